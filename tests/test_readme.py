@@ -26,7 +26,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", README, flags=re.DOTALL | re.MULTILINE)
 COMMANDS = [line for kind, text in BLOCKS if not kind for line in text.splitlines() if line.startswith(".venv/")]
 PROGRAMS = [text for kind, text in BLOCKS if kind == "python"]
-OWN_SYSTEM, IN_FMPY, OWN_BLOCK, OWN_BUILD = PROGRAMS
+IN_PYTHON, STEPS, AGENT, OWN_SYSTEM, IN_FMPY, OWN_BLOCK, OWN_BUILD = PROGRAMS
 
 
 def handover(command: str, folder: Path) -> "subprocess.CompletedProcess[str]":
@@ -186,10 +186,25 @@ def shell(script: str, folder: Path) -> str:
     return done.stdout
 
 
+def test_a_scenario_is_run_from_python(tmp_path: Path):
+    assert len(IN_PYTHON.split("\n\n")[1].splitlines()) + 1 <= 5  # lines of program
+    assert program(IN_PYTHON, tmp_path).startswith("True closed at ")
+    assert (tmp_path / "hand.png").is_file()
+    assert len([*tmp_path.glob("runs/*/signals.parquet")]) == 1
+
+
+def test_a_scenario_is_stepped_from_python(tmp_path: Path):
+    assert program(STEPS, tmp_path).startswith("3.008 [")
+
+
+def test_an_agent_takes_a_units_place(tmp_path: Path):
+    assert "Box(-inf, inf, (3,), float64)" in program(AGENT, tmp_path)
+
+
 def test_a_system_of_ones_own_is_co_simulated(tmp_path: Path):
     printed = program(OWN_SYSTEM, tmp_path)
     assert printed.strip() == "[0.25 0.   0.  ]"
-    assert (tmp_path / "push.parquet").is_file()
+    assert (tmp_path / "push" / "signals.parquet").is_file()
 
 
 def test_a_block_of_ones_own_is_built(tmp_path: Path):

@@ -107,6 +107,7 @@ class FmuPort(Declared):
         discrete: whether it changes at events only.
         nominal: the usual magnitude of its values, in its unit, where the FMU declares it.
         clocks: it can be accessed only while one of these ticks; always where there are none.
+        tunable: whether a parameter may be changed at communication points; else it is fixed from the start on.
     """
 
     fmi_type: str
@@ -116,6 +117,7 @@ class FmuPort(Declared):
     discrete: bool = False
     nominal: float | None = None
     clocks: tuple[str, ...] = ()
+    tunable: bool = False
 
     @property
     def is_continuous(self) -> bool:
@@ -166,6 +168,11 @@ class FmuDescription:
     experiment: DefaultExperiment = DefaultExperiment()
     untouched_fault: str = ""
     clocks: Mapping[str, FmuClock] = field(default_factory=dict[str, FmuClock])
+
+    def _repr_html_(self) -> str:
+        from handover.cosim.fmu.port_table import description_html  # of notebooks alone
+
+        return description_html(self)
 
 
 @contextmanager
@@ -284,6 +291,7 @@ def _port(v: "ModelVariable", units: Mapping[str, Unit], mimes: Mapping[str, str
         width=_WIDTHS.get(v.type),
         description=v.description or "",
         clocks=tuple(c.name for c in v.clocks or ()),
+        tunable=v.causality == "parameter" and v.variability == "tunable",
     )
 
 
@@ -312,7 +320,7 @@ def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
         first = members[0][1]
         shape = members[-1][0]
         is_complete = [m[0] for m in members] == indices_of(shape)
-        is_uniform = len({(p.fmi_type, p.causality, p.unit, p.discrete, p.clocks) for _, p in members}) == 1
+        is_uniform = len({(p.fmi_type, p.causality, p.unit, p.discrete, p.clocks, p.tunable) for _, p in members}) == 1
         if shape and is_complete and is_uniform:
             starts = [p.start for _, p in members]
             start = None if None in starts else " ".join(str(s) for s in starts)

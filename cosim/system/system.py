@@ -77,6 +77,11 @@ class PlacedUnit:
         """Its outputs, by attribute."""
         return PortNames(self.name)
 
+    def _repr_html_(self) -> str:
+        from handover.cosim.fmu.port_table import description_html  # of notebooks alone
+
+        return description_html(self.description)
+
 
 @dataclass(frozen=True)
 class Connection:
@@ -182,6 +187,11 @@ class System:
             faults += [f for port, series in inputs.items() if (f := self._series_fault(PortName(unit, port), series))]
         if faults:
             raise WiringError(faults)
+
+    def _repr_html_(self) -> str:
+        from handover.cosim.system.graph import system_svg  # of notebooks alone
+
+        return system_svg(self)
 
     @property
     def untouched_faults(self) -> dict[Path, str]:

@@ -61,3 +61,26 @@ class TimeSeries:
         if self.values.shape[1] != port.size:
             return f"{self.values.shape[1]} values a time where {port.size} {'is' if port.size == 1 else 'are'} right"
         return None if not self.linear or port.is_continuous else "its values are held: it does not vary continuously"
+
+
+class HeldValue(TimeSeries):
+    """A value that is set from outside while a run goes on, and holds until it is set again.
+
+    An input that follows it takes a new value at the next communication point at which its unit gets inputs; this is
+    how a program sets inputs that no output feeds, see `System.follow`.
+
+    Args:
+        entries: the value until it is set, entries in row-major order, in the unit of the input.
+    """
+
+    def __init__(self, entries: Sequence[Any] | NDArray[Any]) -> None:
+        super().__init__([0.0], np.array([entries]), linear=False)
+
+    @property
+    def entries(self) -> NDArray[Any]:
+        """The value that holds, entries in row-major order."""
+        return self.values[0]
+
+    def set(self, entries: Sequence[Any] | NDArray[Any]) -> None:
+        """Hold another value of as many entries from now on."""
+        self.values[0] = entries

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import click
 
-from handover.scenarios.cli.console import progress_bar
 from handover.scenarios.cli.master_options import isolate_option, isolated
 from handover.scenarios.cli.options import limit_options, limits
 from handover.scenarios.cli.run_summary import exit_with
 from handover.scenarios.execution.errors import one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.execution.progress import progress_bar
 from handover.scenarios.execution.resume import InterruptedRun
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.results.run_folder import RunFolder

@@ -15,10 +15,9 @@ from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.cli.campaign import pool_config, run_campaign_command
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, campaign_options, limit_options, limits, scenario_options
-from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
-from handover.scenarios.execution.fmu_run import is_fmu
+from handover.scenarios.execution.errors import one_line_errors, require_extra
+from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.selection import find_scenario
-from handover.scenarios.execution.ssp_run import is_ssp
 
 _HELP = """Run a SCENARIO many times: all combinations of the given values, each --repeat times.
 
@@ -89,10 +88,7 @@ def sweep(
     if not no_report:
         require_extra("reports", "report and figures", "--no-report")
     pool = pool_config(workers, scheduler)
-    if is_ssp(scenario):
-        raise UsageError(f"{scenario}: a scenario can be swept, an SSP has no parameters of its own")
-    if is_fmu(scenario):
-        raise UsageError(f"{scenario}: a scenario can be swept, an FMU can be run by itself")
+    RunRequest(subject=scenario).check_sweepable()
     experiment = find_scenario(scenario)
     with one_line_errors():
         units, choices = split_units(experiment, replaced)

@@ -15,9 +15,9 @@ from handover.cosim.exceptions import CosimError, UnitFailure
 from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import cached
 from handover.fmus.compile import CompilationError, UnknownPlatform
-from handover.scenarios.cli.console import progress_bar
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.execution.progress import progress_bar
 from handover.scenarios.vsl.training import MIN_POINTS, Errors, NothingToLearn, VslTraining, file_text
 
 _PATH = click.Path(path_type=Path)

@@ -5,7 +5,7 @@ import os
 import signal
 import socket
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -32,9 +32,13 @@ class Interruption:
     Python handles signals between its own instructions. A thread that reads them from a wakeup socket therefore ends
     the process if an abort is not handled in time, as when a unit's native code hangs. The stream of what was recorded
     stays; `complete_record` makes the record of it, as when the run is resumed.
+
+    Args:
+        ending: signals besides SIGINT that end a run, all of them by default.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, ending: Sequence[int] = _ENDING) -> None:
+        self._ending = ending
         self.asked = False
         """Whether the run should end."""
         self._aborted = False
@@ -62,7 +66,7 @@ class Interruption:
         ours, pythons = socket.socketpair()
         pythons.setblocking(False)
         self._before = signal.signal(signal.SIGINT, self._take)
-        ending = {n: signal.getsignal(n) for n in _ENDING}
+        ending = {n: signal.getsignal(n) for n in self._ending}
         ending = {n: handler for n, handler in ending.items() if handler is not signal.SIG_IGN}
         for number in ending:
             signal.signal(number, self._end)
@@ -99,7 +103,7 @@ class Interruption:
         raise KeyboardInterrupt
 
     def _end(self, number: int, frame: FrameType | None) -> None:
-        """Let one of `_ENDING` end a run that has begun as one Ctrl-C does."""
+        """Let another signal end a run that has begun as one Ctrl-C does."""
         if self._running:
             self.asked = True
         else:

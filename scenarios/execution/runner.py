@@ -1,7 +1,9 @@
 """Runs an experiment once: all is checked, then the folder is made, then it runs, then its results are written."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.failures import UnitTerminated
@@ -9,14 +11,15 @@ from handover.cosim.master.checkpoint import Checkpointer, check_states, remove_
 from handover.cosim.master.master import Master
 from handover.cosim.plan.memory import note_crashes
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.stepping.options import Algorithm
+from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import ObserveAfter, Observer, Signals
+from handover.cosim.system.system import System
 from handover.scenarios.execution.exit_status import status_of_run
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.resumption import Resumption, pack
 from handover.scenarios.execution.supervisor import heartbeat_of_run, is_supervised
 from handover.scenarios.execution.unit_values import built_system
-from handover.scenarios.experiment.experiment import Evaluator, Outcome
+from handover.scenarios.experiment.experiment import Evaluator, Experiment, Outcome
 from handover.scenarios.results.pictures import write_picture_files
 from handover.scenarios.results.run_facts import record_of
 from handover.scenarios.results.run_folder import disk_errors_reported
@@ -34,6 +37,21 @@ from handover.scenarios.results.tolerated_faults import GuardedEvaluator, Tolera
 
 Progress = Callable[[float, float], None]
 """Is called with the simulated time and the time at which the run ends at the latest, in seconds."""
+
+
+def experiment_system(
+    experiment: Experiment[Any], parameters: Any, seed: int, fmus: Mapping[str, Path], unit_values: Mapping[str, str],
+    options: MasterOptions,
+) -> System:  # fmt: skip
+    """Return a scenario's system; its units have the scenario's step where the algorithm steps all in parallel.
+
+    Raises:
+        InvalidFmu, InvalidParameter, ScenarioFailed: see `built_system`.
+    """
+    system = built_system(experiment, parameters, seed, fmus, unit_values)
+    if options.algorithm is Algorithm.JACOBI and experiment.parallel_step is not None:
+        system.set_step(experiment.parallel_step)
+    return system
 
 
 def run_task(
@@ -57,10 +75,8 @@ def run_task(
             experiment.evaluator(parameters) if resumption is None else resumption.evaluator(experiment, parameters)
         )
         experiment.stop_time(parameters)
-    system = built_system(experiment, parameters, task.seed, task.fmus, task.unit_values)
+    system = experiment_system(experiment, parameters, task.seed, task.fmus, task.unit_values, task.options)
     failure: UnitFailure | None = None
-    if task.options.algorithm is Algorithm.JACOBI and experiment.parallel_step is not None:
-        system.set_step(experiment.parallel_step)
     if task.every is not None:
         check_states(system)
     master = Master(system, replace(task.options, cpu_times=True), heartbeat_of_run())

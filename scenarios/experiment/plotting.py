@@ -8,11 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-
-mpl.use("Agg")
-
-import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
 from matplotlib.transforms import ScaledTranslation
 
@@ -57,16 +54,16 @@ def figure(
 ) -> Generator[list[Axes], None, None]:
     """Make a figure of `rows` x `columns` axes, row by row; save it as PNG and SVG on leaving the context.
 
-    `path` is without suffix, `size` in inches; `heights` are the rows' relative heights.
+    `path` is without suffix, `size` in inches; `heights` are the rows' relative heights. pyplot, which holds what a
+    user's own program draws, is left alone.
     """
-    with plt.rc_context(STYLE):
-        canvas, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, height_ratios=heights)
-        try:
-            axes_by_row: list[Axes] = axes.reshape(-1).tolist()
-            yield axes_by_row
-            _save(canvas, path)
-        finally:
-            plt.close(canvas)
+    with mpl.rc_context(STYLE):
+        canvas = Canvas(figsize=size)
+        FigureCanvasAgg(canvas)  # draws it to memory
+        axes: Any = canvas.subplots(rows, columns, squeeze=False, height_ratios=heights)
+        axes_by_row: list[Axes] = axes.reshape(-1).tolist()
+        yield axes_by_row
+        _save(canvas, path)
 
 
 def draw_time_figures(figures: Sequence[TimeFigure], time: Floats, folder: Path) -> list[Figure]:

@@ -1,80 +1,20 @@
 """The section of a page that draws a run's units and the signals between them, with a table of connections.
 
-First the layout (`places`, `bent`): few units stand around a circle, in the order in which signals flow; many by a
-force-directed layout. Then what is drawn of it.
+The layout is that of `handover.cosim.system.graph`, which draws the same for notebooks.
 """
 
-import itertools
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
-import networkx as nx
-import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.conversion import LinearTransformation
+from handover.cosim.system.graph import Pair, bent, places
 from handover.scenarios.experiment.time_plot import COLOURS
 from handover.scenarios.reporting.html import plot_html
 from handover.scenarios.reporting.page import Section, template
-
-Pair = tuple[str, str]
-"""Names of the units that signals go from and to."""
-
-_MAX_ON_A_CIRCLE = 8
-_BEND = 0.16
-"""Offset of a bent line's middle from the straight line, as a share of its length."""
-_POINTS = 21
-
-
-def places(units: Sequence[str], pairs: Collection[Pair]) -> dict[str, Floats]:
-    """Return each unit's position, shape (2,), within -1 and 1 each way; the same for the same system.
-
-    Few units lie on a circle, clockwise from the top, in the order that minimizes the total distance of signals around
-    it; two lie side by side. Of many units, connected ones lie near each other.
-    """
-    if len(units) <= 2:
-        return {name: np.array([2.0 * k - (len(units) - 1.0), 0.0]) for k, name in enumerate(units)}
-    if len(units) <= _MAX_ON_A_CIRCLE:
-        return _around(_flow(units, pairs))
-    return _near_each_other(units, pairs)
-
-
-def bent(a: Floats, b: Floats) -> Floats:
-    """Return points of a line from a to b bent to its left, shape (n, 2): both directions are seen apart."""
-    along = b - a
-    middle = (a + b) / 2.0 + 2.0 * _BEND * np.array([-along[1], along[0]])
-    s = np.linspace(0.0, 1.0, _POINTS)[:, np.newaxis]
-    return (1.0 - s) ** 2 * a + 2.0 * s * (1.0 - s) * middle + s**2 * b
-
-
-def _flow(units: Sequence[str], pairs: Collection[Pair]) -> list[str]:
-    """Return the order with the least sum of clockwise steps from source to target; the first unit stays first."""
-    first, *others = units
-
-    def steps(order: tuple[str, ...]) -> int:
-        at = {name: k for k, name in enumerate((first, *order))}
-        return sum((at[b] - at[a]) % len(units) for a, b in pairs)
-
-    return [first, *min(itertools.permutations(others), key=steps)]
-
-
-def _around(order: Sequence[str]) -> dict[str, Floats]:
-    angles = 2.0 * np.pi * np.arange(len(order)) / len(order)
-    return {name: np.array([np.sin(angle), np.cos(angle)]) for name, angle in zip(order, angles, strict=True)}
-
-
-def _near_each_other(units: Sequence[str], pairs: Collection[Pair]) -> dict[str, Floats]:
-    """Return positions by Kamada and Kawai's layout, started from a circle, that fill the square."""
-    graph = cast(Any, nx).Graph()
-    graph.add_nodes_from(units)
-    graph.add_edges_from(pairs)
-    layout = cast(dict[str, Floats], nx.kamada_kawai_layout(graph, pos=cast(Any, nx).circular_layout(graph)))
-    points: Floats = np.array([layout[name] for name in units])
-    low, high = points.min(axis=0), points.max(axis=0)
-    return {name: 2.0 * (layout[name] - low) / np.maximum(high - low, 1e-9) - 1.0 for name in units}
-
 
 _MAX_UNITS = 40
 _MAX_ROWS = 1000

@@ -68,24 +68,32 @@ def write_page(path: Path, title: str, header: Markup, sections: Sequence[Sectio
         path: the HTML file.
         title: the heading.
         header: what stands under the heading.
-        sections: in order of appearance; Plotly is included if one of them has plots or scripts.
+        sections: see `page_html`.
 
     Raises:
         RecordNotWritten: it cannot be written.
     """
+    write_whole(path, page_html(title, header, sections))
+
+
+def page_html(title: str, header: Markup, sections: Sequence[Section]) -> str:
+    """Return a page.
+
+    Args:
+        title: the heading.
+        header: what stands under the heading.
+        sections: in order of appearance; Plotly is included if one of them has plots or scripts.
+    """
     names = [_SCRIPT, *dict.fromkeys(name for s in sections for name in s.scripts)]
     has_plots = any(s.scripts or 'class="plot"' in s.html for s in sections)
     scripts = [*([_plotly()] if has_plots else []), *map(asset, names)]
-    write_whole(
-        path,
-        template("page.html").render(
-            title=title,
-            header=Markup(non_breaking(header)),
-            sections=[replace(s, html=Markup(non_breaking(s.html))) for s in sections],
-            style=Markup(asset("page.css")),
-            scripts=[Markup(s) for s in scripts],
-            policy=_policy(scripts),
-        ),
+    return template("page.html").render(
+        title=title,
+        header=Markup(non_breaking(header)),
+        sections=[replace(s, html=Markup(non_breaking(s.html))) for s in sections],
+        style=Markup(asset("page.css")),
+        scripts=[Markup(s) for s in scripts],
+        policy=_policy(scripts),
     )
 
 

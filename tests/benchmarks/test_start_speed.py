@@ -16,6 +16,7 @@ resource = pytest.importorskip("resource", reason="the CPU time of children is t
 ROUNDS = 5
 CALLS: dict[str, tuple[str, ...]] = {
     "python -c pass": (sys.executable, "-c", "pass"),
+    "python -c 'import handover'": (sys.executable, "-c", "import handover"),
     "handover --version": ("handover", "--version"),
     "handover --help": ("handover", "--help"),
     "handover list": ("handover", "list"),

@@ -6,7 +6,9 @@ from pathlib import Path
 
 PARAMETER, INPUT, OUTPUT = range(3)
 REAL, INTEGER, BOOLEAN, BINARY, CLOCK = range(5)
-NO_STATES, FIXED_STEP, INTERPOLATES, DERIVATIVES, EVENTS, EARLY_RETURN = (1 << i for i in range(6))
+NO_STATES, FIXED_STEP, INTERPOLATES, DERIVATIVES, EVENTS, EARLY_RETURN, _, TUNABLE_PARAMETERS = (
+    1 << i for i in range(8)
+)
 
 
 class _Variable(ctypes.Structure):

@@ -17,6 +17,7 @@ from native_declaration import (
     OUTPUT,
     PARAMETER,
     REAL,
+    TUNABLE_PARAMETERS,
     Declaration,
     Variable,
 )
@@ -59,7 +60,7 @@ def description2(d: Declaration, step: float, dependencies: bool, flags: Mapping
     ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize=repr(step))
     rows = ElementTree.SubElement(root, "ModelVariables")
     for v in d.variables:
-        ends = {"name": v.name, "valueReference": str(v.reference), **_kind(v)}
+        ends = {"name": v.name, "valueReference": str(v.reference), **_kind(d, v)}
         row = ElementTree.SubElement(rows, "ScalarVariable", ends)
         ElementTree.SubElement(row, FMI2_TYPES[v.type], {**_start(v), **({"unit": v.unit} if v.unit else {})})
     structure = ElementTree.SubElement(root, "ModelStructure")
@@ -109,7 +110,7 @@ def description3(d: Declaration, step: float, dependencies: bool, flags: Mapping
 
 def _add_variable3(rows: ElementTree.Element, d: Declaration, v: Variable) -> None:
     row = ElementTree.SubElement(
-        rows, FMI3_TYPES[v.type], {"name": v.name, "valueReference": str(v.reference), **_kind(v)}
+        rows, FMI3_TYPES[v.type], {"name": v.name, "valueReference": str(v.reference), **_kind(d, v)}
     )
     if v.unit:
         row.set("unit", v.unit)
@@ -133,9 +134,11 @@ def _add_variable3(rows: ElementTree.Element, d: Declaration, v: Variable) -> No
         ElementTree.SubElement(row, "Dimension", start=str(v.length))
 
 
-def _kind(v: Variable) -> dict[str, str]:
+def _kind(d: Declaration, v: Variable) -> dict[str, str]:
     causality = ("parameter", "input", "output")[v.causality]
-    variability = "fixed" if v.causality == PARAMETER else "continuous" if v.is_continuous else "discrete"
+    variability = "continuous" if v.is_continuous else "discrete"
+    if v.causality == PARAMETER:
+        variability = "tunable" if d.abilities & TUNABLE_PARAMETERS else "fixed"
     return {"causality": causality, "variability": variability}
 
 

@@ -48,6 +48,11 @@ static const Model gain = {"gain", one, COUNT(one), 0.1, DERIVATIVES, sizeof(Gai
 static const Model sum = {"sum", two, COUNT(two), 0.1, DERIVATIVES, sizeof(Gain), .outputs = outputs};
 UNIT(gain)
 UNIT(sum)
+
+static const Model tuned_gain = {
+    "tuned_gain", one, COUNT(one), 0.1, TUNABLE_PARAMETERS, sizeof(Gain), .outputs = outputs,
+};
+UNIT(tuned_gain)
 static const Model two_gains = {
     "two_gains", apart, COUNT(apart), 0.1, DERIVATIVES, sizeof(TwoGains), .outputs = outputs_apart,
 };

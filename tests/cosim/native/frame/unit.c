@@ -96,7 +96,8 @@ const Variable *variable(Unit *unit, uint32_t reference, enum type type, bool to
         say(unit, ERROR, "%s: there is no such variable with value reference %u", call, (unsigned)reference);
         return NULL;
     }
-    if (to_set && v->causality == PARAMETER && !allowed(unit, INSTANTIATED | INITIALIZATION, call))
+    int tuned = unit->model->abilities & TUNABLE_PARAMETERS ? (unit->event_mode ? EVENT : STEP) : 0;
+    if (to_set && v->causality == PARAMETER && !allowed(unit, INSTANTIATED | INITIALIZATION | tuned, call))
         return NULL;
     if (!to_set && v->causality == PARAMETER && unit->model->abilities & SECRET_PARAMETERS) {
         say(unit, ERROR, "%s: %s cannot be read", call, v->name);

@@ -49,7 +49,7 @@ typedef struct {
 
 /* what a unit cannot do, or can beyond the ordinary */
 enum ability { NO_STATES = 1, FIXED_STEP = 2, INTERPOLATES = 4, DERIVATIVES = 8, EVENTS = 16, EARLY_RETURN = 32,
-               SECRET_PARAMETERS = 64 };
+               SECRET_PARAMETERS = 64, TUNABLE_PARAMETERS = 128 };
 
 /* The first fields, down to `abilities`, are read by native_units.py. */
 typedef struct {

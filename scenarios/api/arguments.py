@@ -1,0 +1,149 @@
+"""What a Python call gives, as the texts, exact times and options that the command gives; and errors for Python."""
+
+import enum
+import math
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from handover.cosim.exceptions import CosimError, UnitFailure, nearest
+from handover.cosim.fmu.default_experiment import exact_seconds
+from handover.cosim.record.formats import RECORD_FORMATS
+from handover.cosim.stepping.options import Algorithm, MasterOptions
+from handover.scenarios.execution.errors import (
+    ClusterLost,
+    RunNotWritten,
+    UnitLost,
+    UsageError,
+    WorkersLost,
+    one_line_errors,
+)
+
+CALL_LIMIT = 60.0
+"""Seconds of wall time that a unit may take for one call where the options do not say, as in the command."""
+
+Seconds = float | Fraction
+"""A time in seconds; a number with a point is taken as it is written, 0.1 as one tenth."""
+
+
+class InvalidInput(ValueError):
+    """What is asked for cannot be run: the message has all faults, with what would be right.
+
+    Nothing has started, and nothing is written.
+    """
+
+
+@contextmanager
+def errors_for_python() -> Generator[None, None, None]:
+    """Raise what is wrong with a call as InvalidInput, and other failures as they are.
+
+    Raises:
+        InvalidInput: see there. UnitFailure: a unit failed before anything ran. RecordNotWritten: the disk is full.
+            ClusterLost: a campaign's workers were lost.
+    """
+    try:
+        with one_line_errors():
+            yield
+    except UsageError as e:
+        raise InvalidInput(e.message) from e.__cause__
+    except (UnitLost, RunNotWritten, WorkersLost) as e:
+        cause = e.__cause__
+        raise cause if isinstance(cause, (CosimError, UnitFailure, ClusterLost)) else e from None
+
+
+def text_of_value(value: Any) -> str:
+    """Return a parameter's value as the command takes it: `reflex`, `true`, `0.1,0.2`."""
+    if isinstance(value, enum.Enum):
+        return value.name.lower()
+    plain: Any = value.tolist() if hasattr(value, "tolist") else value  # of numpy's arrays and numbers
+    if isinstance(plain, bool):
+        return str(plain).lower()
+    if isinstance(plain, (list, tuple)):
+        return ",".join(text_of_value(entry) for entry in cast(Sequence[Any], plain))
+    return repr(float(plain)) if isinstance(plain, (float, Fraction)) else str(plain)
+
+
+def texts_of(values: Mapping[str, Any]) -> list[str]:
+    """Return parameters as texts `NAME=VALUE`."""
+    return [f"{name}={text_of_value(value)}" for name, value in values.items()]
+
+
+def merged(parameters: Mapping[str, Any] | None, named: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parameters of a call: those by keyword, and those of its mapping.
+
+    Raises:
+        InvalidInput: some are given both ways.
+    """
+    given = parameters or {}
+    if both := [name for name in named if name in given]:
+        raise InvalidInput(f"{', '.join(both)}: given by keyword and in parameters={{...}}; one of both is right")
+    return {**given, **named}
+
+
+def unit_texts(units: Mapping[str, Path | str] | None) -> list[str]:
+    """Return replacements of units as texts `NAME=FILE`."""
+    return [f"{name}={file}" for name, file in (units or {}).items()]
+
+
+def exact(name: str, seconds: Seconds | None) -> Fraction | None:
+    """Return a time in seconds exactly; None for None.
+
+    Raises:
+        InvalidInput: it is not a finite number above 0.
+    """
+    if seconds is None:
+        return None
+    try:
+        fits = 0 < seconds < math.inf
+    except TypeError:
+        fits = False
+    if not fits:
+        raise InvalidInput(f"{name} = {seconds!r}: a finite number of seconds above 0 is right")
+    return seconds if isinstance(seconds, Fraction) else exact_seconds(float(seconds))
+
+
+def seed_of(seed: Any) -> int:
+    """Return a seed.
+
+    Raises:
+        InvalidInput: it is not a whole number from 0 on.
+    """
+    if isinstance(seed, (bool, np.bool_)) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise InvalidInput(f"seed = {seed!r}: a whole number from 0 on is right")
+    return int(cast(Any, seed))
+
+
+def formats_of(formats: Sequence[str]) -> tuple[str, ...]:
+    """Return formats of a record.
+
+    Raises:
+        InvalidInput: one is unknown.
+    """
+    given = (formats,) if isinstance(formats, str) else tuple(formats)
+    if wrong := [f for f in given if f not in RECORD_FORMATS]:
+        raise InvalidInput(f"formats: {'; '.join(f'{f!r}: {nearest(str(f), RECORD_FORMATS)}' for f in wrong)}")
+    return given
+
+
+def master_options(
+    options: MasterOptions | None, algorithm: str | Algorithm | None, isolate: str | Sequence[str] = ()
+) -> MasterOptions:
+    """Return the master's options: the given ones or the command's defaults, with algorithm and isolation set.
+
+    Raises:
+        InvalidInput: there is no such algorithm. InvalidOptions: see `MasterOptions`.
+    """
+    chosen = MasterOptions(call_limit=CALL_LIMIT) if options is None else options
+    if isinstance(algorithm, str):
+        known = {a.value: a for a in Algorithm}
+        if algorithm not in known:
+            raise InvalidInput(f"no algorithm {algorithm!r}; {nearest(algorithm, known)}")
+        algorithm = known[algorithm]
+    names = (isolate,) if isinstance(isolate, str) else tuple(isolate)
+    chosen = chosen if algorithm is None else replace(chosen, algorithm=algorithm)
+    return replace(chosen, isolated=tuple(dict.fromkeys(names))) if names else chosen

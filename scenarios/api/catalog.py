@@ -1,0 +1,79 @@
+"""What there is: units and systems by name, FMUs by file, and the results of former runs by folder."""
+
+import contextlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from handover.cosim.exceptions import nearest
+from handover.cosim.fmu.description import FmuDescription, describe_fmu
+from handover.cosim.system.system import System
+from handover.fmus.build import cached
+from handover.fmus.catalog import UNITS
+from handover.scenarios.api.arguments import InvalidInput, errors_for_python, merged, seed_of, texts_of, unit_texts
+from handover.scenarios.api.campaign_result import Campaign
+from handover.scenarios.api.run_result import Run
+from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.results.run_folder import RunFolder
+
+
+def unit(name: str, fmi: Literal[2, 3] = 3) -> Path:
+    """Return the FMU of a catalogued unit, such as "TendonArm", for `System.add`; it is built where it is not yet.
+
+    Raises:
+        InvalidInput: there is no such unit, or it cannot be built in this standard.
+    """
+    if name not in UNITS:
+        raise InvalidInput(f"no unit {name!r}: {nearest(name, UNITS)}")
+    with errors_for_python():
+        return cached(name, fmi)
+
+
+def describe(fmu: str | Path) -> FmuDescription:
+    """Return what an FMU declares, which a notebook shows as a table: of a file, or of a catalogued unit.
+
+    Raises:
+        InvalidInput: it is no valid FMU, or no unit of that name.
+    """
+    with errors_for_python():
+        return describe_fmu(unit(str(fmu)) if str(fmu) in UNITS else Path(fmu))
+
+
+def system(
+    scenario: str | type[Experiment[Any]],
+    /,
+    *,
+    seed: int = 0,
+    units: Mapping[str, Path | str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    **named: Any,
+) -> System:
+    """Return the system that a scenario wires with such parameters, which a notebook shows as a graph.
+
+    It may be changed and run: `handover.run(system, stop=10)`. For the arguments see `handover.run`.
+
+    Raises:
+        InvalidInput: there is no such scenario, or parameters or units do not fit it.
+    """
+    texts = texts_of(merged(parameters, named))
+    with errors_for_python(), contextlib.ExitStack() as opened:
+        request = RunRequest(subject=scenario, parameters=texts, seed=seed_of(seed), units=unit_texts(units))
+        request.check_options()
+        asked = request.open(opened)
+        return request.system(asked, request.seed, request.fmus(asked.experiment))
+
+
+def load(folder: Path | str) -> Run | Campaign:
+    """Return the run or the campaign that a folder is of, also of one that was interrupted.
+
+    Raises:
+        InvalidInput: it is the folder of neither.
+    """
+    path = Path(folder)
+    if CampaignFolder(path).is_there:
+        return Campaign(path)
+    if not RunFolder.of_run(path).is_there:
+        raise InvalidInput(f"{path} is the folder of neither a run (no run.json) nor a campaign (no campaign.json)")
+    return Run(path)

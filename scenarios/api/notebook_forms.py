@@ -1,0 +1,86 @@
+"""What a notebook shows of a run and of a campaign: verdict, headline, and pictures of the plots over time."""
+
+import base64
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+
+from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.parameters import InvalidParameter, parameters_of
+from handover.scenarios.experiment.plotting import draw_time_figures
+from handover.scenarios.experiment.time_plot import TimeFigure
+from handover.scenarios.reporting.run_figures import figures_of_outputs
+from handover.scenarios.results.run_facts import RunFacts
+from handover.scenarios.results.tolerated_faults import ToleratedFaults
+
+_MAX_FIGURES = 2
+_GOOD, _BAD = "#2e7d32", "#c62828"
+
+
+def run_html(facts: RunFacts, metrics: Mapping[str, float], record: Record | None) -> str:
+    """Return a run's verdict with its reason, the metrics of its headline, and its first plots over time."""
+    summary = facts.summary
+    faults = ToleratedFaults(InvalidParameter)
+    pictures: list[Markup] = []
+    if record is not None and len(record.time) > 1:
+        with faults.tolerated("the plots over time could not be drawn"):
+            pictures = _pictures(facts, record)
+    rows = [(metrics_description(facts, name), str(metrics[name])) for name in facts.headline if name in metrics]
+    return str(
+        Markup("<div>{}{}{}{}<p><small>results: {}</small></p></div>").format(
+            verdict_html(facts.scenario, good=bool(summary["success"]), reason=str(summary["reason"])),
+            Markup().join(Markup("<p>{}</p>").format(line) for line in faults.lines),
+            table_html((), rows),
+            Markup().join(pictures),
+            str(facts.folder.shown),
+        )
+    )
+
+
+def metrics_description(facts: RunFacts, name: str) -> str:
+    """Return what a metric is; its name where the run does not say."""
+    return str(facts.summary["metrics"][name].get("description") or name)
+
+
+def verdict_html(name: str, *, good: bool, reason: str) -> Markup:
+    """Return a verdict in its colour, with its reason."""
+    html = Markup("<p><b>{}: <span style='color: {}'>{}</span></b>, {}</p>")
+    return html.format(name, _GOOD if good else _BAD, "succeeded" if good else "failed", reason)
+
+
+def table_html(header: Sequence[str], rows: Iterable[Sequence[str]]) -> Markup:
+    """Return a plain table, as notebooks style it; "" without rows."""
+    body = [Markup("<tr>{}</tr>").format(_cells("td", row)) for row in rows]
+    if not body:
+        return Markup()
+    head = Markup("<thead><tr>{}</tr></thead>").format(_cells("th", header)) if header else Markup()
+    return Markup("<table>{}<tbody>{}</tbody></table>").format(head, Markup().join(body))
+
+
+def _cells(kind: str, texts: Sequence[str]) -> Markup:
+    tag = Markup(kind)
+    cell = Markup("<{} style='text-align: left'>{}</{}>")
+    return Markup().join(cell.format(tag, text, tag) for text in texts)
+
+
+def _pictures(facts: RunFacts, record: Record) -> list[Markup]:
+    figures = _time_figures(facts.experiment, facts, record)[:_MAX_FIGURES]
+    with tempfile.TemporaryDirectory(prefix="handover-") as folder:
+        drawn = draw_time_figures(figures, record.time, Path(folder))
+        files = [(Path(folder) / f"{figure.name}.png", figure.caption) for figure in drawn]
+        return [_picture(file.read_bytes(), caption) for file, caption in files]
+
+
+def _time_figures(experiment: Experiment[Any] | None, facts: RunFacts, record: Record) -> Sequence[TimeFigure]:
+    if experiment is None:
+        return figures_of_outputs(facts.run.get("units", {}), record)
+    return experiment.time_figures(parameters_of(type(experiment), facts.run["parameters"]), record)
+
+
+def _picture(png: bytes, caption: str) -> Markup:
+    html = Markup("<img alt='{0}' title='{0}' style='max-width: 760px; width: 100%' src='data:image/png;base64,{1}'>")
+    return html.format(caption, base64.b64encode(png).decode())

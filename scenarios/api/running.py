@@ -1,0 +1,121 @@
+"""One run from Python, on the same path as the command `handover run`."""
+
+import contextlib
+import threading
+from collections.abc import Generator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from handover.cosim.stepping.options import Algorithm, MasterOptions
+from handover.cosim.system.system import System
+from handover.scenarios.api.arguments import (
+    Seconds,
+    errors_for_python,
+    exact,
+    formats_of,
+    master_options,
+    merged,
+    seed_of,
+    texts_of,
+    unit_texts,
+)
+from handover.scenarios.api.progress import bar
+from handover.scenarios.api.run_result import Run
+from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.execution.runner import run_task
+from handover.scenarios.experiment.experiment import Experiment
+
+
+def run(
+    subject: str | Path | System | type[Experiment[Any]],
+    /,
+    *,
+    seed: int = 0,
+    units: Mapping[str, Path | str] | None = None,
+    out: Path | str | None = None,
+    stop: Seconds | None = None,
+    step: Seconds | None = None,
+    inputs: Path | str | None = None,
+    formats: Sequence[str] = (),
+    checkpoint: Seconds | None = None,
+    algorithm: str | Algorithm | None = None,
+    isolate: str | Sequence[str] = (),
+    options: MasterOptions | None = None,
+    report: bool = False,
+    progress: bool = True,
+    parameters: Mapping[str, Any] | None = None,
+    **named: Any,
+) -> Run:
+    """Run a scenario, a system, an SSP or an FMU once, and return the result: `run("ir_grasp", strategy="blind")`.
+
+    All is checked before anything starts. The results are in a folder that stays: `out`, or one of its own in `runs/`
+    of the working directory, as of the command; `handover.load` reads it again. A unit that fails ends the run, which
+    is then a result without success. The units live in this process; one that crashes ends it, unless `isolate` gives
+    it a process of its own.
+
+    Args:
+        subject: name of a scenario, path of an `.ssp` or `.fmu` file, a `System`, or a scenario's class.
+        seed: of all random numbers of a scenario.
+        units: what takes the place of a scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`.
+        out: the folder for the results, new or empty.
+        stop: of a system, SSP or FMU: when it ends, s; files may propose it, a system does not.
+        step: of an SSP or FMU: the communication step of all units, s.
+        inputs: of an FMU: a CSV file of its inputs over time.
+        formats: of the record besides Parquet: `csv`, `mat`.
+        checkpoint: simulated seconds between checkpoints, from which `handover resume` continues.
+        algorithm: `jacobi`, `gauss-seidel`, `fixed-point` or `newton`.
+        isolate: units in processes of their own: names, `foreign` or `all`.
+        options: all options of the master; by default a call of a unit may take 60 s.
+        report: whether figures and the report page are made at once; `Run.report` makes them later.
+        progress: whether a bar is shown, where there is a notebook or a terminal.
+        parameters: parameters whose names are also those of options, or no names in Python: `{"servo.gain": 0.5}` is of
+            a unit.
+        **named: the scenario's or the FMU's other parameters, in SI units or the FMU's; enumerations by name.
+
+    Raises:
+        InvalidInput: something of it cannot be run, with all faults and what would be right; nothing is written.
+        UnitFailure: a unit failed before the run began; nothing is written.
+        KeyboardInterrupt: Ctrl-C, after the step under way; what was recorded until then is in the folder.
+        RecordNotWritten: the disk is full.
+    """
+    with errors_for_python(), contextlib.ExitStack() as opened:
+        request = RunRequest(
+            subject=str(subject) if isinstance(subject, Path) else subject,
+            parameters=texts_of(merged(parameters, named)),
+            seed=seed_of(seed),
+            units=unit_texts(units),
+            out=None if out is None else Path(out),
+            stop=exact("stop", stop),
+            step=exact("step", step),
+            inputs=None if inputs is None else Path(inputs),
+            formats=formats_of(formats),
+            every=exact("checkpoint", checkpoint),
+            options=master_options(options, algorithm, isolate),
+            presented=report,
+        )
+        with interruption_in_python() as interruption:
+            task = request.task(opened)
+            with bar(progress) as move:
+                run_task(task, lambda t, end: move(t, end, f"{t:.1f} of at most {end:.0f} s simulated"), interruption)
+        if interruption.asked:
+            raise KeyboardInterrupt(f"the run was interrupted; what was recorded is in {task.folder.shown}")
+    return Run(task.folder.shown, task.experiment if isinstance(subject, type) else None)
+
+
+@contextlib.contextmanager
+def interruption_in_python() -> Generator[Interruption, None, None]:
+    """Give what lets Ctrl-C end a run after its step, where this thread handles signals; others stay as they are.
+
+    Raises:
+        KeyboardInterrupt: the run was aborted.
+    """
+    interruption = Interruption(ending=())
+    if threading.current_thread() is not threading.main_thread():
+        yield interruption
+        return
+    try:
+        with interruption:
+            yield interruption
+    except SystemExit:
+        raise KeyboardInterrupt("aborted") from None

@@ -1,0 +1,344 @@
+"""A system that a program steps itself: it sets free inputs, steps, reads signals, saves and restores the state."""
+
+import contextlib
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handover.cosim.blocks.block import InvalidState
+from handover.cosim.blocks.start_values import fault_of
+from handover.cosim.exceptions import nearest
+from handover.cosim.fmu.description import FmuPort
+from handover.cosim.master.checkpoint import Checkpoint, check_states, take_checkpoint
+from handover.cosim.master.master import Master
+from handover.cosim.stepping.options import Algorithm, MasterOptions
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
+from handover.scenarios.api.arguments import (
+    InvalidInput,
+    Seconds,
+    errors_for_python,
+    exact,
+    master_options,
+    merged,
+    seed_of,
+    texts_of,
+    unit_texts,
+)
+from handover.scenarios.api.open_inputs import OpenSystem
+from handover.scenarios.execution.fmu_run import is_fmu
+from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.execution.ssp_run import is_ssp
+from handover.scenarios.experiment.experiment import Evaluator, Experiment, Outcome
+from handover.scenarios.results.tolerated_faults import GuardedEvaluator
+
+_ANY_STOP = Fraction(10**6)
+"""Of what has no end of its own, s; a program steps as far as it likes."""
+
+
+@dataclass(frozen=True)
+class SavedState:
+    """The whole state of a session: units, master, evaluation, and what was set from outside.
+
+    Attributes:
+        checkpoint: states of units and master.
+        evaluator: what the evaluation has seen.
+        free: values of the free inputs, and of the outputs of the unit that is left out.
+        asked: the time until which it was stepped, s.
+    """
+
+    checkpoint: Checkpoint
+    evaluator: bytes
+    free: Mapping[str, NDArray[Any]]
+    asked: Fraction
+
+
+class Session:
+    """A running system. `handover.open` makes it; use it as a context manager, or call `close` at the end.
+
+    `s["unit.port"]` reads an output, an input or a parameter; `s["unit.port"] = value` sets an input that no output
+    feeds, or a tunable parameter, in its own unit. What is set counts from the present communication point on, for the
+    steps that begin there; units that sample at that instant have acted before.
+    """
+
+    def __init__(
+        self, experiment: Experiment[Any], parameters: Any, system: System, options: MasterOptions,
+        left_out: str | None = None,
+    ) -> None:  # fmt: skip
+        """Load and initialise a checked system; nothing is stepped yet.
+
+        Raises:
+            InvalidInput: see `OpenSystem`. CosimError: see `Master`.
+        """
+        self._open = OpenSystem(system, left_out)
+        self.stop = float(experiment.stop_time(parameters))
+        """When a run of the scenario ends at the latest, s."""
+        self._evaluator: GuardedEvaluator[Evaluator] = GuardedEvaluator(experiment.evaluator(parameters))
+        self._asked, self._seen = Fraction(0), -1.0
+        self._master = Master(self._open.system, options)
+        self._master.__enter__()
+        self._signals = self._all_signals()
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._master.time
+
+    @property
+    def over(self) -> bool:
+        """Whether the scenario's task has ended, well or not, or a unit has ended the simulation."""
+        return self._evaluator.over or self._master.ended is not None
+
+    @property
+    def outcome(self) -> Outcome:
+        """The verdict on what has happened until now, with its reason and metrics."""
+        evaluator = copy.deepcopy(self._evaluator)
+        evaluator.finish(self._signals)
+        return evaluator.outcome()
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs that can be set."""
+        return tuple(self._open.free)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of all outputs."""
+        return tuple(f"{u.name}.{port}" for u in self._open.system.units.values() for port in u.description.outputs)
+
+    @property
+    def open_system(self) -> OpenSystem:
+        """The system, with what is set from outside."""
+        return self._open
+
+    def step(self, duration: Seconds) -> float:
+        """Step on by a duration, s, to the first communication point at or after it; return the time reached.
+
+        Durations add up exactly: ten steps of 0.1 s end at 1 s. It ends before where the task is over.
+
+        Raises:
+            InvalidInput: the duration is none. UnitFailure: a unit failed; the session can only be closed then.
+            RuntimeError: a unit failed before, or has ended the simulation.
+        """
+        return self._run(self._asked + (exact("duration", duration) or Fraction(0)))
+
+    def start(self) -> float:
+        """Let units that sample at 0 s act, and the evaluation begin, as the first step would; return the time.
+
+        Raises:
+            UnitFailure: a unit failed.
+        """
+        return self._run(self._asked)
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a copy of a signal's value: a number, an array, or a text; enumerations as numbers, see `text`.
+
+        Raises:
+            KeyError: there is no such port; the nearest names are given. UnitFailure: a unit does not give it.
+        """
+        unit, port = self._open.split(name)
+        if self._open.place is not None and unit == self._open.place.unit.name:
+            return _plain(self._signals[name])
+        d = self._open.system.units[unit].description
+        if port in d.outputs:
+            return _plain(self._signals[name])
+        if name in self._open.free:
+            return _plain(np.array(self._open.free[name].entries).reshape(d.inputs[port].shape))
+        instance = self._master.ensemble.instances[unit]
+        if port in d.inputs and port in instance.u:
+            return _plain(np.array(instance.u[port][0]).reshape(d.inputs[port].shape))
+        if port in d.parameters:
+            return _plain(self._parameter(unit, d.parameters[port]))
+        raise KeyError(f"no port {name!r}; {nearest(port, [*d.outputs, *d.inputs, *d.parameters])}")
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        """Set a free input, a tunable parameter, or an output of the unit that is left out.
+
+        Raises:
+            KeyError: there is no such port; the nearest names are given.
+            InvalidInput: it cannot be set, or not to this value. UnitFailure: the unit does not take it.
+        """
+        unit, port = self._open.split(name)
+        if self._open.place is not None and unit == self._open.place.unit.name:
+            if port not in self._open.place.ports:
+                raise KeyError(f"no output {name!r} that can be set; {nearest(port, self._open.place.ports)}")
+            self._open.set_output(port, value)
+        elif name in self._open.free:
+            self._open.set(name, value)
+        else:
+            self._tune(unit, port, value)
+
+    def text(self, name: str) -> str:
+        """Return the name of an enumeration output's value, or the text of a string output.
+
+        Raises:
+            KeyError: there is no such output.
+        """
+        return self._signals.text(name)
+
+    def save(self) -> SavedState:
+        """Return the whole state, to which `restore` goes back, also in another session of the same system.
+
+        Raises:
+            InvalidInput: a unit cannot save its state. UnitFailure: one fails to do so.
+        """
+        with errors_for_python():
+            check_states(self._open.system)
+        free: dict[str, NDArray[Any]] = {name: held.entries.copy() for name, held in self._open.free.items()}
+        if (place := self._open.place) is not None:
+            free |= {f"{place.unit.name}.{name}": views[0].copy() for name, views in place.outputs.items()}
+        checkpoint = self._master.call_units(lambda: take_checkpoint(self._master, 0))
+        return SavedState(checkpoint, self._evaluator.evaluator.get_state(), free, self._asked)
+
+    def restore(self, state: SavedState) -> None:
+        """Go back to a state; the steps that follow are those that followed it, bit for bit.
+
+        Raises:
+            InvalidInput: it is the state of another system. UnitFailure: a unit does not take it.
+            RuntimeError: a unit has ended the simulation.
+        """
+        if self._master.ended is not None:
+            raise RuntimeError(f"{self._master.ended.summary}: open another session")
+        with errors_for_python():
+            self._master.call_units(lambda: state.checkpoint.restore(self._master))
+        self._evaluator = GuardedEvaluator(self._evaluator.evaluator)
+        try:
+            self._evaluator.evaluator.set_state(state.evaluator)
+        except InvalidState as e:
+            raise InvalidInput(f"the state is of another scenario: {e}") from e
+        for name, held in self._open.free.items():
+            held.set(state.free[name])
+        if self._open.place is not None:
+            for name, views in self._open.place.outputs.items():
+                views[0][:] = state.free[f"{self._open.place.unit.name}.{name}"]
+        self._asked, self._seen = state.asked, state.checkpoint.time if state.asked else -1.0
+
+    def close(self) -> None:
+        """Terminate and free the units.
+
+        Raises:
+            UnitFailure: one did not end properly; all are freed.
+        """
+        self._master.__exit__(None, None, None)
+
+    def __enter__(self) -> "Session":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._master.__exit__(kind, error, trace)
+
+    def __repr__(self) -> str:
+        """Return the time and the units."""
+        return f"<session at {self.time:g} s of {', '.join(self._open.system.units)}>"
+
+    def _run(self, until: Fraction) -> float:
+        was_over = self._evaluator.over
+        self._master.run(until, [self._observe], until=lambda: self._evaluator.over and not was_over)
+        if self._master.ended is not None:
+            self._evaluator.note_end(self._master.ended.unit, self._master.ended.reached)
+        self._asked = max(self._asked, Fraction(self.time)) if self._evaluator.over and not was_over else until
+        return self.time
+
+    def _observe(self, t: float, _signals: Signals) -> None:
+        """Let the evaluation see a communication point once."""
+        if t > self._seen:
+            self._seen = t
+            self._evaluator(t, self._signals)
+
+    def _all_signals(self) -> Signals:
+        """Return the outputs of all units, and those of the unit that is left out as they were set."""
+        ensemble, place = self._master.ensemble, self._open.place
+        views = {name: i.y for name, i in ensemble.instances.items()}
+        ports = {name: u.description.outputs for name, u in self._open.system.units.items()}
+        if place is not None:
+            views, ports = {**views, place.unit.name: dict(place.outputs)}, {**ports, place.unit.name: place.ports}
+        return Signals(views, ports, ensemble)
+
+    def _parameter(self, unit: str, port: FmuPort) -> Any:
+        instance = self._master.ensemble.instances[unit]
+        buffers = self._master.call_units(lambda: instance.read([port]))
+        if not buffers:
+            raise KeyError(f"{unit}.{port.name} is a parameter that its unit does not give")
+        return Signals({unit: buffers[0].views}, {unit: {port.name: port}}, buffers)[f"{unit}.{port.name}"]
+
+    def _tune(self, unit: str, port: str, value: Any) -> None:
+        placed, name = self._open.system.units[unit], f"{unit}.{port}"
+        d = placed.description
+        if port in d.inputs:
+            source = self._open.system.sources_of(unit).get(port)
+            raise InvalidInput(f"{name} is fed by {source}" if source else f"{name} cannot be set: see `inputs`")
+        if port in d.outputs:
+            raise InvalidInput(f"{name} is an output: inputs that nothing feeds and tunable parameters can be set")
+        if port not in d.parameters:
+            raise KeyError(f"no port {name!r}; {nearest(port, [*d.inputs, *d.parameters])}")
+        if not d.parameters[port].tunable:
+            raise InvalidInput(f"{name} is a fixed parameter: it is set before the start, by what builds the system")
+        if placed.uses_events:
+            raise InvalidInput(f"{name} can be changed in the event mode of its unit only, which steps do not enter")
+        if fault := fault_of(d.parameters[port], value):
+            raise InvalidInput(f"{name}: {fault}")
+        self._master.call_units(lambda: self._master.ensemble.instances[unit].set_start({port: value}))
+
+
+def open(  # noqa: A001 (handover.open is named like it)
+    subject: str | Path | System | type[Experiment[Any]],
+    /,
+    *,
+    seed: int = 0,
+    place: str | None = None,
+    units: Mapping[str, Path | str] | None = None,
+    step: Seconds | None = None,
+    algorithm: str | Algorithm | None = None,
+    isolate: str | Sequence[str] = (),
+    options: MasterOptions | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    **named: Any,
+) -> Session:
+    """Open a scenario, a system, an SSP or an FMU to be stepped: `with handover.open("flyer_impedance") as s:`.
+
+    Args:
+        subject: as of `handover.run`.
+        seed: likewise.
+        place: a unit that is left out; its outputs are set instead, `s["unit.port"] = value`.
+        units: what takes the place of a scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`.
+        step: of an SSP or FMU: the communication step of all units, s.
+        algorithm: `jacobi`, `gauss-seidel`, `fixed-point` or `newton`.
+        isolate: units in processes of their own: names, `foreign` or `all`.
+        options: all options of the master; by default calls of units may take any time.
+        parameters: parameters whose names are also those of options, or no names in Python.
+        **named: the other parameters.
+
+    Raises:
+        InvalidInput: something of it cannot be run, with all faults and what would be right.
+        UnitFailure: a unit failed as it was loaded or initialised.
+    """
+    with errors_for_python(), contextlib.ExitStack() as opened:
+        name = str(subject) if isinstance(subject, Path) else subject
+        endless = isinstance(name, System) or (isinstance(name, str) and (is_ssp(name) or is_fmu(name)))
+        request = RunRequest(
+            subject=name,
+            parameters=texts_of(merged(parameters, named)),
+            seed=seed_of(seed),
+            units=unit_texts(units),
+            stop=_ANY_STOP if endless else None,
+            step=exact("step", step),
+            options=master_options(options or MasterOptions(), algorithm, isolate),
+        )
+        request.check_options()
+        asked = request.open(opened)
+        system = request.system(asked, request.seed, request.fmus(asked.experiment))
+        return Session(asked.experiment, asked.parameters, system, request.options, place)
+
+
+def _plain(value: Any) -> Any:
+    """Return a number or a text for an array without dimensions."""
+    return value.item() if hasattr(value, "shape") and not value.shape else value

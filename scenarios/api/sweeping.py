@@ -1,0 +1,144 @@
+"""A campaign from Python, on the same path as the command `handover sweep`."""
+
+import contextlib
+import sys
+import types
+from collections.abc import Generator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from handover.cosim.stepping.options import Algorithm, MasterOptions
+from handover.scenarios.api.arguments import (
+    InvalidInput,
+    errors_for_python,
+    master_options,
+    merged,
+    seed_of,
+    text_of_value,
+    texts_of,
+)
+from handover.scenarios.api.campaign_result import Campaign
+from handover.scenarios.api.progress import bar
+from handover.scenarios.campaign.campaign import run_campaign
+from handover.scenarios.campaign.folder import CampaignFolder, default_folder
+from handover.scenarios.campaign.grid import parse_grid, set_parameters
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.plan_check import prepared
+from handover.scenarios.campaign.pool_config import LazyPool, PoolConfig
+from handover.scenarios.campaign.worker_pool import RunCounts
+from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.execution.selection import find_scenario
+
+
+def sweep(
+    scenario: str,
+    /,
+    *,
+    seeds: int = 1,
+    seed: int = 0,
+    paired: bool = True,
+    units: Mapping[str, Path | str] | None = None,
+    out: Path | str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    algorithm: str | Algorithm | None = None,
+    isolate: str | Sequence[str] = (),
+    options: MasterOptions | None = None,
+    progress: bool = True,
+    parameters: Mapping[str, Any] | None = None,
+    **named: Any,
+) -> Campaign:
+    """Run all combinations of parameters' values, each with so many seeds, on all cores; return the campaign.
+
+    `sweep("ir_grasp", seeds=5, strategy=["reflex", "blind"])` makes ten runs. Lists are varied, single values set; of a
+    parameter that is an array, a list of arrays is varied. Each run is a process of its own. The folder stays: `out`,
+    or one of its own in `campaigns/`. However a campaign was ended, the same call resumes it and repeats nothing that
+    is done.
+
+    Args:
+        scenario: its name.
+        seeds: runs of each combination.
+        seed: of the campaign, from which those of the runs follow.
+        paired: whether all combinations get the same seeds, so that they can be compared run by run.
+        units: what takes the place of the scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`.
+        out: the folder of the campaign.
+        workers: runs at the same time, by default one a core.
+        scheduler: address of a Dask scheduler whose workers do the runs.
+        algorithm: as of `handover.run`.
+        isolate: likewise.
+        options: likewise.
+        progress: whether a bar is shown, where there is a notebook or a terminal.
+        parameters: what is varied and set of parameters whose names are also those of options.
+        **named: what is varied and set of the others.
+
+    Raises:
+        InvalidInput: something of it cannot be run, with all faults and what would be right; nothing is written.
+        KeyboardInterrupt: Ctrl-C; runs that have ended are kept.
+        RecordNotWritten: the disk is full. ClusterLost: all workers were lost; runs that have ended are kept.
+    """
+    given = merged(parameters, named)
+    with errors_for_python():
+        if workers is not None and scheduler is not None:
+            raise InvalidInput("workers and scheduler: a scheduler has workers of its own; one of both is right")
+        RunRequest(subject=scenario).check_sweepable()
+        experiment = find_scenario(scenario)
+        shapes = {v.name: v.shape for v in experiment.parameters()}
+        varied = {name: value for name, value in given.items() if _is_varied(value, shapes.get(name, ()))}
+        texts = [f"{name}={_values_text(value, shapes.get(name, ()))}" for name, value in varied.items()]
+        points = parse_grid(experiment, texts)
+        fixed = texts_of({name: value for name, value in given.items() if name not in varied})
+        plan = CampaignPlan(
+            scenario=scenario,
+            points=points,
+            fixed=set_parameters(experiment, fixed, points),
+            repetitions=seed_of(seeds),
+            seed=seed_of(seed),
+            paired=paired,
+            units={name: str(file) for name, file in (units or {}).items()},
+            options=master_options(options, algorithm, isolate),
+        )
+        return _carried_out(plan, None if out is None else Path(out), PoolConfig(workers, scheduler), progress)
+
+
+def _carried_out(plan: CampaignPlan, out: Path | None, workers: PoolConfig, shown: bool) -> Campaign:
+    ready = prepared(plan, lambda _checked: workers.check())
+    folder = CampaignFolder(out) if out else default_folder(ready.plan, ready.fmus)
+    folder.check(ready.plan, ready.fmus)
+    with contextlib.ExitStack() as opened, bar(shown) as move, _main_module_hidden():
+
+        def tell(counts: RunCounts) -> None:
+            ended = counts.ended + counts.lost
+            move(ended, counts.total, f"{ended} of {counts.total} runs")
+
+        run_campaign(ready, folder, LazyPool(workers.start, opened), tell)
+    return Campaign(folder.path)
+
+
+def _is_varied(value: Any, shape: tuple[int, ...]) -> bool:
+    """Return whether a value is a list of values of a parameter of this shape, and not one value."""
+    if isinstance(value, str) or not isinstance(value, (Sequence, np.ndarray)):
+        return False
+    return np.ndim(cast(Any, value)) > len(shape) or not len(cast(Any, value))
+
+
+def _values_text(values: Any, shape: tuple[int, ...]) -> str:
+    texts = [text_of_value(value) for value in values]
+    return (";" if shape or any("," in text for text in texts) else ",").join(texts)
+
+
+@contextlib.contextmanager
+def _main_module_hidden() -> Generator[None, None, None]:
+    """Keep worker processes from running the program again that starts them.
+
+    Python imports the main program in processes that it starts, for the sake of what is defined there; workers need
+    nothing of it, and a program without `if __name__ == "__main__"` would start workers of workers.
+    """
+    main = sys.modules.get("__main__")
+    sys.modules["__main__"] = types.ModuleType("__main__")
+    try:
+        yield
+    finally:
+        if main is not None:
+            sys.modules["__main__"] = main

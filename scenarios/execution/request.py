@@ -1,0 +1,202 @@
+"""A run as it is asked for, by the command or from Python: all is checked, then there is a task, and nothing written.
+
+Names of options in messages are those of the command.
+"""
+
+import contextlib
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from handover.cosim.stepping.options import MasterOptions
+from handover.cosim.system.system import System
+from handover.fmus.build import cached
+from handover.scenarios.catalog import SCENARIOS, InvalidScenario, named_scenario
+from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.fmu_run import FmuRun, is_fmu
+from handover.scenarios.execution.runner import experiment_system
+from handover.scenarios.execution.selection import find_scenario, own_source, replacements, select_fmus
+from handover.scenarios.execution.ssp_run import is_ssp, open_experiment, source_of, system_experiment
+from handover.scenarios.execution.unit_values import split_parameters
+from handover.scenarios.experiment.experiment import Experiment, NoParameters
+from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.task import Task
+
+RUNS = Path("runs")
+"""Where runs' folders are if nothing names one."""
+
+
+@dataclass(frozen=True)
+class OpenedSubject:
+    """What is to be run: the scenario, its parameters, and what the run's folder keeps to find it again.
+
+    Attributes:
+        experiment, parameters: the scenario, or what runs a file or a system as one.
+        unit_values: values of units' parameters, as texts by `UNIT.NAME`.
+        source: as of `Task`.
+    """
+
+    experiment: Experiment[Any]
+    parameters: Any = NoParameters()
+    unit_values: Mapping[str, str] = field(default_factory=dict[str, str])
+    source: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunRequest:
+    """What one run is asked to be.
+
+    Attributes:
+        subject: name of a scenario, path of an SSP or FMU, a system that was wired in Python, or a scenario's class.
+        parameters: texts `NAME=VALUE`.
+        seed: of all random numbers.
+        units: texts `NAME=FILE` or `NAME=MODULE:CLASS`, of what takes the place of a scenario's units.
+        out: the run's folder, new or empty; None for one of its own in `runs/`.
+        stop, step: in seconds, where the subject leaves them open.
+        inputs: a file of inputs over time, of an FMU by itself.
+        formats, every, options, presented: as of `Task`.
+    """
+
+    subject: str | System | type[Experiment[Any]]
+    parameters: Sequence[str] = ()
+    seed: int = 0
+    units: Sequence[str] = ()
+    out: Path | None = None
+    stop: Fraction | None = None
+    step: Fraction | None = None
+    inputs: Path | None = None
+    formats: Sequence[str] = ()
+    every: Fraction | None = None
+    options: MasterOptions = field(default_factory=MasterOptions)
+    presented: bool = True
+
+    def task(self, opened: contextlib.ExitStack) -> Task:
+        """Return the task, all parts of which are checked; `opened` closes what that opens.
+
+        Raises:
+            UsageError, InvalidParameter, InvalidRunFolder, CosimError: what is asked for cannot be run.
+        """
+        self.check_options()
+        asked = self.open(opened)
+        folder = RunFolder(self.out or default_run_folder(Path(asked.experiment.name).stem))
+        return Task(
+            experiment=asked.experiment,
+            parameters=asked.parameters,
+            seed=self.seed,
+            fmus=self.fmus(asked.experiment),
+            unit_values=asked.unit_values,
+            folder=folder,
+            formats=tuple(dict.fromkeys(self.formats)),
+            every=self.every,
+            source=asked.source,
+            options=self.options,
+            presented=self.presented,
+        )
+
+    def check_options(self) -> None:
+        """Reject options that are for another kind of run than this one.
+
+        Raises:
+            UsageError: one of them is given.
+        """
+        of_scenarios = {"-p": self.parameters, "--seed": self.seed, "--unit": self.units}
+        of_files = {"--stop": self.stop, "--step": self.step, "--input": self.inputs}
+        used = [name for name, value in {**of_scenarios, **of_files}.items() if value]
+        if isinstance(self.subject, System):
+            if wrong := [name for name in used if name != "--stop"]:
+                raise UsageError(f"{', '.join(wrong)}: a system has its parameters, units, inputs and steps inside")
+        elif self._is_file(is_ssp):
+            if wrong := [name for name in of_scenarios if name in used]:
+                raise UsageError(f"{', '.join(wrong)}: for scenarios; an SSP has its parameters and units inside")
+            if "--input" in used:
+                raise UsageError("--input: for an FMU that runs by itself; an SSP's inputs are wired in it")
+        elif self._is_file(is_fmu):
+            if wrong := [name for name in ("--seed", "--unit") if name in used]:
+                raise UsageError(f"{', '.join(wrong)}: for scenarios; of an FMU, -p sets parameters")
+        elif "--input" in used:
+            raise UsageError("--input is for an FMU that runs by itself; a scenario's inputs are wired in it")
+        elif {"--stop", "--step"} & set(used):
+            raise UsageError("--stop and --step are for an SSP or an FMU; a scenario has its own")
+
+    def check_sweepable(self) -> None:
+        """Reject what has no parameters that could be swept.
+
+        Raises:
+            UsageError: it is an SSP or an FMU.
+        """
+        if self._is_file(is_ssp):
+            raise UsageError(f"{self.subject}: a scenario can be swept, an SSP has no parameters of its own")
+        if self._is_file(is_fmu):
+            raise UsageError(f"{self.subject}: a scenario can be swept, an FMU can be run by itself")
+
+    def open(self, opened: contextlib.ExitStack) -> OpenedSubject:
+        """Return what is to be run; `opened` closes what that opens.
+
+        Raises:
+            UsageError, InvalidParameter, CosimError: there is no such subject, or a value is invalid.
+        """
+        if isinstance(self.subject, System):
+            if self.stop is None:
+                raise UsageError("a system has no stop time of its own; --stop 10 lets it run for 10 s")
+            return OpenedSubject(system_experiment("system", "a system wired in Python", self.subject, self.stop))
+        if isinstance(self.subject, type):
+            return self._of_class(self.subject)
+        path = Path(self.subject)
+        if is_ssp(self.subject):
+            of_ssp = open_experiment(path, self.stop, self.step, opened)
+            return OpenedSubject(of_ssp, source=source_of(path, of_ssp.stop_time(NoParameters()), self.step))
+        if is_fmu(self.subject):
+            alone = FmuRun(path=path, parameters=self.parameters, inputs=self.inputs, stop=self.stop, step=self.step)
+            of_fmu = alone.open()
+            return OpenedSubject(of_fmu, source=alone.as_source(of_fmu.stop_time(NoParameters())))
+        scenario = find_scenario(self.subject)
+        return OpenedSubject(scenario(), *split_parameters(scenario, self.parameters), own_source(self.subject))
+
+    def fmus(self, experiment: Experiment[Any]) -> dict[str, Path]:
+        """Return the FMU of each unit of the scenario; those of the catalog are built where they are not yet.
+
+        Raises:
+            UsageError: a unit is not of the scenario, or cannot be built.
+        """
+        kind = type(experiment)
+        return select_fmus(kind, replacements(kind, self.units), lambda unit: cached(unit, 3))
+
+    def system(self, asked: OpenedSubject, seed: int, fmus: Mapping[str, Path]) -> System:
+        """Return the system that is to be run, checked.
+
+        Raises:
+            CosimError, InvalidParameter, ScenarioFailed: it cannot be wired so.
+        """
+        units = fmus, asked.unit_values
+        system = experiment_system(asked.experiment, asked.parameters, seed, *units, self.options)
+        system.check()
+        return system
+
+    def _of_class(self, scenario: type[Experiment[Any]]) -> OpenedSubject:
+        """Return a scenario by its class; that of a program or a notebook has no path by which it is found again."""
+        if missing := sorted(getattr(scenario, "__abstractmethods__", ())):
+            raise UsageError(f"{scenario.__name__} is not complete: it has no {', '.join(missing)}")
+        values = split_parameters(scenario, self.parameters)
+        try:
+            path = f"{scenario.__module__}:{scenario.__qualname__}"
+            is_ours = scenario.name in SCENARIOS and SCENARIOS[scenario.name] is scenario
+            source = {} if is_ours or named_scenario(path) is not scenario else own_source(path)
+        except (KeyError, InvalidScenario):
+            source = {}
+        return OpenedSubject(scenario(), *values, source)
+
+    def _is_file(self, is_of_kind: Callable[[str], bool]) -> bool:
+        return isinstance(self.subject, str) and is_of_kind(self.subject)
+
+
+def default_run_folder(stem: str) -> Path:
+    """Return a folder in `runs/` that is not there yet, named by date, time and `stem`."""
+    name = time.strftime(f"%Y-%m-%d_%H%M%S_{stem}")
+    path, number = RUNS / name, 1
+    while path.exists():
+        number += 1
+        path = RUNS / f"{name}_{number}"
+    return path

@@ -1,0 +1,141 @@
+"""A scenario as an environment: Gymnasium's own check, the declared spaces, and the trajectories of the unit itself."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gymnasium import spaces
+from gymnasium.utils.env_checker import check_env
+
+import handover
+from handover.cosim.fmu.description import describe_fmu
+from handover.scenarios.api.environment import ScenarioEnvironment, space_of
+
+COMMANDS = ("p_WH_cmd", "yaw_cmd", "sigma_cmd")
+DRAWN_AND_DRIVEN = {
+    "flyer_impedance": "impedance",
+    "flyer_human_to_robot": "decision",
+    "ir_grasp": "reflex",
+    "vsl_hybrid": "kinematics",
+}
+
+
+@pytest.mark.filterwarnings("ignore:.*Box (action|observation) space.*")
+@pytest.mark.parametrize(("scenario", "place"), DRAWN_AND_DRIVEN.items())
+def test_gymnasium_accepts_it(scenario: str, place: str):
+    env = handover.environment(scenario, place=place)
+    try:
+        check_env(env, skip_render_check=True)
+    finally:
+        env.close()
+
+
+def test_its_spaces_are_what_the_unit_declares():
+    env = handover.environment("ir_grasp", place="reflex", actions=["sigma_cmd", "phase"])
+    assert env.action_space == spaces.Dict(
+        {"phase": spaces.Discrete(10), "sigma_cmd": spaces.Box(0.0, 1.0, (), np.float64)}
+    )
+    inputs = describe_fmu(handover.unit("IrReflex")).inputs
+    assert env.observation_space == spaces.Dict({name: space_of(inputs[name]) for name in inputs})
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> handover.Run:
+    return handover.run("ir_grasp", seed=3, strategy="blind", out=tmp_path_factory.mktemp("runs") / "r")
+
+
+def driven(env: ScenarioEnvironment, run: handover.Run) -> tuple[list[float], dict[str, object]]:
+    """Act as the unit did in a run; return the rewards and the last information."""
+    observed, info = env.reset(seed=3)
+    rewards: list[float] = []
+    signals = run.signals
+    for k in range(len(signals.time)):
+        for name in ("p_WH", "yaw", "sigma", "ticks"):
+            assert np.array_equal(observed[name], signals[f"scene.{name}"][k]), (name, k)
+        action = {name: signals[f"reflex.{name}"][k] for name in (*COMMANDS, "phase")}
+        observed, reward, terminated, truncated, info = env.step(action)
+        rewards.append(reward)
+        assert not truncated
+        if terminated:
+            return rewards, info
+    raise AssertionError("the episode has not ended")
+
+
+def test_who_acts_as_the_unit_does_moves_the_world_as_it_did(run: handover.Run):
+    env = handover.environment("ir_grasp", place="reflex", actions=[*COMMANDS, "phase"], strategy="blind")
+    rewards, info = driven(env, run)
+    assert info["success"] == run.success
+    assert sum(rewards) == float(run.success)
+    env.close()
+
+
+def test_a_reward_of_ones_own_sees_all_signals(run: handover.Run):
+    env = handover.environment(
+        "ir_grasp",
+        place="reflex",
+        actions=[*COMMANDS, "phase"],
+        reward=lambda s: -float(np.linalg.norm(s["scene.p_WO"] - s["scene.p_WH"])),
+        strategy="blind",
+    )
+    rewards, _ = driven(env, run)
+    away = np.linalg.norm(run.signals["scene.p_WO"] - run.signals["scene.p_WH"], axis=1)
+    assert rewards[: len(away) - 1] == pytest.approx(-away[1:])
+    env.close()
+
+
+def test_an_episode_is_truncated_at_the_scenarios_end():
+    env = handover.environment("vsl_hybrid", place="kinematics", period=1000)
+    env.reset(seed=1)
+    _, reward, terminated, truncated, info = env.step(
+        {name: np.zeros(space.shape or ()) for name, space in env.action_space.items()}  # pyright: ignore
+    )
+    assert (terminated or truncated, reward) == (True, 0.0)
+    assert "reason" in info
+    env.close()
+
+
+def test_episodes_without_a_seed_differ_and_follow_from_the_first():
+    env = handover.environment("ir_grasp", place="reflex")
+    first = [env.reset(seed=1)[1]["seed"], env.reset()[1]["seed"], env.reset()[1]["seed"]]
+    assert first[0] == 1
+    assert len({*first}) == 3
+    assert [env.reset(seed=1)[1]["seed"], env.reset()[1]["seed"], env.reset()[1]["seed"]] == first
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("scenario", "given", "told"),
+    [
+        ("ir_grasp", {"place": "reflexx"}, "no unit 'reflexx' whose place could be taken; did you mean reflex?"),
+        ("ir_grasp", {"place": "reflex", "actions": ["yaw"]}, "actions: 'yaw', did you mean yaw_cmd?"),
+        ("helix_handover", {"place": "camera"}, "camera.left is a binary"),
+        ("flyer_impedance", {"place": "push"}, "observations: there are none"),
+        ("ir_grasp", {"place": "reflex", "strategi": 1}, "did you mean strategy?"),
+    ],
+)
+def test_what_makes_no_environment_is_refused(scenario: str, given: dict[str, object], told: str):
+    with pytest.raises(handover.InvalidInput) as e:
+        handover.environment(scenario, **given)  # pyright: ignore
+    assert told in str(e.value)
+
+
+def test_a_bad_action_is_refused():
+    env = handover.environment("ir_grasp", place="reflex")
+    with pytest.raises(RuntimeError, match="call reset first"):
+        env.step({})
+    env.reset(seed=0)
+    with pytest.raises(handover.InvalidInput, match="the action has no p_WH_cmd"):
+        env.step({"yaw_cmd": 0.0})
+    with pytest.raises(handover.InvalidInput, match=r"reflex\.sigma_cmd: 2\.0 is out of range: from 0 to 1"):
+        env.step({"p_WH_cmd": np.zeros(2), "yaw_cmd": 0.0, "sigma_cmd": 2.0})
+    env.close()
+
+
+def test_without_gymnasium_one_line_says_what_to_install(tmp_path: Path):
+    program = "import sys; sys.modules['gymnasium'] = None; import handover; handover.environment"
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stderr.splitlines()[-1] == (
+        "ImportError: handover.environment needs gymnasium: python -m pip install 'handover-cosim[gym]'"
+    )

@@ -1,0 +1,126 @@
+"""What a result gives: numbers with units, arrays by name, tables, figures, pages; and what notebooks show of it."""
+
+import copy
+import re
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import handover
+from handover.scenarios.api.progress import bar_html
+
+
+@pytest.fixture
+def run(grasp: Path) -> handover.Run:
+    found = handover.load(grasp)
+    assert isinstance(found, handover.Run)
+    return found
+
+
+def test_metrics_are_numbers_with_units(run: handover.Run):
+    displacement = run.metrics["displacement"]
+    assert displacement + 0.0 == float(displacement)
+    assert displacement.unit == "m"
+    assert "pushed" in displacement.description
+    assert str(handover.Quantity(0.0123, "m")) == "12.3 mm"
+    assert copy.copy(displacement).unit == "m"
+
+
+def test_signals_are_arrays_by_name(run: handover.Run):
+    signals = run.signals
+    assert signals["scene.p_WH"].shape == (len(signals.time), 2)
+    assert signals.unit("scene.p_WH") == "m"
+    assert signals.units["scene.yaw"] == "rad"
+    assert "reflex.phase" in list(signals)
+    assert "REACH" in signals.item_names("reflex.phase").values()
+    with pytest.raises(KeyError, match=r"did you mean scene\.p_WH"):
+        signals["scene.p_WHH"]
+
+
+def test_signals_become_a_table(run: handover.Run):
+    table = run.signals.to_pandas()
+    assert table.index.name == "time"
+    assert table["scene.p_WH[2]"].tolist() == run.signals["scene.p_WH"][:, 1].tolist()
+    assert table.attrs["units"]["scene.p_WH[2]"] == "m"
+
+
+def test_without_pandas_one_line_says_what_to_install(run: handover.Run, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match=r"^to_pandas needs pandas: python -m pip install pandas$"):
+        run.signals.to_pandas()
+
+
+def test_plots_have_names_and_units_at_their_axes(run: handover.Run):
+    figure = run.plot("scene.p_WH", "reflex.phase")
+    above, below = figure.axes
+    assert above.get_ylabel() == "scene.p_WH (m)"
+    assert below.get_ylabel() == "reflex.phase"
+    assert below.get_xlabel() == "time (s)"
+    assert [line.get_label() for line in above.get_lines()] == ["p_WH[1]", "p_WH[2]"]
+    assert np.array_equal(np.asarray(above.get_lines()[1].get_ydata()), run.signals["scene.p_WH"][:, 1])
+    assert "reach" in [label.get_text() for label in below.get_yticklabels()]
+    assert figure._repr_png_().startswith(b"\x89PNG")  # pyright: ignore
+    assert not plt.get_fignums()
+
+
+def test_plots_go_into_axes_of_ones_own(run: handover.Run):
+    figure, axes = plt.subplots()
+    assert run.plot("scene.yaw", axes=axes) is figure
+    assert axes.get_ylabel() == "scene.yaw (rad)"
+    plt.close(figure)
+
+
+def test_a_plot_of_nothing_is_refused(run: handover.Run):
+    with pytest.raises(KeyError, match=r"no signal 'scene.yav': did you mean scene.yaw.*; no signal 'reflex.fase'"):
+        run.plot("scene.yav", "reflex.fase")
+    with pytest.raises(ValueError, match="no signal is named"):
+        run.plot()
+
+
+def test_replay_and_report_are_pages(run: handover.Run, tmp_path: Path):
+    replay = run.replay()
+    assert 'class="replay"' in replay.html
+    saved = replay.save(tmp_path / "replay.html")
+    assert saved.path is not None
+    assert saved.path.read_text(encoding="utf-8") == replay.html
+    report = run.report()
+    assert report.path == run.folder / "report.html"
+    assert 'class="replay"' in report.html
+    assert re.match(r'<iframe srcdoc="&lt;!', report._repr_html_())  # pyright: ignore
+
+
+def test_a_notebook_shows_verdict_headline_and_plots(run: handover.Run):
+    html = run._repr_html_()  # pyright: ignore
+    assert "succeeded</span>" in html
+    assert "how far the object was pushed" in html
+    assert html.count("data:image/png;base64,") == 2
+    assert "object at 0x" not in repr(run)
+
+
+def test_a_notebook_shows_a_system_as_its_graph():
+    html = handover.system("helix_handover")._repr_html_()  # pyright: ignore
+    assert html.startswith("<svg")
+    for text in ("camera", "StereoCamera", "FMI 3, 500 ms, sampled", "arm → hand", "p_WG (real [3] m)"):
+        assert text in html
+    assert html.count("<rect") == 5
+
+
+def test_a_notebook_shows_a_unit_as_its_ports():
+    html = handover.describe("IrReflex")._repr_html_()  # pyright: ignore
+    for text in ("<b>Inputs", "<b>Outputs", "<b>Parameters", "p_WH_cmd", "real [2]", "at least 1", ">reflex<"):
+        assert text in html
+    placed = handover.System().add("push", handover.unit("Push"))
+    assert "<b>Parameters" in placed._repr_html_()  # pyright: ignore
+
+
+def test_progress_is_a_bar():
+    assert bar_html(2.0, 5.0, "2 of 5 <s>").startswith("<progress value='2' max='5'")
+    assert "&lt;s&gt;" in bar_html(2.0, 5.0, "2 of 5 <s>")
+
+
+def test_the_folder_of_nothing_is_refused(tmp_path: Path):
+    with pytest.raises(handover.InvalidInput, match="the folder of neither a run"):
+        handover.load(tmp_path)

@@ -1,0 +1,148 @@
+"""A run from Python is that of the command, byte for byte, and refuses what that refuses."""
+
+import threading
+from fractions import Fraction
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import handover
+from handover.controllers.ir_grasp.parameters import Strategy
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.cli.command import main
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+
+OPTIONS = set(handover.run.__kwdefaults__ or {}) | set(handover.sweep.__kwdefaults__ or {})
+
+
+def system() -> handover.System:
+    """5 N for 0.5 s on a robot of 10 kg."""
+    s = handover.System()
+    push = s.add("push", handover.unit("Push"), force=5.0, duration=0.5)
+    robot = s.add("robot", handover.unit("FreeFlyer"), mass=10.0)
+    s.connect(push.y.f_G, robot.u.f_G)
+    return s
+
+
+@pytest.fixture(scope="module")
+def blind(tmp_path_factory: pytest.TempPathFactory) -> handover.Run:
+    out = tmp_path_factory.mktemp("runs") / "blind"
+    return handover.run("ir_grasp", seed=4, strategy=Strategy.BLIND, standoff=0.06, out=out)
+
+
+def test_it_leaves_the_same_bytes_as_the_command(blind: handover.Run, tmp_path: Path):
+    command = ["run", "ir_grasp", "--seed", "4", "-p", "strategy=blind", "-p", "standoff=0.06", "--no-report"]
+    assert CliRunner().invoke(main, [*command, "--out", str(tmp_path / "c")]).exit_code in (0, 1)
+    assert (tmp_path / "c" / "signals.parquet").read_bytes() == (blind.folder / "signals.parquet").read_bytes()
+    assert handover.load(tmp_path / "c").reason == blind.reason  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_its_result_is_what_the_folder_has(blind: handover.Run):
+    assert blind.seed == 4
+    assert blind.parameters["strategy"] == "blind"
+    assert blind.parameters["standoff"] == 0.06
+    again = handover.load(blind.folder)
+    assert isinstance(again, handover.Run)
+    assert (again.success, again.reason, again.metrics) == (blind.success, blind.reason, blind.metrics)
+
+
+def test_all_faults_are_told_at_once_and_nothing_is_written(tmp_path: Path):
+    with pytest.raises(handover.InvalidInput) as e:
+        handover.run("ir_grasp", strategi="reflex", forward=-1, literal=np.bool_(True), out=tmp_path / "r")
+    assert str(e.value) == (
+        "ir_grasp has no parameter 'strategi'; did you mean strategy?; forward: -1.0 is out of range: from 0 to 0.3 m"
+    )
+    assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.parametrize(
+    ("subject", "given", "told"),
+    [
+        ("ir_grap", {}, "no scenario 'ir_grap': did you mean ir_grasp?"),
+        ("ir_grasp", {"stop": 3}, "--stop and --step are for an SSP or an FMU; a scenario has its own"),
+        ("ir_grasp", {"units": {"reflexx": "a.fmu"}}, "ir_grasp has no unit 'reflexx': did you mean reflex?"),
+        ("ir_grasp", {"algorithm": "jacoby"}, "no algorithm 'jacoby'; did you mean jacobi?"),
+        ("ir_grasp", {"seed": -1}, "seed = -1: a whole number from 0 on is right"),
+        ("ir_grasp", {"seed": 0.5}, "seed = 0.5: a whole number from 0 on is right"),
+        ("ir_grasp", {"formats": ["cvs"]}, "formats: 'cvs': did you mean csv?"),
+        ("ir_grasp", {"checkpoint": 0}, "checkpoint = 0: a finite number of seconds above 0 is right"),
+        ("ir_grasp", {"thing": 1, "parameters": {"thing": 2}}, "thing: given by keyword and in parameters={...}"),
+        ("nowhere.fmu", {"stop": 1}, "nowhere.fmu"),
+    ],
+)
+def test_what_cannot_be_run_is_refused_in_one_line(
+    subject: str, given: dict[str, object], told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(handover.InvalidInput) as e:
+        handover.run(subject, **given)  # pyright: ignore[reportArgumentType]
+    assert told in str(e.value)
+    assert "\n" not in str(e.value)
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_system_is_run_and_its_results_outlive_the_call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    runs = [handover.run(system(), stop=Fraction(3)) for _ in range(2)]
+    assert len({run.folder for run in runs}) == 2  # also within one second
+    for run in runs:
+        assert run.folder.parent == Path("runs")
+        assert run.success
+        assert run.signals["robot.v_WB"][-1] == pytest.approx([0.25, 0.0, 0.0])
+    assert runs[0].scenario == "system"
+
+
+def test_a_system_needs_a_stop_time_and_takes_no_parameters():
+    with pytest.raises(handover.InvalidInput, match="a system has no stop time of its own"):
+        handover.run(system())
+    with pytest.raises(handover.InvalidInput, match="-p, --seed: a system has its parameters"):
+        handover.run(system(), stop=1, seed=3, mass=3)
+
+
+class Nearer(IrGrasp):
+    """A scenario of one's own, as one writes it into a notebook."""
+
+    name: ClassVar[str] = "nearer"
+    title: ClassVar[str] = "a hand that begins nearer"
+
+
+def test_a_class_of_ones_own_is_run_and_drawn(tmp_path: Path):
+    run = handover.run(Nearer, strategy="blind", standoff=0.05, out=tmp_path / "n")
+    assert run.scenario == "nearer"
+    assert 'class="replay"' in run.replay().html
+    assert "data:image/png" in run._repr_html_()  # pyright: ignore
+    with handover.open(Nearer, strategy="blind") as s:
+        assert "scene.p_WH" in s.outputs
+    with pytest.raises(handover.InvalidInput, match="nearer has no parameter 'strategi'"):
+        handover.run(Nearer, strategi="blind")
+
+
+def test_an_fmu_is_run_by_itself(tmp_path: Path):
+    run = handover.run(handover.unit("Push", fmi=2), stop=1, out=tmp_path / "p", force=2, parameters={"start": 0.25})
+    force = run.signals["Push.f_G"][:, 0]
+    assert (force[run.signals.time < 0.24] == 0.0).all()
+    assert force.max() == pytest.approx(2.0)
+
+
+def test_a_unit_that_fails_is_a_result_without_success(tmp_path: Path):
+    s = handover.System()
+    s.add("robot", handover.unit("FreeFlyer"), mass=0.1, f_G=np.array([1e308, 0.0, 0.0]))
+    run = handover.run(s, stop=5, out=tmp_path / "f")
+    assert not run.success
+    assert "robot" in run.reason
+
+
+def test_other_threads_may_run(tmp_path: Path):
+    runs: list[handover.Run] = []
+    thread = threading.Thread(target=lambda: runs.append(handover.run(system(), stop=1, out=tmp_path / "t")))
+    thread.start()
+    thread.join()
+    assert runs[0].success
+
+
+def test_no_shipped_parameter_has_the_name_of_an_option():
+    for scenario in SCENARIOS.values():
+        assert not {v.name for v in scenario.parameters()} & OPTIONS, scenario.name

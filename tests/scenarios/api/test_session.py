@@ -1,0 +1,147 @@
+"""Stepping from Python: what is set acts, what is saved comes back, and the evaluation follows as in a run."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from native_units import native_fmu
+
+import handover
+
+
+def gain(fmu: Path) -> handover.System:
+    s = handover.System()
+    s.add("gain", fmu, a=2.0)
+    return s
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("isolate", [(), ("gain",)])
+def test_a_free_input_acts_in_the_steps_that_follow(fmi: int, isolate: tuple[str, ...]):
+    with handover.open(gain(native_fmu("gain", fmi)), isolate=isolate) as s:
+        assert s.inputs == ("gain.u",)
+        s["gain.u"] = 3.0
+        assert s["gain.u"] == 3.0
+        s.step(0.1)
+        assert s["gain.y"] == 6.0
+        s["gain.u"] = -1.0
+        assert s["gain.y"] == 6.0
+        s.step(0.1)
+        assert s["gain.y"] == -2.0
+        assert s["gain.a"] == 2.0
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_tunable_parameter_may_change(fmi: int):
+    fmu = native_fmu("tuned_gain", fmi)
+    assert handover.describe(fmu).parameters["a"].tunable
+    with handover.open(gain(fmu)) as s:
+        s["gain.u"] = 1.0
+        s.step(0.1)
+        s["gain.a"] = 5.0
+        assert s["gain.a"] == 5.0
+        s.step(0.1)
+        assert s["gain.y"] == 5.0
+
+
+def test_what_cannot_be_set_or_read_is_refused():
+    with handover.open("flyer_impedance") as s:
+        for name, error, told in (
+            ("robot.f_B", handover.InvalidInput, "robot.f_B is fed by thrusters.f_B"),
+            ("push.force", handover.InvalidInput, "push.force is a fixed parameter"),
+            ("robot.p_WB", handover.InvalidInput, "robot.p_WB is an output"),
+            ("rbot.f_B", KeyError, "did you mean robot?"),
+            ("thrusters.f_posse", KeyError, "did you mean f_pose or tau_pose?"),
+        ):
+            with pytest.raises(error) as e:
+                s[name] = 1.0
+            assert told in str(e.value)
+        with pytest.raises(handover.InvalidInput, match=r"thrusters.f_pose: 1.0 is not an array of shape \[3\]"):
+            s["thrusters.f_pose"] = 1.0
+        with pytest.raises(KeyError, match="did you mean"):
+            s["robot.p_WW"]
+        with pytest.raises(handover.InvalidInput, match="duration = 0: a finite number of seconds above 0"):
+            s.step(0)
+
+
+def test_durations_add_up_exactly():
+    with handover.open(gain(native_fmu("gain"))) as s:
+        assert [s.step(0.1) for _ in range(10)][-1] == 1.0
+        assert s.step(0.05) == 1.1  # the first communication point at or after it
+        assert s.step(0.05) == 1.1
+
+
+def test_a_scenario_that_is_stepped_ends_as_its_run(tmp_path: Path):
+    run = handover.run("ir_grasp", seed=3, strategy="blind", out=tmp_path / "r")
+    with handover.open("ir_grasp", seed=3, strategy="blind") as s:
+        seen: list[np.ndarray[tuple[int], np.dtype[np.float64]]] = []
+        while not s.over and s.time < s.stop:
+            s.step(0.3)
+            seen.append(s["scene.p_WH"])
+        rows = [round(0.3 * (k + 1) / 0.015) for k in range(len(seen) - 1)]
+        assert np.array_equal(seen[:-1], run.signals["scene.p_WH"][rows])
+        assert s.time == run.signals.time[-1]
+        assert s.text("reflex.phase") == "DONE"
+        outcome = s.outcome
+        assert (outcome.success, outcome.reason) == (run.success, run.reason)
+        assert outcome.metrics["displacement"].value == run.metrics["displacement"]
+        assert s.outcome == outcome
+
+
+@pytest.mark.parametrize("other", [False, True])
+def test_the_whole_state_is_saved_and_restored(other: bool):
+    with handover.open("flyer_impedance", seed=2) as s:
+        s["thrusters.f_pose"] = [0.5, 0.0, 0.0]
+        s.step(0.7)
+        state = s.save()
+        s["thrusters.f_pose"] = [0.0, 0.0, 0.0]
+        rest = [s.step(0.25) for _ in range(4)]
+        p_free = s["robot.p_WB_meas"]
+        s.restore(state)
+        assert s["thrusters.f_pose"].tolist() == [0.5, 0.0, 0.0]
+        s.step(1)
+        p_pushed, outcome = s["robot.p_WB_meas"], s.outcome
+        assert not np.array_equal(p_free, p_pushed)
+        with handover.open("flyer_impedance", seed=5) if other else s as again:
+            again.restore(state)
+            assert again.time == pytest.approx(0.704)
+            again["thrusters.f_pose"] = [0.0, 0.0, 0.0]
+            assert [again.step(0.25) for _ in range(4)] == rest
+            assert np.array_equal(again["robot.p_WB_meas"], p_free)
+            again.restore(state)
+            again.step(1)
+            assert np.array_equal(again["robot.p_WB_meas"], p_pushed)
+            assert again.outcome == outcome
+
+
+def test_a_state_of_another_system_is_refused():
+    with handover.open("flyer_impedance") as a:
+        state = a.save()
+    with (
+        handover.open(gain(native_fmu("gain"))) as b,
+        pytest.raises(handover.InvalidInput, match="a checkpoint of the units"),
+    ):
+        b.restore(state)
+
+
+def test_a_unit_without_states_is_told():
+    with (
+        handover.open(gain(native_fmu("gain", 2, canGetAndSetFMUstate=False))) as s,
+        pytest.raises(handover.InvalidInput, match="canGetAndSetFMUstate"),
+    ):
+        s.save()
+
+
+def test_a_system_is_not_changed_by_being_opened():
+    system = gain(native_fmu("gain"))
+    with handover.open(system):
+        pass
+    assert not any(system.followed.values())
+
+
+def test_an_ssp_and_an_fmu_are_stepped(tmp_path: Path):
+    fmu = shutil.copyfile(native_fmu("gain"), tmp_path / "gain.fmu")
+    with handover.open(fmu, a=3, u=2) as s:
+        s.step(0.1)
+        assert s["gain.y"] == 6.0

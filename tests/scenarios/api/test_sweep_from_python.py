@@ -1,0 +1,93 @@
+"""A campaign from Python: the command's, also from a program without a main guard, and resumed by the same call."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import handover
+
+PROGRAM = """
+import handover
+
+campaign = handover.sweep("ir_grasp", seeds=2, strategy=["blind", "reflex"], standoff=0.06, out="c", workers=2)
+print(campaign)
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return where a program of four lines has run a campaign."""
+    made = tmp_path_factory.mktemp("campaigns")
+    (made / "program.py").write_text(PROGRAM)
+    call = [sys.executable, "program.py"]
+    done = subprocess.run(call, cwd=made, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("\n") == 1  # workers do not run the program again
+    return made / "c"
+
+
+def test_it_has_a_row_for_each_run_and_a_point_for_each_value(folder: Path):
+    campaign = handover.load(folder)
+    assert isinstance(campaign, handover.Campaign)
+    assert [row["strategy"] for row in campaign.rows] == ["blind", "blind", "reflex", "reflex"]
+    seeds = [row["seed"] for row in campaign.rows]
+    assert seeds[:2] == seeds[2:]  # paired
+    blind, reflex = campaign.points
+    assert (reflex.values, reflex.runs, reflex.rate) == ({"strategy": "reflex"}, 2, reflex.successes / 2)
+    assert blind.interval is not None
+    low, high = blind.interval
+    assert low <= blind.rate <= high
+    assert campaign.unit("final_distance_thumb") == "m"
+    table = campaign.to_pandas()
+    assert table["seed"].tolist() == seeds
+    assert table.attrs["units"]["final_distance_thumb"] == "m"
+
+
+def test_its_runs_are_runs(folder: Path):
+    campaign = handover.load(folder)
+    assert isinstance(campaign, handover.Campaign)
+    assert [run.success for run in campaign.runs] == [row["success"] for row in campaign.rows]
+    assert campaign.runs[0].parameters["standoff"] == 0.06
+
+
+def test_the_same_call_repeats_nothing(folder: Path):
+    before = {path: path.stat().st_mtime_ns for path in (folder / "runs").glob("*/summary.json")}
+    campaign = handover.sweep("ir_grasp", seeds=2, strategy=["blind", "reflex"], standoff=0.06, out=folder)
+    assert {path: path.stat().st_mtime_ns for path in (folder / "runs").glob("*/summary.json")} == before
+    assert len(campaign.rows) == 4
+
+
+def test_a_notebook_shows_rates_and_medians(folder: Path):
+    html = handover.load(folder)._repr_html_()  # pyright: ignore
+    for text in ("<b>ir_grasp</b>", "of 2", "95 % interval", "reflex", "final_distance_thumb, median"):
+        assert text in html
+
+
+def test_its_report_is_a_page(folder: Path):
+    page = handover.load(folder).report()
+    assert page.path == folder / "report.html"
+    assert "strategy" in page.html
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"strategi": ["blind"], "forward": -1}, "did you mean strategy?"),
+        ({"strategy": ["blind", "blink"]}, "'blink' is none of"),
+        ({"strategy": []}, "strategy: the list of values is empty"),
+        ({"seeds": 0}, "the campaign has no runs"),
+        ({"workers": 1, "scheduler": "tcp://1.2.3.4:5"}, "a scheduler has workers of its own"),
+    ],
+)
+def test_what_cannot_be_run_is_refused(given: dict[str, object], told: str, tmp_path: Path):
+    with pytest.raises(handover.InvalidInput) as e:
+        handover.sweep("ir_grasp", out=tmp_path / "c", **given)  # pyright: ignore
+    assert told in str(e.value)
+    assert not (tmp_path / "c").exists()
+
+
+def test_files_are_not_swept():
+    with pytest.raises(handover.InvalidInput, match="a scenario can be swept, an SSP has no parameters of its own"):
+        handover.sweep("a.ssp", seeds=2)
