@@ -120,6 +120,14 @@ def test_a_class_of_ones_own_is_run_and_drawn(tmp_path: Path):
         handover.run(Nearer, strategi="blind")
 
 
+def test_parameters_of_units_are_set(blind: handover.Run, tmp_path: Path):
+    own = {"reflex.shake_cycles": 1}  # of 3, at 1.5 Hz
+    run = handover.run("ir_grasp", seed=4, strategy="blind", standoff=0.06, parameters=own, out=tmp_path / "u")
+    assert run.signals.time[-1] == pytest.approx(blind.signals.time[-1] - 2 / 1.5, abs=0.05)
+    with pytest.raises(handover.InvalidInput, match="no parameter 'closing_tim'; did you mean closing_time"):
+        handover.run("ir_grasp", parameters={"reflex.closing_tim": 3.0}, out=tmp_path / "v")
+
+
 def test_an_fmu_is_run_by_itself(tmp_path: Path):
     run = handover.run(handover.unit("Push", fmi=2), stop=1, out=tmp_path / "p", force=2, parameters={"start": 0.25})
     force = run.signals["Push.f_G"][:, 0]
