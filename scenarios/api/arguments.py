@@ -85,9 +85,9 @@ def merged(parameters: Mapping[str, Any] | None, named: Mapping[str, Any]) -> di
     return {**given, **named}
 
 
-def unit_texts(units: Mapping[str, Path | str] | None) -> list[str]:
-    """Return replacements of units as texts `NAME=FILE`."""
-    return [f"{name}={file}" for name, file in (units or {}).items()]
+def unit_texts(units: Mapping[str, Path | str | Sequence[Path | str]] | None) -> list[str]:
+    """Return replacements of units as texts `NAME=FILE`, several as `NAME=A,B`."""
+    return [f"{name}={text_of_value(files)}" for name, files in (units or {}).items()]
 
 
 def exact(name: str, seconds: Seconds | None) -> Fraction | None:

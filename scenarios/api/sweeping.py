@@ -18,12 +18,13 @@ from handover.scenarios.api.arguments import (
     seed_of,
     text_of_value,
     texts_of,
+    unit_texts,
 )
 from handover.scenarios.api.campaign_result import Campaign
 from handover.scenarios.api.progress import bar
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder, default_folder
-from handover.scenarios.campaign.grid import parse_grid, set_parameters
+from handover.scenarios.campaign.grid import parse_grid, set_parameters, split_units, vary_units
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.pool_config import LazyPool, PoolConfig
@@ -39,7 +40,7 @@ def sweep(
     seeds: int = 1,
     seed: int = 0,
     paired: bool = True,
-    units: Mapping[str, Path | str] | None = None,
+    units: Mapping[str, Path | str | Sequence[Path | str]] | None = None,
     out: Path | str | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -62,7 +63,8 @@ def sweep(
         seeds: runs of each combination.
         seed: of the campaign, from which those of the runs follow.
         paired: whether all combinations get the same seeds, so that they can be compared run by run.
-        units: what takes the place of the scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`.
+        units: what takes the place of the scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`;
+            a list varies the unit.
         out: the folder of the campaign.
         workers: runs at the same time, by default one a core.
         scheduler: address of a Dask scheduler whose workers do the runs.
@@ -87,7 +89,8 @@ def sweep(
         shapes = {v.name: v.shape for v in experiment.parameters()}
         varied = {name: value for name, value in given.items() if _is_varied(value, shapes.get(name, ()))}
         texts = [f"{name}={_values_text(value, shapes.get(name, ()))}" for name, value in varied.items()]
-        points = parse_grid(experiment, texts)
+        kept_units, choices = split_units(experiment, unit_texts(units))
+        points = vary_units(parse_grid(experiment, texts), choices)
         fixed = texts_of({name: value for name, value in given.items() if name not in varied})
         plan = CampaignPlan(
             scenario=scenario,
@@ -96,7 +99,8 @@ def sweep(
             repetitions=seed_of(seeds),
             seed=seed_of(seed),
             paired=paired,
-            units={name: str(file) for name, file in (units or {}).items()},
+            units=kept_units,
+            varied_units=tuple(choices),
             options=master_options(options, algorithm, isolate),
         )
         return _carried_out(plan, None if out is None else Path(out), PoolConfig(workers, scheduler), progress)

@@ -88,6 +88,14 @@ def test_what_cannot_be_run_is_refused(given: dict[str, object], told: str, tmp_
     assert not (tmp_path / "c").exists()
 
 
+def test_units_are_varied(tmp_path: Path):
+    fmus = [handover.unit("IrReflex", fmi=2), handover.unit("IrReflex", fmi=3)]
+    campaign = handover.sweep("ir_grasp", units={"reflex": fmus}, strategy="blind", out=tmp_path / "c")
+    assert [point.values["reflex"] for point in campaign.points] == [str(fmu) for fmu in fmus]
+    first, second = campaign.runs
+    assert first.reason == second.reason
+
+
 def test_files_are_not_swept():
     with pytest.raises(handover.InvalidInput, match="a scenario can be swept, an SSP has no parameters of its own"):
         handover.sweep("a.ssp", seeds=2)
