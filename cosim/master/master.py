@@ -39,7 +39,7 @@ def never() -> bool:
 
 
 def _tell_of_faults(system: System, *, strict: bool) -> None:
-    """Warn of model descriptions that break the standard where it does not matter here.
+    """Warn of model descriptions that break the standard where it does not matter here, and of what is left out.
 
     Raises:
         InvalidFmu: `strict` does not let them pass.
@@ -48,6 +48,8 @@ def _tell_of_faults(system: System, *, strict: bool) -> None:
         if strict:
             raise InvalidFmu(path, f"its {DESCRIPTION} is not valid: {fault}")
         _log.warning("%s: its %s is not valid, which does not matter here: %s", path, DESCRIPTION, fault)
+    for line in system.left_out:
+        _log.warning("%s", line)
 
 
 class Master:

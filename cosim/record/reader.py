@@ -28,6 +28,10 @@ class Record:
             self._columns.setdefault(_SUBSCRIPT.sub("", name), []).append(name)
         self.time = self._values("time")
 
+    def __contains__(self, signal: object) -> bool:
+        """Return whether a signal of this name was recorded."""
+        return signal in self._columns
+
     def __getitem__(self, signal: str) -> NDArray[Any]:
         """Return a signal over time; an array port has its shape after the first axis.
 
@@ -81,6 +85,10 @@ class RecordedSignals(Signals):
         self._record = record
         self._arrays: dict[str, NDArray[Any]] = {}
         self.row = 0
+
+    def __contains__(self, name: object) -> bool:
+        """Return whether a signal of this name was recorded."""
+        return name in self._record
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Return a copy of a signal's value in its shape.

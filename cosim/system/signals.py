@@ -38,6 +38,10 @@ class Signals:
         self._views = {f"{unit}.{port}": views for unit, ys in outputs.items() for port, views in ys.items()}
         self._ports = {f"{unit}.{name}": p for unit, ps in ports.items() for name, p in ps.items()}
 
+    def __contains__(self, name: object) -> bool:
+        """Return whether there is an output of this name."""
+        return name in self._views
+
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Return a copy of a signal's value in its shape.
 

@@ -104,6 +104,8 @@ class System:
         self._sources: defaultdict[str, dict[str, PortName]] = defaultdict(dict)  # by unit, by input
         self.followed: defaultdict[str, dict[str, TimeSeries]] = defaultdict(dict)
         """By unit and input, the values over time that inputs follow."""
+        self.left_out: list[str] = []
+        """Which connections and values its units do not have and need not have, in lines for who runs it."""
         self._faults: list[str] = []
         self._descriptions: dict[Path, FmuDescription] = {}
 
@@ -155,6 +157,21 @@ class System:
                 raise TypeError(f"{end!r} is not a port: give unit.y.NAME and unit.u.NAME of what add returned")
         self.connections.append(Connection(source, target, transformation))
         self._sources[target.unit][target.port] = source
+
+    def disconnect(self, end: PortName) -> None:
+        """Remove the connections of a port, and what it is set to or follows."""
+        self.connections = [c for c in self.connections if end not in (c.source, c.target)]
+        for sources in self._sources.values():
+            for port in [p for p, source in sources.items() if source == end]:
+                del sources[port]
+        self._sources[end.unit].pop(end.port, None)
+        self.followed[end.unit].pop(end.port, None)
+        unit = self.units[end.unit]
+        self.units[end.unit] = replace(unit, start={n: x for n, x in unit.start.items() if n != end.port})
+
+    def add_fault(self, fault: str) -> None:
+        """Let `check` raise a fault that whoever wires the system has found, besides those that it finds."""
+        self._faults.append(fault)
 
     def follow(self, target: PortName, series: TimeSeries) -> None:
         """Let an input that no output feeds follow values over time, which are in its unit.

@@ -8,6 +8,7 @@ import click
 from rich.console import Console
 
 from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.variable import Causality
 from handover.cosim.exceptions import nearest
 from handover.fmus.catalog import (
     UNITS,
@@ -28,22 +29,36 @@ from handover.scenarios.catalog import (
     search_folder,
 )
 from handover.scenarios.cli.console import open_console, print_rows
-from handover.scenarios.cli.port_tables import allowed, plain, port_rows, variable_data
+from handover.scenarios.cli.port_tables import allowed, plain, port_rows, type_of, variable_data
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.places import ports_of_place
 
 
 @click.command("list", short_help="List scenarios and units, or what one of them takes and gives.")
 @click.argument("name", required=False, metavar="[SCENARIO|UNIT]")
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON, for programs.")
-def list_command(name: str | None, *, as_json: bool) -> None:
+@click.option(
+    "--unit",
+    "place",
+    metavar="NAME",
+    help="Of a SCENARIO: list what a unit needs to take the place of its unit NAME.",
+)
+def list_command(name: str | None, place: str | None, *, as_json: bool) -> None:
     """List scenarios and units, the parameters of a SCENARIO, or parameters and ports of a UNIT.
 
     Either can be your own, named MODULE:CLASS, such as my_scene:TwoLinkReach for the class TwoLinkReach in my_scene.py;
     modules are looked for in the working directory first.
     """
-    if name is None:
+    if place is not None:
+        if name is None:
+            raise UsageError("--unit is for a SCENARIO: handover list SCENARIO --unit NAME")
+        if as_json:
+            click.echo(json.dumps(place_data(find_scenario(name), place), indent=2))
+        else:
+            print_place(find_scenario(name), place)
+    elif name is None:
         if as_json:
             click.echo(json.dumps(catalog_data(), indent=2))
         else:
@@ -124,6 +139,86 @@ def print_scenario(experiment: type[Experiment[Any]]) -> None:
     print_rows(console, [(v.name, plain(v.start), allowed(v), v.description) for v in experiment.parameters()])
     console.print("Units, to be replaced with --unit name=file.fmu or name=module:Class")
     print_rows(console, list(experiment.units.items()))
+    if experiment.places:
+        text = f"What a unit needs to take a place: handover list {_named(experiment)} --unit name"
+        console.print(text, markup=False, soft_wrap=True)
+
+
+def _named(experiment: type[Experiment[Any]]) -> str:
+    """Return the name by which commands find a scenario."""
+    known = experiment.name in SCENARIOS or experiment.name in installed_scenarios()
+    return experiment.name if known else f"{experiment.__module__}:{experiment.__name__}"
+
+
+def _own_unit(experiment: type[Experiment[Any]], name: str) -> Entry:
+    """Return the unit that a scenario ships with in a place.
+
+    Raises:
+        UsageError: the scenario has no such unit.
+    """
+    if name not in experiment.units:
+        raise UsageError(f"{experiment.name} has no unit {name!r}: {nearest(name, experiment.units)}")
+    try:
+        return find_unit(experiment.units[name])
+    except (UnknownUnit, UnknownBlock) as e:
+        raise UsageError(f"unit {name}: {e}") from e
+
+
+def place_data(experiment: type[Experiment[Any]], name: str) -> dict[str, Any]:
+    """Return what a unit needs to take a place, as JSON can hold it; `ports` is None where that is not declared.
+
+    Raises:
+        UsageError: the scenario has no such unit.
+    """
+    own, place = _own_unit(experiment, name), experiment.places.get(name)
+    data = {"scenario": experiment.name, "place": name, "unit": own.name}
+    if place is None:
+        return {**data, "remarks": [], "ports": None}
+    ports = [
+        {
+            **variable_data(p.declared),
+            "causality": p.declared.causality.value,
+            "required": p.is_required,
+            "description": p.sentence,
+        }
+        for p in ports_of_place(place, own)
+    ]
+    return {**data, "remarks": list(place.remarks), "ports": ports}
+
+
+def print_place(experiment: type[Experiment[Any]], name: str) -> None:
+    """Print what a unit must have and may have to take the place of one of a scenario's.
+
+    Raises:
+        UsageError: the scenario has no such unit.
+    """
+    own = _own_unit(experiment, name)
+    if name not in experiment.places:
+        text = f"{experiment.name} does not say what a unit in the place {name} may lack; its own, {own.name}, has:"
+        open_console().print(text, markup=False, soft_wrap=True)
+        print_unit(own)
+        return
+    console = open_console()
+    place = experiment.places[name]
+    console.print(f"{experiment.name}, place {name}: {own.name} or a unit of your own", style="bold")
+    for remark in place.remarks:
+        console.print(remark, markup=False)
+    ports = ports_of_place(place, own)
+    for is_required, needed in ((True, "required"), (False, "optional")):
+        for causality, what in (
+            (Causality.INPUT, "Inputs"),
+            (Causality.OUTPUT, "Outputs"),
+            (Causality.PARAMETER, "Parameters"),
+        ):
+            rows = [
+                (p.declared.name, type_of(p.declared), allowed(p.declared), p.sentence)
+                for p in ports
+                if p.is_required is is_required and p.declared.causality is causality
+            ]
+            if rows:
+                console.print(f"{what}, {needed}", style="bold")
+                print_rows(console, rows)
+    console.print("Optional ones that a unit does not have are left out of the wiring, and what is shown of them.")
 
 
 def print_unit(unit: Entry) -> None:

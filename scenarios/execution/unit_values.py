@@ -142,7 +142,7 @@ def built_system(
         ScenarioFailed: the code of a scenario that is not this package's failed.
     """
     with scenario_code(experiment):
-        system = experiment.build(parameters, seed, lambda unit: fmus[unit])
+        system = experiment.wire(parameters, seed, lambda unit: fmus[unit])
     set_values(system, values)
     return system
 

@@ -21,6 +21,7 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
+from handover.scenarios.experiment.places import Place, fit_places
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure, TimePlot
 
@@ -126,6 +127,9 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
     units: ClassVar[Mapping[str, str]]
     """The unit behind each of the system's units, by name in the system: a name in the catalog, or the path of a block
     as `my_module:MyBlock`."""
+    places: ClassVar[Mapping[str, Place]] = {}
+    """What a unit must have to take the place of one of `units`, by the same names. A unit in a place that is not here
+    must have all that `build` wires and sets."""
     headline: ClassVar[tuple[str, ...]] = ()
     """Names of the metrics that summaries list first, in this order; a run need not have all of them. By default, those
     of the evaluator's outcome."""
@@ -151,7 +155,17 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
 
     @abc.abstractmethod
     def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:
-        """Wire the units into a system."""
+        """Wire the units into a system; the wiring is that of the scenario's own units, see `wire`."""
+
+    def wire(self, parameters: Any, seed: int, fmu: FmuOf) -> System:
+        """Return the system that `build` wires, without what units in its places do not have and need not have.
+
+        Raises:
+            InvalidFmu: a file is not a valid co-simulation FMU.
+        """
+        system = self.build(parameters, seed, fmu)
+        fit_places(system, self.places, self.units)
+        return system
 
     @abc.abstractmethod
     def stop_time(self, parameters: Any) -> Fraction:

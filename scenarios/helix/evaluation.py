@@ -89,9 +89,10 @@ def _measured(side: Cover, signals: Signals) -> Iterator[Mark]:
 
 
 def _estimated(side: Cover, signals: Signals) -> Iterator[Mark]:
-    if not np.any(signals["servo.p_WG_est"]):  # the controller has seen nothing yet
+    given = [name for name in _SHAPES if f"servo.{name}_est" in signals]
+    if not given or not np.any(signals[f"servo.{given[-1]}_est"]):  # the controller has seen nothing yet
         return
-    for name in _SHAPES:
+    for name in given:
         yield from _mark(side, name, signals[f"servo.{name}_est"], "as the controller has it", ESTIMATED)
 
 
@@ -121,15 +122,29 @@ _SETTLING = 1.0
 _NOTHING_SEEN = 10.0
 """How long the controller may wait for its first sight of ball and ring, s (assumed)."""
 
+_GRIP_CLOSED = 0.999
+"""Closure at which a gripper has closed, of a controller that does not say so."""
+
 _MOMENTS = {"APPROACH": "approach", "DESCEND": "descent", "GRASP": "at the ball"}
 _COVERED = "lens covered"
+
+
+def phase_of(signals: Signals) -> str:
+    """Return the controller's phase; of one that gives none, what the gripper shows: APPROACH, GRASP or HOLD."""
+    if "servo.phase" in signals:
+        return signals.text("servo.phase")
+    if float(signals["arm.grip"]) >= _GRIP_CLOSED:
+        return "HOLD"
+    return "GRASP" if "servo.closure" in signals and float(signals["servo.closure"]) > 0.0 else "APPROACH"
 
 
 class HandoverEvaluator(Evaluator):
     """Follows one handover, keeps pictures of its key moments, and decides whether it succeeded.
 
+    A controller may have other outputs than `VisualServo`: see the scenario's places.
+
     Attributes:
-        phases: the controller's phases and when each was first entered, in s.
+        phases: the controller's phases and when each was first entered, in s; for one without phases, see `phase_of`.
 
     Args:
         parameters: the scenario's.
@@ -152,15 +167,17 @@ class HandoverEvaluator(Evaluator):
         self._offset: Floats | None = None  # p_GO when the hand let go
         self._mismatch: ModelMismatch | None = None  # when the gripper began to close
         self._error = 0.0
+        self._gives_error = False
         self._nearest = np.inf
         self._released_at: float | None = None
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Follow phases and positions."""
-        phase, holder = signals.text("servo.phase"), signals.text("hand.holder")
+        phase, holder = phase_of(signals), signals.text("hand.holder")
         self._p_WG, self._p_WO = signals["arm.p_WG"], signals["hand.p_WO"]
         self._p_GO = np.transpose(rotation_of(signals["arm.q_WG"])) @ (self._p_WO - self._p_WG)
-        self._error = float(signals["servo.error"])
+        self._gives_error = "servo.error" in signals
+        self._error = float(signals["servo.error"]) if self._gives_error else self.distance
         if phase in ("APPROACH", "DESCEND"):
             self._nearest = min(self._nearest, self._error)
         self._t = t
@@ -168,7 +185,8 @@ class HandoverEvaluator(Evaluator):
             self._keep("start", signals)
         if phase in _MOMENTS and phase not in self.phases:
             self._keep(_MOMENTS[phase], signals)
-        if phase == "GRASP" and phase not in self.phases:
+        compares = "servo.q_sys" in signals and "servo.p_WG_est" in signals
+        if compares and phase == "GRASP" and phase not in self.phases:
             self._mismatch = model_mismatch(signals["servo.q_sys"], signals["servo.p_WG_est"])
         if self._is_first_covered(t):
             self._keep(_COVERED, signals)
@@ -227,7 +245,9 @@ class HandoverEvaluator(Evaluator):
         metrics = {
             "final_distance": Metric(self.distance, "m", "gripper to ball at the end, ground truth"),
         }
-        if np.isfinite(self._nearest):  # else the controller never saw ball and arm, and its error means nothing
+        if self._gives_error and np.isfinite(
+            self._nearest
+        ):  # else the controller never saw ball and arm, and its error means nothing
             metrics["controller_error"] = Metric(self._error, "m", "error that the controller saw last")
         if grasp_began is not None:
             steps = round(grasp_began / float(self.parameters.period)) + 1
@@ -266,8 +286,9 @@ class HandoverEvaluator(Evaluator):
         if self._t < self._deadline:
             return f"stopped at {self._t:.1f} s in phase {self._phase}, before the handover was done"
         reach = "out of reach or too slow" if self._nearest > 2 * self.parameters.threshold else "no grasp"
+        goal = "its goal" if self._gives_error else "the ball"
         within = f"within {self.parameters.patience:.0f} s"
-        return f"{reach}: {within} the arm came no nearer than {self._nearest:.3f} m to its goal; {where}"
+        return f"{reach}: {within} the arm came no nearer than {self._nearest:.3f} m to {goal}; {where}"
 
 
 def _mismatch_metrics(m: ModelMismatch) -> dict[str, Metric]:

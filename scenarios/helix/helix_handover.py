@@ -15,11 +15,13 @@ from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.pictures import CameraPicture
+from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.helix.cameras import calibration
 from handover.scenarios.helix.evaluation import HandoverEvaluator
 from handover.scenarios.helix.parameters import Cover, Parameters, Tuning
+from handover.scenarios.helix.places import PLACES
 
 _PAPER = "helix"
 
@@ -66,6 +68,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
         "arm": "TendonArm",
         "hand": "HandoverPartner",
     }
+    places: ClassVar[Mapping[str, Place]] = PLACES
     headline: ClassVar[tuple[str, ...]] = (
         "final_distance",
         "grasp_offset_lateral",

@@ -33,8 +33,11 @@ _STROKES: tuple[Stroke, ...] = ("solid", "dashed", "dotted")
 
 def figures_of_handover(parameters: Parameters, record: Record) -> list[TimeFigure]:
     """Return the figures of the distance to the goal, of true and estimated positions, and of tendons and gripper."""
-    phases = phases_of(record, "servo.phase")
-    change, tension = 1000 * record["servo.dl_t"], record["arm.tension"]
+    phases = phases_of(record, "servo.phase") if "servo.phase" in record else ()
+    change, title = 1000 * record["servo.dl_t"], "Commanded tendon lengths, since calibration"
+    tendons = [_tendons(title, "change", "mm", change, phases, held=True)]
+    if "arm.tension" in record:
+        tendons.append(_tendons("Tendon forces", "tension", "N", record["arm.tension"], phases, held=False))
     return [
         TimeFigure(
             name="error",
@@ -50,11 +53,7 @@ def figures_of_handover(parameters: Parameters, record: Record) -> list[TimeFigu
             name="tendons",
             caption="Commanded tendon lengths, from calibration, tendon forces, and how far the gripper is closed. A "
             "slack tendon is at 0 N.",
-            plots=[
-                _tendons("Commanded tendon lengths, since calibration", "change", "mm", change, phases, held=True),
-                _tendons("Tendon forces", "tension", "N", tension, phases, held=False),
-                _gripper(record, phases),
-            ],
+            plots=[*tendons, _gripper(record, phases)],
         ),
     ]
 
@@ -64,23 +63,23 @@ def _known(record: Record, values: Floats) -> Floats:
 
     Those of a controller without phases are all kept.
     """
-    waits = record["servo.phase"] <= 0
-    return np.where(waits, np.nan, values)
+    return np.where(record["servo.phase"] > 0, values, np.nan) if "servo.phase" in record else values
 
 
 def _distance(parameters: Parameters, record: Record, phases: Sequence[Phase]) -> TimePlot:
-    seen = _known(record, 1000 * record["servo.error"])
+    curves: list[Curve] = []
+    if "servo.error" in record:
+        seen = _known(record, 1000 * record["servo.error"])
+        curves.append(Curve(label="gripper to its goal, as the controller sees it", values=seen, held=True))
     true = 1000 * np.linalg.norm(record["arm.p_WG"] - record["hand.p_WO"], axis=1)
+    curves.append(Curve(label="gripper to ball, true", values=true))
     return TimePlot(
         title="Distance to the goal",
         quantity="distance",
         unit="mm",
         phases=phases,
         limits=(0.0, None),
-        curves=(
-            Curve(label="gripper to its goal, as the controller sees it", values=seen, held=True),
-            Curve(label="gripper to ball, true", values=true),
-        ),
+        curves=curves,
         levels=(
             Level(label="descends", value=1000 * parameters.threshold),
             Level(label="grasps", value=1000 * parameters.settings["threshold_grasp"]),
@@ -91,9 +90,10 @@ def _distance(parameters: Parameters, record: Record, phases: Sequence[Phase]) -
 def _position(record: Record, axis: int, phases: Sequence[Phase]) -> TimePlot:
     curves: list[Curve] = []
     for what, true, estimated in _FOLLOWED:
-        values = _known(record, 1000 * record[estimated][:, axis])
         curves.append(Curve(label=f"{what}, true", values=1000 * record[true][:, axis], group=what))
-        curves.append(Curve(label=f"{what}, estimated", values=values, held=True, stroke="dashed", group=what))
+        if estimated in record:
+            values = _known(record, 1000 * record[estimated][:, axis])
+            curves.append(Curve(label=f"{what}, estimated", values=values, held=True, stroke="dashed", group=what))
     name = "xyz"[axis]
     return TimePlot(
         title=f"Gripper and ball along {name} of W",
@@ -121,15 +121,15 @@ def _tendons(title: str, quantity: str, unit: str, values: Floats, phases: Seque
 
 
 def _gripper(record: Record, phases: Sequence[Phase]) -> TimePlot:
+    curves = [Curve(label="as it is", values=record["arm.grip"])]
+    if "servo.closure" in record:
+        curves.append(Curve(label="commanded", values=record["servo.closure"], held=True, stroke="dashed"))
     return TimePlot(
         title="Gripper",
         quantity="closure, 0 to 1",
         unit="",
         phases=phases,
-        curves=(
-            Curve(label="as it is", values=record["arm.grip"]),
-            Curve(label="commanded", values=record["servo.closure"], held=True, stroke="dashed"),
-        ),
+        curves=curves,
     )
 
 

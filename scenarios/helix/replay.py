@@ -31,14 +31,14 @@ _OCTAGON = np.radians(np.arange(22.5, 360.0, 45.0))
 def replay_handover(record: Record) -> Replay:
     """Return the scene of a run over its time."""
     arm = Line(label="arm", colour=_ARM, points=record["arm.backbone"], radii=np.full(25, CameraParams().arm_radius))
-    cameras = [_frustum(side) for side in ("left", "right")]
+    cameras, estimates = [_frustum(side) for side in ("left", "right")], _estimates(record)
     return Replay(
         bodies=[*_plates(record), _collar(record), *_gripper_body(record), *_hand_body(record), _ball(record)],
-        lines=[arm, *_fingers(record), *_forearm(record), *_estimates(record)],
+        lines=[arm, *_fingers(record), *_forearm(record), *estimates],
         fixed=cameras,
         eye=(-0.35, -1.25, 0.35),
-        phases="servo.phase",
-        notes=("Where things were; orange: where the controller took ball and gripper to be.",),
+        phases="servo.phase" if "servo.phase" in record else "",
+        notes=("Where things were; orange: where the controller took ball and gripper to be.",) if estimates else (),
         window=_window(record, cameras),
     )
 
@@ -125,12 +125,13 @@ def _forearm(record: Record) -> list[Line]:
 
 
 def _estimates(record: Record) -> list[Line]:
-    """Return the controller's estimates of ball and gripper, from when it has them."""
-    waits = (record["servo.phase"] <= 0)[:, None]
+    """Return those estimates of ball and gripper that the controller gives, from when it has them."""
+    known = (record["servo.phase"] > 0 if "servo.phase" in record else np.full(len(record.time), True))[:, None]
     named = (("ball, estimated", "servo.p_WO_est"), ("gripper, estimated", "servo.p_WG_est"))
     return [
-        Line(label=label, colour=_ESTIMATE, points=np.where(waits, np.nan, record[signal])[:, None], width=5.0)
+        Line(label=label, colour=_ESTIMATE, points=np.where(known, record[signal], np.nan)[:, None], width=5.0)
         for label, signal in named
+        if signal in record
     ]
 
 

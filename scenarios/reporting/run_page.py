@@ -171,13 +171,14 @@ def master_section(facts: RunFacts) -> Section | None:
     try:
         rows = master_rows(facts.summary) if "master" in facts.summary else []
         conversions = [format_conversion(c) for c in facts.run.get("conversions", [])]
-        warnings = [str(line) for line in facts.run.get("warnings", [])]
+        warnings, notes = ([str(line) for line in facts.run.get(kind, [])] for kind in ("warnings", "notes"))
     except (KeyError, TypeError, ValueError) as e:
         fault = f"its description of the master is damaged: {type(e).__name__} {e}"
         raise InvalidRunFolder(facts.folder.path, fault) from e
-    if not (rows or conversions or warnings):
+    if not (rows or conversions or warnings or notes):
         return None
-    html = template("run_master.html").render(rows=rows, conversions=conversions, warnings=warnings)
+    told = (("Warnings", warnings), ("Notes", notes))
+    html = template("run_master.html").render(rows=rows, conversions=conversions, told=told)
     return Section(anchor="master", title="Master", html=Markup(html))
 
 

@@ -172,14 +172,16 @@ class _OfSomeRuns(TypedDict, total=False):
     system: dict[str, Any]
     conversions: list[dict[str, Any]]
     warnings: list[str]
+    notes: list[str]
     failure: dict[str, Any] | None
 
 
 class RunData(Configuration, _OfSomeRuns):
     """What another process needs to resume a run, or to present it: see `Task` and `Experiment`.
 
-    A run that started has `system` and `conversions`, and `warnings` of its FMUs if there are any; one that
-    could not start has `failure`; `units` are the FMUs' names and hashes.
+    A run that started has `system` and `conversions`, `warnings` of its FMUs if there are any, and `notes` on what its
+    units do not have and the wiring leaves out; one that could not start has `failure`; `units` are the FMUs' names and
+    hashes.
     """
 
     source: dict[str, Any]
@@ -306,6 +308,8 @@ def begun_run(task: Task, master: Master) -> RunData:
     of_this_run: _OfSomeRuns = {"system": system, "conversions": conversions_of(master.system)}
     if faults := master.system.untouched_faults:
         of_this_run["warnings"] = [f"{path.name}: {fault}" for path, fault in faults.items()]
+    if master.system.left_out:
+        of_this_run["notes"] = master.system.left_out
     return _run_data(task, fmus, of_this_run)
 
 

@@ -1,0 +1,167 @@
+"""Places of a scenario: what a unit that takes one must have and may have, and how wiring leaves out the rest.
+
+A scenario declares by name what it wires and reads of each of its units. Kinds, shapes and units of measurement are
+those of the unit that it ships with, so that they are declared once.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.variable import Causality, Kind, Variable
+from handover.cosim.exceptions import nearest
+from handover.cosim.fmu.description import FmuDescription, FmuPort
+from handover.cosim.system.conversion import needs_no_conversion
+from handover.cosim.system.system import PlacedUnit, PortName, System
+from handover.fmus.catalog import Entry, find_unit, import_class
+
+_CAUSALITIES = (Causality.INPUT, Causality.OUTPUT, Causality.PARAMETER)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """What a unit in one place of a system must have and may have, besides ports of its own.
+
+    Attributes:
+        required: inputs, outputs and parameters without which the scenario cannot be, each with what to know of it
+            besides its description by the scenario's own unit, such as its frame; "" where that says it all.
+        optional: likewise those that the scenario wires, sets or reads where the unit has them.
+        remarks: sentences on the whole: frames, signs, what is left out without the optional ones.
+    """
+
+    required: Mapping[str, str] = field(default_factory=dict[str, str])
+    optional: Mapping[str, str] = field(default_factory=dict[str, str])
+    remarks: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class PlacePort:
+    """An input, output or parameter of a place: as the scenario's own unit declares it, and all to know of it."""
+
+    declared: Variable
+    is_required: bool
+    sentence: str
+
+
+def ports_of_place(place: Place, unit: Entry) -> list[PlacePort]:
+    """Return a place's inputs, outputs and parameters, the required ones first, by what its own unit declares.
+
+    Raises:
+        KeyError: the unit does not declare one of them. UnknownBlock: its class cannot be imported.
+    """
+    declared = {v.name: v for v in describe(import_class(unit.block)).variables}
+    return [
+        PlacePort(declared[name], is_required, "; ".join(text for text in (declared[name].description, more) if text))
+        for is_required, named in ((True, place.required), (False, place.optional))
+        for name, more in named.items()
+    ]
+
+
+def fit_places(system: System, places: Mapping[str, Place], units: Mapping[str, str]) -> None:
+    """Leave out of a system what the units in its places do not have and need not have; what they must have is a fault.
+
+    The scenario's own units have all of it. What is left out of another one is noted in `System.left_out`, and
+    what is wrong with it in what `System.check` raises.
+
+    Args:
+        system: as the scenario wires it.
+        places: what each place needs, by the unit's name in the system.
+        units: the scenario's own unit in each place, by its name in the catalog or its block's path.
+    """
+    for name, place in places.items():
+        if name in system.units:
+            own, placed = find_unit(units[name]), system.units[name]
+            if placed.description.name != own.name or any(_missing(placed.description, place)):
+                _Fitting(system, placed, place, own).fit()
+
+
+def _missing(unit: FmuDescription, place: Place) -> Iterator[str]:
+    return (n for n in (*place.required, *place.optional) if not any(n in ports for ports in _ports(unit).values()))
+
+
+def _ports(unit: FmuDescription) -> dict[Causality, Mapping[str, FmuPort]]:
+    """Return by what it is to be where a unit's ports are; an input may be set like a parameter."""
+    return {
+        Causality.INPUT: unit.inputs,
+        Causality.OUTPUT: unit.outputs,
+        Causality.PARAMETER: {**unit.parameters, **unit.inputs},
+    }
+
+
+class _Fitting:
+    """One unit in a place."""
+
+    def __init__(self, system: System, unit: PlacedUnit, place: Place, own: Entry) -> None:
+        self._system, self._unit, self._own = system, unit, own
+        self._ports = ports_of_place(place, own)
+        self._what = f"unit {unit.name} ({unit.description.name})"
+
+    def fit(self) -> None:
+        """Find what is missing and of another kind; disconnect the former."""
+        absent: dict[Causality, list[str]] = {causality: [] for causality in _CAUSALITIES}
+        for port in self._ports:
+            v = port.declared
+            found = _ports(self._unit.description)[v.causality].get(v.name)
+            if found is not None:
+                self._check(found, v)
+                continue
+            self._system.disconnect(PortName(self._unit.name, v.name))
+            if port.is_required:
+                self._system.add_fault(self._fault_of_missing(port))
+            else:
+                absent[v.causality].append(v.name)
+        self._note(absent)
+
+    def _check(self, found: FmuPort, wanted: Variable) -> None:
+        """Check the kind of an output that the scenario itself reads; ports of connections are checked with these."""
+        end = PortName(self._unit.name, found.name)
+        if found.causality is not Causality.OUTPUT or any(c.source == end for c in self._system.connections):
+            return
+        if fault := _difference(found, wanted):
+            self._system.add_fault(f"{end} ({found.signature}): {fault}, as that of {self._own.name}")
+
+    def _fault_of_missing(self, port: PlacePort) -> str:
+        v, d = port.declared, self._unit.description
+        others = [n for n in _ports(d)[v.causality] if n not in {p.declared.name for p in self._ports}]
+        elsewhere = next((c for c in _CAUSALITIES if v.name in _ports(d)[c] and c is not Causality.PARAMETER), None)
+        hint = f"; its {v.name} is an {elsewhere.value}" if elsewhere else _near(v.name, others)
+        return f"{self._what} needs the {v.causality.value} {v.name} ({signature(v)}): {port.sentence}{hint}"
+
+    def _note(self, absent: Mapping[Causality, Sequence[str]]) -> None:
+        """Note what is left out, and which of the unit's inputs nothing feeds: their names may be misspelled."""
+        if parts := [_listed(causality, names) for causality, names in absent.items() if names]:
+            self._system.left_out.append(f"{self._what} does without {'; '.join(parts)}: left out")
+        fed = {*self._system.fed_inputs(self._unit.name), *self._unit.start}
+        missing = [n for names in absent.values() for n in names]
+        for name in self._unit.description.inputs:
+            if name not in fed and all(p.declared.name != name for p in self._ports):
+                text = f"{self._unit.name}.{name}: nothing feeds it, so it stays at its start value"
+                self._system.left_out.append(f"{text}{_near(name, missing)}")
+
+
+def signature(v: Variable) -> str:
+    """Return kind, shape, unit and items of what a block declares, as in `real [3] m`."""
+    shape = f" [{','.join(map(str, v.shape))}]" if v.shape else ""
+    unit = f" {v.unit.symbol}" if v.kind is Kind.REAL and v.unit.symbol != "1" else ""
+    return f"{v.kind.value}{shape}{unit}"
+
+
+def _listed(causality: Causality, names: Sequence[str]) -> str:
+    return f"{causality.value}{'s' if len(names) > 1 else ''} {', '.join(names)}"
+
+
+def _near(name: str, valid: Sequence[str]) -> str:
+    text = nearest(name, valid)
+    return f"; {text}" if text.startswith("did you mean") else ""
+
+
+def _difference(found: FmuPort, wanted: Variable) -> str | None:
+    """Return how an output must be to be read like that of the scenario's own unit, None if it is."""
+    if found.kind is not wanted.kind or found.shape != wanted.shape:
+        return f"it must be {signature(wanted)}"
+    if found.kind is Kind.ENUMERATION and found.items != wanted.items:
+        return f"its items must be {', '.join(f'{name} = {value}' for name, value in wanted.items)}"
+    a, b = found.unit, wanted.unit
+    if found.kind is Kind.REAL and a != b and not needs_no_conversion(a, b):
+        return f"its unit must be {b.symbol}"
+    return None

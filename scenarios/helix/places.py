@@ -1,0 +1,119 @@
+"""What a unit needs to take a place in the Helix handover, and what its author has to know of frames and signs."""
+
+from handover.scenarios.experiment.places import Place
+
+_BASE = (
+    "W is the world: its origin is the arm's mount, z points up, x away from the cameras, y to their left. In B, the "
+    "arm's base frame, z points down along the hanging arm: x of B is x of W, y of B is minus y of W, z of B is minus "
+    "z of W."
+)
+_CALIBRATION = {
+    f"{what}_{side}": ""
+    for side in ("left", "right")
+    for what in ("p_WC", "q_WC", "intrinsics", "distortion")
+}  # fmt: skip
+_SEEN = {
+    "p_WO_meas": "in W; while it is not seen, the last one, zeros before any",
+    "p_WR_meas": "in W; the wrist carries the marker ring, at the end of the arm's centre line",
+    "p_WG_meas": "in W; the gripper is 0.1 m beyond the wrist, along the ring's axis",
+    "seen_O": "in both pictures",
+    "seen_R": "in both pictures",
+}
+_COVARIANCES = {
+    "cov_O": "in W; large while it is not seen",
+    "cov_R": "in W; large while it is not seen",
+    "cov_G": "in W; large while it is not seen",
+}
+
+PLACES = {
+    "camera": Place(
+        required={"left": "", "right": ""},
+        optional={
+            "backbone": "in W",
+            "p_WR": "in W",
+            "q_WR": "of W's frame, scalar first; z of the ring points along the arm, away from the mount",
+            "p_WG": "in W",
+            "q_WG": "of W's frame, scalar first; z of the gripper points to its tip",
+            "grip": "",
+            "p_WO": "in W",
+            "p_WH": "in W",
+            **_CALIBRATION,
+            "seed": "follows from the run's seed",
+            "cover_left_from": "",
+            "cover_left_until": "",
+            "cover_right_from": "",
+            "cover_right_until": "",
+        },
+        remarks=(_BASE, "In a camera's frame C, z is its direction of view, x points to the right and y down."),
+    ),
+    "vision": Place(
+        required=_SEEN,
+        optional={"left": "", "right": "", **_COVARIANCES, **_CALIBRATION},
+        remarks=(_BASE, "Without covariances, those that the controller gets are zeros."),
+    ),
+    "servo": Place(
+        required={
+            "dl_t": "three tendons of each segment, base segment first, at the angles 0, 120 and 240 degrees from x of "
+            "B towards y of B; a shorter tendon (a negative change) bends its segment towards its angle, so that at "
+            "120 degrees towards +y of B, which is -y of W; all three by as much change the segment's length",
+        },
+        optional={
+            "closure": "the hand lets go once the gripper has closed around the ball",
+            **_SEEN,
+            **_COVARIANCES,
+            "phase": "by it, time and success of the handover are judged: it fails in GIVEN_UP",
+            "error": "shown, and by it the run says how near the arm came",
+            "q_est": "shown as a signal",
+            "q_sys": "compared with p_WG_est as the gripper begins to close, as in fig. 9 of the thesis",
+            "p_WO_est": "in W; shown in plots, pictures and replay",
+            "p_WR_est": "in W; shown in pictures",
+            "p_WG_est": "in W; shown in plots, pictures and replay",
+            "control_period": "the unit is stepped so often",
+            "alpha": "the scenario's alpha",
+            "threshold": "the scenario's threshold",
+            "threshold_grasp": "by the scenario's tuning",
+            "epsilon_pose_bound": "by the scenario's tuning",
+            "epsilon_control": "by the scenario's tuning",
+            "A_pose_upd": "by the scenario's tuning",
+            "settle_steps": "by the scenario's tuning",
+        },
+        remarks=(
+            _BASE,
+            "Calibrated, the arm hangs straight with segments of 0.12, 0.24 and 0.24 m, tendons 0.035 m from its axis; "
+            "the gripper is 0.1 m beyond. With Dx and Dy a segment's rotation, rad, towards x and y of B, and l its "
+            "length, m, the tendon at angle s has the length l - 0.035 (Dx cos s + Dy sin s).",
+            "Without phase, the gripper itself tells when it begins to close (closure above 0) and when it has closed; "
+            "without error, the distance of gripper and ball is taken for it. Without closure it stays open.",
+        ),
+    ),
+    "arm": Place(
+        required={
+            "dl_t": "as the controller commands it: see the place servo",
+            "p_WR": "in W",
+            "q_WR": "of W's frame, scalar first",
+            "p_WG": "in W",
+            "q_WG": "of W's frame, scalar first; z of the gripper points to its tip",
+            "backbone": "in W",
+            "grip": "",
+        },
+        optional={"closure": "", "f_G": "in W; by it a person guides the gripper", "tension": "shown over time"},
+        remarks=(_BASE,),
+    ),
+    "hand": Place(
+        required={
+            "p_WO": "in W",
+            "p_WH": "in W",
+            "holder": "it is a success if GRIPPER has the ball at the end",
+            "p_WO_0": "in W; follows from the scenario's place, radius and height",
+        },
+        optional={
+            "f_G": "in W",
+            "p_WG": "in W",
+            "q_WG": "of W's frame, scalar first; z of the gripper points to its tip",
+            "grip": "",
+            "seed": "follows from the run's seed",
+        },
+        remarks=(_BASE,),
+    ),
+}
+"""By the units' names in the system."""
