@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import click
 
-from handover.cosim.exceptions import CosimError, RecordNotWritten, UnitFailure
+from handover.cosim.exceptions import CosimError, RecordNotWritten, UnitFailure, WiringError
 from handover.scenarios.execution.exit_status import UNIT_FAILED, USAGE_ERROR
 
 
@@ -65,6 +65,9 @@ def one_line_errors() -> Generator[None, None, None]:
         raise RunNotWritten(str(e)) from e
     except ClusterLost as e:
         raise WorkersLost(str(e)) from e
+    except WiringError as e:
+        number = f"{len(e.faults)} fault{'s' if len(e.faults) > 1 else ''}"
+        raise UsageError(f"{number} in the system: {'; '.join(e.faults)}") from e
     except (CosimError, InvalidParameter, InvalidRunFolder, ScenarioFailed) as e:
         raise UsageError(str(e)) from e
     except (PoolError, NotCompiled, UnknownPlatform, PackageFailure) as e:

@@ -18,14 +18,14 @@ def write_files(folder: Path) -> None:
         (folder / name).write_text(code, encoding="utf-8")
 
 
-def call(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Call the command in a folder."""
-    return subprocess.run([*COMMAND, *arguments], cwd=folder, capture_output=True, text=True, timeout=300)
+def call(folder: Path, *arguments: str, limit: float = 300.0) -> subprocess.CompletedProcess[str]:
+    """Call the command in a folder, for so many seconds at most."""
+    return subprocess.run([*COMMAND, *arguments], cwd=folder, capture_output=True, text=True, timeout=limit)
 
 
-def succeeded(folder: Path, *arguments: str) -> str:
+def succeeded(folder: Path, *arguments: str, limit: float = 300.0) -> str:
     """Call the command in a folder, assert that it succeeds, and return what it prints."""
-    done = call(folder, *arguments)
+    done = call(folder, *arguments, limit=limit)
     assert done.returncode == 0, done.stderr + done.stdout
     return done.stdout
 

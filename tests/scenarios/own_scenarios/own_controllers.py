@@ -1,0 +1,133 @@
+"""Controllers of a test's own for places of scenarios, as their authors would write them."""
+
+from pathlib import Path
+
+_HEAD = '''
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from handover.cosim.blocks.ports import Vector2, Vector3, Vector9, output, parameter, port
+from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.units import Metre, NewtonMetre, Number, Radian, RadianPerSecond
+
+
+@dataclass(kw_only=True)
+class Params:
+    pass
+
+
+class Stateless:
+    """No state, no parameters."""
+
+    period: ClassVar[Fraction | None] = None
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+
+    def __init__(self, params: Params) -> None:
+        pass
+
+    def get_state(self) -> bytes:
+        return b""
+
+    def set_state(self, state: bytes) -> None:
+        pass
+
+'''
+
+JOINTS = """
+@dataclass(kw_only=True)
+class Inputs:
+    q: Vector2[Radian] = port(np.zeros(2), "joint angles")
+    v: Vector2[RadianPerSecond] = port(np.zeros(2), "joint rates")
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    tau: Vector2[NewtonMetre] = output("joint torques")
+
+
+class Joints(Stateless):
+    feedthrough = {"tau": ("q", "v")}
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:
+        return Outputs(tau=np.array([1.0, 1.0]) * (np.array([0.5, 0.8]) - u.q) - 0.3 * u.v)
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        return self.outputs(t, u)
+"""
+"""A controller that has its goal in itself: it has no p_WG."""
+
+MISSPELLED = """
+@dataclass(kw_only=True)
+class Inputs:
+    angles: Vector2[Radian] = port(np.zeros(2), "joint angles")
+    vv: Vector2[RadianPerSecond] = port(np.zeros(2), "joint rates")
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    taw: Vector2[NewtonMetre] = output("joint torques")
+    energy: int = output("in units of its own")
+
+
+class Misspelled(Stateless):
+    feedthrough = {"taw": ("angles", "vv"), "energy": ()}
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:
+        return Outputs(taw=np.zeros(2), energy=0)
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        return self.outputs(t, u)
+"""
+"""A controller of which no port is named as its place has it, and one is of another kind."""
+
+PROPORTIONAL = """
+ANGLES = np.radians([0.0, 120.0, 240.0])
+LENGTHS = np.array([0.12, 0.24, 0.24])
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    p_WO_meas: Vector3[Metre] = port(np.zeros(3), "position of the ball")
+    p_WG_meas: Vector3[Metre] = port(np.zeros(3), "position of the gripper")
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    dl_t: Vector9[Metre] = output("tendon length changes")
+
+
+class Proportional(Stateless):
+    \"\"\"Bends and stretches all segments alike, in proportion to what is left of the way.\"\"\"
+
+    feedthrough = {"dl_t": ("p_WO_meas", "p_WG_meas")}
+    period = Fraction(1, 2)
+
+    def __init__(self, params: Params) -> None:
+        self.bend, self.stretch = np.zeros(2), 0.0  # rad towards x and y of B; share of a segment's length
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:
+        towards = self.bend @ [np.cos(ANGLES), np.sin(ANGLES)]
+        return Outputs(dl_t=(self.stretch * LENGTHS[:, None] - 0.035 * towards).reshape(9))
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        e = u.p_WO_meas - u.p_WG_meas
+        self.bend = self.bend + 0.3 * np.array([e[0], -e[1]])  # y of B is minus y of W
+        self.stretch = min(max(self.stretch - 0.6 * e[2], -0.3), 0.08)
+        return self.outputs(t, u)
+
+    def get_state(self) -> bytes:
+        return pack_state((self.bend, self.stretch))
+
+    def set_state(self, state: bytes) -> None:
+        self.bend, self.stretch = unpack_state(state)
+"""
+"""The shortest controller of the Helix: it takes two inputs and gives one output."""
+
+
+def write_controller(folder: Path, module: str, code: str) -> None:
+    """Write a controller's module into a folder."""
+    (folder / f"{module}.py").write_text(_HEAD + code, encoding="utf-8")
