@@ -19,10 +19,12 @@ from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
+from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
 from handover.scenarios.free_flyer.parameters import HandoverParameters
+from handover.scenarios.free_flyer.places import PLACES_OF_HANDOVER
 from handover.scenarios.free_flyer.published import published_of_giving, published_of_receiving
 from handover.scenarios.free_flyer.robot_wiring import arm, expected_lag, wire_handover
 
@@ -42,6 +44,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         "person": "HandAndObject",
         "robot": "FreeFlyer",
     }
+    places: ClassVar[Mapping[str, Place]] = PLACES_OF_HANDOVER
     headline: ClassVar[tuple[str, ...]] = (
         "transfer_time",
         "transfer_speed",

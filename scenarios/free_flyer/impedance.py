@@ -11,10 +11,12 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
+from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.free_flyer.impedance_evaluation import ImpedanceEvaluator
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Wrench
+from handover.scenarios.free_flyer.places import PLACES_OF_PUSH
 from handover.scenarios.free_flyer.published import published_of_push
 from handover.scenarios.free_flyer.robot_wiring import arm, expected_lag, wire_controller, wire_forces
 
@@ -31,6 +33,7 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
         "push": "Push",
         "robot": "FreeFlyer",
     }
+    places: ClassVar[Mapping[str, Place]] = PLACES_OF_PUSH
     parallel_step: ClassVar[Fraction | None] = Fraction(1, 500)
     headline: ClassVar[tuple[str, ...]] = (
         "greatest_position_error",

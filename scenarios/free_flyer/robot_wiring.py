@@ -68,17 +68,21 @@ def wire_handover(s: System) -> None:
 
 
 _SLOWEST_MODE = {"pose": "the slowest mode, the integrator's"}
+_POLES = ("pole_radius", "damping_ratio", "pole_frequency")
 _PERIOD = 2 / 125
 """Period of the controllers, s."""
 
 
 def stability_metrics(signals: Signals, controllers: Sequence[str]) -> dict[str, Metric]:
-    """Return the outermost pole's margin and decay, and the least damping ratio, of each controller's closed loop."""
+    """Return the outermost pole's margin and decay, and the least damping ratio, of each controller's closed loop.
+
+    A controller that does not give them has none.
+    """
     metrics: dict[str, Metric] = {}
     for name in controllers:
-        radius, damping, frequency = (
-            float(signals[f"{name}.{what}"]) for what in ("pole_radius", "damping_ratio", "pole_frequency")
-        )
+        if not all(f"{name}.{what}" in signals for what in _POLES):
+            continue
+        radius, damping, frequency = (float(signals[f"{name}.{what}"]) for what in _POLES)
         text = f"{name} control, by its own model"
         metrics[f"pole_margin_{name}"] = Metric(
             1.0 - radius, "1", f"outermost pole to unit circle, 1 - |z|, above 0 if stable: {text}"

@@ -27,6 +27,14 @@ _COST = "cost f of thumb and ring, [Luberto] eq. (4), as the hand began to close
 IN_COST = (0, 2)
 """Thumb and ring, the fingers in the cost, as indices of distances."""
 
+_SIGNALS = {
+    "final_cost": "reflex.cost",
+    "steps": "reflex.steps",
+    "stop": "reflex.stop",
+    **{f"final_distance_{finger}": "reflex.distance" for finger in ("thumb", "index", "ring")},
+}
+"""By metric, the output of the controller that it takes; without it, it is left out."""
+
 _AFTER_CLOSING = ("PULL", "SHAKE", "DONE")
 _REFINING = ("CHECK", "APPROACH", "RECOVER", "PROBE", "STEP")
 
@@ -34,6 +42,11 @@ _REFINING = ("CHECK", "APPROACH", "RECOVER", "PROBE", "STEP")
 def _where_below(values: Floats, ceiling: float) -> Floats:
     """Return values, NaN where they are at a ceiling that stands for nothing seen."""
     return np.where(values < ceiling, values, np.nan)
+
+
+def _given(signals: Signals, name: str, shape: tuple[int, ...] = ()) -> Floats:
+    """Return an output of the controller, zeros where it does not give it."""
+    return signals[name] if name in signals else np.zeros(shape)
 
 
 class GraspEvaluator(Evaluator):
@@ -113,17 +126,18 @@ class GraspEvaluator(Evaluator):
 
     def _close(self, t: float, signals: Signals) -> None:
         self.moments["before closing"] = t
-        self._stop = signals.text("reflex.stop").lower().replace("_", " ")
+        gives_stop = "reflex.stop" in signals
+        self._stop = signals.text("reflex.stop").lower().replace("_", " ") if gives_stop else ""
         began = min((self._entered[p] for p in _REFINING if p in self._entered), default=t)
-        seen = _where_below(signals["reflex.distance"], ReflexParams().distance_max)
+        seen = _where_below(_given(signals, "reflex.distance", (3,)), ReflexParams().distance_max)
         true = _where_below(signals["scene.range"], OUT_OF_RANGE)
-        cost, blind = float(signals["reflex.cost"]), bool(np.isnan(seen[list(IN_COST)]).any())
+        cost, blind = float(_given(signals, "reflex.cost")), bool(np.isnan(seen[list(IN_COST)]).any())
         what_of_cost = f"{_COST} (thumb or ring sees nothing)" if blind else _COST
         displaced = float(np.linalg.norm(signals["scene.p_WO"] - self._p_WO_start))
-        stop = int(signals["reflex.stop"])
+        stop = int(_given(signals, "reflex.stop"))
         metrics = {
             "final_cost": Metric(math.nan if blind else cost, "m2", what_of_cost),
-            "steps": Metric(int(signals["reflex.steps"]), "1", "Gauss-Newton steps"),
+            "steps": Metric(int(_given(signals, "reflex.steps")), "1", "Gauss-Newton steps"),
             "refinement_time": Metric(t - began, "s", "time from the first look at the sensors until the hand closes"),
             "displacement": Metric(displaced, "m", "how far the object was pushed before the hand closed"),
             "stop": Metric(stop, "1", f"why the refinement ended, by number: {stop} is {self._stop}"),
@@ -134,7 +148,7 @@ class GraspEvaluator(Evaluator):
             unmet = " (meets nothing)" if np.isnan(true[i]) else ""
             metrics[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{what}, by [Luberto] eq. (11){unseen}")
             metrics[f"true_distance_{finger}"] = Metric(float(true[i]), "m", f"{what}, true along the beam{unmet}")
-        self._at_closing = metrics
+        self._at_closing = {name: m for name, m in metrics.items() if _SIGNALS.get(name, "scene.range") in signals}
 
     def _count(self, phase: str, signals: Signals) -> None:
         command = (
@@ -179,7 +193,7 @@ class GraspEvaluator(Evaluator):
     def _reason(self, success: bool) -> str:
         if not self.over:
             return f"stopped at {self._t:.1f} s in phase {self._phase}, before the grasp was tried"
-        refined = f"closed at {self.moments['before closing']:.1f} s ({self._stop})"
+        refined = f"closed at {self.moments['before closing']:.1f} s{f' ({self._stop})' if self._stop else ''}"
         if success:
             return f"{refined}; the object came along with the hand and stayed in it"
         closed = self._p_HO_closed

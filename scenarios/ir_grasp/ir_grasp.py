@@ -16,10 +16,12 @@ from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.parameters import InvalidParameter
+from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.ir_grasp.evaluation import GraspEvaluator
 from handover.scenarios.ir_grasp.parameters import Parameters, Situation
+from handover.scenarios.ir_grasp.places import PLACES
 
 FINGERS = ("thumb", "index", "ring")
 """Columns of table II, in the order in which `paper.toml` has them."""
@@ -59,6 +61,7 @@ class IrGrasp(Experiment[GraspEvaluator]):
     title: ClassVar[str] = "a soft hand grasps an object whose place is known roughly, by infrared reflexes"
     parameters_type: ClassVar[type[Parameters]] = Parameters
     units: ClassVar[Mapping[str, str]] = {"scene": "GraspScene", "reflex": "IrReflex"}
+    places: ClassVar[Mapping[str, Place]] = PLACES
     headline: ClassVar[tuple[str, ...]] = (
         "final_distance_thumb",
         "final_distance_index",

@@ -14,6 +14,9 @@ from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.vsl.parameters import Parameters
 
+_ESTIMATES = ("kinematics.p_WG_model", "kinematics.p_WG_est")
+"""Where the tip is by rigid links and by the forward model."""
+
 
 @dataclass(frozen=True)
 class PathPoint:
@@ -24,9 +27,9 @@ class PathPoint:
         desired: the point that the arm was commanded to reach.
         tracked: the tip by the tracker.
         true: the tip itself.
-        servo: the tip by encoders and rigid links.
-        estimated: the tip by the forward model.
-        outside: whether the learned model had to extrapolate.
+        servo: the tip by encoders and rigid links; NaN where the controller does not give it.
+        estimated: the tip by the forward model; likewise.
+        outside: whether the learned model had to extrapolate; None where the controller does not say.
     """
 
     t: float
@@ -35,7 +38,7 @@ class PathPoint:
     true: Floats
     servo: Floats
     estimated: Floats
-    outside: bool
+    outside: bool | None
 
     @classmethod
     def take(cls, t: float, desired: Floats, signals: Signals) -> "PathPoint":
@@ -45,9 +48,8 @@ class PathPoint:
             desired,
             signals["arm.p_WG_meas"],
             signals["arm.p_WG"],
-            signals["kinematics.p_WG_model"],
-            signals["kinematics.p_WG_est"],
-            bool(signals["kinematics.outside"]),
+            *(signals[s] if s in signals else np.full(3, np.nan) for s in _ESTIMATES),
+            bool(signals["kinematics.outside"]) if "kinematics.outside" in signals else None,
         )
 
     @property
@@ -163,19 +165,21 @@ class PathEvaluator(Evaluator):
                 lambda p: distance_to_path(p.tracked, path), "mean distance of the tip, by the tracker, from the path"
             ),
             **self._over_reach(),
-            "servo_error": self._mean(
-                lambda p: distance(p.servo, p.desired), "mean error by the encoders, links taken as rigid"
-            ),
-            "model_error": self._mean(
-                lambda p: distance(p.servo, p.true), "mean error of the rigid-link model's estimate of the tip"
-            ),
         }
-        if self.hybrid:
+        if np.isfinite(self.points[0].servo).all():
+            metrics["servo_error"] = self._mean(
+                lambda p: distance(p.servo, p.desired), "mean error by the encoders, links taken as rigid"
+            )
+            metrics["model_error"] = self._mean(
+                lambda p: distance(p.servo, p.true), "mean error of the rigid-link model's estimate of the tip"
+            )
+        if self.hybrid and np.isfinite(self.points[0].estimated).all():
             metrics["estimate_error"] = self._mean(
                 lambda p: distance(p.estimated, p.true), "mean error of the hybrid forward model's estimate of the tip"
             )
+        if self.hybrid and self.points[0].outside is not None:
             metrics["outside"] = self._mean(
-                lambda p: float(p.outside), "share of points at which the model had to extrapolate", "1"
+                lambda p: float(bool(p.outside)), "share of points at which the model had to extrapolate", "1"
             )
         visited = f"points visited of the path's {self.parameters.points_in_all}"
         if self.completed is not None and len(self.points) < self.parameters.points_in_all:

@@ -15,10 +15,12 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.parameters import InvalidParameter
+from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.vsl.evaluation import PathEvaluator
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
+from handover.scenarios.vsl.places import PLACES
 
 _GRACE = 5
 """Time by which the path may be completed late before the run ends, s (assumed)."""
@@ -32,6 +34,7 @@ class PathExperiment(Experiment[PathEvaluator]):
         "kinematics": "HybridKinematics",
         "arm": "VslArm",
     }
+    places: ClassVar[Mapping[str, Place]] = PLACES
     headline: ClassVar[tuple[str, ...]] = (
         "mean_error",
         "median_error",

@@ -140,3 +140,39 @@ def test_what_vision_does_not_see_is_not_marked():
     labels = [m.label for m in picture.marks]
     assert "ball, as measured" not in labels
     assert {"wrist, as measured", "gripper, as measured", "ball, as the controller has it"} <= set(labels)
+
+
+def of_a_short_controller(closure: float | None, grip: float, holder: Holder = Holder.HAND) -> Signals:
+    """Return the like for a controller that gives neither phase nor error nor estimates."""
+    full = signals(Phase.APPROACH, holder, beside=0.04)
+    given = {"arm": ("p_WG", "q_WG"), "hand": ("p_WO", "holder"), "camera": ("left", "right"), "vision": (
+        "p_WO_meas", "p_WR_meas", "p_WG_meas", "seen_O", "seen_R")}  # fmt: skip
+    views: dict[str, dict[str, Any]] = {u: {n: full._views[f"{u}.{n}"] for n in names} for u, names in given.items()}
+    ports = {u: {n: full._ports[f"{u}.{n}"] for n in names} for u, names in given.items()}
+    views["arm"]["grip"], ports["arm"]["grip"] = (np.array([grip]),), port("grip", Kind.REAL)
+    views["servo"], ports["servo"] = {}, {}
+    if closure is not None:
+        views["servo"]["closure"], ports["servo"]["closure"] = (np.array([closure]),), port("closure", Kind.REAL)
+    return Signals(views, ports, full)
+
+
+def test_a_controller_without_phases_is_judged_by_its_gripper():
+    moments = (0.0, 0.0, 0.0), (8.0, 1.0, 0.1), (9.0, 1.0, 1.0), (10.1, 1.0, 1.0)
+    evaluator = follow(*((t, of_a_short_controller(closure, grip)) for t, closure, grip in moments))
+    assert evaluator.phases == {"APPROACH": 0.0, "GRASP": 8.0, "HOLD": 9.0}
+    assert evaluator.over
+    outcome = evaluator.outcome()
+    assert "the gripper closed with the ball 0.040 m beside its axis" in outcome.reason
+    assert outcome.metrics["arm_time"].value == 8.0
+    assert not {"controller_error", "model_mismatch"} & set(outcome.metrics)
+    assert {mark.label for p in evaluator.pictures() for mark in p.marks} <= {
+        f"{what}, as measured" for what in ("ball", "wrist", "gripper")
+    }
+    taken = [(t, of_a_short_controller(1.0, 1.0, Holder.GRIPPER)) for t in (8.0, 9.1)]
+    assert follow((0.0, of_a_short_controller(0.0, 0.0)), *taken).outcome().success
+
+
+def test_a_controller_without_a_gripper_command_is_told_how_near_it_came_to_the_ball():
+    evaluator = follow(*((t, of_a_short_controller(None, 0.0)) for t in (0.0, 60.0)))
+    assert evaluator.over
+    assert "the arm came no nearer than 0.040 m to the ball" in evaluator.outcome().reason

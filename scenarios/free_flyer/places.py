@@ -1,0 +1,129 @@
+"""What a unit needs to take a place in the scenarios of the free-flyer."""
+
+from handover.scenarios.experiment.places import Place
+
+_FRAMES = (
+    "W is the world, without gravity. B is the robot's frame, with its origin in its centre of mass; G, the gripper, "
+    "has the axes of B and stands at p_BG. Quaternions are scalar first, of the frame's orientation in W.",
+)
+_ESTIMATE = {
+    "p_WB_meas": "in W",
+    "q_WB_meas": "scalar first",
+    "v_WB_meas": "in W",
+    "w_WB_meas": "as the robot's unit gives it",
+}
+_WRENCH = {"f_B": "at the centre of mass, in B", "tau_B": "in B"}
+_ON_GRIPPER = {"f_G": "at G, in W", "tau_G": "in W"}
+_MOTION = {"p_WG": "in W", "q_WG": "scalar first", "v_WG": "in W", "w_WB": ""}
+_CONTROLLER = Place(
+    required={"f_cmd": "at the centre of mass, in B", "tau_cmd": "in B"},
+    optional={
+        **_ESTIMATE,
+        "p_WG_goal": "in W",
+        "q_WG_goal": "scalar first",
+        "active": "a controller that is not active is to command zeros: the thrusters add all commands",
+        "error_p": "shown as a signal",
+        "error_R": "shown as a signal",
+        "pole_radius": "of metrics of the closed loop, which want damping_ratio and pole_frequency too",
+        "damping_ratio": "see pole_radius",
+        "pole_frequency": "see pole_radius",
+        "behaviour": "the scenario's parameter",
+        "p_BG": "in B",
+        "delay": "the scenario's parameter",
+        "lag": "of the thrusters, as a controller may expect it",
+    },
+    remarks=_FRAMES,
+)
+_POSE = Place(
+    required=_CONTROLLER.required,
+    optional={name: text for name, text in _CONTROLLER.optional.items() if name != "behaviour"},
+    remarks=_FRAMES,
+)
+
+
+def _thrusters(*controllers: str) -> Place:
+    commands = {f"{what}_{name}": "in B" for name in controllers for what in ("f", "tau")}
+    return Place(
+        required={**commands, **_WRENCH, "saturated": "its share of the run is a metric"},
+        optional={"ideal": "the scenario's parameter", "delay": "the scenario's parameter"},
+        remarks=_FRAMES,
+    )
+
+
+_ROBOT = Place(
+    required={**_WRENCH, **_ON_GRIPPER, **_ESTIMATE, **_MOTION, "p_WB": "in W", "q_WB": "scalar first"},
+    optional={"v_WB": "in W", "seed": "follows from the run's seed", "p_BG": "in B", "p_WB_0": "in W"},
+    remarks=_FRAMES,
+)
+
+PLACES_OF_PUSH = {
+    "impedance": _CONTROLLER,
+    "thrusters": _thrusters("impedance"),
+    "push": Place(
+        required=_ON_GRIPPER,
+        optional=dict.fromkeys(("axis", "force", "torque", "start", "duration"), "the scenario's parameter"),
+        remarks=_FRAMES,
+    ),
+    "robot": _ROBOT,
+}
+"""Of `FlyerImpedance`, by the units' names in the system."""
+
+PLACES_OF_HANDOVER = {
+    "decision": Place(
+        required={
+            "impedance": "whether the unit impedance is to be active",
+            "pose": "whether the unit pose is to be active",
+            "p_WG_goal": "in W",
+            "q_WG_goal": "scalar first",
+            "closure": "",
+            "light": "by it the person knows when to act",
+            "phase": "by it the run is judged, and ends",
+            "failed_receptions": "the person may be to feign some",
+            "speed_G": "of the gripper",
+        },
+        optional={
+            **_ESTIMATE,
+            "gripper_angle": "",
+            **dict.fromkeys(
+                ("task", "behaviour", "p_WG_handover", "patience"), "the scenario's, or its parameter's value"
+            ),
+            "p_BG": "in B",
+            "p_WO_0": "in W",
+            "p_OG": "in the object's frame",
+        },
+        remarks=_FRAMES,
+    ),
+    "impedance": _CONTROLLER,
+    "pose": _POSE,
+    "thrusters": _thrusters("impedance", "pose"),
+    "person": Place(
+        required={
+            **_ON_GRIPPER,
+            **_MOTION,
+            "closure": "",
+            "light": "",
+            "gripper_angle": "",
+            "p_WO": "in W",
+            "q_WO": "scalar first",
+            "p_WH": "in W",
+            "q_WH": "scalar first",
+            "finger": "shown in space",
+            "holder": "by it the run is judged",
+            "f_H": "in W; shown over time",
+            "motion": "the scenario's",
+            "object_with": "the scenario's",
+        },
+        optional={
+            "v_WO": "in W",
+            "activity": "shown as a signal",
+            "motion_again": "the scenario's",
+            "seed": "follows from the run's seed",
+            "p_WO_0": "in W",
+            "angle_0": "",
+            "arm_force_max": "the scenario's parameter strength",
+        },
+        remarks=_FRAMES,
+    ),
+    "robot": _ROBOT,
+}
+"""Of the handovers, by the units' names in the system."""

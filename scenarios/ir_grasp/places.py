@@ -1,0 +1,58 @@
+"""What a unit needs to take a place in the infrared grasp."""
+
+from handover.scenarios.experiment.places import Place
+
+_TABLE = (
+    "The scene is planar, seen from above: W lies on the table, with its origin where vision saw the object; headings "
+    "turn counter-clockwise from x of W, and the hand points along its heading."
+)
+_HAND = {"p_WH": "in W", "yaw": "counter-clockwise from x of W", "sigma": ""}
+_COMMAND = {
+    "p_WH_cmd": "in W; the hand goes there at its own speed",
+    "yaw_cmd": "counter-clockwise from x of W",
+    "sigma_cmd": "0 open, 1 closed",
+}
+
+PLACES = {
+    "scene": Place(
+        required={
+            "ticks": "",
+            **_HAND,
+            **_COMMAND,
+            "q": "shown in space",
+            "p_WO": "in W",
+            "yaw_O": "counter-clockwise from x of W",
+            "touching": "an object that is held touches at least two",
+            "range": "",
+            "thing": "the scenario's parameter",
+            "p_WO_0": "in W; drawn from the run's seed",
+            "yaw_O_0": "drawn from the run's seed",
+            "p_WH_0": "in W; drawn from the run's seed",
+            "yaw_H_0": "drawn from the run's seed",
+        },
+        optional={"tension": "shown as a signal", "seed": "follows from the run's seed"},
+        remarks=(_TABLE,),
+    ),
+    "reflex": Place(
+        required={
+            **_COMMAND,
+            "phase": "by it the run is judged: from PULL on the object must stay in the hand, and DONE ends the run",
+        },
+        optional={
+            "ticks": "",
+            **_HAND,
+            "case": "shown as a signal",
+            "cost": "a metric as the hand begins to close",
+            "distance": "metrics as the hand begins to close",
+            "steps": "a metric",
+            "stop": "a metric, and part of the verdict's reason",
+            "strategy": "the scenario's parameter",
+            "forward_distance": "the scenario's parameter forward",
+            "literal": "the scenario's parameter",
+            "p_WH_pregrasp": "in W; by vision",
+            "yaw_pregrasp": "counter-clockwise from x of W; by vision",
+        },
+        remarks=(_TABLE,),
+    ),
+}
+"""By the units' names in the system."""

@@ -1,0 +1,58 @@
+"""What a unit needs to take a place in the scenarios of the arm with links of variable stiffness."""
+
+from handover.scenarios.experiment.places import Place
+
+_WORLD = "W is the world: z points up, and the first joint turns about it; the ground is at z = 0."
+_Q_REF = {"q_ref": "by rigid kinematics, joint 1 first", "qd_ref": "joint 1 first"}
+_COMMAND = {"q_cmd": "joint 1 first", "qd_cmd": "joint 1 first; 0 is as fast as they can"}
+
+PLACES = {
+    "planner": Place(
+        required={
+            **_Q_REF,
+            "p_cmd": "",
+            "p_WG_goal": "errors are those of the tip from it",
+            "segment": "shown over time",
+            "moving": "a point of the path counts as it is left while this is true",
+            "done": "by it the run ends",
+        },
+        optional=dict.fromkeys(
+            ("path", "x_0", "x_g", "N", "V", "settle", "elbow", "pressure"), "the scenario's parameter"
+        ),
+        remarks=(_WORLD,),
+    ),
+    "kinematics": Place(
+        required=_COMMAND,
+        optional={
+            **_Q_REF,
+            "q_meas": "joint 1 first; the links' bending is not in it",
+            "p_meas": "",
+            "i_meas": "joint 1 first",
+            "p_WG_model": "in W; compared with goal and tip",
+            "p_WG_est": "in W; compared with the tip",
+            "outside": "its share of the path is a metric",
+            "method": "the scenario's",
+            "elbow": "the scenario's parameter",
+            "model": "the scenario's parameter",
+        },
+        remarks=(_WORLD,),
+    ),
+    "arm": Place(
+        required={
+            **_COMMAND,
+            "q_meas": "joint 1 first",
+            "p_meas": "",
+            "i_meas": "joint 1 first",
+            "p_WG": "in W",
+            "p_WG_meas": "in W; by it the run is judged",
+            "shape": "in W",
+        },
+        optional={
+            "p_cmd": "",
+            **dict.fromkeys(("motion", "link_2", "link_3", "load", "q_0"), "the scenario's parameter"),
+            "seed": "follows from the run's seed",
+        },
+        remarks=(_WORLD,),
+    ),
+}
+"""By the units' names in the system."""
