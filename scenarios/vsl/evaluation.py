@@ -14,8 +14,10 @@ from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.vsl.parameters import Parameters
 
-_ESTIMATES = ("kinematics.p_WG_model", "kinematics.p_WG_est")
-"""Where the tip is by rigid links and by the forward model."""
+
+def _point(signals: Signals, name: str) -> Floats:
+    """Return a position, NaN where the controller does not give it."""
+    return signals[name] if name in signals else np.full(3, np.nan)
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,8 @@ class PathPoint:
             desired,
             signals["arm.p_WG_meas"],
             signals["arm.p_WG"],
-            *(signals[s] if s in signals else np.full(3, np.nan) for s in _ESTIMATES),
+            _point(signals, "kinematics.p_WG_model"),
+            _point(signals, "kinematics.p_WG_est"),
             bool(signals["kinematics.outside"]) if "kinematics.outside" in signals else None,
         )
 

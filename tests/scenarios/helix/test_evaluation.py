@@ -19,9 +19,20 @@ CALIBRATED = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.24, 0.0, 0.0, 0.24])
 P_WR = P_WG + np.array([0.0, 0.0, 0.1])
 
 
+Views = dict[str, dict[str, tuple[NDArray[Any], ...]]]
+Ports = dict[str, dict[str, FmuPort]]
+
+
 def signals(
     phase: Phase, holder: Holder = Holder.HAND, beside: float = 0.0, along: float = 0.0, sees_ball: bool = True
 ) -> Signals:
+    """Return what a gripper that hangs down, and a ball at a place in its frame, would show."""
+    return Signals(*views_and_ports(phase, holder, beside, along, sees_ball), PICTURE)
+
+
+def views_and_ports(
+    phase: Phase, holder: Holder = Holder.HAND, beside: float = 0.0, along: float = 0.0, sees_ball: bool = True
+) -> tuple[Views, Ports]:
     """Return what a gripper that hangs down, and a ball at a place in its frame, would show."""
     reals = {
         "arm": {"p_WG": P_WG, "q_WG": [0.0, 1.0, 0.0, 0.0]},
@@ -29,10 +40,10 @@ def signals(
         "servo": {"error": [0.01], "p_WO_est": P_WG, "p_WR_est": P_WG, "p_WG_est": P_WG, "q_sys": CALIBRATED},
         "vision": {"p_WO_meas": P_WG, "p_WR_meas": P_WR, "p_WG_meas": P_WG},
     }
-    units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
+    units: Views = {
         unit: {name: (np.array(value),) for name, value in values.items()} for unit, values in reals.items()
     }
-    ports: dict[str, dict[str, FmuPort]] = {
+    ports: Ports = {
         unit: {name: port(name, Kind.REAL, shape=v[0].shape if v[0].size > 1 else ()) for name, v in values.items()}
         for unit, values in units.items()
     }
@@ -45,7 +56,7 @@ def signals(
     pixels = (np.array([PICTURE.ctypes.data]), np.array([PICTURE.size]))
     units["camera"] = dict.fromkeys(("left", "right"), pixels)
     ports["camera"] = {side: port(side, Kind.BINARY) for side in ("left", "right")}
-    return Signals(units, ports, PICTURE)
+    return units, ports
 
 
 def port(name: str, kind: Kind, **more: Any) -> FmuPort:
@@ -144,16 +155,12 @@ def test_what_vision_does_not_see_is_not_marked():
 
 def of_a_short_controller(closure: float | None, grip: float, holder: Holder = Holder.HAND) -> Signals:
     """Return the like for a controller that gives neither phase nor error nor estimates."""
-    full = signals(Phase.APPROACH, holder, beside=0.04)
-    given = {"arm": ("p_WG", "q_WG"), "hand": ("p_WO", "holder"), "camera": ("left", "right"), "vision": (
-        "p_WO_meas", "p_WR_meas", "p_WG_meas", "seen_O", "seen_R")}  # fmt: skip
-    views: dict[str, dict[str, Any]] = {u: {n: full._views[f"{u}.{n}"] for n in names} for u, names in given.items()}
-    ports = {u: {n: full._ports[f"{u}.{n}"] for n in names} for u, names in given.items()}
-    views["arm"]["grip"], ports["arm"]["grip"] = (np.array([grip]),), port("grip", Kind.REAL)
+    views, ports = views_and_ports(Phase.APPROACH, holder, beside=0.04)
     views["servo"], ports["servo"] = {}, {}
+    views["arm"]["grip"], ports["arm"]["grip"] = (np.array([grip]),), port("grip", Kind.REAL)
     if closure is not None:
         views["servo"]["closure"], ports["servo"]["closure"] = (np.array([closure]),), port("closure", Kind.REAL)
-    return Signals(views, ports, full)
+    return Signals(views, ports, PICTURE)
 
 
 def test_a_controller_without_phases_is_judged_by_its_gripper():
