@@ -143,3 +143,25 @@ def test_distance_to_a_path_is_to_its_nearest_leg_or_corner():
     assert distance_to_path(np.array([0.4, 0.3, 0.0]), corners) == pytest.approx(0.3)
     assert distance_to_path(np.array([1.3, 0.0, -0.4]), corners) == pytest.approx(0.5)
     assert distance_to_path(np.array([0.9, 0.0, 0.6]), corners) == pytest.approx(0.1)
+
+
+def test_kinematics_that_only_command_are_judged_without_their_own_view_of_the_tip():
+    class Short(Signals):
+        def __init__(self, full: Signals) -> None:
+            self.full = full
+
+        def __contains__(self, name: object) -> bool:
+            return not str(name).startswith("kinematics.")
+
+        def __getitem__(self, name: str) -> NDArray[Any]:
+            if name not in self:
+                raise KeyError(name)
+            return self.full[name]
+
+    moments = path(0.01, 0.02, 0.03)
+    full = follow(PathEvaluator(Parameters(), hybrid=True), *moments).outcome()
+    short = follow(PathEvaluator(Parameters(), hybrid=True), *map(Short, moments)).outcome()
+    assert short.reason == full.reason
+    lacking = {"servo_error", "model_error", "estimate_error", "outside"}
+    assert lacking <= set(full.metrics)
+    assert short.metrics == {name: metric for name, metric in full.metrics.items() if name not in lacking}
