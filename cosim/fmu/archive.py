@@ -5,6 +5,7 @@ or be unreadable (`archive_faults`). Archives that are written have the same byt
 """
 
 import contextlib
+import io
 import os
 import re
 import stat

@@ -36,7 +36,7 @@ def test_the_page_of_a_long_run(benchmark: BenchmarkFixture, tmp_path: Path) -> 
     t = np.arange(ROWS) * 0.001
     columns = {"time": t, "arm.phase": np.floor(t / 7).astype(np.int64)}
     columns |= {f"arm.x[{k}]": np.sin(t * k) + 0.1 * random.normal(size=ROWS) for k in range(1, COLUMNS)}
-    table = pa.table(columns)
+    table = pa.Table.from_pydict(columns)
     folder = RunFolder(tmp_path / "run")
     folder.make()
     pq.write_table(table, folder.signals)

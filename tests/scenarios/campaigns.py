@@ -73,7 +73,7 @@ def table_of(points: Sequence[Mapping[str, Any]], repetitions: int = 2, **more: 
         **{name: [1.0] * len(runs) for name in ("simulated_seconds", "wall_seconds", "cpu_seconds")},
         **more,
     }
-    table: Any = pa.table({name: list(values) for name, values in columns.items()})
+    table: Any = pa.Table.from_pydict({name: list(values) for name, values in columns.items()})
     roles = {n: "parameter" for p in points for n in p} | dict.fromkeys(more, "metric")
     fields: list[Any] = [
         pa.field(f.name, f.type, metadata={"role": roles.get(f.name, "run"), "unit": "m" if f.name in more else "1"})

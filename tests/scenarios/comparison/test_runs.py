@@ -30,7 +30,7 @@ def run(path: Path, time: Sequence[float], signals: Mapping[str, tuple[str, Any]
     arrays: dict[str, Any] = {n: pa.array(values) for n, (_, values) in signals.items()}
     fields += [pa.field(n, arrays[n].type, metadata={"unit": unit}) for n, (unit, _) in signals.items()]
     columns: dict[str, Any] = {"time": list(time), **arrays}
-    table: Any = pa.table(columns, schema=pa.schema(fields))
+    table: Any = pa.Table.from_pydict(columns, schema=pa.schema(fields))
     pq.write_table(table, path / "signals.parquet")
     return path
 

@@ -26,7 +26,7 @@ CUBE = Body(label="<cube>", colour="#123456", mesh=prism(SQUARE, -0.1, 0.1), p_W
 
 @pytest.fixture
 def record(tmp_path: Path) -> Record:
-    pq.write_table(pa.table({"time": np.linspace(0.0, 10.0, ROWS)}), tmp_path / "s")
+    pq.write_table(pa.Table.from_pydict({"time": np.linspace(0.0, 10.0, ROWS)}), tmp_path / "s")
     return Record(tmp_path / "s")
 
 

@@ -22,7 +22,7 @@ def record(tmp_path: Path) -> Record:
     """Return six rows, a second apart, of an enumeration's signal."""
     phase = pa.field("servo.phase", pa.int64(), metadata={"items": "0 WAIT, 1 LOOK_FAR, 2 LOOK_NEAR, 3 DONE"})
     schema = pa.schema([pa.field("time", pa.float64()), phase])
-    table = pa.table({"time": np.arange(6.0), "servo.phase": np.array([0, 1, 2, 2, 1, 3])}, schema=schema)
+    table = pa.Table.from_pydict({"time": np.arange(6.0), "servo.phase": np.array([0, 1, 2, 2, 1, 3])}, schema=schema)
     pq.write_table(table, tmp_path / "signals.parquet")
     return Record(tmp_path / "signals.parquet")
 
@@ -124,6 +124,6 @@ def test_a_name_that_fits_over_one_phase_is_not_repeated_upright_over_short_ones
 
 
 def test_a_signal_of_which_nothing_is_known_has_no_phases(tmp_path: Path):
-    table = pa.table({"time": np.arange(3.0), "servo.phase": np.full(3, np.nan)})
+    table = pa.Table.from_pydict({"time": np.arange(3.0), "servo.phase": np.full(3, np.nan)})
     pq.write_table(table, tmp_path / "s.parquet")
     assert phases_of(Record(tmp_path / "s.parquet"), "servo.phase") == ()

@@ -119,7 +119,7 @@ def test_a_block_of_ones_own_tells_what_its_outputs_would_have_been(tmp_path: Pa
 
 
 def _one_row(folder: Path) -> Path:
-    pq.write_table(pa.table({"time": [0.0]}), folder / "one.parquet")
+    pq.write_table(pa.Table.from_pydict({"time": [0.0]}), folder / "one.parquet")
     return folder / "one.parquet"
 
 
