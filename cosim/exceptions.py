@@ -159,8 +159,8 @@ class InitializationError(CosimError):
     """A unit did not accept its parameters or did not initialise; nothing has run yet."""
 
     def __init__(self, failure: UnitFailure) -> None:
-        logged = failure.message != failure.status
-        how = failure.message if logged else f"{failure.call} {failure.what}"
+        is_status = failure.message == failure.status and failure.status.isalpha()  # one word, such as Discard
+        how = f"{failure.call} {failure.what}" if is_status else failure.message
         super().__init__(f"{failure.unit} does not start: {how}")
         self.failure = failure
 

@@ -10,6 +10,9 @@ from nbclient import NotebookClient
 NOTEBOOK = Path(__file__).parent.parent / "docs" / "python.ipynb"
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def executed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, Any]]]:
     """Return the outputs of each cell by its first line, after the notebook was executed in an empty folder."""
@@ -53,7 +56,7 @@ def test_a_plot_is_a_picture(executed: dict[str, list[dict[str, Any]]]):
 
 
 def test_numbers_have_units(executed: dict[str, list[dict[str, Any]]]):
-    assert "0.1504 mm - how far the object was pushed" in printed(executed, "moved = ")
+    assert "0.150 mm - how far the object was pushed" in printed(executed, "moved = ")
     assert "(945, 2) m" in printed(executed, "moved = ")
     assert "scene.yaw" in shown(executed, "moved = ", "text/html")
 

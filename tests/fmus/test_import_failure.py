@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from ctypes_host import CtypesHost
 from workshop import Workshop
 
 from handover.fmus.catalog import PackageFailure, UnknownBlock, import_class
@@ -51,10 +52,16 @@ def test_the_builder_tells_it(package: "tuple[str, str]"):
     assert text.count("Cure: ") == 1
 
 
-def test_an_fmu_tells_it(package: "tuple[str, str]", workshop: Workshop):
+@pytest.fixture
+def host(workshop: Workshop) -> CtypesHost:
+    """Return an FMU for a test, made before `package` changes the folders that an FMU notes and other tests find in it."""
+    made = workshop.host("scalars:Scalars", 3)
+    made.free()
+    return made
+
+
+def test_an_fmu_tells_it(host: CtypesHost, package: "tuple[str, str]"):
     name, told = package
-    host = workshop.host("scalars:Scalars", 3)
-    host.free()
     unit = host.folder / "resources" / "unit.json"
     unit.write_text(unit.read_text().replace("_fmu_", f"_fmu_{name}_"))
     (host.folder / "resources" / "sources" / "sample_units" / "scalars.py").write_text(f"import {name}\n")

@@ -138,7 +138,7 @@ def test_a_loop_is_solved_beside_units_with_events():
     "options",
     [
         MasterOptions(algorithm=Algorithm.JACOBI, repeat_discarded=True),
-        MasterOptions(algorithm=Algorithm.JACOBI, adaptive=AdaptiveStep()),
+        pytest.param(MasterOptions(algorithm=Algorithm.JACOBI, adaptive=AdaptiveStep()), marks=pytest.mark.slow),
         MasterOptions(algorithm=Algorithm.JACOBI, extrapolation=Extrapolation.LINEAR),
     ],
     ids=["events", "adaptive", "extrapolated"],

@@ -88,6 +88,7 @@ def test_what_cannot_be_run_is_refused(given: dict[str, object], told: str, tmp_
     assert not (tmp_path / "c").exists()
 
 
+@pytest.mark.slow
 def test_units_are_varied(tmp_path: Path):
     fmus = [handover.unit("IrReflex", fmi=2), handover.unit("IrReflex", fmi=3)]
     campaign = handover.sweep("ir_grasp", units={"reflex": fmus}, strategy="blind", out=tmp_path / "c")

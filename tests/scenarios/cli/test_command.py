@@ -143,8 +143,8 @@ def test_a_broken_fmu_is_refused(tmp_path: Path):
 def test_an_fmu_that_does_not_fit_is_refused_with_every_fault(tmp_path: Path):
     out = tmp_path / "out"
     result = call("run", "helix_handover", "--unit", f"arm={cached('HandoverPartner', 3)}", "--out", out)
-    assert_refused(result, "arm has no output 'backbone'", out)
-    assert "arm has no input 'dl_t'" in result.output
+    assert_refused(result, "unit arm (HandoverPartner) needs the output backbone (real [25,3] m)", out)
+    assert "unit arm (HandoverPartner) needs the input dl_t (real [9] m)" in result.output
 
 
 @pytest.mark.parametrize("below", ["", "x"])

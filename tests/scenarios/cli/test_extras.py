@@ -66,6 +66,7 @@ def test_the_base_installation_takes_less_than_half(base: Path):
     assert size(distributions("handover-cosim")) < 0.5 * size(distributions("handover-cosim", ["all"]))
 
 
+@pytest.mark.slow
 def test_the_base_installation_builds_checks_and_runs_units(base: Path, tmp_path: Path):
     for arguments in (
         ["list"],

@@ -221,7 +221,8 @@ def test_a_scheduler_is_tried_before_units_are_built(here: Path, monkeypatch: py
 def test_a_unit_in_a_place_that_it_does_not_fit_is_reported_at_once(here: Path, monkeypatch: pytest.MonkeyPatch):
     result, begun = sweep(monkeypatch, *CALL, "--unit", f"reflex={cached('GraspScene', 3)}")
     assert result.exit_code == 2, result.output
-    assert "reflex.sigma_cmd is an input, not an output" in result.output
+    assert "unit reflex (GraspScene) needs the output p_WH_cmd (real [2] m)" in result.output
+    assert "its sigma_cmd is an input" in result.output
     assert begun == []
     assert list(here.iterdir()) == []
 

@@ -25,7 +25,7 @@ def test_a_pushed_robot_comes_back_and_moves_as_the_impedance_model_says(tmp_pat
     impulse = np.diff(record.time) @ record["push.f_G"][1:]
     assert impulse == pytest.approx([2.5, 0.0, 0.0])
     figures = {p.name for p in (tmp_path / "r" / "figures").iterdir()}
-    assert figures == {f"{n}.{s}" for n in ("errors", "scene", "thrust") for s in ("png", "svg")}
+    assert figures == {f"{n}.{s}" for n in ("errors", "push", "scene", "thrust") for s in ("png", "svg")}
 
 
 @pytest.mark.parametrize(

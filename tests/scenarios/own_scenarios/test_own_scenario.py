@@ -59,6 +59,7 @@ def test_list_prints_scenario_controller_and_plant(here: Path):
     assert "SpringToGoal: tau = J^T k (p_WG - p_WE) - d v" in succeeded(here, "list", "control:SpringToGoal")
 
 
+@pytest.mark.slow
 def test_another_block_or_file_takes_a_units_place(here: Path):
     (here / "softer.py").write_text(SOFTER)
     succeeded(here, "run", SCENE, "--out", "stiff", "--no-report")
@@ -139,7 +140,9 @@ def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(here: Path):
         here, "run", SCENE, "--unit", "controller=control:Spring"
     )
     (here / "broken.py").write_text("import nowhere_to_be_found\n")
-    assert "No module named 'nowhere_to_be_found'" in refused(here, "sweep", "broken:Scene")
+    assert "the module nowhere_to_be_found is needed, which this Python does not have" in refused(
+        here, "sweep", "broken:Scene"
+    )
 
 
 def test_all_that_a_scenario_lacks_is_told_at_once(here: Path):
@@ -164,6 +167,7 @@ def test_all_that_a_scenario_lacks_is_told_at_once(here: Path):
         assert "(lacking.py, line 15)" in line
 
 
+@pytest.mark.slow
 def test_an_installed_package_adds_scenarios_and_units_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     installed = tmp_path / "site-packages"
     information = installed / "reaching-1.0.dist-info"

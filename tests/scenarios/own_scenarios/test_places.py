@@ -65,6 +65,7 @@ def here(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_controller_without_the_optional_ports_runs_and_what_is_left_out_is_noted_once(here: Path):
     options = ["--unit", "controller=joints:Joints", "-p", "patience=0.5"]
     done = call(here, "run", SCENE, *options, "--out", "run")
@@ -82,6 +83,7 @@ def test_a_controller_without_the_optional_ports_runs_and_what_is_left_out_is_no
     assert {json.loads(p.read_text())["notes"][0] for p in here.glob("swept/runs/*/run.json")} == {note}
 
 
+@pytest.mark.slow
 def test_the_scenarios_own_unit_has_nothing_left_out(here: Path):
     done = call(here, "run", SCENE, "--out", "run", "--no-report", "-p", "patience=0.2")
     assert "left out" not in done.stderr

@@ -35,6 +35,7 @@ def test_a_run_takes_it_and_keeps_it(here: Path):
     assert "unit_values" not in json.loads((here / "stiff" / "run.json").read_text())
 
 
+@pytest.mark.slow
 def test_a_sweep_varies_it(here: Path):
     sweep = ["sweep", SCENE, "controller.stiffness=10:30:3", "patience=0.1", "-p", "arm.mass=2", "--out", "swept"]
     printed = succeeded(here, *sweep)
@@ -87,6 +88,7 @@ class Soft(SpringToGoal):
 """
 
 
+@pytest.mark.slow
 def test_a_sweep_varies_the_unit_itself(here: Path):
     (here / "soft.py").write_text(SOFT)
     (here / "else").mkdir()
