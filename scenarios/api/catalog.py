@@ -5,40 +5,47 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.description import FmuDescription, describe_fmu
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
-from handover.fmus.catalog import UNITS
+from handover.fmus.catalog import UnknownBlock, UnknownUnit
 from handover.scenarios.api.arguments import InvalidInput, errors_for_python, merged, seed_of, texts_of, unit_texts
 from handover.scenarios.api.campaign_result import Campaign
 from handover.scenarios.api.run_result import Run
 from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.catalog import search_folder
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import RunFolder
 
 
 def unit(name: str, fmi: Literal[2, 3] = 3) -> Path:
-    """Return the FMU of a catalogued unit, such as "TendonArm", for `System.add`; it is built where it is not yet.
+    """Return the FMU of a unit, for `System.add`; it is built where it is not yet.
+
+    Args:
+        name: a unit of the catalog or of an installed package, such as "TendonArm", or the path of a block, such as
+            "my_arm:MyArm", whose module is looked for in the working directory first.
+        fmi: 2 or 3.
 
     Raises:
         InvalidInput: there is no such unit, or it cannot be built in this standard.
     """
-    if name not in UNITS:
-        raise InvalidInput(f"no unit {name!r}: {nearest(name, UNITS)}")
-    with errors_for_python():
-        return cached(name, fmi)
+    search_folder(Path.cwd())
+    try:
+        with errors_for_python():
+            return cached(name, fmi)
+    except (UnknownUnit, UnknownBlock) as e:
+        raise InvalidInput(str(e)) from e
 
 
 def describe(fmu: str | Path) -> FmuDescription:
-    """Return what an FMU declares, which a notebook shows as a table: of a file, or of a catalogued unit.
+    """Return what an FMU declares, which a notebook shows as a table: of a file, or of a unit as `unit` takes it.
 
     Raises:
         InvalidInput: it is no valid FMU, or no unit of that name.
     """
     with errors_for_python():
-        return describe_fmu(unit(str(fmu)) if str(fmu) in UNITS else Path(fmu))
+        return describe_fmu(Path(fmu) if Path(fmu).suffix.lower() == ".fmu" else unit(str(fmu)))
 
 
 def system(

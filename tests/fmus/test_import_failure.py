@@ -54,7 +54,7 @@ def test_the_builder_tells_it(package: "tuple[str, str]"):
 
 @pytest.fixture
 def host(workshop: Workshop) -> CtypesHost:
-    """Return an FMU for a test, made before `package` changes the folders that an FMU notes and other tests find in it."""
+    """Return an instance's host, whose FMU is made before `package` changes the folders that it notes."""
     made = workshop.host("scalars:Scalars", 3)
     made.free()
     return made
