@@ -16,7 +16,8 @@ from handover.fmus.build import cached
 from handover.scenarios.cli.command import main
 from handover.scenarios.free_flyer.impedance import FlyerImpedance
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.results.summary import describe_system, parameter_rows
+from handover.scenarios.results.summary import parameter_rows
+from handover.scenarios.results.system_facts import describe_system
 from handover.scenarios.results.task import Task
 
 

@@ -19,10 +19,10 @@ from handover.scenarios.results.summary import (
     crashed_summary,
     faults_of,
     metric_data,
-    peak_memory,
     unstarted_run,
     unstarted_summary,
 )
+from handover.scenarios.results.system_facts import peak_memory
 from handover.scenarios.results.tables import format_metric
 
 

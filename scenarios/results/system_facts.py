@@ -1,0 +1,83 @@
+"""What is told of a run's system, whatever the scenario: units and connections, CPU times, memory, iterations.
+
+`run.json` keeps the system's units and connections for the report's graph (`describe_system`); `run_metrics` are the
+metrics that every run has.
+"""
+
+import statistics
+import sys
+from typing import Any
+
+import numpy as np
+
+from handover.cosim.master.master import Master
+from handover.cosim.stepping.iteration import IterationCount
+from handover.cosim.system.system import Connection, PlacedUnit, System
+from handover.scenarios.experiment.experiment import Experiment, Metric
+
+
+def describe_system(system: System, *, adaptive: bool) -> dict[str, Any]:
+    """Return the units and connections of a checked system, as JSON can hold them; for `adaptive` see `own_period`."""
+    units = [
+        {
+            "name": name,
+            "model": unit.description.name,
+            "fmi": str(unit.description.fmi),
+            "period": own_period(unit, adaptive=adaptive),
+            "sampled": unit.sampled,
+        }
+        for name, unit in system.units.items()
+    ]
+    return {"units": units, "connections": [_describe_connection(system, c) for c in system.connections]}
+
+
+def own_period(unit: PlacedUnit, *, adaptive: bool) -> float | None:
+    """Return a unit's step, s; None where it varies: with adaptive steps, only sampled units keep their own."""
+    return None if adaptive and not unit.sampled else float(unit.period)
+
+
+def _describe_connection(system: System, c: Connection) -> dict[str, Any]:
+    port = system.units[c.source.unit].description.outputs.get(c.source.port)
+    if port is None:
+        kind, unit, size = "clock", "", 1
+    else:
+        kind, unit, size = port.kind.value, port.unit.symbol, port.size
+    return {"source": str(c.source), "target": str(c.target), "unit": unit, "size": size, "kind": kind}
+
+
+def run_metrics(experiment: Experiment[Any], master: Master) -> dict[str, Metric]:
+    """Return the metrics that every run has, by name: memory, CPU times, and iterations if steps were iterated."""
+    medians = [statistics.median(master.cpu[u]) for u in experiment.cycle() if master.cpu[u]]
+    peak = peak_memory()
+    units = " + ".join(experiment.cycle())
+    metrics: dict[str, Metric] = {}
+    if peak is not None:
+        metrics["peak_memory"] = Metric(peak, "B", "largest resident memory of the process")
+    if medians:
+        metrics["cpu_per_cycle"] = Metric(sum(medians), "s", f"median CPU time of a control cycle ({units})")
+    for name, spent in master.cpu.items():
+        total = float(np.sum(spent))
+        metrics[f"cpu_{name}"] = Metric(total, "s", f"CPU time of {name} in all")
+        period = own_period(master.system.units[name], adaptive=master.steps is not None)
+        simulated = master.time if period is None else len(spent) * period
+        metrics[f"pace_{name}"] = Metric(simulated / total if total else 0.0, "1", f"simulated s per CPU s of {name}")
+    return {**metrics, **_iterations(master.iterations)}
+
+
+def peak_memory() -> float | None:
+    """Return the process's peak resident memory in bytes, None where the system does not report it (Windows)."""
+    try:
+        import resource
+    except ImportError:
+        return None
+    return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) * (1 if sys.platform == "darwin" else 1024)
+
+
+def _iterations(count: IterationCount) -> dict[str, Metric]:
+    if not count.steps:
+        return {}
+    text = f"mean number of iterations of a step that was iterated, {count.most} at most"
+    return {
+        "iterations": Metric(count.iterations / count.steps, "1", text),
+        "rollbacks": Metric(count.rollbacks, "1", "how often units were rolled back to the start of a step"),
+    }
