@@ -267,3 +267,10 @@ def test_a_unit_that_fails_ends_the_run_with_status_3_and_keeps_the_record(tmp_p
     assert summary["reason"].startswith("a unit failed: arm: fmi3DoStep at t = 0.3 s: RuntimeError: a tendon tore")
     assert Record(out / "signals.parquet").time[-1] == pytest.approx(0.3)
     assert (out / "report.html").is_file()
+
+
+@pytest.mark.parametrize(("words", "completed"), [("com", "compare"), ("run --alg", "--algorithm")])
+def test_a_shell_completes_commands_and_options(words: str, completed: str):
+    told = {"_HANDOVER_COMPLETE": "bash_complete", "COMP_WORDS": f"handover {words}"}
+    result = CliRunner().invoke(main, env={**told, "COMP_CWORD": str(len(words.split()))}, prog_name="handover")
+    assert result.output.strip() == f"plain,{completed}"
