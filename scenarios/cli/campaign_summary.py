@@ -2,6 +2,8 @@
 
 import math
 from collections import Counter
+from dataclasses import asdict
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -19,6 +21,27 @@ _MAX_POINTS = 12
 _MAX_REASONS = 5
 _COLUMN_WIDTH = 24
 """Characters that a metric's column takes; as many metrics are shown as fit the terminal."""
+
+
+def campaign_data(results: CampaignResults, counts: RunCounts, folder: CampaignFolder) -> dict[str, Any]:
+    """Return how the runs of each point went, as JSON can hold it; medians of metrics stand with their units."""
+    points = [
+        {
+            "values": dict(point.values),
+            "runs": len(point.rows),
+            "done": len(point.done),
+            "successes": point.successes,
+            "interval": None if point.interval is None else [point.interval.low, point.interval.high],
+            "medians": {
+                name: {"value": median, "unit": results.table.unit(name)}
+                for name in results.measured
+                if math.isfinite(median := results.median(point, name))
+            },
+        }
+        for point in results.points
+    ]
+    places = {"folder": str(folder.path), "table": str(folder.table)}
+    return {"scenario": results.scenario, "counts": asdict(counts), "points": points, **places}
 
 
 def print_campaign(results: CampaignResults, counts: RunCounts, folder: CampaignFolder) -> None:

@@ -15,7 +15,7 @@ from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, HeadedOption, Seconds, limit_options, limits, scenario_options
-from handover.scenarios.cli.run_summary import exit_with
+from handover.scenarios.cli.run_summary import AS_JSON, exit_with
 from handover.scenarios.execution.errors import one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import progress_bar
@@ -79,6 +79,7 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
     help="Refuse an FMU that breaks the standard even where co-simulation does not touch the fault; see"
     " `handover check`.  [default: warn]",
 )
+@click.option(AS_JSON, "as_json", is_flag=True, help="Print the summary as JSON, with the run's folder.")
 @click.help_option("-h", "--help")
 @file_options
 @_record_option(
@@ -109,6 +110,7 @@ def run(
     formats: Sequence[str],
     every: Fraction | None,
     no_report: bool,
+    as_json: bool,
     strict: bool,
     call_limit: float,
     pace: float | None,
@@ -136,4 +138,4 @@ def run(
         task = replace(request, options=options).task(opened)
         with progress_bar(sys.stderr) as progress:
             result = run_task(task, progress, interruption)
-    exit_with(result, task)
+    exit_with(result, task, as_json=as_json)

@@ -1,5 +1,6 @@
 """What a command prints of a run that has ended or crashed, and with which exit status it ends."""
 
+import json
 import shlex
 import sys
 from collections.abc import Sequence
@@ -21,6 +22,11 @@ from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
 _MAX_CONVERSIONS = 8
 """Conversions of physical units that are listed at the end of a run."""
+
+
+def print_summary_as_json(result: RunResult, folder: RunFolder) -> None:
+    """Print what `summary.json` says, with the run's folder."""
+    click.echo(json.dumps({**result.summary, "folder": str(folder.shown)}, indent=2, allow_nan=False))
 
 
 def print_summary(result: RunResult, headline: Sequence[str], folder: RunFolder) -> None:
@@ -51,15 +57,21 @@ def _conversion_rows(folder: RunFolder) -> list[tuple[str, str]]:
     return [(f"converted: {ends}", change) for ends, change in conversions[:_MAX_CONVERSIONS]] + more
 
 
-def exit_with(result: RunResult, task: Task) -> NoReturn:
-    """Print how a run ended, and exit with the status for that."""
+def exit_with(result: RunResult, task: Task, *, as_json: bool = False) -> NoReturn:
+    """Print how a run ended, as JSON or for people, and exit with the status for that."""
     if result.failure:
         click.echo(str(result.failure), err=True)
     for line in result.left_out:
         click.echo(line, err=True)
-    print_summary(result, task.experiment.headline, task.folder)
+    if as_json:
+        print_summary_as_json(result, task.folder)
+    else:
+        print_summary(result, task.experiment.headline, task.folder)
     sys.exit(status_of_run(unit_failed=result.failure is not None, succeeded=result.outcome.success))
 
+
+AS_JSON = "--json"
+"""The option by which the summary is printed as JSON."""
 
 _SIGNAL_STATUS = 128  # shells add it to a signal's number
 
@@ -80,7 +92,10 @@ def report_crash(heartbeat: Heartbeat, end: ChildEnd, wall: float) -> int:
         result = crash.complete(crash.folder)
         if crash.presented:
             _write_page(crash.folder)
-        print_summary(result, (), crash.folder)
+        if AS_JSON in sys.argv:  # what crashed was the process that had read the options
+            print_summary_as_json(result, crash.folder)
+        else:
+            print_summary(result, (), crash.folder)
     except RecordNotWritten as e:
         sys.stderr.write(f"{e}\n")
     return UNIT_FAILED

@@ -1,5 +1,6 @@
 """The command `handover sweep`: a campaign over all combinations of parameters' values."""
 
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -63,6 +64,7 @@ Exit status
 @click.option(
     "--paired", is_flag=True, help="Let all combinations of a repetition share a seed, to compare them run by run."
 )
+@click.option("--json", "as_json", is_flag=True, help="Print the results of all points as JSON.")
 @scenario_options
 @campaign_options
 @master_options
@@ -77,6 +79,7 @@ def sweep(
     replaced: Sequence[str],
     out: Path | None,
     no_report: bool,
+    as_json: bool,
     workers: int | None,
     scheduler: str | None,
     call_limit: float,
@@ -107,9 +110,13 @@ def sweep(
     outcome = run_campaign_command(plan, out, pool, (lambda _folder, _table: None) if no_report else _write_report)
 
     from handover.scenarios.campaign.results import CampaignResults  # its statistics take long to load
-    from handover.scenarios.cli.campaign_summary import print_campaign
+    from handover.scenarios.cli.campaign_summary import campaign_data, print_campaign
 
-    print_campaign(CampaignResults(outcome.folder.read(), outcome.table), outcome.counts, outcome.folder)
+    results = CampaignResults(outcome.folder.read(), outcome.table)
+    if as_json:
+        click.echo(json.dumps(campaign_data(results, outcome.counts, outcome.folder), indent=2, allow_nan=False))
+    else:
+        print_campaign(results, outcome.counts, outcome.folder)
     sys.exit(outcome.status)
 
 

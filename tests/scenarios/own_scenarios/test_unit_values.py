@@ -115,3 +115,15 @@ def test_units_that_cannot_be_varied_are_told_and_nothing_is_written(here: Path)
     assert done.returncode == 2
     assert "4 faults in the system" in done.stderr
     assert not (here / "other").exists()
+
+
+def test_a_run_and_a_sweep_are_summarised_as_json(here: Path):
+    done = call(here, "run", SCENE, *QUIET, "--json", "--out", "run")
+    summary = json.loads(done.stdout)
+    assert (done.returncode, summary["success"], summary["folder"]) == (1, False, "run")
+    assert summary["metrics"]["distance"]["unit"] == "m"
+    swept = json.loads(succeeded(here, "sweep", SCENE, "arm.mass=1,2", *QUIET, "--json", "--out", "swept"))
+    assert swept["counts"]["ended"] == 2
+    assert [p["values"] for p in swept["points"]] == [{"arm.mass": "1"}, {"arm.mass": "2"}]
+    assert [p["successes"] for p in swept["points"]] == [0, 0]
+    assert swept["points"][0]["medians"]["distance"]["unit"] == "m"
