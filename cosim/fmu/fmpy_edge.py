@@ -147,7 +147,7 @@ def problems_of(path: Path) -> tuple[list[str], str]:
     try:
         md: Any = fmpy.read_model_description(archive.xml_source(), validate=False)
         problems += validate_model_description(md, validate_variable_names=True, validate_model_structure=True)
-    except Exception as e:
+    except Exception as e:  # as above
         return problems, f"{type(e).__name__}: {one_line(e)}"
     return problems, ""
 

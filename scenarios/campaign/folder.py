@@ -9,7 +9,6 @@ import json
 import os
 import platform
 import shutil
-import time
 from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from handover.scenarios.catalog import named_scenario
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
     check_place,
+    dated_folder,
     disk_errors_reported,
     folder_held,
     read_object,
@@ -261,9 +261,4 @@ def _stem(plan: CampaignPlan) -> str:
 
 
 def _new_folder(plan: CampaignPlan) -> CampaignFolder:
-    name = time.strftime(f"%Y-%m-%d_%H%M%S_{_stem(plan)}")
-    path, number = PLACE / name, 1
-    while path.exists():
-        number += 1
-        path = PLACE / f"{name}_{number}"
-    return CampaignFolder(path)
+    return CampaignFolder(dated_folder(PLACE, _stem(plan)))

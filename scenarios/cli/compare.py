@@ -1,7 +1,6 @@
 """The command `handover compare`: campaigns, or runs, on one page and in one table."""
 
 import json
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from handover.scenarios.execution.errors import UsageError, one_line_errors
-from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.run_folder import RunFolder, dated_folder
 
 if TYPE_CHECKING:
     from handover.scenarios.comparison.page import Comparison
@@ -91,12 +90,7 @@ _PLACE = Path("comparisons")
 def _default(scenario: str) -> Path:
     """Return a folder that is not there, named by the date and the scenario."""
     stem = scenario.partition(":")[2] or scenario
-    name = time.strftime(f"%Y-%m-%d_%H%M%S_{Path(stem).stem}")
-    path, number = _PLACE / name, 1
-    while path.exists():
-        number += 1
-        path = _PLACE / f"{name}_{number}"
-    return path
+    return dated_folder(_PLACE, Path(stem).stem)
 
 
 def _print(comparison: "Comparison", folder: RunFolder) -> None:

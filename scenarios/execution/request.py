@@ -4,7 +4,6 @@ Names of options in messages are those of the command.
 """
 
 import contextlib
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -22,7 +21,7 @@ from handover.scenarios.execution.selection import find_scenario, own_source, re
 from handover.scenarios.execution.ssp_run import is_ssp, open_experiment, source_of, system_experiment
 from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.experiment.experiment import Experiment, NoParameters
-from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.run_folder import RunFolder, dated_folder
 from handover.scenarios.results.task import Task
 
 RUNS = Path("runs")
@@ -194,9 +193,4 @@ class RunRequest:
 
 def default_run_folder(stem: str) -> Path:
     """Return a folder in `runs/` that is not there yet, named by date, time and `stem`."""
-    name = time.strftime(f"%Y-%m-%d_%H%M%S_{stem}")
-    path, number = RUNS / name, 1
-    while path.exists():
-        number += 1
-        path = RUNS / f"{name}_{number}"
-    return path
+    return dated_folder(RUNS, stem)

@@ -12,6 +12,7 @@ import json
 import os
 import platform
 import shutil
+import time
 from collections.abc import Generator, Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -231,6 +232,16 @@ def write_whole(path: Path, text: str) -> None:
         except OSError:
             unfinished.unlink(missing_ok=True)
             raise
+
+
+def dated_folder(place: Path, stem: str) -> Path:
+    """Return a folder in `place` that is not there yet, named by date, time and `stem`."""
+    name = time.strftime(f"%Y-%m-%d_%H%M%S_{stem}")
+    path, number = place / name, 1
+    while path.exists():
+        number += 1
+        path = place / f"{name}_{number}"
+    return path
 
 
 def sha256_of(file: Path) -> str:
