@@ -22,7 +22,7 @@ from handover.fmus.catalog import UNITS
 
 DRIVER = Path(__file__).with_name("driver.py")
 SEED = 20
-FEW, FEW_APART, MANY = 60, 20, 2000
+FEW, FEW_APART, MANY = 25, 10, 2000
 SOON = 3.0
 HUNG = 60.0
 """Seconds without another call."""
@@ -140,6 +140,7 @@ def test_a_few_sequences_on_light_units(pool: WorkerPool, tmp_path: Path):
     pool.run()
 
 
+@pytest.mark.slow
 def test_a_unit_that_crashes_or_hangs_is_reported_with_its_last_calls(pool: WorkerPool, tmp_path: Path):
     for name in ("Crashing", "Hanging"):
         fmu = build_block(f"sample_units.fatal:{name}", 3, tmp_path)

@@ -21,13 +21,15 @@ from handover.scenarios.results.tolerated_faults import GuardedEvaluator, Tolera
 
 KINDS = {"zero": 0.0, "one": 1.0, "nan": np.nan, "infinite": np.inf}
 FIRST = ("flyer_impedance", "ir_grasp")
+ALL = [(rows, kind, name) for name in SCENARIOS for kind in KINDS for rows in (1, 2, 40)]
+FAST = [(*some, name) for name in FIRST for some in ((1, "one"), (2, "zero"), (2, "infinite"), (40, "nan"))]
 
 
 @pytest.mark.filterwarnings("ignore:.*:RuntimeWarning")
-@pytest.mark.parametrize("rows", [1, 2, 40])
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in FIRST else (pytest.mark.slow,)) for n in SCENARIOS])
-def test_verdict_figures_and_page_are_made_of_any_outputs(name: str, kind: str, rows: int, tmp_path: Path):
+@pytest.mark.parametrize(
+    ("rows", "kind", "name"), [pytest.param(*one, marks=() if one in FAST else pytest.mark.slow) for one in ALL]
+)
+def test_verdict_figures_and_page_are_made_of_any_outputs(rows: int, kind: str, name: str, tmp_path: Path):
     experiment = SCENARIOS[name]()
     parameters = parse_parameters(SCENARIOS[name], ())
     system = experiment.build(parameters, 0, lambda unit: cached(experiment.units[unit], 3))
@@ -83,7 +85,9 @@ def test_an_arm_whose_outputs_are_all_zero_costs_neither_verdict_nor_page(tmp_pa
     assert 'id="signals"' in page
 
 
-@pytest.mark.parametrize("where", ["__call__", "over", "finish", "outcome", "pictures"])
+@pytest.mark.parametrize(
+    "where", ["__call__", *(pytest.param(w, marks=pytest.mark.slow) for w in ("over", "finish", "outcome")), "pictures"]
+)
 def test_an_evaluator_that_fails_leaves_a_whole_run_that_is_not_judged(
     where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

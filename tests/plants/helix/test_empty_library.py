@@ -109,6 +109,7 @@ def test_with_a_screen_the_real_libraries_are_taken():
     assert call(sys.executable, "-c", COMPARE).stdout.split() == ["True", "True"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [[], ["--isolate", "all"]])
 def test_without_a_screen_an_arm_runs_to_the_same_bytes(
     without_screen: "list[str]", options: "list[str]", tmp_path: Path

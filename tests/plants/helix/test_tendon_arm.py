@@ -112,6 +112,7 @@ def test_sags_away_from_constant_curvature_with_a_slack_tendon_as_the_paper_show
     assert np.count_nonzero(y.tension < 0.01) == 1
 
 
+@pytest.mark.slow
 def test_discs_converge_quadratically_to_a_tip_error_below_a_millimetre():
     u = Inputs(dl_t=tendon_lengths(Q_SYS) - CALIBRATED, f_G=np.array([0.05, 0.2, 0.1]))
     coarse, usual, fine = (settled(u, discs).p_WG for discs in [(2, 4, 4), (4, 8, 8), (8, 16, 16)])

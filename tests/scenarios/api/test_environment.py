@@ -23,7 +23,10 @@ DRAWN_AND_DRIVEN = {
 
 
 @pytest.mark.filterwarnings("ignore:.*Box (action|observation) space.*")
-@pytest.mark.parametrize(("scenario", "place"), DRAWN_AND_DRIVEN.items())
+@pytest.mark.parametrize(
+    ("scenario", "place"),
+    [pytest.param(*one, marks=() if one[0] == "ir_grasp" else pytest.mark.slow) for one in DRAWN_AND_DRIVEN.items()],
+)
 def test_gymnasium_accepts_it(scenario: str, place: str):
     env = handover.environment(scenario, place=place)
     try:

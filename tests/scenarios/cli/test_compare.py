@@ -29,6 +29,7 @@ def compare(*arguments: object) -> Result:
     return CliRunner().invoke(main, ["compare", *map(str, arguments)])
 
 
+@pytest.mark.slow
 def test_a_known_difference_is_found_run_by_run(grasps: Path, tmp_path: Path, browser: Browser):
     out = tmp_path / "out"
     call = (grasps / "far", grasps / "near", "--name", "10 cm", "--name", "<at once>", "--out", out)

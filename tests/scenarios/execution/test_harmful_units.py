@@ -24,11 +24,8 @@ HARMLESS_IN_THE_END = (
     "trap_division", "fork_itself", "limit_files", "limit_descriptors",
 )  # fmt: skip
 FIRST = {
-    ("close_descriptors", "step"),
-    ("take_output", "load"),
     ("round_up", "step"),
     ("fork_itself", "step"),
-    ("limit_files", "step"),
 }
 
 
@@ -80,7 +77,7 @@ def test_a_run_ends_as_if_the_unit_had_done_no_harm(
 @pytest.mark.parametrize(
     ("bad", "text"),
     [
-        ("hang_in_load", "bad: loading of its library at t = 0 s did not return within 0.5 s"),
+        pytest.param("hang_in_load", "bad: loading of its library at t = 0 s did not return within 0.5 s", marks=slow),
         ("hang_in_unload", "bad: unloading of its library at t = 1 s did not return within 0.5 s"),
         pytest.param("hang_in_instantiate", "bad: fmi3InstantiateCoSimulation at t = 0 s did not", marks=slow),
         pytest.param("hang_in_terminate", "bad: fmi3Terminate at t = 1 s did not return within 0.5 s", marks=slow),
@@ -117,6 +114,7 @@ def test_a_thread_of_a_unit_that_crashes_is_told_with_the_unit(tmp_path: Path):
     assert (failure["kind"], failure["instance"]) == ("crash", "bad")
 
 
+@slow
 def test_what_a_unit_has_forked_does_not_outlive_the_run(tmp_path: Path):
     going = start(
         tmp_path, failing_ssp(tmp_path, "fork_and_hang_in_step"), "--out", "r", "--call-limit", "2", "--no-report"
@@ -136,7 +134,7 @@ def test_what_a_unit_has_forked_does_not_outlive_the_run(tmp_path: Path):
 @pytest.mark.parametrize(
     ("bad", "isolate"),
     [
-        ("sleep_in_group", ("--isolate", "all")),
+        pytest.param("sleep_in_group", ("--isolate", "all"), marks=slow),
         ("sleep_in_daemon", ()),
         pytest.param("sleep_in_daemon", ("--isolate", "all"), marks=slow),
     ],
@@ -157,7 +155,7 @@ def test_what_a_unit_has_forked_and_left_ends_with_the_command(bad: str, isolate
     assert len(seen) > 1 + 3 * bool(isolate), "nothing was forked"
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=slow)])
 def test_a_run_that_a_unit_has_stopped_can_be_aborted(number: signal.Signals, tmp_path: Path):
     going = start(tmp_path, failing_ssp(tmp_path, "stop_itself_in_step"), "--out", "r", "--call-limit", "0")
 

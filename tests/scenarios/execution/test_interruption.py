@@ -115,6 +115,7 @@ def test_ctrl_c_while_units_are_built_leaves_nothing(tmp_path: Path, monkeypatch
     assert not out.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("block", BLOCKS)
 def test_a_second_ctrl_c_ends_a_run_whose_unit_hangs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("HANGING_ARM_TELLS", str(tmp_path / "hangs"))

@@ -61,7 +61,7 @@ def slow(*values: Any) -> Any:
 @pytest.mark.parametrize(
     ("scenario", "every", "passed", "number"),
     [
-        ("ir_grasp -p strategy=forward -p forward=0.055 --format csv --format mat", 0.7, 1.6, signal.SIGKILL),
+        slow("ir_grasp -p strategy=forward -p forward=0.055 --format csv --format mat", 0.7, 1.6, signal.SIGKILL),
         slow("ir_grasp", 3, 7, signal.SIGKILL),
         slow("ir_grasp", 3, 7, signal.SIGINT),
         slow("flyer_robot_to_human", 4, 9, signal.SIGKILL),

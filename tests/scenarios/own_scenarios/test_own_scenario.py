@@ -39,6 +39,7 @@ def here(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_it_runs_and_its_report_is_written_again_from_elsewhere(here: Path, tmp_path: Path):
     printed = succeeded(here, "run", SCENE, "-p", "goal=0.4,0.3", "--out", "first")
     assert "two_link_reach succeeded" in printed

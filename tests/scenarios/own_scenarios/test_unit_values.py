@@ -117,6 +117,7 @@ def test_units_that_cannot_be_varied_are_told_and_nothing_is_written(here: Path)
     assert not (here / "other").exists()
 
 
+@pytest.mark.slow
 def test_a_run_and_a_sweep_are_summarised_as_json(here: Path):
     done = call(here, "run", SCENE, *QUIET, "--json", "--out", "run")
     summary = json.loads(done.stdout)
