@@ -173,6 +173,10 @@ class CampaignResults:
         values = self._measured_at(point, metric)
         return float(np.median(values)) if len(values) else np.nan
 
+    def number_measured(self, point: PointResults, metric: str) -> int:
+        """Return of how many of the runs done a metric has a value; a sensor may not have seen its object."""
+        return len(self._measured_at(point, metric))
+
     def median_interval(self, point: PointResults, metric: str) -> Interval | None:
         """Return the interval of a median by bootstrap; None where the values are fewer than three, or all the same."""
         key = (point.number, metric)

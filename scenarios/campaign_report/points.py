@@ -43,6 +43,8 @@ def points_section(results: CampaignResults) -> Section | None:
     first = len(header) - 3 - len(metrics)
     line = "Of the runs done. Intervals of success rates: Clopper and Pearson"
     line += "; of medians: bootstrap, from three values on." if results.has_intervals and metrics else "."
+    if any(results.number_measured(p, m) < len(p.done) for p in points for m in metrics):
+        line += " “Of 2”: so many of the runs done have a value."
     table = rows_table(header, rows, numbers=range(first, len(header)), sortable=True)
     note = Markup("<p class='soft'>{}</p>").format(line)
     return Section(anchor="points", title="Points", html=table + note, scripts=("campaign.js",))
@@ -83,7 +85,8 @@ def _median(results: CampaignResults, point: PointResults, metric: str, unit: Di
     if span is not None:
         low, high = (f"{x * unit.factor:.{max(digits - 1, 0)}f}" for x in (span.low, span.high))
         line += f" ({low} to {high})"
-    return Cell(line, median)
+    number = results.number_measured(point, metric)
+    return Cell(line if number == len(point.done) else f"{line}, of {number}", median)
 
 
 _SCREEN = 15

@@ -75,6 +75,7 @@ def _point(results: ComparedCampaigns, point: PointResults) -> dict[str, Any]:
     metrics = {
         m: {
             "median": _number(results.median(point, m)),
+            "runs": results.number_measured(point, m),
             "interval": _interval(results.median_interval(point, m)),
         }
         for m in results.shown_metrics

@@ -143,6 +143,15 @@ def test_numbers_of_a_column_have_one_precision(tmp_path: Path):
         assert "0.05991" not in part.replace("data-key='5.991e-05'", "")
 
 
+def test_a_median_of_some_of_the_runs_says_of_how_many(tmp_path: Path):
+    table = table_of(POINTS, final_distance_thumb=[0.04, math.nan, 0.06, 0.06])
+    page = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table)
+    part = page.partition('id="points"')[2].partition("</section>")[0]
+    assert ">40, of 1<" in part
+    assert ">60<" in part
+    assert "so many of the runs done have a value" in part
+
+
 def test_few_runs_are_points_and_many_have_a_box_too():
     for repetitions, boxed in ((5, False), (12, True)):
         values = np.linspace(0.01, 0.02, 2 * repetitions).tolist()

@@ -102,7 +102,7 @@ def test_a_metric_that_one_lacks_is_shown_where_it_is(tmp_path: Path):
     results = compared(first, second, metrics=["moved", "pushed"])
     assert metric_tests(results, "pushed") == []
     (point,) = campaigns_data(results, ())["points"]
-    assert point["campaigns"]["a"]["metrics"]["pushed"] == {"median": None, "interval": None}
+    assert point["campaigns"]["a"]["metrics"]["pushed"] == {"median": None, "runs": 0, "interval": None}
     assert point["campaigns"]["b"]["metrics"]["pushed"]["median"] == 0.5
     header, a, b = campaigns_csv(results).splitlines()
     assert header.endswith("moved_median,moved_low,moved_high,pushed_median,pushed_low,pushed_high")
