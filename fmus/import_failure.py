@@ -35,11 +35,11 @@ def explain_import(error: BaseException) -> str:
         needs = f"{package} needs the module {module}" if package else f"the module {module} is needed"
         return f"{needs}, which this Python does not have ({sys.executable or sys.prefix}). Cure: {_install(module)}"
     cause = [str(e) for e in _chain(error) if isinstance(e, ImportError)] or messages
-    told = next((line.strip() for line in cause[-1].splitlines() if line.strip()), type(error).__name__)
+    reason = next((line.strip() for line in cause[-1].splitlines() if line.strip()), type(error).__name__)
     what = package or module
     place = "" if package else " ({}, line {})".format(*_raised_at(error))
     anew = f" Cure: install it anew, `python -m pip install --force-reinstall {_distribution(what)}`" if what else ""
-    return f"importing {what or 'a module'} fails: {told.rstrip('.')}{place}.{anew}"
+    return f"importing {what or 'a module'} fails: {reason.rstrip('.')}{place}.{anew}"
 
 
 def is_of_a_package(error: BaseException) -> bool:

@@ -212,8 +212,8 @@ def describe_fmu(path: Path) -> FmuDescription:
     inputs = by_causality[Causality.INPUT]
     declared, presumed = _feedthrough(md.outputs, owner, inputs)
     initial, presumed_initial = _feedthrough(md.initialUnknowns, owner, inputs)
-    told_initially = {owner.get(u.variable.valueReference) for u in md.initialUnknowns}
-    presumed_initial |= {y: us for y, us in presumed.items() if y not in told_initially}
+    declared_initially = {owner.get(u.variable.valueReference) for u in md.initialUnknowns}
+    presumed_initial |= {y: us for y, us in presumed.items() if y not in declared_initially}
     outputs = [v for v in md.modelVariables if v.causality == "output"]
     capabilities = capabilities_of(root, 2 if is_fmi2 else 3)
     clocks = _clocks(path, root)

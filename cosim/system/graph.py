@@ -99,7 +99,9 @@ def system_svg(system: "System") -> str:
         for name, p in places(names, bundles).items()
     }
     colour = {name: _COLOURS[k % len(_COLOURS)] for k, name in enumerate(names)}
-    lines = [_arrow(bent(at[a], at[b]), colour[a], _told(system, a, b, cs)) for (a, b), cs in bundles.items()]
+    lines = [
+        _arrow(bent(at[a], at[b]), colour[a], _connections_text(system, a, b, cs)) for (a, b), cs in bundles.items()
+    ]
     boxes = [
         _box(unit, at[unit.name], colour[unit.name], detailed=len(names) <= _FEW) for unit in system.units.values()
     ]
@@ -110,7 +112,7 @@ def system_svg(system: "System") -> str:
     )
 
 
-def _told(system: "System", source: str, target: str, connections: "Sequence[Connection]") -> str:
+def _connections_text(system: "System", source: str, target: str, connections: "Sequence[Connection]") -> str:
     outputs = system.units[source].description.outputs
     lines = [f"{source} → {target}"]
     for c in connections:
@@ -119,14 +121,14 @@ def _told(system: "System", source: str, target: str, connections: "Sequence[Con
     return "\n".join(lines)
 
 
-def _arrow(points: Floats, colour: str, told: str) -> str:
+def _arrow(points: Floats, colour: str, title: str) -> str:
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points.tolist())
     middle = points[len(points) // 2]
     along = points[len(points) // 2 + 1] - middle
     angle = float(np.degrees(np.arctan2(along[1], along[0])))
     place = f"translate({middle[0]:.1f} {middle[1]:.1f}) rotate({angle:.1f})"
     return (
-        f'<g><title>{html.escape(told)}</title><polyline points="{path}" fill="none" stroke="{colour}" '
+        f'<g><title>{html.escape(title)}</title><polyline points="{path}" fill="none" stroke="{colour}" '
         f'stroke-width="1.8"/><path d="M-7 -6 L7 0 L-7 6 Z" fill="{colour}" transform="{place}"/></g>'
     )
 
@@ -143,9 +145,9 @@ def _box(unit: "PlacedUnit", at: Floats, colour: str, *, detailed: bool) -> str:
         f"{_NAME if k == 0 else _DETAIL}>{html.escape(line)}</tspan>"
         for k, line in enumerate(lines)
     )
-    told = html.escape("\n".join([unit.name, *details]))
+    title = html.escape("\n".join([unit.name, *details]))
     return (
-        f"<g><title>{told}</title>"
+        f"<g><title>{title}</title>"
         f'<rect x="{x - width / 2:.1f}" y="{y - height / 2:.1f}" width="{width:.1f}" height="{height}" rx="4" '
         f'fill="#fff" stroke="{colour}" stroke-width="2"/>'
         f'<text text-anchor="middle" fill="#1f2933">{texts}</text></g>'
