@@ -1,0 +1,155 @@
+"""What the person does: takes, gives, pretends to give, waits for the light, and lets go."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hand_scene import CALM, DT, GIVING, IDLE, Scene
+from scipy.spatial.transform import Rotation
+
+from handover.cosim.blocks.ports import Floats
+from handover.plants.free_flyer.hand_and_object import Activity, Holder, Motion, Params
+
+TAKEN = [Activity.WAIT, Activity.REACH, Activity.GRASP, Activity.PULL, Activity.WITHDRAW, Activity.REST]
+
+
+def test_takes_what_the_robot_gives():
+    scene = Scene(replace(CALM, motion_again=Motion.NONE))
+    scene.go(2.0, closure=1.0)
+    scene.until(Activity.PULL, light=True)
+    scene.go(1.0, light=False)
+    assert scene.y.holder is Holder.BOTH
+    assert scene.y.f_G[2] > 0.5
+    scene.until(Activity.REST, closure=0.0)
+    assert scene.activities() == TAKEN
+    holders = [y.holder for y in scene.seen[125:]]
+    assert Holder.FREE not in holders
+    assert holders[-1] is Holder.HAND
+    y = scene.go(6.0)
+    np.testing.assert_allclose(y.p_WH, [-0.40, 0.10, -0.05], atol=5e-3)
+    np.testing.assert_allclose(y.p_WH - y.p_WO, [0.0, 0.07, 0.0], atol=5e-3)
+
+
+def test_gives_what_it_holds():
+    scene = Scene(replace(GIVING, motion_again=Motion.NONE))
+    scene.until(Activity.PUSH, light=True)
+    scene.go(1.0)
+    assert scene.y.f_G[0] > 0.2
+    assert abs(scene.y.f_G[2]) < 0.05
+    scene.until(Activity.LET_GO, closure=1.0)
+    assert scene.y.holder is Holder.GRIPPER
+    scene.until(Activity.REST)
+    assert scene.activities() == [
+        Activity.WAIT,
+        Activity.OFFER,
+        Activity.PUSH,
+        Activity.LET_GO,
+        Activity.WITHDRAW,
+        Activity.REST,
+    ]
+    assert Holder.FREE not in [y.holder for y in scene.seen]
+    np.testing.assert_allclose(scene.y.p_WO - scene.u.p_WG, [0.0, 0.07, 0.0], atol=0.012)
+    np.testing.assert_allclose(scene.go(0.5).p_WH, [-0.40, 0.10, -0.05], atol=1e-5)
+
+
+def test_a_gripper_that_is_turned_gets_the_object_turned():
+    q = Rotation.from_euler("xyz", [0.2, -0.15, 0.3]).as_quat(scalar_first=True)
+    scene = Scene(GIVING)
+    scene.until(Activity.PUSH, light=True, q_WG=q)
+    scene.go(0.5)
+    scene.until(Activity.LET_GO, closure=1.0)
+    assert scene.y.holder is Holder.GRIPPER
+    assert abs(scene.y.q_WO @ q) > math.cos(0.5 * 0.03)
+
+
+def test_false_reception_pushes_and_leaves_nothing():
+    scene = Scene(replace(GIVING, motion=Motion.PUSH, motion_again=Motion.GIVE))
+    scene.until(Activity.PUSH, light=True)
+    while scene.go(DT).f_G[0] < 0.5:
+        assert scene.y.activity is Activity.PUSH
+    scene.until(Activity.REST, closure=1.0, light=False)
+    assert scene.y.gripper_angle == pytest.approx(0.60)
+    assert {y.holder for y in scene.seen} == {Holder.HAND}
+    assert max(y.f_G[0] for y in scene.seen) <= 2.0 * 1.03
+    scene.go(1.5, closure=0.0)
+    scene.until(Activity.PUSH, light=True)
+    scene.until(Activity.LET_GO, closure=1.0)
+    assert scene.y.holder is Holder.GRIPPER
+
+
+def test_without_a_motion_nothing_moves():
+    scene = Scene(IDLE)
+    y = scene.go(3.0, light=True)
+    np.testing.assert_array_equal(y.p_WH, [-0.40, 0.10, -0.05])
+    assert scene.activities() == [Activity.WAIT]
+
+
+def test_reacts_to_the_light_after_the_reaction_time():
+    scene = Scene(replace(CALM, reaction_time=0.4))
+    scene.go(0.8)
+    begin = scene.i
+    scene.until(Activity.REACH, light=True)
+    assert (scene.i - begin) * DT == pytest.approx(0.4, abs=0.017)
+
+
+def test_a_light_that_stays_on_is_one_signal():
+    scene = Scene(replace(CALM, motion_again=Motion.TAKE))
+    scene.go(1.0, closure=1.0)
+    scene.until(Activity.PULL, light=True)
+    scene.until(Activity.REST, closure=0.0)
+    scene.go(5.0)
+    assert scene.activities() == TAKEN
+
+
+def test_reaction_times_differ_from_signal_to_signal_and_by_seed():
+    def reaction(seed: int) -> float:
+        scene = Scene(replace(CALM, reaction_spread=0.2, seed=seed, reaction_time=1.0))
+        scene.until(Activity.REACH, light=True)
+        return scene.i * DT
+
+    times = [reaction(seed) for seed in range(12)]
+    assert len(set(times)) > 6
+    assert 0.08 < float(np.std(times)) < 0.35
+
+
+def test_what_is_out_of_reach_is_waited_for():
+    scene = Scene(replace(CALM, p_WO_0=np.array([1.0, 0.0, 0.0])), np.array([1.0, -0.07, 0.0]))
+    scene.go(3.0, closure=1.0, light=True)
+    assert scene.y.activity is Activity.WAIT
+    scene.go(10.0, v_WG=np.array([-0.1, 0.0, 0.0]))
+    assert Activity.REACH in scene.activities()
+
+
+def test_lets_go_when_its_patience_is_at_an_end():
+    scene = Scene(replace(CALM, patience=2.0, motion_again=Motion.NONE))
+    scene.go(2.0, closure=1.0)
+    scene.until(Activity.REST, light=True)
+    assert scene.activities() == [*TAKEN[:4], Activity.LET_GO, *TAKEN[4:]]
+    assert scene.y.holder is Holder.GRIPPER
+
+
+def test_fingers_close_in_a_minimum_jerk_within_their_range():
+    scene = Scene(CALM)
+    scene.go(2.0, closure=1.0)
+    scene.until(Activity.GRASP, light=True)
+    scene.until(Activity.PULL)
+    fingers = np.array([y.finger for y in scene.seen])
+    assert np.min(fingers) == 0.0
+    assert np.max(fingers) <= 0.5 * math.pi
+    closed = scene.go(0.5).finger
+    assert np.all(closed > 0.5)
+    middle = next(y for y in scene.seen if y.finger[0] >= 0.5 * closed[0])
+    np.testing.assert_allclose(middle.finger / closed, middle.finger[0] / closed[0], atol=1e-12)
+
+
+def test_tremor_is_in_the_hand_and_comes_by_its_seed():
+    def hand(seed: int) -> Floats:
+        scene = Scene(Params(motion=Motion.NONE, seed=seed, tremor_rms=0.002, drift_rms=0.0))
+        scene.go(4.0)
+        return np.array([y.p_WH for y in scene.seen]) - scene.seen[0].p_WH
+
+    a, b, c = hand(1), hand(1), hand(2)
+    np.testing.assert_array_equal(a, b)
+    assert not np.array_equal(a, c)
+    assert 0.001 < np.sqrt(np.mean(np.sum(a**2, axis=1, dtype=np.float64))) < 0.004
