@@ -12,7 +12,7 @@ from handover.scenarios.api.arguments import errors_for_python
 from handover.scenarios.api.pages import Page
 from handover.scenarios.api.run_result import Quantity, Run
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.results import CampaignResults, PointResults
+from handover.scenarios.campaign.results import PointResults, read_results
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -55,14 +55,13 @@ class Campaign:
         Raises:
             InvalidInput: it is not the folder of a campaign, or it is damaged.
         """
-        from handover.scenarios.campaign.table import CampaignTable
         from handover.scenarios.campaign.table_writer import rebuild_table
 
         self.folder = Path(folder)
         self._place = CampaignFolder(self.folder)
         with errors_for_python():
             rebuild_table(self._place)
-            self._results = CampaignResults(self._place.read(), CampaignTable.read(self.folder))
+            self._results = read_results(self._place)
 
     @property
     def scenario(self) -> str:

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind, Variable
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import is_number
 from handover.scenarios.campaign.statistics import Interval, success_interval, time_interval
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.catalog import scenario_of
 from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.results.run_folder import InvalidRunFolder
 
 _MAX_METRICS = 4
 _MAX_INTERVALS = 150
@@ -206,3 +208,28 @@ class CampaignResults:
         """Return a point's label: the values in which it differs from the others."""
         texts = [self.value_text(name, point.values[name]) for name in self.independent if name in point.values]
         return ", ".join(texts) or "all runs"
+
+
+_FORMS: Mapping[str, type] = {"scenario": str, "points": list, "fixed": dict, "repetitions": int, "seed": int}
+_COLUMNS = ("run", "point", "repetition", "seed", "status", "success", "reason", "cpu_seconds", "wall_seconds")
+
+
+def read_results(folder: CampaignFolder) -> CampaignResults:
+    """Read a campaign's plan and its table, which may be another version's, or damaged: both are checked.
+
+    Raises:
+        InvalidRunFolder: it is not the folder of a campaign, or one of the files is damaged.
+    """
+    content = folder.read()
+    faults = [f"{n!r} is {content.get(n)!r:.40}" for n, form in _FORMS.items() if not isinstance(content.get(n), form)]
+    if not faults and not all(isinstance(p, dict) for p in content["points"]):
+        faults = ["its points are not mappings of parameters to values"]
+    if faults:
+        raise InvalidRunFolder(folder.path, f"its campaign.json is damaged: {'; '.join(faults)}")
+    table = CampaignTable.read(folder.table)
+    missing = [name for name in _COLUMNS if name not in table.table.column_names]
+    if missing:
+        raise InvalidRunFolder(
+            folder.path, f"its {folder.table.name} is damaged: it has no column {', '.join(missing)}"
+        )
+    return CampaignResults(content, table)

@@ -1,7 +1,4 @@
-"""Writes the page of a campaign from its folder: reads and checks the files, writes the header, chooses the sections.
-
-Files are checked as they are read: they may be another version's, or damaged.
-"""
+"""Writes the page of a campaign from its folder: the header, and the sections that it has."""
 
 import json
 import tempfile
@@ -14,8 +11,7 @@ from markupsafe import Markup
 
 from handover.cosim.exceptions import one_line
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.results import CampaignResults
-from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.campaign.results import CampaignResults, read_results
 from handover.scenarios.campaign_report.claims_section import claims_section, comparison_section, verdict_html
 from handover.scenarios.campaign_report.figures import draw_campaign
 from handover.scenarios.campaign_report.pairs_section import pairs_section
@@ -111,31 +107,6 @@ def _values(results: CampaignResults, name: str) -> str:
     if len(shown) > _MAX_VALUES:
         shown = [*shown[:4], "…", shown[-1]]
     return ", ".join(shown) + symbol
-
-
-_FORMS: Mapping[str, type] = {"scenario": str, "points": list, "fixed": dict, "repetitions": int, "seed": int}
-_COLUMNS = ("run", "point", "repetition", "seed", "status", "success", "reason", "cpu_seconds", "wall_seconds")
-
-
-def read_results(folder: CampaignFolder) -> CampaignResults:
-    """Read a campaign's plan and its table.
-
-    Raises:
-        InvalidRunFolder: it is not the folder of a campaign, or one of the files is damaged.
-    """
-    content = folder.read()
-    faults = [f"{n!r} is {content.get(n)!r:.40}" for n, form in _FORMS.items() if not isinstance(content.get(n), form)]
-    if not faults and not all(isinstance(p, dict) for p in content["points"]):
-        faults = ["its points are not mappings of parameters to values"]
-    if faults:
-        raise InvalidRunFolder(folder.path, f"its campaign.json is damaged: {'; '.join(faults)}")
-    table = CampaignTable.read(folder.table)
-    missing = [name for name in _COLUMNS if name not in table.table.column_names]
-    if missing:
-        raise InvalidRunFolder(
-            folder.path, f"its {folder.table.name} is damaged: it has no column {', '.join(missing)}"
-        )
-    return CampaignResults(content, table)
 
 
 def read_claims(folder: CampaignFolder) -> Sequence[Claim]:

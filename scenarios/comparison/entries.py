@@ -11,8 +11,7 @@ from typing import Any, cast
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.results import CampaignResults
-from handover.scenarios.campaign_report.campaign_page import read_results
+from handover.scenarios.campaign.results import CampaignResults, read_results
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
 from handover.scenarios.results.run_facts import RunFacts, record_of

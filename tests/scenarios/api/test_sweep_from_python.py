@@ -5,8 +5,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from campaigns import campaign_metadata, folder_of, table_of
 
 import handover
+from handover.scenarios.campaign.table import CampaignTable
 
 PROGRAM = """
 import handover
@@ -69,6 +71,16 @@ def test_its_report_is_a_page(folder: Path):
     page = handover.load(folder).report()
     assert page.path == folder / "report.html"
     assert "strategy" in page.html
+
+
+def test_a_damaged_folder_is_refused(tmp_path: Path):
+    plan, table = campaign_metadata("ir_grasp", [{}]), table_of([{}])
+    folder_of(tmp_path, {name: value for name, value in plan.items() if name != "points"}, table)
+    with pytest.raises(handover.InvalidInput, match=r"its campaign\.json is damaged: 'points' is None"):
+        handover.load(tmp_path)
+    folder_of(tmp_path, plan, CampaignTable(table.table.drop_columns(["status"])))
+    with pytest.raises(handover.InvalidInput, match="it has no column status"):
+        handover.load(tmp_path)
 
 
 @pytest.mark.parametrize(
