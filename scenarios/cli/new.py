@@ -2,6 +2,8 @@
 
 import keyword
 import re
+from collections.abc import Iterable
+from importlib.util import find_spec
 from pathlib import Path
 from string import Template
 
@@ -43,6 +45,7 @@ def new(kind: str, name: str, out: Path) -> None:
         check_place(out)
         if there := [file for file in files if (out / file).exists()]:
             raise UsageError(f"{out}: {', '.join(there)} {'is' if len(there) == 1 else 'are'} there already")
+        _check_hides_nothing(files)
         with disk_errors_reported(out):
             out.mkdir(parents=True, exist_ok=True)
             for file, text in files.items():
@@ -73,6 +76,16 @@ def _names(name: str) -> tuple[str, str]:
     if class_name in UNITS or module in SCENARIOS:
         raise UsageError(f"{name!r} is in the catalog already, see `handover list`; give another name")
     return class_name, module
+
+
+def _check_hides_nothing(files: Iterable[str]) -> None:
+    """Refuse modules that would stand before others of their names: blocks' folders are searched first.
+
+    Raises:
+        UsageError: Python has a module of such a name.
+    """
+    if taken := [file for file in files if find_spec(file.removesuffix(".py")) is not None]:
+        raise UsageError(f"{', '.join(taken)} would hide a module that Python or a package has; give another name")
 
 
 def _files(kind: str, class_name: str, module: str) -> dict[str, str]:

@@ -5,7 +5,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from tutorial import refused, succeeded
+
+from handover.scenarios.cli.command import main
 
 
 def files_in(folder: Path) -> set[str]:
@@ -37,3 +40,11 @@ def test_nothing_is_overwritten_and_names_are_checked(tmp_path: Path):
     assert "is in the catalog already" in refused(tmp_path, "new", "unit", "TendonArm")
     assert "letters, digits and underscores are right" in refused(tmp_path, "new", "unit", "my-arm")
     assert "is a keyword of Python" in refused(tmp_path, "new", "controller", "class")
+
+
+@pytest.mark.parametrize("name", ["Random", "Handover", "numpy"])
+def test_a_module_that_python_has_is_not_hidden(name: str, tmp_path: Path):
+    done = CliRunner().invoke(main, ["new", "unit", name, "--out", str(tmp_path)])
+    assert done.exit_code == 2
+    assert f"{name.lower()}.py would hide a module that Python or a package has; give another name" in done.output
+    assert not list(tmp_path.iterdir())
