@@ -90,14 +90,12 @@ def unit_texts(units: Mapping[str, Path | str | Sequence[Path | str]] | None) ->
     return [f"{name}={text_of_value(files)}" for name, files in (units or {}).items()]
 
 
-def exact(name: str, seconds: Seconds | None) -> Fraction | None:
-    """Return a time in seconds exactly; None for None.
+def exact(name: str, seconds: Seconds) -> Fraction:
+    """Return a time in seconds exactly.
 
     Raises:
         InvalidInput: it is not a finite number above 0.
     """
-    if seconds is None:
-        return None
     try:
         fits = 0 < seconds < math.inf
     except TypeError:
@@ -107,15 +105,20 @@ def exact(name: str, seconds: Seconds | None) -> Fraction | None:
     return seconds if isinstance(seconds, Fraction) else exact_seconds(float(seconds))
 
 
-def seed_of(seed: Any) -> int:
-    """Return a seed.
+def exact_or_none(name: str, seconds: Seconds | None) -> Fraction | None:
+    """Return a time that may be left open, likewise; None for None."""
+    return None if seconds is None else exact(name, seconds)
+
+
+def whole_number(name: str, value: Any, least: int = 0) -> int:
+    """Return a whole number, such as a seed.
 
     Raises:
-        InvalidInput: it is not a whole number from 0 on.
+        InvalidInput: it is none, or less than `least`.
     """
-    if isinstance(seed, (bool, np.bool_)) or not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise InvalidInput(f"seed = {seed!r}: a whole number from 0 on is right")
-    return int(cast(Any, seed))
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InvalidInput(f"{name} = {value!r}: a whole number from {least} on is right")
+    return int(cast(Any, value))
 
 
 def formats_of(formats: Sequence[str]) -> tuple[str, ...]:

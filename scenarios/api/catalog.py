@@ -9,7 +9,14 @@ from handover.cosim.fmu.description import FmuDescription, describe_fmu
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.fmus.catalog import UnknownBlock, UnknownUnit
-from handover.scenarios.api.arguments import InvalidInput, errors_for_python, merged, seed_of, texts_of, unit_texts
+from handover.scenarios.api.arguments import (
+    InvalidInput,
+    errors_for_python,
+    merged,
+    texts_of,
+    unit_texts,
+    whole_number,
+)
 from handover.scenarios.api.campaign_result import Campaign
 from handover.scenarios.api.run_result import Run
 from handover.scenarios.campaign.folder import CampaignFolder
@@ -66,7 +73,8 @@ def system(
     """
     texts = texts_of(merged(parameters, named))
     with errors_for_python(), contextlib.ExitStack() as opened:
-        request = RunRequest(subject=scenario, parameters=texts, seed=seed_of(seed), units=unit_texts(units))
+        checked = whole_number("seed", seed)
+        request = RunRequest(subject=scenario, parameters=texts, seed=checked, units=unit_texts(units))
         request.check_options()
         asked = request.open(opened)
         return request.system(asked, request.seed, request.fmus(asked.experiment))

@@ -26,11 +26,11 @@ from handover.scenarios.api.arguments import (
     InvalidInput,
     Seconds,
     errors_for_python,
-    exact,
+    exact_or_none,
     merged,
-    seed_of,
     texts_of,
     unit_texts,
+    whole_number,
 )
 from handover.scenarios.api.open_inputs import HELD_KINDS, OpenSystem
 from handover.scenarios.api.session import Session
@@ -107,7 +107,7 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
             wired = OpenSystem(self._system(0), place).place
         assert wired is not None, "a unit is left out"
         self._unit, self._reward = place, reward
-        self._period = exact("period", period) or wired.unit.period
+        self._period = exact_or_none("period", period) or wired.unit.period
         self._sources, inputs = wired.sources, wired.unit.description.inputs
         seen = [name for name in wired.sources if inputs[name].kind in HELD_KINDS]
         self._actions = _chosen("actions", actions, [*wired.targets], wired.ports)
@@ -126,7 +126,7 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
             UnitFailure: a unit did not start.
         """
         super().reset(seed=seed, options=options)
-        drawn = int(self.np_random.integers(_SEEDS)) if seed is None else seed_of(seed)
+        drawn = int(self.np_random.integers(_SEEDS)) if seed is None else whole_number("seed", seed)
         self.close()
         with errors_for_python():
             system = self._system(drawn)

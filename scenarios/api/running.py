@@ -11,13 +11,13 @@ from handover.cosim.system.system import System
 from handover.scenarios.api.arguments import (
     Seconds,
     errors_for_python,
-    exact,
+    exact_or_none,
     formats_of,
     master_options,
     merged,
-    seed_of,
     texts_of,
     unit_texts,
+    whole_number,
 )
 from handover.scenarios.api.progress import bar
 from handover.scenarios.api.run_result import Run
@@ -83,14 +83,14 @@ def run(
         request = RunRequest(
             subject=str(subject) if isinstance(subject, Path) else subject,
             parameters=texts_of(merged(parameters, named)),
-            seed=seed_of(seed),
+            seed=whole_number("seed", seed),
             units=unit_texts(units),
             out=None if out is None else Path(out),
-            stop=exact("stop", stop),
-            step=exact("step", step),
+            stop=exact_or_none("stop", stop),
+            step=exact_or_none("step", step),
             inputs=None if inputs is None else Path(inputs),
             formats=formats_of(formats),
-            every=exact("checkpoint", checkpoint),
+            every=exact_or_none("checkpoint", checkpoint),
             options=master_options(options, algorithm, isolate),
             presented=report,
         )

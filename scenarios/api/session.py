@@ -26,11 +26,12 @@ from handover.scenarios.api.arguments import (
     Seconds,
     errors_for_python,
     exact,
+    exact_or_none,
     master_options,
     merged,
-    seed_of,
     texts_of,
     unit_texts,
+    whole_number,
 )
 from handover.scenarios.api.open_inputs import OpenSystem
 from handover.scenarios.execution.fmu_run import is_fmu
@@ -127,7 +128,7 @@ class Session:
             InvalidInput: the duration is none. UnitFailure: a unit failed; the session can only be closed then.
             RuntimeError: a unit failed before, or has ended the simulation.
         """
-        return self._run(self._asked + (exact("duration", duration) or Fraction(0)))
+        return self._run(self._asked + exact("duration", duration))
 
     def start(self) -> float:
         """Let units that sample at 0 s act, and the evaluation begin, as the first step would; return the time.
@@ -327,10 +328,10 @@ def open(  # noqa: A001 (handover.open is named like it)
         request = RunRequest(
             subject=name,
             parameters=texts_of(merged(parameters, named)),
-            seed=seed_of(seed),
+            seed=whole_number("seed", seed),
             units=unit_texts(units),
             stop=_ANY_STOP if endless else None,
-            step=exact("step", step),
+            step=exact_or_none("step", step),
             options=master_options(options or MasterOptions(), algorithm, isolate),
         )
         request.check_options()

@@ -15,10 +15,10 @@ from handover.scenarios.api.arguments import (
     errors_for_python,
     master_options,
     merged,
-    seed_of,
     text_of_value,
     texts_of,
     unit_texts,
+    whole_number,
 )
 from handover.scenarios.api.campaign_result import Campaign
 from handover.scenarios.api.progress import bar
@@ -96,8 +96,8 @@ def sweep(
             scenario=scenario,
             points=points,
             fixed=set_parameters(experiment, fixed, points),
-            repetitions=seed_of(seeds),
-            seed=seed_of(seed),
+            repetitions=whole_number("seeds", seeds, 1),
+            seed=whole_number("seed", seed),
             paired=paired,
             units=kept_units,
             varied_units=tuple(choices),

@@ -63,6 +63,8 @@ def test_what_cannot_be_set_or_read_is_refused():
             s["robot.p_WW"]
         with pytest.raises(handover.InvalidInput, match="duration = 0: a finite number of seconds above 0"):
             s.step(0)
+        with pytest.raises(handover.InvalidInput, match="duration = None: a finite number of seconds above 0"):
+            s.step(None)  # pyright: ignore
 
 
 def test_durations_add_up_exactly():
