@@ -1,6 +1,7 @@
 """Stepping from Python: what is set acts, what is saved comes back, and the evaluation follows as in a run."""
 
 import shutil
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from native_units import native_fmu
 
 import handover
+from handover.cosim.ssp.writing import write_ssp
 
 
 def gain(fmu: Path) -> handover.System:
@@ -147,3 +149,8 @@ def test_an_ssp_and_an_fmu_are_stepped(tmp_path: Path):
     with handover.open(fmu, a=3, u=2) as s:
         s.step(0.1)
         assert s["gain.y"] == 6.0
+    write_ssp(gain(fmu), tmp_path / "gain.ssp", "gain", Fraction(1))
+    with handover.open(tmp_path / "gain.ssp", step=0.1) as s:
+        s["gain.u"] = 2.0
+        s.step(0.1)
+        assert s["gain.y"] == 4.0
