@@ -6,6 +6,7 @@ units run as ever. The scenario's evaluation decides when an episode is over, an
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
@@ -26,6 +27,7 @@ from handover.scenarios.api.arguments import (
     InvalidInput,
     Seconds,
     errors_for_python,
+    exact,
     exact_or_none,
     merged,
     texts_of,
@@ -41,6 +43,7 @@ Values = dict[str, Any]
 """Values by port's name, as the spaces have them."""
 
 _SEEDS = 2**31
+"""From how many a seed is drawn where an episode is given none."""
 
 
 def environment(
@@ -86,7 +89,7 @@ def environment(
 
 
 class ScenarioEnvironment(gymnasium.Env[Values, Values]):
-    """See `environment`.
+    """A scenario without one of its units, whose place an agent takes; `environment` makes it.
 
     Spaces are dictionaries by port's name: reals and integers are boxes with the declared bounds, booleans and
     enumerations are discrete. An observation beyond what the input declares is given as the bound. `reset(seed=3)` is
@@ -114,10 +117,13 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
         wired_inputs = {name: inputs[name] for name in seen}
         self._observations = _chosen("observations", observations, seen, wired_inputs)
         self.action_space = spaces.Dict({name: space_of(p) for name, p in self._actions.items()})
-        self.observation_space = spaces.Dict({name: space_of(p) for name, p in self._observations.items()})
+        self._seen_in = {name: space_of(p) for name, p in self._observations.items()}
+        self.observation_space = spaces.Dict(self._seen_in)
         self.session: Session | None = None
         """The running episode, for looking at any signal; None before the first `reset`."""
         self._last: Values = {}
+        self._left = Fraction(0)
+        """Until the scenario's stop time, s; not above 0 for who steps on beyond it."""
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Values, Values]:
         """Begin an episode; return the observation at 0 s and information.
@@ -132,12 +138,15 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
             system = self._system(drawn)
             experiment, parameters = self._asked.experiment, self._asked.parameters
             self.session = Session(experiment, parameters, system, self._request.options, self._unit)
+        self._left = exact("stop", self.session.stop)
         self.session.start()
         self._last = self._observed(self.session)
         return self._last, {"time": self.session.time, "seed": drawn}
 
     def step(self, action: Values) -> tuple[Values, float, bool, bool, Values]:
         """Set the outputs of the place, step on by a period; return observation, reward, and whether it has ended.
+
+        The last period is shorter where the scenario's stop time is within it.
 
         Raises:
             InvalidInput: the action is not one of the space. RuntimeError: there is no running episode.
@@ -150,7 +159,9 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
         for name, port in self._actions.items():
             session[f"{self._unit}.{name}"] = bool(action[name]) if _is_flag(port) else action[name]
         try:
-            session.step(self._period)
+            duration = min(self._period, self._left) if self._left > 0 else self._period
+            self._left -= duration
+            session.step(duration)
         except UnitFailure as e:
             self.close()
             return self._last, 0.0, True, False, {"time": session.time, "success": False, "reason": str(e)}
@@ -182,7 +193,7 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
             value = np.asarray(session[str(source)])
             if change is not None:
                 value = value * change.factor + change.offset
-            seen[name] = _observation(port, value, space_of(port))
+            seen[name] = _observation(port, value, self._seen_in[name])
         return seen
 
 

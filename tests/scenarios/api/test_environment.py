@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ from gymnasium.utils.env_checker import check_env
 import handover
 from handover.cosim.fmu.description import describe_fmu
 from handover.scenarios.api.environment import ScenarioEnvironment, space_of
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.ir_grasp.parameters import Parameters
 
 COMMANDS = ("p_WH_cmd", "yaw_cmd", "sigma_cmd")
 DRAWN_AND_DRIVEN = {
@@ -88,14 +91,21 @@ def test_a_reward_of_ones_own_sees_all_signals(run: handover.Run):
     env.close()
 
 
+class Brief(IrGrasp):
+    """A grasp that is given up after 0.3 s."""
+
+    def stop_time(self, parameters: Parameters) -> Fraction:  # noqa: ARG002
+        return Fraction(3, 10)
+
+
 def test_an_episode_is_truncated_at_the_scenarios_end():
-    env = handover.environment("vsl_hybrid", place="kinematics", period=1000)
+    env = handover.environment(Brief, place="reflex", actions=["sigma_cmd"], period=0.18)
     env.reset(seed=1)
-    _, reward, terminated, truncated, info = env.step(
-        {name: np.zeros(space.shape or ()) for name, space in env.action_space.items()}  # pyright: ignore
-    )
-    assert (terminated or truncated, reward) == (True, 0.0)
-    assert "reason" in info
+    first, second = (env.step({"sigma_cmd": np.float64(0.0)}) for _ in range(2))
+    assert first[2:] == (False, False, {"time": 0.18})
+    _, reward, terminated, truncated, info = second
+    assert (reward, terminated, truncated) == (0.0, False, True)
+    assert (info["time"], info["success"]) == (0.3, False)
     env.close()
 
 
