@@ -4,16 +4,15 @@ import base64
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from markupsafe import Markup
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.parameters import InvalidParameter, parameters_of
+from handover.scenarios.experiment.parameters import parameters_of
 from handover.scenarios.experiment.plotting import draw_time_figures
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.reporting.run_figures import figures_of_outputs
+from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.run_facts import RunFacts
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
@@ -24,12 +23,13 @@ _GOOD, _BAD = "#2e7d32", "#c62828"
 def run_html(facts: RunFacts, metrics: Mapping[str, float], record: Record | None) -> str:
     """Return a run's verdict with its reason, the metrics of its headline, and its first plots over time."""
     summary = facts.summary
-    faults = ToleratedFaults(InvalidParameter)
-    pictures: list[Markup] = []
-    if record is not None and len(record.time) > 1:
+    faults, pictures = ToleratedFaults(), list[Markup]()
+    if record is not None:
         with faults.tolerated("the plots over time could not be drawn"):
-            pictures = _pictures(facts, record)
-    rows = [(metrics_description(facts, name), str(metrics[name])) for name in facts.headline if name in metrics]
+            figures, left_out = _time_figures(facts, record)
+            pictures = _pictures(figures[:_MAX_FIGURES], record)
+            faults.lines += [f"Left out: {line}." for line in left_out]
+    rows = [(_description(facts, name), str(metrics[name])) for name in facts.headline if name in metrics]
     return str(
         Markup("<div>{}{}{}{}<p><small>results: {}</small></p></div>").format(
             verdict_html(facts.scenario, good=bool(summary["success"]), reason=str(summary["reason"])),
@@ -41,7 +41,7 @@ def run_html(facts: RunFacts, metrics: Mapping[str, float], record: Record | Non
     )
 
 
-def metrics_description(facts: RunFacts, name: str) -> str:
+def _description(facts: RunFacts, name: str) -> str:
     """Return what a metric is; its name where the run does not say."""
     return str(facts.summary["metrics"][name].get("description") or name)
 
@@ -67,18 +67,21 @@ def _cells(kind: str, texts: Sequence[str]) -> Markup:
     return Markup().join(cell.format(tag, text, tag) for text in texts)
 
 
-def _pictures(facts: RunFacts, record: Record) -> list[Markup]:
-    figures = _time_figures(facts.experiment, facts, record)[:_MAX_FIGURES]
+def _pictures(figures: Sequence[TimeFigure], record: Record) -> list[Markup]:
     with tempfile.TemporaryDirectory(prefix="handover-") as folder:
         drawn = draw_time_figures(figures, record.time, Path(folder))
         files = [(Path(folder) / f"{figure.name}.png", figure.caption) for figure in drawn]
         return [_picture(file.read_bytes(), caption) for file, caption in files]
 
 
-def _time_figures(experiment: Experiment[Any] | None, facts: RunFacts, record: Record) -> Sequence[TimeFigure]:
+def _time_figures(facts: RunFacts, record: Record) -> tuple[Sequence[TimeFigure], Sequence[str]]:
+    """Return the scenario's figures over time, else those of all outputs, and what is left out of them."""
+    experiment = facts.experiment
     if experiment is None:
-        return figures_of_outputs(facts.run.get("units", {}), record)
-    return experiment.time_figures(parameters_of(type(experiment), facts.run["parameters"]), record)
+        return figures_of_outputs(facts.run.get("units", {}), record), ()
+    known = LackingRecord(record, experiment.units)
+    figures = experiment.time_figures(parameters_of(type(experiment), facts.run["parameters"]), known)
+    return known.drawable(figures), known.lines
 
 
 def _picture(png: bytes, caption: str) -> Markup:

@@ -18,7 +18,8 @@ from handover.scenarios.execution.resume import complete_signals
 from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import parameters_of
-from handover.scenarios.results.run_facts import RunFacts
+from handover.scenarios.results.lacking_record import LackingRecord
+from handover.scenarios.results.run_facts import RunFacts, record_of, whole_record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 
 
@@ -144,14 +145,16 @@ class Run:
         from handover.scenarios.reporting.replay_section import replay_section
 
         experiment = self._facts.experiment
-        with errors_for_python():
-            record = self._record
-            parameters = None if experiment is None else parameters_of(type(experiment), self.parameters)
-        replay = None if experiment is None else experiment.replay(parameters, record)
-        if replay is None:
+        if experiment is None:
             raise InvalidInput(f"{self.scenario} declares no replay of its runs; plot() draws signals")
+        with errors_for_python():
+            record = LackingRecord(self._record, experiment.units)
+            replay = experiment.replay(parameters_of(type(experiment), self.parameters), record)
+        shown = None if replay is None else record.drawable_replay(replay)
+        if shown is None:
+            raise InvalidInput(f"{self.scenario} has no replay of this run; plot() draws signals")
         header = Markup("<p>{}</p>").format(self.reason)
-        return Page(page_html(f"{self.scenario}: replay", header, [replay_section(replay, record)]), height=760)
+        return Page(page_html(f"{self.scenario}: replay", header, [replay_section(shown, record)]), height=760)
 
     def report(self, figures: bool = False) -> Page:
         """Write the report page into the folder, and with `figures` the figures as PNG and SVG; return the page.
@@ -176,20 +179,12 @@ class Run:
     def _repr_html_(self) -> str:
         from handover.scenarios.api.notebook_forms import run_html  # draws figures
 
-        return run_html(self._facts, self.metrics, self._record_or_none())
+        return run_html(self._facts, self.metrics, record_of(self._place))
 
     @functools.cached_property
     def _record(self) -> Record:
         with errors_for_python():
-            record = self._record_or_none()
+            record = whole_record_of(self._place)
             if record is None:
                 raise InvalidRunFolder(self.folder, "it has no record: the run ended before its first step")
             return record
-
-    def _record_or_none(self) -> Record | None:
-        if not self._place.signals.exists():
-            return None
-        try:
-            return Record(self._place.signals)
-        except (OSError, ValueError, KeyError) as e:  # Arrow's exceptions are subclasses of these
-            raise InvalidRunFolder(self.folder, f"its record is damaged: {e}") from e

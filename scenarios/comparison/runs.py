@@ -16,6 +16,7 @@ from handover.scenarios.comparison.entries import NotComparable, RunEntry
 from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.experiment.parameters import parameters_of
 from handover.scenarios.experiment.time_plot import Curve, TimePlot
+from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.summary import metric_of
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
@@ -139,13 +140,16 @@ def _of_scenario(entries: Sequence[tuple[RunEntry, Record]], left_out: list[str]
 
 
 def _plots_of(entry: RunEntry, record: Record, left_out: list[str]) -> Sequence[TimePlot]:
+    """Return the plots that the scenario makes of a run, without what the run's units do not give."""
     experiment = entry.facts.experiment
-    faults = ToleratedFaults()
-    if experiment is not None:
-        with faults.tolerated(f"{entry.name} has no curves of the scenario's plots"):
-            return experiment.plots(parameters_of(type(experiment), entry.facts.run["parameters"]), record)
-    left_out += faults.lines
-    return ()
+    if experiment is None:
+        return ()
+    faults, known, plots = ToleratedFaults(), LackingRecord(record, experiment.units), list[TimePlot]()
+    with faults.tolerated(f"{entry.name} has no curves of the scenario's plots"):
+        parameters = parameters_of(type(experiment), entry.facts.run["parameters"])
+        plots += known.drawable_plots(experiment.plots(parameters, known))
+    left_out += [*faults.lines, *(f"{entry.name} lacks {line}" for line in known.lines)]
+    return plots
 
 
 def _both_limits(panel: TimePlot, plot: TimePlot) -> tuple[float | None, float | None]:

@@ -92,8 +92,8 @@ def _check_metrics(folder: RunFolder, metrics: Mapping[str, Any]) -> None:
             raise InvalidRunFolder(folder.path, f"its summary.json is damaged: metric {name!r} is {metric!r:.60}")
 
 
-def record_of(folder: RunFolder) -> Record | None:
-    """Return a run's record; None where there is none, or only one row of it, which shows nothing over time.
+def whole_record_of(folder: RunFolder) -> Record | None:
+    """Return a run's record; None where there is none.
 
     Raises:
         InvalidRunFolder: the record is damaged.
@@ -101,7 +101,12 @@ def record_of(folder: RunFolder) -> Record | None:
     if not folder.signals.exists():
         return None
     try:
-        record = Record(folder.signals)
-        return record if len(record.time) > 1 else None
+        return Record(folder.signals)
     except (OSError, ValueError, KeyError) as e:  # Arrow's exceptions are subclasses of these
         raise InvalidRunFolder(folder.path, f"its {folder.signals.name} is damaged: {one_line(e)}") from e
+
+
+def record_of(folder: RunFolder) -> Record | None:
+    """Return a run's record, likewise; None also where it has only one row, which shows nothing over time."""
+    record = whole_record_of(folder)
+    return None if record is None or len(record.time) < 2 else record

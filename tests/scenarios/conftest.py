@@ -3,6 +3,7 @@ import shutil
 from collections.abc import Generator
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 from playwright.sync_api import Browser, sync_playwright
@@ -36,3 +37,13 @@ def grasp(tmp_path_factory: pytest.TempPathFactory) -> Path:
     done = CliRunner().invoke(main, ["run", "ir_grasp", "--out", str(out)])
     assert done.exit_code == 0, done.output
     return out
+
+
+@pytest.fixture
+def grasp_without_reflex(grasp: Path, tmp_path: Path) -> Path:
+    """Return a copy of that run whose controller has recorded nothing, as one without the optional outputs."""
+    copy = shutil.copytree(grasp, tmp_path / "without_reflex")
+    table = pq.read_table(copy / "signals.parquet")
+    kept = [name for name in table.column_names if not name.startswith("reflex.")]
+    pq.write_table(table.select(kept), copy / "signals.parquet")
+    return copy

@@ -1,6 +1,7 @@
 """What a result gives: numbers with units, arrays by name, tables, figures, pages; and what notebooks show of it."""
 
 import copy
+import json
 import re
 import sys
 from pathlib import Path
@@ -98,6 +99,26 @@ def test_a_notebook_shows_verdict_headline_and_plots(run: handover.Run):
     assert "how far the object was pushed" in html
     assert html.count("data:image/png;base64,") == 2
     assert "object at 0x" not in repr(run)
+
+
+def test_what_a_unit_did_not_give_is_left_out(grasp_without_reflex: Path):
+    run = handover.Run(grasp_without_reflex)
+    assert 'class="replay"' in run.replay().html
+    html = run._repr_html_()  # pyright: ignore
+    assert html.count("data:image/png;base64,") == 2
+    assert "Left out: what is drawn from reflex." in html
+
+
+def test_a_run_of_another_version_is_shown_without_plots(grasp_without_reflex: Path):
+    described = json.loads((grasp_without_reflex / "run.json").read_text())
+    described["parameters"]["colour"] = "red"
+    (grasp_without_reflex / "run.json").write_text(json.dumps(described))
+    run = handover.Run(grasp_without_reflex)
+    html = run._repr_html_()  # pyright: ignore
+    assert "succeeded</span>" in html
+    assert "the plots over time could not be drawn: InvalidParameter" in html
+    with pytest.raises(handover.InvalidInput, match="colour"):
+        run.replay()
 
 
 def test_a_notebook_shows_a_system_as_its_graph():

@@ -116,6 +116,15 @@ def test_axes_have_room_for_all_runs_and_lines_for_long_labels(tmp_path: Path):
     assert [p.axis_label for p in plots] == ["x, tip by the\nservos, links taken\nas rigid (m)", "x, tip (m)"]
 
 
+def test_a_curve_that_a_unit_does_not_give_is_left_out_of_that_run_alone(grasp: Path, grasp_without_reflex: Path):
+    overlay = overlaid(runs(grasp, grasp_without_reflex))
+    drawn = {p.title: [c.label for c in p.curves] for p in overlay.plots}
+    assert drawn["Distances of the fingers from the object: thumb, as seen"] == [grasp.name]
+    assert drawn["Wrist along x of W"] == [grasp.name, grasp_without_reflex.name]
+    (line,) = overlay.left_out
+    assert line.startswith(f"{grasp_without_reflex.name} lacks what is drawn from reflex.")
+
+
 def test_a_run_without_a_record_is_told(tmp_path: Path):
     first = run(tmp_path / "a", [0.0, 1.0], {"mass.x": ("m", [0.0, 1.0])})
     second = run(tmp_path / "b", [0.0, 1.0], {"mass.x": ("m", [0.0, 1.0])})
