@@ -120,12 +120,12 @@ class Campaign:
 
     def __repr__(self) -> str:
         """Return how many runs succeeded, and where the results are."""
-        return f"<campaign of {self.scenario}: {self._told}; {self.folder}>"
+        return f"<campaign of {self.scenario}: {self._outcome}; {self.folder}>"
 
     @property
-    def _told(self) -> str:
-        ended, successes = sum(p.runs for p in self.points), sum(p.successes for p in self.points)
-        return f"{successes} of {ended} runs succeeded, {self._results.planned} planned"
+    def _outcome(self) -> str:
+        results = self._results
+        return f"{results.successes} of {results.done} runs succeeded, {results.planned} planned"
 
     def _point(self, point: PointResults) -> CampaignPoint:
         table, results = self._results.table, self._results
@@ -150,8 +150,8 @@ class Campaign:
         varied, metrics = self._results.varied, self._results.shown_metrics
         header = [*varied, "succeeded", "95 % interval", *(f"{name}, median" for name in metrics)]
         rows = [_row(point, varied, metrics) for point in self.points]
-        told = Markup("<div><p><b>{}</b>: {}</p>{}<p><small>results: {}</small></p></div>")
-        return str(told.format(self.scenario, self._told, table_html(header, rows), str(self.folder)))
+        html = Markup("<div><p><b>{}</b>: {}</p>{}<p><small>results: {}</small></p></div>")
+        return str(html.format(self.scenario, self._outcome, table_html(header, rows), str(self.folder)))
 
 
 def _row(point: CampaignPoint, varied: Sequence[str], metrics: Sequence[str]) -> list[str]:

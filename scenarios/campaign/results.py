@@ -166,6 +166,16 @@ class CampaignResults:
         return points
 
     @property
+    def done(self) -> int:
+        """How many runs came to their end."""
+        return sum(len(point.done) for point in self.points)
+
+    @property
+    def successes(self) -> int:
+        """How many of these succeeded."""
+        return sum(point.successes for point in self.points)
+
+    @property
     def has_intervals(self) -> bool:
         """Whether medians have intervals, which would take too long for very many points."""
         return len(self.points) * len(self.shown_metrics) <= _MAX_INTERVALS

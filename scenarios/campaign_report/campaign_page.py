@@ -59,8 +59,7 @@ def _scenario(results: CampaignResults) -> str:
 def _verdict(results: CampaignResults) -> Markup:
     ended, planned, status = len(results.table), results.planned, results.table.column("status")
     done, failed, lost = (int(np.count_nonzero(status == s)) for s in ("done", "failed", "lost"))
-    succeeded = sum(p.successes for p in results.points)
-    parts = [f"in {succeeded} of {done} runs done the task succeeded"]
+    parts = [f"in {results.successes} of {done} runs done the task succeeded"]
     parts += [f"{failed} failed to run"] if failed else []
     parts += [f"{lost} {'was' if lost == 1 else 'were'} lost"] if lost else []
     sentence = "; ".join(parts) + "."

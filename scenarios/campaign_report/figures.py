@@ -32,7 +32,7 @@ def draw_campaign(results: CampaignResults, folder: Path, layout: PointLayout | 
         folder: where the figures go; it is made if it is not there.
         layout: where the points stand; by default as `layout_of` lays them out.
     """
-    if not any(len(p.done) for p in results.points):
+    if not results.done:
         return []
     layout = layout or layout_of(results)
     if layout.listed and len(results.points) > _MAX_ENTRIES:

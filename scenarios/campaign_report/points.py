@@ -95,7 +95,7 @@ _SCREEN = 15
 
 def success_section(results: CampaignResults, layout: PointLayout) -> Section | None:
     """Return the plot of success rates with their intervals; None if no run is done."""
-    if not any(len(p.done) for p in results.points):
+    if not results.done:
         return None
     figure = go.Figure()
     for group, name in enumerate(layout.group_names):

@@ -52,12 +52,12 @@ def _outcome(entry: Entry) -> str:
 
 def campaign_outcome(entry: CampaignEntry) -> str:
     """Return how many runs of a campaign ended and succeeded, in words."""
-    points, table = entry.results.points, entry.results.table
-    done, succeeded = sum(len(p.done) for p in points), sum(p.successes for p in points)
-    text = f"{succeeded} of {done} runs done succeeded"
-    if len(table) > done:
-        text += f", {len(table) - done} failed to run or were lost"
-    left = entry.results.planned - len(table)
+    results = entry.results
+    ended, done = len(results.table), results.done
+    text = f"{results.successes} of {done} runs done succeeded"
+    if ended > done:
+        text += f", {ended - done} failed to run or were lost"
+    left = results.planned - ended
     return f"{text}, {left} {'is' if left == 1 else 'are'} still to be done" if left > 0 else text
 
 

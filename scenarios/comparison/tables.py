@@ -60,14 +60,8 @@ def _common(kind: str, entries: Sequence[Entry], differences: Sequence[Differenc
 
 def _outcome(entry: Entry) -> dict[str, Any]:
     if isinstance(entry, CampaignEntry):
-        points = entry.results.points
-        done, succeeded = sum(len(p.done) for p in points), sum(p.successes for p in points)
-        return {
-            "planned": entry.results.planned,
-            "ended": len(entry.results.table),
-            "done": done,
-            "succeeded": succeeded,
-        }
+        r = entry.results
+        return {"planned": r.planned, "ended": len(r.table), "done": r.done, "succeeded": r.successes}
     return {"success": bool(entry.facts.summary["success"]), "reason": entry.facts.summary["reason"]}
 
 
