@@ -11,6 +11,7 @@ import numpy as np
 from handover.scenarios.api.arguments import errors_for_python
 from handover.scenarios.api.pages import Page
 from handover.scenarios.api.run_result import Quantity, Run
+from handover.scenarios.api.signals import data_frame
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.results import PointResults, read_results
 
@@ -98,13 +99,8 @@ class Campaign:
         Raises:
             ImportError: pandas is not installed.
         """
-        try:
-            import pandas as pd
-        except ImportError as e:
-            raise ImportError("to_pandas needs pandas: python -m pip install pandas") from e
-        table = pd.DataFrame(self.rows)
-        table.attrs["units"] = {name: self.unit(str(name)) for name in table.columns}
-        return table
+        columns = self._results.table.table.to_pydict()
+        return data_frame(columns, {name: self.unit(name) for name in columns})
 
     def report(self) -> Page:
         """Write the report page into the folder, and return it.

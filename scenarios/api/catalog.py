@@ -19,7 +19,7 @@ from handover.scenarios.api.arguments import (
 )
 from handover.scenarios.api.campaign_result import Campaign
 from handover.scenarios.api.run_result import Run
-from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.catalog import search_folder
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.experiment.experiment import Experiment
@@ -90,5 +90,5 @@ def load(folder: Path | str) -> Run | Campaign:
     if CampaignFolder(path).is_there:
         return Campaign(path)
     if not RunFolder.of_run(path).is_there:
-        raise InvalidInput(f"{path} is the folder of neither a run (no run.json) nor a campaign (no campaign.json)")
+        raise InvalidInput(f"{path} {OF_NEITHER}")
     return Run(path)

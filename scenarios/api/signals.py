@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import nearest
-from handover.cosim.fmu.description import indices_of
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.plotting import STYLE, draw_time_plot
 from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimePlot
+from handover.scenarios.results.run_facts import elements_of
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -80,31 +80,29 @@ class SignalTable(Mapping[str, NDArray[Any]]):
         Raises:
             ImportError: pandas is not installed.
         """
-        try:
-            import pandas as pd
-        except ImportError as e:
-            raise ImportError("to_pandas needs pandas: python -m pip install pandas") from e
-        columns: dict[str, NDArray[Any]] = {}
-        units: dict[str, str] = {}
-        for name in self:
-            for column, values in scalars_of(name, self[name]):
-                columns[column], units[column] = values, self.unit(name)
-        table = pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
-        table.attrs["units"] = units
-        return table
+        elements = {name: elements_of(name, self[name]) for name in self}
+        columns = {column: values for of_signal in elements.values() for column, values in of_signal.items()}
+        units = {column: self.unit(name) for name, of_signal in elements.items() for column in of_signal}
+        return data_frame({"time": self.time, **columns}, units).set_index("time")
 
     def __repr__(self) -> str:
         """Return how many there are, and over which time."""
         return f"<{len(self)} signals over {self.time[-1] - self.time[0]:g} s, {len(self.time)} rows>"
 
 
-def scalars_of(name: str, values: NDArray[Any]) -> list[tuple[str, NDArray[Any]]]:
-    """Return a signal's scalars over time with their names, `p[1]`, `p[2]`, ..., counted from 1."""
-    if values.ndim == 1:
-        return [(name, values)]
-    subscripts = [",".join(map(str, index)) for index in indices_of(values.shape[1:])]
-    columns = values.reshape(len(values), -1)
-    return [(f"{name}[{subscript}]", columns[:, k]) for k, subscript in enumerate(subscripts)]
+def data_frame(columns: Mapping[str, Any], units: Mapping[str, str]) -> "DataFrame":
+    """Return a table of pandas, whose `attrs["units"]` has the columns' units.
+
+    Raises:
+        ImportError: pandas is not installed.
+    """
+    try:
+        import pandas as pd
+    except ImportError as e:
+        raise ImportError("to_pandas needs pandas: python -m pip install pandas") from e
+    table = pd.DataFrame(columns)
+    table.attrs["units"] = dict(units)
+    return table
 
 
 class Plot(Figure):
@@ -153,9 +151,9 @@ def plot_signals(signals: SignalTable, names: Sequence[str], axes: Axes | None =
 
 def _draw(axes: Axes, signals: SignalTable, name: str) -> None:
     values, items = signals[name], signals.item_names(name)
-    scalars = scalars_of(name.rpartition(".")[2], values)[: len(COLOURS)]
+    elements = list(elements_of(name.rpartition(".")[2], values).items())[: len(COLOURS)]
     held = values.dtype.kind != "f"
-    curves = [Curve(label=label, values=column.astype(np.float64), held=held) for label, column in scalars]
+    curves = [Curve(label=label, values=column.astype(np.float64), held=held) for label, column in elements]
     plot = TimePlot(title=name, quantity=name, unit=unit_symbol(signals.unit(name)), curves=curves)
     draw_time_plot(axes, plot, signals.time)
     if items:

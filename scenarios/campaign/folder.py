@@ -29,6 +29,9 @@ from handover.scenarios.results.run_folder import (
 
 _FILE = "campaign.json"
 
+OF_NEITHER = f"is the folder of neither a run (no run.json) nor a campaign (no {_FILE})"
+"""What is said of a folder where a run's or a campaign's is right."""
+
 
 class CampaignFolder:
     """The folder of a campaign: `campaign.json`, `fmus/`, `runs/NAME/`, `runs.parquet`, `report.html`.

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, check_place
 
@@ -40,7 +40,7 @@ def report(folder: Path, figures: bool, runs: bool, file: Path | None) -> None:
         if campaign.is_there:
             _write_of_campaign(campaign, page, figures, runs)
         elif not RunFolder.of_run(folder).is_there:
-            raise UsageError(f"{folder} is the folder of neither a run (no run.json) nor a campaign (no campaign.json)")
+            raise UsageError(f"{folder} {OF_NEITHER}")
         elif runs:
             raise UsageError(f"{folder} is the folder of a run; --runs is for that of a campaign")
         else:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from handover.cosim.record.reader import Record
-from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.campaign.results import CampaignResults, read_results
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
@@ -122,8 +122,7 @@ def read_entries(
                 run = RunFolder.of_run(folder)
                 runs.append(RunEntry(name, folder, RunFacts.read(run), record_of(run)))
             else:
-                of_neither = "is the folder of neither a run (no run.json) nor a campaign (no campaign.json)"
-                what = of_neither if folder.is_dir() else "is no folder"
+                what = OF_NEITHER if folder.is_dir() else "is no folder"
                 faults.append(f"{folder} {what}; name folders of runs, or of campaigns")
         except InvalidRunFolder as e:
             faults.append(f"{folder}: {e.fault}")

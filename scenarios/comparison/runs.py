@@ -4,8 +4,6 @@ import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +15,7 @@ from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.experiment.parameters import parameters_of
 from handover.scenarios.experiment.time_plot import Curve, TimePlot
 from handover.scenarios.results.lacking_record import LackingRecord
+from handover.scenarios.results.run_facts import elements_of
 from handover.scenarios.results.summary import metric_of
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
@@ -226,14 +225,8 @@ def _split(record: Record, signal: str) -> tuple[str, str] | None:
 
 
 def _columns(record: Record, signal: str, subscript: str) -> dict[str, Floats]:
-    """Return a signal's elements by their names, with subscripts from 1 as in the record's columns."""
-    values: Any = record[signal]
-    names = [
-        f"{signal}[{','.join(str(i + 1) for i in index)}]" if index else signal
-        for index in product(*map(range, values.shape[1:]))
-    ]
-    flat = values.reshape(len(values), -1).astype(np.float64)
-    columns = {name: flat[:, k] for k, name in enumerate(names)}
+    """Return a signal's elements as numbers by their names; with a subscript only the one that it names."""
+    columns = {name: values.astype(np.float64) for name, values in elements_of(signal, record[signal]).items()}
     return {signal + subscript: columns[signal + subscript]} if subscript else columns
 
 

@@ -7,7 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
+from numpy.typing import NDArray
+
 from handover.cosim.exceptions import one_line
+from handover.cosim.fmu.description import indices_of
 from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import scenario_of
 from handover.scenarios.experiment.experiment import Experiment
@@ -110,3 +113,10 @@ def record_of(folder: RunFolder) -> Record | None:
     """Return a run's record, likewise; None also where it has only one row, which shows nothing over time."""
     record = whole_record_of(folder)
     return None if record is None or len(record.time) < 2 else record
+
+
+def elements_of(signal: str, values: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    """Return a signal's elements over time by the names of their columns in the record: `p`, or `p[1]`, `p[2]`, ..."""
+    columns = values.reshape(len(values), -1)
+    subscripts = [",".join(map(str, index)) for index in indices_of(values.shape[1:])]
+    return {f"{signal}[{text}]" if text else signal: columns[:, k] for k, text in enumerate(subscripts)}
