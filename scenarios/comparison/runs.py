@@ -25,8 +25,14 @@ _MAX_PLOTS = 6
 _MAX_ELEMENTS = 9
 """Of a signal that is an array, each of which is a plot."""
 
-_ALIKE = 0.004
-"""Of a plot's range: curves that are nearer to each other than this lie on each other."""
+_ALIKE, _HIDDEN = 0.004, 0.2
+"""Of a plot's range: curves that are nearer lie on each other; of a curve: how much of it another one may hide so."""
+
+_HELD = 0.7
+"""Of a signal's steps: one that changes in fewer is held between them, as a sampled unit's output."""
+
+_LINE = 20
+"""Letters that fit along a vertical axis."""
 
 
 @dataclass(frozen=True)
@@ -160,19 +166,12 @@ def _both_limits(panel: TimePlot, plot: TimePlot) -> tuple[float | None, float |
     )
 
 
-_LINE = 20
-"""Letters that fit along a vertical axis."""
-
-
 def _panel(plot: TimePlot, curve: Curve, curves: int) -> TimePlot:
-    if curves == 1:
-        quantity = textwrap.fill(plot.quantity, _LINE)
-        return replace(plot, quantity=quantity, curves=(), levels=(), phases=(), palette=())
-    quantity = f"{plot.quantity}, {curve.label}"
-    title = f"{plot.title}: {curve.label}"
-    return replace(
-        plot, title=title, quantity=textwrap.fill(quantity, _LINE), curves=(), levels=(), phases=(), palette=()
-    )
+    title, quantity = plot.title, plot.quantity
+    if curves > 1:
+        title, quantity = f"{title}: {curve.label}", f"{quantity}, {curve.label}"
+    quantity = textwrap.fill(quantity, _LINE)
+    return replace(plot, title=title, quantity=quantity, curves=(), levels=(), phases=(), palette=())
 
 
 def _named(entries: Sequence[tuple[RunEntry, Record]], signals: Sequence[str]) -> list[Panel]:
@@ -211,7 +210,7 @@ def _panel_of(record: Record, signal: str, title: str, columns: Mapping[str, Map
 def _is_held(values: Floats) -> bool:
     """Return whether a signal keeps its value over most steps, as a sampled unit's output does."""
     changes = np.count_nonzero(np.diff(values))
-    return bool(0 < changes < 0.7 * (len(values) - 1))
+    return bool(0 < changes < _HELD * (len(values) - 1))
 
 
 def _split(record: Record, signal: str) -> tuple[str, str] | None:
@@ -246,17 +245,10 @@ def _resampled(panel: Panel, times: Mapping[str, Floats], time: Floats) -> TimeP
 def at_times(curve: Curve, own: Floats, time: Floats) -> Floats:
     """Return a curve's values at other times: on lines, or held; NaN beyond its last time, and beside its gaps."""
     values = np.asarray(curve.values, dtype=np.float64)
-    if np.array_equal(own, time):
-        return values
-    before = np.clip(np.searchsorted(own, time, side="right") - 1, 0, len(own) - 1)
-    after = np.minimum(before + 1, len(own) - 1)
-    span = own[after] - own[before]
-    share = np.divide(time - own[before], span, out=np.zeros_like(time), where=span > 0.0)
-    exact = curve.held | (share == 0.0)
-    with np.errstate(invalid="ignore"):
-        between = values[before] + share * (values[after] - values[before])
+    last = values[np.maximum(np.searchsorted(own, time, side="right") - 1, 0)]  # of an event's two rows the second
+    is_exact = curve.held | np.isin(time, own)
     inside = (time >= own[0]) & (time <= own[-1])
-    return np.where(inside, np.where(exact, values[before], between), np.nan)
+    return np.where(inside, np.where(is_exact, last, np.interp(time, own, values)), np.nan)
 
 
 def _with_strokes(plots: Sequence[TimePlot]) -> list[TimePlot]:
@@ -276,6 +268,6 @@ def _is_hidden(curve: Curve, below: Sequence[Curve]) -> bool:
         tolerance = _ALIKE * float(np.nanmax(both) - np.nanmin(both))
         with np.errstate(invalid="ignore"):
             near = np.abs(curve.values - other.values) <= tolerance
-        if np.count_nonzero(near) > 0.2 * np.count_nonzero(drawn):
+        if np.count_nonzero(near) > _HIDDEN * np.count_nonzero(drawn):
             return True
     return False
