@@ -1,6 +1,6 @@
 """Campaigns beside each other: their points matched by the values of their parameters, and tests at each point."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -158,7 +158,7 @@ def _faults_of_points(entries: Sequence[CampaignEntry], by_entry: Sequence[Mappi
     return faults
 
 
-def _values(keys: Any) -> dict[str, dict[str, None]]:
+def _values(keys: Iterable[Key]) -> dict[str, dict[str, None]]:
     values: dict[str, dict[str, None]] = {}
     for key in keys:
         for name, text in key:
@@ -166,7 +166,7 @@ def _values(keys: Any) -> dict[str, dict[str, None]]:
     return values
 
 
-def _list(texts: Any) -> str:
+def _list(texts: Iterable[str]) -> str:
     shown = list(texts)
     return ", ".join(shown[:4]) + (", ..." if len(shown) > 4 else "") if shown else "not given"
 
@@ -200,42 +200,19 @@ _KEPT = ("repetition", "seed", "status", "success", "reason")
 
 def _merged(entries: Sequence[CampaignEntry], numbers: Sequence[Mapping[int, int]]) -> CampaignTable:
     """Return the runs of all campaigns in one table, by the points' new numbers; a metric that one lacks is null."""
-    tables: list[Any] = [e.results.table.table for e in entries]
-    columns: dict[str, Any] = {
-        "run": pa.chunked_array(
-            [[f"{e.name}: {run}" for run in t.column("run").to_pylist()] for e, t in _both(entries)]
-        ),
-        "point": pa.chunked_array(
-            [[of.get(k, -1) for k in t.column("point").to_pylist()] for of, t in zip(numbers, tables, strict=True)],
-            type=pa.int64(),
-        ),
-    }
-    fields: list[Any] = [pa.field("run", pa.string()), pa.field("point", pa.int64())]
-    for name in _KEPT:
-        kind = next(t.schema.field(name).type for t in tables if name in t.column_names)
-        columns[name] = _column_of(tables, [name] * len(tables), kind)
-        fields.append(pa.field(name, kind))
-    for name in dict.fromkeys(name for e in entries for name in _metrics(e)):
-        owner = next(e for e in entries if name in _metrics(e)).results.table
-        source = name if name in owner.metrics else f"{name}_metric"
-        metadata = {"role": "metric", "unit": owner.unit(source), "description": owner.description(source)}
-        columns[name] = _column_of(tables, [_column(e, name) for e in entries], pa.float64())
-        fields.append(pa.field(name, pa.float64(), metadata=metadata))
-    table: Any = pa.table(columns, schema=pa.schema(fields))
-    return CampaignTable(table)
+    parts = [_renumbered(e, of_points) for e, of_points in zip(entries, numbers, strict=True)]
+    arrow: Any = pa  # whose stubs do not know the option
+    return CampaignTable(arrow.concat_tables(parts, promote_options="permissive"))
 
 
-def _both(entries: Sequence[CampaignEntry]) -> list[tuple[CampaignEntry, Any]]:
-    return [(e, e.results.table.table) for e in entries]
-
-
-def _column_of(tables: Sequence[Any], names: Sequence[str], kind: Any) -> Any:
-    parts: Any = [
-        t.column(n).combine_chunks().cast(kind) if n in t.column_names else pa.nulls(t.num_rows, kind)
-        for t, n in zip(tables, names, strict=True)
-    ]
-    arrow: Any = pa  # whose stubs ask for a type that is known
-    return arrow.chunked_array(parts, type=kind)
+def _renumbered(entry: CampaignEntry, numbers: Mapping[int, int]) -> Any:
+    """Return a campaign's runs, named with the campaign, with their points' new numbers and metrics' own names."""
+    table: Any = entry.results.table.table
+    metrics = _metrics(entry)
+    part = table.select([*_KEPT, *(_column(entry, name) for name in metrics)]).rename_columns([*_KEPT, *metrics])
+    runs = pa.array([f"{entry.name}: {run}" for run in table.column("run").to_pylist()], pa.string())
+    points = pa.array([numbers.get(k, -1) for k in table.column("point").to_pylist()], pa.int64())
+    return part.append_column("run", runs).append_column("point", points)
 
 
 @dataclass(frozen=True, kw_only=True)
