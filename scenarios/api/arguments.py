@@ -90,8 +90,8 @@ def unit_texts(units: Mapping[str, Path | str | Sequence[Path | str]] | None) ->
     return [f"{name}={text_of_value(files)}" for name, files in (units or {}).items()]
 
 
-def exact(name: str, seconds: Seconds) -> Fraction:
-    """Return a time in seconds exactly.
+def positive_seconds(name: str, seconds: Seconds) -> Fraction:
+    """Return a time in seconds, which must be given, exactly.
 
     Raises:
         InvalidInput: it is not a finite number above 0.
@@ -105,9 +105,9 @@ def exact(name: str, seconds: Seconds) -> Fraction:
     return seconds if isinstance(seconds, Fraction) else exact_seconds(float(seconds))
 
 
-def exact_or_none(name: str, seconds: Seconds | None) -> Fraction | None:
-    """Return a time that may be left open, likewise; None for None."""
-    return None if seconds is None else exact(name, seconds)
+def exact(name: str, seconds: Seconds | None) -> Fraction | None:
+    """Return a time that may be left open, exactly, likewise; None for None."""
+    return None if seconds is None else positive_seconds(name, seconds)
 
 
 def whole_number(name: str, value: Any, least: int = 0) -> int:

@@ -28,8 +28,8 @@ from handover.scenarios.api.arguments import (
     Seconds,
     errors_for_python,
     exact,
-    exact_or_none,
     merged,
+    positive_seconds,
     texts_of,
     unit_texts,
     whole_number,
@@ -110,7 +110,7 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
             wired = OpenSystem(self._system(0), place).place
         assert wired is not None, "a unit is left out"
         self._unit, self._reward = place, reward
-        self._period = exact_or_none("period", period) or wired.unit.period
+        self._period = exact("period", period) or wired.unit.period
         self._sources, inputs = wired.sources, wired.unit.description.inputs
         seen = [name for name in wired.sources if inputs[name].kind in HELD_KINDS]
         self._actions = _chosen("actions", actions, [*wired.targets], wired.ports)
@@ -138,7 +138,7 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
             system = self._system(drawn)
             experiment, parameters = self._asked.experiment, self._asked.parameters
             self.session = Session(experiment, parameters, system, self._request.options, self._unit)
-        self._left = exact("stop", self.session.stop)
+        self._left = positive_seconds("stop", self.session.stop)
         self.session.start()
         self._last = self._observed(self.session)
         return self._last, {"time": self.session.time, "seed": drawn}

@@ -11,7 +11,7 @@ from handover.cosim.system.system import System
 from handover.scenarios.api.arguments import (
     Seconds,
     errors_for_python,
-    exact_or_none,
+    exact,
     formats_of,
     master_options,
     merged,
@@ -86,11 +86,11 @@ def run(
             seed=whole_number("seed", seed),
             units=unit_texts(units),
             out=None if out is None else Path(out),
-            stop=exact_or_none("stop", stop),
-            step=exact_or_none("step", step),
+            stop=exact("stop", stop),
+            step=exact("step", step),
             inputs=None if inputs is None else Path(inputs),
             formats=formats_of(formats),
-            every=exact_or_none("checkpoint", checkpoint),
+            every=exact("checkpoint", checkpoint),
             options=master_options(options, algorithm, isolate),
             presented=report,
         )

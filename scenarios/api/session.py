@@ -26,9 +26,9 @@ from handover.scenarios.api.arguments import (
     Seconds,
     errors_for_python,
     exact,
-    exact_or_none,
     master_options,
     merged,
+    positive_seconds,
     texts_of,
     unit_texts,
     whole_number,
@@ -128,7 +128,7 @@ class Session:
             InvalidInput: the duration is none. UnitFailure: a unit failed; the session can only be closed then.
             RuntimeError: a unit failed before, or has ended the simulation.
         """
-        return self._run(self._asked + exact("duration", duration))
+        return self._run(self._asked + positive_seconds("duration", duration))
 
     def start(self) -> float:
         """Let units that sample at 0 s act, and the evaluation begin, as the first step would; return the time.
@@ -331,7 +331,7 @@ def open(  # noqa: A001 (handover.open is named like it)
             seed=whole_number("seed", seed),
             units=unit_texts(units),
             stop=_ANY_STOP if endless else None,
-            step=exact_or_none("step", step),
+            step=exact("step", step),
             options=master_options(options or MasterOptions(), algorithm, isolate),
         )
         request.check_options()
