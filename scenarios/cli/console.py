@@ -1,8 +1,12 @@
-"""What commands print to: the console, and rows in columns."""
+"""What commands print to: the console; rows in columns; data as JSON."""
 
+import json
 import os
 import sys
+from collections.abc import Mapping
+from typing import Any
 
+import click
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -19,6 +23,11 @@ def print_rows(console: Console, rows: list[tuple[str, ...]]) -> None:
     for row in rows:
         table.add_row("", *map(Text, row))
     console.print(table)
+
+
+def print_json(data: Mapping[str, Any]) -> None:
+    """Print data as JSON, for programs."""
+    click.echo(json.dumps(data, indent=2))
 
 
 class _Console(Console):

@@ -1,6 +1,5 @@
 """The command `handover info`: what is in an FMU or an SSP, from any tool, without loading it."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from handover.cosim.fmu.description import FmuDescription, describe_fmu
 from handover.cosim.fmu.fmpy_edge import platforms_in
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.system import System
-from handover.scenarios.cli.console import open_console, print_rows
+from handover.scenarios.cli.console import open_console, print_json, print_rows
 from handover.scenarios.cli.port_tables import port_rows, variable_data
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.fmu_run import is_fmu
@@ -48,13 +47,9 @@ def info(file: Path, *, as_json: bool) -> None:
                 data = system_data(ssp.name, stop, ssp.system)
                 print_json(data) if as_json else _print_system(data)
             return
-        data = fmu_data(describe_fmu(file), platforms_in(FmuArchive(file)))
-        print_json(data) if as_json else _print_fmu(data, describe_fmu(file))
-
-
-def print_json(data: dict[str, Any]) -> None:
-    """Print data as JSON."""
-    click.echo(json.dumps(data, indent=2))
+        described = describe_fmu(file)
+        data = fmu_data(described, platforms_in(FmuArchive(file)))
+        print_json(data) if as_json else _print_fmu(data, described)
 
 
 def fmu_data(d: FmuDescription, platforms: list[str]) -> dict[str, Any]:

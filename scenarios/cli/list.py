@@ -1,13 +1,14 @@
 """The command `handover list`: scenarios and units, their parameters and ports."""
 
-import json
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 from rich.console import Console
 
-from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.description import Description, describe
 from handover.cosim.blocks.variable import Causality
 from handover.cosim.exceptions import nearest
 from handover.fmus.catalog import (
@@ -28,12 +29,12 @@ from handover.scenarios.catalog import (
     named_scenario,
     search_folder,
 )
-from handover.scenarios.cli.console import open_console, print_rows
+from handover.scenarios.cli.console import open_console, print_json, print_rows
 from handover.scenarios.cli.port_tables import allowed, plain, port_rows, type_of, variable_data
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.places import ports_of_place
+from handover.scenarios.experiment.places import PlacePort, ports_of_place
 
 
 @click.command("list", short_help="List scenarios and units, or what one of them takes and gives.")
@@ -51,32 +52,33 @@ def list_command(name: str | None, place: str | None, *, as_json: bool) -> None:
     Either can be your own, named MODULE:CLASS, such as my_scene:TwoLinkReach for the class TwoLinkReach in my_scene.py;
     modules are looked for in the working directory first.
     """
+    data, show = _subject(name, place)
+    if as_json:
+        print_json(data())
+    else:
+        show()
+
+
+def _subject(name: str | None, place: str | None) -> tuple[Callable[[], dict[str, Any]], Callable[[], None]]:
+    """Return what gives the data of what is asked for, and what prints it.
+
+    Raises:
+        UsageError: there is no such scenario or unit.
+    """
     if place is not None:
         if name is None:
             raise UsageError("--unit is for a SCENARIO: handover list SCENARIO --unit NAME")
-        if as_json:
-            click.echo(json.dumps(place_data(find_scenario(name), place), indent=2))
-        else:
-            print_place(find_scenario(name), place)
-    elif name is None:
-        if as_json:
-            click.echo(json.dumps(catalog_data(), indent=2))
-        else:
-            print_catalog()
-    elif (unit := _unit(name)) is not None:
-        if as_json:
-            click.echo(json.dumps(unit_data(unit), indent=2))
-        else:
-            print_unit(unit)
-    elif ":" in name or name in SCENARIOS or name in installed_scenarios():
         scenario = find_scenario(name)
-        if as_json:
-            click.echo(json.dumps(scenario_data(scenario), indent=2))
-        else:
-            print_scenario(scenario)
-    else:
-        valid = [*SCENARIOS, *installed_scenarios(), *UNITS, *installed_units()]
-        raise UsageError(f"no scenario or unit {name!r}: {nearest(name, valid)}")
+        return partial(place_data, scenario, place), partial(print_place, scenario, place)
+    if name is None:
+        return catalog_data, print_catalog
+    if (unit := _unit(name)) is not None:
+        return partial(unit_data, unit), partial(print_unit, unit)
+    if ":" in name or name in SCENARIOS or name in installed_scenarios():
+        scenario = find_scenario(name)
+        return partial(scenario_data, scenario), partial(print_scenario, scenario)
+    valid = [*SCENARIOS, *installed_scenarios(), *UNITS, *installed_units()]
+    raise UsageError(f"no scenario or unit {name!r}: {nearest(name, valid)}")
 
 
 def _unit(name: str) -> Entry | None:
@@ -164,6 +166,15 @@ def _own_unit(experiment: type[Experiment[Any]], name: str) -> Entry:
         raise UsageError(f"unit {name}: {e}") from e
 
 
+def _ports_of_place(experiment: type[Experiment[Any]], name: str, own: Entry) -> list[PlacePort]:
+    try:
+        return ports_of_place(experiment.places[name], own)
+    except KeyError as e:
+        raise UsageError(f"{experiment.name}, place {name}: {e.args[0]!r} is no port or parameter of {own.name}") from e
+    except UnknownBlock as e:
+        raise UsageError(f"unit {name}: {e}") from e
+
+
 def place_data(experiment: type[Experiment[Any]], name: str) -> dict[str, Any]:
     """Return what a unit needs to take a place, as JSON can hold it; `ports` is None where that is not declared.
 
@@ -181,7 +192,7 @@ def place_data(experiment: type[Experiment[Any]], name: str) -> dict[str, Any]:
             "required": p.is_required,
             "description": p.sentence,
         }
-        for p in ports_of_place(place, own)
+        for p in _ports_of_place(experiment, name, own)
     ]
     return {**data, "remarks": list(place.remarks), "ports": ports}
 
@@ -203,7 +214,7 @@ def print_place(experiment: type[Experiment[Any]], name: str) -> None:
     console.print(f"{experiment.name}, place {name}: {own.name} or a unit of your own", style="bold")
     for remark in place.remarks:
         console.print(remark, markup=False)
-    ports = ports_of_place(place, own)
+    ports = _ports_of_place(experiment, name, own)
     for is_required, needed in ((True, "required"), (False, "optional")):
         for causality, what in (
             (Causality.INPUT, "Inputs"),
@@ -221,13 +232,21 @@ def print_place(experiment: type[Experiment[Any]], name: str) -> None:
     console.print("Optional ones that a unit does not have are left out of the wiring, and what is shown of them.")
 
 
-def print_unit(unit: Entry) -> None:
-    """Print a unit's parameters with defaults and ranges, its inputs and its outputs."""
-    console = open_console()
+def _described(unit: Entry) -> Description:
+    """Return what a unit declares.
+
+    Raises:
+        UsageError: a package that it needs is missing.
+    """
     try:
-        d = describe(import_class(unit.block))
+        return describe(import_class(unit.block))
     except PackageFailure as e:
         raise UsageError(str(e)) from e
+
+
+def print_unit(unit: Entry) -> None:
+    """Print a unit's parameters with defaults and ranges, its inputs and its outputs."""
+    console, d = open_console(), _described(unit)
     step = "sampled every" if d.period is not None else "stepped by, for instance,"
     console.print(f"{unit.name}: {unit.summary}", style="bold")
     console.print(f"{step} {float(unit.step) * 1000:.4g} ms")
@@ -260,7 +279,7 @@ def scenario_data(experiment: type[Experiment[Any]]) -> dict[str, Any]:
 
 def unit_data(unit: Entry) -> dict[str, Any]:
     """Return a unit's parameters and ports, as JSON can hold them; its step is in seconds."""
-    d = describe(import_class(unit.block))
+    d = _described(unit)
     named = {"parameters": d.parameters, "inputs": d.inputs, "outputs": d.outputs}
     variables = {kind: [variable_data(v) for v in of_kind] for kind, of_kind in named.items()}
     facts = {"name": unit.name, "summary": unit.summary, "step": float(unit.step), "sampled": d.period is not None}

@@ -1,14 +1,20 @@
 """`handover info`, `handover list --json` and what they tell of FMUs, SSPs, units and scenarios."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 from click.testing import CliRunner, Result
 
 from handover.fmus.build import cached
+from handover.fmus.catalog import PackageFailure
 from handover.scenarios.cli.command import main
+from handover.scenarios.cli.list import place_data, print_place
+from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.experiment.places import Place
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 
 
 def call(*arguments: str | Path) -> Result:
@@ -81,6 +87,30 @@ def test_list_as_data():
     unit = data_of("list", "Thrusters")
     assert unit["step"] == 0.016
     assert [p["name"] for p in unit["outputs"]] == ["f_B", "tau_B", "saturated"]
+
+
+@pytest.mark.parametrize("as_json", [(), ("--json",)])
+def test_a_unit_whose_package_is_missing_is_told_in_one_line(as_json: tuple[str, ...], monkeypatch: pytest.MonkeyPatch):
+    def lacking(path: str) -> type[Any]:
+        raise PackageFailure(path, "exudyn is missing")
+
+    monkeypatch.setattr("handover.scenarios.cli.list.import_class", lacking)
+    result = call("list", "TendonArm", *as_json)
+    assert result.exit_code == 2
+    (line,) = result.output.splitlines()
+    assert line.endswith("exudyn is missing")
+
+
+class Misplaced(IrGrasp):
+    """A scenario that names a port which its own unit does not have."""
+
+    places: ClassVar[Mapping[str, Place]] = {"reflex": Place(required={"sigma_cmt": ""})}
+
+
+def test_a_place_with_a_port_that_there_is_not_is_told():
+    for show in (place_data, print_place):
+        with pytest.raises(UsageError, match="place reflex: 'sigma_cmt' is no port or parameter of IrReflex"):
+            show(Misplaced, "reflex")
 
 
 def test_an_export_replaces_a_file_only_when_told_to(tmp_path: Path):
