@@ -29,7 +29,7 @@ _TYPES: Mapping[Kind, Any] = {Kind.REAL: np.float64, Kind.BOOLEAN: np.bool_}
 
 
 @dataclass(frozen=True)
-class Place:
+class VacantPlace:
     """The place of a unit that is left out: what it was fed, what it fed, and its outputs as they are set.
 
     Attributes:
@@ -120,7 +120,7 @@ class OpenSystem:
         self.free[str(target)] = held
         self.system.follow(target, held)
 
-    def _place(self, system: System, name: str) -> Place:
+    def _place(self, system: System, name: str) -> VacantPlace:
         unit, sources = system.units[name], dict[str, tuple[PortName, LinearTransformation | None]]()
         targets: dict[str, list[tuple[PortName, LinearTransformation | None]]] = {}
         for c in system.connections:
@@ -129,7 +129,7 @@ class OpenSystem:
             if c.target.unit == name and not _is_clock(system, c):
                 sources[c.target.port] = c.source, system.transformation_of(c)
         outputs = {p.name: self._memory(p, targets) for p in unit.description.outputs.values() if p.kind in HELD_KINDS}
-        return Place(unit, sources, targets, outputs)
+        return VacantPlace(unit, sources, targets, outputs)
 
     def _memory(
         self, port: FmuPort, targets: Mapping[str, Sequence[tuple[PortName, LinearTransformation | None]]]

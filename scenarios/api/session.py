@@ -114,11 +114,6 @@ class Session:
         """Names of all outputs."""
         return tuple(f"{u.name}.{port}" for u in self._open.system.units.values() for port in u.description.outputs)
 
-    @property
-    def open_system(self) -> OpenSystem:
-        """The system, with what is set from outside."""
-        return self._open
-
     def step(self, duration: Seconds) -> float:
         """Step on by a duration, s, to the first communication point at or after it; return the time reached.
 

@@ -3,7 +3,6 @@
 import base64
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, cast
 
 from markupsafe import Markup
 
@@ -12,15 +11,16 @@ from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.reporting.html import rows_table
 from handover.scenarios.reporting.page import Section
-from handover.scenarios.results.tables import format_value
+from handover.scenarios.results.tables import format_value, options_in_words
 
 
 def setting_section(results: CampaignResults) -> Section:
     """Return tables of what is set for all runs; other parameters have the scenario's defaults."""
     metadata = results.metadata
+    options = options_in_words(metadata.get("master", {}))
     parts = [
         _part("Fixed parameters", {n: _value(results, n, v) for n, v in metadata["fixed"].items()}),
-        _part("Master", _flat(metadata.get("master", {}))),
+        _part("Master", {n: format_value(v) for n, v in options.items() if v is not None}),
         _part("Versions", {n: str(v) for n, v in metadata.get("versions", {}).items()}),
         _fmus(metadata.get("units", {})),
     ]
@@ -56,17 +56,6 @@ def _value(results: CampaignResults, name: str, text: str) -> str:
         return display_unit(results.unit(name), float(text)).text(float(text))
     unit = results.unit(name)
     return text if unit == "1" else f"{text} {unit}"
-
-
-def _flat(options: Mapping[str, Any]) -> dict[str, str]:
-    """Return options as texts, nested ones by both names, without those that are not set."""
-    flat: dict[str, str] = {}
-    for name, value in options.items():
-        if isinstance(value, Mapping):
-            flat |= {f"{name} {n}": t for n, t in _flat(cast(Mapping[str, Any], value)).items()}
-        elif value is not None:
-            flat[name.replace("_", " ")] = format_value(value)
-    return flat
 
 
 def figures_section(figures: Sequence[Figure], folder: Path) -> Section | None:

@@ -69,7 +69,7 @@ class ComparedCampaigns(CampaignResults):
         numbers = {pair: number for number, pair in enumerate(pairs)}
         metadata: dict[str, Any] = {
             "scenario": entries[0].scenario,
-            "source": entries[0].description.get("source", {}),
+            "source": entries[0].metadata.get("source", {}),
             "points": [{**dict(key), ENTRY: entries[k].name} for key, k in pairs],
             "fixed": {},
             "repetitions": 1,
@@ -79,8 +79,8 @@ class ComparedCampaigns(CampaignResults):
     def _points_of(self, entry: CampaignEntry) -> dict[Key, list[int]]:
         """Return the numbers of a campaign's points by the values that tell points apart."""
         points: dict[Key, list[int]] = {}
-        for number, values in enumerate(entry.description["points"]):
-            full = full_parameters(entry.results.experiment, {**entry.description["fixed"], **values})
+        for number, values in enumerate(entry.metadata["points"]):
+            full = full_parameters(entry.results.experiment, {**entry.metadata["fixed"], **values})
             key = tuple((name, full[name]) for name in self.keys if name in full)
             points.setdefault(key, []).append(number)
         return points
@@ -243,13 +243,18 @@ class SuccessTest:
 
 @dataclass(frozen=True, kw_only=True)
 class MetricTest:
-    """In what a metric differs between two campaigns at a point, and by which test; see `SuccessTest`."""
+    """In what a metric differs between two campaigns at a point, and by which test; see `SuccessTest`.
+
+    Attributes:
+        paired: whether the runs have shared seeds, and the test is of these pairs.
+    """
 
     key: Key
     first: str
     second: str
     metric: str
     test: DifferenceTest
+    paired: bool
     corrected: float = 1.0
 
 
@@ -291,7 +296,8 @@ def _metric_tests(results: ComparedCampaigns, metric: str) -> list[MetricTest]:
         else:
             test = unpaired_difference(values[a.done], values[b.done])
         if test is not None:
-            tests.append(MetricTest(key=key, first=first, second=second, metric=metric, test=test))
+            paired = bool(rows)
+            tests.append(MetricTest(key=key, first=first, second=second, metric=metric, test=test, paired=paired))
     corrected = holm([t.test.p for t in tests])
     return [replace(t, corrected=p) for t, p in zip(tests, corrected, strict=True)]
 

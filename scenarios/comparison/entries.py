@@ -16,7 +16,7 @@ from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
 from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
-from handover.scenarios.results.tables import format_value
+from handover.scenarios.results.tables import format_value, options_in_words
 
 MAX_ENTRIES = 9
 """Campaigns or runs on one page: as many as there are colours."""
@@ -44,7 +44,7 @@ class CampaignEntry:
         return self.results.scenario
 
     @property
-    def description(self) -> Mapping[str, Any]:
+    def metadata(self) -> Mapping[str, Any]:
         """Content of `campaign.json`."""
         return self.results.metadata
 
@@ -69,7 +69,7 @@ class RunEntry:
         return self.facts.scenario
 
     @property
-    def description(self) -> Mapping[str, Any]:
+    def metadata(self) -> Mapping[str, Any]:
         """Content of `run.json`."""
         return self.facts.run
 
@@ -192,7 +192,7 @@ def differences_of(entries: Sequence[Entry], varied: Sequence[str] = ()) -> list
     found = _of_kind(entries, "parameter", lambda e: {n: t for n, t in e.parameters.items() if n not in varied})
     found += _of_kind(entries, "unit", lambda e: {n: _fmu(u) for n, u in _part(e, "units").items()})
     found += _of_kind(entries, "scenario", _code)
-    found += _of_kind(entries, "master", lambda e: _flat(_part(e, "master")))
+    found += _of_kind(entries, "master", _options)
     found += _of_kind(entries, "seeds", _seeds)
     return found + _of_kind(entries, "version", lambda e: {n: str(v) for n, v in _part(e, "versions").items()})
 
@@ -205,7 +205,7 @@ def _of_kind(entries: Sequence[Entry], kind: str, texts: Callable[[Any], Mapping
 
 
 def _part(entry: Entry, name: str) -> Mapping[str, Any]:
-    part: Any = entry.description.get(name)
+    part: Any = entry.metadata.get(name)
     return cast(Mapping[str, Any], part) if isinstance(part, dict) else {}
 
 
@@ -222,19 +222,13 @@ def _code(entry: Entry) -> dict[str, str]:
 
 
 def _seeds(entry: Entry) -> dict[str, str]:
-    content = entry.description
+    content = entry.metadata
     if isinstance(entry, RunEntry):
         return {"seed": str(content.get("seed"))}
     names = {"seed": "campaign's seed", "repetitions": "runs of each point", "paired": "points share seeds"}
     return {words: format_value(content.get(name)) for name, words in names.items()}
 
 
-def _flat(options: Mapping[str, Any], before: str = "") -> dict[str, str]:
-    flat: dict[str, str] = {}
-    for name, value in options.items():
-        words = f"{before}{name.replace('_', ' ')}"
-        if isinstance(value, Mapping):
-            flat |= _flat(cast(Mapping[str, Any], value), f"{words} ")
-        else:
-            flat[words] = "none" if value is None else format_value(value)
-    return flat
+def _options(entry: Entry) -> dict[str, str]:
+    options = options_in_words(_part(entry, "master"))
+    return {name: "none" if value is None else format_value(value) for name, value in options.items()}

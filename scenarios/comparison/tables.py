@@ -109,7 +109,7 @@ def _metric_data(results: ComparedCampaigns, metric: str) -> list[dict[str, Any]
             "parameters": dict(t.key),
             "first": t.first,
             "second": t.second,
-            "paired": t.test.method == "Wilcoxon",
+            "paired": t.paired,
             "n": t.test.n,
             "difference": t.test.difference,
             "interval": _interval(t.test.interval),

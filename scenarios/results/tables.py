@@ -4,7 +4,7 @@ The command line and the report page show the same rows.
 """
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 from handover.cosim.master.pacing import PaceReport
 from handover.cosim.stepping.options import Algorithm
@@ -79,6 +79,18 @@ def format_value(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:g}"
     return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def options_in_words(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of options by their names in words; one within another by both names."""
+    flat: dict[str, Any] = {}
+    for name, value in options.items():
+        words = name.replace("_", " ")
+        if isinstance(value, Mapping):
+            flat |= {f"{words} {n}": v for n, v in options_in_words(cast(Mapping[str, Any], value)).items()}
+        else:
+            flat[words] = value
+    return flat
 
 
 def format_metric(metric: Mapping[str, Any]) -> str:
