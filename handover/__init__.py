@@ -17,7 +17,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from handover.cosim.exceptions import UnitFailure
+    from handover.cosim.exceptions import RecordNotWritten, UnitFailure
     from handover.cosim.fmu.description import FmuDescription
     from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
     from handover.cosim.system.system import System
@@ -31,17 +31,20 @@ if TYPE_CHECKING:
     from handover.scenarios.api.session import SavedState, Session, open  # noqa: A004
     from handover.scenarios.api.signals import SignalTable
     from handover.scenarios.api.sweeping import sweep
+    from handover.scenarios.execution.errors import ClusterLost
 
 _EXPORTS = {
     "AdaptiveStep": "cosim.stepping.options",
     "Algorithm": "cosim.stepping.options",
     "Campaign": "scenarios.api.campaign_result",
+    "ClusterLost": "scenarios.execution.errors",
     "Extrapolation": "cosim.stepping.options",
     "FmuDescription": "cosim.fmu.description",
     "InvalidInput": "scenarios.api.arguments",
     "MasterOptions": "cosim.stepping.options",
     "Page": "scenarios.api.pages",
     "Quantity": "scenarios.api.run_result",
+    "RecordNotWritten": "cosim.exceptions",
     "Run": "scenarios.api.run_result",
     "SavedState": "scenarios.api.session",
     "Session": "scenarios.api.session",
@@ -63,12 +66,14 @@ __all__ = [
     "AdaptiveStep",
     "Algorithm",
     "Campaign",
+    "ClusterLost",
     "Extrapolation",
     "FmuDescription",
     "InvalidInput",
     "MasterOptions",
     "Page",
     "Quantity",
+    "RecordNotWritten",
     "Run",
     "SavedState",
     "Session",

@@ -1,9 +1,12 @@
 """`import handover` takes next to no time, and what it exports is there, documented, and typed."""
 
 import ast
+import builtins
 import inspect
+import re
 import subprocess
 import sys
+from operator import attrgetter
 from pathlib import Path
 
 import handover
@@ -29,6 +32,16 @@ def test_all_that_it_exports_can_be_loaded_and_is_documented():
         found = getattr(handover, name)
         assert inspect.getdoc(found), name
         assert found.__name__ == name
+
+
+def test_all_errors_of_its_own_that_are_documented_can_be_caught():
+    documented: set[str] = set()
+    for name in ("run", "sweep", "open", "environment", "load", "Run.report", "Campaign.report", "Session.step"):
+        text = inspect.getdoc(attrgetter(name)(handover)) or ""
+        documented |= set(re.findall(r"\b([A-Z]\w+): ", text.partition("Raises:")[2]))
+    assert {name for name in documented if not hasattr(builtins, name)} == {
+        "ClusterLost", "InvalidInput", "RecordNotWritten", "UnitFailure",
+    } <= set(handover.__all__)  # fmt: skip
 
 
 def test_type_checkers_see_what_is_loaded():
