@@ -39,11 +39,11 @@ def spread_section(results: CampaignResults, layout: PointLayout) -> Section | N
     options = Markup().join(Markup("<option>{}</option>").format(c["name"]) for c in choices)
     html = Markup(
         "<div class='chooser' data-axis='{}'><div class='controls'><label>Metric <select>{}</select></label></div>\n"
-        "<p class='soft told'>{}</p>{}{}</div>\n<p class='soft'>{}</p>"
+        "<p class='soft description'>{}</p>{}{}</div>\n<p class='soft'>{}</p>"
     ).format(
         "xaxis" if layout.listed else "yaxis",
         options,
-        choices[0]["told"],
+        choices[0]["description"],
         plot_html(figure, plot_height(layout) + 60, f"{first} by point"),
         json_html(choices, "choices"),
         _note(results),
@@ -141,7 +141,7 @@ def _choice(results: CampaignResults, layout: PointLayout, name: str, strips: Se
     return {
         "name": words,
         "axis": unit.axis(f"{words}<br>" if layout.listed else words),
-        "told": results.table.description(name),
+        "description": results.table.description(name),
         "traces": [*boxes, *({across: _plain(values[rows])} for _, _, rows, _ in strips)],
     }
 

@@ -9,7 +9,7 @@
     const axis = chooser.dataset.axis;
     select.addEventListener("change", () => {
       const choice = choices[select.selectedIndex];
-      chooser.querySelector(".told").textContent = choice.told;
+      chooser.querySelector(".description").textContent = choice.description;
       page.draw(plot, {
         data: figure.data.map((trace, k) => ({...trace, ...choice.traces[k]})),
         layout: {...figure.layout, [axis]: {...figure.layout[axis], title: {text: choice.axis}}},

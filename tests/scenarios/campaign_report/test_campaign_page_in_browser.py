@@ -33,7 +33,7 @@ def test_a_metric_is_chosen_and_runs_are_sorted_and_filtered(browser: Browser, c
         page.select_option(".chooser select", label="refinement time")
         wait_until(page, f"{plot}.layout.yaxis.title.text === 'refinement time (s)'")
         assert page.evaluate(f"JSON.stringify({plot}.data.map(t => t.y ?? t.median))") != before
-        assert "until the hand closes" in page.inner_text(".chooser .told")
+        assert "until the hand closes" in page.inner_text(".chooser .description")
 
         rows = page.locator("#all-runs tbody tr")
         seeds = "[...document.querySelectorAll('#all-runs tbody tr')].map(r => Number(r.cells[2].textContent))"
