@@ -36,7 +36,7 @@ _WIDTH, _HEIGHT = 1400, 1350
 _FLAGS = ("--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 _BACKGROUND = (237, 229, 222)  # blue green red
 _EDGE = 24
-_HIDDEN = "{} {{ display: none }}"
+"""Around the pictures of the page, px."""
 
 
 def main() -> None:
@@ -51,10 +51,10 @@ def main() -> None:
 
 
 def _copy(figure: Path, to: Path) -> None:
-    pixels = _read(figure)
     if to.suffix == ".png":
         shutil.copyfile(figure, to)
         return
+    pixels = np.asarray(cv2.imread(str(figure)), dtype=np.uint8)
     height = round(pixels.shape[0] * _WIDTH / pixels.shape[1])
     cv2.imwrite(str(to), cv2.resize(pixels, (_WIDTH, height), interpolation=cv2.INTER_AREA), _JPEG)
 
@@ -82,7 +82,7 @@ def _shown(browser: Browser, file: Path, width: int, scheme: Any, hidden: str) -
     page.set_default_timeout(120_000)
     page.goto(file.as_uri(), wait_until="commit")
     page.wait_for_selector("html[data-drawn]", state="attached")
-    page.add_style_tag(content=_HIDDEN.format(hidden))
+    page.add_style_tag(content=f"{hidden} {{ display: none }}")
     page.evaluate("""() => {
         const slider = document.querySelector(".replay-time");
         slider.value = Math.round(slider.max * 0.43);
@@ -92,10 +92,6 @@ def _shown(browser: Browser, file: Path, width: int, scheme: Any, hidden: str) -
     seen = np.frombuffer(page.screenshot(), dtype=np.uint8)
     page.close()
     return np.asarray(cv2.imdecode(seen, cv2.IMREAD_COLOR), dtype=np.uint8)
-
-
-def _read(file: Path) -> Pixels:
-    return np.asarray(cv2.imread(str(file)), dtype=np.uint8)
 
 
 if __name__ == "__main__":

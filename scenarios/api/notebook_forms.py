@@ -32,7 +32,7 @@ def run_html(facts: RunFacts, metrics: Mapping[str, float], record: Record | Non
     rows = [(_description(facts, name), str(metrics[name])) for name in facts.headline if name in metrics]
     return str(
         Markup("<div>{}{}{}{}<p><small>results: {}</small></p></div>").format(
-            verdict_html(facts.scenario, good=bool(summary["success"]), reason=str(summary["reason"])),
+            _verdict(facts.scenario, good=bool(summary["success"]), reason=str(summary["reason"])),
             Markup().join(Markup("<p>{}</p>").format(line) for line in faults.lines),
             table_html((), rows),
             Markup().join(pictures),
@@ -46,7 +46,7 @@ def _description(facts: RunFacts, name: str) -> str:
     return str(facts.summary["metrics"][name].get("description") or name)
 
 
-def verdict_html(name: str, *, good: bool, reason: str) -> Markup:
+def _verdict(name: str, *, good: bool, reason: str) -> Markup:
     """Return a verdict in its colour, with its reason."""
     html = Markup("<p><b>{}: <span style='color: {}'>{}</span></b>, {}</p>")
     return html.format(name, _GOOD if good else _BAD, "succeeded" if good else "failed", reason)

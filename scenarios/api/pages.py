@@ -15,12 +15,12 @@ class Page:
     Attributes:
         html: its text.
         path: the file that it is in; None where it was not saved.
+        height: of its frame in a notebook, pixels.
     """
 
     html: str
     path: Path | None = None
     height: int = 640
-    """Of its frame in a notebook, pixels."""
 
     def save(self, path: Path | str) -> "Page":
         """Write the page to a file and return it with that as its path.

@@ -92,7 +92,7 @@ def _cost(results: CampaignResults) -> str:
         return ""
     cpu, wall = (float(np.nansum(results.table.column(n).astype(np.float64))) for n in ("cpu_seconds", "wall_seconds"))
     times = [display_unit("s", seconds).text(seconds) for seconds in (cpu, wall)]
-    return f"The runs took {times[0]} of CPU time, and {times[1]} from begin to end, added up."
+    return f"The runs took {times[0]} of CPU time, and {times[1]} from beginning to end, added up."
 
 
 def _values(results: CampaignResults, name: str) -> str:
