@@ -1,7 +1,7 @@
 """The calls of one unit's functions: each noted in the heartbeat, its status checked, its log lines kept.
 
-A status above Warning raises the `UnitFailure` of that status. A unit may live in a process of its own, see
-`InstanceProcess`.
+A status above Warning raises the `UnitFailure` of that status; Warning is counted. A unit may live in a process of its
+own, see `InstanceProcess`.
 """
 
 import collections
@@ -16,9 +16,10 @@ from handover.cosim.fmu.failures import STATUS, failure_of
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.instance_process import InstanceProcess
 from handover.cosim.fmu.loading import LOADING, UNLOADING, load_unit
+from handover.cosim.fmu.unit_warnings import UnitWarnings
 
 _LOG_LINES = 30
-_DISCARD, _FATAL = 2, 4
+_WARNING, _DISCARD, _FATAL = 1, 2, 4
 
 
 def _nothing() -> None:
@@ -51,6 +52,7 @@ class CheckedCalls:
         self._heartbeat = heartbeat or Heartbeat()
         self._codes: dict[str, int] = {}
         self._failed: int | None = None
+        self._warnings = UnitWarnings()
         d = description
         self._process = InstanceProcess(name, d.path, self._heartbeat, isolated=isolated)
         try:
@@ -97,6 +99,14 @@ class CheckedCalls:
             self._process.kill()
         elif self.isolated:
             self._end_process()
+
+    @property
+    def warnings(self) -> UnitWarnings:
+        """The calls that answered Warning until now, but for those in a plan, see `PlanStepper.publish_warnings`."""
+        if self._process.own is not None:
+            for warned in self._process.own.take_warnings():
+                self._warnings.add(*warned)
+        return self._warnings
 
     @property
     def isolated(self) -> bool:
@@ -146,8 +156,15 @@ class CheckedCalls:
         self._begins(self._prefix + name)
         status = self._function(name)(self._component, *arguments)
         self._returned()
-        if status not in SUCCEEDED:
-            self._fail(self._prefix + name, status)
+        if status:
+            self._check(self._prefix + name, status)
+
+    def _check(self, call: str, status: int, failing: str = "") -> None:
+        """Count a Warning; raise a failure of a call, as one that is told as `failing`."""
+        if status == _WARNING:
+            self._warnings.add(call, self.time)
+        elif status not in SUCCEEDED:
+            self._fail(failing or call, status)
 
     def _end_process(self) -> None:
         if self.lost:
@@ -179,5 +196,7 @@ class CheckedCalls:
         if status > 0:
             text = message.removeprefix(f"{self.name}: ")  # logs are shown with the instance's name
             line = f"[{STATUS[status] if status < len(STATUS) else status}] {text}"
+            if status == _WARNING:
+                self._warnings.note_message(text)
             self.log.append(line)
             self._heartbeat.log(self.name, line)

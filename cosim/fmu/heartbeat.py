@@ -150,6 +150,11 @@ class Heartbeat:
         """Address of the two cells of `crash`, for C code."""
         return self.address + 8 * _CRASHED
 
+    @property
+    def time_address(self) -> int:
+        """Address of the cell of `time`, for C code."""
+        return self.address + 8 * _TIME
+
     def record_facts(self, **facts: Any) -> None:
         """Keep facts, in addition to those kept before, for the report if this process crashes; JSON must hold them."""
         line = json.dumps({**self.facts, **facts})

@@ -1,7 +1,7 @@
 """One FMU, unpacked, loaded and instantiated, behind the same few methods for FMI 2 and FMI 3.
 
 An instance has its values in preallocated buffers, `u` for inputs and `y` for outputs. Every call goes through the
-heartbeat and is checked: a status above Warning raises the `UnitFailure` of that status.
+heartbeat and is checked: a status above Warning raises the `UnitFailure` of that status, and Warning is counted.
 """
 
 import collections
@@ -27,7 +27,7 @@ from handover.cosim.fmu.description import FmuDescription, FmuPort
 from handover.cosim.fmu.failures import InvalidReturn, StepDiscarded, UnitError, UnitTerminated
 from handover.cosim.fmu.heartbeat import Heartbeat
 
-_DISCARD, _FATAL, _PENDING = 2, 4, 5
+_WARNING, _DISCARD, _FATAL, _PENDING = 1, 2, 4, 5
 
 
 class Instance(CheckedCalls):
@@ -73,8 +73,8 @@ class Instance(CheckedCalls):
             self._begins(buffer.name)
             status = buffer()
             self._returned()
-            if status == _FATAL:
-                self._fail(buffer.name, status)
+            if status in (_WARNING, _FATAL):
+                self._check(buffer.name, status)
             if status in SUCCEEDED:
                 given.append(buffer)
             elif len(buffer.views) > 1:  # one that is not given takes all of a call with it
@@ -284,6 +284,8 @@ class Instance(CheckedCalls):
         self._begins(self._step_call)
         status: int = self._do_step(self._component, t, dt, not self.can_roll_back, *self._step_returns.arguments)
         self._returned()
+        if status == _WARNING:
+            self._check(self._step_call, status)
         return status
 
     def _reached(self, dt: float) -> float:
@@ -322,8 +324,8 @@ class Instance(CheckedCalls):
             self._begins(buffer.name)
             status = buffer()
             self._returned()
-            if status not in SUCCEEDED:
-                self._fail(buffer.name, status)
+            if status:
+                self._check(buffer.name, status)
             if isinstance(buffer, OutputBuffer):
                 self.check_memory(buffer)
 
@@ -334,5 +336,4 @@ class Instance(CheckedCalls):
         status = buffer()
         del kept
         self._returned()
-        if status not in SUCCEEDED:
-            self._fail(f"setting {port.name}", status)
+        self._check(buffer.name, status, f"setting {port.name}")

@@ -40,7 +40,7 @@ class InstanceProcess:
         if isolated:
             heartbeat.isolated.add(name)
             try:
-                self.own = UnitProcess(heartbeat.limit)
+                self.own = UnitProcess(heartbeat.limit, heartbeat.time_address)
             except NoUnitProcess as e:
                 raise InvalidFmu(fmu, f"could not be loaded: {e}") from e
 

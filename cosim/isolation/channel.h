@@ -54,6 +54,7 @@ typedef struct {
     _Atomic uint32_t turn, asleep[2];
     uint32_t spin;          /* microseconds that a side waits before it sleeps */
     uint32_t log_is_full;   /* the turn is given only to empty the log */
+    uint32_t warned;        /* a call answered Warning, and the master has not looked which */
     _Atomic int32_t doing;  /* the call that the unit's process is in; -1: none */
     uint64_t tape_used;     /* bytes */
     uint64_t stopped_at;    /* offset of the record that was executed last */

@@ -291,6 +291,8 @@ static bool play_tape(bool *ended) {
         if (is_copy)
             _exit(0);
         record->status = status;
+        if (status == WARNING)
+            shared->warned = 1;
         enum shape shape = entries[record->call].shape;
         *ended = shape == UNLOAD;
         stepped |= shape == STEP_2 || shape == STEP_3;

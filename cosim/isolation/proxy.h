@@ -32,6 +32,7 @@ struct Connection {
     int file, number;
     long process;
     double limit; /* seconds that a call may take; 0: any */
+    const volatile double *time; /* the simulated time of the call that the master makes, or NULL */
     Logger2 logger_2;
     Logger3 logger_3;
     void *environment;
@@ -45,6 +46,10 @@ struct Connection {
     int failed;           /* the call in which the last failure arose; -1: in the one that was asked for */
     enum ending ending;
     int ended_with;       /* the signal or the exit status */
+    struct {
+        uint64_t n;
+        double first;     /* simulated time, s */
+    } warned[N_CALLS];    /* the calls that answered Warning after they had returned OK */
     Connection *next;
 };
 

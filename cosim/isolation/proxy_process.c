@@ -41,9 +41,10 @@ API Connection *isolation_open(int file, uint64_t size, int number, uint32_t spi
     return c;
 }
 
-API void isolation_started(Connection *c, long process, double limit) {
+API void isolation_started(Connection *c, long process, double limit, const double *time) {
     c->process = process;
     c->limit = limit;
+    c->time = time;
 }
 
 /* The next instance that this thread makes is the one of this connection. */
@@ -80,6 +81,19 @@ API int isolation_ending(const Connection *c, int *ended_with) {
 
 /* The call in which the last failure arose, where it is not the one that reported it; "" otherwise. */
 API const char *isolation_failed_call(const Connection *c) { return c->failed < 0 ? "" : names[c->failed]; }
+
+/* Return a call that answered Warning after it had returned OK, with the time of the first and how many there were, and
+ * forget it; NULL if there is none left. */
+API const char *isolation_take_warnings(Connection *c, double *first, uint64_t *n) {
+    for (int i = 0; i < N_CALLS; i++)
+        if (c->warned[i].n) {
+            *first = c->warned[i].first;
+            *n = c->warned[i].n;
+            c->warned[i].n = 0;
+            return names[i];
+        }
+    return NULL;
+}
 
 /* Let the process measure the CPU time of its steps; return where it adds it up, for the master to take away. */
 API double *isolation_measure_cpu(Connection *c) {

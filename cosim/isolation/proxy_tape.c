@@ -99,6 +99,23 @@ static int too_large(Connection *c) {
     return ERROR;
 }
 
+/* Count the calls that answered Warning only as the tape was played, all but the one whose status is `reported`. */
+static void count_warnings(Connection *c, uint64_t reported) {
+    Shared *shared = c->channel.shared;
+    if (!shared->warned)
+        return;
+    shared->warned = 0;
+    for (uint64_t at = TAPE_AT, end = tape_end(c); at < end && at <= c->size / 2 - sizeof(Record);) {
+        const Record *r = record(c, at);
+        int id = r->call;
+        if (at != reported && !r->batched && r->status == WARNING && id >= 0 && id < N_CALLS && !c->warned[id].n++)
+            c->warned[id].first = c->time ? *c->time : 0;
+        if (r->size < sizeof(Record) || r->size > c->size)
+            return;
+        at += r->size;
+    }
+}
+
 /* Read the status of the tape that was played until the record at `wanted`, and clear it. */
 static int outcome(Connection *c, uint64_t wanted) {
     Shared *shared = c->channel.shared;
@@ -119,7 +136,9 @@ static int outcome(Connection *c, uint64_t wanted) {
 static int exchange(Connection *c, uint64_t wanted) {
     c->failed = -1;
     channel_give(&c->channel);
-    return await(c) ? outcome(c, wanted) : FATAL;
+    bool answered = await(c);
+    count_warnings(c, wanted);
+    return answered ? outcome(c, wanted) : FATAL;
 }
 
 int close_call(Connection *c, Call *call) {
@@ -186,6 +205,7 @@ int end_step(Connection *c, bool *has_results) {
         return c->ending == RUNNING ? ERROR : FATAL; /* it could not be begun */
     c->in_flight = false;
     bool answered = await(c), went_on = !answered && ended_after_step(c);
+    count_warnings(c, c->step_at);
     int status = answered ? outcome(c, c->step_at) : went_on ? record(c, c->step_at)->status : FATAL;
     if (has_results)
         *has_results = went_on || (c->ending == RUNNING && c->failed < 0);

@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -59,6 +59,7 @@ class UnitProcess:
 
     Args:
         limit: seconds of wall time that a call may take before the process is ended; 0: any.
+        time: address of a double that holds the simulated time of each call that the unit makes; 0: of none.
 
     Attributes:
         proxy: the library whose functions make the calls, of the instance that `select` chose.
@@ -67,7 +68,7 @@ class UnitProcess:
         NoUnitProcess: it cannot be started.
     """
 
-    def __init__(self, limit: float = 0.0) -> None:
+    def __init__(self, limit: float = 0.0, time: int = 0) -> None:
         files = isolation_files()
         if files is None:
             raise NoUnitProcess(unavailable())
@@ -90,7 +91,7 @@ class UnitProcess:
         except (OSError, NoUnitProcess) as e:
             _close(memory, sockets)
             raise NoUnitProcess(f"a process for a unit cannot be started: {e}") from e
-        self._library.isolation_started(self._connection, self._process.pid, limit)
+        self._library.isolation_started(self._connection, self._process.pid, limit, time)
         self._logger: Any = None
         weakref.finalize(self, self._library.isolation_close, self._connection)
         self._end = weakref.finalize(self, _end, self._process, memory, sockets)
@@ -147,6 +148,15 @@ class UnitProcess:
     def is_stepping(self) -> bool:
         """Whether a step was begun that nobody has waited for."""
         return self._library.isolation_is_stepping(self._connection)
+
+    def take_warnings(self) -> Iterator[tuple[str, float, int]]:
+        """Yield, once, the calls that answered Warning after they had returned OK: what is set waits for the step.
+
+        Of each the name, the simulated time of the first in s, and how many there were.
+        """
+        first, n = ctypes.c_double(), ctypes.c_uint64()
+        while call := self._library.isolation_take_warnings(self._connection, ctypes.byref(first), ctypes.byref(n)):
+            yield call.decode(), first.value, n.value
 
     def measure_cpu(self) -> int:
         """Measure the CPU time of steps from now on; return the address of their seconds, to be taken away from there.
@@ -222,13 +232,17 @@ def _loaded(file: Path) -> ctypes.CDLL:
     connection = ctypes.c_void_p
     signatures: dict[str, tuple[Any, tuple[Any, ...]]] = {
         "open": (connection, (ctypes.c_int, ctypes.c_uint64, ctypes.c_int, ctypes.c_uint32, ctypes.c_int)),
-        "started": (None, (connection, ctypes.c_long, ctypes.c_double)),
+        "started": (None, (connection, ctypes.c_long, ctypes.c_double, ctypes.c_void_p)),
         "select": (None, (connection,)),
         "log_to": (None, (connection, _LOGGER)),
         "load": (ctypes.c_int, (connection, ctypes.c_char_p, ctypes.c_char_p)),
         "unload": (ctypes.c_int, (connection,)),
         "ending": (ctypes.c_int, (connection, ctypes.POINTER(ctypes.c_int))),
         "failed_call": (ctypes.c_char_p, (connection,)),
+        "take_warnings": (
+            ctypes.c_char_p,
+            (connection, ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_uint64)),
+        ),
         "is_stepping": (ctypes.c_bool, (connection,)),
         "over": (None, (connection,)),
         "measure_cpu": (ctypes.c_void_p, (connection,)),

@@ -13,6 +13,7 @@ from handover.cosim.fmu.calls import is_rounding
 from handover.cosim.fmu.failures import UnitCrashed, UnitHung, UnitTerminated
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.host_process import mark_as_host
+from handover.cosim.fmu.unit_warnings import UnitWarnings
 from handover.cosim.master.pacing import Pacer
 from handover.cosim.master.stepper_factory import StepperFactory
 from handover.cosim.master.watchdog import Watchdog
@@ -161,6 +162,16 @@ class Master:
         if isinstance(self._stepper, PlanStepper):
             self._stepper.publish_cpu_times()
         return self.ensemble.cpu
+
+    @property
+    def warnings(self) -> dict[str, UnitWarnings]:
+        """The calls that answered Warning until now, by unit, of those that have any."""
+        if self._ensemble is None:
+            return {}
+        if isinstance(self._stepper, PlanStepper):
+            self._stepper.publish_warnings()
+        found = {name: instance.warnings for name, instance in self._ensemble.instances.items()}
+        return {name: warnings for name, warnings in found.items() if warnings}
 
     @property
     def signals(self) -> Signals:

@@ -182,6 +182,12 @@ static void charge(Plan *plan, const Operation *o) {
     plan->clock = now;
 }
 
+static void count_warning(Plan *plan, int64_t operation) {
+    Warned *warned = &plan->warned[operation];
+    if (!warned->n++)
+        warned->first = ((volatile double *)plan->heartbeat)[TIME];
+}
+
 /* Return PAUSED if all succeeded, else STOPPED, with the operation and its status in the plan; ABANDONED if the units
  * were taken from this thread while it was in a call. */
 enum outcome carry_out(Plan *plan, const Segment *segment) {
@@ -247,6 +253,10 @@ enum outcome carry_out(Plan *plan, const Segment *segment) {
         }
         if (heartbeat[TAKEN])
             return ABANDONED;
+        if (status == OK && well)
+            continue;
+        if (status == WARNING)
+            count_warning(plan, o - all);
         if ((unsigned)status > WARNING || !well) {
             plan->stopped_at = o - all;
             plan->status = status;

@@ -49,6 +49,12 @@ class Rows(ctypes.Structure):
     )
 
 
+class Warned(ctypes.Structure):
+    """How often a call answered Warning, and the simulated time of the first in seconds."""
+
+    _fields_ = (("n", ctypes.c_int64), ("first", ctypes.c_double))
+
+
 class Plan(ctypes.Structure):
     """All state of the loop."""
 
@@ -74,6 +80,7 @@ class Plan(ctypes.Structure):
         ("status", ctypes.c_int64),
         ("identity", ctypes.c_void_p),
         ("float_control", ctypes.c_uint64),
+        ("warned", ctypes.POINTER(Warned)),
     )
 
 

@@ -112,6 +112,12 @@ typedef struct {
     int64_t n_parts;
 } Record;
 
+/* How often a call answered Warning, and the simulated time of the first. */
+typedef struct {
+    int64_t n;
+    double first;
+} Warned;
+
 /* Cells of the heartbeat, see heartbeat.py: which call is under way (-1: none), how many calls began, the simulated time
  * (a double), and whether the units were taken from this thread. */
 enum cell { DOING, COUNT, TIME, TAKEN };
@@ -136,6 +142,7 @@ typedef struct {
     int64_t status;     /* what it returned */
     const volatile char *identity; /* 0 in a process that a unit has forked from this one, see host_process.py */
     uint64_t float_control;        /* of the thread that calls the plan */
+    Warned *warned;                /* of each operation */
 } Plan;
 
 double exact_time(uint64_t ticks, uint64_t numerator, uint64_t denominator);

@@ -132,6 +132,7 @@ class PlanMaker:
 
     Attributes:
         judges: for each operation that can stop the plan, by its index, what raises the failure.
+        calls: for each operation that is an FMI call with a status, by its index, the unit and the call.
         arrive, depart: the operations at a communication point before and after observers look.
         groups: by group, the units that are always due together.
         library: the functions of the loop.
@@ -142,6 +143,7 @@ class PlanMaker:
         self, ensemble: Ensemble, schedule: Schedule, algorithm: Algorithm, library: CDLL, *, clock: bool
     ) -> None:
         self.judges: dict[int, Judge] = {}
+        self.calls: dict[int, tuple[str, str]] = {}
         self.groups: dict[tuple[int, bool], list[str]] = {}
         self.arrive: list[Segment] = []
         self.depart: list[Segment] = []
@@ -259,7 +261,9 @@ class PlanMaker:
         def judge(status: int, t: float) -> None:  # noqa: ARG001
             instance.judge_step(status, slot.period)
 
-        code = self._ensemble.heartbeat.code(slot.unit, f"fmi{instance.description.fmi}DoStep")
+        call = f"fmi{instance.description.fmi}DoStep"
+        code = self._ensemble.heartbeat.code(slot.unit, call)
+        self.calls[len(self._packed)] = slot.unit, call
         self._note(step(self._units[slot.unit], instance.native_step, slot.period, code), judge)
 
     def _publish(self, slot: Slot) -> None:
@@ -296,6 +300,7 @@ class PlanMaker:
             instance.judge(buffer.name, status)
 
         code = self._ensemble.heartbeat.code(unit, buffer.name)
+        self.calls[len(self._packed)] = unit, buffer.name
         self._note(access(self._units[unit], buffer.native, arrays, code), judge)
 
     def _judge_numbers(self, unit: str, check: FiniteCheck) -> Judge:

@@ -11,7 +11,7 @@ from handover.cosim.fmu.failures import UnitTerminated
 from handover.cosim.fmu.heartbeat import Abandoned
 from handover.cosim.fmu.host_process import identity_address
 from handover.cosim.plan import memory
-from handover.cosim.plan.plan_maker import PlanMaker
+from handover.cosim.plan.plan_maker import SIZE, PlanMaker
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.record.tail import RecordBlock
 from handover.cosim.stepping.ensemble import Ensemble
@@ -45,6 +45,7 @@ class PlanStepper:
         self.arriving = False
         self._library, self._clock = plan.library, plan.has_clock
         self._judges, self._units = plan.judges, list(ensemble.instances)
+        self._calls = plan.calls
         self._members = list(plan.groups.values())
         n = len(self._units)
         self._operations = ctypes.create_string_buffer(plan.packed, len(plan.packed))
@@ -58,6 +59,7 @@ class PlanStepper:
         self._room = min(_MAX_ROOM, max(_LEAST_ROOM, _MAX_SPENT // max(n, 1)))
         self._spent = (ctypes.c_double * (n * self._room if self._clock else 0))()
         self._n_spent = (ctypes.c_int64 * n)()
+        self._warned = (memory.Warned * (len(plan.packed) // SIZE))()
         self._unpublished = 0  # communication points whose CPU times the ensemble does not have yet
         self._plan = memory.Plan(
             operations=ctypes.addressof(self._operations),
@@ -75,6 +77,7 @@ class PlanStepper:
             spent_capacity=self._room,
             heartbeat=ensemble.heartbeat.address,
             identity=identity_address(),
+            warned=self._warned,
         )
         self._read_times()
 
@@ -145,6 +148,14 @@ class PlanStepper:
             self._ensemble.cpu[unit].extend(spent)
             self._n_spent[i] = 0
         self._unpublished = 0
+
+    def publish_warnings(self) -> None:
+        """Hand over to the units' instances how many calls answered Warning."""
+        for i, (unit, call) in self._calls.items():
+            warned = self._warned[i]
+            if warned.n:
+                self._ensemble.instances[unit].warnings.add(call, warned.first, warned.n)
+                warned.n = 0
 
     def publish_unit_times(self) -> None:
         """Hand over to the units' instances the times that they have reached."""

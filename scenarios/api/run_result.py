@@ -21,6 +21,7 @@ from handover.scenarios.experiment.parameters import parameters_of
 from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.run_facts import RunFacts, record_of, whole_record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.results.tables import warning_lines
 
 
 class Quantity(float):
@@ -101,6 +102,11 @@ class Run:
     def reason(self) -> str:
         """Why it succeeded or failed, in a sentence; of a unit that failed, its call, time and message."""
         return str(self._facts.summary["reason"])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Units of which calls answered Warning: which, how often and from when on, a line each."""
+        return tuple(warning_lines(self._facts.summary))
 
     @property
     def left_out(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from handover.scenarios.execution.crash import Crash
 from handover.scenarios.execution.exit_status import UNIT_FAILED, status_of_run
 from handover.scenarios.results.run_folder import RunFolder, disk_errors_reported
 from handover.scenarios.results.summary import RunResult
-from handover.scenarios.results.tables import format_conversion, format_metric, pace_rows
+from handover.scenarios.results.tables import format_conversion, format_metric, pace_rows, warning_lines
 from handover.scenarios.results.task import Task
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
@@ -61,7 +61,7 @@ def exit_with(result: RunResult, task: Task, *, as_json: bool = False) -> NoRetu
     """Print how a run ended, as JSON or for people, and exit with the status for that."""
     if result.failure:
         click.echo(str(result.failure), err=True)
-    for line in result.left_out:
+    for line in (*warning_lines(result.summary), *result.left_out):
         click.echo(line, err=True)
     if as_json:
         print_summary_as_json(result, task.folder)

@@ -23,7 +23,7 @@ from handover.scenarios.reporting.time_plots import explorer_section, time_plots
 from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
-from handover.scenarios.results.tables import format_conversion, format_metric, master_rows
+from handover.scenarios.results.tables import format_conversion, format_metric, master_rows, warning_lines
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
 
@@ -172,7 +172,8 @@ def master_section(facts: RunFacts) -> Section | None:
         rows = master_rows(facts.summary) if "master" in facts.summary else []
         conversions = [format_conversion(c) for c in facts.run.get("conversions", [])]
         warnings, notes = ([str(line) for line in facts.run.get(kind, [])] for kind in ("warnings", "notes"))
-    except (KeyError, TypeError, ValueError) as e:
+        warnings += warning_lines(facts.summary)
+    except (KeyError, TypeError, ValueError, AttributeError) as e:
         fault = f"its description of the master is damaged: {type(e).__name__} {e}"
         raise InvalidRunFolder(facts.folder.path, fault) from e
     if not (rows or conversions or warnings or notes):

@@ -16,6 +16,7 @@ from typing import Any, TypedDict, get_args, get_origin, get_type_hints, is_type
 import numpy as np
 
 from handover.cosim.exceptions import CosimError, InitializationError, UnitFailure, one_line
+from handover.cosim.fmu.unit_warnings import WarningData
 from handover.cosim.master.master import Master
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Metric, Outcome
@@ -63,6 +64,7 @@ class _OfSomeSummaries(TypedDict, total=False):
     steps: dict[str, Any]
     pace: dict[str, Any]
     ended: dict[str, Any]
+    warnings: list[WarningData]
     left_out: list[str]
 
 
@@ -70,8 +72,9 @@ class Summary(Configuration, _OfSomeSummaries):
     """How a run went: one that is not `complete` can be resumed; `failure` is as `UnitFailure.as_data`, or None.
 
     Runs with adaptive steps have `steps`, see `StepStatistics`; those paced by real time have `pace`, see `PaceReport`;
-    those that a unit ended have its request in `ended`, as `UnitTerminated.as_data`. `left_out` says, a line each,
-    which figures, pictures or parts of the report could not be made.
+    those that a unit ended have its request in `ended`, as `UnitTerminated.as_data`. `warnings` has the calls that
+    answered Warning, by unit, where there are any; of a resumed run since then. `left_out` says, a line each, which
+    figures, pictures or parts of the report could not be made.
     """
 
     complete: bool
@@ -170,6 +173,8 @@ def finished_summary(
         summary["pace"] = master.pacer.report.as_data()
     if master.ended is not None:
         summary["ended"] = master.ended.as_data()
+    if warned := master.warnings:
+        summary["warnings"] = [warnings.as_data(unit) for unit, warnings in warned.items()]
     return summary
 
 

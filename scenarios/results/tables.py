@@ -42,6 +42,22 @@ def pace_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [("pace", f"{report.pace:g} x real time{reached}"), ("deadlines missed", str(report))]
 
 
+def warning_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Return a line for each unit of which calls answered Warning, from what is in `summary.json`."""
+    return [_warning_line(warned) for warned in summary.get("warnings", [])]
+
+
+def _warning_line(warned: Mapping[str, Any]) -> str:
+    calls: Mapping[str, int] = warned["calls"]
+    n, t = sum(calls.values()), f"t = {warned['time']:.6g} s"
+    times = f"once, at {t}" if n == 1 else f"{n} times, first at {t}"
+    if len(calls) > 1:
+        times += f" ({', '.join(f'{call} {count}' for call, count in calls.items())})"
+    which = f" from {next(iter(calls))}" if len(calls) == 1 else ""
+    said = f"; last message: {warned['message']}" if warned["message"] else ""
+    return f"unit {warned['instance']} returned Warning{which} {times}{said}"
+
+
 def _steps(steps: Mapping[str, Any]) -> str:
     text = f"{steps['accepted']} accepted, {steps['rejected']} rejected"
     if not steps["accepted"]:

@@ -149,6 +149,13 @@ def harmless(fault: str, call: str, *, off: float = 0.0, fast: tuple[str, ...] =
     return Fault(fault, call, Right(off=off), fast=fast)
 
 
+def warned(call: str, n: int, *, fast: tuple[str, ...] = ()) -> Fault:
+    """Return a row of calls that answer Warning: the run goes on, and they are told with their number."""
+    times = "once, at t = 0 s" if n == 1 else f"{n} times, first at t = 0.3 s"
+    told = f"unit b returned Warning from {{call}} {times}; last message: {call}: the step size was halved"
+    return Fault("warning", call, Right(told=(told,)), fast=fast)
+
+
 FAULTS = [
     crash("crash", "load", SEGMENT, fast=PLAN),
     crash("crash", "instantiate", SEGMENT),
@@ -195,6 +202,10 @@ FAULTS = [
     failure("negative", "step", 3, "b: {call} at t = 0.3 s", "-2", rows=UNTIL_FAULT),
     failure("nan", "get", 3, "b: {call} at t = 0.3 s", "y = NaN", rows=UNTIL_OUTPUT, fast=("general",)),
     failure("infinity", "get", 3, "b: {call} at t = 0.3 s", "y = infinity", rows=UNTIL_OUTPUT),
+    warned("exit", 1),
+    warned("set", 7, fast=("isolated",)),
+    warned("get", 8),
+    warned("step", 7, fast=PLAN),
     crash("exhaust", "step", ""),
     harmless("flood", "step"),
     harmless("log_null", "step"),

@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from failing_systems import failing_ssp, native_fmu
+from faulty_units import faulty_fmu
 
+import handover
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
 from handover.scenarios.cli.command import main
@@ -86,7 +88,7 @@ def test_the_report_says_how_units_were_coupled(tmp_path: Path):
     file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
     run(file, out, "--adaptive", "1e-3", "--pace", "1000", "--extrapolation", "linear")
     page, summary = Page(out / "report.html"), json.loads((out / "summary.json").read_text())
-    assert set(summary) == set(Summary.__annotations__) - {"ended", "left_out", "unit_values"}
+    assert set(summary) == set(Summary.__annotations__) - {"ended", "left_out", "unit_values", "warnings"}
     rows = dict(row for row in page.rows if len(row) == 2)
     assert rows["algorithm"] == "gauss-seidel"
     assert rows["extrapolation"] == "linear"
@@ -98,6 +100,29 @@ def test_the_report_says_how_units_were_coupled(tmp_path: Path):
     assert f"of {summary['pace']['deadlines']}" in rows["deadlines missed"]
     assert "Parameters" not in page.headings
     assert any(row[2:3] == ["varies"] for row in page.rows)
+
+
+def test_warnings_of_units_are_reported_in_summary_json_terminal_report_and_python(tmp_path: Path):
+    s, out = System(), tmp_path / "out"
+    s.add("b", faulty_fmu("warning_in_step", 2, tmp_path))
+    s.add("c", faulty_fmu("warning_in_all", 3, tmp_path))
+    shown = run(write_ssp(s, tmp_path / "x.ssp", "x", Fraction(1)), out)
+    lines = [
+        "unit b returned Warning from fmi2DoStep 7 times, first at t = 0.3 s; last message: step: the step size was "
+        "halved",
+        "unit c returned Warning 18 times, first at t = 0 s (fmi3DoStep 7, fmi3EnterInitializationMode 1, "
+        "fmi3ExitInitializationMode 1, fmi3GetFloat64 8, fmi3Terminate 1); last message: terminate: the step size was "
+        "halved",
+    ]
+    assert [line for line in shown.splitlines() if "Warning" in line] == lines
+    page = (out / "report.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    assert all(f"<li>{line}</li>" in page for line in lines)
+    assert json.loads((out / "summary.json").read_text())["warnings"][0] == {
+        "instance": "b", "calls": {"fmi2DoStep": 7}, "time": 0.3, "message": "step: the step size was halved"
+    }  # fmt: skip
+    loaded = handover.load(out)
+    assert isinstance(loaded, handover.Run)
+    assert list(loaded.warnings) == lines
 
 
 def test_iterations_are_reported_once():

@@ -242,6 +242,14 @@ __attribute__((constructor)) static void load(void) {
 }
 __attribute__((destructor)) static void unload(void) { go_wrong("unload", NULL); }
 
+/* Answer Warning in place of OK, if it is to be so here: in this call, or in all. */
+static int answer(const char *where, Unit *unit, int status) {
+    if (status != OK || !is("warning") || (strcmp(call, where) && strcmp(call, "all")))
+        return status;
+    say(unit, WARNING, "%s: the step size was halved", where);
+    return WARNING;
+}
+
 #define WRONG(where, c)                                                                                                \
     int wrong = go_wrong(where, c);                                                                                    \
     if (wrong != -1)                                                                                                   \
@@ -255,19 +263,23 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance, fmi2Real start,
                                fmi2Boolean has_stop, fmi2Real stop) {
     WRONG("setup", c)
-    return sound_fmi2SetupExperiment(c, has_tolerance, tolerance, start, has_stop, stop);
+    return answer("setup", c, sound_fmi2SetupExperiment(c, has_tolerance, tolerance, start, has_stop, stop));
 }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
     WRONG("enter", c)
-    return sound_fmi2EnterInitializationMode(c);
+    return answer("enter", c, sound_fmi2EnterInitializationMode(c));
 }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     WRONG("exit", c)
-    return sound_fmi2ExitInitializationMode(c);
+    return answer("exit", c, sound_fmi2ExitInitializationMode(c));
 }
 
 /* What goes wrong while it runs does so from 0.3 s on. */
 static bool runs(Unit *unit) { return unit->kept->mode == STEP && unit->kept->time > 0.25; }
+
+static int answer_running(const char *where, Unit *unit, bool running, int status) {
+    return running ? answer(where, unit, status) : status;
+}
 
 static double spoilt(double y) { return is("nan") ? NAN : is("infinity") ? INFINITY : y; }
 
@@ -275,7 +287,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     if (runs(c)) {
         WRONG("set", c)
     }
-    return sound_fmi2SetReal(c, vr, n, values);
+    return answer_running("set", c, runs(c), sound_fmi2SetReal(c, vr, n, values));
 }
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real values[]) {
     if (runs(c)) {
@@ -284,24 +296,25 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     fmi2Status status = sound_fmi2GetReal(c, vr, n, values);
     for (size_t i = 0; i < n && runs(c) && !strcmp(call, "get"); i++)
         values[i] = spoilt(values[i]);
-    return status;
+    return answer_running("get", c, runs(c), status);
 }
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_rollback) {
-    if (runs(c)) {
+    bool running = runs(c);
+    if (running) {
         WRONG("step", c)
     }
-    return sound_fmi2DoStep(c, t, h, no_rollback);
+    return answer_running("step", c, running, sound_fmi2DoStep(c, t, h, no_rollback));
 }
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     if (runs(c)) {
         WRONG("save", c)
     }
-    return sound_fmi2GetFMUstate(c, state);
+    return answer("save", c, sound_fmi2GetFMUstate(c, state));
 }
 fmi2Status fmi2Terminate(fmi2Component c) {
     WRONG("terminate", c)
     note(c, "terminated");
-    return sound_fmi2Terminate(c);
+    return answer("terminate", c, sound_fmi2Terminate(c));
 }
 void fmi2FreeInstance(fmi2Component c) {
     go_wrong("free", c);
@@ -321,17 +334,17 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance, fmi3Float64 tolerance,
                                        fmi3Float64 start, fmi3Boolean has_stop, fmi3Float64 stop) {
     WRONG("enter", c)
-    return sound_fmi3EnterInitializationMode(c, has_tolerance, tolerance, start, has_stop, stop);
+    return answer("enter", c, sound_fmi3EnterInitializationMode(c, has_tolerance, tolerance, start, has_stop, stop));
 }
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
     WRONG("exit", c)
-    return sound_fmi3ExitInitializationMode(c);
+    return answer("exit", c, sound_fmi3ExitInitializationMode(c));
 }
 fmi3Status fmi3SetFloat64(REFERENCES, const fmi3Float64 values[], size_t n_values) {
     if (runs(c)) {
         WRONG("set", c)
     }
-    return sound_fmi3SetFloat64(c, vr, n, values, n_values);
+    return answer_running("set", c, runs(c), sound_fmi3SetFloat64(c, vr, n, values, n_values));
 }
 fmi3Status fmi3GetFloat64(REFERENCES, fmi3Float64 values[], size_t n_values) {
     if (runs(c)) {
@@ -340,7 +353,7 @@ fmi3Status fmi3GetFloat64(REFERENCES, fmi3Float64 values[], size_t n_values) {
     fmi3Status status = sound_fmi3GetFloat64(c, vr, n, values, n_values);
     for (size_t i = 0; i < n_values && runs(c) && !strcmp(call, "get"); i++)
         values[i] = spoilt(values[i]);
-    return status;
+    return answer_running("get", c, runs(c), status);
 }
 fmi3Status fmi3GetBinary(REFERENCES, size_t sizes[], fmi3Binary values[], size_t n_values) {
     fmi3Status status = sound_fmi3GetBinary(c, vr, n, sizes, values, n_values);
@@ -352,23 +365,25 @@ fmi3Status fmi3GetBinary(REFERENCES, size_t sizes[], fmi3Binary values[], size_t
 }
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean no_rollback, fmi3Boolean *event_needed,
                       fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *last_time) {
-    if (runs(c)) {
+    bool running = runs(c);
+    if (running) {
         *event_needed = *terminate = *early = false;
         *last_time = t;
         WRONG("step", c)
     }
-    return sound_fmi3DoStep(c, t, h, no_rollback, event_needed, terminate, early, last_time);
+    int status = sound_fmi3DoStep(c, t, h, no_rollback, event_needed, terminate, early, last_time);
+    return answer_running("step", c, running, status);
 }
 fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) {
     if (runs(c)) {
         WRONG("save", c)
     }
-    return sound_fmi3GetFMUState(c, state);
+    return answer("save", c, sound_fmi3GetFMUState(c, state));
 }
 fmi3Status fmi3Terminate(fmi3Instance c) {
     WRONG("terminate", c)
     note(c, "terminated");
-    return sound_fmi3Terminate(c);
+    return answer("terminate", c, sound_fmi3Terminate(c));
 }
 void fmi3FreeInstance(fmi3Instance c) {
     go_wrong("free", c);
