@@ -103,12 +103,26 @@ static bool fits(const Operation *o) {
     return true;
 }
 
-/* A number times zero is zero, unless it is infinite or NaN: a sum without branches, which compilers vectorise. */
+/* Where a number is infinite or NaN, all bits of its exponent are set, and one more carries into the sign's. This is done
+ * with integers, since a unit may have had floating-point operations trap, and without branches, for the vectoriser. */
 static bool values_are_finite(const Operation *o) {
-    double sum = 0;
-    for (size_t i = 0; i < o->check.n; i++)
-        sum += real(o->check.values, (int)o->check.type, i) * 0.0;
-    return sum == 0;
+    const char *values = o->check.values;
+    if (o->check.type == FLOAT32) {
+        uint32_t carried = 0;
+        for (size_t i = 0; i < o->check.n; i++) {
+            uint32_t bits;
+            memcpy(&bits, values + i * sizeof bits, sizeof bits);
+            carried |= (bits & 0x7f800000u) + 0x00800000u;
+        }
+        return !(carried >> 31);
+    }
+    uint64_t carried = 0;
+    for (size_t i = 0; i < o->check.n; i++) {
+        uint64_t bits;
+        memcpy(&bits, values + i * sizeof bits, sizeof bits);
+        carried |= (bits & 0x7ff0000000000000u) + 0x0010000000000000u;
+    }
+    return !(carried >> 63);
 }
 
 /* Copy texts or binaries; those that lie in memory which a unit's process shares are only looked at. */
@@ -147,7 +161,8 @@ static bool return_is_valid(const Operation *o, double t) {
     if (last == end)
         return true;
     double slack = 1e-3 * o->step.step + 16 * DBL_EPSILON * fabs(end);
-    return last >= (*o->step.early ? end : t) - slack && last <= end + slack;
+    /* quiet comparisons: NaN must not trap */
+    return isgreaterequal(last, (*o->step.early ? end : t) - slack) && islessequal(last, end + slack);
 }
 
 static int step(Plan *plan, const Operation *o, bool *well) {

@@ -118,6 +118,7 @@ NO_STATES = "the plan saves no states: with --repeat-discarded the run goes on t
 PLAN = ("plan",)
 EACH = ("plan", "general", "isolated")
 SEGMENT = "segmentation fault"
+TRAPPED = "floating point exception"
 HANG = "did not return within 2 s"
 
 
@@ -220,6 +221,11 @@ FAULTS = [
     harmless("handlers", "step"),
     harmless("rounding", "load"),
     harmless("rounding", "step", off=1e-14),
+    harmless("trap", "load"),
+    harmless("trap", "step"),
+    crash("trap_division", "step", TRAPPED),
+    crash("trap_division", "get", TRAPPED),
+    failure("trap_infinity", "get", 3, "b: {call} at t = 0.3 s", "y = infinity", rows=UNTIL_OUTPUT),
     harmless("fork", "step"),
     harmless("duplicate", "step", fast=("isolated",)),
 ]

@@ -162,6 +162,10 @@ static void exhaust(void) {
 
 static volatile int *nowhere = NULL;
 static volatile int zero = 0;
+static volatile double quotient;
+
+/* Have this thread's floating-point unit send SIGFPE where a result is infinite or not a number. */
+static void trap(void) { feenableexcept(FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW); }
 
 /* Do it, if it is to be wrong here; return the status to answer, -1 if the call goes on as usual. */
 static int go_wrong(const char *where, Unit *unit) {
@@ -207,7 +211,11 @@ static int go_wrong(const char *where, Unit *unit) {
             signal(i, SIG_IGN);
     else if (is("rounding"))
         fesetround(FE_UPWARD);
-    else if (is("fork")) {
+    else if (!strncmp(fault, "trap", 4)) {
+        trap();
+        if (is("trap_division"))
+            quotient = 1.0 / (double)zero;
+    } else if (is("fork")) {
         if (fork() == 0)
             _exit(9);
     } else if (is("duplicate")) {
@@ -281,7 +289,11 @@ static int answer_running(const char *where, Unit *unit, bool running, int statu
     return running ? answer(where, unit, status) : status;
 }
 
-static double spoilt(double y) { return is("nan") ? NAN : is("infinity") ? INFINITY : y; }
+static double spoilt(double y) {
+    if (is("trap_infinity"))
+        trap();
+    return is("nan") ? NAN : is("infinity") || is("trap_infinity") ? INFINITY : y;
+}
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real values[]) {
     if (runs(c)) {
