@@ -14,7 +14,7 @@ import numpy as np
 
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.check.described_variable import variables_of
-from handover.cosim.check.finding import Finding, fault, warning
+from handover.cosim.check.finding import Finding, fault, note, warning
 from handover.cosim.check.isolated_process import Journal
 from handover.cosim.check.probed_instance import ProbedInstance
 from handover.cosim.exceptions import InvalidFmu, UnitFailure, log_lines
@@ -183,6 +183,9 @@ class SmokeRun:
                     self.journal.found(fault(what, where=where, cure=cure, log=_log_tail(list(e.log)[-1:])))
                 else:
                     pending += [ports[len(ports) // 2 :], ports[: len(ports) // 2]]
+        if unread := [port.name for ports in pending for port in ports]:
+            what = f"after {_MAX_RESTARTS} restarts it is not known which of these can be read: {_first_of(unread)}"
+            self.journal.found(note(what, where="variables inside", cure="mend those that cannot, and check again"))
 
     def _compare(
         self,

@@ -46,6 +46,16 @@ def test_a_derivative_that_the_library_does_not_know_is_found(tmp_path: Path, fm
     assert "no such variable with value reference 77" in finding.log[-1]
 
 
+def test_locals_that_the_search_does_not_come_to_are_told(tmp_path: Path):
+    file = with_locals(tmp_path, 3, {f"der(x_{i})": 77 for i in range(40)})
+    *faults, last = found_in_run(file)
+    assert {f.level for f in faults} == {Level.FAULT}
+    assert last.level is Level.NOTE
+    text = "variables inside: after 60 restarts it is not known which of these can be read: der(x_"
+    assert last.line.startswith(text)
+    assert f" and {40 - len(faults) - 5} more; mend those that cannot, and check again" in last.line
+
+
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_locals_that_the_library_knows_are_no_finding(tmp_path: Path, fmi: int):
     assert found_in_run(with_locals(tmp_path, fmi, {"der(x)": 3})) == []
