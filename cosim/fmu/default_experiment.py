@@ -10,15 +10,25 @@ from fractions import Fraction
 
 from handover.cosim.fmu.xml import XmlElement
 
-_SHORTEST = 1e-12
+SHORTEST_STEP = 1e-12
 """Seconds; a shorter step would be lost in the rounding of times, which doubles hold to some 1e-16 of their size."""
 
 _MAX_DENOMINATOR = 10**6
 """Of times that are taken for rounded fractions."""
 
 NO_STEP = "its FMU proposes no communication step"
-GIVE_STEP = "give one that is above 0 s"
-"""What is wrong with a unit that has no communication step, and the remedy."""
+INVALID_STEP = f"is no communication step; a number from {SHORTEST_STEP:g} s on is right"
+"""What is wrong with a text that should be a step."""
+
+
+class NoStep(str):
+    """The fault of a unit that has no communication step, with the remedy, to which commands add their option."""
+
+    __slots__ = ()
+
+    def __new__(cls, unit: str, reason: str) -> "NoStep":
+        """Make the text of the fault of a unit, for a reason."""
+        return super().__new__(cls, f"{unit}: {reason}; give one that is above 0 s")
 
 
 @dataclass(frozen=True)
@@ -53,7 +63,7 @@ def default_experiment(root: XmlElement) -> DefaultExperiment:
     if step is not None:
         return DefaultExperiment(start, stop, step)
     where = f"stepSize={text[:80]!r} of its DefaultExperiment (line {experiment.line})"
-    return DefaultExperiment(start, stop, None, f"{where} is no communication step; a number from 1e-12 s on is right")
+    return DefaultExperiment(start, stop, None, f"{where} {INVALID_STEP}")
 
 
 def proposed_step(step: float | None) -> Fraction | None:
@@ -74,7 +84,7 @@ def exact_seconds(seconds: float) -> Fraction:
 
 def _step(text: str | None) -> float | None:
     number = _finite(text)
-    return number if number is not None and number >= _SHORTEST else None
+    return number if number is not None and number >= SHORTEST_STEP else None
 
 
 def is_finite(text: str) -> bool:

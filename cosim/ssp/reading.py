@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
 from handover.cosim.blocks.units import UNKNOWN, Unit
-from handover.cosim.fmu.default_experiment import proposed_step
+from handover.cosim.fmu.default_experiment import INVALID_STEP, SHORTEST_STEP, proposed_step
 from handover.cosim.fmu.xml import XmlElement
 from handover.cosim.ssp.archive import SspArchive
 from handover.cosim.ssp.parameter_set import (
@@ -44,9 +44,6 @@ _PERIOD = re.compile(r"[1-9]\d{0,11}(/[1-9]\d{0,11})?")
 
 _MAX_NAME = 255
 """Characters of an element's name: units keep it in fixed buffers, and files may be called by it."""
-
-_SHORTEST = 1e-12
-"""Seconds; a shorter step would be lost in the rounding of times."""
 
 _NO_TYPES = ("ConnectorGeometry", "Annotations", "Dimension", "MetaData", "Signature")
 """Children of a connector that are not its type."""
@@ -119,10 +116,8 @@ def _steps(part: SspPart, e: XmlElement) -> Iterator[Fraction | None]:
     for name in ("stepSize", "baseStepSize"):
         if name in e.attributes:
             given, step = e.attributes[name], part.number(e, name)
-            if not step >= _SHORTEST:
-                raise part.fault(
-                    e, f"{name}={given[:80]!r} is no communication step; a number from 1e-12 s on is right"
-                )
+            if not step >= SHORTEST_STEP:
+                raise part.fault(e, f"{name}={given[:80]!r} {INVALID_STEP}")
             yield proposed_step(step)
     for child in e.children:
         yield from _steps(part, child)

@@ -123,8 +123,8 @@ class MasterOptions:
             states at every step; else a discarded step ends the run. Systems with events do so anyway.
         call_limit: seconds of wall time that a unit may take for one call; None: any.
         isolated: units that live in processes of their own, by name; `foreign` are those that were not built by this
-            project, `all` is all. What a unit does then harms itself alone, and units that do not wait for each other
-            step at the same time; the results are the same.
+            project, `all` is all, also where a unit itself is named so. What a unit does then harms itself alone, and
+            units that do not wait for each other step at the same time; the results are the same.
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
         strict: whether a model description that breaks the standard is refused even where only parts are at fault that
             co-simulation does not touch, such as local variables; else the master warns of it.

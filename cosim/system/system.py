@@ -17,7 +17,7 @@ from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import WiringError, nearest
 from handover.cosim.fmu.clocks import FmuClock
-from handover.cosim.fmu.default_experiment import GIVE_STEP, NO_STEP, DefaultExperiment, proposed_step
+from handover.cosim.fmu.default_experiment import NO_STEP, DefaultExperiment, NoStep, proposed_step
 from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.system.conversion import LinearTransformation, conversion, needs_no_conversion
 from handover.cosim.system.time_series import TimeSeries
@@ -266,7 +266,7 @@ class System:
         if step is not None:
             return step
         reason = proposed.step_fault or NO_STEP if period is None else f"its communication step is {period} s"
-        self._faults.append(f"{name}: {reason}; {GIVE_STEP}")
+        self._faults.append(NoStep(name, reason))
         return Fraction(1, 100)  # any: `check` reports the fault, but more units can be added until then
 
     def _connection_faults(self, c: Connection) -> list[str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from handover.cosim.exceptions import InvalidSsp
-from handover.cosim.fmu.default_experiment import GIVE_STEP
+from handover.cosim.fmu.default_experiment import NoStep
 from handover.cosim.record.reader import Record
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.signals import Signals
@@ -106,7 +106,7 @@ def open_experiment(
 
 def naming_step(faults: Sequence[str]) -> list[str]:
     """Return faults of a system, with the option that gives units a step where one has none."""
-    return [f"{f}, such as by --step 0.01" if f.endswith(GIVE_STEP) else f for f in faults]
+    return [f"{f}, such as by --step 0.01" if isinstance(f, NoStep) else f for f in faults]
 
 
 def source_of(path: Path, stop: Fraction, step: Fraction | None) -> dict[str, Any]:

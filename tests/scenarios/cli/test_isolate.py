@@ -70,6 +70,17 @@ def test_foreign_units_are_those_that_this_project_did_not_build():
     assert isolated_units(system, []) == frozenset()
 
 
+def test_units_that_are_named_like_the_words_for_several_are_isolated_by_all():
+    """As the help says: by name they cannot be."""
+    system = System()
+    for name in ("foreign", "all"):
+        system.add(name, native_fmu("gain"))
+    assert isolated_units(system, ["all"]) == {"foreign", "all"}
+    assert isolated_units(system, ["foreign"]) == {"foreign", "all"}  # both were not built by this project
+    shown = " ".join(CliRunner().invoke(main, ["run", "--help"]).output.split())
+    assert "Units that are named foreign or all themselves are isolated by all only" in shown
+
+
 @pytest.mark.parametrize("again", [(), ("--isolate", "all")])
 def test_a_failed_run_is_resumed_with_the_units_isolated_that_were(again: tuple[str, ...], tmp_path: Path):
     """The unit fails again at the same step; as one in this process it would end the test."""

@@ -1,5 +1,6 @@
 """`handover run FILE.fmu`: one unit by itself, with its inputs constant or from a table, as `fmpy simulate` runs it."""
 
+import contextlib
 import json
 import re
 import signal
@@ -15,11 +16,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from native_units import native_fmu
+from ssp_of import component, described, pack_ssp, system
 
+from handover.cosim.exceptions import InvalidSsp
+from handover.cosim.fmu.default_experiment import NoStep
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.scenarios.cli.command import main
-from handover.scenarios.execution.ssp_run import UntilStop
+from handover.scenarios.execution.ssp_run import UntilStop, naming_step, open_experiment
 
 PULL = "time,f\n0,0\n0.5,2\n0.5,-1\n0.8,1\n"
 
@@ -178,6 +182,15 @@ def test_a_run_with_a_table_resumes_to_the_same_bytes(tmp_path: Path, monkeypatc
     for name in ("mass.x", "mass.v"):
         a, b = (Record(folder / "signals.parquet")[name] for folder in (whole, parted))
         assert a.tobytes() == b.tobytes()
+
+
+def test_the_option_is_added_to_faults_of_steps_alone(tmp_path: Path):
+    other = "b: a limit of 0 m; give one that is above 0 s"
+    assert naming_step([NoStep("a", "none"), other]) == [f"{NoStep('a', 'none')}, such as by --step 0.01", other]
+    parts = {"resources/unit.fmu": without_step(tmp_path)}
+    file = pack_ssp(tmp_path / "a.ssp", described(system(component("a"))), parts)
+    with contextlib.ExitStack() as opened, pytest.raises(InvalidSsp, match=r"above 0 s, such as by --step 0\.01$"):
+        open_experiment(file, None, None, opened)
 
 
 def test_a_step_is_named_where_the_fmu_gives_none(tmp_path: Path):
