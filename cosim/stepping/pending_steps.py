@@ -8,6 +8,7 @@ after another.
 import contextlib
 from collections.abc import Callable, Generator, Sequence
 
+from handover.cosim.exceptions import UnitFailure
 from handover.cosim.stepping.ensemble import Ensemble
 from handover.cosim.system.schedule import Slot
 
@@ -53,14 +54,14 @@ class PendingSteps:
     def failing_first(self, before: Sequence[Slot] | None = None) -> Generator[None, None, None]:
         """Do something with a unit: where that fails, failures of units that come before it are raised in its place.
 
-        These are all that were begun, or those of them that `before` has.
+        These are all that were begun, or those of them that `before` has. What is no failure of a unit passes at once.
 
         Raises:
             UnitFailure: a step that was begun failed.
         """
         try:
             yield
-        except Exception:
+        except UnitFailure:
             self._slots = [slot for slot in self._slots if before is None or slot in before]
             self.finish()
             raise
