@@ -22,15 +22,15 @@ static void sleep_until(const Channel *channel, int milliseconds) {
 #include <poll.h>
 
 static void wake(const Channel *channel) {
-    if (write(channel->wire, "", 1) != 1) {
+    if (write(channel->socket, "", 1) != 1) {
         /* the other side looks by itself after its time */
     }
 }
 
 static void sleep_until(const Channel *channel, int milliseconds) {
-    struct pollfd wire = {.fd = channel->wire, .events = POLLIN};
+    struct pollfd socket = {.fd = channel->socket, .events = POLLIN};
     char bytes[64];
-    if (poll(&wire, 1, milliseconds) > 0 && read(channel->wire, bytes, sizeof bytes) <= 0)
+    if (poll(&socket, 1, milliseconds) > 0 && read(channel->socket, bytes, sizeof bytes) <= 0)
         usleep(1000); /* the other side is gone */
 }
 #endif

@@ -13,13 +13,13 @@
 
 enum status { OK, WARNING, DISCARD, ERROR, FATAL };
 enum side { MASTER, UNIT };
-enum { MAX_ARGUMENTS = 10, MAX_REALS = 3, LOG_SIZE = 1 << 16, TAPE_AT = 1 << 17 };
+enum { MAX_ARGUMENTS = 10, MAX_REALS = 3, LOG_SIZE = 1 << 16, BATCH_AT = 1 << 17 };
 
-/* A call, followed by what its arguments point to. The calls that are to be made lie one after another on the tape. */
+/* A call, followed by what its arguments point to. The calls that are to be made lie one after another: a batch. */
 typedef struct {
     int32_t call, status;
     uint32_t addresses; /* bit i: argument i is an offset, to be passed as an address; 0 is NULL */
-    uint32_t batched;   /* a GET_SLOT that is made only if the step before it went on as asked */
+    uint32_t after_step;   /* a GET_SLOT that is made only if the step before it went on as asked */
     uint64_t size;      /* of all this */
     uint64_t arguments[MAX_ARGUMENTS];
     double reals[MAX_REALS];
@@ -56,21 +56,21 @@ typedef struct {
     uint32_t log_is_full;   /* the turn is given only to empty the log */
     uint32_t warned;        /* a call answered Warning, and the master has not looked which */
     _Atomic int32_t doing;  /* the call that the unit's process is in; -1: none */
-    uint64_t tape_used;     /* bytes */
+    uint64_t batch_used;     /* bytes */
     uint64_t stopped_at;    /* offset of the record that was executed last */
-    uint64_t heap_used;     /* offset of free memory, behind the tape */
+    uint64_t heap_used;     /* offset of free memory, behind the batch */
     double cpu;             /* seconds of CPU time of the steps that the master has not taken yet, */
     uint32_t measures_cpu;  /* if it wants them */
     uint32_t log_used;
     char log[LOG_SIZE];
 } Shared;
 
-_Static_assert(sizeof(Shared) <= TAPE_AT, "the tape begins after it");
+_Static_assert(sizeof(Shared) <= BATCH_AT, "the batch begins after it");
 
 typedef struct {
     Shared *shared;
     enum side side;
-    int wire; /* a socket to the other side, where the system has no futex; else -1 */
+    int socket; /* a socket to the other side, where the system has no futex; else -1 */
 } Channel;
 
 void channel_give(const Channel *channel);

@@ -13,13 +13,13 @@ FOLDER = Path(__file__).parent
 PROXY = (
     "channel.c",
     "proxy_process.c",
-    "proxy_tape.c",
+    "proxy_batch.c",
     "proxy_values.c",
     "proxy_calls.c",
     "proxy_fmi2.c",
     "proxy_fmi3.c",
 )
-HOST = ("channel.c", "host.c", "host_calls.c")
+PROCESS = ("channel.c", "unit_process.c", "unit_calls.c")
 
 
 def is_supported(platform: "str | None" = None) -> bool:
@@ -52,12 +52,12 @@ def isolation_files() -> "tuple[Path, Path] | None":
         compile_isolation()
     if not _libraries().is_current(host):
         return None
-    return _libraries().library(host, "proxy"), _libraries().program(host, "unit_host")
+    return _libraries().library(host, "proxy"), _libraries().program(host, "unit_process")
 
 
 def _libraries() -> NativeLibraries:
     what = "process of isolated units"
-    return NativeLibraries(what, "isolation", FOLDER, {"proxy": PROXY}, zig_cc, {"unit_host": HOST})
+    return NativeLibraries(what, "isolation", FOLDER, {"proxy": PROXY}, zig_cc, {"unit_process": PROCESS})
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 /* The master's side: the functions of both standards, each of which lets the process of its unit make the call.
  *
- * An instance's pointer is its `Connection`. What a unit is set to between steps waits on the tape until the next other
- * call; after a step its process reads at once what the master asked for after the step before. */
+ * An instance's pointer is its `Connection`. What a unit is set to between steps waits in the batch until the next
+ * other call; after a step its process reads at once what the master asked for after the step before. */
 #ifndef PROXY_H
 #define PROXY_H
 
@@ -64,12 +64,12 @@ typedef struct {
 } Call;
 
 void end_process(Connection *c, enum ending why);
-/* Wait until the process has played the tape; return whether it has. */
+/* Wait until the process has made the calls of the batch; return whether it has. */
 bool await(Connection *c);
 Connection *owner(const void *address);
 
 Record *record(Connection *c, uint64_t at);
-/* Return room at the end of the tape, 0 if there is none. */
+/* Return room at the end of the batch, 0 if there is none. */
 uint64_t extend(Connection *c, Call *call, uint64_t size);
 uint64_t copied(Connection *c, Call *call, const void *bytes, uint64_t size);
 void add_argument(Connection *c, Call *call, uint64_t value, bool is_address);

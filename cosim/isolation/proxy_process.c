@@ -23,12 +23,13 @@ static const char *const names[] = {
     CALLS(AS_NAME)};
 
 /* Map `size` bytes of a file. `number` is one that no other connection of this process has. */
-API Connection *isolation_open(int file, uint64_t size, int number, uint32_t spin, int wire) {
+API Connection *isolation_open(int file, uint64_t size, int number, uint32_t spin, int socket) {
     void *memory = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_NORESERVE, file, 0);
     if (memory == MAP_FAILED)
         return NULL;
     Connection *c = calloc(1, sizeof *c);
-    *c = (Connection){.channel = {memory, MASTER, wire}, .base = memory, .size = size, .file = file, .number = number};
+    *c = (Connection){
+        .channel = {memory, MASTER, socket}, .base = memory, .size = size, .file = file, .number = number};
     c->failed = -1;
     Shared *shared = memory;
     shared->spin = spin;
@@ -152,8 +153,8 @@ static double seconds(void) {
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* Wait until the process has played the tape; return whether it has. Of the time between two looks only a part counts:
- * if more has passed, the machine was asleep, or this process was stopped. */
+/* Wait until the process has made the calls of the batch; return whether it has. Of the time between two looks only a
+ * part counts: if more has passed, the machine was asleep, or this process was stopped. */
 bool await(Connection *c) {
     Shared *shared = c->channel.shared;
     double spent = 0, looked = 0;

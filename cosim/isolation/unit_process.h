@@ -1,5 +1,5 @@
-#ifndef HOST_H
-#define HOST_H
+#ifndef UNIT_PROCESS_H
+#define UNIT_PROCESS_H
 
 #include "calls.h"
 #include "channel.h"

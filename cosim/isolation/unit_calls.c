@@ -1,6 +1,6 @@
-/* Makes the calls on the tape, one after another, until one fails. */
+/* Makes the calls of a batch, one after another, until one fails. */
 #define _GNU_SOURCE
-#include "host.h"
+#include "unit_process.h"
 
 #include <fcntl.h>
 #include <fenv.h>
@@ -278,14 +278,14 @@ static int make_call(const Record *record, bool *plain) {
 }
 
 /* Return whether a step was among the calls. */
-static bool play_tape(bool *ended) {
+static bool make_calls(bool *ended) {
     bool plain = true, stepped = false;
-    for (uint64_t at = TAPE_AT, end = TAPE_AT + shared->tape_used; at < end;) {
+    for (uint64_t at = BATCH_AT, end = BATCH_AT + shared->batch_used; at < end;) {
         Record *record = address(at);
-        if (record->batched && !plain)
+        if (record->after_step && !plain)
             break;
         uint64_t size = record->size;
-        shared->stopped_at = record->batched ? shared->stopped_at : at;
+        shared->stopped_at = record->after_step ? shared->stopped_at : at;
         atomic_store(&shared->doing, record->call);
         int status = make_call(record, &plain);
         if (is_copy)
@@ -296,7 +296,7 @@ static bool play_tape(bool *ended) {
         enum shape shape = entries[record->call].shape;
         *ended = shape == UNLOAD;
         stepped |= shape == STEP_2 || shape == STEP_3;
-        if (!succeeded(status) && !record->batched)
+        if (!succeeded(status) && !record->after_step)
             break;
         at += size;
     }
@@ -324,7 +324,7 @@ _Noreturn void serve(const Channel *with, size_t size) {
         while (!channel_wait(&channel, 1000))
             ;
         double began = shared->measures_cpu ? cpu_seconds() : 0;
-        bool stepped = play_tape(&ended);
+        bool stepped = make_calls(&ended);
         fesetenv(&arithmetic); /* as the master puts back what a unit in its own process changes */
         if (shared->measures_cpu && stepped)
             shared->cpu += cpu_seconds() - began;

@@ -1,8 +1,8 @@
 /* The process of one unit: loads its library and makes the calls that the master asks for.
  *
- * unit_host FILE SIZE MASTER WIRE: the descriptor and size of the shared memory, the master's process, the socket. */
+ * unit_process FILE SIZE MASTER SOCKET: descriptor and size of the shared memory, the master's process, the socket. */
 #define _GNU_SOURCE
-#include "host.h"
+#include "unit_process.h"
 
 #include <dlfcn.h>
 #include <limits.h>
@@ -91,5 +91,5 @@ int main(int n, char *arguments[]) {
     }
     close(file);
     start_watching();
-    serve(&(Channel){.shared = memory, .side = UNIT, .wire = atoi(arguments[4])}, size);
+    serve(&(Channel){.shared = memory, .side = UNIT, .socket = atoi(arguments[4])}, size);
 }

@@ -1,26 +1,26 @@
-/* The tape: calls are written one after another, and played up to the one whose result is wanted. */
+/* The batch of calls: they are written one after another, and made when the result of one is wanted. */
 #include "proxy.h"
 
 #include <string.h>
 
 Record *record(Connection *c, uint64_t at) { return (Record *)(c->base + at); }
 
-static uint64_t tape_end(const Connection *c) { return TAPE_AT + c->channel.shared->tape_used; }
+static uint64_t batch_end(const Connection *c) { return BATCH_AT + c->channel.shared->batch_used; }
 
-/* Return room at the end of the tape, 0 if there is none. */
+/* Return room at the end of the batch, 0 if there is none. */
 uint64_t extend(Connection *c, Call *call, uint64_t size) {
     Shared *shared = c->channel.shared;
-    uint64_t at = tape_end(c), more = aligned(size);
+    uint64_t at = batch_end(c), more = aligned(size);
     if (!call->at || size > c->size || at + more > c->size / 2) {
         call->at = 0;
         return 0;
     }
-    shared->tape_used += more;
+    shared->batch_used += more;
     record(c, call->at)->size += more;
     return at;
 }
 
-static void clear_tape(Connection *c) { c->channel.shared->tape_used = 0; }
+static void clear_batch(Connection *c) { c->channel.shared->batch_used = 0; }
 
 bool open_call(Connection *c, Call *call, int id) {
     *call = (Call){0};
@@ -30,7 +30,7 @@ bool open_call(Connection *c, Call *call, int id) {
         end_step(c, NULL);
     if (c->ending != RUNNING)
         return false;
-    call->at = tape_end(c);
+    call->at = batch_end(c);
     if (!extend(c, call, sizeof(Record)))
         return false;
     *record(c, call->at) = (Record){.call = id, .size = sizeof(Record)};
@@ -91,7 +91,7 @@ static void take_results(Connection *c, const Call *call) {
 /* Note that no room is left, as the unit's own log would. */
 static int too_large(Connection *c) {
     const char *text = "a value is larger than the memory that is shared with the unit's process";
-    clear_tape(c);
+    clear_batch(c);
     if (c->logger_2)
         c->logger_2(c->environment, c->name ? c->name : "", ERROR, "unit", "%s", text);
     else if (c->logger_3)
@@ -99,16 +99,16 @@ static int too_large(Connection *c) {
     return ERROR;
 }
 
-/* Count the calls that answered Warning only as the tape was played, all but the one whose status is `reported`. */
+/* Count the calls that answered Warning after they had returned OK: all of the batch but the one that is `reported`. */
 static void count_warnings(Connection *c, uint64_t reported) {
     Shared *shared = c->channel.shared;
     if (!shared->warned)
         return;
     shared->warned = 0;
-    for (uint64_t at = TAPE_AT, end = tape_end(c); at < end && at <= c->size / 2 - sizeof(Record);) {
+    for (uint64_t at = BATCH_AT, end = batch_end(c); at < end && at <= c->size / 2 - sizeof(Record);) {
         const Record *r = record(c, at);
         int id = r->call;
-        if (at != reported && !r->batched && r->status == WARNING && id >= 0 && id < N_CALLS && !c->warned[id].n++)
+        if (at != reported && !r->after_step && r->status == WARNING && id >= 0 && id < N_CALLS && !c->warned[id].n++)
             c->warned[id].first = c->time ? *c->time : 0;
         if (r->size < sizeof(Record) || r->size > c->size)
             return;
@@ -116,12 +116,12 @@ static void count_warnings(Connection *c, uint64_t reported) {
     }
 }
 
-/* Read the status of the tape that was played until the record at `wanted`, and clear it. */
+/* Read the status of the batch that was made until the record at `wanted`, and clear it. */
 static int outcome(Connection *c, uint64_t wanted) {
     Shared *shared = c->channel.shared;
     uint64_t stopped = shared->stopped_at;
     int status = ERROR;
-    if (stopped >= TAPE_AT && stopped <= c->size / 2 - sizeof(Record)) {
+    if (stopped >= BATCH_AT && stopped <= c->size / 2 - sizeof(Record)) {
         const Record *r = record(c, stopped);
         status = r->status;
         if (stopped != wanted)
@@ -129,7 +129,7 @@ static int outcome(Connection *c, uint64_t wanted) {
     }
     if (status == FATAL)
         end_process(c, BY_MASTER); /* the standards forbid all further calls */
-    clear_tape(c);
+    clear_batch(c);
     return status;
 }
 
@@ -169,18 +169,18 @@ int call_plain(Connection *c, int id) {
 static void add_gets(Connection *c) {
     for (size_t i = 0; i < c->n_known; i++) {
         Known *known = &c->known[i];
-        Call get = {.at = tape_end(c)};
+        Call get = {.at = batch_end(c)};
         if (!known->asked || !extend(c, &get, sizeof(Record)))
             continue;
         *record(c, get.at) = (Record){
-            .call = CALL_get_slot, .size = sizeof(Record), .batched = 1, .addresses = 1, .arguments = {known->at}};
+            .call = CALL_get_slot, .size = sizeof(Record), .after_step = 1, .addresses = 1, .arguments = {known->at}};
         ((Slot *)(c->base + known->at))->done = 0;
         known->generation = c->generation;
         known->asked = false;
     }
 }
 
-/* Let the tape be played, up to the step and on to the reading of what was asked for since the one before. */
+/* Let the batch be made, up to the step and on to the reading of what was asked for since the one before. */
 void start_step(Connection *c, Call *call) {
     if (!call->at) {
         too_large(c);
