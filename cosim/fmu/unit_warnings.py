@@ -43,6 +43,12 @@ class UnitWarnings:
         """Keep what the unit has logged with the status Warning; the last of it is told, in one line."""
         self._message = message
 
+    def add_all(self, data: WarningData) -> None:
+        """Count what `as_data` returned, as of the run that is resumed."""
+        for call, n in data["calls"].items():
+            self.add(call, data["time"], n)
+        self.note_message(data["message"])
+
     def __bool__(self) -> bool:
         """Whether a call answered Warning; what is only logged does not count."""
         return bool(self._calls)

@@ -21,6 +21,7 @@ from typing import Any
 
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.exceptions import CosimError, one_line
+from handover.cosim.fmu.unit_warnings import WarningData
 from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import Signals
@@ -78,6 +79,7 @@ class Checkpoint:
         units: of each unit its serialised state.
         contents: of each unit the contents of its buffers, which may be values of another time than its state's.
         cpu: of each unit the CPU seconds of its steps.
+        warnings: the calls of units that answered Warning.
         kept: bytes of whoever runs the master.
     """
 
@@ -88,6 +90,7 @@ class Checkpoint:
     contents: Mapping[str, Sequence[Sequence[bytes]]]
     cpu: Mapping[str, bytes]
     kept: bytes = b""
+    warnings: Sequence[WarningData] = ()
 
     def restore(self, master: Master) -> None:
         """Restore this run in a master that has been entered.
@@ -104,6 +107,8 @@ class Checkpoint:
                 instance.deserialise_state(self.units[name])
                 instance.refill(self.contents[name])
                 master.cpu[name][:] = array.array("d", self.cpu[name])
+            for warned in self.warnings:
+                master.ensemble.instances[warned["instance"]].warnings.add_all(warned)
             master.stepper.set_state(self.stepper)
         except (LookupError, TypeError, ValueError, AttributeError) as e:
             raise CosimError(f"the checkpoint does not fit its run ({type(e).__name__}: {one_line(e)})") from e
@@ -116,6 +121,7 @@ def take_checkpoint(master: Master, rows: int, kept: bytes = b"") -> Checkpoint:
         UnitFailure: a unit does not give its state.
     """
     instances = master.ensemble.instances
+    warnings = [warnings.as_data(name) for name, warnings in master.warnings.items()]
     return Checkpoint(
         time=master.time,
         rows=rows,
@@ -124,6 +130,7 @@ def take_checkpoint(master: Master, rows: int, kept: bytes = b"") -> Checkpoint:
         contents={name: i.contents() for name, i in instances.items()},
         cpu={name: spent.tobytes() for name, spent in master.cpu.items()},
         kept=kept,
+        warnings=warnings,
     )
 
 
@@ -144,6 +151,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
         "rows": checkpoint.rows,
         "stepper": checkpoint.stepper,
         "units": list(checkpoint.units),
+        "warnings": list(checkpoint.warnings),
         "sha256": {part: hashlib.sha256(content).hexdigest() for part, content in parts.items()},
     }
     unfinished = _unfinished(path)
@@ -199,6 +207,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
                 contents={name: unpack_state(read(f"{i}.contents")) for i, name in enumerate(names)},
                 cpu={name: read(f"{i}.cpu") for i, name in enumerate(names)},
                 kept=read("kept"),
+                warnings=header.get("warnings", ()),  # earlier versions kept none
             )
     except FileNotFoundError as e:
         raise InvalidCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint SECONDS") from e

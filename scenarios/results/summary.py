@@ -73,8 +73,8 @@ class Summary(Configuration, _OfSomeSummaries):
 
     Runs with adaptive steps have `steps`, see `StepStatistics`; those paced by real time have `pace`, see `PaceReport`;
     those that a unit ended have its request in `ended`, as `UnitTerminated.as_data`. `warnings` has the calls that
-    answered Warning, by unit, where there are any; of a resumed run since then. `left_out` says, a line each, which
-    figures, pictures or parts of the report could not be made.
+    answered Warning, by unit, where there are any. `left_out` says, a line each, which figures, pictures or parts of
+    the report could not be made.
     """
 
     complete: bool

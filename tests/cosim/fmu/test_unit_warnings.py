@@ -9,6 +9,7 @@ from faulty_units import faulty_fmu
 
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.unit_warnings import WarningData
+from handover.cosim.master.checkpoint import read_checkpoint, take_checkpoint, write_checkpoint
 from handover.cosim.master.master import Master
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.options import Algorithm, MasterOptions
@@ -68,6 +69,23 @@ def test_all_calls_that_warn_are_counted_alike_on_all_paths(fmi: int, algorithm:
     }  # fmt: skip
     assert (first["time"], first["message"]) == (0.0, "terminate: the step size was halved")
     assert [way for way, data in ways.items() if data != ways["plan"]] == []
+
+
+@pytest.mark.parametrize("compiled", [True, False], ids=["plan", "general path"])
+def test_a_resumed_run_counts_on(compiled: bool, tmp_path: Path):
+    def system() -> System:
+        s = System()
+        s.add("b", faulty_fmu("warning_in_step", 3, tmp_path))
+        return s
+
+    options = MasterOptions(compiled=compiled)
+    with Master(system(), options) as master:
+        master.run(Fraction(1, 2))
+        write_checkpoint(tmp_path / "c.zip", take_checkpoint(master, 0))
+    with Master(system(), options) as master:
+        read_checkpoint(tmp_path / "c.zip").restore(master)
+        master.run(Fraction(1))
+    assert [master.warnings["b"].as_data("b")] == right(3, DoStep=7)
 
 
 def test_a_plan_that_stops_has_counted_the_steps_before(tmp_path: Path):
