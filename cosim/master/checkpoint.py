@@ -14,7 +14,7 @@ import math
 import os
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -90,7 +90,7 @@ class Checkpoint:
     contents: Mapping[str, Sequence[Sequence[bytes]]]
     cpu: Mapping[str, bytes]
     kept: bytes = b""
-    warnings: Sequence[WarningData] = ()
+    warnings: Sequence[WarningData] = field(default_factory=list[WarningData])
 
     def restore(self, master: Master) -> None:
         """Restore this run in a master that has been entered.
@@ -207,7 +207,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
                 contents={name: unpack_state(read(f"{i}.contents")) for i, name in enumerate(names)},
                 cpu={name: read(f"{i}.cpu") for i, name in enumerate(names)},
                 kept=read("kept"),
-                warnings=header.get("warnings", ()),  # earlier versions kept none
+                warnings=header.get("warnings", []),  # earlier versions kept none
             )
     except FileNotFoundError as e:
         raise InvalidCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint SECONDS") from e

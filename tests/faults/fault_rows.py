@@ -150,11 +150,11 @@ def harmless(fault: str, call: str, *, off: float = 0.0, fast: tuple[str, ...] =
     return Fault(fault, call, Right(off=off), fast=fast)
 
 
-def warned(call: str, n: int, *, fast: tuple[str, ...] = ()) -> Fault:
+def warned(call: str, n: int) -> Fault:
     """Return a row of calls that answer Warning: the run goes on, and they are told with their number."""
     times = "once, at t = 0 s" if n == 1 else f"{n} times, first at t = 0.3 s"
     told = f"unit b returned Warning from {{call}} {times}; last message: {call}: the step size was halved"
-    return Fault("warning", call, Right(told=(told,)), fast=fast)
+    return Fault("warning", call, Right(told=(told,)))
 
 
 FAULTS = [
@@ -204,9 +204,9 @@ FAULTS = [
     failure("nan", "get", 3, "b: {call} at t = 0.3 s", "y = NaN", rows=UNTIL_OUTPUT, fast=("general",)),
     failure("infinity", "get", 3, "b: {call} at t = 0.3 s", "y = infinity", rows=UNTIL_OUTPUT),
     warned("exit", 1),
-    warned("set", 7, fast=("isolated",)),
+    warned("set", 7),
     warned("get", 8),
-    warned("step", 7, fast=PLAN),
+    warned("step", 7),
     crash("exhaust", "step", ""),
     harmless("flood", "step"),
     harmless("log_null", "step"),

@@ -46,6 +46,7 @@ def test_a_derivative_that_the_library_does_not_know_is_found(tmp_path: Path, fm
     assert "no such variable with value reference 77" in finding.log[-1]
 
 
+@pytest.mark.slow
 def test_locals_that_the_search_does_not_come_to_are_told(tmp_path: Path):
     file = with_locals(tmp_path, 3, {f"der(x_{i})": 77 for i in range(40)})
     *faults, last = found_in_run(file)
