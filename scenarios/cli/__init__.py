@@ -1,1 +1,1 @@
-"""The command `handover`: a file a command."""
+"""The command `handover`: a file a command; what they print is in `summaries`."""

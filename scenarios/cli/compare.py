@@ -94,6 +94,6 @@ def _default(scenario: str) -> Path:
 
 
 def _print(comparison: "Comparison", folder: RunFolder) -> None:
-    from handover.scenarios.cli.comparison_summary import print_comparison
+    from handover.scenarios.cli.summaries.comparison import print_comparison
 
     print_comparison(comparison, folder)

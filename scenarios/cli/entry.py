@@ -53,6 +53,6 @@ def _command() -> None:
 
 
 def _report_crash(heartbeat: "Heartbeat", end: "ChildEnd", wall: float) -> int:
-    from handover.scenarios.cli.run_summary import report_crash  # only a run that crashed loads it
+    from handover.scenarios.cli.summaries.run import report_crash  # only a run that crashed loads it
 
     return report_crash(heartbeat, end, wall)

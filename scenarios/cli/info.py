@@ -11,7 +11,7 @@ from handover.cosim.fmu.fmpy_edge import platforms_in
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.system import System
 from handover.scenarios.cli.console import open_console, print_json, print_rows
-from handover.scenarios.cli.port_tables import port_rows, variable_data
+from handover.scenarios.cli.summaries.port_tables import port_rows, variable_data
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.fmu_run import is_fmu
 from handover.scenarios.execution.ssp_run import is_ssp

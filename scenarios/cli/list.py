@@ -30,7 +30,7 @@ from handover.scenarios.catalog import (
     search_folder,
 )
 from handover.scenarios.cli.console import open_console, print_json, print_rows
-from handover.scenarios.cli.port_tables import allowed, plain, port_rows, type_of, variable_data
+from handover.scenarios.cli.summaries.port_tables import allowed, plain, port_rows, type_of, variable_data
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.experiment import Experiment

@@ -75,7 +75,7 @@ def paper(
     finish = _Finish(published, report=not no_report)
     outcome = run_campaign_command(replace(plan, experiment=experiment), out, pool_config(workers, scheduler), finish)
 
-    from handover.scenarios.cli.claims_summary import print_results
+    from handover.scenarios.cli.summaries.claims import print_results
 
     print_results(published, finish.results, outcome.folder)
     sys.exit(outcome.status)

@@ -10,7 +10,7 @@ import click
 
 from handover.scenarios.cli.master_options import isolate_option, isolated
 from handover.scenarios.cli.options import limit_options, limits
-from handover.scenarios.cli.run_summary import exit_with
+from handover.scenarios.cli.summaries.run import exit_with
 from handover.scenarios.execution.errors import one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import progress_bar

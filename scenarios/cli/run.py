@@ -15,7 +15,7 @@ from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import HeadedCommand, HeadedOption, Seconds, limit_options, limits, scenario_options
-from handover.scenarios.cli.run_summary import AS_JSON, exit_with
+from handover.scenarios.cli.summaries.run import AS_JSON, exit_with
 from handover.scenarios.execution.errors import one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import progress_bar

@@ -110,7 +110,7 @@ def sweep(
     outcome = run_campaign_command(plan, out, pool, (lambda _folder, _table: None) if no_report else _write_report)
 
     from handover.scenarios.campaign.results import CampaignResults  # its statistics take long to load
-    from handover.scenarios.cli.campaign_summary import campaign_data, print_campaign
+    from handover.scenarios.cli.summaries.campaign import campaign_data, print_campaign
 
     results = CampaignResults(outcome.folder.read(), outcome.table)
     if as_json:

@@ -17,7 +17,7 @@ from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import main
-from handover.scenarios.cli.run_summary import print_summary
+from handover.scenarios.cli.summaries.run import print_summary
 from handover.scenarios.execution import resumption
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.experiment.parameters import parse_parameters

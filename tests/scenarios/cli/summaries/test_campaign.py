@@ -11,7 +11,7 @@ from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.campaign.table import CampaignTable, RunRow
 from handover.scenarios.campaign.table_writer import table_of
 from handover.scenarios.campaign.worker_pool import RunCounts
-from handover.scenarios.cli.campaign_summary import print_campaign
+from handover.scenarios.cli.summaries.campaign import print_campaign
 from handover.scenarios.experiment.experiment import Metric
 
 

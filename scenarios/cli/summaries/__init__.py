@@ -1,0 +1,1 @@
+"""What commands print of runs, campaigns, comparisons, claims and units, and as JSON."""
