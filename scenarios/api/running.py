@@ -59,7 +59,7 @@ def run(
         seed: of all random numbers of a scenario.
         units: what takes the place of a scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`.
         out: the folder for the results, new or empty.
-        stop: of a system, SSP or FMU: when it ends, s; files may propose it, a system does not.
+        stop: when it ends, s, if its evaluation does not end it before; only a system has no stop time of its own.
         step: of an SSP or FMU: the communication step of all units, s.
         inputs: of an FMU: a CSV file of its inputs over time.
         formats: of the record besides Parquet: `csv`, `mat`.

@@ -12,7 +12,9 @@ import numpy as np
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.scenarios.api.arguments import (
     InvalidInput,
+    Seconds,
     errors_for_python,
+    exact,
     master_options,
     merged,
     text_of_value,
@@ -42,6 +44,7 @@ def sweep(
     paired: bool = True,
     units: Mapping[str, Path | str | Sequence[Path | str]] | None = None,
     out: Path | str | None = None,
+    stop: Seconds | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     algorithm: str | Algorithm | None = None,
@@ -66,6 +69,7 @@ def sweep(
         units: what takes the place of the scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`;
             a list varies the unit.
         out: the folder of the campaign.
+        stop: as of `handover.run`.
         workers: runs at the same time, by default one a core.
         scheduler: address of a Dask scheduler whose workers do the runs.
         algorithm: as of `handover.run`.
@@ -102,6 +106,7 @@ def sweep(
             units=kept_units,
             varied_units=tuple(choices),
             options=master_options(options, algorithm, isolate),
+            stop=exact("stop", stop),
         )
         return _carried_out(plan, None if out is None else Path(out), PoolConfig(workers, scheduler), progress)
 

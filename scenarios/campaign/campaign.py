@@ -115,6 +115,7 @@ class _CampaignState:
             fmus={unit: str(path) for unit, path in self.plan.fmus(run.point, fmus).items()},
             runs=str(self.folder.runs.absolute()),
             options=self.plan.options,
+            stop=self.plan.stop,
             modules="" if self._source is None else self._source.folder,
         )
 

@@ -27,6 +27,7 @@ def identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
         "repetitions": plan.repetitions,
         "seed": plan.seed,
         "paired": plan.paired,
+        "stop": None if plan.stop is None else str(plan.stop),
         "scenes": list(plan.scenes),
         **({"varied_units": list(plan.varied_units)} if plan.varied_units else {}),
         "units": {name: {"fmu": path.name, "sha256": sha256_of(path)} for name, path in fmus.items()},

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +55,7 @@ class CampaignPlan:
         units: what takes the place of units in all runs, by the units' names: files of FMUs, or paths of blocks.
         varied_units: units that points give other FMUs; a point names the file or the block by the unit's name.
         options: how units are run.
+        stop: when each run ends, s; None: as the scenario says.
         experiment: name of the published experiment that it belongs to; "" if to none.
     """
 
@@ -67,6 +69,7 @@ class CampaignPlan:
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     varied_units: Sequence[str] = ()
     options: MasterOptions = field(default_factory=MasterOptions)
+    stop: Fraction | None = None
     experiment: str = ""
 
     @property

@@ -63,6 +63,7 @@ def _task(job: RunJob, folder: Path) -> Task:
         fmus={name: Path(path) for name, path in job.fmus.items()},
         folder=RunFolder(folder),
         options=job.options,
+        stop=job.stop,
         source=own_source(job.scenario),
         presented=False,
     )

@@ -6,6 +6,7 @@
 import os
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
 
@@ -26,6 +27,7 @@ class RunJob:
         fmus: the FMU of each unit.
         runs: the campaign's folder of runs.
         options: how units are run.
+        stop: when the run ends, s; None: as the scenario says.
     """
 
     name: str
@@ -36,6 +38,7 @@ class RunJob:
     runs: str
     options: MasterOptions
     modules: str = ""
+    stop: Fraction | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

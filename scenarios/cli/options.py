@@ -101,6 +101,17 @@ def scenario_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+stop_option = click.option(
+    "--stop",
+    "--stop-time",
+    "stop",
+    type=Seconds(),
+    metavar="SECONDS",
+    help="When a run ends: at the first communication point at or after it, if its evaluation does not end it before."
+    "  [default: the scenario's or the file's own stop time]",
+)
+"""For commands that run what has a stop time."""
+
 CALL_LIMIT = 60.0
 """Seconds of wall time that a unit may take for one call by default."""
 

@@ -14,7 +14,15 @@ import click
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.cli.master_options import coupling_of, master_options
-from handover.scenarios.cli.options import HeadedCommand, HeadedOption, Seconds, limit_options, limits, scenario_options
+from handover.scenarios.cli.options import (
+    HeadedCommand,
+    HeadedOption,
+    Seconds,
+    limit_options,
+    limits,
+    scenario_options,
+    stop_option,
+)
 from handover.scenarios.cli.summaries.run import AS_JSON, exit_with
 from handover.scenarios.execution.errors import one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
@@ -23,14 +31,6 @@ from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import run_task
 
 _option = partial(click.option, cls=HeadedOption, heading="Of FILE.ssp and FILE.fmu")
-_STOP = _option(
-    "--stop",
-    "--stop-time",
-    "stop",
-    type=Seconds(),
-    metavar="SECONDS",
-    help="When the run ends: at the first communication point at or after it.  [default: the file's own stop time]",
-)
 _STEP = _option(
     "--step",
     type=Seconds(),
@@ -48,8 +48,8 @@ _INPUT = _option(
 
 
 def file_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `--stop`, `--step` and `--input`, which are for SSPs and FMUs."""
-    return _STOP(_STEP(_INPUT(command)))
+    """Add `--step` and `--input`, which are for SSPs and FMUs."""
+    return _STEP(_INPUT(command))
 
 
 _HELP = """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
@@ -69,6 +69,7 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
 @click.command("run", cls=HeadedCommand, help=_HELP, context_settings={"show_default": True})
 @click.argument("scenario", metavar="SCENARIO|FILE.ssp|FILE.fmu")
 @scenario_options
+@stop_option
 @click.option(
     "--out", type=click.Path(path_type=Path), help="Folder for the results.  [default: one of its own in runs/]"
 )

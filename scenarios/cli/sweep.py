@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Sequence
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,14 @@ from handover.scenarios.campaign.plan import MAX_REPETITIONS, CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.cli.campaign import pool_config, run_campaign_command
 from handover.scenarios.cli.master_options import coupling_of, master_options
-from handover.scenarios.cli.options import HeadedCommand, campaign_options, limit_options, limits, scenario_options
+from handover.scenarios.cli.options import (
+    HeadedCommand,
+    campaign_options,
+    limit_options,
+    limits,
+    scenario_options,
+    stop_option,
+)
 from handover.scenarios.execution.errors import one_line_errors, require_extra
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.selection import find_scenario
@@ -66,6 +74,7 @@ Exit status
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the results of all points as JSON.")
 @scenario_options
+@stop_option
 @campaign_options
 @master_options
 @limit_options
@@ -82,6 +91,7 @@ def sweep(
     as_json: bool,
     workers: int | None,
     scheduler: str | None,
+    stop: Fraction | None,
     call_limit: float,
     pace: float | None,
     **coupling: Any,
@@ -106,6 +116,7 @@ def sweep(
             units=units,
             varied_units=tuple(choices),
             options=MasterOptions(**coupling_of(coupling), **limits(call_limit, pace)),
+            stop=stop,
         )
     outcome = run_campaign_command(plan, out, pool, (lambda _folder, _table: None) if no_report else _write_report)
 

@@ -35,13 +35,14 @@ class OpenedSubject:
     Attributes:
         experiment, parameters: the scenario, or what runs a file or a system as one.
         unit_values: values of units' parameters, as texts by `UNIT.NAME`.
-        source: as of `Task`.
+        source, stop: as of `Task`.
     """
 
     experiment: Experiment[Any]
     parameters: Any = NoParameters()
     unit_values: Mapping[str, str] = field(default_factory=dict[str, str])
     source: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    stop: Fraction | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +55,8 @@ class RunRequest:
         seed: of all random numbers.
         units: texts `NAME=FILE` or `NAME=MODULE:CLASS`, of what takes the place of a scenario's units.
         out: the run's folder, new or empty; None for one of its own in `runs/`.
-        stop, step: in seconds, where the subject leaves them open.
+        stop: when the run ends, s; a scenario, an SSP and an FMU may have a time of their own.
+        step: of all units of an SSP or FMU, s.
         inputs: a file of inputs over time, of an FMU by itself.
         formats, every, options, presented: as of `Task`.
     """
@@ -93,6 +95,7 @@ class RunRequest:
             source=asked.source,
             options=self.options,
             presented=self.presented,
+            stop=asked.stop,
         )
 
     def check_options(self) -> None:
@@ -117,8 +120,8 @@ class RunRequest:
                 raise UsageError(f"{', '.join(wrong)}: for scenarios; of an FMU, -p sets parameters")
         elif "--input" in used:
             raise UsageError("--input is for an FMU that runs by itself; a scenario's inputs are wired in it")
-        elif {"--stop", "--step"} & set(used):
-            raise UsageError("--stop and --step are for an SSP or an FMU; a scenario has its own")
+        elif "--step" in used:
+            raise UsageError("--step is for an SSP or an FMU; a scenario's units have steps of their own")
 
     def check_sweepable(self) -> None:
         """Reject what has no parameters that could be swept.
@@ -152,7 +155,8 @@ class RunRequest:
             of_fmu = alone.open()
             return OpenedSubject(of_fmu, source=alone.as_source(of_fmu.stop_time(NoParameters())))
         scenario = find_scenario(self.subject)
-        return OpenedSubject(scenario(), *split_parameters(scenario, self.parameters), own_source(self.subject))
+        values = split_parameters(scenario, self.parameters)
+        return OpenedSubject(scenario(), *values, own_source(self.subject), self.stop)
 
     def fmus(self, experiment: Experiment[Any]) -> dict[str, Path]:
         """Return the FMU of each unit of the scenario; those of the catalog are built where they are not yet.
@@ -185,7 +189,7 @@ class RunRequest:
             source = {} if is_ours or named_scenario(path) is not scenario else own_source(path)
         except (KeyError, InvalidScenario):
             source = {}
-        return OpenedSubject(scenario(), *values, source)
+        return OpenedSubject(scenario(), *values, source, self.stop)
 
     def _is_file(self, is_of_kind: Callable[[str], bool]) -> bool:
         return isinstance(self.subject, str) and is_of_kind(self.subject)

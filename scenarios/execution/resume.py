@@ -79,7 +79,7 @@ class InterruptedRun:
         try:
             experiment = self._experiment(opened)
             fmus = {name: self._fmu(name, unit) for name, unit in experiment.units.items()}
-            every = description["checkpoint"]
+            every, stop = description["checkpoint"], description.get("stop")
             task = Task(
                 experiment=experiment,
                 parameters=self.resumption.parameters(type(experiment)),
@@ -91,6 +91,7 @@ class InterruptedRun:
                 source=description["source"],
                 unit_values=description.get("unit_values", {}),
                 options=self.resumption.options,
+                stop=None if stop is None else Fraction(stop),
             )
         except InvalidRunFolder:
             raise

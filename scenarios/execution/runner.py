@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.fmu.failures import UnitTerminated
 from handover.cosim.master.checkpoint import Checkpointer, check_states, remove_checkpoint
 from handover.cosim.master.master import Master
 from handover.cosim.plan.memory import note_crashes
@@ -125,7 +124,7 @@ def _run(
     around: _Surroundings,
 ) -> UnitFailure | None:  # fmt: skip
     """Step until the end, and record; return the failure that it ended with, if any."""
-    stop, interruption = task.experiment.stop_time(task.parameters), around.interruption
+    stop, interruption = task.stop_time, around.interruption
     rows = 0 if resumption is None else resumption.checkpoint.rows
     with Recorder(task.folder.signals, task.formats, after=rows) as recorder:
         checkpoints = _checkpoints(task, master, recorder, evaluator, around.clock)
@@ -174,7 +173,7 @@ def _conclude(
 ) -> RunResult:  # fmt: skip
     """Write the summary of a run at its end, its pictures and its report."""
     interrupted = interrupted and master.ended is None
-    outcome = _outcome(evaluator, failure, interrupted, master.ended)
+    outcome = _outcome(task, evaluator, failure, interrupted, master)
     complete = failure is None and (evaluator.over or not interrupted)
     summary = finished_summary(task, outcome, master, spent, failure, complete)
     task.folder.write_summary(summary)
@@ -196,15 +195,18 @@ def _conclude(
 
 
 def _outcome(
-    evaluator: Evaluator, failure: UnitFailure | None, interrupted: bool, ended: UnitTerminated | None
+    task: Task, evaluator: Evaluator, failure: UnitFailure | None, interrupted: bool, master: Master
 ) -> Outcome:
+    """Return the verdict; a run that ended before its evaluation was over, as it was told to, has not succeeded."""
     seen = evaluator.outcome()
     if failure is not None:
-        return Outcome(success=False, reason=failure_reason(failure), metrics=seen.metrics)
+        return replace(seen, success=False, reason=failure_reason(failure))
     if interrupted and not evaluator.over:
-        return Outcome(success=False, reason=f"interrupted: {seen.reason}", metrics=seen.metrics)
-    if ended is not None:
-        return Outcome(success=seen.success, reason=f"{seen.reason}; {ended.summary}", metrics=seen.metrics)
+        return replace(seen, success=False, reason=f"interrupted: {seen.reason}")
+    if master.ended is not None:
+        return replace(seen, reason=f"{seen.reason}; {master.ended.summary}")
+    if task.is_cut_short and not evaluator.over:
+        return replace(seen, success=False, reason=f"stopped at {master.time:g} s, as asked: {seen.reason}")
     return seen
 
 

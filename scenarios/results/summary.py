@@ -28,12 +28,13 @@ from handover.scenarios.results.task import Task
 
 class _OfSomeConfigurations(TypedDict, total=False):
     unit_values: dict[str, str]
+    stop: str
 
 
 class Configuration(_OfSomeConfigurations):
     """What determines a run's signals; `seed` is None where nothing is random, `master` as `MasterOptions.as_data`.
 
-    `unit_values` are there only if some are given, see `Task`.
+    `unit_values` and `stop`, s, are there only if some are given, see `Task`.
     """
 
     scenario: str
@@ -141,6 +142,8 @@ class ElapsedTime:
 def configuration(task: Task) -> Configuration:
     """Return what determines a run's signals."""
     given: _OfSomeConfigurations = {"unit_values": dict(task.unit_values)} if task.unit_values else {}
+    if task.stop is not None:
+        given["stop"] = str(task.stop)
     return Configuration(
         **given,
         scenario=task.experiment.name,
@@ -283,7 +286,8 @@ def _given_rows(task: Task) -> list[list[str]]:
     """Return the like of the start values that `Task.source` keeps as texts."""
     given: Sequence[str] = task.source.get("parameters", ())
     rows = [[*(part.strip() for part in text.split("=", 1)), "given start value"] for text in given]
-    return rows + [[name, text, "given value of the unit's parameter"] for name, text in task.unit_values.items()]
+    rows += [[name, text, "given value of the unit's parameter"] for name, text in task.unit_values.items()]
+    return rows if task.stop is None else [*rows, ["stop", f"{float(task.stop):g} s", "given stop time of the run"]]
 
 
 def faults_of(content: Mapping[str, Any], declared: type[Any]) -> list[str]:

@@ -25,6 +25,7 @@ class Task:
         source: what `resume` needs to find the experiment again, if the catalog does not have it.
         options: of the master, which runs the units.
         presented: whether figures and a report are made at the end.
+        stop: when the run ends, s, at the first communication point at or after it; None: as the scenario says.
     """
 
     experiment: Experiment[Any]
@@ -38,3 +39,14 @@ class Task:
     source: Mapping[str, Any] = field(default_factory=dict[str, Any])
     options: MasterOptions = field(default_factory=MasterOptions)
     presented: bool = True
+    stop: Fraction | None = None
+
+    @property
+    def stop_time(self) -> Fraction:
+        """When the run ends at the latest, s."""
+        return self.experiment.stop_time(self.parameters) if self.stop is None else self.stop
+
+    @property
+    def is_cut_short(self) -> bool:
+        """Whether it is to stop before the scenario itself would end it."""
+        return self.stop is not None and self.stop < self.experiment.stop_time(self.parameters)

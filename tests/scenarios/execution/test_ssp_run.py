@@ -115,9 +115,9 @@ def test_what_is_for_scenarios_is_refused(spring: Path, tmp_path: Path):
     result = run(packed(spring, tmp_path, Fraction(2)), "-p", "a=1", "--seed", "3", "--out", tmp_path / "out")
     assert result.exit_code == 2, result.output
     assert "-p, --seed: for scenarios" in result.output
-    result = CliRunner().invoke(main, ["run", "ir_grasp", "--stop", "1", "--out", str(tmp_path / "out")])
+    result = CliRunner().invoke(main, ["run", "ir_grasp", "--step", "1", "--out", str(tmp_path / "out")])
     assert result.exit_code == 2, result.output
-    assert "--stop and --step are for an SSP" in result.output
+    assert "--step is for an SSP or an FMU" in result.output
     assert not (tmp_path / "out").exists()
 
 
