@@ -7,12 +7,14 @@ variables of their FMUs, and all faults are collected.
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.description import FmuDescription, FmuPort
 from handover.cosim.ssp.connected_ports import find_entry, ports_of, settable_names, variable_names
+from handover.cosim.ssp.given_parameters import put
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.ssp.start_values import Given, chained, converted
 from handover.cosim.ssp.structure import SspComponent, SspConnection, SspConnector, SspElement, SspEnd, SspNestedSystem
@@ -58,12 +60,16 @@ class FlatConnection:
 
 @dataclass
 class FlatSystem:
-    """Components by path, connections between their variables, and values for variables by component and name."""
+    """Components by path, connections between their variables, and values for variables by component and name.
+
+    `values_of_systems` are those of systems' own connectors.
+    """
 
     components: Mapping[str, SspComponent]
     connections: list[FlatConnection] = field(default_factory=list[FlatConnection])
     given: dict[str, dict[str, Given]] = field(default_factory=dict[str, dict[str, Given]])
     faults: list[str] = field(default_factory=list[str])
+    values_of_systems: dict[Node, SspValue] = field(default_factory=dict[Node, SspValue])
 
 
 def components_of(system: SspNestedSystem, path: str = "") -> Iterator[tuple[str, SspComponent]]:
@@ -76,9 +82,16 @@ def components_of(system: SspNestedSystem, path: str = "") -> Iterator[tuple[str
             yield from components_of(element, here)
 
 
-def flatten(system: SspNestedSystem, descriptions: Mapping[str, FmuDescription]) -> FlatSystem:
-    """Return a system's components, connections and start values; all that is wrong is in `faults`."""
-    return _Flattening(system, descriptions).flat
+def flatten(
+    system: SspNestedSystem,
+    descriptions: Mapping[str, FmuDescription],
+    asked: Mapping[Node, SspValue] = MappingProxyType({}),
+) -> FlatSystem:
+    """Return a system's components, connections and start values; all that is wrong is in `faults`.
+
+    The values of `asked` come before those that the file gives.
+    """
+    return _Flattening(system, descriptions, asked).flat
 
 
 def _join(path: str, name: str) -> str:
@@ -86,13 +99,19 @@ def _join(path: str, name: str) -> str:
 
 
 class _Flattening:
-    def __init__(self, system: SspNestedSystem, descriptions: Mapping[str, FmuDescription]) -> None:
+    def __init__(
+        self,
+        system: SspNestedSystem,
+        descriptions: Mapping[str, FmuDescription],
+        asked: Mapping[Node, SspValue],
+    ) -> None:
         self._descriptions = descriptions
         self._connectors: dict[Node, SspConnector] = {}
         self._fed: dict[Node, Fed] = {}
         self._values: dict[Node, SspValue] = {}
         self.flat = FlatSystem(dict(components_of(system)))
         self._enter(system, "")
+        self._values |= {node: value for node, value in asked.items() if node[0] not in descriptions}
         passed_on = {fed.source for fed in self._fed.values()}
         for target in self._fed:
             if target not in passed_on:
@@ -100,6 +119,11 @@ class _Flattening:
         for (path, name), value in self._values.items():
             if path in descriptions:
                 self.flat.given.setdefault(path, {}).setdefault(name, Given(value))
+        for (path, name), value in asked.items():
+            entry = find_entry(descriptions[path].parameters, name) if path in descriptions else None
+            if entry is not None:
+                put(self.flat.given.setdefault(path, {}), entry, name, value)
+        self.flat.values_of_systems = {node: v for node, v in self._values.items() if node[0] not in descriptions}
 
     def _enter(self, system: SspNestedSystem, path: str) -> None:
         self._connectors |= {(path, c.name): c for c in system.connectors.values()}

@@ -9,7 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
+from typing import Any
 
 from handover.cosim.exceptions import InvalidFmu, InvalidSsp, WiringError
 from handover.cosim.fmu.default_experiment import exact_seconds, proposed_step
@@ -17,8 +18,11 @@ from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.ssp.archive import SspArchive
 from handover.cosim.ssp.connected_ports import entry_names, find_entry, split_arrays
 from handover.cosim.ssp.flattening import FlatConnection, FlatSystem, Node, components_of, flatten
+from handover.cosim.ssp.given_parameters import SettableParameter, named_parameters, settable_parameters
+from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.ssp.reading import read_structure
 from handover.cosim.ssp.start_values import start_values
+from handover.cosim.ssp.structure import SspConnector, SspNestedSystem
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import PortName, System
 
@@ -146,6 +150,8 @@ class SspFile:
         path: the file.
         step: communication step of all units, s; without it each has the one of an annotation by `write_ssp`, or
             else the one that its FMU proposes, or that is annotated for OMSimulator or libcosim.
+        parameters: texts by the names of the property `parameters`, which come before what the file gives; of an array
+            the values stand with commas between them, or a name such as `arm.p[1]` gives one.
 
     Attributes:
         name: the system's name.
@@ -157,7 +163,9 @@ class SspFile:
         InvalidSsp: with all that is wrong with it.
     """
 
-    def __init__(self, path: Path, step: Fraction | None = None) -> None:
+    def __init__(
+        self, path: Path, step: Fraction | None = None, parameters: Mapping[str, str] = MappingProxyType({})
+    ) -> None:
         archive = SspArchive(path)
         structure = read_structure(archive)
         self.path, self.name = path, structure.name
@@ -167,12 +175,14 @@ class SspFile:
         try:
             archive.unpack(Path(self._folder.name))
             descriptions = self._describe({n: c.member for n, c in components_of(structure.system)})
-            flat = flatten(structure.system, descriptions)
+            asked = self._named(structure.system, descriptions, parameters) if parameters else {}
+            flat = flatten(structure.system, descriptions, asked)
             steps = {
                 n: step or c.period or (None if proposed_step(descriptions[n].step) else structure.step)
                 for n, c in flat.components.items()
             }
             self.system = self._build(flat, descriptions, steps)
+            self._flat, self._structure, self._descriptions = flat, structure, descriptions
         except BaseException:
             self.close()
             raise
@@ -181,6 +191,12 @@ class SspFile:
     def folder(self) -> Path:
         """Where its FMUs are unpacked until it is closed."""
         return Path(self._folder.name)
+
+    @property
+    def parameters(self) -> dict[str, FmuPort]:
+        """Parameters of components and of systems by the names by which they are given, starting from their values."""
+        known = settable_parameters(self._structure.system, self._descriptions)
+        return {p.full_name: p.described(self._value(p)) for p in known}
 
     def close(self) -> None:
         """Remove the unpacked FMUs."""
@@ -232,3 +248,25 @@ class SspFile:
         except WiringError as e:
             raise InvalidSsp(self.path, e.faults) from e
         return system
+
+    def _named(
+        self, system: SspNestedSystem, descriptions: Mapping[str, FmuDescription], texts: Mapping[str, str]
+    ) -> dict[Node, SspValue]:
+        """Return the values of parameters that a call gives."""
+        known = {p.full_name: p for p in settable_parameters(system, descriptions)}
+        asked, faults = named_parameters(known, descriptions, texts)
+        if faults:
+            raise InvalidSsp(self.path, faults)
+        return asked
+
+    def _value(self, parameter: SettableParameter) -> Any:
+        """Return the value from which a parameter starts; None for the one that its FMU says."""
+        path, name = parameter.path, parameter.name
+        if isinstance(parameter.declared, SspConnector):
+            value = self._flat.values_of_systems.get((path, name))
+            return None if value is None else " ".join(value.texts)
+        unit = self.system.units[path]
+        if name in unit.description.parameters:
+            return unit.start.get(name)
+        names = entry_names(parameter.declared)  # of an array that was split
+        return " ".join(str(unit.start.get(n, unit.description.parameters[n].start)) for n in names)

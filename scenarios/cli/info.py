@@ -1,12 +1,13 @@
 """The command `handover info`: what is in an FMU or an SSP, from any tool, without loading it."""
 
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
 import click
 
 from handover.cosim.fmu.archive import FmuArchive
-from handover.cosim.fmu.description import FmuDescription, describe_fmu
+from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.fmu.fmpy_edge import platforms_in
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.system import System
@@ -17,7 +18,8 @@ from handover.scenarios.execution.fmu_run import is_fmu
 from handover.scenarios.execution.ssp_run import is_ssp
 
 _HELP = """Tell what is in FILE, an FMU (2.0 or 3.0, co-simulation) or an SSP: names, steps, capabilities, parameters,
-inputs and outputs; of an SSP its units and connections. Nothing is loaded or run; `handover check` does that.
+inputs and outputs; of an SSP its units, parameters and connections. Nothing is loaded or run; `handover check` does
+that.
 """
 
 _CAPABILITIES = {
@@ -44,8 +46,8 @@ def info(file: Path, *, as_json: bool) -> None:
         if is_ssp(str(file)):
             with SspFile(file) as ssp:
                 stop = None if ssp.stop is None else float(ssp.stop)
-                data = system_data(ssp.name, stop, ssp.system)
-                print_json(data) if as_json else _print_system(data)
+                data = system_data(ssp.name, stop, ssp.system, ssp.parameters.values())
+                print_json(data) if as_json else _print_system(data, ssp.parameters.values())
             return
         described = describe_fmu(file)
         data = fmu_data(described, platforms_in(FmuArchive(file)))
@@ -71,14 +73,15 @@ def fmu_data(d: FmuDescription, platforms: list[str]) -> dict[str, Any]:
     }
 
 
-def system_data(name: str, stop: float | None, system: System) -> dict[str, Any]:
-    """Return an SSP's units and connections, as JSON can hold them; times are in seconds."""
+def system_data(name: str, stop: float | None, system: System, parameters: Iterable[FmuPort]) -> dict[str, Any]:
+    """Return an SSP's units, parameters and connections, as JSON can hold them; times are in seconds."""
     units = {
         unit: {"model": u.description.name, "fmi": u.description.fmi, "step": float(u.period), "sampled": u.sampled}
         for unit, u in system.units.items()
     }
     connections = [[str(c.source), str(c.target)] for c in system.connections]
-    return {"name": name, "stop": stop, "units": units, "connections": connections}
+    rows = [variable_data(p) for p in parameters]
+    return {"name": name, "stop": stop, "units": units, "parameters": rows, "connections": connections}
 
 
 def _print_fmu(data: dict[str, Any], d: FmuDescription) -> None:
@@ -102,13 +105,16 @@ def _print_fmu(data: dict[str, Any], d: FmuDescription) -> None:
             print_rows(console, port_rows(ports.values()))
 
 
-def _print_system(data: dict[str, Any]) -> None:
+def _print_system(data: dict[str, Any], parameters: Collection[FmuPort]) -> None:
     console = open_console()
     stop = "no stop time" if data["stop"] is None else f"until {data['stop']:g} s"
     console.print(f"{data['name']}: a system of {len(data['units'])} units, {stop}", style="bold", markup=False)
     console.print("Units", style="bold")
     units = data["units"].items()
     print_rows(console, [(n, u["model"], f"FMI {u['fmi']}.0", f"{1000 * u['step']:.4g} ms") for n, u in units])
+    if parameters:
+        console.print("Parameters, which -p of `handover run` sets", style="bold")
+        print_rows(console, port_rows(parameters))
     if data["connections"]:
         console.print("Connections", style="bold")
         print_rows(console, [(source, "->", target) for source, target in data["connections"]])

@@ -111,8 +111,8 @@ class RunRequest:
             if wrong := [name for name in used if name != "--stop"]:
                 raise UsageError(f"{', '.join(wrong)}: a system has its parameters, units, inputs and steps inside")
         elif self._is_file(is_ssp):
-            if wrong := [name for name in of_scenarios if name in used]:
-                raise UsageError(f"{', '.join(wrong)}: for scenarios; an SSP has its parameters and units inside")
+            if wrong := [name for name in ("--seed", "--unit") if name in used]:
+                raise UsageError(f"{', '.join(wrong)}: for scenarios; an SSP has its units inside")
             if "--input" in used:
                 raise UsageError("--input: for an FMU that runs by itself; an SSP's inputs are wired in it")
         elif self._is_file(is_fmu):
@@ -130,7 +130,7 @@ class RunRequest:
             UsageError: it is an SSP or an FMU.
         """
         if self._is_file(is_ssp):
-            raise UsageError(f"{self.subject}: a scenario can be swept, an SSP has no parameters of its own")
+            raise UsageError(f"{self.subject}: a scenario can be swept, an SSP cannot; `run` sets its parameters by -p")
         if self._is_file(is_fmu):
             raise UsageError(f"{self.subject}: a scenario can be swept, an FMU can be run by itself")
 
@@ -148,8 +148,9 @@ class RunRequest:
             return self._of_class(self.subject)
         path = Path(self.subject)
         if is_ssp(self.subject):
-            of_ssp = open_experiment(path, self.stop, self.step, opened)
-            return OpenedSubject(of_ssp, source=source_of(path, of_ssp.stop_time(NoParameters()), self.step))
+            of_ssp = open_experiment(path, self.stop, self.step, opened, self.parameters)
+            until = of_ssp.stop_time(NoParameters())
+            return OpenedSubject(of_ssp, source=source_of(path, until, self.step, self.parameters))
         if is_fmu(self.subject):
             alone = FmuRun(path=path, parameters=self.parameters, inputs=self.inputs, stop=self.stop, step=self.step)
             of_fmu = alone.open()

@@ -125,7 +125,8 @@ class InterruptedRun:
         file, step = Path(source["ssp"]), source["step"]
         if not file.is_file() or sha256_of(file) != source["sha256"]:
             raise InvalidRunFolder(self.folder.path, f"{file} is not the file that the run began with")
-        return open_experiment(file, Fraction(source["stop"]), None if step is None else Fraction(step), opened)
+        times = Fraction(source["stop"]), None if step is None else Fraction(step)
+        return open_experiment(file, *times, opened, source.get("parameters", ()))
 
     def _own_scenario(self, source: Mapping[str, Any]) -> Experiment[Any]:
         """Return a scenario that is not this package's, if it is what it was."""

@@ -84,16 +84,23 @@ def system_experiment(
 
 
 def open_experiment(
-    path: Path, stop: Fraction | None, step: Fraction | None, opened: contextlib.ExitStack
+    path: Path,
+    stop: Fraction | None,
+    step: Fraction | None,
+    opened: contextlib.ExitStack,
+    parameters: Sequence[str] = (),
 ) -> Experiment[UntilStop]:
     """Open an SSP as an experiment; `opened` closes it.
 
+    `parameters` are texts `NAME=VALUE`, see `SspFile`.
+
     Raises:
         InvalidSsp: see `SspFile`; where a unit has no step, it names `--step`.
-        UsageError: neither the file nor the command gives a stop time.
+        UsageError: neither the file nor the command gives a stop time, or a text is of another form.
     """
+    texts = _texts_by_name(path, parameters)
     try:
-        ssp = opened.enter_context(SspFile(path, step))
+        ssp = opened.enter_context(SspFile(path, step, texts))
     except InvalidSsp as e:
         raise InvalidSsp(e.path, naming_step(e.faults)) from e
     supervisor.heartbeat.record_scratch_folder(str(ssp.folder))
@@ -104,12 +111,23 @@ def open_experiment(
     return system_experiment(path.name, heading, ssp.system, until, None if step else ssp.parallel_step)
 
 
+def _texts_by_name(path: Path, given: Sequence[str]) -> dict[str, str]:
+    pairs = [tuple(part.strip() for part in text.split("=", 1)) for text in given]
+    names = [pair[0] for pair in pairs]
+    faults = [f"{t!r} is not of the form NAME=VALUE" for t, p in zip(given, pairs, strict=True) if len(p) < 2]
+    faults += [f"{name} is given twice" for name in dict.fromkeys(names) if names.count(name) > 1]
+    if faults:
+        raise UsageError(f"{path}: {'; '.join(faults)}")
+    return {pair[0]: pair[1] for pair in pairs}
+
+
 def naming_step(faults: Sequence[str]) -> list[str]:
     """Return faults of a system, with the option that gives units a step where one has none."""
     return [f"{f}, such as by --step 0.01" if isinstance(f, NoStep) else f for f in faults]
 
 
-def source_of(path: Path, stop: Fraction, step: Fraction | None) -> dict[str, Any]:
-    """Return what a run's folder keeps of an SSP so that the run can be resumed: the file, stop time and step."""
+def source_of(path: Path, stop: Fraction, step: Fraction | None, parameters: Sequence[str]) -> dict[str, Any]:
+    """Return what a run's folder keeps of an SSP so that the run can be resumed: the file, times and given values."""
     times = {"stop": str(stop), "step": None if step is None else str(step)}
-    return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **times}
+    given = {"parameters": list(parameters)} if parameters else {}
+    return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **times, **given}

@@ -15,6 +15,27 @@ NAMESPACES = " ".join(
 )
 MM = '<ssd:Units><ssc:Unit name="mm"><ssc:BaseUnit m="1" factor="0.001"/></ssc:Unit></ssd:Units>'
 
+_MORE = """
+    <ScalarVariable name="p[1]" valueReference="20" causality="parameter" variability="fixed"><Real start="1" unit="m"/>
+    </ScalarVariable>
+    <ScalarVariable name="p[2]" valueReference="21" causality="parameter" variability="fixed"><Real start="2" unit="m"/>
+    </ScalarVariable>
+    <ScalarVariable name="on" valueReference="22" causality="parameter" variability="fixed"><Boolean start="false"/>
+    </ScalarVariable>
+    <ScalarVariable name="called" valueReference="23" causality="parameter" variability="fixed"><String start=""/>
+    </ScalarVariable>
+    <ScalarVariable name="light" valueReference="24" causality="parameter" variability="fixed">
+      <Enumeration declaredType="Light" start="1"/></ScalarVariable>
+"""
+_TYPES = """<TypeDefinitions><SimpleType name="Light"><Enumeration>
+<Item name="RED" value="1"/><Item name="GREEN" value="2"/>
+</Enumeration></SimpleType></TypeDefinitions>"""
+MORE_PARAMETERS = (
+    ("</ModelVariables>", _MORE + "</ModelVariables>"),
+    ("</UnitDefinitions>", "</UnitDefinitions>" + _TYPES),
+)
+"""Edits of decay.c's description: parameters of all types."""
+
 
 def connectors(**kinds: str) -> str:
     """Return connectors of reals by name and kind; `x="output mm"` has a unit."""

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from ssp_of import (
     MM,
+    MORE_PARAMETERS,
     NAMESPACES,
     bindings,
     component,
@@ -24,21 +25,6 @@ from ssp_of import (
 from handover.cosim.exceptions import InvalidSsp
 from handover.cosim.ssp.ssp_file import SspFile
 
-MORE = """
-    <ScalarVariable name="p[1]" valueReference="20" causality="parameter" variability="fixed"><Real start="1" unit="m"/>
-    </ScalarVariable>
-    <ScalarVariable name="p[2]" valueReference="21" causality="parameter" variability="fixed"><Real start="2" unit="m"/>
-    </ScalarVariable>
-    <ScalarVariable name="on" valueReference="22" causality="parameter" variability="fixed"><Boolean start="false"/>
-    </ScalarVariable>
-    <ScalarVariable name="called" valueReference="23" causality="parameter" variability="fixed"><String start=""/>
-    </ScalarVariable>
-    <ScalarVariable name="light" valueReference="24" causality="parameter" variability="fixed">
-      <Enumeration declaredType="Light" start="1"/></ScalarVariable>
-"""
-TYPES = """<TypeDefinitions><SimpleType name="Light"><Enumeration>
-<Item name="RED" value="1"/><Item name="GREEN" value="2"/>
-</Enumeration></SimpleType></TypeDefinitions>"""
 SET_MM = MM.replace("ssd:", "ssv:")
 
 Starts = Mapping[str, Mapping[str, Any]]
@@ -48,8 +34,7 @@ Open = Callable[..., Starts]
 @pytest.fixture
 def started(tmp_path: Path) -> Open:
     """Open an SSP of decay.c's FMU with more parameters; return its units' start values."""
-    edits = (("</ModelVariables>", MORE + "</ModelVariables>"), ("</UnitDefinitions>", "</UnitDefinitions>" + TYPES))
-    fmu = decay.pack(tmp_path / "unit.fmu", b"", decay.edited(*edits))
+    fmu = decay.pack(tmp_path / "unit.fmu", b"", decay.edited(*MORE_PARAMETERS))
 
     def start(inside: str, more: str = "", files: Mapping[str, str] | None = None) -> Starts:
         file = pack_ssp(tmp_path / "a.ssp", described(inside, more), {"resources/unit.fmu": fmu, **(files or {})})

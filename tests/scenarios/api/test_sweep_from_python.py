@@ -110,5 +110,5 @@ def test_units_are_varied(tmp_path: Path):
 
 
 def test_files_are_not_swept():
-    with pytest.raises(handover.InvalidInput, match="a scenario can be swept, an SSP has no parameters of its own"):
+    with pytest.raises(handover.InvalidInput, match="a scenario can be swept, an SSP cannot"):
         handover.sweep("a.ssp", seeds=2)

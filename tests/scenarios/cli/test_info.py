@@ -60,9 +60,12 @@ def test_an_ssps_units_and_connections(tmp_path: Path):
     assert data["stop"] == 90.0
     assert data["units"]["reflex"]["model"] == "IrReflex"
     assert ["reflex.p_WH_cmd", "scene.p_WH_cmd"] in data["connections"]
+    (seed,) = [p for p in data["parameters"] if p["name"] == "scene.seed"]
+    assert seed["start"] > 0  # as the file binds it; its FMU starts from 0
     printed = call("info", file).output
     assert "ir_grasp: a system of 2 units, until 90 s" in printed
     assert "reflex.sigma_cmd" in printed
+    assert "Parameters, which -p of `handover run` sets" in printed
 
 
 def test_what_has_no_information_is_refused_in_one_line(tmp_path: Path):

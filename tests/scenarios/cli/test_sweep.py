@@ -170,7 +170,7 @@ def test_workers_that_cannot_be_had_leave_nothing(here: Path, monkeypatch: pytes
     ("call", "sentence"),
     [
         (["ir_gasp"], "no scenario 'ir_gasp': did you mean ir_grasp?"),
-        (["x.ssp"], "x.ssp: a scenario can be swept, an SSP has no parameters of its own"),
+        (["x.ssp"], "x.ssp: a scenario can be swept, an SSP cannot"),
         (["x.fmu"], "x.fmu: a scenario can be swept, an FMU can be run by itself"),
         (["ir_grasp", "thing=cylindr"], "thing: 'cylindr' is none of cylinder, baby_cup_a"),
         (["ir_grasp", "forward=0.1", "-p", "forward=0.2"], "forward is varied and set by -p; one of both is right"),

@@ -1,5 +1,6 @@
 """`handover run FILE.ssp`: the files that it writes, and the errors for files that it cannot run."""
 
+import contextlib
 import hashlib
 import json
 import zipfile
@@ -11,11 +12,14 @@ import pytest
 from click.testing import CliRunner, Result
 from failing_systems import failing_ssp
 
+import handover
 from handover.cosim.record.reader import Record
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
 from handover.fmus.build import build_block
 from handover.scenarios.cli.command import main
+from handover.scenarios.execution.resume import InterruptedRun
+from handover.scenarios.results.run_folder import RunFolder
 
 
 def run(file: Path, *arguments: str | Path) -> Result:
@@ -112,9 +116,9 @@ def test_without_a_stop_time_one_is_asked_for(spring: Path, tmp_path: Path):
 
 
 def test_what_is_for_scenarios_is_refused(spring: Path, tmp_path: Path):
-    result = run(packed(spring, tmp_path, Fraction(2)), "-p", "a=1", "--seed", "3", "--out", tmp_path / "out")
+    result = run(packed(spring, tmp_path, Fraction(2)), "--unit", "a=1", "--seed", "3", "--out", tmp_path / "out")
     assert result.exit_code == 2, result.output
-    assert "-p, --seed: for scenarios" in result.output
+    assert "--seed, --unit: for scenarios" in result.output
     result = CliRunner().invoke(main, ["run", "ir_grasp", "--step", "1", "--out", str(tmp_path / "out")])
     assert result.exit_code == 2, result.output
     assert "--step is for an SSP or an FMU" in result.output
@@ -165,3 +169,36 @@ def test_a_file_that_is_not_there_is_reported(tmp_path: Path):
     result = run(tmp_path / "missing.ssp")
     assert result.exit_code == 2, result.output
     assert result.output == f"Error: {tmp_path / 'missing.ssp'}: there is no such file\n"
+
+
+def test_p_sets_a_components_parameter_which_a_resumed_run_sets_again(spring: Path, tmp_path: Path):
+    file, out = packed(spring, tmp_path, Fraction(2), tears=5.0), tmp_path / "out"
+    result = run(file, "-p", "left.tears=0.45", "-p", "right.tears=1.05", "--checkpoint", "0.2", "--out", out)
+    assert result.exit_code == 3, result.output
+    assert "left: fmi2DoStep at t = 0.5 s: RuntimeError: the spring tore" in result.output
+    data = json.loads((out / "run.json").read_text())
+    assert data["source"]["parameters"] == ["left.tears=0.45", "right.tears=1.05"]
+    assert ["right.tears", "1.05", "given start value"] in data["told_parameters"]
+    with contextlib.ExitStack() as opened:
+        task = InterruptedRun(RunFolder.of_run(out)).task(opened)
+        system = task.experiment.build(task.parameters, 0, lambda _unit: file)
+        assert {name: unit.start["tears"] for name, unit in system.units.items()} == {"left": 0.45, "right": 1.05}
+
+
+def test_what_is_wrong_with_parameters_is_told_in_one_line(spring: Path, tmp_path: Path):
+    file = packed(spring, tmp_path, Fraction(2))
+    given = ("-p", "left.tear=1", "-p", "tears=1")
+    result = run(file, *given, "--out", tmp_path / "out")
+    assert result.exit_code == 2, result.output
+    assert "no parameter 'left.tear'; did you mean left.tears or right.tears?; no parameter 'tears'; " in result.output
+    result = run(file, "-p", "left.tears=soon", "--out", tmp_path / "out")
+    assert (result.exit_code, "left.tears: 'soon' is not a number" in result.output) == (2, True), result.output
+    result = run(file, "-p", "left.tears", "--out", tmp_path / "out")
+    assert (result.exit_code, "'left.tears' is not of the form NAME=VALUE" in result.output) == (2, True)
+    assert not (tmp_path / "out").exists()
+
+
+def test_python_gives_them_too(spring: Path, tmp_path: Path):
+    file = packed(spring, tmp_path, Fraction(2))
+    with handover.open(file, parameters={"left.tears": 0.25}) as s:
+        assert (s["left.tears"], s["right.tears"]) == (0.25, 100.0)
