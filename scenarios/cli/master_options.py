@@ -117,7 +117,7 @@ _OPTIONS = (
         help="Roll all units back and take a shorter step where one of them discards it, as with --adaptive anyway.",
     ),
 )
-_CONTROL_FIELDS: Mapping[str, str] = {
+CONTROL_FIELDS: Mapping[str, str] = {
     "adaptive_absolute": "absolute",
     "first_step": "initial",
     "smallest_step": "smallest",
@@ -145,11 +145,11 @@ def coupling_of(given: Mapping[str, Any]) -> dict[str, Any]:
         UsageError: options of step size control are given without --adaptive.
         InvalidOptions: options contradict each other.
     """
-    limits = {name: given[name] for name in _CONTROL_FIELDS if given[name] not in (None, ())}
+    limits = {name: given[name] for name in CONTROL_FIELDS if given[name] not in (None, ())}
     if given["adaptive"] is None and limits:
         text = ", ".join("--" + name.replace("_", "-") for name in limits)
         raise UsageError(f"{text}: with --adaptive only; without it, steps are fixed")
-    control = {_CONTROL_FIELDS[name]: value for name, value in limits.items()}
+    control = {CONTROL_FIELDS[name]: value for name, value in limits.items()}
     return {
         "algorithm": Algorithm(given["algorithm"]),
         "tolerance": given["tolerance"],

@@ -13,9 +13,9 @@ import click
 
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import MasterOptions
+from handover.scenarios.cli.config_file import ConfiguredCommand, config_option
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import (
-    HeadedCommand,
     HeadedOption,
     Seconds,
     limit_options,
@@ -66,8 +66,9 @@ is not, and such a unit ends the command.
 _record_option = partial(click.option, cls=HeadedOption, heading="Record")
 
 
-@click.command("run", cls=HeadedCommand, help=_HELP, context_settings={"show_default": True})
+@click.command("run", cls=ConfiguredCommand, help=_HELP, context_settings={"show_default": True})
 @click.argument("scenario", metavar="SCENARIO|FILE.ssp|FILE.fmu")
+@config_option
 @scenario_options
 @stop_option
 @click.option(

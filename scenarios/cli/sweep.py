@@ -15,9 +15,9 @@ from handover.scenarios.campaign.grid import parse_grid, set_parameters, split_u
 from handover.scenarios.campaign.plan import MAX_REPETITIONS, CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.cli.campaign import pool_config, run_campaign_command
+from handover.scenarios.cli.config_file import ConfiguredCommand, config_option
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import (
-    HeadedCommand,
     campaign_options,
     limit_options,
     limits,
@@ -65,7 +65,7 @@ Exit status
 """
 
 
-@click.command("sweep", cls=HeadedCommand, help=_HELP, context_settings={"show_default": True})
+@click.command("sweep", cls=ConfiguredCommand, help=_HELP, context_settings={"show_default": True})
 @click.argument("scenario", metavar="SCENARIO")
 @click.argument("grid", nargs=-1, metavar="[NAME=VALUES]...")
 @click.option("--repeat", type=click.IntRange(1, MAX_REPETITIONS), default=1, help="Runs of each combination.")
@@ -73,6 +73,7 @@ Exit status
     "--paired", is_flag=True, help="Let all combinations of a repetition share a seed, to compare them run by run."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the results of all points as JSON.")
+@config_option
 @scenario_options
 @stop_option
 @campaign_options

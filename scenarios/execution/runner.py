@@ -206,7 +206,7 @@ def _outcome(
     if master.ended is not None:
         return replace(seen, reason=f"{seen.reason}; {master.ended.summary}")
     if task.is_cut_short and not evaluator.over:
-        return replace(seen, success=False, reason=f"stopped at {master.time:g} s, as asked: {seen.reason}")
+        return replace(seen, success=False, reason=f"ended at {master.time:g} s, as asked: {seen.reason}")
     return seen
 
 

@@ -36,7 +36,7 @@ def test_a_run_ends_at_the_first_point_at_or_after_it_and_has_not_succeeded(tmp_
     done = call("run", "ir_grasp", "--stop", "1", "--no-report", "--out", out)
     assert done.exit_code == 1, done.output
     assert Record(out / "signals.parquet").time[-1] == pytest.approx(1.005)  # steps of 15 ms
-    assert "ir_grasp failed: stopped at 1.005 s, as asked: " in done.output
+    assert "ir_grasp failed: ended at 1.005 s, as asked: " in done.output
     summary = read(out, "summary.json")
     assert (summary["success"], summary["complete"], summary["stop"]) == (False, True, "1")
     assert read(out, "run.json")["stop"] == "1"

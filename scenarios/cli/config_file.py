@@ -1,0 +1,303 @@
+"""`--config FILE`: values of a command's options from a TOML or JSON file, or the `run.json` of a run to be repeated.
+
+Keys are the options as they are typed, without dashes in front; `scenario` is what is run. `-p`, `--unit` and the
+values to vary are tables by name: `parameters`, `unit` and, of `handover sweep`, `sweep`. The command line comes first,
+of these tables name by name.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+import click
+import tomli
+
+from handover.cosim.exceptions import nearest, one_line
+from handover.fmus.build import is_of_cache
+from handover.scenarios.catalog import InvalidScenario, ScenarioSource, scenario_of
+from handover.scenarios.cli.master_options import CONTROL_FIELDS
+from handover.scenarios.cli.options import HeadedCommand
+from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.results.run_folder import sha256_of, version_differences, versions
+
+_META = "handover.config"
+_TABLES = {"parameters": "parameters", "unit": "replaced", "sweep": "grid"}
+"""Keys that are tables by name, and the parameters of commands that take them as texts `NAME=VALUE`."""
+_NOT_KEPT = ("help", "config")
+_OF_RUN_JSON = {"scenario", "parameters", "files", "master", "versions"}
+
+
+@dataclass(frozen=True)
+class ConfigFile:
+    """What a file gives to a command.
+
+    Attributes:
+        path: the file.
+        defaults: values for click's options, by the names of its parameters.
+        texts: texts `NAME=VALUE`, by the names of click's parameters.
+    """
+
+    path: Path
+    defaults: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    texts: Mapping[str, Sequence[str]] = field(default_factory=dict[str, Sequence[str]])
+
+    def merge_into(self, params: dict[str, Any]) -> None:
+        """Put the file's texts before those of the command line, without names that this gives.
+
+        Where the file names the scenario, the first argument of a sweep may be `NAME=VALUES`.
+        """
+        if "grid" in params and "=" in params["scenario"] and "scenario" in self.defaults:
+            params["grid"] = (params["scenario"], *params["grid"])
+            params["scenario"] = self.defaults["scenario"]
+        given: dict[str, Sequence[str]] = {name: params[name] for name in _TABLES.values() if name in params}
+        varied_or_set = {_name(t) for name in ("parameters", "grid") for t in given.get(name, ())}
+        units = {_name(t) for t in given.get("replaced", ())}
+        for name, texts in given.items():
+            ours = units if name == "replaced" else varied_or_set
+            params[name] = (*(t for t in self.texts.get(name, ()) if _name(t) not in ours), *texts)
+
+
+class ConfiguredCommand(HeadedCommand):
+    """A command with `--config`, see `config_option`; what cannot be run is told with the name of the file."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the command line and add what the file gives."""
+        rest = super().parse_args(ctx, args)
+        if (config := ctx.meta.get(_META)) is not None:
+            config.merge_into(ctx.params)
+        return rest
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Call the command."""
+        try:
+            return super().invoke(ctx)
+        except UsageError as e:
+            if (config := ctx.meta.get(_META)) is None:
+                raise
+            raise UsageError(f"with {config.path}: {e.message}") from e
+
+
+def config_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add `--config`, to a `ConfiguredCommand`."""
+    return click.option(
+        "--config",
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        is_eager=True,
+        expose_value=False,
+        callback=_take,
+        help="TOML or JSON file with values of these options, keys as they are typed without dashes: `seed = 3`, tables"
+        " `parameters`, `unit`, of a sweep `sweep`, and `scenario`. The command line comes first. A run's run.json"
+        " repeats that run.",
+    )(command)
+
+
+def _take(ctx: click.Context, _option: click.Parameter, path: Path | None) -> None:
+    if path is None or ctx.resilient_parsing:
+        return
+    config = read_config(path, ctx)
+    ctx.meta[_META] = config
+    ctx.default_map = {**(ctx.default_map or {}), **config.defaults}
+
+
+def read_config(path: Path, ctx: click.Context) -> ConfigFile:
+    """Read and check a file for the command of a context.
+
+    Raises:
+        UsageError: it cannot be read, or with all keys that are unknown or whose values are not right.
+    """
+    content = _content(path)
+    options = dict(_options(ctx.command))
+    tables = {key: name for key, name in _TABLES.items() if name in {p.name for p in ctx.command.params}}
+    if content.keys() >= _OF_RUN_JSON:
+        content = {key: value for key, value in _of_run(path, content).items() if key in {**options, **tables}}
+    faults: list[str] = []
+    defaults: dict[str, Any] = {}
+    texts: dict[str, Sequence[str]] = {}
+    for key, value in content.items():
+        try:
+            if key in tables:
+                texts[tables[key]] = list(_texts(key, value))
+            elif key in options:
+                defaults[str(options[key].name)] = _checked(options[key], ctx, value)
+            else:
+                faults.append(f"no option {key!r}; {nearest(key, {**options, **tables})}")
+        except click.BadParameter as e:
+            faults.append(f"{key} = {_short(value)}: {e.message.rstrip('.')}")
+        except ValueError as e:
+            faults.append(one_line(e))
+    if faults:
+        raise UsageError(f"{path}: {'; '.join(faults)}")
+    return ConfigFile(path, defaults, texts)
+
+
+def _content(path: Path) -> dict[str, Any]:
+    form = "JSON" if path.suffix.lower() == ".json" else "TOML"
+    try:
+        content: Any = (json.loads if form == "JSON" else tomli.loads)(path.read_text(encoding="utf-8"))
+    except OSError as e:
+        raise UsageError(f"{path}: it cannot be read: {e.strerror or e}") from e
+    except (ValueError, RecursionError) as e:  # of both parsers, and of bytes that are not UTF-8
+        raise UsageError(f"{path}: it is not {form}: {one_line(e)}") from e
+    if not isinstance(content, dict):
+        raise UsageError(f'{path}: an object of options is right, such as {{"seed": 3}}')
+    return cast(dict[str, Any], content)
+
+
+def _options(command: click.Command) -> Iterator[tuple[str, click.Parameter]]:
+    """Yield the options that a file can give, by their keys."""
+    for parameter in command.params:
+        if parameter.name in _TABLES.values():
+            continue
+        names = parameter.opts if isinstance(parameter, click.Option) else [f"--{parameter.name}"]
+        for name in names:
+            if name.startswith("--") and name[2:] not in _NOT_KEPT:
+                yield name[2:], parameter
+
+
+def _checked(option: click.Parameter, ctx: click.Context, value: Any) -> Any:
+    """Return an option's value as click takes it.
+
+    Raises:
+        BadParameter: it is none.
+    """
+    if isinstance(option, click.Option) and option.is_flag:
+        if not isinstance(value, bool):
+            raise click.BadParameter("true or false is right")
+        return value
+    several = isinstance(option, click.Option) and option.multiple
+    values = cast(list[Any], value) if several and isinstance(value, list) else [value]
+    if any(isinstance(v, bool) or not isinstance(v, (str, int, float)) for v in values):
+        raise click.BadParameter("a text or a number is right" + (", or several in [...]" if several else ""))
+    texts = [_text(v) for v in values]
+    given = texts if several else texts[0]
+    option.type_cast_value(ctx, given)
+    return given
+
+
+def _texts(key: str, table: Any) -> Iterator[str]:
+    """Yield the texts `NAME=VALUE` of a table.
+
+    Raises:
+        ValueError: it is none, or has a value of another type.
+    """
+    if not isinstance(table, dict):
+        raise ValueError(f"{key} = {_short(table)}: a table by name is right, such as [{key}]")
+    for name, value in _leaves(cast(dict[str, Any], table)):
+        entries = list(_flat(value))
+        if any(not isinstance(v, (str, int, float)) for v in entries):
+            raise ValueError(f"{key}.{name} = {_short(value)}: texts, numbers, true, false and lists of them are right")
+        if key != "sweep" or not isinstance(value, list):
+            yield f"{name}={','.join(map(_text, entries))}"
+            continue
+        texts = [",".join(map(_text, _flat(item))) for item in cast(list[Any], value)]
+        yield f"{name}={(';' if any(',' in text for text in texts) else ',').join(texts)}"
+
+
+def _flat(value: Any) -> Iterator[Any]:
+    """Yield the entries of an array, or a single value."""
+    if isinstance(value, list):
+        for entry in cast(list[Any], value):
+            yield from _flat(entry)
+    else:
+        yield value
+
+
+def _leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the values of a table, and of tables in it, by names with points between."""
+    for name, value in table.items():
+        if isinstance(value, dict):
+            yield from _leaves(cast(dict[str, Any], value), f"{before}{name}.")
+        else:
+            yield f"{before}{name}", value
+
+
+def _text(value: str | float) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value, default=str)
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+def _name(text: str) -> str:
+    return text.partition("=")[0].strip()
+
+
+def _of_run(path: Path, run: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what repeats a run, from its `run.json`; tell of files and versions that are others than it had.
+
+    Raises:
+        UsageError: it is damaged, or its scenario or an FMU is not here.
+    """
+    if other := version_differences(versions(), run["versions"]):
+        click.echo(f"{path}: the run was of other versions: {other}", err=True)
+    try:
+        content: dict[str, Any] = {**_subject(path, run), **_of_master(run["master"])}
+        content |= {"seed": run["seed"], "stop": run.get("stop", content.get("stop"))}
+        content |= {"checkpoint": run["checkpoint"], "format": run["formats"]}
+        content["parameters"] = {**run["parameters"], **run.get("unit_values", {}), **content.get("parameters", {})}
+        content["unit"] = _units(path, run)
+    except (KeyError, TypeError, ValueError, AttributeError) as e:
+        raise UsageError(f"{path}: it is damaged: {type(e).__name__} {one_line(e)}") from e
+    return {key: value for key, value in content.items() if value is not None}
+
+
+def _subject(path: Path, run: Mapping[str, Any]) -> dict[str, Any]:
+    source = run["source"]
+    if not source:
+        return {"scenario": run["scenario"]}
+    if "scenario" not in source:
+        file = source["ssp"] if "ssp" in source else source["fmu"]
+        _compare(path, Path(file), source["sha256"])
+        given = dict(tuple(part.strip() for part in text.split("=", 1)) for text in source.get("parameters", ()))
+        return {"scenario": file, "input": source.get("input"), "step": source["step"], "parameters": given} | {
+            "stop": source["stop"]
+        }
+    before = ScenarioSource(**source)
+    try:
+        before.find()
+    except (KeyError, InvalidScenario) as e:
+        raise UsageError(f"{path}: its scenario {before.scenario} is not here: {one_line(e)}") from e
+    if ScenarioSource.of(before.scenario) != before:
+        click.echo(f"{path}: the code of {before.scenario} is not what the run had", err=True)
+    return {"scenario": before.scenario}
+
+
+def _of_master(master: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options of the master, from `MasterOptions.as_data`."""
+    control: Mapping[str, Any] = master.get("adaptive") or {}
+    options = {key: master[key] for key in ("algorithm", "tolerance", "iterations", "extrapolation")}
+    options |= {"repeat-discarded": master["repeat_discarded"], "isolate": master.get("isolated")}
+    options |= {option.replace("_", "-"): control.get(name) for option, name in CONTROL_FIELDS.items()}
+    return {**options, "adaptive": control.get("relative")}
+
+
+def _units(path: Path, run: Mapping[str, Any]) -> dict[str, str]:
+    """Return the FMUs of a run's units; those of the catalog that are no longer there are built again.
+
+    Raises:
+        UsageError: another one is not there.
+    """
+    scenario = scenario_of(run["scenario"], run["source"])
+    units: dict[str, str] = {}
+    for name, file in run["files"].items():
+        own = "" if scenario is None else scenario.units.get(name, "").rpartition(":")[2]
+        if Path(file).is_file():
+            units[name] = file
+            _compare(path, Path(file), run["units"].get(name, {}).get("sha256"))
+        elif not is_of_cache(Path(file)) or not Path(file).name.startswith(f"{own}."):
+            cure = f"--unit {name}=FILE or {name}=MODULE:CLASS gives another"
+            raise UsageError(f"{path}: the FMU of its unit {name}, {file}, is not there; {cure}")
+    return units
+
+
+def _compare(path: Path, file: Path, sha256: str) -> None:
+    """Tell of a file that is not what the run had; one that is not there is told of later."""
+    if file.is_file() and sha256_of(file) != sha256:
+        click.echo(f"{path}: {file} is not the file that the run had", err=True)

@@ -1,0 +1,228 @@
+"""`--config`: options from a TOML or JSON file, under the command line; a run's `run.json` repeats the run."""
+
+import json
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+from click.testing import CliRunner, Result
+from native_units import native_fmu
+
+from handover.cosim.ssp.writing import write_ssp
+from handover.cosim.system.system import System
+from handover.fmus.build import cached
+from handover.scenarios.cli.command import main
+from handover.scenarios.cli.run import run as run_command
+from handover.scenarios.cli.sweep import sweep as sweep_command
+
+RUN = """
+scenario = "ir_grasp"
+seed = 3
+stop = 0.3
+call-limit = 30
+no-report = true
+format = ["csv", "mat"]
+isolate = "reflex"
+
+[parameters]
+strategy = "reflex"
+forward = 0.05
+reflex.damping = 0.5
+
+[parameters.scene]
+grip_friction = 0.4
+"""
+
+
+def parsed(command: click.Command, folder: Path, text: str, *arguments: str, name: str = "run.toml") -> dict[str, Any]:
+    """Return what a command gets as its options."""
+    file = folder / name
+    file.write_text(text, encoding="utf-8")
+    return command.make_context("command", ["--config", str(file), *arguments]).params
+
+
+def refused(folder: Path, text: str, *arguments: str, name: str = "run.toml", command: str = "run") -> str:
+    """Return what is wrong with a file, in one line; nothing is written."""
+    file = folder / name
+    file.write_text(text, encoding="utf-8")
+    before = list(folder.iterdir())
+    result = call(command, "--config", file, *arguments, "--out", folder / "out")
+    assert (result.exit_code, list(folder.iterdir())) == (2, before), result.output
+    assert len(result.output.splitlines()) == 1
+    return result.output.replace(f"{folder}/", "")
+
+
+def call(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+def test_a_file_gives_what_is_run_and_the_options(tmp_path: Path):
+    got = parsed(run_command, tmp_path, RUN)
+    assert (got["scenario"], got["seed"], got["stop"], got["call_limit"]) == ("ir_grasp", 3, Fraction(3, 10), 30.0)
+    assert (got["no_report"], got["formats"], got["isolate"]) == (True, ("csv", "mat"), ("reflex",))
+    texts = ("strategy=reflex", "forward=0.05", "reflex.damping=0.5", "scene.grip_friction=0.4")
+    assert got["parameters"] == texts
+    assert (got["algorithm"], got["strict"]) == ("gauss-seidel", False)
+
+
+def test_json_is_the_same(tmp_path: Path):
+    text = '{"scenario": "x.fmu", "step": "1/30", "parameters": {"on": true, "p": [1, 2.5]}, "unit": {"arm": "my:Arm"}}'
+    got = parsed(run_command, tmp_path, text, name="run.json")
+    assert (got["scenario"], str(got["step"])) == ("x.fmu", "1/30")
+    assert (got["parameters"], got["replaced"]) == (("on=true", "p=1,2.5"), ("arm=my:Arm",))
+
+
+def test_the_command_line_comes_first_of_tables_name_by_name(tmp_path: Path):
+    text = RUN + '[unit]\nscene = "a.fmu"\nreflex = "b.fmu"\n'
+    given = ("--seed", "7", "-p", "forward=0.1", "--unit", "reflex=c.fmu", "vsl_hybrid", "--format", "csv")
+    got = parsed(run_command, tmp_path, text, *given)
+    assert (got["scenario"], got["seed"], got["formats"]) == ("vsl_hybrid", 7, ("csv",))
+    assert set(got["parameters"]) == {"strategy=reflex", "forward=0.1", "reflex.damping=0.5", "scene.grip_friction=0.4"}
+    assert set(got["replaced"]) == {"scene=a.fmu", "reflex=c.fmu"}
+
+
+def test_a_sweep_has_a_table_of_values_to_vary(tmp_path: Path):
+    text = """
+scenario = "reach:Reach"
+repeat = 5
+paired = true
+parameters.arm.mass = 2
+parameters.gain = 1
+[unit]
+servo = ["a.fmu", "b.fmu"]
+[sweep]
+alpha = "0.1:0.4:4"
+goal = [[0.3, 0.6], [0.4, 0.2]]
+strategy = ["reflex", "blind"]
+servo.gain = [0.2, 0.4]
+"""
+    got = parsed(sweep_command, tmp_path, text)
+    assert (got["repeat"], got["paired"], got["replaced"]) == (5, True, ("servo=a.fmu,b.fmu",))
+    wanted = ("alpha=0.1:0.4:4", "goal=0.3,0.6;0.4,0.2", "strategy=reflex,blind", "servo.gain=0.2,0.4")
+    assert got["grid"] == wanted
+    assert got["parameters"] == ("arm.mass=2", "gain=1")
+    got = parsed(sweep_command, tmp_path, text, "other", "gain=3,4", "-p", "alpha=0.2")
+    assert (got["scenario"], got["grid"]) == ("other", (*wanted[1:], "gain=3,4"))
+    assert got["parameters"] == ("arm.mass=2", "alpha=0.2")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("seed = ", "run.toml: it is not TOML: Invalid value (at end of document)"),
+        ("sed = 3", "run.toml: no option 'sed'; did you mean seed"),
+        ("call_limit = 3", "run.toml: no option 'call_limit'; did you mean call-limit?"),
+        ("seed = -1", "run.toml: seed = -1: -1 is not in the range x>=0"),
+        ("seed = true", "run.toml: seed = true: a text or a number is right"),
+        (
+            "stop = 'soon'",
+            """run.toml: stop = "soon": 'soon' is not a positive number of seconds, such as 0.01 or 1/30""",
+        ),
+        ("stop = 1979-05-27", "run.toml: stop = "),
+        ("strict = 1", "run.toml: strict = 1: true or false is right"),
+        ("algorithm = 'jacoby'", "is not one of 'jacobi', 'gauss-seidel'"),
+        ("format = [['csv']]", 'run.toml: format = [["csv"]]: a text or a number is right, or several in [...]'),
+        ("parameters = 3", "run.toml: parameters = 3: a table by name is right, such as [parameters]"),
+        ("parameters.a.b = 1979-05-27", "run.toml: parameters.a.b = "),
+        ("sweep.a = [1, 2]", "run.toml: no option 'sweep'; "),
+        ("scenario = 'ir_grasp'\nadaptive-absolute = 1", "with run.toml: --adaptive-absolute: with --adaptive only"),
+        ("seed = -1\nsed = 2", "run.toml: seed = -1: -1 is not in the range x>=0; no option 'sed'; "),
+        ("scenario = 'ir_grap'", "with run.toml: no scenario 'ir_grap': did you mean ir_grasp?"),
+        (
+            "scenario = 'ir_grasp'\n[parameters]\nstrategi = 'blind'\nforward = 9",
+            "with run.toml: ir_grasp has no parameter 'strategi'; did you mean strategy?; forward: 9.0 is out of range",
+        ),
+    ],
+)
+def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(text: str, told: str, tmp_path: Path):
+    assert told in refused(tmp_path, text)
+
+
+def test_files_that_cannot_be_read_are_told(tmp_path: Path):
+    assert "run.json: it is not JSON: Expecting value" in refused(tmp_path, "seed = 3", name="run.json")
+    assert "run.json: an object of options is right" in refused(tmp_path, "[3]", name="run.json")
+    result = call("sweep", "ir_grasp", "--config", tmp_path / "none.toml")
+    assert (result.exit_code, "none.toml: it cannot be read: No such file" in result.output) == (2, True)
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a run with options of all kinds."""
+    folder = tmp_path_factory.mktemp("first")
+    file = folder / "run.toml"
+    file.write_text(RUN.replace('isolate = "reflex"', 'algorithm = "jacobi"\ncheckpoint = 1\ntolerance = 1e-6'))
+    done = call("run", "--config", file, "--unit", f"scene={cached('GraspScene', 2)}", "--out", folder / "r")
+    assert done.exit_code == 1, done.output
+    return folder / "r"
+
+
+def test_a_run_s_run_json_repeats_it_byte_for_byte(first: Path, tmp_path: Path):
+    done = call("run", "--config", first / "run.json", "--no-report", "--out", tmp_path / "r")
+    assert done.exit_code == 1, done.output
+    for name in ("run.json", "signals.parquet", "signals.csv", "signals.mat"):
+        assert (tmp_path / "r" / name).read_bytes() == (first / name).read_bytes(), name
+    data = json.loads((first / "run.json").read_text())
+    assert (data["seed"], data["stop"], data["checkpoint"], data["master"]["tolerance"]) == (3, "3/10", "1", 1e-6)
+    assert data["units"]["scene"]["fmu"] == "GraspScene.fmi2.fmu"
+
+
+def test_it_can_be_changed_by_the_command_line_and_be_swept(first: Path):
+    options = ["--config", str(first / "run.json")]
+    got = sweep_command.make_context("sweep", [*options, "forward=0.03,0.1", "--seed", "9"]).params
+    assert (got["scenario"], got["seed"], got["grid"]) == ("ir_grasp", 9, ("forward=0.03,0.1",))
+    assert not [text for text in got["parameters"] if text.startswith("forward=")]
+    assert {"strategy=reflex", "reflex.damping=0.5"} < set(got["parameters"])
+
+
+def test_adaptive_steps_and_isolation_are_repeated(first: Path, tmp_path: Path):
+    data = json.loads((first / "run.json").read_text())
+    control = {"relative": 1e-4, "absolute": 1e-5, "smallest": "1/1000", "largest": None, "initial": "1/50"}
+    data["master"] |= {"adaptive": {**control, "uncontrolled": ["scene.p"]}, "isolated": ["all"]}
+    data["versions"]["numpy"] = "0.1"
+    got = parsed(run_command, tmp_path, json.dumps(data), name="run.json")
+    taken = {name: got[name] for name in ("adaptive", "adaptive_absolute", "largest_step", "uncontrolled", "isolate")}
+    assert taken == {
+        "adaptive": 1e-4,
+        "adaptive_absolute": 1e-5,
+        "largest_step": None,
+        "uncontrolled": ("scene.p",),
+        "isolate": ("all",),
+    }
+    assert (got["smallest_step"], got["first_step"]) == (Fraction(1, 1000), Fraction(1, 50))
+
+
+def test_other_versions_and_files_that_are_gone_are_told(first: Path, tmp_path: Path):
+    data = json.loads((first / "run.json").read_text())
+    data["versions"]["numpy"] = "0.1"
+    data["files"]["reflex"] = str(tmp_path / "gone.fmu")
+    told = call_with(data, tmp_path)
+    assert "the run was of other versions: numpy 0.1" in told
+    assert f"the FMU of its unit reflex, {tmp_path / 'gone.fmu'}, is not there; --unit reflex=FILE" in told
+    del data["master"]["tolerance"]
+    assert "run.json: it is damaged: KeyError 'tolerance'" in call_with(data, tmp_path)
+
+
+def call_with(data: Any, folder: Path) -> str:
+    (folder / "run.json").write_text(json.dumps(data))
+    result = call("run", "--config", folder / "run.json", "--out", folder / "out")
+    assert (result.exit_code, (folder / "out").exists()) == (2, False), result.output
+    return result.output
+
+
+def test_a_run_of_an_fmu_or_an_ssp_is_repeated(tmp_path: Path):
+    inputs = tmp_path / "inputs.csv"
+    inputs.write_text("time,f\n0,0\n0.5,2\n")
+    system = System()
+    system.add("mass", native_fmu("mass", 2))
+    ssp = write_ssp(system, tmp_path / "x.ssp", "x", None)
+    of_fmu = ("-p", "m=2", "--input", inputs, "--stop", "0.2", "--step", "0.05")
+    of_ssp = ("-p", "mass.m=2", "--stop", "0.2", "--step", "0.05")
+    for file, given in ((native_fmu("mass", 2), of_fmu), (ssp, of_ssp)):
+        out = tmp_path / file.stem
+        assert call("run", file, *given, "--no-report", "--out", out / "1").exit_code == 0
+        done = call("run", "--config", out / "1" / "run.json", "--no-report", "--out", out / "2")
+        assert done.exit_code == 0, done.output
+        for name in ("run.json", "signals.parquet"):
+            assert (out / "1" / name).read_bytes() == (out / "2" / name).read_bytes()
