@@ -61,7 +61,7 @@ def test_list_prints_scenario_controller_and_plant(here: Path):
 
 
 @pytest.mark.slow
-def test_another_block_or_file_takes_a_units_place(here: Path):
+def test_another_block_or_file_takes_a_units_place(here: Path, tmp_path: Path):
     (here / "softer.py").write_text(SOFTER)
     succeeded(here, "run", SCENE, "--out", "stiff", "--no-report")
     succeeded(here, "run", SCENE, "--unit", "controller=softer:Softer", "--out", "soft", "--no-report")
@@ -69,8 +69,10 @@ def test_another_block_or_file_takes_a_units_place(here: Path):
     np.testing.assert_allclose(first[1], 0.5 * first[0], rtol=1e-12)
     built = succeeded(here, "build", "softer:Softer", "--fmi", "3", "--out", "fmus").strip()
     succeeded(here, "run", SCENE, "--unit", f"controller={built}", "--out", "file", "--no-report")
-    signals = [(here / name / "signals.parquet").read_bytes() for name in ("soft", "file")]
-    assert signals[0] == signals[1]
+    again = ("--out", str(here / "again"), "--no-report")
+    succeeded(tmp_path, "run", "--config", str(here / "soft" / "run.json"), *again)  # from elsewhere
+    signals = [(here / name / "signals.parquet").read_bytes() for name in ("soft", "file", "again")]
+    assert signals[0] == signals[1] == signals[2]
 
 
 @pytest.mark.slow
