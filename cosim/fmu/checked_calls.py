@@ -5,6 +5,7 @@ own, see `InstanceProcess`.
 """
 
 import collections
+import logging
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
@@ -20,6 +21,16 @@ from handover.cosim.fmu.unit_warnings import UnitWarnings
 
 _LOG_LINES = 30
 _WARNING, _DISCARD, _FATAL = 1, 2, 4
+
+UNIT_LOG = logging.getLogger("handover.units")
+"""Takes what units log, for programs that listen; without one nothing of it is printed, and a failure has its log."""
+UNIT_LOG.addHandler(logging.NullHandler())
+_LEVELS = (logging.DEBUG, logging.WARNING, logging.WARNING, logging.ERROR, logging.ERROR, logging.DEBUG)
+"""Levels of the standards' statuses, by number."""
+
+
+def _status_name(status: int) -> str:
+    return STATUS[status] if 0 <= status < len(STATUS) else str(status)
 
 
 def _nothing() -> None:
@@ -66,6 +77,8 @@ class CheckedCalls:
         self._component = self._fmu.component
         self.on_fatal: Callable[[], object] = _nothing
         """Is called when a call returns Fatal, after which no instance of the FMU may be called."""
+        if UNIT_LOG.isEnabledFor(logging.DEBUG):
+            self._log_all_categories()
 
     def judge(self, call: str, status: int) -> None:
         """Check the status of a call at `time`.
@@ -193,10 +206,25 @@ class CheckedCalls:
             raise failure
 
     def _take_log_line(self, status: int, message: str) -> None:
+        level = _LEVELS[status] if 0 <= status < len(_LEVELS) else logging.WARNING
+        if status <= 0 and not UNIT_LOG.isEnabledFor(level):
+            return
+        text = message.removeprefix(f"{self.name}: ")  # logs are shown with the instance's name
+        line = f"[{_status_name(status)}] {text}"
         if status > 0:
-            text = message.removeprefix(f"{self.name}: ")  # logs are shown with the instance's name
-            line = f"[{STATUS[status] if status < len(STATUS) else status}] {text}"
             if status == _WARNING:
                 self._warnings.note_message(text)
             self.log.append(line)
             self._heartbeat.log(self.name, line)
+        UNIT_LOG.log(level, "%s: %s", self.name, line)
+
+    def _log_all_categories(self) -> None:
+        """Let the unit log by all its categories; some log by a few only where logging is on from the start."""
+        call = f"{self._prefix}SetDebugLogging"
+        self._begins(call)
+        status = self._function("SetDebugLogging")(self._component, True, 0, None)
+        self._returned()
+        if status == _FATAL:
+            self._fail(call, status)
+        if status not in SUCCEEDED:
+            UNIT_LOG.debug("%s: %s answered %s: it logs as from the start", self.name, call, _status_name(status))

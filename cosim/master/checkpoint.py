@@ -264,6 +264,7 @@ class Checkpointer:
         checkpoint = take_checkpoint(self._master, self._recorder.sync(), self._keep())
         try:
             write_checkpoint(self.path, checkpoint)
+            _log.info("a checkpoint at t = %.9g s is written", checkpoint.time)
         except OSError as e:
             reason = e.strerror or e
             _log.warning(

@@ -203,6 +203,7 @@ class Master:
         self._check_can_run(stop)
         try:
             self.call_units(lambda: self._run(stop, observers, until))
+            _log.info("units are stepped to t = %.9g s", self.time)
         finally:
             self.ensemble.host.restore(handlers_set_here=False)
 
@@ -222,10 +223,12 @@ class Master:
         self._coupling = self._factory.couple(ensemble)
         self._stepper = self._factory.stepper(ensemble, self._coupling)
         self._ensemble = ensemble
+        _log.info("%d units are initialised at t = %.9g s", len(ensemble.instances), self.time)
 
     def _end(self) -> UnitFailure | None:
         """Terminate and free all units but those that do not return; return the first failure of that."""
         self._is_left = True
+        _log.debug("units are terminated and freed")
         if isinstance(self._stepper, PlanStepper):
             self._stepper.publish_unit_times()  # failures state the time that the unit has reached
         if self._ensemble is not None:

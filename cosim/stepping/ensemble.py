@@ -7,6 +7,7 @@ import array
 import collections
 import contextlib
 import functools
+import logging
 import tempfile
 import time
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
@@ -27,6 +28,8 @@ from handover.cosim.stepping.transfers import Feeding, FiniteCheck, feedings, fi
 from handover.cosim.system.schedule import Slot
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
+
+_log = logging.getLogger(__name__)
 
 
 class CleanupStack:
@@ -354,6 +357,8 @@ class Ensemble:
                 instance.on_fatal = functools.partial(self._corrupt.add, d.path)
                 named[unpacked[d.path]].append(name)
             self._cleanups.add(functools.partial(self._free, instance))
+            process = ", in a process of its own" if instance.isolated else ""
+            _log.info("%s: %s (FMI %d) of %s is loaded%s", name, d.name, d.fmi, d.path, process)
             self.instances[name] = instance
         note_libraries(self.heartbeat, named)
 

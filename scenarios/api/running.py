@@ -52,7 +52,7 @@ def run(
     All is checked before anything starts. The results are in a folder that stays: `out`, or one of its own in `runs/`
     of the working directory, as of the command; `handover.load` reads it again. A unit that fails ends the run, which
     is then a result without success. The units live in this process; one that crashes ends it, unless `isolate` gives
-    it a process of its own.
+    it a process of its own. Python's logger `handover` has the master's progress, `handover.units` what units log.
 
     Args:
         subject: name of a scenario, path of an `.ssp` or `.fmu` file, a `System`, or a scenario's class.

@@ -116,6 +116,7 @@ class _CampaignState:
             runs=str(self.folder.runs.absolute()),
             options=self.plan.options,
             stop=self.plan.stop,
+            log_level=self.plan.log_level,
             modules="" if self._source is None else self._source.folder,
         )
 

@@ -56,6 +56,7 @@ class CampaignPlan:
         varied_units: units that points give other FMUs; a point names the file or the block by the unit's name.
         options: how units are run.
         stop: when each run ends, s; None: as the scenario says.
+        log_level: from which level on each run's log.txt has logs, see `log_told`.
         experiment: name of the published experiment that it belongs to; "" if to none.
     """
 
@@ -70,6 +71,7 @@ class CampaignPlan:
     varied_units: Sequence[str] = ()
     options: MasterOptions = field(default_factory=MasterOptions)
     stop: Fraction | None = None
+    log_level: str | None = None
     experiment: str = ""
 
     @property

@@ -28,6 +28,7 @@ class RunJob:
         runs: the campaign's folder of runs.
         options: how units are run.
         stop: when the run ends, s; None: as the scenario says.
+        log_level: from which level on its log has logs, see `log_told`.
     """
 
     name: str
@@ -39,6 +40,7 @@ class RunJob:
     options: MasterOptions
     modules: str = ""
     stop: Fraction | None = None
+    log_level: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,6 +15,8 @@ from typing import Any
 
 import click
 
+from handover.scenarios.execution.progress import LOG_LEVELS
+
 
 class HeadedOption(click.Option):
     """An option that stands under a heading; for a `HeadedCommand`."""
@@ -111,6 +113,14 @@ stop_option = click.option(
     "  [default: the scenario's or the file's own stop time]",
 )
 """For commands that run what has a stop time."""
+
+log_option = click.option(
+    "--log-level",
+    type=click.Choice(LOG_LEVELS),
+    help="From which level on the units' logs and the master's progress are told on standard error; debug: all that"
+    " units log.  [default: the master's warnings, and the log of a unit that fails]",
+)
+"""For commands that run units; `log_told` takes its value."""
 
 CALL_LIMIT = 60.0
 """Seconds of wall time that a unit may take for one call by default."""

@@ -9,11 +9,11 @@ from pathlib import Path
 import click
 
 from handover.scenarios.cli.master_options import isolate_option, isolated
-from handover.scenarios.cli.options import limit_options, limits
+from handover.scenarios.cli.options import limit_options, limits, log_option
 from handover.scenarios.cli.summaries.run import exit_with
 from handover.scenarios.execution.errors import one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import progress_bar
+from handover.scenarios.execution.progress import log_told, progress_bar
 from handover.scenarios.execution.resume import InterruptedRun
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.results.run_folder import RunFolder
@@ -34,10 +34,13 @@ somebody else's, see that they are yours.
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.option("--no-report", is_flag=True, help="Write neither figures nor a report: `handover report` can, later.")
 @isolate_option
+@log_option
 @limit_options
-def resume(folder: Path, no_report: bool, isolate: Sequence[str], call_limit: float, pace: float | None) -> None:
+def resume(
+    folder: Path, no_report: bool, isolate: Sequence[str], log_level: str | None, call_limit: float, pace: float | None
+) -> None:
     """Resume a run from its last checkpoint."""
-    with Interruption() as interruption, one_line_errors(), contextlib.ExitStack() as opened:
+    with Interruption() as interruption, one_line_errors(), log_told(log_level), contextlib.ExitStack() as opened:
         if not no_report:
             require_extra("reports", "report and figures", "--no-report")
         run_folder = RunFolder.of_run(folder)

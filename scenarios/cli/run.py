@@ -20,13 +20,14 @@ from handover.scenarios.cli.options import (
     Seconds,
     limit_options,
     limits,
+    log_option,
     scenario_options,
     stop_option,
 )
 from handover.scenarios.cli.summaries.run import AS_JSON, exit_with
 from handover.scenarios.execution.errors import one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import progress_bar
+from handover.scenarios.execution.progress import log_told, progress_bar
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import run_task
 
@@ -71,6 +72,7 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
 @config_option
 @scenario_options
 @stop_option
+@log_option
 @click.option(
     "--out", type=click.Path(path_type=Path), help="Folder for the results.  [default: one of its own in runs/]"
 )
@@ -113,13 +115,14 @@ def run(
     every: Fraction | None,
     no_report: bool,
     as_json: bool,
+    log_level: str | None,
     strict: bool,
     call_limit: float,
     pace: float | None,
     **coupling: Any,
 ) -> None:
     """Run a SCENARIO, an SSP or an FMU once."""
-    with Interruption() as interruption, one_line_errors(), contextlib.ExitStack() as opened:
+    with Interruption() as interruption, one_line_errors(), log_told(log_level), contextlib.ExitStack() as opened:
         if not no_report:
             require_extra("reports", "report and figures", "--no-report")
         request = RunRequest(

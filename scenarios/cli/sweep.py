@@ -21,6 +21,7 @@ from handover.scenarios.cli.options import (
     campaign_options,
     limit_options,
     limits,
+    log_option,
     scenario_options,
     stop_option,
 )
@@ -51,7 +52,7 @@ unit fails is a row with its reason; a run that was lost, as with its machine, i
 --repeat adds runs. Without --out, the command resumes its newest campaign in campaigns/ if that is not complete, else
 it begins a new one.
 
-A run's seed follows from --seed, its point and its repetition.
+A run's seed follows from --seed, its point and its repetition. What it prints, as by --log-level, is in its log.txt.
 
 Progress goes to standard error: a bar on a terminal, else a line every half minute.
 
@@ -76,6 +77,7 @@ Exit status
 @config_option
 @scenario_options
 @stop_option
+@log_option
 @campaign_options
 @master_options
 @limit_options
@@ -90,6 +92,7 @@ def sweep(
     out: Path | None,
     no_report: bool,
     as_json: bool,
+    log_level: str | None,
     workers: int | None,
     scheduler: str | None,
     stop: Fraction | None,
@@ -118,6 +121,7 @@ def sweep(
             varied_units=tuple(choices),
             options=MasterOptions(**coupling_of(coupling), **limits(call_limit, pace)),
             stop=stop,
+            log_level=log_level,
         )
     outcome = run_campaign_command(plan, out, pool, (lambda _folder, _table: None) if no_report else _write_report)
 

@@ -1,9 +1,11 @@
-"""The progress bar of a run on a terminal."""
+"""What is told on standard error while a run goes on: its progress as a bar on a terminal, and logs as asked for."""
 
+import logging
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import TextIO
 
+import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeElapsedColumn
 from rich.text import Text
@@ -38,3 +40,39 @@ def progress_bar(stream: TextIO) -> Generator[Callable[[float, float], None], No
             progress.update(task, completed=t, total=end)
 
         yield move
+
+
+LOG_LEVELS = ("debug", "info", "warning", "error")
+"""From which level on logs can be told, as `log_told` takes it."""
+
+
+@contextmanager
+def log_told(level: str | None) -> Generator[None, None, None]:
+    """Tell of units' logs and of the master's progress on standard error, from a level on.
+
+    `debug` has all that units log, by all their categories, `info` the master's progress. None leaves all as it is:
+    the master's warnings are told, and of a unit's log what belongs to its failure.
+    """
+    logger, handler = logging.getLogger(__name__.partition(".")[0]), _ToStandardError()
+    if level is None:
+        yield
+        return
+    before = logger.level
+    logger.setLevel(level.upper())
+    logger.addHandler(handler)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(before)
+
+
+class _ToStandardError(logging.Handler):
+    """Writes to what standard error is at the time: a bar redirects it, so that lines stand above the bar."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a line."""
+        try:
+            click.echo(f"{record.levelname.lower()}: {record.getMessage()}", err=True)
+        except Exception:  # as logging's own handlers do: what is logged must not end a run
+            self.handleError(record)

@@ -1,0 +1,70 @@
+"""`--log-level`: what is told on standard error of units' logs and of the master's progress, with the same results."""
+
+import logging
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from native_units import native_fmu
+from sample_jobs import job
+
+from handover.scenarios.campaign.run_job import run_job
+from handover.scenarios.cli.command import main
+
+STEP = "[Warning] line 1 of 1 of the step from t = 0.1 s"
+CHOSEN = "debug: talks: [OK] 0 categories are chosen"
+STEPPED = "info: units are stepped to t = 0.2 s"
+
+
+def told(out: Path, *options: str, fmi: int = 2) -> str:
+    """Return what a run of a unit that warns at each step tells on standard error."""
+    arguments = ["run", str(native_fmu("talks", fmi)), "--stop", "0.2", "--no-report", "--out", str(out), *options]
+    before = logging.getLogger("handover").handlers[:]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.output
+    assert logging.getLogger("handover").handlers == before
+    return result.stderr
+
+
+def test_by_default_units_that_do_not_fail_are_silent(tmp_path: Path):
+    assert told(tmp_path / "r") == ""
+
+
+@pytest.mark.parametrize(
+    ("level", "lines", "not_told"),
+    [
+        ("error", [], [STEP, STEPPED]),
+        ("warning", [f"warning: talks: {STEP}"], [STEPPED, "categories"]),
+        ("info", [f"warning: talks: {STEP}", STEPPED, "info: talks: talks (FMI 2) of "], ["categories"]),
+        ("debug", [f"warning: talks: {STEP}", STEPPED, CHOSEN], []),
+    ],
+)
+def test_a_level_tells_of_that_and_what_is_above(tmp_path: Path, level: str, lines: list[str], not_told: list[str]):
+    printed = told(tmp_path / "r", "--log-level", level)
+    assert all(line in printed for line in lines), printed
+    assert not any(text in printed for text in not_told), printed
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_results_are_the_same_bytes_also_of_isolated_units(tmp_path: Path, fmi: int):
+    told(tmp_path / "1", fmi=fmi)
+    for number, isolate in (("2", ()), ("3", ("--isolate", "all"))):
+        assert CHOSEN in told(tmp_path / number, "--log-level", "debug", *isolate, fmi=fmi)
+        record = (tmp_path / number / "signals.parquet").read_bytes()
+        assert record == (tmp_path / "1" / "signals.parquet").read_bytes()
+
+
+def test_units_of_ours_tell_of_their_calls(tmp_path: Path, caplog: pytest.LogCaptureFixture):
+    """What Python's logging takes is for every program that uses the library."""
+    with caplog.at_level(logging.DEBUG, logger="handover"):
+        run_job(job(tmp_path / "runs", "r", "strategy=blind"), tmp_path / "runs" / "r")
+    lines = [record.getMessage() for record in caplog.records if record.name == "handover.units"]
+    assert "scene: [OK] fmi3EnterInitializationMode: initialising at t = 0 s" in lines
+    assert any("fmi3Terminate: ends at t" in line for line in lines), lines
+
+
+def test_a_campaign_s_runs_tell_in_their_logs(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    of_campaign = job(tmp_path / "runs", "r", "strategy=blind")
+    run_job(replace(of_campaign, log_level="info"), tmp_path / "runs" / "r")
+    assert "info: units are stepped to t = " in capsys.readouterr().err
