@@ -11,9 +11,11 @@ from click.testing import CliRunner, Result
 from native_units import native_fmu
 
 from handover.cosim.ssp.writing import write_ssp
+from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.cli.command import main
+from handover.scenarios.cli.master_options import coupling_of
 from handover.scenarios.cli.run import run as run_command
 from handover.scenarios.cli.sweep import sweep as sweep_command
 
@@ -176,21 +178,33 @@ def test_it_can_be_changed_by_the_command_line_and_be_swept(first: Path):
     assert {"strategy=reflex", "reflex.damping=0.5"} < set(got["parameters"])
 
 
-def test_adaptive_steps_and_isolation_are_repeated(first: Path, tmp_path: Path):
+@pytest.mark.parametrize(
+    "options",
+    [
+        MasterOptions(adaptive=AdaptiveStep()),
+        MasterOptions(
+            algorithm=Algorithm.NEWTON,
+            tolerance=1e-7,
+            max_iterations=7,
+            extrapolation=Extrapolation.LINEAR,
+            repeat_discarded=True,
+            isolated=("foreign", "arm"),
+            adaptive=AdaptiveStep(
+                relative=0.1,
+                absolute=1e-7,
+                smallest=Fraction(1, 3000),
+                largest=Fraction(1, 3),
+                initial=Fraction("0.01"),
+                uncontrolled=("arm.q", "arm.v"),
+            ),
+        ),
+    ],
+)
+def test_all_options_of_the_master_are_repeated(options: MasterOptions, first: Path, tmp_path: Path):
     data = json.loads((first / "run.json").read_text())
-    control = {"relative": 1e-4, "absolute": 1e-5, "smallest": "1/1000", "largest": None, "initial": "1/50"}
-    data["master"] |= {"adaptive": {**control, "uncontrolled": ["scene.p"]}, "isolated": ["all"]}
-    data["versions"]["numpy"] = "0.1"
+    data["master"] = options.as_data()
     got = parsed(run_command, tmp_path, json.dumps(data), name="run.json")
-    taken = {name: got[name] for name in ("adaptive", "adaptive_absolute", "largest_step", "uncontrolled", "isolate")}
-    assert taken == {
-        "adaptive": 1e-4,
-        "adaptive_absolute": 1e-5,
-        "largest_step": None,
-        "uncontrolled": ("scene.p",),
-        "isolate": ("all",),
-    }
-    assert (got["smallest_step"], got["first_step"]) == (Fraction(1, 1000), Fraction(1, 50))
+    assert MasterOptions(**coupling_of(got)) == options
 
 
 def test_other_versions_and_files_that_are_gone_are_told(first: Path, tmp_path: Path):
