@@ -1,15 +1,12 @@
 """`--log-level`: what is told on standard error of units' logs and of the master's progress, with the same results."""
 
 import logging
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 from native_units import native_fmu
-from sample_jobs import job
 
-from handover.scenarios.campaign.run_job import run_job
 from handover.scenarios.cli.command import main
 
 STEP = "[Warning] line 1 of 1 of the step from t = 0.1 s"
@@ -53,18 +50,3 @@ def test_results_are_the_same_bytes_also_of_isolated_units(tmp_path: Path, fmi: 
         assert CHOSEN in told(tmp_path / number, "--log-level", "debug", *isolate, fmi=fmi)
         record = (tmp_path / number / "signals.parquet").read_bytes()
         assert record == (tmp_path / "1" / "signals.parquet").read_bytes()
-
-
-def test_units_of_ours_tell_of_their_calls(tmp_path: Path, caplog: pytest.LogCaptureFixture):
-    """What Python's logging takes is for every program that uses the library."""
-    with caplog.at_level(logging.DEBUG, logger="handover"):
-        run_job(job(tmp_path / "runs", "r", "strategy=blind"), tmp_path / "runs" / "r")
-    lines = [record.getMessage() for record in caplog.records if record.name == "handover.units"]
-    assert "scene: [OK] fmi3EnterInitializationMode: initialising at t = 0 s" in lines
-    assert any("fmi3Terminate: ends at t" in line for line in lines), lines
-
-
-def test_a_campaign_s_runs_tell_in_their_logs(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    of_campaign = job(tmp_path / "runs", "r", "strategy=blind")
-    run_job(replace(of_campaign, log_level="info"), tmp_path / "runs" / "r")
-    assert "info: units are stepped to t = " in capsys.readouterr().err
