@@ -13,10 +13,12 @@ from handover.scenarios.api.pages import Page
 from handover.scenarios.api.run_result import Quantity, Run
 from handover.scenarios.api.signals import data_frame
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.results import PointResults, read_results
+from handover.scenarios.execution.errors import require_extra
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+    from handover.scenarios.campaign.results import PointResults
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,13 +56,18 @@ class Campaign:
         """Read a campaign's folder.
 
         Raises:
-            InvalidInput: it is not the folder of a campaign, or it is damaged.
+            InvalidInput: it is not the folder of a campaign, or it is damaged; or SciPy is not installed.
         """
         from handover.scenarios.campaign.table_writer import rebuild_table
 
         self.folder = Path(folder)
         self._place = CampaignFolder(self.folder)
         with errors_for_python():
+            try:
+                from handover.scenarios.campaign.results import read_results  # its statistics take long to load
+            except ImportError:
+                require_extra("campaigns", "campaigns")
+                raise
             rebuild_table(self._place)
             self._results = read_results(self._place)
 
@@ -106,8 +113,11 @@ class Campaign:
         """Write the report page into the folder, and return it.
 
         Raises:
-            InvalidInput: a file of the folder is damaged. RecordNotWritten: the disk is full.
+            InvalidInput: a file of the folder is damaged, or the extra `reports` is not installed. RecordNotWritten:
+                the disk is full.
         """
+        with errors_for_python():
+            require_extra("reports", "reports")
         from handover.scenarios.campaign_report.campaign_page import write_campaign_page  # Plotly takes long to load
 
         with errors_for_python():
@@ -123,7 +133,7 @@ class Campaign:
         results = self._results
         return f"{results.successes} of {results.done} runs succeeded, {results.planned} planned"
 
-    def _point(self, point: PointResults) -> CampaignPoint:
+    def _point(self, point: "PointResults") -> CampaignPoint:
         table, results = self._results.table, self._results
         medians = {
             name: Quantity(results.median(point, name), table.unit(name), table.description(name))

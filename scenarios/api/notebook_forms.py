@@ -9,9 +9,7 @@ from markupsafe import Markup
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.parameters import parameters_of
-from handover.scenarios.experiment.plotting import draw_time_figures
 from handover.scenarios.experiment.time_plot import TimeFigure
-from handover.scenarios.reporting.run_figures import figures_of_outputs
 from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.run_facts import RunFacts
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
@@ -68,6 +66,8 @@ def _cells(kind: str, texts: Sequence[str]) -> Markup:
 
 
 def _pictures(figures: Sequence[TimeFigure], record: Record) -> list[Markup]:
+    from handover.scenarios.experiment.plotting import draw_time_figures  # matplotlib may not be installed
+
     with tempfile.TemporaryDirectory(prefix="handover-") as folder:
         drawn = draw_time_figures(figures, record.time, Path(folder))
         files = [(Path(folder) / f"{figure.name}.png", figure.caption) for figure in drawn]
@@ -78,6 +78,8 @@ def _time_figures(facts: RunFacts, record: Record) -> tuple[Sequence[TimeFigure]
     """Return the scenario's figures over time, else those of all outputs, and what is left out of them."""
     experiment = facts.experiment
     if experiment is None:
+        from handover.scenarios.reporting.run_figures import figures_of_outputs  # likewise
+
         return figures_of_outputs(facts.run.get("units", {}), record), ()
     known = LackingRecord(record, experiment.units)
     figures = experiment.time_figures(parameters_of(type(experiment), facts.run["parameters"]), known)

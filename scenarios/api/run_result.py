@@ -4,16 +4,15 @@ import functools
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.api.arguments import InvalidInput, errors_for_python
 from handover.scenarios.api.pages import Page
-from handover.scenarios.api.signals import SignalTable, plot_signals
+from handover.scenarios.api.signals import SignalTable
+from handover.scenarios.execution.errors import require_extra
 from handover.scenarios.execution.resume import complete_signals
 from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.experiment.experiment import Experiment
@@ -22,6 +21,10 @@ from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.run_facts import RunFacts, record_of, whole_record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.tables import warning_lines
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 class Quantity(float):
@@ -133,20 +136,25 @@ class Run:
         """
         return SignalTable(self._record)
 
-    def plot(self, *names: str, axes: Axes | None = None) -> Figure:
+    def plot(self, *names: str, axes: "Axes | None" = None) -> "Figure":
         """Draw signals over time, below each other, with units at the axes; into `axes` where they are given.
 
         Raises:
-            KeyError: there is no such signal; the nearest names are given.
+            KeyError: there is no such signal; the nearest names are given. InvalidInput: matplotlib is not installed.
         """
+        with errors_for_python():
+            from handover.scenarios.api.signal_plots import plot_signals  # matplotlib takes long to load
         return plot_signals(self.signals, names, axes)
 
     def replay(self) -> Page:
         """Return the scene in space, to be turned and played in a notebook or, once saved, in a browser.
 
         Raises:
-            InvalidInput: the scenario has no replay, or the record is not one of this version's.
+            InvalidInput: the scenario has no replay, the record is not one of this version's, or the extra `reports` is
+                not installed.
         """
+        with errors_for_python():
+            require_extra("reports", "replays")
         from handover.scenarios.reporting.page import page_html  # Plotly takes long to load
         from handover.scenarios.reporting.replay_section import replay_section
 
@@ -166,8 +174,11 @@ class Run:
         """Write the report page into the folder, and with `figures` the figures as PNG and SVG; return the page.
 
         Raises:
-            InvalidInput: a file of the folder is damaged. RecordNotWritten: the disk is full.
+            InvalidInput: a file of the folder is damaged, or the extra `reports` is not installed. RecordNotWritten:
+                the disk is full.
         """
+        with errors_for_python():
+            require_extra("reports", "reports")
         from handover.scenarios.reporting.run_figures import draw_run
         from handover.scenarios.reporting.run_page import write_run_page
 

@@ -21,6 +21,7 @@ from handover.scenarios.api.arguments import (
 )
 from handover.scenarios.api.progress import bar
 from handover.scenarios.api.run_result import Run
+from handover.scenarios.execution.errors import require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import run_task
@@ -80,6 +81,8 @@ def run(
         RecordNotWritten: the disk is full.
     """
     with errors_for_python(), contextlib.ExitStack() as opened:
+        if report:
+            require_extra("reports", "reports", "report=False")
         request = RunRequest(
             subject=str(subject) if isinstance(subject, Path) else subject,
             parameters=texts_of(merged(parameters, named)),

@@ -1,28 +1,16 @@
-"""The signals of a run as arrays by name, as a table of pandas, and as a figure of matplotlib."""
+"""The signals of a run as arrays by name, and as a table of pandas."""
 
-import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.exceptions import nearest
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment.display_unit import unit_symbol
-from handover.scenarios.experiment.plotting import STYLE, draw_time_plot
-from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimePlot
 from handover.scenarios.results.run_facts import elements_of
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-_WIDTH, _ALONE, _STACKED = 8.0, 3.0, 2.1
-"""Width of a figure, height of a single plot, and of each of several below each other, in."""
 
 
 class SignalTable(Mapping[str, NDArray[Any]]):
@@ -103,60 +91,3 @@ def data_frame(columns: Mapping[str, Any], units: Mapping[str, str]) -> "DataFra
     table = pd.DataFrame(columns)
     table.attrs["units"] = dict(units)
     return table
-
-
-class Plot(Figure):
-    """A figure of matplotlib that a notebook shows without a backend; `savefig` writes it."""
-
-    def _repr_png_(self) -> bytes:
-        picture = io.BytesIO()
-        self.savefig(picture, format="png", dpi=110)
-        return picture.getvalue()
-
-
-def plot_signals(signals: SignalTable, names: Sequence[str], axes: Axes | None = None) -> Figure:
-    """Draw signals over time, one below the other, with names and units at the axes; pyplot is left alone.
-
-    Args:
-        signals: of a run.
-        names: which of them.
-        axes: where to draw a single one; by default in a new figure.
-
-    Raises:
-        KeyError: a name is of no signal; all of these are named.
-        ValueError: no name is given, or several for one pair of axes.
-    """
-    if not names:
-        raise ValueError("no signal is named: plot('arm.p_WG') draws one")
-    if unknown := [n for n in names if n not in signals]:
-        raise KeyError("; ".join(f"no signal {n!r}: {nearest(n, signals)}" for n in unknown))
-    if axes is not None and len(names) > 1:
-        raise ValueError(f"{len(names)} signals for one pair of axes; one is right")
-    with mpl.rc_context(STYLE):
-        if axes is not None:
-            _draw(axes, signals, names[0])
-            axes.set_xlabel("time (s)")
-            canvas = axes.get_figure(root=True)
-            assert canvas is not None, "axes are drawn within a figure"
-            return canvas
-        height = _ALONE if len(names) == 1 else _STACKED * len(names) + 0.4
-        figure = Plot(figsize=(_WIDTH, height))
-        grid: Any = figure.subplots(len(names), 1, squeeze=False, sharex=True)
-        for row, name in zip(grid[:, 0], names, strict=True):
-            _draw(row, signals, name)
-        grid[-1, 0].set_xlabel("time (s)")
-        figure.align_ylabels()
-        return figure
-
-
-def _draw(axes: Axes, signals: SignalTable, name: str) -> None:
-    values, items = signals[name], signals.item_names(name)
-    elements = list(elements_of(name.rpartition(".")[2], values).items())[: len(COLOURS)]
-    held = values.dtype.kind != "f"
-    curves = [Curve(label=label, values=column.astype(np.float64), held=held) for label, column in elements]
-    plot = TimePlot(title=name, quantity=name, unit=unit_symbol(signals.unit(name)), curves=curves)
-    draw_time_plot(axes, plot, signals.time)
-    if items:
-        axes.set_yticks(list(items), [text.replace("_", " ").lower() for text in items.values()])
-    if len(curves) > 1:
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

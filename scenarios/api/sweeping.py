@@ -31,6 +31,7 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.pool_config import LazyPool, PoolConfig
 from handover.scenarios.campaign.worker_pool import RunCounts
+from handover.scenarios.execution.errors import require_extra
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.selection import find_scenario
 
@@ -80,12 +81,14 @@ def sweep(
         **named: what is varied and set of the others.
 
     Raises:
-        InvalidInput: something of it cannot be run, with all faults and what would be right; nothing is written.
+        InvalidInput: something of it cannot be run, with all faults and what would be right, or the extra `campaigns`
+            is not installed; nothing is written.
         KeyboardInterrupt: Ctrl-C; runs that have ended are kept.
         RecordNotWritten: the disk is full. ClusterLost: all workers were lost; runs that have ended are kept.
     """
     given = merged(parameters, named)
     with errors_for_python():
+        require_extra("campaigns", "campaigns")
         if workers is not None and scheduler is not None:
             raise InvalidInput("workers and scheduler: a scheduler has workers of its own; one of both is right")
         RunRequest(subject=scenario).check_sweepable()

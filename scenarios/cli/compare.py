@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from handover.scenarios.execution.errors import UsageError, one_line_errors
+from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.results.run_folder import RunFolder, dated_folder
 
 if TYPE_CHECKING:
@@ -66,6 +66,7 @@ def compare(
     as_json: bool,
 ) -> None:
     """Put campaigns, or runs, on one page."""
+    require_extra("reports", "the page")
     from handover.scenarios.comparison.entries import NotComparable  # pages and statistics take long to load
     from handover.scenarios.comparison.page import compare as compared
     from handover.scenarios.comparison.page import write_comparison

@@ -48,10 +48,15 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def handover(base: Path, folder: Path, *arguments: object) -> "subprocess.CompletedProcess[str]":
-    program = f"import sys; sys.path += [{str(ROOT)!r}, {str(base)!r}]; {MAIN}"
+def handover(base: Path, folder: Path, *arguments: object, program: str = MAIN) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(
-        [sys.executable, "-S", "-c", program, *map(str, arguments)],
+        [
+            sys.executable,
+            "-S",
+            "-c",
+            f"import sys; sys.path += {[str(ROOT), str(base)]}\n{program}",
+            *map(str, arguments),
+        ],
         cwd=folder,
         env={**os.environ, "HANDOVER_CACHE": str(base.parent / "cache")},
         stdout=subprocess.PIPE,
@@ -83,6 +88,49 @@ def test_the_base_installation_builds_checks_and_runs_units(base: Path, tmp_path
     assert (tmp_path / "two" / "signals.parquet").is_file()
 
 
+IN_PYTHON = """
+import handover
+system = handover.System()
+system.add("one", handover.unit("Push"))
+run = handover.run(system, stop=0.1, out="one")
+assert run.success and handover.load("one").signals["one.f_G"].any() == 0
+assert "results: one" in run._repr_html_()
+with handover.open("vsl_model_based") as session:
+    session.step(0.1)
+for call in (
+    lambda: run.plot("one.f_G"),
+    lambda: run.replay(),
+    lambda: run.report(),
+    lambda: handover.run(system, stop=0.1, out="two", report=True),
+    lambda: handover.sweep("vsl_model_based", load=[0.0, 0.025], out="three"),
+    lambda: handover.Campaign("four"),
+    lambda: handover.environment("vsl_model_based", "kinematics"),
+):
+    try:
+        call()
+    except (handover.InvalidInput, ImportError) as e:
+        print(type(e).__name__, e)
+"""
+
+
+@pytest.mark.slow
+def test_python_runs_and_steps_on_the_base_installation_and_names_the_extra_of_all_else(base: Path, tmp_path: Path):
+    done = handover(base, tmp_path, program=IN_PYTHON)
+    lines = done.stdout.splitlines()
+    told = [
+        ("reports", "matplotlib"),
+        *3 * [("reports", "plotly")],
+        *2 * [("campaigns", "scipy")],
+        ("gym", "gymnasium"),
+    ]
+    assert len(lines) == len(told), done.stdout
+    for line, (extra, names) in zip(lines, told, strict=True):
+        assert line.startswith("ImportError" if extra == "gym" else "InvalidInput")
+        assert f"handover-cosim[{extra}]" in line
+        assert names in line
+    assert {p.name for p in tmp_path.iterdir()} == {"one"}
+
+
 @pytest.mark.parametrize(
     ("arguments", "extra", "names"),
     [
@@ -93,6 +141,7 @@ def test_the_base_installation_builds_checks_and_runs_units(base: Path, tmp_path
         (["sweep", "ir_grasp", "strategy=reflex,blind", "--out", "r"], "campaigns", "distributed"),
         (["paper", "ir-table", "--out", "r"], "campaigns", "distributed"),
         (["report", "."], "reports", "matplotlib"),
+        (["compare", ".", "."], "reports", "plotly"),
     ],
 )
 def test_what_needs_an_extra_names_it_in_one_line_and_writes_nothing(
