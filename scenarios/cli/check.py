@@ -1,8 +1,8 @@
-"""The command `handover check`: what is wrong with FMUs, from any tool, as text or JSON."""
+"""The command `handover check`: what is wrong with FMUs and SSPs, from any tool, as text or JSON."""
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import click
@@ -12,18 +12,21 @@ from rich.text import Text
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.finding import CheckReport, Finding, Level, Section
 from handover.cosim.fmu.archive import NO_FILE_FAULT, folder_fault
+from handover.cosim.ssp.check_ssp import check_ssp
 from handover.scenarios.cli.console import open_console
 from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.ssp_run import is_ssp
 
 _FAULTS = 1
 _MAX_FINDINGS = 20  # of one level in one section
 _STYLES = {Level.OK: "green", Level.NOTE: "cyan", Level.WARNING: "yellow", Level.FAULT: "bold red"}
 
-_HELP = """Find what is wrong with FILEs that should be co-simulation FMUs of FMI 2.0 or 3.0, from any tool.
+_HELP = """Find what is wrong with FILEs that should be co-simulation FMUs of FMI 2.0 or 3.0, or SSPs, from any tool.
 
 The archive, its model description (by the standard's schema and rules) and its library for this machine are checked;
 then the unit is loaded and run for ten steps in a process of its own, which may crash. A unit of `handover build` reads
-its environment variables then, as in other tools: see `handover build --help`.
+its environment variables then, as in other tools: see `handover build --help`. Of an SSP its system is checked, then
+each FMU in it.
 
 \b
 Exit status
@@ -33,7 +36,7 @@ Exit status
 """
 
 
-@click.command("check", help=_HELP, short_help="Find what is wrong with FMUs, whoever made them.")
+@click.command("check", help=_HELP, short_help="Find what is wrong with FMUs and SSPs, whoever made them.")
 @click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path))
 @click.option(
     "--timeout",
@@ -45,16 +48,21 @@ Exit status
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON.")
 def check(files: Sequence[Path], timeout: float, as_json: bool) -> None:
-    """Find what is wrong with files that should be co-simulation FMUs."""
+    """Find what is wrong with files that should be co-simulation FMUs or SSPs."""
     _check_files_exist(files)
     reports: list[CheckReport] = []
     for file in files:
-        reports.append(check_fmu(file, timeout))
-        if not as_json:
-            _print_report(reports[-1])
+        for report in _reports(file, timeout):
+            reports.append(report)
+            if not as_json:
+                _print_report(report)
     if as_json:
         click.echo(json.dumps([r.as_json() for r in reports], indent=2))
     sys.exit(0 if all(r.passed for r in reports) else _FAULTS)
+
+
+def _reports(file: Path, timeout: float) -> Iterable[CheckReport]:
+    return check_ssp(file, timeout) if is_ssp(str(file)) else (check_fmu(file, timeout),)
 
 
 def _check_files_exist(files: Sequence[Path]) -> None:

@@ -109,7 +109,9 @@ COMMANDS = (
         help="Build UNITs (all by default) as FMUs for other tools.",
     ),
     DeferredCommand(
-        "check", "handover.scenarios.cli.check:check", short_help="Find what is wrong with FMUs, whoever made them."
+        "check",
+        "handover.scenarios.cli.check:check",
+        short_help="Find what is wrong with FMUs and SSPs, whoever made them.",
     ),
     DeferredCommand(
         "compare",

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from ssp_of import component, connection, connectors, described, pack_ssp, system
 
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
@@ -122,6 +123,23 @@ def test_the_worst_of_several_files_decides(broken: Path):
     assert result.exit_code == 1
     assert "usable: no faults were found" in result.output
     assert "not usable as it is" in result.output
+
+
+@pytest.mark.parametrize(("output", "status"), [("f_G", 0), ("f_B", 1)])
+def test_of_an_ssp_the_system_is_checked_and_then_each_unit(tmp_path: Path, output: str, status: int):
+    ends = connectors(**{output: "output"})
+    element = component("push", ends, "resources/Push.fmu")
+    wired = system(element, connection(f"push.{output}", "f"), before=connectors(f="output"))
+    file = pack_ssp(tmp_path / "x.ssp", described(wired), {"resources/Push.fmu": cached("Push", 3).read_bytes()})
+    result = check(file, "--json")
+    assert result.exit_code == status, result.output
+    whole, unit = json.loads(result.output)
+    assert whole["file"] == str(file)
+    assert whole["passed"] == (status == 0)
+    told = " ".join(finding["what"] for finding in whole["checks"][0]["findings"])
+    assert ("the FMU of 'push' has no variable 'f_B'" in told) == (status == 1), told
+    assert unit["file"] == str(file / "resources/Push.fmu")
+    assert unit["passed"]
 
 
 def test_files_that_are_not_there_are_all_reported_before_anything_is_checked(broken: Path, tmp_path: Path):

@@ -1,0 +1,47 @@
+"""Checks an SSP file: the system as the master takes it, then each FMU in it by itself."""
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from handover.cosim.check.check_fmu import check_fmu
+from handover.cosim.check.finding import CheckReport, Finding, Section, fault, warning
+from handover.cosim.exceptions import InvalidSsp
+from handover.cosim.fmu.default_experiment import GIVE_STEP
+from handover.cosim.ssp.archive import SspArchive
+from handover.cosim.ssp.flattening import components_of
+from handover.cosim.ssp.reading import read_structure
+from handover.cosim.ssp.ssp_file import SspFile
+
+
+def check_ssp(path: Path, timeout: float) -> Iterator[CheckReport]:
+    """Yield the reports of an SSP that is there: of its system, then of its FMUs, as `x.ssp/resources/arm.fmu`.
+
+    Loading and running may each take `timeout` seconds of each FMU. It never raises for the file.
+    """
+    yield CheckReport(path, (_system(path),))
+    with tempfile.TemporaryDirectory(prefix="handover-check-", ignore_cleanup_errors=True) as folder:
+        try:
+            archive = SspArchive(path)
+            components = [component for _, component in components_of(read_structure(archive).system)]
+            archive.unpack(Path(folder))
+        except InvalidSsp:  # which the first report tells
+            return
+        for member in dict.fromkeys(component.member for component in components):
+            yield replace(check_fmu(Path(folder) / member, timeout), path=path / member)
+
+
+def _system(path: Path) -> Section:
+    try:
+        with SspFile(path) as ssp:
+            units, connections = len(ssp.system.units), len(ssp.system.connections)
+            until = "no stop time given: a run needs --stop" if ssp.stop is None else f"until {float(ssp.stop):g} s"
+            return Section("system", f"{ssp.name}, units: {units}, connections: {connections}, {until}")
+    except InvalidSsp as e:
+        return Section("system", "", tuple(_finding(line) for line in e.faults))
+
+
+def _finding(line: str) -> Finding:
+    """Return a fault; no more than a warning where a run has an option for what the file leaves open."""
+    return warning(line, cure="a run needs --step") if line.endswith(GIVE_STEP) else fault(line)
