@@ -1,22 +1,18 @@
 """The wheels for all platforms: what they are called, what they are for, and what an index shows of them."""
 
-import os
 import re
-import shutil
-import subprocess
-import sys
 import zipfile
 from email import message_from_bytes
 from pathlib import Path
 
 import pytest
 from libraries import facts
+from wheels import ROOT, build_wheel, copy_sources
 
 from handover.cosim.native_libraries import TARGETS
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[3]
 TAGS = {
     "x86_64-linux": "manylinux_2_17_x86_64",
     "aarch64-linux": "manylinux_2_17_aarch64",
@@ -36,33 +32,7 @@ SITE = "https://example.org/files"
 
 @pytest.fixture(scope="module")
 def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a copy of the sources with what builds them, `build-tools`."""
-    folder = tmp_path_factory.mktemp("checkout") / "handover"
-    ignored = shutil.ignore_patterns(".*", "bin", "build", "dist", "tests", "runs", "*.egg-info", "__pycache__")
-    shutil.copytree(ROOT, folder, symlinks=True, ignore=ignored)
-    tools = ["setuptools>=77", *re.findall(r'"(ziglang==[\d.]+)"\]', (ROOT / "pyproject.toml").read_text())]
-    command = [sys.executable, "-m", "pip", "install", "--quiet", "--target", str(folder / "build-tools"), *tools]
-    subprocess.run(command, check=True)
-    return folder
-
-
-def wheel(checkout: Path, platform: str, **environment: str) -> Path:
-    out = checkout.parent / platform
-    command = [
-        "-m",
-        "pip",
-        "wheel",
-        "--quiet",
-        "--no-deps",
-        "--no-build-isolation",
-        "--wheel-dir",
-        str(out),
-        str(checkout),
-    ]
-    names = {"PYTHONPATH": str(checkout / "build-tools"), "HANDOVER_WHEEL_PLATFORM": platform, **environment}
-    subprocess.run([sys.executable, *command], env={**os.environ, **names}, check=True)
-    (made,) = out.iterdir()
-    return made
+    return copy_sources(tmp_path_factory.mktemp("checkout") / "handover")
 
 
 def test_every_platform_is_tried():
@@ -73,7 +43,7 @@ def test_every_platform_is_tried():
 
 @pytest.mark.parametrize("platform", TAGS)
 def test_a_wheel_has_the_libraries_of_its_platform_and_no_others(checkout: Path, platform: str):
-    made = wheel(checkout, platform)
+    made = build_wheel(checkout, platform)
     assert made.name.endswith(f"-py3-none-{TAGS[platform]}.whl")
     system, suffix = platform.partition("-")[2], TARGETS[platform][1]
     expected = [f"handover/{name.format(platform)}{suffix}" for name in LIBRARIES]
@@ -91,7 +61,7 @@ def test_an_index_shows_pictures_by_their_address_or_leaves_them_out(checkout: P
     host = next(iter(TAGS))
     pages: list[str] = []
     for site in ("", SITE):
-        made = wheel(checkout, host, HANDOVER_SITE=site)
+        made = build_wheel(checkout, host, HANDOVER_SITE=site)
         with zipfile.ZipFile(made) as archive:
             (name,) = [n for n in archive.namelist() if n.endswith(".dist-info/METADATA")]
             metadata = message_from_bytes(archive.read(name))

@@ -1,0 +1,40 @@
+"""Builds the project's wheels from a copy of its sources."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[3]
+
+
+def copy_sources(folder: Path) -> Path:
+    """Copy the sources with what builds them, `build-tools`, to a folder, and return that."""
+    ignored = shutil.ignore_patterns(".*", "bin", "build", "dist", "tests", "runs", "*.egg-info", "__pycache__")
+    shutil.copytree(ROOT, folder, symlinks=True, ignore=ignored)
+    tools = ["setuptools>=77", *re.findall(r'"(ziglang==[\d.]+)"\]', (ROOT / "pyproject.toml").read_text())]
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--target", str(folder / "build-tools"), *tools]
+    subprocess.run(command, check=True)
+    return folder
+
+
+def build_wheel(checkout: Path, platform: str, **environment: str) -> Path:
+    """Build the wheel for a platform into a folder beside the copied sources, and return its path."""
+    out = checkout.parent / platform
+    command = [
+        "-m",
+        "pip",
+        "wheel",
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "--wheel-dir",
+        str(out),
+        str(checkout),
+    ]
+    names = {"PYTHONPATH": str(checkout / "build-tools"), "HANDOVER_WHEEL_PLATFORM": platform, **environment}
+    subprocess.run([sys.executable, *command], env={**os.environ, **names}, check=True)
+    (made,) = out.iterdir()
+    return made
