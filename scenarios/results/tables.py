@@ -110,6 +110,6 @@ def options_in_words(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def format_metric(metric: Mapping[str, Any]) -> str:
-    """Return a metric of `summary.json` with its value in a display unit; "undefined" where it was not finite."""
-    value, unit = metric["value"], metric["unit"]
-    return "undefined" if value is None else display_unit(unit, value).text(value)
+    """Return a metric of `summary.json` with its value in a display unit; a dash where it was not finite."""
+    value, unit = float("nan") if metric["value"] is None else metric["value"], metric["unit"]
+    return display_unit(unit, value).text(value)

@@ -47,10 +47,10 @@ def test_however_a_run_ends_its_files_are_of_one_declaration(tmp_path: Path):
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_a_metric_that_is_not_finite_is_null_and_reported_as_undefined(value: float):
+def test_a_metric_that_is_not_finite_is_null_and_shown_as_a_dash(value: float):
     made = metric_data(Metric(value, "m", "a length"))
     assert made == {"value": None, "unit": "m", "description": "a length"}
-    assert format_metric(made) == "undefined"
+    assert format_metric(made) == "–"
 
 
 @pytest.mark.parametrize(

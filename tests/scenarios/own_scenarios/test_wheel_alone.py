@@ -90,7 +90,7 @@ class Installation:
 
     def distance(self, folder: str) -> float:
         """Return the metric `distance` of a run's summary."""
-        return self.data(f"{folder}/summary.json")["metrics"]["distance"]["value"]
+        return float(self.data(f"{folder}/summary.json")["metrics"]["distance"]["value"])
 
 
 @pytest.fixture(scope="module")
