@@ -109,8 +109,8 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
 
         return figures_of_push(parameters, record)
 
-    def replay(self, parameters: ImpedanceParameters, record: Record) -> Replay:  # noqa: ARG002
+    def replay(self, parameters: ImpedanceParameters, record: Record) -> Replay:
         """Return the robot, its gripper's place of rest and the push in space."""
         from handover.scenarios.free_flyer.replay import replay_push
 
-        return replay_push(record)
+        return replay_push(parameters, record)

@@ -219,7 +219,7 @@ def figures_of_push(parameters: ImpedanceParameters, record: Record) -> list[Tim
     p_WG_goal = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])
     errors = errors_of(motion, p_WG_goal, parameters.behaviour)
     turned, turned_model = (np.degrees(values) for values in errors.without_jumps)
-    phases = _phases(parameters, float(record.time[-1]))
+    phases = phases_of_push(parameters, record)
     return [
         TimeFigure(
             name="errors",
@@ -245,7 +245,9 @@ def figures_of_push(parameters: ImpedanceParameters, record: Record) -> list[Tim
     ]
 
 
-def _phases(p: ImpedanceParameters, end: float) -> list[Phase]:
+def phases_of_push(p: ImpedanceParameters, record: Record) -> list[Phase]:
+    """Return the time before, of and after the push; the push alone has a name, in plots and replay."""
+    end = float(record.time[-1])
     begin, over = min(p.begin, end), min(p.end, end)
     return [
         Phase(begin=0.0, end=begin, name=""),

@@ -8,6 +8,8 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, faceted, hull
+from handover.scenarios.free_flyer.parameters import ImpedanceParameters
+from handover.scenarios.free_flyer.plots import phases_of_push
 from handover.scenarios.free_flyer.scene import FINGER_WIDTH, Solid, finger_points, jaw_gap, person_at, robot_at
 
 _PUSH, _TWIST, _PATH = "#d1602b", "#8357a8", "#b58a1b"
@@ -29,7 +31,7 @@ def replay_handover(record: Record) -> Replay:
     )
 
 
-def replay_push(record: Record) -> Replay:
+def replay_push(parameters: ImpedanceParameters, record: Record) -> Replay:
     """Return the robot, its gripper's place of rest, and what pushes it."""
     pushes = (
         ("push", _PUSH, _PER_NEWTON * record["push.f_G"]),
@@ -41,6 +43,7 @@ def replay_push(record: Record) -> Replay:
         lines=[path, *(_arrow(label, colour, record, along) for label, colour, along in pushes if np.any(along))],
         fixed=_frame("place of rest", np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])),
         eye=(-1.0, -1.15, 0.6),
+        phases=phases_of_push(parameters, record),
         notes=(f"Arrows: {1000 * _PER_NEWTON:.0f} mm a newton, {1000 * _PER_NEWTON_METRE:.0f} mm a newton metre.",),
     )
 

@@ -11,7 +11,7 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.replay import Body, Line
-from handover.scenarios.reporting.replay_section import replay_section
+from handover.scenarios.reporting.replay_section import phase_changes, replay_section
 
 MUST_SHOW: dict[str, set[str]] = {
     "helix_handover": {"arm", "gripper", "hand", "ball", "cameras"},
@@ -42,6 +42,7 @@ def test_a_scenario_is_shown_in_space(name: str, tmp_path: Path):
     assert any(len(np.unique(positions(d), axis=0)) > 1 for d in (*replay.bodies, *replay.lines)), "nothing moves"
     for d in drawn:
         check(d, len(record.time))
+    assert any(phase for _, phase in phase_changes(record, replay.phases)), "no phase is shown beside the time"
     assert len(replay_section(replay, record).html) < LARGEST
 
 
