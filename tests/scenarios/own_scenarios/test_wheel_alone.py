@@ -46,7 +46,7 @@ class Installation:
 
     def install(self, wheel: Path, extras: str = "") -> None:
         packages = ["--constraint", str(ROOT / "constraints.txt"), f"{wheel}{extras}"]
-        self.python("-m", "pip", "install", "--quiet", *packages)
+        self.python("-m", "pip", "install", "--quiet", "--no-compile", *packages)
 
     def python(self, *arguments: str) -> str:
         python = self.environment / "bin" / "python"
