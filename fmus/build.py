@@ -78,7 +78,7 @@ def cached(name: str, fmi: int, *, scalar: bool = False, start: Mapping[str, Any
     entry = replace(find_unit(name), start=start or {})
     carried = closure(entry.block)
     folder = _cache() / _content_key(entry, _form(fmi, scalar=scalar), carried)
-    wanted = folder / file_name(name, _form(fmi, scalar=scalar))
+    wanted = folder / file_name(entry.name, _form(fmi, scalar=scalar))
     if wanted.is_file():
         try:
             FmuArchive(wanted).verify()

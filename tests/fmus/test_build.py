@@ -97,17 +97,22 @@ def test_a_new_token_for_new_sources(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert tokens[0] != tokens[1]
 
 
-def test_the_cache_builds_once_and_again_when_a_source_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize("by_path", [False, True])
+def test_the_cache_builds_once_and_again_when_a_source_changes(
+    by_path: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
-    block = write_block(tmp_path, "kept", "1.0", helper="kept_helper")
+    module = f"kept_{by_path}".lower()
+    block = write_block(tmp_path, module, "1.0", helper=f"{module}_helper")
     monkeypatch.setitem(cast("dict[str, Entry]", UNITS), "Kept", Entry("Kept", block, Fraction(1), "for a test"))
-    first = cached("Kept", 3)
+    name = block if by_path else "Kept"
+    first = cached(name, 3)
     assert first.is_relative_to(tmp_path / "cache")
     made = first.stat().st_ino
-    assert cached("Kept", 3).stat().st_ino == made
-    write_block(tmp_path, "kept", "2.0", helper="kept_helper")
-    assert cached("Kept", 3) != first
+    assert cached(name, 3).stat().st_ino == made
+    write_block(tmp_path, module, "2.0", helper=f"{module}_helper")
+    assert cached(name, 3) != first
 
 
 @pytest.mark.parametrize("damage", ["cut off", "empty", "a bit", "zeros at the end"])
