@@ -8,7 +8,7 @@ from pathlib import Path
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.finding import CheckReport, Finding, Section, fault, warning
 from handover.cosim.exceptions import InvalidSsp
-from handover.cosim.fmu.default_experiment import GIVE_STEP
+from handover.cosim.fmu.default_experiment import NoStep
 from handover.cosim.ssp.archive import SspArchive
 from handover.cosim.ssp.flattening import components_of
 from handover.cosim.ssp.reading import read_structure
@@ -44,4 +44,4 @@ def _system(path: Path) -> Section:
 
 def _finding(line: str) -> Finding:
     """Return a fault; no more than a warning where a run has an option for what the file leaves open."""
-    return warning(line, cure="a run needs --step") if line.endswith(GIVE_STEP) else fault(line)
+    return warning(line, cure="a run needs --step") if isinstance(line, NoStep) else fault(line)

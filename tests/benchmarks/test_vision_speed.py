@@ -67,7 +67,8 @@ def test_picture_pair(benchmark: BenchmarkFixture):
     benchmark.extra_info.update(median_ms=float(np.median(times)))
 
 
-@pytest.mark.parametrize("eyes", [pytest.param("both", marks=pytest.mark.slow), "left"])
+@pytest.mark.slow
+@pytest.mark.parametrize("eyes", ["both", "left"])
 def test_detection(benchmark: BenchmarkFixture, eyes: str):
     params = CameraParams(cover_right_until=0.0 if eyes == "both" else 1e9)
     camera, rng = StereoCamera(params), np.random.default_rng(5)

@@ -136,7 +136,8 @@ def catalog_fmus(names: "tuple[str, ...]") -> list[tuple[Path, int]]:
 
 
 def test_a_few_sequences_on_light_units(pool: WorkerPool, tmp_path: Path):
-    pool.add([*sample_fmus(tmp_path), *catalog_fmus(LIGHT)], FEW)
+    fmus = [*sample_fmus(tmp_path), *catalog_fmus(LIGHT)]
+    pool.add([fmu for k, fmu in enumerate(fmus) if k % 4 in (0, 3)], FEW)  # each in one of the standards
     pool.add(catalog_fmus(LIGHT[:1]), FEW_APART, apart=True)
     pool.run()
 

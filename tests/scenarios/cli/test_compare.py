@@ -64,6 +64,7 @@ def test_a_known_difference_is_found_run_by_run(grasps: Path, tmp_path: Path, br
         assert overflow(page) <= 0
 
 
+@pytest.mark.slow
 def test_runs_are_compared_by_their_curves(grasps: Path, tmp_path: Path, browser: Browser):
     folders = [grasps / name / "runs" / "000_thing=cylinder_r0000" for name in ("far", "near")]
     out = tmp_path / "out"
@@ -83,6 +84,7 @@ def test_runs_are_compared_by_their_curves(grasps: Path, tmp_path: Path, browser
         assert far - near == pytest.approx(100, abs=2)  # mm, which it goes forward before it closes
 
 
+@pytest.mark.slow
 def test_the_scenarios_own_plots_are_compared_where_no_signal_is_named(grasps: Path, tmp_path: Path):
     folders = [grasps / name / "runs" / "000_thing=cylinder_r0000" for name in ("far", "near")]
     done = compare(*folders, "--out", tmp_path / "out", "--json")

@@ -55,6 +55,7 @@ def test_the_robot_gives_an_object_to_a_person(tmp_path: Path):
     assert figures == {f"{n}.{s}" for n in names for s in ("png", "svg")}
 
 
+@pytest.mark.slow
 def test_a_compliant_robot_gives_way_further_where_the_thrusters_can_tell_it_from_a_rigid_one(tmp_path: Path):
     rigid, compliant = (run(RobotToHuman, tmp_path / b, f"behaviour={b}", "ideal=true") for b in ("rigid", "compliant"))
     assert rigid.outcome.success, rigid.outcome.reason

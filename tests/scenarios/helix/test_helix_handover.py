@@ -38,12 +38,24 @@ def test_a_command_acts_in_the_step_that_follows_its_picture():
     assert [s.unit for s in schedule.continuous] == ["arm", "hand"]
 
 
+def test_the_arm_comes_nearer_to_a_ball_that_it_has_seen(tmp_path: Path):
+    status, summary = run(tmp_path / "r", "--seed", "3", "--stop", "3", "--no-report")
+    assert status == 1
+    assert "ended at 3 s, as asked" in summary["reason"]
+    record = Record(tmp_path / "r" / "signals.parquet")
+    apart = np.linalg.norm(record["arm.p_WG"] - record["hand.p_WO"], axis=1)
+    assert apart[-1] < 0.6 * apart[0]
+    seen = record["vision.seen_O"] & (record.time > 1.0)
+    assert np.median(np.linalg.norm(record["vision.p_WO_meas"] - record["hand.p_WO"], axis=1)[seen]) < 0.005
+
+
 @pytest.fixture(scope="module")
 def handover(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int, dict[str, Any]]:
     out = tmp_path_factory.mktemp("runs") / "r"
     return out, *run(out, "--seed", "3")
 
 
+@pytest.mark.slow
 def test_the_ball_changes_hands(handover: tuple[Path, int, dict[str, Any]]):
     out, status, summary = handover
     assert status == 0
@@ -60,10 +72,12 @@ def test_the_ball_changes_hands(handover: tuple[Path, int, dict[str, Any]]):
     assert record["hand.holder"][-1] == 1
 
 
+@pytest.mark.slow
 def test_the_run_stays_within_its_memory(handover: tuple[Path, int, dict[str, Any]]):
     assert handover[2]["metrics"]["peak_memory"]["value"] < 1.5e9
 
 
+@pytest.mark.slow
 def test_a_run_leaves_its_whole_folder(handover: tuple[Path, int, dict[str, Any]]):
     out = handover[0]
     assert sorted(p.name for p in out.iterdir()) == [
@@ -82,6 +96,7 @@ def test_a_run_leaves_its_whole_folder(handover: tuple[Path, int, dict[str, Any]
     assert all(len(u["sha256"]) == 64 for u in content["units"].values())
 
 
+@pytest.mark.slow
 def test_the_controller_sees_the_ball_and_the_arm_well(handover: tuple[Path, int, dict[str, Any]]):
     record = Record(handover[0] / "signals.parquet")
     late = record.time > 1.0  # when the arm hangs before the ball, half of it is hidden

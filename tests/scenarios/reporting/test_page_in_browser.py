@@ -29,6 +29,7 @@ def looks(page: Page) -> list[list[str]]:
     return page.evaluate(LOOKS)
 
 
+@pytest.mark.slow
 def test_each_phase_is_named_on_the_page_as_in_the_figure(browser: Browser, grasp: Path):
     phases = phases_of_grasp(Record(grasp / "signals.parquet"))
     with opened(browser, grasp / "report.html") as page:
