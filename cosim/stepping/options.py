@@ -107,6 +107,10 @@ class Algorithm(enum.Enum):
                 return "the same by Newton's method"
 
 
+CALL_LIMIT = 60.0
+"""Seconds of wall time that a unit may take for one call where a command or a program does not say."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class MasterOptions:
     """How a master couples its units.

@@ -14,7 +14,7 @@ import numpy as np
 from handover.cosim.exceptions import CosimError, UnitFailure, nearest
 from handover.cosim.fmu.default_experiment import exact_seconds
 from handover.cosim.record.formats import RECORD_FORMATS
-from handover.cosim.stepping.options import Algorithm, MasterOptions
+from handover.cosim.stepping.options import CALL_LIMIT, Algorithm, MasterOptions
 from handover.scenarios.execution.errors import (
     ClusterLost,
     RunNotWritten,
@@ -23,9 +23,6 @@ from handover.scenarios.execution.errors import (
     WorkersLost,
     one_line_errors,
 )
-
-CALL_LIMIT = 60.0
-"""Seconds of wall time that a unit may take for one call where the options do not say, as in the command."""
 
 Seconds = float | Fraction
 """A time in seconds; a number with a point is taken as it is written, 0.1 as one tenth."""

@@ -15,6 +15,7 @@ from typing import Any
 
 import click
 
+from handover.cosim.stepping.options import CALL_LIMIT
 from handover.scenarios.execution.progress import LOG_LEVELS
 
 
@@ -121,9 +122,6 @@ log_option = click.option(
     " units log.  [default: the master's warnings, and the log of a unit that fails]",
 )
 """For commands that run units; `log_told` takes its value."""
-
-CALL_LIMIT = 60.0
-"""Seconds of wall time that a unit may take for one call by default."""
 
 _wall_time_option = partial(click.option, cls=HeadedOption, heading="Wall time")
 _LIMIT = _wall_time_option(
