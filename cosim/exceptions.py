@@ -15,6 +15,10 @@ _SYNTAX = re.compile(r"(?:SyntaxError|IndentationError|TabError): ")
 _LOCATION = re.compile(r'File "(?:.*?/resources/sources/)?([^"]+)", line (\d+)')
 
 
+_RAISED = re.compile(r'\A[\s\S]*^  File "[^\n]*\n(?:[ \t][^\n]*\n)*(\S[\s\S]*)', re.MULTILINE)
+"""A traceback, as far as to what was raised, whose message may have several lines."""
+
+
 def nearest(name: str, valid: Iterable[str]) -> str:
     """Return "did you mean ...?" with the nearest valid names, those as near by name, or all when none is near."""
     names = sorted(set(valid))
@@ -33,12 +37,15 @@ def log_lines(log: Iterable[str]) -> list[str]:
 
 
 def last_line(log: Iterable[str]) -> str:
-    """Return the last line of a log that says anything, without status and call: of a traceback, what was raised.
+    """Return the last line of a log that says anything, without status and call.
 
-    A syntax error gets its file and line appended, which a traceback gives in an earlier line.
+    Of a traceback that is what was raised, with all of its message. A syntax error gets its file and line appended,
+    which a traceback gives in an earlier line.
     """
+    log = list(log)
     lines = [line.strip() for line in log_lines(log)]
-    message = _STATUS_AND_CALL.sub("", lines[-1]) if lines else ""
+    raised = _RAISED.search(next((entry for entry in reversed(log) if entry.strip()), ""))
+    message = " ".join(raised[1].split()) if raised else _STATUS_AND_CALL.sub("", lines[-1]) if lines else ""
     locations = [location for line in lines if (location := _LOCATION.search(line))]
     if not locations or not _SYNTAX.match(message):
         return message

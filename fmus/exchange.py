@@ -36,7 +36,8 @@ class InvalidOutput(TypeError):
         given = type(value).__name__
         if isinstance(value, np.ndarray):
             given = f"{value.dtype} array of shape {value.shape}"
-        super().__init__(f"output '{variable.name}' is declared as {declared}; the block gave {given}: {value!r:.80}")
+        shown = " ".join(repr(value).split())
+        super().__init__(f"output '{variable.name}' is declared as {declared}; the block gave {given}: {shown:.80}")
         self.variable, self.value = variable, value
 
 

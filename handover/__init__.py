@@ -24,10 +24,9 @@ if TYPE_CHECKING:
     from handover.scenarios.api.arguments import InvalidInput
     from handover.scenarios.api.campaign_result import Campaign
     from handover.scenarios.api.catalog import describe, load, system, unit
-    from handover.scenarios.api.environment import environment
     from handover.scenarios.api.pages import Page
     from handover.scenarios.api.run_result import Quantity, Run
-    from handover.scenarios.api.running import run
+    from handover.scenarios.api.running import environment, run
     from handover.scenarios.api.session import SavedState, Session, open  # noqa: A004
     from handover.scenarios.api.signals import SignalTable
     from handover.scenarios.api.sweeping import sweep
@@ -52,7 +51,7 @@ _EXPORTS = {
     "System": "cosim.system.system",
     "UnitFailure": "cosim.exceptions",
     "describe": "scenarios.api.catalog",
-    "environment": "scenarios.api.environment",
+    "environment": "scenarios.api.running",
     "load": "scenarios.api.catalog",
     "open": "scenarios.api.session",
     "run": "scenarios.api.running",

@@ -39,7 +39,7 @@ class Inputs:
 
     dl_t: Vector9[Metre] = port(
         np.zeros(9),
-        "tendon length changes from calibration, three of each segment; the motors have end stops",
+        "tendon length changes from calibration, three of each segment, positive longer; the motors have end stops",
     )
     f_G: Vector3[Newton] = port(np.zeros(3), "external force on the gripper, in the world")
     closure: Number = port(0.0, "commanded closure of the gripper: 0 open, 1 closed", minimum=0.0, maximum=1.0)

@@ -7,7 +7,6 @@ units run as ever. The scenario's evaluation decides when an episode is over, an
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from fractions import Fraction
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -21,71 +20,24 @@ except ImportError as e:
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import UnitFailure, nearest
 from handover.cosim.fmu.description import FmuPort
-from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.system import System
 from handover.scenarios.api.arguments import (
     InvalidInput,
     Seconds,
     errors_for_python,
     exact,
-    merged,
     positive_seconds,
-    texts_of,
-    unit_texts,
     whole_number,
 )
 from handover.scenarios.api.open_inputs import HELD_KINDS, OpenSystem
 from handover.scenarios.api.session import Session
 from handover.scenarios.execution.request import RunRequest
-from handover.scenarios.experiment.experiment import Experiment
 
 Values = dict[str, Any]
 """Values by port's name, as the spaces have them."""
 
 _SEEDS = 2**31
 """From how many a seed is drawn where an episode is given none."""
-
-
-def environment(
-    scenario: str | type[Experiment[Any]],
-    /,
-    place: str,
-    *,
-    actions: Sequence[str] | None = None,
-    observations: Sequence[str] | None = None,
-    reward: Callable[[Session], float] | None = None,
-    period: Seconds | None = None,
-    units: Mapping[str, Path | str] | None = None,
-    options: MasterOptions | None = None,
-    parameters: Mapping[str, Any] | None = None,
-    **named: Any,
-) -> "ScenarioEnvironment":
-    """Return a scenario as an environment of Gymnasium: `environment("ir_grasp", place="reflex")`.
-
-    Args:
-        scenario: its name or its class.
-        place: the unit whose place the agent takes.
-        actions: outputs of the unit that the agent sets, by default those that are wired. The others keep their
-            values; where the evaluation reads one of them, such as a phase, name it too.
-        observations: inputs of the unit that the agent sees, by default those that are wired, without pictures.
-        reward: of a step, by the running session; by default 1 for an episode that ends with success, else 0.
-        period: time between two actions, s, by default the step of the unit.
-        units: what takes the place of other units, by their names: files of FMUs, or blocks as `my_arm:MyArm`.
-        options: of the master, as of `handover.open`.
-        parameters: the scenario's parameters whose names are those of options here.
-        **named: its other parameters.
-
-    Raises:
-        InvalidInput: something of it cannot be run, with what would be right.
-        ImportError: Gymnasium is not installed.
-    """
-    request = RunRequest(
-        subject=scenario,
-        parameters=texts_of(merged(parameters, named)),
-        units=unit_texts(units),
-        options=options or MasterOptions(),
-    )
-    return ScenarioEnvironment(request, place, actions, observations, reward, period)
 
 
 class ScenarioEnvironment(gymnasium.Env[Values, Values]):

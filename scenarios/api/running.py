@@ -1,10 +1,10 @@
-"""One run from Python, on the same path as the command `handover run`."""
+"""A run from Python, on the path of the command `handover run`; and a scenario as an environment of Gymnasium."""
 
 import contextlib
 import threading
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.system import System
@@ -26,6 +26,10 @@ from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.experiment.experiment import Experiment
+
+if TYPE_CHECKING:
+    from handover.scenarios.api.environment import ScenarioEnvironment
+    from handover.scenarios.api.session import Session
 
 
 def run(
@@ -104,6 +108,50 @@ def run(
         if interruption.asked:
             raise KeyboardInterrupt(f"the run was interrupted; what was recorded is in {task.folder.shown}")
     return Run(task.folder.shown, task.experiment if isinstance(subject, type) else None)
+
+
+def environment(
+    scenario: str | type[Experiment[Any]],
+    /,
+    place: str,
+    *,
+    actions: Sequence[str] | None = None,
+    observations: Sequence[str] | None = None,
+    reward: Callable[["Session"], float] | None = None,
+    period: Seconds | None = None,
+    units: Mapping[str, Path | str] | None = None,
+    options: MasterOptions | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    **named: Any,
+) -> "ScenarioEnvironment":
+    """Return a scenario as an environment of Gymnasium: `environment("ir_grasp", place="reflex")`.
+
+    Args:
+        scenario: its name or its class.
+        place: the unit whose place the agent takes.
+        actions: outputs of the unit that the agent sets, by default those that are wired. The others keep their
+            values; where the evaluation reads one of them, such as a phase, name it too.
+        observations: inputs of the unit that the agent sees, by default those that are wired, without pictures.
+        reward: of a step, by the running session; by default 1 for an episode that ends with success, else 0.
+        period: time between two actions, s, by default the step of the unit.
+        units: what takes the place of other units, by their names: files of FMUs, or blocks as `my_arm:MyArm`.
+        options: of the master, as of `handover.open`.
+        parameters: the scenario's parameters whose names are those of options here.
+        **named: its other parameters.
+
+    Raises:
+        InvalidInput: something of it cannot be run, with what would be right.
+        ImportError: Gymnasium is not installed.
+    """
+    from handover.scenarios.api.environment import ScenarioEnvironment  # needs Gymnasium, an extra
+
+    request = RunRequest(
+        subject=scenario,
+        parameters=texts_of(merged(parameters, named)),
+        units=unit_texts(units),
+        options=options or MasterOptions(),
+    )
+    return ScenarioEnvironment(request, place, actions, observations, reward, period)
 
 
 @contextlib.contextmanager

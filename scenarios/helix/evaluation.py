@@ -161,6 +161,7 @@ class HandoverEvaluator(Evaluator):
         self._t = 0.0
         self._phase = ""
         self._holder = ""
+        self._has_seen = False
         self._p_WG: Floats = np.zeros(3)
         self._p_WO: Floats = np.zeros(3)
         self._p_GO: Floats = np.zeros(3)
@@ -174,6 +175,7 @@ class HandoverEvaluator(Evaluator):
     def __call__(self, t: float, signals: Signals) -> None:
         """Follow phases and positions."""
         phase, holder = phase_of(signals), signals.text("hand.holder")
+        self._has_seen = True
         self._p_WG, self._p_WO = signals["arm.p_WG"], signals["hand.p_WO"]
         self._p_GO = np.transpose(rotation_of(signals["arm.q_WG"])) @ (self._p_WO - self._p_WG)
         self._gives_error = "servo.error" in signals
@@ -242,9 +244,9 @@ class HandoverEvaluator(Evaluator):
         """Return whether the gripper has the ball, why, and the metrics."""
         success = self._holder == "GRIPPER"
         grasp_began = self.phases.get("GRASP")
-        metrics = {
-            "final_distance": Metric(self.distance, "m", "gripper to ball at the end, ground truth"),
-        }
+        metrics: dict[str, Metric] = {}
+        if self._has_seen:  # else the run failed before anything was there to be measured
+            metrics["final_distance"] = Metric(self.distance, "m", "gripper to ball at the end, ground truth")
         if self._gives_error and np.isfinite(
             self._nearest
         ):  # else the controller never saw ball and arm, and its error means nothing

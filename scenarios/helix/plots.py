@@ -80,10 +80,15 @@ def _distance(parameters: Parameters, record: Record, phases: Sequence[Phase]) -
         phases=phases,
         limits=(0.0, None),
         curves=curves,
-        levels=(
-            Level(label="descends", value=1000 * parameters.threshold),
-            Level(label="grasps", value=1000 * parameters.settings["threshold_grasp"]),
-        ),
+        levels=_thresholds(parameters) if curves[1:] and "servo.phase" in record else (),
+    )
+
+
+def _thresholds(parameters: Parameters) -> tuple[Level, ...]:
+    """Return the errors at which the scenario's own controller, which has phases, descends and grasps, mm."""
+    return (
+        Level(label="descends", value=1000 * parameters.threshold),
+        Level(label="grasps", value=1000 * parameters.settings["threshold_grasp"]),
     )
 
 

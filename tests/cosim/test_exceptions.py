@@ -1,8 +1,10 @@
-"""Which names an error suggests for an unknown one."""
+"""Which names an error suggests for an unknown one, and which line of a log it shows."""
+
+import traceback
 
 import pytest
 
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import last_line, nearest
 
 
 @pytest.mark.parametrize(
@@ -17,3 +19,13 @@ from handover.cosim.exceptions import nearest
 )
 def test_the_nearest_come_first_and_those_as_near_by_name(name: str, valid: list[str], text: str):
     assert nearest(name, iter(valid)).startswith(text)
+
+
+def test_of_a_traceback_all_that_was_raised_is_the_last_line():
+    try:
+        raise ValueError("the arm is lost\n  (see the manual)\n")
+    except ValueError:
+        log = ["[Warning] fmi3DoStep: slow", f"[Error] fmi3DoStep: {traceback.format_exc()}"]
+    assert last_line(log) == "ValueError: the arm is lost (see the manual)"
+    assert last_line([*log, "[Error] fmi3DoStep: given up"]) == "given up"
+    assert last_line(["[Error] fmi3DoStep: two\nlines"]) == "lines"

@@ -76,3 +76,8 @@ def test_numpys_scalars_and_lists_of_numbers_are_taken():
     assert buffers.integers[entries["mood_out"]] == [5]
     assert buffers.booleans[entries["off"]] == [True]
     assert buffers.strings[entries["sentence"]] == ["ä".encode()]
+
+
+def test_what_a_block_gave_is_shown_in_one_line():
+    variable = next(v for v in describe(every_kind.EveryKind).outputs if v.shape)
+    assert "\n" not in str(InvalidOutput(variable, np.ones((40, 9))))

@@ -147,7 +147,10 @@ def test_a_bad_action_is_refused():
 
 
 def test_without_gymnasium_one_line_says_what_to_install(tmp_path: Path):
-    program = "import sys; sys.modules['gymnasium'] = None; import handover; handover.environment"
+    program = (
+        "import inspect, sys; sys.modules['gymnasium'] = None; import handover; inspect.getmembers(handover);"
+        " handover.environment('ir_grasp', place='reflex')"
+    )
     done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.stderr.splitlines()[-1] == (
         "ImportError: handover.environment needs gymnasium: python -m pip install 'handover-cosim[gym]'"

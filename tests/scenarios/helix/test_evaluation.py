@@ -183,3 +183,7 @@ def test_a_controller_without_a_gripper_command_is_told_how_near_it_came_to_the_
     evaluator = follow(*((t, of_a_short_controller(None, 0.0)) for t in (0.0, 60.0)))
     assert evaluator.over
     assert "the arm came no nearer than 0.040 m to the ball" in evaluator.outcome().reason
+
+
+def test_a_run_that_failed_before_its_first_sample_has_no_distance():
+    assert "final_distance" not in HandoverEvaluator(Parameters()).outcome().metrics
