@@ -33,10 +33,9 @@ class InvalidOutput(TypeError):
             declared = "one of " + ", ".join(f"{number} {name}" for name, number in variable.items)
         if variable.raster:
             declared = f"uint8 array of shape {(variable.raster.height, variable.raster.width, 3)}"
-        given = type(value).__name__
+        given, shown = type(value).__name__, " ".join(repr(value).split())
         if isinstance(value, np.ndarray):
             given = f"{value.dtype} array of shape {value.shape}"
-        shown = " ".join(repr(value).split())
         super().__init__(f"output '{variable.name}' is declared as {declared}; the block gave {given}: {shown:.80}")
         self.variable, self.value = variable, value
 
