@@ -191,7 +191,7 @@ def test_units_and_parameters_are_swept_with_the_numbers_of_single_runs(own: Ins
 
 def test_a_run_that_was_killed_is_resumed_to_the_same_bytes(own: Installation):
     run = ["run", SCENE, "--no-report", "--checkpoint", "0.2", "--pace", "1", "--out", "killed"]
-    own.killed(*run, once="killed/checkpoint*")
+    own.killed(*run, once="killed/checkpoint.zip")
     assert not (own.here / "killed" / "summary.json").exists()
     assert "two_link_reach succeeded" in own.succeeded("resume", "killed", "--no-report")
     assert own.signals("killed") == own.signals("first")
