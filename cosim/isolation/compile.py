@@ -19,7 +19,7 @@ PROXY = (
     "proxy_fmi2.c",
     "proxy_fmi3.c",
 )
-PROCESS = ("channel.c", "unit_process.c", "unit_calls.c")
+PROCESS = ("channel.c", "unit_process.c", "unit_calls.c", "unit_forks.c")
 
 
 def is_supported(platform: "str | None" = None) -> bool:

@@ -31,7 +31,6 @@ static char *base;
 static void *component;
 static pthread_t serving;
 static fenv_t arithmetic;
-static volatile bool is_copy; /* of the process, that the unit has forked */
 static const char *maps[MAX_MAPS];
 
 static void *address(uint64_t offset) { return offset ? base + offset : NULL; }
@@ -61,6 +60,8 @@ static void give_and_wait(void) {
 
 void add_log(int status, const char *message) {
     size_t length = message ? strlen(message) : 0;
+    if (is_forked_copy())
+        return; /* nobody reads its log */
     if (!message)
         message = "";
     if (pthread_equal(pthread_self(), serving)) {
@@ -288,7 +289,7 @@ static bool make_calls(bool *ended) {
         shared->stopped_at = record->after_step ? shared->stopped_at : at;
         atomic_store(&shared->doing, record->call);
         int status = make_call(record, &plain);
-        if (is_copy)
+        if (is_forked_copy())
             _exit(0);
         record->status = status;
         if (status == WARNING)
@@ -304,8 +305,6 @@ static bool make_calls(bool *ended) {
     return stepped;
 }
 
-static void note_copy(void) { is_copy = true; }
-
 static double cpu_seconds(void) {
     struct timespec now;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
@@ -318,7 +317,7 @@ _Noreturn void serve(const Channel *with, size_t size) {
     base = (char *)shared;
     region_size = size;
     serving = pthread_self();
-    pthread_atfork(NULL, NULL, note_copy);
+    separate_forks(base, size);
     fegetenv(&arithmetic);
     for (bool ended = false;;) {
         while (!channel_wait(&channel, 1000))

@@ -17,6 +17,8 @@ extern Entry entries[N_CALLS];
 int load_library(const char *path, const char *prefix);
 void unload_library(void);
 void add_log(int status, const char *message);
+void separate_forks(void *memory, size_t size);
+bool is_forked_copy(void);
 _Noreturn void serve(const Channel *channel, size_t size);
 
 #endif

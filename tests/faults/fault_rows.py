@@ -228,4 +228,5 @@ FAULTS = [
     failure("trap_infinity", "get", 3, "b: {call} at t = 0.3 s", "y = infinity", rows=UNTIL_OUTPUT),
     harmless("fork", "step"),
     harmless("duplicate", "step", fast=("isolated",)),
+    harmless("duplicate", "get"),
 ]
