@@ -16,19 +16,21 @@ from handover.scenarios.campaign.worker_pool import JobResult, OnRunCounts, RunC
 from handover.scenarios.catalog import ScenarioSource
 from handover.scenarios.results.run_folder import disk_errors_reported
 
+SignalsDeferred = Callable[[], contextlib.AbstractContextManager[None]]
+
 
 def run_campaign(
     ready: PreparedPlan,
     folder: CampaignFolder,
     pool: WorkerPool,
     progress: OnRunCounts,
-    signals_deferred: Callable[[], contextlib.AbstractContextManager[None]] = contextlib.nullcontext,
+    signals_deferred: SignalsDeferred = contextlib.nullcontext,
 ) -> CampaignTable:
     """Run those runs of a campaign that are not done yet, and return the table of all.
 
     However it ends, runs that are done are kept, and running the same command again resumes the campaign. A run is done
-    when its folder is complete, also if a unit failed in it; lost runs are tried again. The table is completed in a
-    block of `signals_deferred`, which can defer signals meanwhile.
+    when its folder is complete, also if a unit failed in it; lost runs are tried again. Each result is taken, and the
+    table completed, in a block of `signals_deferred`, which can defer signals meanwhile.
 
     Raises:
         InvalidRunFolder, PoolError: before anything was written.
@@ -40,7 +42,7 @@ def run_campaign(
     with folder.opened(ready.plan, ready.fmus, check) as fmus:
         state = _CampaignState(ready.plan, folder, progress)
         try:
-            state.run_on(pool, fmus)
+            state.run_on(pool, fmus, signals_deferred)
         finally:
             with signals_deferred():
                 state.end()
@@ -63,14 +65,15 @@ class _CampaignState:
         self._kept = self._keep(self.runs.values())
         progress(self.counts)
 
-    def run_on(self, pool: WorkerPool, fmus: Mapping[str, Path]) -> None:
+    def run_on(self, pool: WorkerPool, fmus: Mapping[str, Path], signals_deferred: SignalsDeferred) -> None:
         """Let a worker pool run the runs that are not done."""
         jobs = [self._job(run, fmus) for run in self._to_do()]
         if not jobs:
             return
         with contextlib.closing(pool.run_jobs(jobs)) as results:
             for result in results:
-                self._take(result)
+                with signals_deferred():  # also tells of a signal whose exception was lost, as in a finalizer
+                    self._take(result)
 
     def end(self) -> None:
         """Write the table, also with runs that have ended but whose results have not come, as after an interruption."""

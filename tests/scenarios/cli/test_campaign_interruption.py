@@ -1,4 +1,4 @@
-"""Ctrl-C as a campaign comes to its end: the table is complete, the workers are ended, the interruption counts."""
+"""Ctrl-C amid a finalizer, or as a campaign ends: the table is complete, the workers are ended, it counts."""
 
 import contextlib
 import os
@@ -56,6 +56,32 @@ class InterruptedEnd:
         yield InProcessPool()
         interrupt()
         self.ended = True
+
+
+class InterruptedFinalizer(InProcessPool):
+    """Is interrupted amid a finalizer, as Dask's futures have some: Python drops the exception."""
+
+    def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
+        for i, result in enumerate(super().run_jobs(jobs)):
+            if i == 0:
+                finalized = InterruptedFinalized()
+                del finalized
+            yield result
+
+
+class InterruptedFinalized:
+    def __del__(self) -> None:
+        interrupt()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_in_a_finalizer(tmp_path: Path):
+    folder = CampaignFolder(tmp_path / "c")
+    with CampaignInterruption() as interruption, pytest.raises(KeyboardInterrupt):
+        run_campaign(
+            prepared(PLAN), folder, InterruptedFinalizer(), lambda _counts: None, interruption.deferred_signals
+        )
+    assert CampaignTable.read(folder.table).column("run").tolist() == NAMES[:1]
 
 
 def test_as_the_table_is_completed(tmp_path: Path):
