@@ -15,8 +15,7 @@ from typing import Any, cast
 
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.exceptions import one_line
-from handover.fmus.catalog import UnknownBlock, UnknownUnit, find_unit, import_class
-from handover.fmus.sources import carried_digest
+from handover.fmus.catalog import UNITS, UnknownBlock, UnknownUnit, find_unit, import_class
 from handover.scenarios.experiment.experiment import Experiment
 
 GROUP = "handover.scenarios"
@@ -32,53 +31,98 @@ class InvalidScenario(ValueError):
 
 
 @dataclass(frozen=True)
+class ScenarioEntry:
+    """A scenario of this package, as lists show it without importing it.
+
+    Attributes:
+        path: import path of its class.
+        title: the one of its class.
+    """
+
+    path: str
+    title: str
+
+
+@dataclass(frozen=True)
 class RobotSystem:
     """A published robot with its world.
 
     Attributes:
         title: what it is.
-        paths: import paths of its scenarios' classes by the scenarios' names.
+        package: name of the packages of its plants, controllers and scenarios.
+        scenarios: its scenarios by name.
     """
 
     title: str
-    paths: Mapping[str, str]
-
-    @property
-    def scenarios(self) -> tuple[type[Experiment[Any]], ...]:
-        """Its scenarios' classes, imported."""
-        return tuple(SCENARIOS[name] for name in self.paths)
+    package: str
+    scenarios: Mapping[str, ScenarioEntry]
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Names of the catalogued units in its scenarios, in order of first use."""
-        return tuple(dict.fromkeys(unit for s in self.scenarios for unit in s.units.values()))
+        """Names of its catalogued units."""
+        return tuple(name for name, unit in UNITS.items() if f".{self.package}." in unit.block)
 
 
 SYSTEMS = (
     RobotSystem(
         "Helix, a tendon-driven soft arm",
-        {"helix_handover": "handover.scenarios.helix.helix_handover:HelixHandover"},
+        "helix",
+        {
+            "helix_handover": ScenarioEntry(
+                "handover.scenarios.helix.helix_handover:HelixHandover",
+                "the Helix takes a ball from a hand by visual servoing",
+            ),
+        },
     ),
     RobotSystem(
         "VSL arm, with links of variable stiffness",
+        "vsl",
         {
-            "vsl_model_based": "handover.scenarios.vsl.path_experiments:VslModelBased",
-            "vsl_hybrid": "handover.scenarios.vsl.path_experiments:VslHybrid",
+            "vsl_model_based": ScenarioEntry(
+                "handover.scenarios.vsl.path_experiments:VslModelBased",
+                "an arm of soft links follows a path by rigid-link kinematics",
+            ),
+            "vsl_hybrid": ScenarioEntry(
+                "handover.scenarios.vsl.path_experiments:VslHybrid",
+                "an arm of soft links follows a path by kinematics with learned corrections",
+            ),
         },
     ),
     RobotSystem(
         "Free-flyer, in microgravity",
+        "free_flyer",
         {
-            "flyer_impedance": "handover.scenarios.free_flyer.impedance:FlyerImpedance",
-            "flyer_robot_to_human": "handover.scenarios.free_flyer.handovers:RobotToHuman",
-            "flyer_human_to_robot": "handover.scenarios.free_flyer.handovers:HumanToRobot",
-            "flyer_failed_reception": "handover.scenarios.free_flyer.handovers:FailedReception",
-            "flyer_collaborative": "handover.scenarios.free_flyer.handovers:Collaborative",
+            "flyer_impedance": ScenarioEntry(
+                "handover.scenarios.free_flyer.impedance:FlyerImpedance",
+                "a free-flyer yields to a push against its gripper and comes back",
+            ),
+            "flyer_robot_to_human": ScenarioEntry(
+                "handover.scenarios.free_flyer.handovers:RobotToHuman",
+                "a free-flyer fetches an object and gives it to a person",
+            ),
+            "flyer_human_to_robot": ScenarioEntry(
+                "handover.scenarios.free_flyer.handovers:HumanToRobot",
+                "a person gives an object to a free-flyer",
+            ),
+            "flyer_failed_reception": ScenarioEntry(
+                "handover.scenarios.free_flyer.handovers:FailedReception",
+                "a free-flyer closes its gripper on nothing, notices, and asks again",
+            ),
+            "flyer_collaborative": ScenarioEntry(
+                "handover.scenarios.free_flyer.handovers:Collaborative",
+                "a free-flyer gives an object to a person, waits, and takes it back",
+            ),
         },
     ),
     RobotSystem(
         "IR grasp, a soft hand with infrared sensors",
-        {"ir_grasp": "handover.scenarios.ir_grasp.ir_grasp:IrGrasp"},
+        "ir_grasp",
+        {
+            "ir_grasp": ScenarioEntry(
+                "handover.scenarios.ir_grasp.ir_grasp:IrGrasp",
+                "a soft hand grasps an object whose place is known roughly, by infrared reflexes",
+            ),
+        },
     ),
 )
 
@@ -86,26 +130,26 @@ SYSTEMS = (
 class _Scenarios(Mapping[str, type[Experiment[Any]]]):
     """Scenarios by name, each imported on first access."""
 
-    def __init__(self, paths: Mapping[str, str]) -> None:
-        self._paths = paths
+    def __init__(self, entries: Mapping[str, ScenarioEntry]) -> None:
+        self._entries = entries
 
     def __getitem__(self, name: str) -> type[Experiment[Any]]:
-        module, _, experiment = self._paths[name].partition(":")
+        module, _, experiment = self._entries[name].path.partition(":")
         scenario: type[Experiment[Any]] = getattr(import_module(module), experiment)
         return scenario
 
     def __contains__(self, name: object) -> bool:
-        return name in self._paths
+        return name in self._entries
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._paths)
+        return iter(self._entries)
 
     def __len__(self) -> int:
-        return len(self._paths)
+        return len(self._entries)
 
 
 SCENARIOS: Mapping[str, type[Experiment[Any]]] = _Scenarios(
-    {name: path for system in SYSTEMS for name, path in system.paths.items()}
+    {name: entry for system in SYSTEMS for name, entry in system.scenarios.items()}
 )
 """Those of this package."""
 
@@ -178,6 +222,8 @@ class ScenarioSource:
         """Return that of a scenario by its name or path; None for those of this package."""
         if name in SCENARIOS:
             return None
+        from handover.fmus.sources import carried_digest  # of own scenarios alone
+
         scenario = named_scenario(name)
         return cls(name, _folder_of(scenario), carried_digest(f"{scenario.__module__}:{scenario.__qualname__}"))
 

@@ -81,7 +81,7 @@ def test_the_table_of_robots_names_their_units_and_scenarios():
     for row, system in zip(rows, SYSTEMS, strict=True):
         _, robot, plants, controllers, scenarios, _ = row.split("|")
         assert system.title.split(",")[0] in robot
-        assert re.findall(r"`(\w+)`", scenarios) == [e.name for e in system.scenarios]
+        assert re.findall(r"`(\w+)`", scenarios) == [*system.scenarios]
         assert set(re.findall(r"`(\w+)`", plants)) == {u for u in system.units if is_plant(u)}
         assert set(re.findall(r"`(\w+)`", controllers)) == {u for u in system.units if not is_plant(u)}
 

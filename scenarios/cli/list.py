@@ -103,14 +103,14 @@ def print_catalog() -> None:
     for system in SYSTEMS:
         console.print(system.title, style="bold")
         for heading, rows in (
-            ("scenarios", [(e.name, e.title) for e in system.scenarios]),
+            ("scenarios", [(name, entry.title) for name, entry in system.scenarios.items()]),
             ("units", [(name, UNITS[name].summary) for name in system.units]),
         ):
             console.print(f"  {heading}", style="italic")
             print_rows(console, [("", name.ljust(width), summary) for name, summary in rows])
     print_installed(console, width)
     if others := sorted(set(UNITS) - {unit for system in SYSTEMS for unit in system.units}):
-        console.print("Units that no scenario uses", style="bold")
+        console.print("Other units", style="bold")
         print_rows(console, [("", name.ljust(width), UNITS[name].summary) for name in others])
 
 
@@ -258,7 +258,7 @@ def print_unit(unit: Entry) -> None:
 
 def catalog_data() -> dict[str, Any]:
     """Return names and titles of all scenarios and units, as JSON can hold them."""
-    scenarios = {name: scenario.title for name, scenario in SCENARIOS.items()}
+    scenarios = {name: entry.title for system in SYSTEMS for name, entry in system.scenarios.items()}
     units = {name: unit.summary for name, unit in UNITS.items()}
     return {
         "scenarios": scenarios | {name: _title(name) for name in installed_scenarios()},

@@ -7,10 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.exceptions import nearest
-from handover.fmus.build import InvalidName
 from handover.fmus.catalog import UNITS, UnknownBlock, UnknownUnit
-from handover.fmus.layout import DuplicateName
-from handover.fmus.model_description import AmbiguousName, InvalidText
 from handover.scenarios.catalog import (
     SCENARIOS,
     InvalidScenario,
@@ -24,8 +21,6 @@ from handover.scenarios.experiment.experiment import Experiment
 
 _BLOCK = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 """The path of a block, `my_arm:MyArm`; a drive's letter is followed by a slash."""
-
-_INVALID_BLOCKS = (UnknownUnit, UnknownBlock, InvalidName, DuplicateName, AmbiguousName, InvalidText)
 
 
 def find_scenario(name: str) -> type[Experiment[Any]]:
@@ -94,8 +89,17 @@ def select_fmus(
             continue
         try:
             fmus[name] = built(other or unit)
-        except _INVALID_BLOCKS as e:
+        except _invalid_blocks() as e:
             raise UsageError(f"unit {name}: {e}") from e
         except OSError as e:
             raise UsageError(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
     return fmus
+
+
+def _invalid_blocks() -> tuple[type[Exception], ...]:
+    """Return what is raised for blocks that do not exist or of which no FMU can be made."""
+    from handover.fmus.build import InvalidName  # what builds units takes long to import
+    from handover.fmus.layout import DuplicateName
+    from handover.fmus.model_description import AmbiguousName, InvalidText
+
+    return UnknownUnit, UnknownBlock, InvalidName, DuplicateName, AmbiguousName, InvalidText

@@ -68,10 +68,17 @@ def test_a_command_is_in_the_help_as_it_says_itself(name: str):
         assert deferred.get_short_help_str(width) == loaded.get_short_help_str(width)
 
 
-def test_scenarios_have_the_names_by_which_they_are_listed():
-    assert [*SCENARIOS] == [experiment.name for experiment in SCENARIOS.values()]
-    assert [*SCENARIOS] == [experiment.name for system in SYSTEMS for experiment in system.scenarios]
+def test_scenarios_have_the_names_and_titles_by_which_they_are_listed():
+    listed = {name: entry.title for system in SYSTEMS for name, entry in system.scenarios.items()}
+    assert listed == {experiment.name: experiment.title for experiment in SCENARIOS.values()}
+    assert [*SCENARIOS] == [*listed]
     assert "nothing" not in SCENARIOS
+
+
+def test_the_units_of_a_robot_are_those_of_its_scenarios():
+    for system in SYSTEMS:
+        used = {unit for name in system.scenarios for unit in SCENARIOS[name].units.values()}
+        assert set(system.units) == used
 
 
 def test_ctrl_c_while_a_command_loads_aborts_it(

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tutorial import write_files
+from tutorial import SOFTER, write_files
 from wheels import ROOT, build_wheel, copy_sources
 
 from handover.cosim.native_libraries import host_platform
@@ -23,17 +23,6 @@ from handover.cosim.record.reader import Record
 pytestmark = pytest.mark.slow
 
 SCENE = "reach:TwoLinkReach"
-SOFTER = """
-
-class Softer(SpringToGoal):
-    def __init__(self, params: Params) -> None:
-        super().__init__(params)
-
-    def outputs(self, t: float, u: Inputs) -> Outputs:
-        y = super().outputs(t, u)
-        y.tau = 0.5 * y.tau
-        return y
-"""
 OTHER_SETTINGS = ("PYTHON", "VIRTUAL_ENV", "HANDOVER")
 
 
@@ -107,8 +96,7 @@ def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Generator[Ins
     made.here.mkdir()
     made.install(wheel)
     write_files(made.here)
-    control = made.here / "control.py"
-    control.write_text(control.read_text() + SOFTER)
+    (made.here / "softer.py").write_text(SOFTER)
     yield made
     shutil.rmtree(made.environment)  # a gigabyte
 
@@ -137,7 +125,7 @@ def campaigns(own: Installation) -> "Sequence[str]":
     assert 0 < len(done) < 6
     assert "6 of 6 runs done" in own.succeeded(*sweep, "--out", "stiff")
     assert {file: file.stat().st_mtime_ns for file in done} == done
-    own.succeeded(*sweep, "--unit", "controller=control:Softer", "--out", "soft")
+    own.succeeded(*sweep, "--unit", "controller=softer:Softer", "--out", "soft")
     return ("stiff", "soft")
 
 
@@ -175,18 +163,20 @@ def test_a_run_has_its_record_and_a_page_with_a_replay(own: Installation):
 
 
 def test_units_and_parameters_are_swept_with_the_numbers_of_single_runs(own: Installation):
-    units = ["--unit", "controller=control:SpringToGoal,control:Softer"]
+    units = ["--unit", "controller=control:SpringToGoal,softer:Softer"]
     printed = own.succeeded("sweep", SCENE, "arm.mass=1,2", *units, "--workers", "2", "--out", "swept")
     assert "4 of 4 runs done" in printed
     runs = sorted(folder.name for folder in (own.here / "swept" / "runs").iterdir())
-    values = [f"controller=control-{name}_arm.mass={mass}" for name in ("SpringToGoal", "Softer") for mass in (1, 2)]
+    values = [
+        f"controller={name}_arm.mass={mass}" for name in ("control-SpringToGoal", "softer-Softer") for mass in (1, 2)
+    ]
     assert runs == [f"{k:03}_{value}_r0000" for k, value in enumerate(values)]
-    other = ["-p", "arm.mass=2", "--unit", "controller=control:Softer"]
+    other = ["-p", "arm.mass=2", "--unit", "controller=softer:Softer"]
     own.succeeded("run", SCENE, *other, "--no-report", "--out", "heavy_and_soft")
     assert own.signals(f"swept/runs/{runs[0]}") == own.signals("first")
     assert own.signals(f"swept/runs/{runs[3]}") == own.signals("heavy_and_soft")
     assert len({own.signals(f"swept/runs/{run}") for run in runs}) == 4
-    assert "control:Softer" in (own.here / "swept" / "report.html").read_text(encoding="utf-8")
+    assert "softer:Softer" in (own.here / "swept" / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_run_that_was_killed_is_resumed_to_the_same_bytes(own: Installation):

@@ -7,6 +7,20 @@ from pathlib import Path
 
 TUTORIAL = Path(__file__).parents[3] / "docs" / "tutorial.md"
 _FILE = re.compile(r"^## \d+\. [^\n]*`(?P<name>\w+\.py)`\n.*?^```python\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL)
+SOFTER = """
+from control import Inputs, Outputs, Params, SpringToGoal
+
+
+class Softer(SpringToGoal):
+    def __init__(self, params: Params) -> None:
+        super().__init__(params)
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:
+        y = super().outputs(t, u)
+        y.tau = 0.5 * y.tau
+        return y
+"""
+"""A controller of which an FMU can be made, after the tutorial's."""
 COMMAND = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()"]
 
 
