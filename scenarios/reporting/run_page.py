@@ -115,6 +115,7 @@ def run_header(facts: RunFacts, left_out: Sequence[str] = ()) -> Markup:
             reason=summary["reason"],
             resumable=facts.folder.checkpoint.exists(),
             left_out=left_out,
+            warnings=len(_warnings(facts)),
             failure={"log": (), "instance": None, **(summary.get("failure") or summary.get("ended") or {})},
         )
     )
@@ -171,8 +172,7 @@ def master_section(facts: RunFacts) -> Section | None:
     try:
         rows = master_rows(facts.summary) if "master" in facts.summary else []
         conversions = [format_conversion(c) for c in facts.run.get("conversions", [])]
-        warnings, notes = ([str(line) for line in facts.run.get(kind, [])] for kind in ("warnings", "notes"))
-        warnings += warning_lines(facts.summary)
+        warnings, notes = _warnings(facts), [str(line) for line in facts.run.get("notes", [])]
     except (KeyError, TypeError, ValueError, AttributeError) as e:
         fault = f"its description of the master is damaged: {type(e).__name__} {e}"
         raise InvalidRunFolder(facts.folder.path, fault) from e
@@ -181,6 +181,11 @@ def master_section(facts: RunFacts) -> Section | None:
     told = (("Warnings", warnings), ("Notes", notes))
     html = template("run_master.html").render(rows=rows, conversions=conversions, told=told)
     return Section(anchor="master", title="Master", html=Markup(html))
+
+
+def _warnings(facts: RunFacts) -> list[str]:
+    """Return what was warned of before the run, and what its units warned of in it."""
+    return [*map(str, facts.run.get("warnings", [])), *warning_lines(facts.summary)]
 
 
 def files_section(facts: RunFacts) -> Section:

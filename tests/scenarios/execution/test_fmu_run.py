@@ -218,6 +218,7 @@ def test_a_fault_that_co_simulation_does_not_touch_is_warned_of_once(tmp_path: P
     assert line.startswith("edited.fmu: The derivative attribute of model variable s (line ")
     page = (out / "report.html").read_text()
     assert "<h3>Warnings</h3>" in page
+    assert '<a href="#master">1 warning</a>' in page
     assert "value reference 999" in page
     strict = run(file, "--strict", "--out", tmp_path / "strict")
     assert strict.exit_code == 2, strict.output
