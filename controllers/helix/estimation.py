@@ -35,9 +35,14 @@ class PositionFilter:
         self._Q: Floats = Q * np.eye(3)
         self._R: Floats = R * np.eye(3)
 
-    def predict(self) -> None:
-        """X <- X, P <- P + Q, eq. (14)."""
-        self.covariance = self.covariance + self._Q
+    def predict(self, share: float = 1.0) -> None:
+        """X <- X, P <- P + Q, eq. (14); of Q only a share, where the filter runs more often than Q is meant for."""
+        self.covariance = self.covariance + share * self._Q
+
+    def deviation(self, X_new: Floats, R: Floats | None = None) -> float:
+        """Return how many standard deviations a measurement lies from what is expected; its covariance is as below."""
+        r = X_new - self.position
+        return math.sqrt(max(float(r @ np.linalg.solve(self.covariance + (self._R if R is None else R), r)), 0.0))
 
     def update(self, X_new: Floats, R: Floats | None = None) -> None:
         """X <- X + K (X_new - X), P <- P - K P with K = P (P + R)^-1, eq. (15).

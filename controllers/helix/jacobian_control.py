@@ -10,7 +10,20 @@ from handover.cosim.blocks.ports import Floats
 
 _STIFFENING = 100.0
 _RANK_TOLERANCE = 1e-9
+_MAX_REACH_STEPS, _REACHED = 200, 0.001
 _INSIDE = 1.0 - 1e-15  # a cropped rotation is not to exceed its bound by rounding
+
+
+class Damping(NamedTuple):
+    """How much of the error is left for a shorter step, where the goal cannot be met: position first, then tilt.
+
+    Attributes:
+        length: error of the gripper's position, m, that weighs as much as a change of the state by one.
+        tilt_weight: weight of the error of the vector from the wrist to the gripper, beside the position's 1.
+    """
+
+    length: float
+    tilt_weight: float
 
 
 class Limits(NamedTuple):
@@ -57,6 +70,8 @@ def control_step(
     epsilon_control: float,
     N_max_iter: int,
     d_gripper: float,
+    damping: Damping | None = None,
+    dq_0: Floats | None = None,
 ) -> ControlStep:
     """JBC, algorithm 1: move q_sys and q_est so that f(q_est) comes to X_goal_alpha and q_sys keeps its limits.
 
@@ -74,20 +89,23 @@ def control_step(
         epsilon_control: error at which the iteration ends, in m.
         N_max_iter: iterations at most.
         d_gripper: distance of wrist and gripper, in m.
+        damping: own addition, see `damped_step`; the error is that of position and weighted tilt. None: as printed.
+        dq_0: own addition, with damping: a change that is wanted where the goal leaves it open, shape (9,).
     """
     K_inv = 1.0 / K
     e = X_goal_alpha - X_meas
     X_est, jacobian = linearise(q_est, d_gripper)
-    stay = ControlStep(q_sys, q_est, float(np.linalg.norm(X_goal_alpha - X_est)), False)
+    stay = ControlStep(q_sys, q_est, _size(X_goal_alpha - X_est, damping), False)
     best = ControlStep(q_sys, q_est, math.inf, False)
     for _ in range(N_max_iter):
-        dq_J = _weighted_step(jacobian, K_inv, e)
+        dq_J = damped_step(jacobian, K_inv, e, damping, dq_0) if damping else _weighted_step(jacobian, K_inv, e)
+        dq_0 = None  # once a control period
         q_sys_J = q_sys + dq_J
         q_sys, K_inv = keep_limits(q_sys_J, K_inv, limits)
         q_est = q_est + dq_J + (q_sys - q_sys_J)
         X_est, jacobian = linearise(q_est, d_gripper)
         e = X_goal_alpha - X_est
-        error = math.sqrt(e @ e)
+        error = _size(e, damping)
         if error < best.error:
             best = ControlStep(q_sys, q_est, error, error < epsilon_control)
         if best.converged:
@@ -104,6 +122,46 @@ def _weighted_step(J: Floats, K_inv: Floats, e: Floats) -> Floats:
     lam, V = np.linalg.eigh(JK @ np.transpose(J))
     regular = lam > _RANK_TOLERANCE * lam[-1]
     return V @ ((e @ V) * regular / np.where(regular, lam, 1.0)) @ JK
+
+
+def damped_step(J: Floats, K_inv: Floats, e: Floats, damping: Damping, dq_0: Floats | None = None) -> Floats:
+    """Return the dq, shape (9,), that makes |D (z - J_z dq)|^2 + length^2 (dq - dq_0)^T K (dq - dq_0) least.
+
+    z is the error of the gripper's position and of the vector to it from the wrist, which are the pose's last three
+    entries, and those minus its first three; D is 1 for the former and the tilt's weight for the latter. So a goal
+    whose tilt is out of reach is met in position, and one that is out of reach does not let dq grow.
+    """
+    J_z = np.concatenate([J[3:], J[3:] - J[:3]])
+    z = np.concatenate([e[3:], e[3:] - e[:3]])
+    JK = J_z * K_inv
+    doubt = damping.length**2 * np.repeat([1.0, damping.tilt_weight**-2], 3)
+    M = JK @ np.transpose(J_z) + np.diag(doubt)
+    if dq_0 is None:
+        return np.linalg.solve(M, z) @ JK
+    return dq_0 + np.linalg.solve(M, z - J_z @ dq_0) @ JK
+
+
+def nearest_pose(p_BG: Floats, q_start: Floats, K: Floats, limits: Limits, d_gripper: float) -> float:
+    """Return how near the model's gripper comes to a point in B, in m, with any state within the limits."""
+    q, best = q_start, math.inf
+    damping = Damping(length=0.003, tilt_weight=0.001)
+    for _ in range(_MAX_REACH_STEPS):
+        X, J = linearise(q, d_gripper)
+        e = p_BG - X[3:]
+        best = min(best, math.sqrt(e @ e))
+        if best < _REACHED:
+            break
+        step = damped_step(J, 1.0 / K, np.tile(e, 2), damping)  # whatever the direction
+        q, _ = keep_limits(q + step, 1.0 / K, limits)
+    return best
+
+
+def _size(e: Floats, damping: Damping | None) -> float:
+    """Return the norm of an error of the pose, in m; with damping that of position and weighted tilt."""
+    if damping is None:
+        return math.sqrt(e @ e)
+    tilt = damping.tilt_weight * (e[3:] - e[:3])
+    return math.sqrt(e[3:] @ e[3:] + tilt @ tilt)
 
 
 def keep_limits(q_sys: Floats, K_inv: Floats, limits: Limits) -> tuple[Floats, Floats]:

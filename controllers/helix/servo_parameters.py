@@ -7,7 +7,7 @@ import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector3, Vector6, Vector9, parameter
-from handover.cosim.blocks.units import Metre, Number, Second, SquareMetre
+from handover.cosim.blocks.units import Metre, Number, Radian, Second, SquareMetre
 
 _ROTATIONS, _LENGTHS = slice(0, None, 2), slice(1, None, 2)  # in q_DL, eq. (8)
 
@@ -28,15 +28,25 @@ class Params:
     alpha: the stated 0.005 m with alpha = 0.1 stalls at the stated threshold, 0.05 m. As stated, epsilon_control is the
     same, so that the last digits decide whether the loop continues, and with alpha = 0.1 how many steps it takes.
     Lengths weigh more than stated in the estimate, since a metre is a lot more than a radian: equal weights explain a
-    sagging arm by segments of half their length. The wrist filter lags by about three control periods, so with alpha =
-    0.4 the arm still moves when the filtered error first is small: hence settle_steps.
+    sagging arm by segments of half their length.
+
+    The stated filters know nothing of the pictures' exactness: the wrist's lags by about three control periods. Here
+    each measurement has its own covariance (`use_covariance`), and every picture counts (`filter_pictures`). As stated,
+    one error is the norm over wrist and gripper; here position and tilt are judged apart (`judge_apart`), and the tilt
+    weighs less the longer the position makes no progress, so that a tilt which cannot be reached keeps the gripper from
+    no ball. As stated, the command stands while the gripper closes; here the arm follows the ball (`follow_until`).
+
+    A hanging arm swings once a second, for long: averaged over that time (`shaping_time`), a command excites no swing.
+    Lengths are stiffer than stated (`K_initialize`), since a longer segment's tendons go slack, and where the goal
+    leaves it open, segments are shortened (`posture`), which tightens them. Where tendons are slack, the arm makes only
+    a part of the commanded motion; the step is divided by that part (`least_response`).
     """
 
     control_period: Second = parameter(
         0.5, "time between two updates of the command (own choice; 1.45)", minimum=0.01, maximum=60.0
     )
     alpha: Number = parameter(
-        0.4, "step size: part of the way to the goal in a control period", minimum=0.0, maximum=1.0
+        0.25, "step size: part of the way to the goal in a control period", minimum=0.0, maximum=1.0
     )
     adaptive_step: bool = parameter(
         False, "let the step grow with the error e: min(0.8, max(alpha, 0.8 e / (e + 0.08 m))) (own choice)"
@@ -58,18 +68,86 @@ class Params:
         minimum=0.0,
     )
     K_initialize: Vector9[Number] = parameter(
-        np.array([0.2, 0.2, 2.0, 0.1, 0.1, 1.0, 0.1, 0.1, 1.0]), "virtual stiffness (diagonal)", minimum=0.0
+        np.array([0.2, 0.2, 10.0, 0.1, 0.1, 5.0, 0.1, 0.1, 5.0]),
+        "virtual stiffness (diagonal; own choice; lengths 2, 1, 1)",
+        minimum=0.0,
     )
     epsilon_pose_bound: Metre = parameter(
-        0.0015, "distance of the estimate's pose from the measured one (own choice; 0.005)", minimum=0.0
+        0.0001, "distance of the estimate's pose from the measured one (own choice; 0.005)", minimum=0.0
     )
-    epsilon_control: Metre = parameter(0.0005, "error at which the Jacobian loop ends (own choice; 0.005)", minimum=0.0)
+    epsilon_control: Metre = parameter(0.0001, "error at which the Jacobian loop ends (own choice; 0.005)", minimum=0.0)
     N_max_iter: int = parameter(20, "iterations of the Jacobian loop at most", minimum=1)
     threshold: Metre = parameter(0.05, "error at which the arm has reached the place above the ball", minimum=0.0)
-    threshold_grasp: Metre = parameter(0.02, "error at which the gripper closes (own choice; 0.05)", minimum=0.0)
+    threshold_grasp: Metre = parameter(0.003, "error at which the gripper closes (own choice; 0.05)", minimum=0.0)
     settle_steps: int = parameter(
-        4, "control steps in a row below threshold_grasp before the gripper closes (own choice; 1)", minimum=1
+        2, "control steps in a row below threshold_grasp before the gripper closes (own choice; 1)", minimum=1
     )
+    judge_apart: bool = parameter(
+        True, "the error is that of the gripper's position, and its tilt is judged by itself (own choice; false)"
+    )
+    threshold_tilt: Radian = parameter(
+        0.6,
+        "tilt of the gripper from straight down at which it still closes, where it is judged apart (own choice)",
+        minimum=0.0,
+        maximum=math.pi,
+    )
+    tilt_weight: Number = parameter(
+        0.02,
+        "weight of the tilt's error beside the position's, where they are judged apart (own choice)",
+        minimum=0.001,
+        maximum=1.0,
+    )
+    damping: Metre = parameter(
+        0.02,
+        "error of position that weighs as much as a state's change by one, where they are judged apart (own choice)",
+        minimum=1e-6,
+        maximum=1.0,
+    )
+    shaping_time: Second = parameter(
+        1.0,
+        "time over which the command is averaged, as long as the arm swings once, so that it does not swing; 0: none "
+        "(own choice; 0)",
+        minimum=0.0,
+        maximum=5.0,
+    )
+    least_response: Number = parameter(
+        0.3,
+        "where the arm makes a part of the commanded motion, the step is divided by it, down to this; 1: never (own "
+        "choice; 1)",
+        minimum=0.01,
+        maximum=1.0,
+    )
+    posture: Number = parameter(
+        0.5,
+        "part of the way to l_preferred that a control step takes where the goal leaves it open (own choice; 0)",
+        minimum=0.0,
+        maximum=1.0,
+    )
+    l_preferred: Vector3[Metre] = parameter(
+        np.array([0.09, 0.18, 0.18]), "segment lengths that keep the tendons taut (own choice)", minimum=0.0
+    )
+    windup: Metre = parameter(
+        0.7,
+        "largest distance of the commanded state's gripper from the estimated one's; 0: any (own choice; 0)",
+        minimum=0.0,
+    )
+    follow_until: Number = parameter(
+        0.95,
+        "part of closing_time for which the arm follows the ball while the gripper closes (own choice; 0)",
+        minimum=0.0,
+        maximum=1.0,
+    )
+    threshold_reopen: Metre = parameter(
+        0.04,
+        "error at which a gripper that closes and follows opens again and comes from above (own choice)",
+        minimum=0.0,
+    )
+    lost_after: Second = parameter(
+        2.5,
+        "time without ring or ball after which the arm goes back and searches; 0: it waits (own choice; 0)",
+        minimum=0.0,
+    )
+    search_steps: int = parameter(60, "control steps of going back and searching at most (own choice)", minimum=1)
     threshold_retreat: Metre = parameter(
         0.16, "error at which the arm, coming down, returns above the ball (own choice)", minimum=0.0
     )
@@ -79,15 +157,39 @@ class Params:
     progress: Metre = parameter(0.001, "change of the error that is progress (own choice)", minimum=0.0)
     max_steps: int = parameter(1000, "control steps before the arm gives up (own choice)", minimum=1)
     P_init: SquareMetre = parameter(2000.0, "variance of all three filters before the first measurement", minimum=0.0)
-    Q_ball: SquareMetre = parameter(0.1, "ball filter: variance that a control period adds", minimum=0.0)
-    R_ball: SquareMetre = parameter(0.01, "ball filter: variance of a measurement", minimum=0.0)
-    Q_wrist: SquareMetre = parameter(0.01, "wrist filter: variance that a control period adds", minimum=0.0)
-    R_wrist: SquareMetre = parameter(0.1, "wrist filter: variance of a measurement", minimum=0.0)
-    Q_direction: SquareMetre = parameter(0.1, "gripper direction filter: variance a control period adds", minimum=0.0)
-    R_direction: SquareMetre = parameter(0.01, "gripper direction filter: variance of a measurement", minimum=0.0)
-    use_covariance: bool = parameter(
-        False, "take the measurements' covariances for R (own choice); then Q wants to be of their size"
+    Q_ball: SquareMetre = parameter(
+        1e-6, "ball filter: variance that a control period adds (own choice; 0.1)", minimum=0.0
     )
+    R_ball: SquareMetre = parameter(0.01, "ball filter: variance of a measurement, without covariances", minimum=0.0)
+    Q_wrist: SquareMetre = parameter(
+        4e-5, "wrist filter: variance that a control period adds (own choice; 0.01)", minimum=0.0
+    )
+    R_wrist: SquareMetre = parameter(0.1, "wrist filter: variance of a measurement, without covariances", minimum=0.0)
+    Q_direction: SquareMetre = parameter(
+        4e-5, "gripper direction filter: variance a control period adds (own choice; 0.1)", minimum=0.0
+    )
+    R_direction: SquareMetre = parameter(
+        0.01, "gripper direction filter: variance of a measurement, without covariances", minimum=0.0
+    )
+    use_covariance: bool = parameter(
+        True, "take the measurements' covariances for R (own choice; false); then Q wants to be of their size"
+    )
+    ball_motion: Metre = parameter(
+        0.0006,
+        "standard deviation, along an axis, of a ball's tremor, which is no motion to follow (own choice)",
+        minimum=0.0,
+    )
+    filter_pictures: bool = parameter(True, "filter in every step, not once a control period (own choice; false)")
+    predict_motion: bool = parameter(True, "expect the arm to move as commanded (own choice; false)")
+    response_time: Second = parameter(
+        0.15, "time in which most of a commanded motion comes (own choice)", minimum=0.001
+    )
+    gate: Number = parameter(
+        8.0,
+        "standard deviations from what is expected beyond which a measurement is refused; 0: none (own choice; 0)",
+        minimum=0.0,
+    )
+    gate_steps: int = parameter(4, "measurements in a row that are refused before one is taken (own choice)", minimum=1)
 
     def check(self) -> None:
         """Raise InvalidServoParameters, with all faults, if the servo cannot work with these values."""

@@ -9,19 +9,27 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from handover.controllers.helix.constant_curvature import tendon_lengths
-from handover.controllers.helix.estimation import PositionFilter, optimise_state
-from handover.controllers.helix.jacobian_control import Limits, blend, control_step
+from handover.controllers.helix.constant_curvature import forward_kinematics, linearise, tendon_lengths
+from handover.controllers.helix.estimation import optimise_state
+from handover.controllers.helix.jacobian_control import Damping, Limits, blend, control_step, nearest_pose
+from handover.controllers.helix.recovery import Recovery
+from handover.controllers.helix.response import Response
 from handover.controllers.helix.servo_parameters import InvalidServoParameters, Params
+from handover.controllers.helix.shaping import Shaper
+from handover.controllers.helix.tracking import Tracker
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, Vector9, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.cosim.blocks.units import Metre, Number, SquareMetre
+from handover.cosim.blocks.units import Metre, Number, Radian, SquareMetre
 
-__all__ = ["Inputs", "InvalidServoParameters", "Outputs", "Params", "Phase", "VisualServo"]
+__all__ = ["Inputs", "InvalidServoParameters", "Outputs", "Params", "Phase", "Verdict", "VisualServo"]
 
 _W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])  # R_WB = diag(1, -1, -1), for both points of a pose
 _UP = np.array([0.0, 0.0, 1.0])
 _SAME_TIME = 1e-9  # s; rounding of a time that a host adds up from steps
+_REACH_TOLERANCE = 0.003  # m; of the model, beyond which a goal is out of its reach
+_RESPONSE_MEMORY = 1.5  # s
+_LARGEST_STEP = 0.8
+_AT_LIMIT = 1e-6  # rad, m
 
 
 class Phase(enum.IntEnum):
@@ -33,6 +41,18 @@ class Phase(enum.IntEnum):
     GRASP = 3
     HOLD = 4
     GIVEN_UP = 5
+    RECOVER = 6
+
+
+class Verdict(enum.IntEnum):
+    """Why the arm has given up."""
+
+    NONE = 0
+    NO_PROGRESS = 1
+    OUT_OF_REACH = 2
+    LIMITS = 3
+    LOST_RING = 4
+    LOST_BALL = 5
 
 
 @dataclass(kw_only=True)
@@ -58,7 +78,11 @@ class Outputs:
     phase: Phase = output("what the arm is doing")
     q_est: Vector9[Number] = output("state that explains the measured pose: Dx, Dy (rad), l (m) of each segment")
     q_sys: Vector9[Number] = output("state that is commanded: Dx, Dy (rad), l (m) of each segment")
-    error: Metre = output("norm of X_goal - X_meas over wrist and gripper; of no meaning in WAIT")
+    error: Metre = output(
+        "distance of the gripper from its goal, or norm over wrist and gripper; of no meaning in WAIT"
+    )
+    tilt: Radian = output("angle of the gripper from straight down")
+    verdict: Verdict = output("why the arm has given up")
     p_WO_est: Vector3[Metre] = output("filtered position of the ball")
     p_WR_est: Vector3[Metre] = output("filtered position of the wrist")
     p_WG_est: Vector3[Metre] = output("filtered position of the gripper")
@@ -67,15 +91,19 @@ class Outputs:
 class VisualServo:
     """Algorithm 3: filter, estimate the state (eq. 16), step towards the goal (algorithm 1), close when it is reached.
 
-    Inputs are read, and the command is updated, once in each control_period, at the beginning of a step; between,
-    the outputs are held. A longer step is one control period. The goal pose has the gripper pointing down, at the ball
-    or (APPROACH) d_grasp_offset above it: X_goal = [p_WG_goal + d_gripper z, p_WG_goal]. The error is the norm |X_goal
-    - X_meas| over all six coordinates, in m, where the source prints its square and compares it with metres.
+    The command is updated once in each control_period, at the beginning of a step; between, it is held, and with
+    filter_pictures the measurements are filtered in each step. A longer step is one control period. The goal pose has
+    the gripper pointing down, at the ball or (APPROACH) d_grasp_offset above it: X_goal = [p_WG_goal + d_gripper z,
+    p_WG_goal]. The mount, B, is at the origin of W.
 
-    Own additions: the command is held while the ring is not seen, since there is no feedback; an
-    error above threshold_retreat in DESCEND (the ball was moved) leads back to APPROACH; an error that makes no
-    progress leads to GIVEN_UP, which does not close. GRASP, HOLD and GIVEN_UP hold the command, and have the ball as
-    goal. The mount, B, is at the origin of W.
+    The error is the distance of the gripper from its goal (judge_apart), or the norm |X_goal - X_meas| over all six
+    coordinates, in m, where the source prints its square and compares it with metres.
+
+    Own additions: see `Params`. The command is held while the ring is not seen, since there is no feedback; after
+    lost_after without ring or ball, RECOVER goes back and searches. An error above threshold_retreat in DESCEND (the
+    ball was moved), or above threshold_reopen while the gripper closes, leads back to APPROACH. An error that makes no
+    progress leads to GIVEN_UP, which does not close; `verdict` says why: OUT_OF_REACH if no state within the limits
+    brings the model's gripper to its goal, else LIMITS if the command is at one, else NO_PROGRESS.
 
     Raises:
         InvalidServoParameters: values that contradict each other or are out of range; all faults are named.
@@ -83,7 +111,10 @@ class VisualServo:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
-        ("dl_t", "closure", "phase", "q_est", "q_sys", "error", "p_WO_est", "p_WR_est", "p_WG_est"),
+        (
+            *("dl_t", "closure", "phase", "q_est", "q_sys", "error", "tilt", "verdict"),
+            *("p_WO_est", "p_WR_est", "p_WG_est"),
+        ),
         ("p_WO_meas", "p_WR_meas", "p_WG_meas", "cov_O", "cov_R", "cov_G", "seen_O", "seen_R"),
     )
     period: ClassVar[Fraction | None] = None
@@ -96,75 +127,108 @@ class VisualServo:
         self._l_t_calib = np.repeat(p.l_calib, 3)
         self._q_sys: Floats = self._q_calib
         self._q_est: Floats = self._q_calib
-        self._ball = PositionFilter(np.zeros(3), p.P_init, p.Q_ball, p.R_ball)
-        self._wrist = PositionFilter(-p.l_calib.sum() * _UP, p.P_init, p.Q_wrist, p.R_wrist)
-        self._direction = PositionFilter(-p.d_gripper * _UP, p.P_init, p.Q_direction, p.R_direction)
+        self._tracker = Tracker(p)
+        self._recovery = Recovery(self._q_calib)
+        self._response = Response(_RESPONSE_MEMORY, 2.0 * p.response_time, p.least_response)
+        self._shaper = Shaper(p.shaping_time, self._q_calib)
         self._phase = Phase.WAIT
+        self._verdict = Verdict.NONE
         self._t_next = -math.inf
+        self._t_filtered = -math.inf
         self._t_close = 0.0
         self._settled = 0
+        self._tilt_share = 1.0
         self._steps = 0
         self._stalled = 0
+        self._searched = 0
         self._best = math.inf
-        self._p_WO_best: Floats = self._ball.position
+        self._p_WO_best: Floats = self._tracker.ball.position
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command in force: no time passes, so nothing is filtered or decided."""
         return Outputs(
-            dl_t=tendon_lengths(self._q_sys, self.params.d) - self._l_t_calib,
+            dl_t=tendon_lengths(self._shaper.q, self.params.d) - self._l_t_calib,
             closure=1.0 if self._phase in (Phase.GRASP, Phase.HOLD) else 0.0,
             phase=self._phase,
             q_est=np.array(self._q_est),
             q_sys=np.array(self._q_sys),
             error=self._error(),
-            p_WO_est=np.array(self._ball.position),
-            p_WR_est=np.array(self._wrist.position),
-            p_WG_est=self._wrist.position + self._direction.position,
+            tilt=self._tilt(),
+            verdict=self._verdict,
+            p_WO_est=np.array(self._tracker.ball.position),
+            p_WR_est=np.array(self._tracker.wrist.position),
+            p_WG_est=self._tracker.p_WG,
         )
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Run the main loop of algorithm 3 once if a control period has passed since it ran."""
-        if t < self._t_next - _SAME_TIME:
+        due = t >= self._t_next - _SAME_TIME
+        if due or self.params.filter_pictures:
+            self._filter(t, u)
+        if not due:
+            self._shaper.advance(t, self._q_sys)
             return self.outputs(t + dt, u)
         following = self._t_next + self.params.control_period
         self._t_next = following if following > t + _SAME_TIME else t + self.params.control_period
-        self._filter(u)
-        if u.seen_R:
+        sees = self._sees_ring(u)
+        if sees:
             self._estimate()
+            self._response.observe(self._tracker.p_WG, self.params.control_period)
         self._decide(t)
-        if u.seen_R and self._phase in (Phase.APPROACH, Phase.DESCEND):
+        if self._phase is Phase.RECOVER:
+            self._q_sys = self._recovery.next(self._q_sys)
+        elif sees and (self._phase in (Phase.APPROACH, Phase.DESCEND) or self._follows(t)):
             self._move()
+        self._shaper.advance(t, self._q_sys)
         return self.outputs(t + dt, u)
 
     def get_state(self) -> bytes:
         """Return filters, states, phase and counters."""
-        filters = [f.get_state() for f in (self._ball, self._wrist, self._direction)]
-        counters = (self._t_next, self._t_close, self._settled, self._steps, self._stalled, self._best, self._p_WO_best)
-        return pack_state((filters, self._q_sys, self._q_est, int(self._phase), counters))
+        counters = (
+            self._settled,
+            self._tilt_share,
+            self._steps,
+            self._stalled,
+            self._searched,
+            self._best,
+            self._p_WO_best,
+        )
+        times = (self._t_next, self._t_filtered, self._t_close)
+        believed = (
+            self._tracker.get_state(),
+            self._recovery.get_state(),
+            self._response.get_state(),
+            self._shaper.get_state(),
+        )
+        return pack_state((believed, self._q_sys, self._q_est, int(self._phase), int(self._verdict), times, counters))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state that `get_state` gave."""
         saved: Any = unpack_state(state)
-        filters, self._q_sys, self._q_est, phase, counters = saved
-        for f, s in zip((self._ball, self._wrist, self._direction), filters, strict=True):
-            f.set_state(s)
-        self._phase = Phase(phase)
-        self._t_next, *counters = counters
-        self._t_close, self._settled, self._steps, self._stalled, self._best, self._p_WO_best = counters
+        (tracker, recovery, response, shaper), self._q_sys, self._q_est, phase, verdict, times, counters = saved
+        self._tracker.set_state(tracker)
+        self._recovery.set_state(recovery)
+        self._response.set_state(response)
+        self._shaper.set_state(shaper)
+        self._phase, self._verdict = Phase(phase), Verdict(verdict)
+        self._t_next, self._t_filtered, self._t_close = times
+        self._settled, self._tilt_share, self._steps, self._stalled, self._searched, *best = counters
+        self._best, self._p_WO_best = best
 
-    def _filter(self, u: Inputs) -> None:
-        p = self.params
-        for f in (self._ball, self._wrist, self._direction):
-            f.predict()
+    def _filter(self, t: float, u: Inputs) -> None:
+        elapsed = t - self._t_filtered
+        self._tracker.advance(min(elapsed, self.params.control_period))
+        self._t_filtered = t
         if u.seen_O:
-            self._ball.update(u.p_WO_meas, u.cov_O if p.use_covariance else None)
+            self._tracker.see_ball(u.p_WO_meas, u.cov_O)
         if u.seen_R:
-            self._wrist.update(u.p_WR_meas, u.cov_R if p.use_covariance else None)
-            direction = self._direction.position
-            self._direction.update(u.p_WG_meas - u.p_WR_meas, u.cov_R + u.cov_G if p.use_covariance else None)
-            # eq. (13): the gripper's length is fixed
-            length = math.sqrt(self._direction.position @ self._direction.position)
-            self._direction.position = self._direction.position * (p.d_gripper / length) if length > 1e-9 else direction
+            self._tracker.see_ring(u.p_WR_meas, u.p_WG_meas, u.cov_R, u.cov_G)
+
+    def _sees_ring(self, u: Inputs) -> bool:
+        """Return whether the wrist is known: from this picture, or from one since the last control step."""
+        if not self.params.filter_pictures:
+            return u.seen_R
+        return self._tracker.unseen_R < self.params.control_period - _SAME_TIME
 
     def _estimate(self) -> None:
         p = self.params
@@ -173,8 +237,8 @@ class VisualServo:
         ).q_est
 
     def _decide(self, t: float) -> None:
-        p, error = self.params, self._error()
-        if self._phase is Phase.WAIT and self._ball.seen and self._wrist.seen:
+        p, error, tracker = self.params, self._error(), self._tracker
+        if self._phase is Phase.WAIT and tracker.ball.seen and tracker.wrist.seen:
             self._enter(Phase.APPROACH)
         elif self._phase is Phase.APPROACH and error < p.threshold:
             self._enter(Phase.DESCEND)
@@ -182,19 +246,54 @@ class VisualServo:
             self._enter(Phase.APPROACH)
         elif self._phase is Phase.GRASP and t - self._t_close >= p.closing_time - 1e-9:
             self._enter(Phase.HOLD)
+        elif (self._follows(t) and error > p.threshold_reopen) or (self._phase is Phase.RECOVER and not self._lost()):
+            self._enter(Phase.APPROACH)
         error = self._error()
         near = self._phase is Phase.DESCEND and error < p.threshold_grasp
+        near = near and not (p.judge_apart and self._tilt() > p.threshold_tilt)
         self._settled = self._settled + 1 if near else 0
         if self._settled >= p.settle_steps:
             self._t_close = t
             self._enter(Phase.GRASP)
-        elif self._phase in (Phase.APPROACH, Phase.DESCEND) and not self._makes_progress(error):
-            self._enter(Phase.GIVEN_UP)
+        elif self._phase in (Phase.APPROACH, Phase.DESCEND):
+            if self._lost():
+                self._enter(Phase.RECOVER)
+            elif not self._makes_progress(error):
+                self._give_up(self._why_stuck())
+        elif self._phase is Phase.RECOVER:
+            self._searched += 1
+            if self._searched > p.search_steps and (lost := self._lost()):
+                self._give_up(lost)
+
+    def _lost(self) -> Verdict:
+        """Return whether ring or ball are lost, by the verdict for it, else NONE."""
+        lost_after = self.params.lost_after
+        if lost_after == 0.0:
+            return Verdict.NONE
+        if self._tracker.unseen_R >= lost_after:
+            return Verdict.LOST_RING
+        return Verdict.LOST_BALL if self._tracker.unseen_O >= lost_after else Verdict.NONE
+
+    def _why_stuck(self) -> Verdict:
+        p, goal = self.params, self._X_goal()[3:]
+        starts = (self._q_calib, self._q_sys, self._q_est)
+        if min(nearest_pose(goal, q, p.K_initialize, self._limits, p.d_gripper) for q in starts) > _REACH_TOLERANCE:
+            return Verdict.OUT_OF_REACH
+        d = np.hypot(self._q_sys[0::3], self._q_sys[1::3])
+        q_DL = np.column_stack([d, self._q_sys[2::3]]).reshape(6)
+        room = np.minimum(self._limits.UB - q_DL, np.where(self._limits.LB > 0.0, q_DL - self._limits.LB, math.inf))
+        return Verdict.LIMITS if room.min() < _AT_LIMIT else Verdict.NO_PROGRESS
+
+    def _follows(self, t: float) -> bool:
+        """Return whether the arm follows the ball although the gripper closes."""
+        p = self.params
+        return self._phase is Phase.GRASP and t - self._t_close < p.follow_until * p.closing_time - _SAME_TIME
 
     def _move(self) -> None:
         p, error, X_meas = self.params, self._error(), self._X_meas()
         alpha = min(0.8, max(p.alpha, 0.8 * error / (error + 0.08))) if p.adaptive_step else p.alpha
-        self._q_sys = control_step(
+        alpha = min(alpha / self._response.part, max(alpha, _LARGEST_STEP))
+        commanded = control_step(
             self._q_sys,
             self._q_est,
             blend(self._X_goal(), X_meas, alpha, p.d_gripper),
@@ -204,36 +303,80 @@ class VisualServo:
             epsilon_control=p.epsilon_control,
             N_max_iter=p.N_max_iter,
             d_gripper=p.d_gripper,
-        ).q_sys
+            damping=Damping(p.damping, p.tilt_weight * self._tilt_share) if p.judge_apart else None,
+            dq_0=self._towards_posture() if p.posture > 0.0 else None,
+        )
+        dq = self._without_windup(commanded.q_sys) - self._q_sys
+        moved = _W_FROM_B * (linearise(self._q_est, p.d_gripper)[1] @ dq)
+        self._response.command(moved[3:])
+        self._tracker.expect(self._response.part * np.concatenate([moved[:3], moved[3:] - moved[:3]]))
+        if p.lost_after > 0.0:
+            self._recovery.keep(self._q_sys)
+        self._q_sys = self._q_sys + dq
+
+    def _towards_posture(self) -> Floats:
+        """Return the change that shortens the segments, shape (9,)."""
+        dq_0 = np.zeros(9)
+        dq_0[2::3] = self.params.posture * (self.params.l_preferred - self._q_sys[2::3])
+        return dq_0
+
+    def _without_windup(self, q_sys: Floats) -> Floats:
+        """Return the command, or as much of its change as does not take it farther from the arm than `windup`."""
+        p = self.params
+        if p.windup == 0.0:
+            return q_sys
+        allowed = max(p.windup, self._ahead(self._q_sys))
+        for share in (1.0, 0.5, 0.25):
+            q = self._q_sys + share * (q_sys - self._q_sys)
+            if self._ahead(q) <= allowed:
+                return q
+        return self._q_sys
+
+    def _ahead(self, q_sys: Floats) -> float:
+        """Return the distance of the commanded state's gripper from the measured one, m."""
+        d = forward_kinematics(q_sys, self.params.d_gripper)[3:] - self._X_meas()[3:]
+        return math.sqrt(d @ d)
 
     def _X_meas(self) -> Floats:
         """Filtered pose, eq. (12), in B."""
-        return _W_FROM_B * np.concatenate([self._wrist.position, self._wrist.position + self._direction.position])
+        return _W_FROM_B * np.concatenate([self._tracker.wrist.position, self._tracker.p_WG])
 
     def _X_goal(self) -> Floats:
         """Goal of the phase, in B."""
         above = self._phase in (Phase.WAIT, Phase.APPROACH)
-        p_WG = self._ball.position + (self.params.d_grasp_offset * _UP if above else 0.0)
+        p_WG = self._tracker.ball.position + (self.params.d_grasp_offset * _UP if above else 0.0)
         return _W_FROM_B * np.concatenate([p_WG + self.params.d_gripper * _UP, p_WG])
 
     def _error(self) -> float:
         e = self._X_goal() - self._X_meas()
-        return math.sqrt(e @ e)
+        return math.sqrt(e[3:] @ e[3:] if self.params.judge_apart else e @ e)
+
+    def _tilt(self) -> float:
+        d = self._tracker.direction.position
+        return math.atan2(math.hypot(d[0], d[1]), -d[2])
 
     def _enter(self, phase: Phase) -> None:
         self._phase = phase
         self._reset_progress()
 
+    def _give_up(self, verdict: Verdict) -> None:
+        self._verdict = verdict
+        self._enter(Phase.GIVEN_UP)
+
     def _reset_progress(self) -> None:
-        self._stalled, self._best, self._p_WO_best = 0, math.inf, self._ball.position
+        self._stalled, self._best, self._p_WO_best = 0, math.inf, self._tracker.ball.position
 
     def _makes_progress(self, error: float) -> bool:
         """Count the step and what it gained; return whether to go on. A ball that has moved restarts the count."""
-        p, moved = self.params, self._ball.position - self._p_WO_best
+        p, moved = self.params, self._tracker.ball.position - self._p_WO_best
         if math.sqrt(moved @ moved) > p.threshold:
             self._reset_progress()
         self._steps += 1
         self._stalled += 1
-        if error < self._best - p.progress:
-            self._stalled, self._best, self._p_WO_best = 0, error, self._ball.position
+        gains = error < self._best - p.progress
+        self._tilt_share = min(
+            max(self._tilt_share * (1.05 if gains or error < p.threshold_grasp else 0.85), 0.05), 1.0
+        )
+        if gains:
+            self._stalled, self._best, self._p_WO_best = 0, error, self._tracker.ball.position
         return self._stalled < p.patience and self._steps <= p.max_steps

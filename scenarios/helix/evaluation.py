@@ -49,7 +49,7 @@ def model_mismatch(q_sys: Floats, p_WG_est: Floats) -> ModelMismatch:
 
 
 MEASURED, ESTIMATED = "#ffd23f", "#4fe3ff"
-_PERIOD = Fraction(1, 30)
+PICTURE_PERIOD = Fraction(1, 30)
 """Period of camera and vision, s."""
 
 _SHAPE = (720, 1280, 3)
@@ -78,7 +78,7 @@ def take_pictures(t: float, role: str, parameters: Parameters, signals: Signals)
 def is_covered(t: float, side: Cover, parameters: Parameters) -> bool:
     """Return whether a lens was covered when the picture that is current at time t was taken."""
     begin, end = parameters.covered(side)
-    taken = float(int(t / float(_PERIOD) + 1e-6) * _PERIOD)
+    taken = float(int(t / float(PICTURE_PERIOD) + 1e-6) * PICTURE_PERIOD)
     return begin <= taken < end
 
 
@@ -129,6 +129,16 @@ _MOMENTS = {"APPROACH": "approach", "DESCEND": "descent", "GRASP": "at the ball"
 _COVERED = "lens covered"
 
 
+_WHY_GIVEN_UP = {
+    "NO_PROGRESS": "no progress",
+    "OUT_OF_REACH": "out of reach",
+    "LIMITS": "limits of the command",
+    "LOST_RING": "lost ring",
+    "LOST_BALL": "lost ball",
+}
+"""By the controller's verdict."""
+
+
 def phase_of(signals: Signals) -> str:
     """Return the controller's phase; of one that gives none, what the gripper shows: APPROACH, GRASP or HOLD."""
     if "servo.phase" in signals:
@@ -160,6 +170,7 @@ class HandoverEvaluator(Evaluator):
         self.phases: dict[str, float] = {}
         self._t = 0.0
         self._phase = ""
+        self._verdict = ""
         self._holder = ""
         self._has_seen = False
         self._p_WG: Floats = np.zeros(3)
@@ -170,11 +181,13 @@ class HandoverEvaluator(Evaluator):
         self._error = 0.0
         self._gives_error = False
         self._nearest = np.inf
+        self._grasp_began: float | None = None  # the last time
         self._released_at: float | None = None
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Follow phases and positions."""
         phase, holder = phase_of(signals), signals.text("hand.holder")
+        self._verdict = signals.text("servo.verdict") if "servo.verdict" in signals else ""
         self._has_seen = True
         self._p_WG, self._p_WO = signals["arm.p_WG"], signals["hand.p_WO"]
         self._p_GO = np.transpose(rotation_of(signals["arm.q_WG"])) @ (self._p_WO - self._p_WG)
@@ -188,8 +201,9 @@ class HandoverEvaluator(Evaluator):
         if phase in _MOMENTS and phase not in self.phases:
             self._keep(_MOMENTS[phase], signals)
         compares = "servo.q_sys" in signals and "servo.p_WG_est" in signals
-        if compares and phase == "GRASP" and phase not in self.phases:
-            self._mismatch = model_mismatch(signals["servo.q_sys"], signals["servo.p_WG_est"])
+        if phase == "GRASP" and self._phase != "GRASP":  # also again, where the gripper had to open
+            self._grasp_began = t
+            self._mismatch = model_mismatch(signals["servo.q_sys"], signals["servo.p_WG_est"]) if compares else None
         if self._is_first_covered(t):
             self._keep(_COVERED, signals)
         self.phases.setdefault(phase, t)
@@ -233,7 +247,7 @@ class HandoverEvaluator(Evaluator):
     def _deadline(self) -> float:
         if self._phase == "WAIT":
             return min(_NOTHING_SEEN, self.parameters.patience)
-        return self.parameters.patience if "GRASP" not in self.phases else np.inf
+        return np.inf if self._phase in ("GRASP", "HOLD") else self.parameters.patience
 
     @property
     def distance(self) -> float:
@@ -243,7 +257,7 @@ class HandoverEvaluator(Evaluator):
     def outcome(self) -> Outcome:
         """Return whether the gripper has the ball, why, and the metrics."""
         success = self._holder == "GRIPPER"
-        grasp_began = self.phases.get("GRASP")
+        grasp_began = self._grasp_began
         metrics: dict[str, Metric] = {}
         if self._has_seen:  # else the run failed before anything was there to be measured
             metrics["final_distance"] = Metric(self.distance, "m", "gripper to ball at the end, ground truth")
@@ -276,7 +290,8 @@ class HandoverEvaluator(Evaluator):
         if self._phase == "WAIT":
             return f"the cameras did not see both ball and arm within {self._deadline:.0f} s; {where}"
         if self._phase == "GIVEN_UP":
-            return f"out of reach: the arm came no nearer than {self._nearest:.2f} m to its goal; {where}"
+            why = _WHY_GIVEN_UP.get(self._verdict, "given up")
+            return f"{why}: the arm came no nearer than {self._nearest:.3f} m to its goal; {where}"
         if self._released_at is not None:
             return f"the hand let go at {self._released_at:.1f} s, and the gripper did not keep the ball; {where}"
         if "HOLD" in self.phases:

@@ -19,7 +19,7 @@ from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.helix.cameras import calibration
-from handover.scenarios.helix.evaluation import HandoverEvaluator
+from handover.scenarios.helix.evaluation import PICTURE_PERIOD, HandoverEvaluator
 from handover.scenarios.helix.parameters import Cover, Parameters, Tuning
 from handover.scenarios.helix.places import PLACES
 
@@ -29,11 +29,15 @@ _PAPER = "helix"
 def published_values(p: Parameters) -> Sequence[PublishedValue]:
     """Return the times and steps of table 1 for its step sizes, and for the smallest of them the model's error.
 
-    Nothing for other step sizes, another place of the ball, or a covered lens.
+    Nothing for other step sizes, other places of the ball, or a covered lens.
     """
     published, default = paper_values(_PAPER, "experiment"), Parameters()
     matches = np.flatnonzero(np.isclose(published["alpha"], p.alpha))
-    if not len(matches) or (p.radius, p.height) != (default.radius, default.height) or p.cover is not Cover.NONE:
+    if (
+        not len(matches)
+        or (p.azimuth, p.radius, p.height) != (default.azimuth, default.radius, default.height)
+        or p.cover is not Cover.NONE
+    ):
         return ()
     k = int(matches[0])
     period = paper_values(_PAPER, "published")["timestep_mean"][k]
@@ -101,7 +105,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
         servo = s.add(
             "servo",
             fmu("servo"),
-            period=p.period,
+            period=PICTURE_PERIOD if p.settings["filter_pictures"] else p.period,
             sampled=True,
             control_period=float(p.period),
             alpha=p.alpha,

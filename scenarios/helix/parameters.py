@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats, parameter
-from handover.cosim.blocks.units import Metre, Number, Second
+from handover.cosim.blocks.units import Metre, Number, Radian, Second
 from handover.scenarios.experiment.paper import paper_values
 
 
@@ -45,8 +45,11 @@ class Tuning(enum.IntEnum):
 class Parameters:
     """One handover."""
 
-    alpha: Number = parameter(0.4, "step size of the Jacobian control, eq. (21)", minimum=0.01, maximum=1.0)
+    alpha: Number = parameter(0.25, "step size of the Jacobian control, eq. (21)", minimum=0.01, maximum=1.0)
     place: Place = parameter(Place.FRONT, "where the hand offers the ball")
+    azimuth: Radian = parameter(
+        0.0, "turn of the offered ball about the arm's axis from that place, to the left", minimum=-np.pi, maximum=np.pi
+    )
     radius: Metre = parameter(0.16, "distance of the offered ball from the arm's axis", minimum=0.0, maximum=2.0)
     height: Metre = parameter(-0.6, "height of the offered ball in W", minimum=-1.1, maximum=0.0)
     control_period: Second = parameter(0.5, "period of the controller", minimum=0.1, maximum=10.0)
@@ -60,7 +63,7 @@ class Parameters:
     @property
     def p_WO(self) -> Floats:
         """Position of the offered ball in W, shape (3,), m."""
-        a = self.place.azimuth
+        a = self.place.azimuth + self.azimuth
         return np.array([self.radius * np.cos(a), self.radius * np.sin(a), self.height])
 
     @property

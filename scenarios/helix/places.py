@@ -25,6 +25,14 @@ _COVARIANCES = {
     "cov_G": "in W; large while it is not seen",
 }
 
+_TUNED = dict.fromkeys(
+    (
+        *("judge_apart", "windup", "follow_until", "lost_after", "use_covariance", "filter_pictures", "predict_motion"),
+        *("shaping_time", "least_response", "posture", "K_initialize", "gate", "Q_ball", "Q_wrist", "Q_direction"),
+    ),
+    "by the scenario's tuning",
+)
+
 PLACES = {
     "camera": Place(
         required={"left": "", "right": ""},
@@ -63,6 +71,8 @@ PLACES = {
             **_COVARIANCES,
             "phase": "by it, time and success of the handover are judged: it fails in GIVEN_UP",
             "error": "shown, and by it the run says how near the arm came",
+            "verdict": "by it the run says why it was given up",
+            "tilt": "shown as a signal",
             "q_est": "shown as a signal",
             "q_sys": "compared with p_WG_est as the gripper begins to close, as in fig. 9 of the thesis",
             "p_WO_est": "in W; shown in plots, pictures and replay",
@@ -76,6 +86,7 @@ PLACES = {
             "epsilon_control": "by the scenario's tuning",
             "A_pose_upd": "by the scenario's tuning",
             "settle_steps": "by the scenario's tuning",
+            **_TUNED,
         },
         remarks=(
             _BASE,

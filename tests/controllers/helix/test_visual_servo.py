@@ -1,4 +1,4 @@
-"""The servo in closed loop with an arm that sags: it bends by 0.55 of the command, and a little by itself."""
+"""The servo by algorithm 3 as printed, with an arm that sags."""
 
 import math
 from collections.abc import Callable
@@ -7,15 +7,26 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sagging_arm import Q_CALIB, W_FROM_B, SaggingArm, ball_at
 
 from handover.controllers.helix.constant_curvature import forward_kinematics, tendon_lengths
 from handover.controllers.helix.visual_servo import Inputs, Outputs, Params, Phase, VisualServo
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
+from handover.scenarios.experiment.paper import paper_values
 
-W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
-Q_CALIB = np.array([0, 0, 0.12, 0, 0, 0.24, 0, 0, 0.24])
 PLACES = {"front": 0.0, "front-left": 45.0, "left": 90.0, "back-left": 135.0}
+_STATED: dict[str, Any] = paper_values("helix", "thesis")
+PRINTED: dict[str, Any] = _STATED | {
+    "alpha": 0.4,
+    "A_pose_upd": np.array([1.0, 1.0, 5.0, 1.05, 1.05, 5.25, 1.1, 1.1, 5.5]),
+    "K_initialize": np.asarray(_STATED["K_initialize"], dtype=np.float64),
+    "epsilon_pose_bound": 0.0015,
+    "epsilon_control": 0.0005,
+    "threshold_grasp": 0.02,
+    "settle_steps": 4,
+}
+"""Algorithm 3 without additions, with tighter bounds than the thesis's."""
 THESIS: dict[str, Any] = {
     "A_pose_upd": np.repeat([1.0, 1.05, 1.1], 3),
     "epsilon_pose_bound": 0.005,
@@ -23,35 +34,6 @@ THESIS: dict[str, Any] = {
     "threshold_grasp": 0.05,
     "settle_steps": 1,
 }
-
-
-def ball_at(degrees: float, reach: float = 0.18) -> Floats:
-    angle = math.radians(degrees)
-    return np.array([reach * math.cos(angle), reach * math.sin(angle), -0.6])
-
-
-class SaggingArm:
-    def __init__(self, seed: int = 0, lag: float = 0.5) -> None:
-        self.rng, self.lag = np.random.default_rng(seed), lag
-        self.own_bend = self.rng.normal(0.0, 0.03, (3, 2))
-        self.q: Floats = self.rest(Q_CALIB)
-
-    def rest(self, q_sys: Floats) -> Floats:
-        segments = q_sys.reshape(3, 3)
-        return np.column_stack(
-            [0.55 * segments[:, :2] + self.own_bend, segments[:, 2] * np.array([1.01, 1.02, 1.02])]
-        ).reshape(9)
-
-    def follow(self, q_sys: Floats, dt: float) -> None:
-        self.q = self.q + (1.0 - math.exp(-dt / self.lag)) * (self.rest(q_sys) - self.q)
-
-    def pose(self) -> Floats:
-        return W_FROM_B * forward_kinematics(self.q, 0.10)
-
-    def measured(self, p_WO: Floats, noise: float = 0.002, seen: bool = True) -> Inputs:
-        wrist, gripper = self.pose()[:3], self.pose()[3:]
-        p_O, p_R, p_G = (self.rng.normal(p, noise) for p in (p_WO, wrist, gripper))
-        return Inputs(p_WO_meas=p_O, p_WR_meas=p_R, p_WG_meas=p_G, seen_O=seen, seen_R=seen)
 
 
 @dataclass
@@ -84,8 +66,12 @@ class Loop:
         return float(np.linalg.norm(self.arm.pose()[3:] - p_WO))
 
 
+def printed(**values: Any) -> VisualServo:
+    return VisualServo(Params(**(PRINTED | values)))
+
+
 def loop(seed: int = 0, dt: float = 0.5, **values: Any) -> Loop:
-    return Loop(VisualServo(Params(control_period=dt, **values)), SaggingArm(seed), [], dt)
+    return Loop(printed(control_period=dt, **values), SaggingArm(seed), [], dt)
 
 
 @pytest.mark.parametrize("place", PLACES)
@@ -155,7 +141,7 @@ def test_the_arm_comes_from_above():
 
 
 def test_the_error_is_the_norm_over_wrist_and_gripper():
-    servo = VisualServo(Params())
+    servo = printed()
     u = Inputs(
         p_WO_meas=np.array([0.2, 0.0, -0.65]),
         p_WR_meas=np.array([0.0, 0.0, -0.6]),
@@ -300,7 +286,7 @@ def test_another_servo_goes_on_from_the_state_bit_for_bit(after: int):
         inputs.append(u)
         first.step(u)
     assert {y.phase for y in first.history} >= {Phase.APPROACH, Phase.DESCEND, Phase.GRASP, Phase.HOLD}
-    begun, other = VisualServo(Params(closing_time=2.0)), VisualServo(Params(closing_time=2.0))
+    begun, other = printed(closing_time=2.0), printed(closing_time=2.0)
     for n, u in enumerate(inputs[:after]):
         begun.step(n * 0.5, 0.5, u)
     other.step(0.0, 0.5, inputs[20])
@@ -317,7 +303,7 @@ def test_short_steps_give_the_commands_of_steps_of_a_control_period(dt: float, p
     for n in range(periods):
         inputs.append(whole.arm.measured(ball_at(45.0), seen=n % 7 != 5))
         whole.step(inputs[-1])
-    servo, t = VisualServo(Params(closing_time=2.0)), 0.0
+    servo, t = printed(closing_time=2.0), 0.0
     between = SaggingArm(seed=9).measured(ball_at(180.0))
     for n, u in enumerate(inputs):
         for k in range(per_period):
@@ -329,7 +315,7 @@ def test_short_steps_give_the_commands_of_steps_of_a_control_period(dt: float, p
 
 def test_steps_that_do_not_divide_the_control_period_update_at_the_first_step_after_it():
     run = loop(dt=0.3)
-    run.servo = VisualServo(Params(control_period=0.5))
+    run.servo = printed(control_period=0.5)
     for _ in range(11):
         run.step(run.arm.measured(ball_at(0.0)))
     changed = [n for n in range(1, 11) if not np.array_equal(run.history[n].p_WO_est, run.history[n - 1].p_WO_est)]
@@ -338,7 +324,7 @@ def test_steps_that_do_not_divide_the_control_period_update_at_the_first_step_af
 
 def test_a_step_longer_than_the_control_period_is_one_update():
     run, longer = loop(dt=1.45), loop(dt=1.45)
-    longer.servo = VisualServo(Params(control_period=0.5))
+    longer.servo = printed(control_period=0.5)
     for _ in range(12):
         assert everything(run.step(run.arm.measured(ball_at(0.0)))) == everything(
             longer.step(longer.arm.measured(ball_at(0.0)))
@@ -348,7 +334,7 @@ def test_a_step_longer_than_the_control_period_is_one_update():
 def test_the_sampling_time_is_part_of_the_state():
     run, dt = loop(), 0.02
     inputs = [run.arm.measured(ball_at(0.0)) for _ in range(80)]
-    first, other = VisualServo(Params()), VisualServo(Params())
+    first, other = printed(), printed()
     for n in range(40):
         first.step(n * dt, dt, inputs[n])
     other.set_state(first.get_state())
@@ -366,13 +352,13 @@ def test_patience_is_part_of_the_state():
     total = steps_until_given_up(alone)
     for _ in range(total - 5):
         begun.step(begun.arm.measured(far))
-    begun.servo, state = VisualServo(Params(patience=15)), begun.servo.get_state()
+    begun.servo, state = printed(patience=15), begun.servo.get_state()
     begun.servo.set_state(state)
     assert steps_until_given_up(begun) == total
 
 
 def test_inputs_that_change_later_do_not_change_the_state():
-    servo = VisualServo(Params())
+    servo = printed()
     u = SaggingArm().measured(ball_at(0.0))
     servo.step(0.0, 0.5, u)
     before = servo.get_state()
@@ -381,7 +367,7 @@ def test_inputs_that_change_later_do_not_change_the_state():
 
 
 def test_outputs_at_the_start_are_those_of_the_calibrated_arm():
-    servo = VisualServo(Params())
+    servo = printed()
     state = servo.get_state()
     y = servo.outputs(0.0, SaggingArm().measured(ball_at(0.0)))
     assert (y.phase, y.closure) == (Phase.WAIT, 0.0)

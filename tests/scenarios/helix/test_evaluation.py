@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from handover.controllers.helix.visual_servo import Phase
+from handover.controllers.helix.visual_servo import Phase, Verdict
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
@@ -24,10 +24,19 @@ Ports = dict[str, dict[str, FmuPort]]
 
 
 def signals(
-    phase: Phase, holder: Holder = Holder.HAND, beside: float = 0.0, along: float = 0.0, sees_ball: bool = True
+    phase: Phase,
+    holder: Holder = Holder.HAND,
+    beside: float = 0.0,
+    along: float = 0.0,
+    sees_ball: bool = True,
+    verdict: Verdict = Verdict.NONE,
 ) -> Signals:
     """Return what a gripper that hangs down, and a ball at a place in its frame, would show."""
-    return Signals(*views_and_ports(phase, holder, beside, along, sees_ball), PICTURE)
+    units, ports = views_and_ports(phase, holder, beside, along, sees_ball)
+    units["servo"]["verdict"] = (np.array([int(verdict)]),)
+    items = tuple((v.name, int(v)) for v in Verdict)
+    ports["servo"]["verdict"] = port("verdict", Kind.ENUMERATION, items=items)
+    return Signals(units, ports, PICTURE)
 
 
 def views_and_ports(
@@ -79,6 +88,32 @@ def test_a_gripper_that_closed_beside_the_ball_fails_and_says_how_far():
     assert not outcome.success
     assert "0.040 m beside its axis and -0.010 m along it" in outcome.reason
     assert "grasp_offset_lateral" not in outcome.metrics
+
+
+@pytest.mark.parametrize(
+    ("verdict", "why"),
+    [
+        (Verdict.LOST_RING, "lost ring: "),
+        (Verdict.LOST_BALL, "lost ball: "),
+        (Verdict.LIMITS, "limits of the command: "),
+        (Verdict.OUT_OF_REACH, "out of reach: "),
+        (Verdict.NO_PROGRESS, "no progress: "),
+    ],
+)
+def test_a_run_that_was_given_up_says_why(verdict: Verdict, why: str):
+    given_up = signals(Phase.GIVEN_UP, verdict=verdict)
+    evaluator = follow((8.0, signals(Phase.APPROACH)), (9.0, given_up))
+    assert evaluator.over
+    assert not evaluator.outcome().success
+    assert evaluator.outcome().reason.startswith(f"{why}the arm came no nearer than 0.010 m to its goal")
+
+
+def test_a_gripper_that_opened_again_is_timed_from_its_last_closing_and_has_no_more_patience():
+    course = [(5.0, Phase.GRASP), (7.0, Phase.APPROACH), (9.0, Phase.DESCEND), (11.0, Phase.GRASP)]
+    evaluator = follow(*((t, signals(phase)) for t, phase in course))
+    assert evaluator.outcome().metrics["arm_time"].value == 11.0
+    evaluator = follow(*((t, signals(phase)) for t, phase in [*course[:2], (61.0, Phase.APPROACH)]))
+    assert evaluator.over
 
 
 def test_offsets_are_those_of_the_moment_when_the_hand_let_go():

@@ -47,7 +47,7 @@ def test_the_scenarios_defaults_have_an_origin(paper: dict[str, dict[str, dict[s
     assert p.radius == experiment["radius"]["value"]
     assert p.height == experiment["height"]["value"]
     assert p.control_period == experiment["control_period"]["value"]
-    assert p.alpha in experiment["alpha"]["value"]
+    assert p.alpha == experiment["default_alpha"]["value"]
     assert [e.name.lower().replace("_", "-") for e in Place] == experiment["places"]["value"]
 
 
