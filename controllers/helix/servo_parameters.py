@@ -209,15 +209,33 @@ class Params:
             "settle_steps",
             "patience",
             "max_steps",
+            "search_steps",
+            "gate_steps",
+            "response_time",
+            "damping",
+            "tilt_weight",
+            "least_response",
         ]
         positive += [n for n in values if n.startswith(("P_", "Q_", "R_"))]
         negative = [n for n in positive if np.any(np.asarray(values[n]) <= 0.0)]
         faults = [f"{n} = {_text(values[n])} is not finite" for n in infinite]
         faults += [f"{n} = {_text(values[n])} must be positive" for n in negative]
-        at_least_0 = ["d_grasp_offset", "closing_time", "progress"]
+        at_least_0 = [
+            "d_grasp_offset",
+            "closing_time",
+            "progress",
+            "windup",
+            "follow_until",
+            "lost_after",
+            "gate",
+            "posture",
+        ]
+        at_least_0 += ["shaping_time", "ball_motion"]
         faults += [f"{n} = {values[n]} must not be negative" for n in at_least_0 if values[n] < 0.0]
         if not 0.0 < self.alpha <= 1.0:
             faults.append(f"alpha = {self.alpha} is outside (0, 1]")
+        if self.least_response > 1.0:
+            faults.append(f"least_response = {self.least_response} is a part, at most 1")
         return faults
 
     def _limit_faults(self) -> list[str]:
@@ -244,6 +262,11 @@ class Params:
         if self.threshold_retreat <= self.threshold_grasp:
             faults.append(
                 f"threshold_retreat = {self.threshold_retreat} must exceed threshold_grasp = {self.threshold_grasp}"
+            )
+        if self.follow_until > 0.0 and self.threshold_reopen <= self.threshold_grasp:
+            faults.append(
+                f"threshold_reopen = {self.threshold_reopen} must exceed threshold_grasp = {self.threshold_grasp}, or "
+                "the gripper opens as soon as it closes"
             )
         return faults
 

@@ -25,6 +25,10 @@ from handover.controllers.helix.visual_servo import VisualServo
         ({"closing_time": -1.0}, "closing_time = -1.0 must not be negative"),
         ({"control_period": 0.0}, "control_period = 0.0 must be positive"),
         ({"N_max_iter": 0}, "N_max_iter = 0 must be positive"),
+        ({"least_response": 1.2}, "least_response = 1.2 is a part, at most 1"),
+        ({"least_response": 0.0}, "least_response = 0.0 must be positive"),
+        ({"windup": -0.1}, "windup = -0.1 must not be negative"),
+        ({"threshold_reopen": 0.002}, "threshold_reopen = 0.002 must exceed threshold_grasp = 0.003"),
     ],
 )
 def test_unusable_parameters_are_refused_by_name(values: dict[str, Any], message: str):
