@@ -44,7 +44,13 @@ def pace(experiment: Experiment[Any]) -> tuple[float, float]:
     return clock.t / spent, sum(sum(cpu) for cpu in master.cpu.values()) / spent
 
 
-@pytest.mark.parametrize("name", ["flyer_impedance", "flyer_robot_to_human", "flyer_collaborative"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "flyer_impedance",
+        *(pytest.param(n, marks=pytest.mark.slow) for n in ("flyer_robot_to_human", "flyer_collaborative")),
+    ],
+)
 def test_pace(benchmark: BenchmarkFixture, name: str):
     runs: list[tuple[float, float]] = []
     benchmark.pedantic(lambda: runs.append(pace(SCENARIOS[name]())), rounds=5, warmup_rounds=1)

@@ -22,6 +22,7 @@ assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == be
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process cannot be sent Ctrl-C alone there")
+@pytest.mark.slow
 def test_ctrl_c_ends_the_run_and_keeps_its_record(tmp_path: Path):
     call = [sys.executable, "-c", PROGRAM]
     with subprocess.Popen(call, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:

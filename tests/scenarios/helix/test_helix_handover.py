@@ -134,7 +134,8 @@ def test_a_ball_out_of_reach_ends_with_status_1_and_says_why(tmp_path: Path):
     assert "out of reach" in summary["reason"] or "did not see" in summary["reason"]
 
 
-@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_run_and_keeps_its_record(tmp_path: Path, number: signal.Signals):
     out = tmp_path / "r"
     going = subprocess.Popen(command("run", "helix_handover", "--out", out), stdout=subprocess.PIPE, text=True)

@@ -24,6 +24,7 @@ def torque(run: Path) -> "np.ndarray[tuple[int, ...], np.dtype[np.float64]]":
     return Record(run / "signals.parquet")["controller.tau"][0]
 
 
+@pytest.mark.slow
 def test_a_run_takes_it_and_keeps_it(here: Path):
     weak = ["-p", "controller.stiffness=10", "-p", "controller.p_WG=0.3,0.6", "-p", "arm.mass=3"]
     ran(here, "run", SCENE, *QUIET, "--out", "stiff")

@@ -123,11 +123,13 @@ def test_the_same_seed_gives_the_same_signals_and_another_seed_others(finished: 
     assert digest(tmp_path / "1") != digest(tmp_path / "0")
 
 
+@pytest.mark.slow
 def test_the_error_grows_with_the_load():
     errors = [error_of(f"load={kg}") for kg in (0.0, 0.025, 0.05, 0.075, 0.1)]
     assert all(b > a + 0.001 for a, b in itertools.pairwise(errors)), errors
 
 
+@pytest.mark.slow
 def test_the_error_falls_with_the_pressure():
     errors = [error_of(f"pressure={pa}") for pa in (0.5e5, 1.0e5, 1.5e5, 2.0e5)]
     assert all(b < a - 0.001 for a, b in itertools.pairwise(errors)), errors
