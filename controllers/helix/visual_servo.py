@@ -103,7 +103,7 @@ class VisualServo:
     lost_after without ring or ball, RECOVER goes back and searches. An error above threshold_retreat in DESCEND (the
     ball was moved), or above threshold_reopen while the gripper closes, leads back to APPROACH. An error that makes no
     progress leads to GIVEN_UP, which does not close; `verdict` says why: OUT_OF_REACH if no state within the limits
-    brings the model's gripper to its goal, else LIMITS if the command is at one, else NO_PROGRESS.
+    brings the model's gripper to its goal, else LIMITS if the command is at one or at windup, else NO_PROGRESS.
 
     Raises:
         InvalidServoParameters: values that contradict each other or are out of range; all faults are named.
@@ -282,7 +282,8 @@ class VisualServo:
         d = np.hypot(self._q_sys[0::3], self._q_sys[1::3])
         q_DL = np.column_stack([d, self._q_sys[2::3]]).reshape(6)
         room = np.minimum(self._limits.UB - q_DL, np.where(self._limits.LB > 0.0, q_DL - self._limits.LB, math.inf))
-        return Verdict.LIMITS if room.min() < _AT_LIMIT else Verdict.NO_PROGRESS
+        wound_up = p.windup > 0.0 and self._ahead(self._q_sys) > 0.95 * p.windup
+        return Verdict.LIMITS if wound_up or room.min() < _AT_LIMIT else Verdict.NO_PROGRESS
 
     def _follows(self, t: float) -> bool:
         """Return whether the arm follows the ball although the gripper closes."""
