@@ -85,7 +85,7 @@ def test_the_helix_true_distance_ends_where_the_summary_says(runs: dict[str, Run
     curve = done.curve("Distance to the goal", "gripper to ball, true")
     assert curve.values[-1] == pytest.approx(1000 * metric(done.ended, "final_distance"))
     descends, grasps = done.plots["Distance to the goal"].levels
-    assert (descends.value, grasps.value) == pytest.approx((50.0, 20.0))
+    assert (descends.value, grasps.value) == pytest.approx((50.0, 3.0))
 
 
 def test_a_push_disagrees_with_the_model_as_much_as_the_summary_says(runs: dict[str, Run]):

@@ -185,7 +185,7 @@ def test_a_run_that_a_unit_has_stopped_can_be_aborted(number: signal.Signals, tm
 def test_a_run_dies_with_its_parent_whatever_the_unit_does(bad: str, tmp_path: Path):
     going = start(tmp_path, failing_ssp(tmp_path, f"{bad}_in_step"), "--out", "r", "--call-limit", "0")
     tail = tmp_path / "r" / "signals.tail"
-    wait_until(lambda: tail.exists() and tail.read_bytes()[16] >= 3, going)
+    wait_until(lambda: tail.exists() and tail.read_bytes()[16:17] >= b"\x03", going)
     processes = children(going.pid)
     assert len(processes) == 1
     os.kill(going.pid, signal.SIGKILL)
