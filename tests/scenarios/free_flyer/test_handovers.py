@@ -38,6 +38,7 @@ def test_a_command_acts_in_the_step_that_follows_its_measurement():
     assert [s.unit for s in schedule.continuous] == ["thrusters", "robot", "person"]
 
 
+@pytest.mark.slow
 def test_the_robot_gives_an_object_to_a_person(tmp_path: Path):
     ended = run(RobotToHuman, tmp_path / "r", drawn=True)
     assert ended.outcome.success, ended.outcome.reason

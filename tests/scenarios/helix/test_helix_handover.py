@@ -38,6 +38,7 @@ def test_a_command_acts_in_the_step_that_follows_its_picture():
     assert [s.unit for s in schedule.continuous] == ["arm", "hand"]
 
 
+@pytest.mark.slow
 def test_the_arm_comes_nearer_to_a_ball_that_it_has_seen(tmp_path: Path):
     status, summary = run(tmp_path / "r", "--seed", "3", "--stop", "3", "--no-report")
     assert status == 1

@@ -109,6 +109,7 @@ def test_a_sweep_varies_the_unit_itself(here: Path):
     assert CampaignTable.read(here / "swept" / "runs.parquet").rows == table.rows
 
 
+@pytest.mark.slow
 def test_units_that_cannot_be_varied_are_told_and_nothing_is_written(here: Path):
     line = refused(here, "sweep", SCENE, "--unit", "controller=control:SpringToGoal,", "--out", "other")
     assert "--unit controller: 'control:SpringToGoal,' has an empty item" in line
