@@ -291,7 +291,7 @@ class HandoverEvaluator(Evaluator):
             return f"the cameras did not see both ball and arm within {self._deadline:.0f} s; {where}"
         if self._phase == "GIVEN_UP":
             why = _WHY_GIVEN_UP.get(self._verdict, "given up")
-            return f"{why}: the arm came no nearer than {self._nearest:.3f} m to its goal; {where}"
+            return f"{why}: the gripper stays {self._error:.3f} m from its goal; {where}"
         if self._released_at is not None:
             return f"the hand let go at {self._released_at:.1f} s, and the gripper did not keep the ball; {where}"
         if "HOLD" in self.phases:

@@ -105,7 +105,7 @@ def test_a_run_that_was_given_up_says_why(verdict: Verdict, why: str):
     evaluator = follow((8.0, signals(Phase.APPROACH)), (9.0, given_up))
     assert evaluator.over
     assert not evaluator.outcome().success
-    assert evaluator.outcome().reason.startswith(f"{why}the arm came no nearer than 0.010 m to its goal")
+    assert evaluator.outcome().reason.startswith(f"{why}the gripper stays 0.010 m from its goal; ball at ")
 
 
 def test_a_gripper_that_opened_again_is_timed_from_its_last_closing_and_has_no_more_patience():
