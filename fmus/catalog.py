@@ -62,13 +62,19 @@ _ENTRIES = (
     Entry(
         "TendonArm",
         "handover.plants.helix.tendon_arm:TendonArm",
-        Fraction(1, 50),
+        Fraction(1, 100),
         "tendon-driven soft arm with a gripper",
+    ),
+    Entry(
+        "TendonArmFast",
+        "handover.plants.helix.tendon_arm_fast:TendonArmFast",
+        Fraction(1, 100),
+        "the same arm by compiled kernels, without Exudyn",
     ),
     Entry(
         "HandoverPartner",
         "handover.plants.helix.handover_partner:HandoverPartner",
-        Fraction(1, 50),
+        Fraction(1, 100),
         "hand that offers a ball",
     ),
     Entry(
@@ -83,7 +89,7 @@ _ENTRIES = (
     Entry(
         "VisualServo",
         "handover.controllers.helix.visual_servo:VisualServo",
-        Fraction(1, 2),
+        Fraction(1, 10),
         "moves the arm by what vision sees",
     ),
     Entry(

@@ -16,6 +16,7 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 
 _SMALL_ANGLE = 1e-3  # rad
+_CONVERGED = 1e-9  # of a Newton step, whose error is some hundredth of its square
 _UNIT_TOLERANCE = 1e-6  # of a quaternion's length
 _MIN_DEPTH = 0.02  # m; points nearer to the lens, or behind it, are not projected
 
@@ -169,7 +170,12 @@ class Pinhole:
         xy = target
         for _ in range(4):
             slope, residual = self._slope(xy), target - self._distorted(xy)
-            xy = xy + np.linalg.solve(slope, residual[:, :, None])[:, :, 0]
+            a, b, c, d = slope[:, 0, 0], slope[:, 0, 1], slope[:, 1, 0], slope[:, 1, 1]
+            x, y = residual[:, 0], residual[:, 1]
+            step = np.column_stack([d * x - b * y, a * y - c * x]) / (a * d - b * c)[:, None]  # the slope's inverse
+            xy = xy + step
+            if np.abs(step).max(initial=0.0) < _CONVERGED:
+                break
         return xy
 
     def rays(self, pixels: Floats) -> Floats:
