@@ -1,134 +1,52 @@
 """A person's hand that offers a ball, guides the arm if asked to, and lets go, after [Vervloet2025] sec. 3.5."""
 
-import enum
 from collections.abc import Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.geometry import rotation_of
-from handover.cosim.blocks.ports import Floats, Vector3, Vector4, output, parameter, port
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.cosim.blocks.units import (
-    Hertz,
-    Kilogram,
-    Metre,
-    MetrePerSecond2,
-    Newton,
-    NewtonPerMetre,
-    NewtonSecondPerMetre,
-    Number,
-    Second,
-)
 from handover.plants.hand_tremor import HandTremor
+from handover.plants.helix.bowl import Bowl
+from handover.plants.helix.guidance import Guidance, GuidanceGains
+from handover.plants.helix.held_ball import HeldBall, bodies
+from handover.plants.helix.partner_parameters import Holder, Inputs, Outputs, Params
 
-
-class InvalidPartnerParameters(InvalidParameters):
-    """Parameters that contradict each other; `faults` lists all of them."""
-
-    block = "HandoverPartner"
-
-
-class Holder(enum.IntEnum):
-    """Who holds the ball."""
-
-    HAND = 0
-    GRIPPER = 1
-    FREE = 2
-
-
-@dataclass(frozen=True, kw_only=True)
-class Params:
-    """Where the ball is offered, how still, and when it changes hands; all assumed but the place's surroundings."""
-
-    p_WO_0: Vector3[Metre] = parameter(
-        np.array([0.18, 0.0, -0.60]), "where the ball is offered, in the world", minimum=-2.0, maximum=2.0
-    )
-    p_OH: Vector3[Metre] = parameter(
-        np.array([0.0, 0.0, -0.04]), "middle of the palm seen from the ball, in the world", minimum=-0.2, maximum=0.2
-    )
-    ball_mass: Kilogram = parameter(0.02, "mass of the ball", minimum=0.0, maximum=1.0)
-    gravity: MetrePerSecond2 = parameter(9.81, "gravity, along -z of the world", minimum=0.0, maximum=30.0)
-    tremor_rms: Metre = parameter(0.001, "root mean square length of the tremor", minimum=0.0, maximum=0.05)
-    tremor_frequency: Hertz = parameter(8.0, "middle of the tremor's band", minimum=0.1, maximum=50.0)
-    tremor_bandwidth: Hertz = parameter(2.0, "width of the tremor's band at half power", minimum=0.01, maximum=50.0)
-    drift_rms: Metre = parameter(0.003, "root mean square length of the drift", minimum=0.0, maximum=0.1)
-    drift_time: Second = parameter(5.0, "correlation time of the drift", minimum=0.1, maximum=1000.0)
-    capture_lateral: Metre = parameter(
-        0.03, "how far beside the gripper's axis the fingers get hold of the ball", minimum=0.0, maximum=0.2
-    )
-    capture_axial: Metre = parameter(
-        0.03, "how far along the axis from the gripper's point they do", minimum=0.0, maximum=0.2
-    )
-    capture_grip: Number = parameter(0.95, "closure from which the gripper holds", minimum=0.0, maximum=1.0)
-    release_grip: Number = parameter(0.5, "closure below which the gripper lets fall", minimum=0.0, maximum=1.0)
-    withdrawal: Metre = parameter(0.15, "how far the hand withdraws", minimum=0.0, maximum=1.0)
-    withdrawal_time: Second = parameter(1.0, "how long that takes", minimum=0.01, maximum=60.0)
-    floor: Metre = parameter(-1.2, "height at which a fallen ball rests", minimum=-100.0, maximum=2.0)
-    guide_stiffness: NewtonPerMetre = parameter(
-        0.0, "stiffness with which a person draws the gripper to the ball", minimum=0.0, maximum=1000.0
-    )
-    guide_damping: NewtonSecondPerMetre = parameter(
-        2.0, "damping of the guided gripper, where there is guidance", minimum=0.0, maximum=100.0
-    )
-    guide_force_max: Newton = parameter(5.0, "largest force of guidance", minimum=0.0, maximum=50.0)
-    seed: int = parameter(0, "seed of the random numbers", minimum=0)
-
-    def check(self) -> None:
-        """Raise InvalidPartnerParameters, with all faults, if values contradict each other."""
-        faults: list[str] = []
-        if not self.tremor_bandwidth < 2.0 * self.tremor_frequency:
-            faults.append(
-                f"tremor_bandwidth {self.tremor_bandwidth:g} Hz must be less than twice tremor_frequency "
-                f"{self.tremor_frequency:g} Hz"
-            )
-        if not self.release_grip < self.capture_grip:
-            faults.append(
-                f"release_grip {self.release_grip:g} must be less than capture_grip {self.capture_grip:g}, or the ball "
-                "falls when it is taken"
-            )
-        if not self.floor < self.p_WO_0[2]:
-            faults.append(f"floor {self.floor:g} m must lie below the offered ball, {self.p_WO_0[2]:g} m")
-        if faults:
-            raise InvalidPartnerParameters(faults)
-
-
-@dataclass(kw_only=True)
-class Inputs:
-    """What the gripper does."""
-
-    p_WG: Vector3[Metre] = port(np.array([0.0, 0.0, -0.7]), "position of the gripper in the world")
-    q_WG: Vector4[Number] = port(np.array([0.0, 1.0, 0.0, 0.0]), "orientation of the gripper in the world")
-    grip: Number = port(0.0, "closure of the gripper: 0 open, 1 closed", minimum=0.0, maximum=1.0)
-
-
-@dataclass(kw_only=True)
-class Outputs:
-    """Where ball and hand are, in the world, and what the gripper feels of them."""
-
-    p_WO: Vector3[Metre] = output("position of the ball")
-    p_WH: Vector3[Metre] = output("position of the middle of the palm")
-    f_G: Vector3[Newton] = output("force on the gripper, in the world: guidance, then the ball's weight")
-    holder: Holder = output("who holds the ball")
+_NEAR = 0.12
+"""Distance of the gripper from the ball beyond which it touches neither ball nor hand, m."""
+_LOST = 0.05
+"""How long nothing may touch the ball before nobody holds it, s: it may jump a little."""
 
 
 class HandoverPartner:
     """Offers a ball in a hand that trembles, until a closed gripper has it, after [Vervloet2025] sec. 3.5.
 
-    - HAND: the ball is at p_WO_0 plus `HandTremor`. If guide_stiffness k > 0, a person leads the gripper to it, with
-      f_G = k (p_WO - p_WG) - c v_WG cut at guide_force_max, v_WG from the last two positions. Forces trail positions by
-      a step: with the arm, at 20 ms, k from 10 to 50 N/m is calm with c = 2 N s/m, and swings up with c = 0 or 4.
-    - GRIPPER, once grip >= capture_grip with the ball between the fingers: p_GO, seen from the gripper's frame G whose
-      z points along its axis to its tip, is at most capture_lateral beside that axis and capture_axial along it. The
-      ball keeps its place in G, f_G is its weight (its inertia and its lever about G are left out), and the hand
-      withdraws, outwards from the arm's axis and down. A ball beside the fingers stays in the hand.
-    - FREE, once grip < release_grip: the ball falls with the velocity that it had, and rests on the floor.
+    The hand is at p_WO_0 plus `HandTremor`, and moves to p_WO_1 in a minimum-jerk course if move_for > 0. The ball lies
+    still in its palm, held with hold_force, until the gripper comes near; from then on ball, hand, and the gripper's
+    fingers and palm are bodies, and what they touch with moves them (`ball_contact`): nothing but contact holds the
+    ball.
 
-    The conditions are judged at the beginning of a step, with inputs and ball of the same instant, and the outputs at
-    its end follow from the inputs held during it. Force and ball therefore trail the gripper by one step.
+    If guide_stiffness k > 0, a person leads the gripper to the ball: see `Guidance`; v_WG is from the last two
+    positions.
+
+    With help_speed > 0 the person brings the ball to G, in a straight line, while a gripper that is near closes.
+
+    The person lets go once the gripper has looked closed (grip >= closed_grip) and its fingers have pressed on the ball
+    with felt_grasp in all, both for reaction_time: first thumb and fingers, within release_time, then the hand
+    withdraws outwards from the arm's axis and down. Pressed with more than force_max, the person does the same at once.
+
+    - HAND: the hand touches the ball, or has within the last 50 ms.
+    - GRIPPER: the gripper does, and the hand does not.
+    - FREE: neither. From then on the ball falls with the velocity that it had, and nobody catches it. Where there is a
+      `Bowl` and its centre comes through the rim's plane within the rim, it rolls in there until it rests; else it
+      rests on the floor, whatever is in its way.
+
+    The gripper's motion in a step is taken as even between the inputs of the step before and those of this one. Forces,
+    ball and hand therefore trail the gripper by one step: with the arm, contacts are calm at 10 ms, where 5 ms gives
+    the same, and throw the ball about at 20 ms; guidance is calm with k from 10 to 50 N/m and c = 2 N s/m.
 
     Raises:
         InvalidPartnerParameters: by the constructor, for parameters that contradict each other.
@@ -149,83 +67,145 @@ class HandoverPartner:
             params.seed,
         )
         self._holder = Holder.HAND
+        self._help: Floats = np.zeros(3)  # how far the person has brought the ball to the gripper
+        self._place: Floats = np.array(params.p_WO_0, dtype=np.float64)  # where the ball is held out, without tremor
         self._p_WO: Floats = np.array(params.p_WO_0, dtype=np.float64)
         self._v_WO: Floats = np.zeros(3)
-        self._p_GO: Floats = np.zeros(3)
+        self._is_touched = False  # whether the gripper has come so near that the ball moves by contact
+        self._ball = HeldBall(params)
+        self._ball.lie(self._p_WO, self._v_WO)
+        self._felt = 0.0  # how long the person has felt a closed gripper's grasp, s
+        self._is_let_go = False
+        self._withdrawing = 0.0  # seconds since then
+        self._untouched = np.zeros(2)  # how long hand and gripper have not touched the ball, s
         self._f_G: Floats = np.zeros(3)
-        self._withdrawing = 0.0  # seconds since the hand let go
+        self._f_H: Floats = np.array([0.0, 0.0, -params.ball_mass * params.gravity])
+        self._guidance = Guidance(
+            GuidanceGains(
+                stiffness=params.guide_stiffness,
+                damping=params.guide_damping,
+                force_max=params.guide_force_max,
+                height=params.guide_height,
+                speed=params.guide_speed,
+            )
+        )
+        self._bowl = Bowl(params.p_WB, params.bowl_radius, params.bowl_depth, params.ball_radius)
+        self._in_bowl = False
         self._p_WG: Floats | None = None  # at the previous step
         self._elapsed = 0.0  # length of that step, s
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return where ball and hand are; no time passes."""
-        return Outputs(p_WO=np.array(self._p_WO), p_WH=self._palm(), f_G=np.array(self._f_G), holder=self._holder)
+        return Outputs(
+            p_WO=np.array(self._p_WO),
+            p_WH=self._held() + self._ball.displacement + self._params.p_OH,
+            f_G=np.array(self._f_G),
+            f_H=np.array(self._f_H),
+            holder=self._holder,
+        )
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Advance from t by dt with u held."""
-        self._change_holder(u)
         self._tremor.advance(dt)
-        if self._holder is not Holder.HAND:
+        if self._is_let_go:
             self._withdrawing += dt
-        {Holder.HAND: self._offer, Holder.GRIPPER: self._carry, Holder.FREE: self._fall}[self._holder](dt, u)
+        else:
+            self._place = self._offered_at(t + dt) + self._helped(dt, u)
+        self._is_touched = self._is_touched or bool(np.linalg.norm(u.p_WG - self._p_WO) < _NEAR)
+        if self._holder is Holder.FREE:
+            self._fall(dt)
+        elif self._is_touched:
+            self._touch(dt, u)
+        else:
+            before, self._p_WO = self._p_WO, self._held()
+            self._ball.lie(self._p_WO, (self._p_WO - before) / dt)
+            self._f_G = np.zeros(3)
+        if self._holder is Holder.HAND and not self._is_let_go:
+            v_WG = np.zeros(3) if self._p_WG is None else (u.p_WG - self._p_WG) / self._elapsed
+            self._f_G = self._f_G + self._guidance.force(self._p_WO, u.p_WG, v_WG, dt)
         self._p_WG, self._elapsed = np.array(u.p_WG), dt
         return self.outputs(t + dt, u)
 
     def get_state(self) -> bytes:
         """Return the complete state."""
-        arrays = (self._p_WO, self._v_WO, self._p_GO, self._f_G, self._p_WG)
-        times = (self._withdrawing, self._elapsed)
-        return pack_state((self._tremor.get_state(), int(self._holder), arrays, times))
+        arrays = (self._help, self._place, self._p_WO, self._v_WO, self._f_G, self._f_H, self._untouched, self._p_WG)
+        times = (self._felt, self._withdrawing, self._elapsed)
+        flags = (self._is_touched, self._is_let_go, self._in_bowl)
+        parts = (self._tremor.get_state(), self._guidance.get_state(), self._ball.get_state())
+        return pack_state((parts, int(self._holder), flags, arrays, times))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this partner or of one with equal parameters."""
-        tremor, holder, arrays, (self._withdrawing, self._elapsed) = unpack_state(state)
+        (tremor, guidance, ball), holder, flags, arrays, times = unpack_state(state)
         self._tremor.set_state(tremor)
+        self._guidance.set_state(guidance)
+        self._ball.set_state(ball)
         self._holder = Holder(holder)
-        self._p_WO, self._v_WO, self._p_GO, self._f_G, self._p_WG = arrays
+        self._is_touched, self._is_let_go, self._in_bowl = flags
+        self._help, self._place, self._p_WO, self._v_WO, self._f_G, self._f_H, self._untouched, self._p_WG = arrays
+        self._felt, self._withdrawing, self._elapsed = times
 
-    def _change_holder(self, u: Inputs) -> None:
+    def _touch(self, dt: float, u: Inputs) -> None:
         p = self._params
-        if self._holder is Holder.HAND and u.grip >= p.capture_grip:
-            p_GO = np.transpose(rotation_of(u.q_WG)) @ (self._p_WO - u.p_WG)
-            if np.hypot(p_GO[0], p_GO[1]) <= p.capture_lateral and abs(p_GO[2]) <= p.capture_axial:
-                self._holder = Holder.GRIPPER
-                self._p_GO = p_GO
-        elif self._holder is Holder.GRIPPER and u.grip < p.release_grip:
-            self._holder = Holder.FREE
+        contact = self._ball.move(bodies(u.p_WG, rotation_of(u.q_WG), u.grip), self._held(), self._pressing(), dt)
+        self._p_WO, self._v_WO = self._ball.p_WO, self._ball.v_WO
+        self._f_G, self._f_H = contact.f_G, contact.f_H
+        is_felt = u.grip >= p.closed_grip and contact.by_gripper >= p.felt_grasp
+        self._felt = self._felt + dt if is_felt else 0.0
+        is_pressed = float(np.linalg.norm(contact.f_H)) > p.force_max
+        self._is_let_go = self._is_let_go or is_pressed or (is_felt and self._felt >= p.reaction_time)
+        touches = np.array([contact.by_hand > 0.0, contact.by_gripper > 0.0])
+        self._untouched = np.where(touches, 0.0, self._untouched + dt)
+        by_hand, by_gripper = self._untouched < _LOST
+        self._holder = Holder.HAND if by_hand else Holder.GRIPPER if by_gripper else Holder.FREE
 
-    def _offer(self, dt: float, u: Inputs) -> None:  # noqa: ARG002
-        self._p_WO = self._params.p_WO_0 + self._tremor.displacement
-        self._f_G = self._guidance(u.p_WG)
-
-    def _carry(self, dt: float, u: Inputs) -> None:
-        p_WO = u.p_WG + rotation_of(u.q_WG) @ self._p_GO
-        self._v_WO = (p_WO - self._p_WO) / dt
-        self._p_WO = p_WO
-        self._f_G = np.array([0.0, 0.0, -self._params.ball_mass * self._params.gravity])
-
-    def _fall(self, dt: float, u: Inputs) -> None:  # noqa: ARG002
+    def _fall(self, dt: float) -> None:
         g = np.array([0.0, 0.0, -self._params.gravity])
-        self._p_WO = self._p_WO + dt * self._v_WO + dt**2 / 2.0 * g
+        before = self._p_WO
+        self._p_WO = before + dt * self._v_WO + dt**2 / 2.0 * g
         self._v_WO = self._v_WO + dt * g
+        if self._params.bowl_radius > 0.0:
+            is_below = self._p_WO[2] < self._params.p_WB[2]
+            self._in_bowl = is_below and (self._in_bowl or self._bowl.catches(before, self._p_WO))
+        if self._in_bowl:
+            self._p_WO, self._v_WO = self._bowl.roll(self._p_WO, self._v_WO, dt)
         if self._p_WO[2] <= self._params.floor:
             self._p_WO[2] = self._params.floor
             self._v_WO = np.zeros(3)
-        self._f_G = np.zeros(3)
+        self._f_G, self._f_H = np.zeros(3), np.zeros(3)
 
-    def _guidance(self, p_WG: Floats) -> Floats:
+    def _offered_at(self, t: float) -> Floats:
+        """Return where the hand holds the ball out, without tremor."""
         p = self._params
-        if p.guide_stiffness == 0.0:
-            return np.zeros(3)
-        v_WG = np.zeros(3) if self._p_WG is None else (p_WG - self._p_WG) / self._elapsed
-        f = p.guide_stiffness * (self._p_WO - p_WG) - p.guide_damping * v_WG
-        return f * min(1.0, p.guide_force_max / max(float(np.linalg.norm(f)), 1e-12))
+        if p.move_for == 0.0:
+            return p.p_WO_0
+        return p.p_WO_0 + _minimum_jerk((t - p.move_from) / p.move_for) * (p.p_WO_1 - p.p_WO_0)
 
-    def _palm(self) -> Floats:
-        """Return p_WH: at the ball's place while it is offered, then withdrawing along a minimum-jerk course."""
+    def _helped(self, dt: float, u: Inputs) -> Floats:
+        """Return how far the person brings the ball to the gripper, evenly in a straight line while that closes."""
+        p, way = self._params, u.p_WG - self._place
+        distance = float(np.linalg.norm(way))
+        if p.help_speed > 0.0 and u.grip > 0.0 and 0.0 < distance < p.help_within:
+            self._help = self._help + min(1.0, p.help_speed * dt / distance) * way
+        return self._help
+
+    def _pressing(self) -> float:
+        """Return the force with which the person presses the ball to the palm, N: evenly less once it is let go."""
         p = self._params
-        outwards = np.array([p.p_WO_0[0], p.p_WO_0[1], 0.0])
+        if not self._is_let_go:
+            return p.hold_force
+        return p.hold_force * max(0.0, 1.0 - self._withdrawing / p.release_time) if p.release_time > 0.0 else 0.0
+
+    def _held(self) -> Floats:
+        """Return where a ball would lie in the hand: held out, or withdrawing along a minimum-jerk course."""
+        p = self._params
+        outwards = np.array([self._place[0], self._place[1], 0.0])
         away = outwards / max(float(np.linalg.norm(outwards)), 1e-9) - np.array([0.0, 0.0, 1.0])
-        s = min(self._withdrawing / p.withdrawal_time, 1.0)
-        course = p.withdrawal * (10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5)
-        return p.p_WO_0 + self._tremor.displacement + p.p_OH + course * away / np.linalg.norm(away)
+        course = p.withdrawal * _minimum_jerk((self._withdrawing - p.release_time) / p.withdrawal_time)
+        return self._place + self._tremor.displacement + course * away / np.linalg.norm(away)
+
+
+def _minimum_jerk(s: float) -> float:
+    """Return the part of the way at a part of the time; 0 before and 1 after it."""
+    s = min(max(s, 0.0), 1.0)
+    return 10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5
