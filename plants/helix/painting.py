@@ -5,6 +5,7 @@ twice the picture's resolution.
 """
 
 import functools
+import math
 from collections.abc import Sequence
 
 import cv2
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
+from handover.plants.helix.polygon_filling import SHIFT, Polygons, fill
 from handover.plants.helix.shapes import Decal, Pixels, PolygonLayer
 
 _WALL = 1.7  # m; x of a wall opposite the cameras
@@ -28,15 +30,19 @@ class Backdrop:
     Attributes:
         plain: the room as a sharp lens under even light would show it, shape (height, width, 3).
         seen: the same through the lens.
+        reach: how far the blur of a pixel reaches, in px.
 
     Args:
         camera: whose view it is.
         width, height: size of the picture in px.
         blur: standard deviation of the lens's blur, in px.
         gradient: relative difference of brightness between the picture's lit and its unlit corner.
+        light: brightness over that of the colours.
     """
 
-    def __init__(self, camera: Pinhole, width: int, height: int, blur: float, gradient: float) -> None:
+    def __init__(self, camera: Pinhole, width: int, height: int, blur: float, gradient: float, light: float) -> None:
+        self._light = light
+        self.reach = int(np.ceil(2.5 * blur))
         self._blur = blur
         self._gain = _gain(width, height, gradient)
         self.plain = _room(camera, width, height)
@@ -45,10 +51,10 @@ class Backdrop:
     def through_lens(self, part: Pixels, x0: int, y0: int) -> Pixels:
         """Return a part of a picture, whose upper left pixel is (x0, y0), under the light's gradient, and blurred."""
         h, w = part.shape[:2]
-        lit = cv2.multiply(part, self._gain[y0 : y0 + h, x0 : x0 + w], scale=1.0 / _FULL_GAIN)
-        if self._blur == 0.0:
+        lit = cv2.multiply(part, self._gain[y0 : y0 + h, x0 : x0 + w], scale=self._light / _FULL_GAIN)
+        if self.reach == 0:
             return np.asarray(lit, dtype=np.uint8)
-        side = 2 * int(np.ceil(2.5 * self._blur)) + 1
+        side = 2 * self.reach + 1
         return np.asarray(cv2.GaussianBlur(lit, (side, side), self._blur), dtype=np.uint8)
 
 
@@ -122,78 +128,151 @@ def _mottled(rows: int, columns: int, scales: tuple[int, ...], amplitude: float,
 
 
 _FINE = 2  # canvas pixels a picture pixel, each way: with the blur, edges come out smooth
-_SHIFT = 4  # fractional bits of polygon corners
 _FAR = 20000.0  # px; beyond, OpenCV's fixed point would overflow
-_MARGIN = 4  # px around what is painted; covers the blur
+_CELL = 4  # px; side of the cells in which it is noted where there are outlines
+_BAND = 72  # px; height of the bands, each of which is painted from its leftmost thing to its rightmost
+_CELL_SHIFT = SHIFT + (_FINE * _CELL).bit_length() - 1  # fractional bits of polygon corners, in cells
+_CELL_OFFSET = ((1 << _CELL_SHIFT) - (1 << SHIFT)) // 2  # from a cell's middle to that of its upper left canvas pixel
+
+Points = NDArray[np.int32]
+Part = tuple[slice, slice]
+"""Rows and columns of a picture."""
 
 
 class Canvas:
-    """Makes pictures of things before a backdrop; only the part that they touch is painted.
+    """Makes pictures of things before a backdrop; only where things are, anything is painted.
 
     Args:
         backdrop: what is behind everything, with the lens's blur and the light's gradient.
     """
 
     def __init__(self, backdrop: Backdrop) -> None:
-        self._backdrop = backdrop
+        self.backdrop = backdrop
         plain = backdrop.plain
-        fine = cv2.resize(plain, None, fx=_FINE, fy=_FINE, interpolation=cv2.INTER_NEAREST)
-        self._fine = np.asarray(fine, dtype=np.uint8)
+        height, width = plain.shape[:2]
+        self._behind = np.repeat(plain, _FINE, axis=1)[:, None]  # rows are repeated as they are copied
+        self._fine = np.empty((_FINE * height, _FINE * width, 3), dtype=np.uint8)
+        self._by_row = self._fine.reshape(height, _FINE, _FINE * width, 3)
         self._size = np.array([plain.shape[1], plain.shape[0]])
+        # what the blur reaches, and one cell more: a line may miss a cell of which it cuts a corner
+        side = 2 * (1 + math.ceil((backdrop.reach + 1) / _CELL)) + 1
+        self._around = np.ones((side, side), dtype=np.uint8)
 
-    def picture(self, layers: Sequence[PolygonLayer], decals: Sequence[Decal]) -> Pixels:
-        """Return the picture, without noise. What is partly behind the camera is left out."""
-        picture = np.array(self._backdrop.seen)
-        outlines = [s.outlines.reshape(len(s.depth), -1, 2) for s in layers] + [d.corners[None] for d in decals]
-        seen, low, high = zip(*[self._extent(points) for points in outlines], strict=True)
-        low, high = np.concatenate(low), np.concatenate(high)
-        if not len(low):
-            return picture
-        x0, y0 = np.maximum(np.floor(low.min(axis=0)).astype(int) - _MARGIN, 0).tolist()
-        x1, y1 = np.minimum(np.ceil(high.max(axis=0)).astype(int) + _MARGIN + 1, self._size).tolist()
-        fine = np.array(self._fine[_FINE * y0 : _FINE * y1, _FINE * x0 : _FINE * x1])
-        corner = np.array([x0, y0])
-        things: list[tuple[float, NDArray[np.int32] | Decal, list[list[float]]]] = []
-        for layer, s in zip(layers, seen, strict=False):
-            on_canvas = np.rint(_on_canvas(layer.outlines[s], corner) * (1 << _SHIFT)).astype(np.int32)
-            things += zip(layer.depth[s].tolist(), on_canvas, layer.colours[s].tolist(), strict=True)
-        things += [(d.depth, d, []) for d, s in zip(decals, seen[len(layers) :], strict=True) if s[0]]
-        for _, thing, colours in sorted(things, key=lambda x: -x[0]):
-            if isinstance(thing, Decal):
-                _paint_decal(fine, thing.texture, _on_canvas(thing.corners, corner))
-                continue
-            for polygon, colour in zip(thing, colours, strict=True):
-                cv2.fillConvexPoly(fine, polygon, colour, cv2.LINE_8, _SHIFT)
-        coarse = cv2.resize(fine, (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
-        picture[y0:y1, x0:x1] = self._backdrop.through_lens(np.asarray(coarse, dtype=np.uint8), x0, y0)
-        return picture
+    def paint(self, layers: Sequence[PolygonLayer], decals: Sequence[Decal]) -> list[tuple[Part, Pixels]]:
+        """Return the parts of the picture where it is not the backdrop, as the lens sees them, without noise.
 
-    def _extent(self, points: Floats) -> tuple[NDArray[np.bool_], Floats, Floats]:
-        """Return which things, with points (m, n, 2), are in the picture, and their smallest and largest pixels."""
-        by_axis = np.ascontiguousarray(np.moveaxis(points, 2, 0))  # (2, m, n): much faster to reduce
-        low, high = np.transpose(by_axis.min(axis=2)), np.transpose(by_axis.max(axis=2))
-        seen = np.all((high >= 0.0) & (low < self._size) & (high < _FAR) & (low > -_FAR), axis=1)
-        return seen, low[seen], high[seen]
+        What is partly behind the camera is left out.
+        """
+        squares = PolygonLayer(
+            np.array([d.depth for d in decals]),
+            np.array([d.corners for d in decals]).reshape(-1, 4, 2),
+            np.empty((0, 3)),
+            np.full(len(decals), True),
+        )
+        things = [*layers, squares]
+        counts = [np.full(len(x.depth), x.outlines.shape[1]) for x in things]
+        first = np.cumsum(np.concatenate([[0], *counts]))
+        with np.errstate(invalid="ignore"):  # what is not finite is not in sight, either
+            corners = np.rint(_on_canvas(np.concatenate([x.outlines.reshape(-1, 2) for x in things])) * (1 << SHIFT))
+            fixed = corners.astype(np.int32)
+            colours = np.rint(np.concatenate([x.colours for x in things])).astype(np.uint8)
+        seen, inside = self._in_sight([x.outlines for x in things])
+        outer = np.concatenate([x.outer for x in things]) & seen
+        in_cells = fixed - _CELL_OFFSET
+        painted = self._parts(
+            [in_cells[first[i] : first[i + 1]] for i in np.flatnonzero(outer & inside).tolist()],
+            [in_cells[first[i] : first[i + 1]] for i in np.flatnonzero(outer & ~inside).tolist()],
+        )
+        wide = [self._widened(part) for part in painted]
+        for rows, columns in wide:
+            fine = slice(_FINE * columns.start, _FINE * columns.stop)
+            self._by_row[rows, :, fine] = self._behind[rows, :, fine]
+        polygons, n = Polygons(fixed, first, colours), len(colours)
+        depths = np.concatenate([x.depth for x in things])
+        shown = np.flatnonzero(seen)
+        order = shown[np.argsort(-depths[shown], kind="stable")]
+        start = 0
+        for place in np.flatnonzero(order >= n).tolist():
+            fill(self._fine, polygons, order[start:place])
+            decal = decals[int(order[place]) - n]
+            _paint_decal(self._fine, decal.texture, _on_canvas(decal.corners))
+            start = place + 1
+        fill(self._fine, polygons, order[start:])
+        return [(part, self._exposed(part, *area)) for part, area in zip(painted, wide, strict=True)]
+
+    def _exposed(self, part: Part, rows: slice, columns: slice) -> Pixels:
+        """Return a part of the picture, from that part of the canvas on which it depends."""
+        fine = self._fine[_FINE * rows.start : _FINE * rows.stop, _FINE * columns.start : _FINE * columns.stop]
+        size = (columns.stop - columns.start, rows.stop - rows.start)
+        coarse = np.asarray(cv2.resize(fine, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        seen = self.backdrop.through_lens(coarse, columns.start, rows.start)
+        top, left = part[0].start - rows.start, part[1].start - columns.start
+        return seen[top : top + part[0].stop - part[0].start, left : left + part[1].stop - part[1].start]
+
+    def _in_sight(self, outlines: Sequence[Floats]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return which outlines, of shapes (p, n, 2) one after another, are in the picture in part, which wholly."""
+        corners = [np.ascontiguousarray(np.swapaxes(x, 0, 1)) for x in outlines]  # (n, p, 2): much faster to reduce
+        low, high = np.concatenate([x.min(axis=0) for x in corners]), np.concatenate([x.max(axis=0) for x in corners])
+        seen = (high > -1.0) & (low < self._size) & (high < _FAR) & (low > -_FAR)
+        inside = (low >= 0.0) & (high < self._size)
+        return seen[:, 0] & seen[:, 1], inside[:, 0] & inside[:, 1]
+
+    def _parts(self, inside: list[Points], crossing: list[Points]) -> list[Part]:
+        """Return the parts of the picture that things touch or lie between: one of each band, with what the blur adds.
+
+        Args:
+            inside: outlines in the picture.
+            crossing: outlines that a border of the picture cuts.
+        """
+        width, height = self._size.tolist()
+        bands = -(-height // _BAND)
+        cells = np.zeros((bands * _BAND // _CELL, -(-width // _CELL)), dtype=np.uint8)
+        cv2.polylines(cells, inside, True, (1,), 1, cv2.LINE_8, _CELL_SHIFT)
+        for outline in crossing:
+            cv2.fillConvexPoly(cells, outline, (1,), cv2.LINE_8, _CELL_SHIFT)
+        dilated = np.asarray(cv2.dilate(cells, self._around), dtype=np.uint8)
+        columns = cells.shape[1]
+        touched = np.any(dilated.reshape(bands, -1, columns), axis=1).reshape(bands, columns)
+        start = (_CELL * touched.argmax(axis=1)).tolist()
+        stop = (_CELL * (columns - touched[:, ::-1].argmax(axis=1))).tolist()
+        return [
+            (slice(_BAND * i, min(_BAND * (i + 1), height)), slice(start[i], min(stop[i], width)))
+            for i in np.flatnonzero(np.any(touched, axis=1)).tolist()
+        ]
+
+    def _widened(self, part: Part) -> Part:
+        """Return a part with all that its blur depends on."""
+        width, height = self._size.tolist()
+        rows, columns = part
+        reach = self.backdrop.reach
+        return (
+            slice(max(rows.start - reach, 0), min(rows.stop + reach, height)),
+            slice(max(columns.start - reach, 0), min(columns.stop + reach, width)),
+        )
 
 
-def _on_canvas(pixels: Floats, corner: NDArray[np.int64]) -> Floats:
+def _on_canvas(pixels: Floats) -> Floats:
     """Return canvas pixels; whole coordinates are centres of pixels in both pictures."""
-    return (pixels - corner + 0.5) * _FINE - 0.5
+    return (pixels + 0.5) * _FINE - 0.5
 
 
 def _paint_decal(fine: Pixels, texture: Pixels, corners: Floats) -> None:
     """Warp a texture onto the canvas and blend it in."""
     height, width = fine.shape[:2]
-    x0, y0 = np.clip(np.floor(corners.min(axis=0)).astype(int), 0, [width, height]).tolist()
-    x1, y1 = np.clip(np.ceil(corners.max(axis=0)).astype(int) + 1, 0, [width, height]).tolist()
+    us, vs = np.transpose(corners).tolist()
+    x0, y0 = max(math.floor(min(us)), 0), max(math.floor(min(vs)), 0)
+    x1, y1 = min(math.ceil(max(us)) + 1, width), min(math.ceil(max(vs)) + 1, height)
     if x1 <= x0 or y1 <= y0:
         return
-    h, w = texture.shape[:2]
-    source = np.array([[0, 0], [w, 0], [w, h], [0, h]], dtype=np.float32) - np.float32(
-        0.5
-    )  # corners of the area, not centres of pixels
-    H = cv2.getPerspectiveTransform(source, (corners - [x0, y0]).astype(np.float32))
+    H = cv2.getPerspectiveTransform(_texture_corners(*texture.shape[:2]), (corners - (x0, y0)).astype(np.float32))
     warped = cv2.warpPerspective(texture, H, (x1 - x0, y1 - y0), flags=cv2.INTER_LINEAR)
+    through = cv2.cvtColor(cv2.bitwise_not(cv2.extractChannel(warped, 3)), cv2.COLOR_GRAY2BGR)
     patch = fine[y0:y1, x0:x1]
-    through = 255 - np.asarray(warped[..., 3:], dtype=np.uint16)
-    patch[:] = (patch * through + 127) // 255 + warped[..., :3]
+    behind = cv2.multiply(patch, through, scale=1.0 / 255.0)
+    patch[:] = cv2.add(behind, cv2.cvtColor(warped, cv2.COLOR_BGRA2BGR))
+
+
+@functools.cache
+def _texture_corners(height: int, width: int) -> NDArray[np.float32]:
+    """Return the corners of a texture's area, not the middles of its pixels."""
+    return np.array([[0, 0], [width, 0], [width, height], [0, height]], dtype=np.float32) - np.float32(0.5)

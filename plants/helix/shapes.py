@@ -1,9 +1,10 @@
 """What is painted: polygons and decals in a picture's pixels, with their depths and shades.
 
-`Limb`s are chains of round rods with rounded ends. `hand` and `gripper` are made of them: a person's hand that offers a
+`Limbs` are chains of round rods with rounded ends. `hand` and `gripper` are made of them: a person's hand that offers a
 ball on its fingers, and a stem with three jointed fingers that close on what is at G.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
+from handover.plants.helix.gripper_fingers import FINGERS, KNUCKLE, finger_joints
 
 Pixels = NDArray[np.uint8]
 """Picture or part of one, shape (h, w, 3), blue, green, red; a decal's texture has a fourth channel, its opacity."""
@@ -19,17 +21,19 @@ Pixels = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class PolygonLayer:
-    """Things made of convex polygons: m things, each of k polygons with n corners, painted in this order.
+    """Convex polygons, p of them with n corners each.
 
     Attributes:
-        depth: shape (m,), in m; a thing hides what is deeper.
-        outlines: shape (m, k, n, 2), in px; a thing with a point that is not finite is left out.
-        colours: shape (m, k, 3), blue, green, red, 0 to 255.
+        depth: shape (p,), in m; a polygon hides what is deeper, and of the same depth what comes before it.
+        outlines: shape (p, n, 2), in px; a polygon with a corner that is not finite is left out.
+        colours: shape (p, 3), blue, green, red, 0 to 255.
+        outer: shape (p,); in every row of the picture, all polygons lie between the outermost of these.
     """
 
     depth: Floats
     outlines: Floats
     colours: Floats
+    outer: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -61,63 +65,112 @@ class Light:
         return Light(self.towards @ R_WC, self.ambient)
 
 
+@dataclass(frozen=True)
+class Limbs:
+    """Chains of three points, m of them, each of which has two rods; one that has only one has its last point twice.
+
+    Attributes:
+        points: p_WP, shape (m, 3, 3), in m.
+        radii: at each point, shape (m, 3), in m.
+        colours: shape (m, 3), blue, green, red, 0 to 255.
+    """
+
+    points: Floats
+    radii: Floats
+    colours: Floats
+
+
+def rods(ends: Floats, radii: Floats, colours: Floats) -> Limbs:
+    """Return straight limbs, from their ends, shape (m, 2, 3), in m, and the radii there, shape (m, 2), in m."""
+    return Limbs(ends[:, [0, 1, 1]], radii[:, [0, 1, 1]], colours)
+
+
+def together(*limbs: Limbs) -> Limbs:
+    """Return all these limbs."""
+    return Limbs(
+        np.concatenate([x.points for x in limbs]),
+        np.concatenate([x.radii for x in limbs]),
+        np.concatenate([x.colours for x in limbs]),
+    )
+
+
 _ARC = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 9)
+_HALF_CIRCLE = np.column_stack([np.cos(_ARC), np.sin(_ARC)])
 _OFFSETS = np.linspace(0.0, 0.9, 6)  # where the shade changes, from the silhouette to the brightest line
 _RIM = 0.62  # brightness of a surface seen edge-on over one seen face-on, under the same light
 
 
-@dataclass(frozen=True)
-class Limb:
-    """Three points p_WP, shape (3, 3), and the radius at each, shape (3,), in m; blue, green, red, 0 to 255."""
-
-    points: Floats
-    radii: Floats
-    colour: tuple[float, float, float]
-
-
-def rod(start: Floats, end: Floats, radii: tuple[float, float], colour: tuple[float, float, float]) -> Limb:
-    """Return a straight limb."""
-    return Limb(np.array([start, end, end]), np.array([radii[0], radii[1], radii[1]]), colour)
-
-
-def polygons(limbs: Sequence[Limb], camera: Pinhole, light: Light) -> PolygonLayer:
-    """Return the limbs, each at the depth of its middle.
+class ShadedLimbs:
+    """Limbs as cameras see them.
 
     A limb is filled several times, each time smaller, brighter and nearer to the light: a cheap, smooth shading.
+
+    Args:
+        cameras: where the pictures are taken, c of them.
+        light: that shines on them.
     """
-    points, radii = np.array([x.points for x in limbs]), np.array([x.radii for x in limbs])
-    depth = camera.depth(points)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        middle, radius = camera.project(points), radii * camera.f[0] / depth  # (m, 3, 2), (m, 3)
-    lit = light.in_camera_frame(camera.R_WC)
-    side = lit.towards[:2]
-    normals = np.column_stack([_OFFSETS[:, None] * side, np.zeros(len(_OFFSETS))])
-    normals[:, 2] = -np.sqrt(1.0 - (normals**2).sum(axis=1))
-    shades = lit.shade(normals) * (_RIM + (1.0 - _RIM) * np.sqrt(_OFFSETS))
-    moved = middle[:, None] + 0.55 * (_OFFSETS[:, None] * radius[:, None])[..., None] * side  # (m, shades, 3, 2)
-    outlines = _outlines(moved, radius[:, None] * (1.0 - _OFFSETS)[:, None])
-    colours = np.minimum(np.array([x.colour for x in limbs])[:, None] * shades[:, None], 255.0)
-    m, k = outlines.shape[:2]
-    return PolygonLayer(depth.mean(axis=1), outlines.reshape(m, 2 * k, -1, 2), np.repeat(colours, 2, axis=1))
+
+    def __init__(self, cameras: Sequence[Pinhole], light: Light) -> None:
+        self._focal_length = np.array([[[camera.f[0]]] for camera in cameras])
+        lights = [light.in_camera_frame(camera.R_WC) for camera in cameras]
+        side = np.array([x.towards[:2] for x in lights])
+        self._aside = 0.55 * _OFFSETS[:, None] * side[:, None, None]  # (c, 1, shades, 2), in radii
+        normals = np.empty((len(cameras), len(_OFFSETS), 3))
+        normals[..., :2] = _OFFSETS[:, None] * side[:, None]
+        normals[..., 2] = -np.sqrt(1.0 - (normals[..., :2] ** 2).sum(axis=2))
+        rim = _RIM + (1.0 - _RIM) * np.sqrt(_OFFSETS)
+        self._shades = np.array([x.shade(n) * rim for x, n in zip(lights, normals, strict=True)])
+
+    def polygons(self, limbs: Limbs, pixels: Floats, depth: Floats) -> list[PolygonLayer]:
+        """Return, for each camera, limbs each at the depth of its middle.
+
+        A rod without length is left out: it would be a disc, with which the limb's other rod ends anyway.
+
+        Args:
+            limbs: m of them.
+            pixels: at which their points are seen, shape (c, m, 3, 2).
+            depth: of these, shape (c, m, 3), in m.
+        """
+        limb, rod = np.nonzero(np.any(limbs.points[:, 1:] != limbs.points[:, :-1], axis=2))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            radius = limbs.radii * self._focal_length / depth
+        ends: list[Floats] = []
+        for k in (0, 1):
+            r = radius[:, limb, rod + k, None]
+            ends += [pixels[:, limb, rod + k, None] + r[..., None] * self._aside, r * (1.0 - _OFFSETS)]
+        outlines = _outlines(*ends)  # (c, rods, shades, 18, 2)
+        n = len(_OFFSETS)
+        of, shade = np.repeat(limb, n), np.tile(np.arange(n), len(limb))
+        order = np.lexsort((shade, of))  # both rods of a limb in one shade, then in the next
+        of, shade = of[order], shade[order]
+        outlines = outlines.reshape(len(outlines), -1, *outlines.shape[3:])[:, order]
+        colours = np.minimum(limbs.colours[of] * self._shades[:, shade, None], 255.0)
+        depths = depth.mean(axis=2)[:, of]
+        return [PolygonLayer(d, o, c, shade == 0) for d, o, c in zip(depths, outlines, colours, strict=True)]
 
 
-def _outlines(points: Floats, radius: Floats) -> Floats:
-    """Return the outlines, shape (m, k, 2, 18, 2), of the rods between neighbours: half a circle about either end."""
-    along = points[..., 1:, :] - points[..., :-1, :]
-    angle = np.arctan2(along[..., 1], along[..., 0])[..., None]
-    angle, radius = np.concatenate([angle + _ARC, angle + np.pi + _ARC], axis=-1), radius[..., None]
-    n = len(_ARC)
-    r = np.concatenate([np.repeat(radius[..., 1:, :], n, axis=-1), np.repeat(radius[..., :-1, :], n, axis=-1)], axis=-1)
-    ends = [points[..., 1:, None, :], points[..., :-1, None, :]]
-    centres = np.concatenate([np.repeat(end, n, axis=-2) for end in ends], axis=-2)
-    return centres + r[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+def _outlines(start: Floats, r_start: Floats, end: Floats, r_end: Floats) -> Floats:
+    """Return the outlines, shape (..., 18, 2), of rods with ends of shape (..., 2): half a circle about either end."""
+    along = end - start
+    length = np.sqrt((along**2).sum(axis=-1, keepdims=True))
+    x = np.where(length > 0.0, along / np.where(length > 0.0, length, 1.0), [1.0, 0.0])[..., None, :]
+    y = np.stack([-x[..., 1], x[..., 0]], axis=-1)
+    out = _HALF_CIRCLE[:, :1] * x + _HALF_CIRCLE[:, 1:] * y  # (..., 9, 2), from the end
+    outlines = [end[..., None, :] + r_end[..., None, None] * out, start[..., None, :] - r_start[..., None, None] * out]
+    return np.concatenate(outlines, axis=-2)
 
 
 _SKIN = (138.0, 164.0, 212.0)
 _SLEEVE = (112.0, 84.0, 62.0)
 _ELBOW = np.array([0.46, 0.56, -1.32])  # p_WE, m: out of the picture; the person stands opposite, to the left
+_UP = np.array([0.0, 0.0, 1.0])
 
 # In the hand's frame at H: along the fingers, across, out of the palm; m.
+_WRIST = np.array([-0.072, 0.0, -0.010])
+_PALM = [
+    [[-0.066, 0.45 * across, -0.008], [-0.030, across, -0.002], [0.028, across, -0.001]]
+    for across in (-0.031, -0.011, 0.010, 0.029)
+]
 _FINGERS = {
     "index": [[0.028, -0.033, 0.000], [0.056, -0.038, 0.006], [0.076, -0.038, 0.018]],
     "middle": [[0.032, -0.011, 0.000], [0.063, -0.012, 0.006], [0.085, -0.012, 0.019]],
@@ -125,52 +178,42 @@ _FINGERS = {
     "little": [[0.024, 0.031, 0.000], [0.047, 0.037, 0.005], [0.062, 0.039, 0.014]],
     "thumb": [[-0.034, -0.036, 0.000], [-0.012, -0.060, 0.006], [0.014, -0.064, 0.016]],
 }
+_HAND = np.array([*_PALM, *_FINGERS.values()])
+_HAND_RADII = np.array([[0.016, 0.014, 0.011]] * len(_PALM) + [[0.0105, 0.0092, 0.0078]] * len(_FINGERS))
+_HAND_COLOURS = np.array([_SKIN] * len(_HAND))
 
 
-def hand(p_WH: Floats) -> list[Limb]:
+def hand(p_WH: Floats) -> Limbs:
     """Return the limbs of a hand with the middle of its palm at H, palm up, and of its forearm."""
     reach = p_WH - _ELBOW
     level = np.array([reach[0], reach[1], 0.0])
-    forwards = level / max(float(np.linalg.norm(level)), 1e-6)
-    up = np.array([0.0, 0.0, 1.0])
-    R_HW = np.array([forwards, np.cross(up, forwards), up])
-
-    def world(points: list[list[float]]) -> Floats:
-        return p_WH + np.array(points) @ R_HW
-
-    wrist = world([[-0.072, 0.0, -0.010]])[0]
+    forwards = level / max(math.hypot(*level), 1e-6)
+    R_HW = np.array([forwards, [-forwards[1], forwards[0], 0.0], _UP])
+    wrist = p_WH + _WRIST @ R_HW
     cuff = wrist + 0.11 * (_ELBOW - wrist)
-    forearm = np.array([_ELBOW, _ELBOW, wrist])  # its middle lies nearer to the elbow: it ends inside the sleeve
-    limbs = [Limb(forearm, np.array([0.036, 0.036, 0.024]), _SKIN), rod(_ELBOW, cuff, (0.066, 0.038), _SLEEVE)]
-    for across in (-0.031, -0.011, 0.010, 0.029):
-        palm = world([[-0.066, 0.45 * across, -0.008], [-0.030, across, -0.002], [0.028, across, -0.001]])
-        limbs.append(Limb(palm, np.array([0.016, 0.014, 0.011]), _SKIN))
-    fingers = [Limb(world(finger), np.array([0.0105, 0.0092, 0.0078]), _SKIN) for finger in _FINGERS.values()]
-    return limbs + fingers
+    forearm = np.array([[_ELBOW, _ELBOW, wrist]])  # its middle lies nearer to the elbow: it ends inside the sleeve
+    return together(
+        Limbs(forearm, np.array([[0.036, 0.036, 0.024]]), np.array([_SKIN])),
+        rods(np.array([[_ELBOW, cuff]]), np.array([[0.066, 0.038]]), np.array([_SLEEVE])),
+        Limbs(p_WH + _HAND @ R_HW, _HAND_RADII, _HAND_COLOURS),
+    )
 
 
 _METAL = (86.0, 82.0, 78.0)
 _FINGER = (52.0, 50.0, 50.0)
 _TIP = (50.0, 96.0, 196.0)
-_OPEN = np.array([[0.012, -0.048], [0.042, -0.026], [0.050, 0.008]])  # from G: distance from the axis, along z_G; m
-_CLOSED = np.array([[0.012, -0.048], [0.031, -0.018], [0.026, 0.014]])
-_AZIMUTHS = np.radians([60.0, 180.0, 300.0])
+_GRIPPER_RADII = np.array(
+    [[0.007, 0.006], [0.0125, 0.0125]] + [[0.0048, 0.0042], [0.0042, 0.0038], [0.0046, 0.0042]] * FINGERS
+)
+_GRIPPER_COLOURS = np.array([_METAL, _METAL] + [_FINGER, _FINGER, _TIP] * FINGERS)
 
 
-def gripper(p_WR: Floats, p_WG: Floats, R_WG: Floats, grip: float) -> list[Limb]:
+def gripper(p_WR: Floats, p_WG: Floats, R_WG: Floats, grip: float) -> Limbs:
     """Return the limbs of a gripper at G on a wrist at R; grip is 0 when open, 1 when closed."""
     z_G = R_WG[:, 2]
-    knuckle = p_WG - 0.050 * z_G
-    limbs = [
-        rod(p_WR + 0.021 * z_G, knuckle, (0.007, 0.006), _METAL),
-        rod(knuckle - 0.004 * z_G, knuckle + 0.002 * z_G, (0.0125, 0.0125), _METAL),
-    ]
-    joints = _OPEN + min(max(grip, 0.0), 1.0) * (_CLOSED - _OPEN)
-    for azimuth in _AZIMUTHS:
-        outwards = R_WG @ np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-        root, joint, tip = p_WG + joints[:, :1] * outwards + joints[:, 1:] * z_G
-        pad = joint + 0.5 * (tip - joint)
-        limbs.append(rod(root, joint, (0.0048, 0.0042), _FINGER))
-        limbs.append(rod(joint, pad, (0.0042, 0.0038), _FINGER))
-        limbs.append(rod(pad, tip, (0.0046, 0.0042), _TIP))
-    return limbs
+    knuckle = p_WG - KNUCKLE * z_G
+    stem = [[p_WR + 0.021 * z_G, knuckle], [knuckle - 0.004 * z_G, knuckle + 0.002 * z_G]]
+    points = finger_joints(p_WG, R_WG, grip)  # (FINGERS, 3, 3): root, joint, tip
+    pad = 0.5 * (points[:, 1] + points[:, 2])
+    fingers = np.stack([points[:, 0], points[:, 1], points[:, 1], pad, pad, points[:, 2]], axis=1)
+    return rods(np.concatenate([stem, fingers.reshape(-1, 2, 3)]), _GRIPPER_RADII, _GRIPPER_COLOURS)

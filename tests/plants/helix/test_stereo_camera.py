@@ -1,9 +1,13 @@
 import hashlib
+import itertools
+import os
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -53,11 +57,16 @@ def test_declares_pictures_that_feed_through_at_30_hz():
     assert float(d.period) == pytest.approx(1 / 30)
 
 
-def test_pictures_are_the_same_in_another_process():
+@pytest.mark.parametrize("kernels", ["compiled", "not compiled", "not loaded"])
+def test_pictures_are_the_same_in_another_process_with_compiled_kernels_and_without(kernels: str):
     code = f"import sys; sys.path[:0] = [{str(HOUSE)!r}, {str(Path(__file__).parent)!r}]\n"
-    code += "import test_stereo_camera as t; print(t.digest())"
-    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert other.stdout.strip() == digest()
+    if kernels != "not loaded":
+        pytest.importorskip("numba")
+        code += "import numba\n"
+    code += "import test_stereo_camera as t; print(t.digest(), 'numba' in sys.modules)"
+    environment = {**os.environ, "HANDOVER_COMPILE": "0" if kernels == "not compiled" else "1"}
+    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    assert other.stdout.split() == [digest(), str(kernels != "not loaded")]
 
 
 def test_seeds_differ_only_in_noise(camera: StereoCamera):
@@ -158,5 +167,89 @@ def test_a_focal_length_that_is_not_positive_is_refused():
 
 
 def test_a_cover_that_ends_before_it_begins_is_refused():
-    with pytest.raises(InvalidCover, match=r"'right'.*from 3\.0 s until 2\.0 s"):
+    with pytest.raises(InvalidCover, match=r"right lens: covered from 3\.0 s until 2\.0 s"):
         StereoCamera(Params(cover_right_from=3.0, cover_right_until=2.0))
+
+
+def test_light_scales_what_is_seen_until_the_sensor_is_full(clean: StereoCamera):
+    cameras = [StereoCamera(Params(noise=0.0, light=light)) for light in (1.0, 0.5, 4.0)]
+    usual, dim, bright = (c.outputs(0.0, Inputs()).left.astype(float) for c in cameras)
+    np.testing.assert_allclose(dim, 0.5 * usual, atol=1.5)
+    assert np.count_nonzero(bright == 255) > 0.5 * bright.size
+    np.testing.assert_array_equal(usual, clean.outputs(0.0, Inputs()).left)
+
+
+def test_a_lost_picture_is_black_and_the_other_camera_s_is_not():
+    camera = StereoCamera(Params(lost_pictures=0.5, seed=2))
+    lost = [(not y.left.any(), not y.right.any()) for y in (camera.step(k / 30, 1 / 30, Inputs()) for k in range(40))]
+    assert all(10 < sum(side) < 30 for side in zip(*lost, strict=True))
+    assert any(left != right for left, right in lost)
+
+
+def test_tape_hides_the_markers_that_face_the_cameras_first():
+    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50))
+    seen: list[set[int]] = []
+    for covered in (0, 1, 3, 8):
+        y = StereoCamera(Params(covered_markers=covered)).outputs(0.0, Inputs())
+        ids: list[Any] = [detector.detectMarkers(cv2.cvtColor(p, cv2.COLOR_BGR2GRAY))[1] for p in (y.left, y.right)]
+        seen.append({int(i) for found in ids if found is not None for i in found.ravel()})
+    assert {3, 4, 5} <= seen[0]
+    assert seen[1] == seen[0] - {4}
+    assert seen[2] == seen[0] - {3, 4, 5}
+    assert seen[3] == set()
+
+
+def test_a_card_hides_the_ball_from_both_cameras_while_it_is_held():
+    camera = StereoCamera(Params(hide_ball_from=1.0, hide_ball_until=2.0))
+    pairs = [camera.outputs(t, Inputs()) for t in (0.9, 1.0, 1.9, 2.0)]
+    seen = [[green(p) > 500 for p in (y.left, y.right)] for y in pairs]
+    assert seen == [[True, True], [False, False], [False, False], [True, True]]
+
+
+def test_of_three_pictures_one_is_taken_and_repeated():
+    camera = StereoCamera(Params(decimation=3))
+    scenes = [Inputs(p_WO=np.array([0.18, 0.0, -0.62 + 0.01 * k])) for k in range(7)]
+    pictures = [camera.step(k / 30, 1 / 30, u).left for k, u in enumerate(scenes)]
+    same = [bool(np.array_equal(a, b)) for a, b in itertools.pairwise(pictures)]
+    assert same == [True, True, False, True, True, False]
+
+
+def test_a_repeated_picture_is_the_same_after_its_state_was_restored():
+    camera, other = (StereoCamera(Params(decimation=3, lost_pictures=0.2, seed=4)) for _ in range(2))
+    camera.step(0.0, 1 / 30, Inputs(grip=0.5))
+    state = camera.get_state()
+    other.set_state(state)
+    for k in range(1, 8):
+        a, b = (c.step(k / 30, 1 / 30, Inputs()) for c in (camera, other))
+        np.testing.assert_array_equal(a.left, b.left)
+        np.testing.assert_array_equal(a.right, b.right)
+
+
+def test_a_pair_is_handed_out_again_until_the_next_is_taken_and_cannot_be_changed():
+    camera = StereoCamera(Params(decimation=2))
+    first, again, second = (camera.step(k / 30, 1 / 30, Inputs()) for k in range(3))
+    assert again.left is first.left
+    assert again.right is first.right
+    assert second.left is not first.left
+    with pytest.raises(ValueError, match="read-only"):
+        second.left[0, 0] = 0
+
+
+def test_a_step_that_is_repeated_from_its_state_is_painted_once_unless_something_else_is_seen():
+    camera = StereoCamera(Params())
+    camera.step(0.0, 1 / 30, Inputs())
+    state = camera.get_state()
+    once = camera.step(1 / 30, 1 / 30, Inputs())
+    camera.set_state(state)
+    assert camera.step(1 / 30, 1 / 30, Inputs()).left is once.left
+    camera.set_state(state)
+    other = camera.step(1 / 30, 1 / 30, Inputs(grip=1.0))
+    fresh = StereoCamera(Params())
+    fresh.set_state(state)
+    assert np.any(other.left != once.left)
+    np.testing.assert_array_equal(other.left, fresh.step(1 / 30, 1 / 30, Inputs(grip=1.0)).left)
+
+
+def test_a_card_that_is_taken_away_before_it_comes_is_refused():
+    with pytest.raises(InvalidCover, match=r"ball: covered from 3.0 s until 2.0 s"):
+        StereoCamera(Params(hide_ball_from=3.0, hide_ball_until=2.0))
