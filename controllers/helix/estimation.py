@@ -72,6 +72,25 @@ class PositionFilter:
         self.position, self.covariance, self.seen = state
 
 
+def weights_of_state(A: Floats, q_sys: Floats, l_calib: Floats, fall: float) -> Floats:
+    """Return the weights A_pose_upd for a commanded state, shape (9,), as [Vervloet2025] sec. 5.4.3 suggests.
+
+    Tendons slacken the more, the longer a segment is and the more it and those above are bent, and there the arm will
+    be farther from its command. How, the thesis leaves open; here segment i's weights are
+
+        A_i / (1 + c (max(0, l_i / l_calib_i - 1) + sum of theta_j, j <= i)),  theta_j = |(d_x, d_y)_j|.
+
+    Args:
+        A: weights of a straight arm, shape (9,).
+        q_sys: commanded state, shape (9,), rad and m.
+        l_calib: lengths after calibration, shape (3,), m.
+        fall: c; 0: the weights stay as they are.
+    """
+    q = q_sys.reshape(3, 3)
+    bent = np.cumsum(np.hypot(q[:, 0], q[:, 1]))
+    return A / np.repeat(1.0 + fall * (np.maximum(0.0, q[:, 2] / l_calib - 1.0) + bent), 3)
+
+
 _STEP_TOLERANCE = 1e-7  # rad and m; the constraint is then met to the square of it
 _MAX_ITERATIONS = 60
 _EXTRAPOLATE_EVERY, _MAX_RATIO = 5, 0.9

@@ -20,7 +20,7 @@ class InvalidServoParameters(InvalidParameters):
 
 @dataclass(frozen=True, kw_only=True)
 class Params:
-    """Values of appendix A and eq. (11); a description that says own choice gives the stated value after it, if any.
+    """Values of appendix A and eq. (11); a description that says own (choice) tells the stated value, if any.
 
     The estimate lies epsilon_pose_bound off the measurement, on the command's side. A Jacobian loop that a smaller
     epsilon_control keeps iterating takes that offset back from the command, period by period. So the command does not
@@ -43,8 +43,15 @@ class Params:
     """
 
     control_period: Second = parameter(
-        0.5, "time between two updates of the command (own choice; 1.45)", minimum=0.01, maximum=60.0
+        0.5, "time between two updates of the command (own; thesis: 1.45)", minimum=0.01, maximum=60.0
     )
+    jitter: Number = parameter(
+        0.0,
+        "largest deviation of a control period, drawn evenly, as a part of it (own choice)",
+        minimum=0.0,
+        maximum=0.9,
+    )
+    seed: int = parameter(0, "seed of the jitter", minimum=0)
     alpha: Number = parameter(
         0.25, "step size: part of the way to the goal in a control period", minimum=0.0, maximum=1.0
     )
@@ -64,26 +71,39 @@ class Params:
     )
     A_pose_upd: Vector9[Number] = parameter(
         np.array([1.0, 1.0, 5.0, 1.05, 1.05, 5.25, 1.1, 1.1, 5.5]),
-        "weight of each state's distance from the command in the estimate (diagonal; own choice; lengths 1, 1.05, 1.1)",
+        "weight of each state's distance from the command in the estimate (own; thesis: lengths 1, 1.05, 1.1)",
         minimum=0.0,
     )
     K_initialize: Vector9[Number] = parameter(
         np.array([0.2, 0.2, 10.0, 0.1, 0.1, 5.0, 0.1, 0.1, 5.0]),
-        "virtual stiffness (diagonal; own choice; lengths 2, 1, 1)",
+        "virtual stiffness (diagonal; own; thesis: lengths 2, 1, 1)",
         minimum=0.0,
     )
     epsilon_pose_bound: Metre = parameter(
-        0.0001, "distance of the estimate's pose from the measured one (own choice; 0.005)", minimum=0.0
+        0.0001, "distance of the estimate's pose from the measured one (own; thesis: 0.005)", minimum=0.0
     )
-    epsilon_control: Metre = parameter(0.0001, "error at which the Jacobian loop ends (own choice; 0.005)", minimum=0.0)
+    bound_by_covariance: bool = parameter(
+        False, "that bound is the standard deviation of the filtered pose instead, sec. 5.4.3 (thesis: false)"
+    )
+    weight_fall: Number = parameter(
+        0.0,
+        "by which part of themselves A_pose_upd falls for a segment twice as long, or bent by 1 rad with those above, "
+        "sec. 5.4.3 (thesis: 0)",
+        minimum=0.0,
+        maximum=10.0,
+    )
+    epsilon_control: Metre = parameter(
+        0.0001, "error at which the Jacobian loop ends (own; thesis: 0.005)", minimum=0.0
+    )
     N_max_iter: int = parameter(20, "iterations of the Jacobian loop at most", minimum=1)
     threshold: Metre = parameter(0.05, "error at which the arm has reached the place above the ball", minimum=0.0)
-    threshold_grasp: Metre = parameter(0.003, "error at which the gripper closes (own choice; 0.05)", minimum=0.0)
+    threshold_grasp: Metre = parameter(0.003, "error at which the gripper closes (own; thesis: 0.05)", minimum=0.0)
     settle_steps: int = parameter(
-        2, "control steps in a row below threshold_grasp before the gripper closes (own choice; 1)", minimum=1
+        2, "control steps in a row below threshold_grasp before the gripper closes (own; thesis: 1)", minimum=1
     )
     judge_apart: bool = parameter(
-        True, "the error is that of the gripper's position, and its tilt is judged by itself (own choice; false)"
+        True,
+        "the error is that of the gripper's position, and its tilt is judged by itself (own; thesis: false)",
     )
     threshold_tilt: Radian = parameter(
         0.6,
@@ -106,20 +126,20 @@ class Params:
     shaping_time: Second = parameter(
         1.0,
         "time over which the command is averaged, as long as the arm swings once, so that it does not swing; 0: none "
-        "(own choice; 0)",
+        "(own; thesis: 0)",
         minimum=0.0,
         maximum=5.0,
     )
     least_response: Number = parameter(
         0.3,
         "where the arm makes a part of the commanded motion, the step is divided by it, down to this; 1: never (own "
-        "choice; 1)",
+        "choice; thesis: 1)",
         minimum=0.01,
         maximum=1.0,
     )
     posture: Number = parameter(
         0.5,
-        "part of the way to l_preferred that a control step takes where the goal leaves it open (own choice; 0)",
+        "part of the way to l_preferred that a control step takes where the goal leaves it open (own; thesis: 0)",
         minimum=0.0,
         maximum=1.0,
     )
@@ -128,12 +148,12 @@ class Params:
     )
     windup: Metre = parameter(
         0.7,
-        "largest distance of the commanded state's gripper from the estimated one's; 0: any (own choice; 0)",
+        "largest distance of the commanded state's gripper from the estimated one's; 0: any (own; thesis: 0)",
         minimum=0.0,
     )
     follow_until: Number = parameter(
         0.95,
-        "part of closing_time for which the arm follows the ball while the gripper closes (own choice; 0)",
+        "part of closing_time for which the arm follows the ball while the gripper closes (own; thesis: 0)",
         minimum=0.0,
         maximum=1.0,
     )
@@ -144,7 +164,7 @@ class Params:
     )
     lost_after: Second = parameter(
         2.5,
-        "time without ring or ball after which the arm goes back and searches; 0: it waits (own choice; 0)",
+        "time without ring or ball after which the arm goes back and searches; 0: it waits (own; thesis: 0)",
         minimum=0.0,
     )
     search_steps: int = parameter(60, "control steps of going back and searching at most (own choice)", minimum=1)
@@ -153,40 +173,50 @@ class Params:
     )
     d_grasp_offset: Metre = parameter(0.05, "height of the first goal above the ball", minimum=0.0)
     closing_time: Second = parameter(10.0, "time that the gripper is given to close", minimum=0.0)
+    delivers: bool = parameter(False, "carry the ball to p_WG_drop and let it fall there (own choice)")
+    p_WG_drop: Vector3[Metre] = parameter(
+        np.array([0.0, -0.16, -0.64]), "where the gripper lets the ball fall, in the world (own choice)"
+    )
+    carry_after: Second = parameter(
+        1.5, "time after closing for which the arm waits before it carries the ball away (own choice)", minimum=0.0
+    )
+    threshold_drop: Metre = parameter(
+        0.015, "error at which the gripper opens above the place (own; thesis: 0.05)", minimum=0.0
+    )
     patience: int = parameter(60, "control steps without progress before the arm gives up (own choice)", minimum=1)
     progress: Metre = parameter(0.001, "change of the error that is progress (own choice)", minimum=0.0)
     max_steps: int = parameter(1000, "control steps before the arm gives up (own choice)", minimum=1)
     P_init: SquareMetre = parameter(2000.0, "variance of all three filters before the first measurement", minimum=0.0)
     Q_ball: SquareMetre = parameter(
-        1e-6, "ball filter: variance that a control period adds (own choice; 0.1)", minimum=0.0
+        1e-6, "ball filter: variance that a control period adds (own; thesis: 0.1)", minimum=0.0
     )
     R_ball: SquareMetre = parameter(0.01, "ball filter: variance of a measurement, without covariances", minimum=0.0)
     Q_wrist: SquareMetre = parameter(
-        4e-5, "wrist filter: variance that a control period adds (own choice; 0.01)", minimum=0.0
+        4e-5, "wrist filter: variance that a control period adds (own; thesis: 0.01)", minimum=0.0
     )
     R_wrist: SquareMetre = parameter(0.1, "wrist filter: variance of a measurement, without covariances", minimum=0.0)
     Q_direction: SquareMetre = parameter(
-        4e-5, "gripper direction filter: variance a control period adds (own choice; 0.1)", minimum=0.0
+        4e-5, "gripper direction filter: variance a control period adds (own; thesis: 0.1)", minimum=0.0
     )
     R_direction: SquareMetre = parameter(
         0.01, "gripper direction filter: variance of a measurement, without covariances", minimum=0.0
     )
     use_covariance: bool = parameter(
-        True, "take the measurements' covariances for R (own choice; false); then Q wants to be of their size"
+        True, "take the measurements' covariances for R (own; thesis: false); then Q wants to be of their size"
     )
     ball_motion: Metre = parameter(
         0.0006,
         "standard deviation, along an axis, of a ball's tremor, which is no motion to follow (own choice)",
         minimum=0.0,
     )
-    filter_pictures: bool = parameter(True, "filter in every step, not once a control period (own choice; false)")
-    predict_motion: bool = parameter(True, "expect the arm to move as commanded (own choice; false)")
+    filter_pictures: bool = parameter(True, "filter in every step, not once a control period (own; thesis: false)")
+    predict_motion: bool = parameter(True, "expect the arm to move as commanded (own; thesis: false)")
     response_time: Second = parameter(
         0.15, "time in which most of a commanded motion comes (own choice)", minimum=0.001
     )
     gate: Number = parameter(
         8.0,
-        "standard deviations from what is expected beyond which a measurement is refused; 0: none (own choice; 0)",
+        "standard deviations from what is expected beyond which a measurement is refused; 0: none (own; thesis: 0)",
         minimum=0.0,
     )
     gate_steps: int = parameter(4, "measurements in a row that are refused before one is taken (own choice)", minimum=1)
@@ -210,6 +240,7 @@ class Params:
             "patience",
             "max_steps",
             "search_steps",
+            "threshold_drop",
             "gate_steps",
             "response_time",
             "damping",
@@ -230,10 +261,12 @@ class Params:
             "gate",
             "posture",
         ]
-        at_least_0 += ["shaping_time", "ball_motion"]
+        at_least_0 += ["shaping_time", "ball_motion", "jitter", "carry_after"]
         faults += [f"{n} = {values[n]} must not be negative" for n in at_least_0 if values[n] < 0.0]
         if not 0.0 < self.alpha <= 1.0:
             faults.append(f"alpha = {self.alpha} is outside (0, 1]")
+        if self.jitter >= 1.0:
+            faults.append(f"jitter = {self.jitter} is a part of the control period, less than 1")
         if self.least_response > 1.0:
             faults.append(f"least_response = {self.least_response} is a part, at most 1")
         return faults

@@ -27,17 +27,18 @@ class StereoRig:
     def triangulate(self, pixel_left: Floats, pixel_right: Floats) -> tuple[Floats, float]:
         """Return the point p_WP, shape (3,), nearest to the rays of two pixels, shape (2,), and the rays' distance.
 
-        It is the middle of the shortest line between the rays. NaN if the rays are parallel.
+        It is the middle of the shortest line between the rays a + s d and b + t e; |a + s d - b - t e| is least for
+        s = (c.d - (d.e) c.e) / (1 - (d.e)^2) and t = ((d.e) c.d - c.e) / (1 - (d.e)^2), with c = b - a. NaN if the rays
+        are parallel.
         """
         a, b = self.left.p_WC, self.right.p_WC
         d, e = self.left.rays(pixel_left[None])[0], self.right.rays(pixel_right[None])[0]
-        normal = np.cross(d, e)
-        squared = float(normal @ normal)
+        along, along_d, along_e = float(d @ e), float((b - a) @ d), float((b - a) @ e)
+        squared = 1.0 - along * along
         if squared < 1e-12:
             return np.full(3, np.nan), float("inf")
-        s = np.cross(b - a, e) @ normal / squared
-        t = np.cross(b - a, d) @ normal / squared
-        on_left, on_right = a + s * d, b + t * e
+        on_left = a + (along_d - along * along_e) / squared * d
+        on_right = b + (along * along_d - along_e) / squared * e
         return 0.5 * (on_left + on_right), float(np.linalg.norm(on_left - on_right))
 
 

@@ -38,10 +38,15 @@ class Tracker:
         """Position of the gripper, shape (3,), m."""
         return self.wrist.position + self.direction.position
 
+    @property
+    def pose_deviation(self) -> float:
+        """Standard deviation of the filtered pose, m: the root of the trace of the covariances of wrist and gripper."""
+        P_R, P_direction = self.wrist.covariance, self.direction.covariance
+        return math.sqrt(float(np.trace(2.0 * P_R + P_direction)))
+
     def expect(self, moved: Floats) -> None:
         """Expect the wrist and the direction to move by J dq, shape (6,), in W, m."""
-        if self._params.predict_motion:
-            self._due = self._due + moved
+        self._due = self._due + moved
 
     def advance(self, dt: float) -> None:
         """Let time pass, s; the variances grow by the part of Q that belongs to it, eq. (14)."""

@@ -1,6 +1,5 @@
 """Visual servoing of the Helix arm to a ball that a hand offers. [Vervloet2025] sec. 3.4, algorithm 3."""
 
-import enum
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from handover.controllers.helix.constant_curvature import forward_kinematics, linearise, tendon_lengths
-from handover.controllers.helix.estimation import optimise_state
+from handover.controllers.helix.delivery import Delivery, Phase, Verdict
+from handover.controllers.helix.estimation import optimise_state, weights_of_state
 from handover.controllers.helix.jacobian_control import Damping, Limits, blend, control_step, nearest_pose
 from handover.controllers.helix.recovery import Recovery
 from handover.controllers.helix.response import Response
@@ -30,29 +30,6 @@ _REACH_TOLERANCE = 0.003  # m; of the model, beyond which a goal is out of its r
 _RESPONSE_MEMORY = 1.5  # s
 _LARGEST_STEP = 0.8
 _AT_LIMIT = 1e-6  # rad, m
-
-
-class Phase(enum.IntEnum):
-    """What the arm is doing."""
-
-    WAIT = 0
-    APPROACH = 1
-    DESCEND = 2
-    GRASP = 3
-    HOLD = 4
-    GIVEN_UP = 5
-    RECOVER = 6
-
-
-class Verdict(enum.IntEnum):
-    """Why the arm has given up."""
-
-    NONE = 0
-    NO_PROGRESS = 1
-    OUT_OF_REACH = 2
-    LIMITS = 3
-    LOST_RING = 4
-    LOST_BALL = 5
 
 
 @dataclass(kw_only=True)
@@ -91,10 +68,10 @@ class Outputs:
 class VisualServo:
     """Algorithm 3: filter, estimate the state (eq. 16), step towards the goal (algorithm 1), close when it is reached.
 
-    The command is updated once in each control_period, at the beginning of a step; between, it is held, and with
-    filter_pictures the measurements are filtered in each step. A longer step is one control period. The goal pose has
-    the gripper pointing down, at the ball or (APPROACH) d_grasp_offset above it: X_goal = [p_WG_goal + d_gripper z,
-    p_WG_goal]. The mount, B, is at the origin of W.
+    The command is updated once in each control_period (give or take its jitter), at the beginning of a step; between,
+    it is held, and with filter_pictures the measurements are filtered in each step. A longer step is one control
+    period. The goal pose has the gripper pointing down, at the ball or (APPROACH) d_grasp_offset above it: X_goal =
+    [p_WG_goal + d_gripper z, p_WG_goal]. The mount, B, is at the origin of W.
 
     The error is the distance of the gripper from its goal (judge_apart), or the norm |X_goal - X_meas| over all six
     coordinates, in m, where the source prints its square and compares it with metres.
@@ -104,6 +81,8 @@ class VisualServo:
     ball was moved), or above threshold_reopen while the gripper closes, leads back to APPROACH. An error that makes no
     progress leads to GIVEN_UP, which does not close; `verdict` says why: OUT_OF_REACH if no state within the limits
     brings the model's gripper to its goal, else LIMITS if the command is at one or at windup, else NO_PROGRESS.
+
+    With `delivers`, HOLD is followed by CARRY and DROP: see `Delivery`.
 
     Raises:
         InvalidServoParameters: values that contradict each other or are out of range; all faults are named.
@@ -131,6 +110,8 @@ class VisualServo:
         self._recovery = Recovery(self._q_calib)
         self._response = Response(_RESPONSE_MEMORY, 2.0 * p.response_time, p.least_response)
         self._shaper = Shaper(p.shaping_time, self._q_calib)
+        self._delivery = Delivery(p)
+        self._rng = np.random.default_rng(p.seed)
         self._phase = Phase.WAIT
         self._verdict = Verdict.NONE
         self._t_next = -math.inf
@@ -148,7 +129,7 @@ class VisualServo:
         """Return the command in force: no time passes, so nothing is filtered or decided."""
         return Outputs(
             dl_t=tendon_lengths(self._shaper.q, self.params.d) - self._l_t_calib,
-            closure=1.0 if self._phase in (Phase.GRASP, Phase.HOLD) else 0.0,
+            closure=1.0 if self._phase in (Phase.GRASP, Phase.HOLD) or self._delivery.keeps_closed else 0.0,
             phase=self._phase,
             q_est=np.array(self._q_est),
             q_sys=np.array(self._q_sys),
@@ -166,10 +147,11 @@ class VisualServo:
         if due or self.params.filter_pictures:
             self._filter(t, u)
         if not due:
-            self._shaper.advance(t, self._q_sys)
+            self._shape(t)
             return self.outputs(t + dt, u)
-        following = self._t_next + self.params.control_period
-        self._t_next = following if following > t + _SAME_TIME else t + self.params.control_period
+        period = self._draw_period()
+        following = self._t_next + period
+        self._t_next = following if following > t + _SAME_TIME else t + period
         sees = self._sees_ring(u)
         if sees:
             self._estimate()
@@ -177,43 +159,45 @@ class VisualServo:
         self._decide(t)
         if self._phase is Phase.RECOVER:
             self._q_sys = self._recovery.next(self._q_sys)
-        elif sees and (self._phase in (Phase.APPROACH, Phase.DESCEND) or self._follows(t)):
+        elif sees and (self._phase in (Phase.APPROACH, Phase.DESCEND, Phase.CARRY) or self._follows(t)):
             self._move()
-        self._shaper.advance(t, self._q_sys)
+        self._shape(t)
         return self.outputs(t + dt, u)
 
     def get_state(self) -> bytes:
         """Return filters, states, phase and counters."""
-        counters = (
-            self._settled,
-            self._tilt_share,
-            self._steps,
-            self._stalled,
-            self._searched,
-            self._best,
-            self._p_WO_best,
-        )
+        best = (self._best, self._p_WO_best)
+        counters = (self._settled, self._tilt_share, self._steps, self._stalled, self._searched, *best)
         times = (self._t_next, self._t_filtered, self._t_close)
         believed = (
             self._tracker.get_state(),
             self._recovery.get_state(),
             self._response.get_state(),
             self._shaper.get_state(),
+            self._delivery.get_state(),
+            self._rng.bit_generator,
         )
         return pack_state((believed, self._q_sys, self._q_est, int(self._phase), int(self._verdict), times, counters))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state that `get_state` gave."""
         saved: Any = unpack_state(state)
-        (tracker, recovery, response, shaper), self._q_sys, self._q_est, phase, verdict, times, counters = saved
+        believed, self._q_sys, self._q_est, phase, verdict, times, counters = saved
+        tracker, recovery, response, shaper, delivery, drawn = believed
         self._tracker.set_state(tracker)
         self._recovery.set_state(recovery)
         self._response.set_state(response)
         self._shaper.set_state(shaper)
+        self._delivery.set_state(delivery)
+        self._rng.bit_generator.state = drawn
         self._phase, self._verdict = Phase(phase), Verdict(verdict)
         self._t_next, self._t_filtered, self._t_close = times
         self._settled, self._tilt_share, self._steps, self._stalled, self._searched, *best = counters
         self._best, self._p_WO_best = best
+
+    def _draw_period(self) -> float:
+        p = self.params
+        return p.control_period * (1.0 + p.jitter * self._rng.uniform(-1.0, 1.0) if p.jitter > 0.0 else 1.0)
 
     def _filter(self, t: float, u: Inputs) -> None:
         elapsed = t - self._t_filtered
@@ -232,8 +216,10 @@ class VisualServo:
 
     def _estimate(self) -> None:
         p = self.params
+        A = weights_of_state(p.A_pose_upd, self._q_sys, p.l_calib, p.weight_fall)
+        bound = self._tracker.pose_deviation if p.bound_by_covariance else p.epsilon_pose_bound
         self._q_est = optimise_state(
-            self._q_sys, self._X_meas(), self._q_est, A=p.A_pose_upd, bound=p.epsilon_pose_bound, d_gripper=p.d_gripper
+            self._q_sys, self._X_meas(), self._q_est, A=A, bound=bound, d_gripper=p.d_gripper
         ).q_est
 
     def _decide(self, t: float) -> None:
@@ -248,6 +234,8 @@ class VisualServo:
             self._enter(Phase.HOLD)
         elif (self._follows(t) and error > p.threshold_reopen) or (self._phase is Phase.RECOVER and not self._lost()):
             self._enter(Phase.APPROACH)
+        else:
+            self._deliver(t)
         error = self._error()
         near = self._phase is Phase.DESCEND and error < p.threshold_grasp
         near = near and not (p.judge_apart and self._tilt() > p.threshold_tilt)
@@ -260,10 +248,17 @@ class VisualServo:
                 self._enter(Phase.RECOVER)
             elif not self._makes_progress(error):
                 self._give_up(self._why_stuck())
+        elif self._phase is Phase.CARRY and not self._makes_progress(error):
+            self._give_up(Verdict.LOST_RING if self._lost() is Verdict.LOST_RING else self._why_stuck())
         elif self._phase is Phase.RECOVER:
             self._searched += 1
             if self._searched > p.search_steps and (lost := self._lost()):
                 self._give_up(lost)
+
+    def _deliver(self, t: float) -> None:
+        following = self._delivery.following(self._phase, t - self._t_close, self._error(), self._tilt())
+        if following is not self._phase:
+            self._enter(following)
 
     def _lost(self) -> Verdict:
         """Return whether ring or ball are lost, by the verdict for it, else NONE."""
@@ -308,12 +303,22 @@ class VisualServo:
             dq_0=self._towards_posture() if p.posture > 0.0 else None,
         )
         dq = self._without_windup(commanded.q_sys) - self._q_sys
-        moved = _W_FROM_B * (linearise(self._q_est, p.d_gripper)[1] @ dq)
-        self._response.command(moved[3:])
-        self._tracker.expect(self._response.part * np.concatenate([moved[:3], moved[3:] - moved[:3]]))
+        self._response.command(self._motion(dq)[3:])
         if p.lost_after > 0.0:
             self._recovery.keep(self._q_sys)
         self._q_sys = self._q_sys + dq
+
+    def _shape(self, t: float) -> None:
+        """Average the command, and expect the arm to move as the average does."""
+        before = self._shaper.q
+        self._shaper.advance(t, self._q_sys)
+        if self.params.predict_motion and not np.array_equal(before, self._shaper.q):
+            moved = self._response.part * self._motion(self._shaper.q - before)
+            self._tracker.expect(np.concatenate([moved[:3], moved[3:] - moved[:3]]))
+
+    def _motion(self, dq: Floats) -> Floats:
+        """Return by how much a change of the state moves wrist and gripper in W, J dq, shape (6,), m."""
+        return _W_FROM_B * (linearise(self._q_est, self.params.d_gripper)[1] @ dq)
 
     def _towards_posture(self) -> Floats:
         """Return the change that shortens the segments, shape (9,)."""
@@ -344,8 +349,10 @@ class VisualServo:
 
     def _X_goal(self) -> Floats:
         """Goal of the phase, in B."""
-        above = self._phase in (Phase.WAIT, Phase.APPROACH)
-        p_WG = self._tracker.ball.position + (self.params.d_grasp_offset * _UP if above else 0.0)
+        p_WG = self._delivery.p_WG_goal
+        if p_WG is None:
+            above = self._phase in (Phase.WAIT, Phase.APPROACH)
+            p_WG = self._tracker.ball.position + (self.params.d_grasp_offset * _UP if above else 0.0)
         return _W_FROM_B * np.concatenate([p_WG + self.params.d_gripper * _UP, p_WG])
 
     def _error(self) -> float:

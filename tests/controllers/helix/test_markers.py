@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from handover.controllers.helix.markers import MarkerReader
+from handover.controllers.helix.markers import MarkerReader, MarkerRing
 from handover.controllers.helix.stereo import Pixels, Region
 from handover.cosim.blocks.ports import Floats
 
@@ -43,7 +43,19 @@ def test_the_shift_moves_corners_outwards():
 
 
 def test_other_numbers_are_not_of_the_ring():
-    assert not len(MarkerReader(0.21).read(picture(9), Region(270, 190, 350, 270)).ids)
+    region = Region(270, 190, 350, 270)
+    assert not len(MarkerReader(0.21).read(picture(9), region).ids)
+    assert MarkerReader(0.21, rings=2).read(picture(9), region).ids.tolist() == [9]
+    assert not len(MarkerReader(0.21, rings=2).read(picture(16), region).ids)
+
+
+def test_the_second_ring_is_the_first_moved_by_a_side_of_the_collar_towards_the_mount():
+    one, two = MarkerRing(0.034, 0.020), MarkerRing(0.034, 0.020, rings=2)
+    side = 2.0 * 0.034 * np.tan(np.pi / 8)
+    np.testing.assert_array_equal(two.corners[:8], one.corners)
+    np.testing.assert_allclose(two.corners[8:], one.corners - [0.0, 0.0, side])
+    assert one.outline[:, 2].max() == pytest.approx(0.5 * side)
+    assert (two.outline[:, 2].min(), two.outline[:, 2].max()) == pytest.approx((-1.5 * side, 0.5 * side))
 
 
 def test_a_search_finds_the_marker_in_the_whole_picture():

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 from handover.controllers.helix.markers import MarkerRing, Markers
@@ -83,14 +84,27 @@ def test_a_misread_marker_is_left_out():
     np.testing.assert_allclose(pose.p_WR, P_WR, atol=1e-7)
 
 
-def test_one_marker_does_not_do_unless_it_was_seen_a_moment_ago():
-    left, _ = seen()
-    alone = [Markers(left.ids[:1], left.corners[:1]), NONE]
+@pytest.mark.parametrize("near", [None, (P_WR + 0.003, R_WR)], ids=["anywhere", "near"])
+def test_one_view_of_a_marker_does_not_carry_a_pose(near: tuple[Floats, Floats] | None):
+    left, right = seen()
     fit = RingFit(RING, CAMERAS, 1.2)
-    assert fit.fit(alone, None) is None
-    pose = fit.fit(alone, (P_WR + 0.003, R_WR))
+    assert fit.fit([Markers(left.ids[:1], left.corners[:1]), NONE], near) is None
+    assert fit.fit([NONE, Markers(right.ids[:1], right.corners[:1])], near) is None
+
+
+def test_a_marker_that_both_cameras_see_carries_a_pose():
+    left, right = seen()
+    k, m = next((k, m) for k, i in enumerate(left.ids) for m, j in enumerate(right.ids) if i == j)
+    views = [Markers(v.ids[n : n + 1], v.corners[n : n + 1]) for v, n in ((left, k), (right, m))]
+    pose = RingFit(RING, CAMERAS, 1.2).fit(views, None)
     assert pose is not None
     np.testing.assert_allclose(pose.p_WR, P_WR, atol=1e-6)
+
+
+def test_a_misread_marker_does_not_leave_one_view_that_carries_a_pose():
+    left, _ = seen()
+    two = Markers(np.array([left.ids[0], (left.ids[1] + 3) % 8]), left.corners[:2])
+    assert RingFit(RING, CAMERAS, 1.2).fit([two, NONE], (P_WR, R_WR)) is None
 
 
 def test_nothing_seen_is_no_pose():

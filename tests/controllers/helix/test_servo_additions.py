@@ -179,3 +179,19 @@ def test_another_servo_goes_on_from_the_state_bit_for_bit(after: int):
     other.set_state(begun.get_state())
     for n, u in enumerate(inputs[after:], after):
         assert everything(other.step(n * PICTURE, PICTURE, u)) == everything(run.history[n])
+
+
+def update_times(loop: Loop, seconds: float) -> Floats:
+    """Return the times at which the commanded state changed, s."""
+    for _ in range(round(seconds / PICTURE)):
+        loop.step(ball_at(0.0))
+    q = np.array([y.q_sys for y in loop.history])
+    return PICTURE * (np.flatnonzero(np.any(np.diff(q, axis=0) != 0.0, axis=1)) + 1).astype(np.float64)
+
+
+def test_jitter_draws_each_control_period_evenly_about_the_nominal_one():
+    steady, jittered = (np.diff(update_times(own(jitter=jitter, seed=1), 12.0)) for jitter in (0.0, 0.8))
+    np.testing.assert_allclose(steady, 0.5)
+    assert jittered.min() < 0.3
+    assert jittered.max() > 0.7
+    assert jittered.mean() == pytest.approx(0.5, abs=0.12)

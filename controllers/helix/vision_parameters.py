@@ -1,0 +1,78 @@
+"""Parameters of the Helix's vision; apart from its detectors, which take OpenCV, so that they are listed at once."""
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+
+from handover.cosim.blocks.geometry import looking_at, quaternion_of
+from handover.cosim.blocks.ports import Vector3, Vector4, Vector5, parameter
+from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Pixel, RadianPerSecond
+
+_P_WC_LEFT = np.array([-0.95, 0.25, -0.60])
+_P_WC_RIGHT = np.array([-0.95, -0.25, -0.60])
+_LOOKED_AT = np.array([0.0, 0.0, -0.62])
+_CORNER_SHIFT, _EDGE_SHIFT = 0.24, -0.005  # px; as scenarios/helix/calibrate_detector.py estimates them from pictures
+
+
+class Detector(enum.IntEnum):
+    """How ball and wrist are found."""
+
+    JOINT = 0
+    PUBLISHED = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    """Calibration of the cameras, sizes of what is looked for, and noise."""
+
+    p_WC_left: Vector3[Metre] = parameter(_P_WC_LEFT, "position of the left camera in the world")
+    p_WC_right: Vector3[Metre] = parameter(_P_WC_RIGHT, "position of the right camera in the world")
+    q_WC_left: Vector4[Number] = parameter(
+        quaternion_of(looking_at(_P_WC_LEFT, _LOOKED_AT)), "orientation of the left camera in the world"
+    )
+    q_WC_right: Vector4[Number] = parameter(
+        quaternion_of(looking_at(_P_WC_RIGHT, _LOOKED_AT)), "orientation of the right camera in the world"
+    )
+    intrinsics_left: Vector4[Pixel] = parameter(
+        np.array([907.0, 906.0, 642.5, 357.0]), "left camera's focal lengths and principal point: fx, fy, cx, cy"
+    )
+    intrinsics_right: Vector4[Pixel] = parameter(
+        np.array([908.5, 907.5, 636.0, 361.5]), "right camera's focal lengths and principal point: fx, fy, cx, cy"
+    )
+    distortion_left: Vector5[Number] = parameter(
+        np.array([0.105, -0.190, 0.0006, -0.0008, 0.060]), "left lens's distortion: k1, k2, p1, p2, k3"
+    )
+    distortion_right: Vector5[Number] = parameter(
+        np.array([0.092, -0.165, -0.0005, 0.0007, 0.045]), "right lens's distortion: k1, k2, p1, p2, k3"
+    )
+    detector: Detector = parameter(Detector.JOINT, "one fit to all that both cameras see, or the thesis's averages")
+    apothem: Metre = parameter(0.034, "distance of the markers from the arm's axis", minimum=0.02, maximum=0.1)
+    marker: Metre = parameter(0.020, "side of a marker", minimum=0.005, maximum=0.05)
+    rings: int = parameter(1, "rings of markers: a second one sits above the first", minimum=1, maximum=2)
+    ball_radius: Metre = parameter(0.025, "radius of the ball", minimum=0.005, maximum=0.1)
+    d_gripper: Metre = parameter(0.10, "distance of the gripper from the wrist, eq. (13)", minimum=0.0, maximum=0.5)
+    corner_noise: Pixel = parameter(0.2, "standard deviation of a marker's corners", minimum=0.001, maximum=5.0)
+    corner_shift: Pixel = parameter(
+        _CORNER_SHIFT,
+        "how far refined corners lie inside of the printed ones, along the diagonal",
+        minimum=-2.0,
+        maximum=2.0,
+    )
+    outline_noise: Pixel = parameter(0.08, "standard deviation of the ball's outline", minimum=0.001, maximum=10.0)
+    edge_shift: Pixel = parameter(_EDGE_SHIFT, "mean shift of the ball's edge outwards", minimum=-3.0, maximum=3.0)
+    edge_doubt: Pixel = parameter(0.04, "standard deviation of the edge's shift", minimum=0.001, maximum=3.0)
+    corner_tolerance: Pixel = parameter(1.2, "RMS misfit beyond which a marker is left out", minimum=0.1, maximum=20.0)
+    ray_tolerance: Metre = parameter(0.012, "largest distance between both cameras' rays to the ball", minimum=0.0)
+    largest_speed: MetrePerSecond = parameter(
+        0.5, "speed of the wrist beyond which a pose contradicts the last one", minimum=0.0, maximum=100.0
+    )
+    largest_turn: RadianPerSecond = parameter(
+        2.0, "rate of turn of the wrist beyond which a pose contradicts the last one", minimum=0.0, maximum=1000.0
+    )
+    largest_deviation: Metre = parameter(
+        0.005, "expected error of the wrist beyond which a pose is worth nothing", minimum=0.0, maximum=10.0
+    )
+    decimation: int = parameter(
+        1, "of 30 pairs of pictures a second, every so many-th is looked at", minimum=1, maximum=300
+    )

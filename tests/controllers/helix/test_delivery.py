@@ -1,0 +1,139 @@
+"""Carrying and dropping: when the arm sets off, where to, when it opens, and that nothing changes without it."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handover.controllers.helix.delivery import Delivery, Phase, Verdict
+from handover.controllers.helix.servo_parameters import InvalidServoParameters
+from handover.controllers.helix.visual_servo import Inputs, Outputs, Params, VisualServo
+
+P_WG_DROP = np.array([0.0, -0.16, -0.64])
+DELIVERS = Params(delivers=True, p_WG_drop=P_WG_DROP, shaping_time=0.0)
+BALL = np.array([0.02, 0.0, -0.68])
+ABOVE = BALL + np.array([0.0, 0.0, 0.05])
+
+
+def measured(p_WG: Any, sees_ring: bool = True) -> Inputs:
+    """Return measurements of a gripper that hangs straight down at a place."""
+    p = np.asarray(p_WG, dtype=np.float64)
+    near = 1e-8 * np.eye(3)
+    up = np.array([0.0, 0.0, 0.1])
+    return Inputs(
+        p_WO_meas=BALL, p_WR_meas=p + up, p_WG_meas=p, cov_O=near, cov_R=near, cov_G=near, seen_O=True, seen_R=sees_ring
+    )
+
+
+class Course:
+    """A servo that is shown where the gripper is, control period by control period."""
+
+    def __init__(self, params: Params) -> None:
+        self.servo, self.t = VisualServo(params), 0.0
+
+    def show(self, p_WG: Any, steps: int = 1, sees_ring: bool = True) -> Outputs:
+        y = self.servo.outputs(self.t, measured(p_WG))
+        for _ in range(steps):
+            y = self.servo.step(self.t, 0.5, measured(p_WG, sees_ring))
+            self.t += 0.5
+        return y
+
+    def until(self, phase: Phase, p_WG: Any) -> list[Outputs]:
+        """Show a gripper at a place until the servo is in a phase; return all that it gave until then."""
+        shown = [self.show(p_WG)]
+        while shown[-1].phase is not phase:
+            assert len(shown) < 60, shown[-1].phase
+            shown.append(self.show(p_WG))
+        return shown
+
+    def take(self) -> list[Outputs]:
+        """Show a gripper that comes to the ball, closes and is about to carry it."""
+        self.until(Phase.DESCEND, ABOVE)
+        return self.until(Phase.CARRY, BALL)
+
+
+def test_it_carries_the_ball_a_while_after_the_gripper_has_closed():
+    course = Course(DELIVERS)
+    phases = [y.phase for y in course.take()]
+    assert phases.count(Phase.HOLD) == round(DELIVERS.carry_after / 0.5)
+    y = course.show(BALL)
+    assert y.closure == 1.0
+    assert y.error == pytest.approx(np.linalg.norm(P_WG_DROP - BALL), abs=1e-3)
+
+
+def test_it_moves_the_gripper_towards_the_place():
+    course = Course(DELIVERS)
+    course.take()
+    before = course.show(BALL)
+    after = course.show(BALL, 2)
+    assert after.q_sys[[1, 4, 7]].sum() > before.q_sys[[1, 4, 7]].sum()  # y of B points to -y of W
+
+
+def test_it_opens_once_the_gripper_has_settled_over_the_place():
+    course = Course(DELIVERS)
+    course.take()
+    near = P_WG_DROP + np.array([0.8 * DELIVERS.threshold_drop, 0.0, 0.0])
+    shown = [course.show(near) for _ in range(12)]
+    opened = [y.phase for y in shown].index(Phase.DROP)
+    assert [y.closure for y in shown] == [1.0] * opened + [0.0] * (12 - opened)
+    assert all(np.array_equal(y.q_sys, shown[opened].q_sys) for y in shown[opened:])
+
+
+def test_it_does_not_open_beside_the_place():
+    course = Course(DELIVERS)
+    course.take()
+    y = course.show(P_WG_DROP + np.array([2.0 * DELIVERS.threshold_drop, 0.0, 0.0]), 30)
+    assert y.phase is Phase.CARRY
+    assert y.closure == 1.0
+
+
+def test_a_carrying_arm_that_makes_no_progress_gives_up_and_keeps_the_ball():
+    course = Course(replace(DELIVERS, patience=8))
+    course.take()
+    y = course.show(BALL, 60)
+    assert y.phase is Phase.GIVEN_UP
+    assert y.verdict is not Verdict.NONE
+    assert y.closure == 1.0
+    assert y.error == pytest.approx(np.linalg.norm(P_WG_DROP - BALL), abs=1e-3)
+
+
+def test_a_carrying_arm_that_is_not_seen_gives_up_for_that():
+    course = Course(replace(DELIVERS, patience=8))
+    course.take()
+    y = course.show(BALL, 30, sees_ring=False)
+    assert (y.phase, y.verdict, y.closure) == (Phase.GIVEN_UP, Verdict.LOST_RING, 1.0)
+
+
+def test_without_delivery_the_gripper_keeps_the_ball():
+    course = Course(replace(DELIVERS, delivers=False))
+    course.until(Phase.DESCEND, ABOVE)
+    course.until(Phase.HOLD, BALL)
+    assert course.show(BALL, 40).phase is Phase.HOLD
+
+
+def test_it_continues_from_a_state():
+    course, other = Course(DELIVERS), VisualServo(DELIVERS)
+    course.take()
+    course.show(P_WG_DROP)
+    state, t = course.servo.get_state(), course.t
+    wanted = [course.show(P_WG_DROP) for _ in range(6)]
+    other.set_state(state)
+    found = [other.step(t + 0.5 * i, 0.5, measured(P_WG_DROP)) for i in range(6)]
+    assert [y.phase for y in found] == [y.phase for y in wanted]
+    assert wanted[-1].phase is Phase.DROP
+    assert [y.closure for y in found] == [y.closure for y in wanted]
+
+
+@pytest.mark.parametrize("judge_apart", [True, False])
+def test_a_tilt_keeps_it_closed_only_where_tilts_are_judged_apart(judge_apart: bool):
+    params = replace(DELIVERS, judge_apart=judge_apart, settle_steps=1)
+    delivery = Delivery(params)
+    assert delivery.following(Phase.HOLD, params.closing_time + params.carry_after, 0.0, 0.0) is Phase.CARRY
+    tilted = delivery.following(Phase.CARRY, 100.0, 0.0, 2.0 * params.threshold_tilt)
+    assert tilted is (Phase.CARRY if judge_apart else Phase.DROP)
+
+
+def test_a_threshold_of_nothing_is_refused():
+    with pytest.raises(InvalidServoParameters, match="threshold_drop"):
+        VisualServo(Params(threshold_drop=0.0))
