@@ -72,6 +72,14 @@ SYSTEMS = (
                 "handover.scenarios.helix.helix_handover:HelixHandover",
                 "the Helix takes a ball from a hand by visual servoing",
             ),
+            "helix_reach": ScenarioEntry(
+                "handover.scenarios.helix.helix_reach:HelixReach",
+                "how far the Helix reaches, with exact measurements instead of cameras",
+            ),
+            "helix_use_case": ScenarioEntry(
+                "handover.scenarios.helix.helix_use_case:HelixUseCase",
+                "the Helix takes a ball from a hand and drops it into a bowl",
+            ),
         },
     ),
     RobotSystem(

@@ -1,31 +1,125 @@
-"""The two calibrated cameras of the experiment: the camera unit and the detector get the same calibration.
+"""The two cameras of the experiment: where they are, and where the calibration finds them.
 
-The thesis calibrates with a box of known corners and gets both cameras' poses from it ([Vervloet2025] sec. 3.2.2);
-here the calibration is taken as perfect, which is an assumption. The values are those of `paper.toml`.
+As in the thesis ([Vervloet2025] sec. 3.2.2), somebody clicks on six corners of a box in both pictures, and the detector
+gets the poses that follow from these clicks alone. Lenses are calibrated separately, which is taken as perfect (an
+assumption). The values are those of `paper.toml`.
 """
 
+import enum
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
+from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of, rotation_by
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.paper import paper_values
 
+SIDES = ("left", "right")
 
-def calibration() -> dict[str, Any]:
-    """Return both cameras' calibration under the names of the units' parameters."""
+
+class CameraPlaces(enum.IntEnum):
+    """Where the right camera is: beside the left one behind the arm, or as [Vervloet2025] sec. 5.4.1 suggests."""
+
+    BEHIND = 0
+    TOP = 1
+    SIDE = 2
+
+
+PICTURE = np.array([1280.0, 720.0])
+"""Width and height of a picture, px."""
+_READ = 17.0  # px; markers whose side is smaller are read rarely
+_DISTANCE = 0.95  # m; from the cameras to the hanging arm
+_MARGIN = 1.0 / 12.0  # of a marker's side, on each side of it: half a cell of white
+
+
+def camera_parameters(turned: float = 0.0, places: CameraPlaces = CameraPlaces.BEHIND) -> dict[str, Any]:
+    """Return both cameras' true poses and lenses under the names of the units' parameters.
+
+    Args:
+        turned: angle by which the right camera was turned to its left about its upright axis, rad.
+        places: of the cameras.
+    """
     camera = {name: np.array(value) for name, value in paper_values("helix", "camera").items()}
     parameters: dict[str, Any] = {}
-    for i, side in enumerate(("left", "right")):
-        p_WC = camera["p_WC"][i]
+    for i, side in enumerate(SIDES):
+        moved = side == "right" and places is not CameraPlaces.BEHIND
+        p_WC = camera[f"p_WC_{places.name.lower()}"] if moved else camera["p_WC"][i]
+        turn = rotation_by(np.array([0.0, -turned if side == "right" else 0.0, 0.0]))
         parameters[f"p_WC_{side}"] = p_WC
-        parameters[f"q_WC_{side}"] = quaternion_of(looking_at(p_WC, camera["looked_at"]))
+        parameters[f"q_WC_{side}"] = quaternion_of(looking_at(p_WC, camera["looked_at"]) @ turn)
         parameters[f"intrinsics_{side}"] = camera["intrinsics"][i]
         parameters[f"distortion_{side}"] = camera["distortion"][i]
     return parameters
 
 
-def camera_of(side: str) -> Pinhole:
-    """Return the camera of one side, `left` or `right`, to mark its pictures with."""
-    c = calibration()
-    return Pinhole(side, *(c[f"{what}_{side}"] for what in ("p_WC", "q_WC", "intrinsics", "distortion")))
+def camera_of(side: str, parameters: Mapping[str, Any]) -> Pinhole:
+    """Return the camera of one side, `left` or `right`, of what `camera_parameters` or `calibrated` returned."""
+    return Pinhole(side, *(parameters[f"{what}_{side}"] for what in ("p_WC", "q_WC", "intrinsics", "distortion")))
+
+
+def box_corners(height: float) -> Floats:
+    """Return the corners of the calibration box that are clicked on, shape (6, 3), in W, m.
+
+    They are those of the side that faces the cameras, and the two far ones of the top.
+
+    Args:
+        height: of the box's middle, m; it stands below the mount.
+    """
+    x, y, z = (0.5 * np.array(paper_values("helix", "calibration")["box_size"])).tolist()
+    near = [[-x, y, z], [-x, -y, z], [-x, -y, -z], [-x, y, -z]]
+    return np.array([0.0, 0.0, height]) + np.array([*near, [x, y, z], [x, -y, z]])
+
+
+def calibrated(
+    click_noise: float, seed: int, box_height: float, places: CameraPlaces = CameraPlaces.BEHIND
+) -> dict[str, Any]:
+    """Return what the calibration finds, under the names of the detector's parameters.
+
+    Args:
+        click_noise: standard deviation of a click along an axis of the picture, px.
+        seed: draws the clicks.
+        box_height: height of the box's middle, m.
+        places: of the cameras; a corner that the box itself hides from one of them is not clicked on.
+
+    Raises:
+        TooFewCorners: a camera sees fewer than four of the corners.
+    """
+    from handover.controllers.helix.calibration import camera_pose  # OpenCV is slow to import, and lists import this
+
+    rng = np.random.default_rng(seed)
+    found, corners = camera_parameters(places=places), box_corners(box_height)
+    outwards = np.sign(corners - np.array([0.0, 0.0, box_height]))
+    for side in SIDES:
+        camera = camera_of(side, found)
+        pixels = camera.project(corners)
+        seen = np.all((pixels >= 0.0) & (pixels <= PICTURE - 1.0), axis=1)
+        seen &= np.any(outwards * (camera.p_WC - corners) > 0.0, axis=1)
+        clicked = np.where(seen[:, None], pixels + click_noise * rng.standard_normal(pixels.shape), np.nan)
+        lens = (found[f"{what}_{side}"] for what in ("intrinsics", "distortion"))
+        pose = camera_pose(side, clicked, corners, *lens)
+        found[f"p_WC_{side}"], found[f"q_WC_{side}"] = pose.p_WC, pose.q_WC
+    return found
+
+
+def marker_fault(marker: float) -> str | None:
+    """Return what is wrong with markers of a size, and which would do; None if the cameras resolve them.
+
+    A marker's side is f marker / 0.95 m wide where the arm hangs, f being the larger focal length. It must also leave
+    white around itself on the collar's side, which is 2 apothem tan(22.5 degrees) wide.
+
+    Args:
+        marker: side of a marker, m.
+    """
+    camera = paper_values("helix", "camera")
+    f = max(camera["focal_length"])
+    least, most = _READ * _DISTANCE / f, 2.0 * camera["apothem"] * np.tan(np.pi / 8.0) / (1.0 + 2.0 * _MARGIN)
+    would_do = f"{np.ceil(1e4 * least) / 1e4:g} to {np.floor(1e4 * most) / 1e4:g} m would do"
+    if marker < least:
+        return (
+            f"no camera resolves it: its side is {f * marker / _DISTANCE:.1f} px wide at {_DISTANCE:g} m, and markers "
+            f"below {_READ:g} px are read rarely; {would_do}"
+        )
+    if marker > most:
+        return f"it leaves no white around itself on the sides of the collar; {would_do}"
+    return None

@@ -5,7 +5,6 @@ the cameras see ([Vervloet2025] sec. 4.2, fig. 9), and keeps marked pictures of 
 """
 
 from collections.abc import Iterator, Sequence
-from fractions import Fraction
 from functools import cache
 from typing import NamedTuple
 
@@ -13,14 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.controllers.helix.constant_curvature import forward_kinematics
+from handover.controllers.helix.vision_parameters import Params as VisionParams
 from handover.cosim.blocks.geometry import Pinhole, rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
-from handover.scenarios.helix.cameras import camera_of
-from handover.scenarios.helix.parameters import Cover, Parameters
+from handover.scenarios.helix.cameras import CameraPlaces, camera_of, camera_parameters
+from handover.scenarios.helix.disturbances import Cover
+from handover.scenarios.helix.parameters import Parameters
 
 _W_FROM_B = np.array([1.0, -1.0, -1.0])  # R_WB = diag(1, -1, -1)
 
@@ -49,9 +50,6 @@ def model_mismatch(q_sys: Floats, p_WG_est: Floats) -> ModelMismatch:
 
 
 MEASURED, ESTIMATED = "#ffd23f", "#4fe3ff"
-PICTURE_PERIOD = Fraction(1, 30)
-"""Period of camera and vision, s."""
-
 _SHAPE = (720, 1280, 3)
 _SHAPES = {"p_WO": ("ball", "circle"), "p_WR": ("wrist", "cross"), "p_WG": ("gripper", "plus")}
 _SEEN_BY = {"p_WO": "vision.seen_O", "p_WR": "vision.seen_R", "p_WG": "vision.seen_R"}
@@ -69,55 +67,57 @@ def take_pictures(t: float, role: str, parameters: Parameters, signals: Signals)
             camera=side.name.lower(),
             role=role,
             pixels=signals[f"camera.{side.name.lower()}"].reshape(_SHAPE),
-            marks=[*_estimated(side, signals), *([] if is_covered(t, side, parameters) else _measured(side, signals))],
+            marks=[
+                *_estimated(camera, signals),
+                *([] if is_covered(t, side, parameters) else _measured(camera, signals)),
+            ],
         )
-        for side in (Cover.LEFT, Cover.RIGHT)
+        for side, camera in _cameras(parameters.camera_turn, parameters.cameras).items()
     ]
 
 
 def is_covered(t: float, side: Cover, parameters: Parameters) -> bool:
     """Return whether a lens was covered when the picture that is current at time t was taken."""
     begin, end = parameters.covered(side)
-    taken = float(int(t / float(PICTURE_PERIOD) + 1e-6) * PICTURE_PERIOD)
+    taken = float(int(t / float(parameters.picture_period) + 1e-6) * parameters.picture_period)
     return begin <= taken < end
 
 
-def _measured(side: Cover, signals: Signals) -> Iterator[Mark]:
+def _measured(camera: Pinhole, signals: Signals) -> Iterator[Mark]:
     for name in _SHAPES:
         if signals[_SEEN_BY[name]]:
-            yield from _mark(side, name, signals[f"vision.{name}_meas"], "as measured", MEASURED)
+            yield from _mark(camera, name, signals[f"vision.{name}_meas"], "as measured", MEASURED)
 
 
-def _estimated(side: Cover, signals: Signals) -> Iterator[Mark]:
+def _estimated(camera: Pinhole, signals: Signals) -> Iterator[Mark]:
     given = [name for name in _SHAPES if f"servo.{name}_est" in signals]
     if not given or not np.any(signals[f"servo.{given[-1]}_est"]):  # the controller has seen nothing yet
         return
     for name in given:
-        yield from _mark(side, name, signals[f"servo.{name}_est"], "as the controller has it", ESTIMATED)
+        yield from _mark(camera, name, signals[f"servo.{name}_est"], "as the controller has it", ESTIMATED)
 
 
-def _mark(side: Cover, name: str, p_WP: Floats, source: str, colour: str) -> Iterator[Mark]:
+def _mark(camera: Pinhole, name: str, p_WP: Floats, source: str, colour: str) -> Iterator[Mark]:
     """Yield the mark of a point, unless it is behind the camera."""
-    from handover.controllers.helix.handover_vision import (
-        Params as Vision,  # slow to import, and listing parameters imports this module
-    )
-
-    camera = _camera(side)
     u, v = camera.project(p_WP).tolist()
     if np.isfinite(u) and np.isfinite(v):
         what, shape = _SHAPES[name]
-        ball = float(camera.f[0]) * Vision().ball_radius / float(camera.depth(p_WP))
+        ball = float(camera.f[0]) * VisionParams().ball_radius / float(camera.depth(p_WP))
         radius = ball if shape == "circle" else 9.0
         yield Mark(label=f"{what}, {source}", shape=shape, u=u, v=v, radius=radius, colour=colour)
 
 
 @cache
-def _camera(side: Cover) -> Pinhole:
-    return camera_of(side.name.lower())
+def _cameras(turned: float, places: CameraPlaces) -> dict[Cover, Pinhole]:
+    found = camera_parameters(turned, places)
+    return {side: camera_of(side.name.lower(), found) for side in (Cover.LEFT, Cover.RIGHT)}
 
 
 _SETTLING = 1.0
 """How long the ball must stay in the closed gripper, s (assumed)."""
+
+_LETTING_GO = 2.0
+"""How long the person may take to let go once the gripper has closed, s (assumed)."""
 
 _NOTHING_SEEN = 10.0
 """How long the controller may wait for its first sight of ball and ring, s (assumed)."""
@@ -125,7 +125,7 @@ _NOTHING_SEEN = 10.0
 _GRIP_CLOSED = 0.999
 """Closure at which a gripper has closed, of a controller that does not say so."""
 
-_MOMENTS = {"APPROACH": "approach", "DESCEND": "descent", "GRASP": "at the ball"}
+_MOMENTS = {"APPROACH": "approach", "DESCEND": "descent", "GRASP": "at the ball", "CARRY": "carrying"}
 _COVERED = "lens covered"
 
 
@@ -182,7 +182,9 @@ class HandoverEvaluator(Evaluator):
         self._gives_error = False
         self._nearest = np.inf
         self._grasp_began: float | None = None  # the last time
+        self._closing_distance = 0.0  # then
         self._released_at: float | None = None
+        self._hand_force = 0.0  # largest on the hand
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Follow phases and positions."""
@@ -202,7 +204,7 @@ class HandoverEvaluator(Evaluator):
             self._keep(_MOMENTS[phase], signals)
         compares = "servo.q_sys" in signals and "servo.p_WG_est" in signals
         if phase == "GRASP" and self._phase != "GRASP":  # also again, where the gripper had to open
-            self._grasp_began = t
+            self._grasp_began, self._closing_distance = t, self.distance
             self._mismatch = model_mismatch(signals["servo.q_sys"], signals["servo.p_WG_est"]) if compares else None
         if self._is_first_covered(t):
             self._keep(_COVERED, signals)
@@ -210,6 +212,8 @@ class HandoverEvaluator(Evaluator):
         if holder == "GRIPPER" and self._released_at is None:
             self._released_at, self._offset = t, self._p_GO
         self._phase, self._holder = phase, holder
+        if "hand.f_H" in signals:
+            self._hand_force = max(self._hand_force, float(np.linalg.norm(signals["hand.f_H"])))
 
     def finish(self, signals: Signals) -> None:
         """Keep the last picture."""
@@ -240,8 +244,10 @@ class HandoverEvaluator(Evaluator):
             return True
         if self._released_at is not None:
             return self._t >= self._released_at + _SETTLING
+        if self._holder == "FREE" or self._is_pressed:
+            return True
         closed = self.phases.get("HOLD")
-        return closed is not None and self._t >= closed + _SETTLING
+        return closed is not None and self._t >= closed + _LETTING_GO
 
     @property
     def _deadline(self) -> float:
@@ -250,13 +256,18 @@ class HandoverEvaluator(Evaluator):
         return np.inf if self._phase in ("GRASP", "HOLD") else self.parameters.patience
 
     @property
+    def _is_pressed(self) -> bool:
+        """Whether the arm has pressed harder on the hand than the person lets it."""
+        return self._hand_force > self.parameters.hand_force_max
+
+    @property
     def distance(self) -> float:
         """Distance between gripper and ball by ground truth, m."""
         return float(np.linalg.norm(self._p_WG - self._p_WO))
 
     def outcome(self) -> Outcome:
         """Return whether the gripper has the ball, why, and the metrics."""
-        success = self._holder == "GRIPPER"
+        success = self._holder == "GRIPPER" and not self._is_pressed
         grasp_began = self._grasp_began
         metrics: dict[str, Metric] = {}
         if self._has_seen:  # else the run failed before anything was there to be measured
@@ -269,36 +280,48 @@ class HandoverEvaluator(Evaluator):
             steps = round(grasp_began / float(self.parameters.period)) + 1
             metrics["arm_time"] = Metric(grasp_began, "s", "from the start until the gripper begins to close")
             metrics["steps"] = Metric(steps, "1", "control steps until the gripper begins to close")
+            metrics["closing_distance"] = Metric(
+                self._closing_distance, "m", "gripper to ball when the gripper begins to close, ground truth"
+            )
         if self._released_at is not None:
-            metrics["handover_time"] = Metric(self._released_at, "s", "from the start until the hand lets go")
+            metrics["handover_time"] = Metric(self._released_at, "s", "from the start until the ball leaves the hand")
+        if self._hand_force > 0.0:
+            metrics["hand_force"] = Metric(self._hand_force, "N", "largest force on the hand, with the ball's weight")
         if self._mismatch is not None:
             metrics |= _mismatch_metrics(self._mismatch)
         if self._offset is not None:
             lateral, axial = _beside_and_along(self._offset)
             metrics["grasp_offset_lateral"] = Metric(
-                lateral, "m", "ball beside the gripper's axis when the hand let go, ground truth"
+                lateral, "m", "ball beside the gripper's axis when it left the hand, ground truth"
             )
             metrics["grasp_offset_axial"] = Metric(
-                axial, "m", "ball along the gripper's axis, towards its tip, when the hand let go, ground truth"
+                axial, "m", "ball along the gripper's axis, towards its tip, when it left the hand, ground truth"
             )
         return Outcome(success=success, reason=self._reason(success), metrics=metrics)
 
+    def _why_given_up(self) -> str:
+        return _WHY_GIVEN_UP.get(self._verdict, "given up")
+
     def _reason(self, success: bool) -> str:
         if success:
-            return f"the hand let go at {self._released_at:.1f} s and the gripper holds the ball"
+            return f"the ball left the hand at {self._released_at:.1f} s and the gripper holds it"
         where = f"ball at {_format_point(self._p_WO)} m, gripper at {_format_point(self._p_WG)} m"
-        if self._phase == "WAIT":
+        if self._phase == "WAIT" and self._t >= self._deadline:
             return f"the cameras did not see both ball and arm within {self._deadline:.0f} s; {where}"
         if self._phase == "GIVEN_UP":
-            why = _WHY_GIVEN_UP.get(self._verdict, "given up")
-            return f"{why}: the gripper stays {self._error:.3f} m from its goal; {where}"
+            return f"{self._why_given_up()}: the gripper stays {self._error:.3f} m from its goal; {where}"
+        if self._is_pressed:
+            most = self.parameters.hand_force_max
+            return f"the arm pressed on the hand with {self._hand_force:.1f} N, and a person bears {most:g} N; {where}"
         if self._released_at is not None:
-            return f"the hand let go at {self._released_at:.1f} s, and the gripper did not keep the ball; {where}"
+            return f"the ball left the hand at {self._released_at:.1f} s, and the gripper did not keep it; {where}"
+        if self._holder == "FREE":
+            return f"the ball was pushed out of the hand at {self._t:.1f} s; {where}"
         if "HOLD" in self.phases:
             lateral, axial = _beside_and_along(self._p_GO)
             return (
-                f"the gripper closed with the ball {lateral:.3f} m beside its axis and {axial:+.3f} m along it, not "
-                "between the fingers; the hand kept the ball"
+                f"the gripper closed with the ball {lateral:.3f} m beside its axis and {axial:+.3f} m along it, and "
+                "its fingers did not get hold of it; the hand kept the ball"
             )
         if self._t < self._deadline:
             return f"stopped at {self._t:.1f} s in phase {self._phase}, before the handover was done"

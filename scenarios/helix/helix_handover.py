@@ -4,6 +4,7 @@ The thesis's own results for such a handover are those of table 1 and sec. 5.2 (
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
@@ -18,9 +19,10 @@ from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
-from handover.scenarios.helix.cameras import calibration
-from handover.scenarios.helix.evaluation import PICTURE_PERIOD, HandoverEvaluator
-from handover.scenarios.helix.parameters import Cover, Parameters, Tuning
+from handover.scenarios.helix.cameras import calibrated, camera_parameters, marker_fault
+from handover.scenarios.helix.disturbances import Disturbances
+from handover.scenarios.helix.evaluation import HandoverEvaluator
+from handover.scenarios.helix.parameters import Parameters, StepRule, Tuning
 from handover.scenarios.helix.places import PLACES
 
 _PAPER = "helix"
@@ -29,15 +31,18 @@ _PAPER = "helix"
 def published_values(p: Parameters) -> Sequence[PublishedValue]:
     """Return the times and steps of table 1 for its step sizes, and for the smallest of them the model's error.
 
-    Nothing for other step sizes, other places of the ball, or a covered lens.
+    Nothing for other step sizes, other places of the ball, other markers, or where anything is amiss.
     """
     published, default = paper_values(_PAPER, "experiment"), Parameters()
     matches = np.flatnonzero(np.isclose(published["alpha"], p.alpha))
-    if (
-        not len(matches)
-        or (p.azimuth, p.radius, p.height) != (default.azimuth, default.radius, default.height)
-        or p.cover is not Cover.NONE
-    ):
+    compared = [f.name for f in fields(Disturbances) if f.name != "help_speed"] + [
+        "azimuth",
+        "radius",
+        "height",
+        "marker",
+        "rings",
+    ]
+    if not len(matches) or any(getattr(p, name) != getattr(default, name) for name in compared):
         return ()
     k = int(matches[0])
     period = paper_values(_PAPER, "published")["timestep_mean"][k]
@@ -88,32 +93,60 @@ class HelixHandover(Experiment[HandoverEvaluator]):
     def build(self, parameters: Parameters, seed: int, fmu: FmuOf) -> System:
         """Wire arm, hand, cameras, vision and controller."""
         p = parameters
-        hand_seed, camera_seed = (int(n) for n in np.random.SeedSequence(seed).generate_state(2) >> 1)
-        left, right = p.covered(Cover.LEFT), p.covered(Cover.RIGHT)
+        hand_seed, camera_seed, click_seed, servo_seed = (
+            int(n) for n in np.random.SeedSequence(seed).generate_state(4) >> 1
+        )
+        from handover.controllers.helix.calibration import (
+            TooFewCorners,  # OpenCV is slow to import, and lists import this
+        )
+        from handover.scenarios.helix.workspace import notes_on_place  # likewise
+
         s = System()
+        s.notes += notes_on_place(p.p_WO, p.cameras)
+        try:
+            calibration = calibrated(p.click_noise, click_seed, p.box_height, p.cameras)
+        except TooFewCorners as e:
+            s.add_fault(f"box_height = {p.box_height:g} m: {e}")
+            calibration = camera_parameters(places=p.cameras)
+        if fault := marker_fault(p.marker):
+            s.add_fault(f"marker = {p.marker:g} m: {fault}")
         camera = s.add(
             "camera",
             fmu("camera"),
-            **calibration(),
+            period=p.picture_period,
+            decimation=p.decimation,
             seed=camera_seed,
-            cover_left_from=left[0],
-            cover_left_until=left[1],
-            cover_right_from=right[0],
-            cover_right_until=right[1],
+            marker=p.marker,
+            rings=p.rings,
+            **camera_parameters(p.camera_turn, p.cameras),
+            **p.camera_values(),
         )
-        vision = s.add("vision", fmu("vision"), **calibration())
+        vision = s.add(
+            "vision",
+            fmu("vision"),
+            period=p.picture_period,
+            decimation=p.decimation,
+            detector=p.detector,
+            marker=p.marker,
+            rings=p.rings,
+            **calibration,
+        )
+        settings = p.settings
         servo = s.add(
             "servo",
             fmu("servo"),
-            period=PICTURE_PERIOD if p.settings["filter_pictures"] else p.period,
+            period=p.picture_period if settings["filter_pictures"] or p.jitter > 0.0 else p.period,
             sampled=True,
             control_period=float(p.period),
             alpha=p.alpha,
             threshold=p.threshold,
-            **p.settings,
+            adaptive_step=p.step_rule is StepRule.BY_ERROR,
+            jitter=p.jitter,
+            seed=servo_seed,
+            **settings,
         )
-        arm = s.add("arm", fmu("arm"))
-        hand = s.add("hand", fmu("hand"), seed=hand_seed, p_WO_0=p.p_WO)
+        arm = s.add("arm", fmu("arm"), **p.arm_values())
+        hand = s.add("hand", fmu("hand"), seed=hand_seed, **p.hand_values(p.p_WO))
         for name in ("backbone", "p_WR", "q_WR", "p_WG", "q_WG", "grip"):
             s.connect(getattr(arm.y, name), getattr(camera.u, name))
         for name in ("p_WO", "p_WH"):

@@ -12,12 +12,13 @@ _CALIBRATION = {
     for side in ("left", "right")
     for what in ("p_WC", "q_WC", "intrinsics", "distortion")
 }  # fmt: skip
+_MARKERS = {"marker": "the scenario's marker", "rings": "the scenario's rings"}
 _SEEN = {
     "p_WO_meas": "in W; while it is not seen, the last one, zeros before any",
     "p_WR_meas": "in W; the wrist carries the marker ring, at the end of the arm's centre line",
     "p_WG_meas": "in W; the gripper is 0.1 m beyond the wrist, along the ring's axis",
-    "seen_O": "in both pictures",
-    "seen_R": "in both pictures",
+    "seen_O": "in this pair of pictures",
+    "seen_R": "in this pair of pictures",
 }
 _COVARIANCES = {
     "cov_O": "in W; large while it is not seen",
@@ -47,16 +48,29 @@ PLACES = {
             "p_WH": "in W",
             **_CALIBRATION,
             "seed": "follows from the run's seed",
-            "cover_left_from": "",
-            "cover_left_until": "",
-            "cover_right_from": "",
-            "cover_right_until": "",
+            "decimation": "the unit is stepped so often",
+            **_MARKERS,
+            **dict.fromkeys(
+                (
+                    *("cover_left_from", "cover_left_until", "cover_right_from", "cover_right_until", "light", "noise"),
+                    *("lost_pictures", "covered_markers", "hide_ball_from", "hide_ball_until"),
+                ),
+                "what the scenario's parameters let be amiss",
+            ),
         },
         remarks=(_BASE, "In a camera's frame C, z is its direction of view, x points to the right and y down."),
     ),
     "vision": Place(
         required=_SEEN,
-        optional={"left": "", "right": "", **_COVARIANCES, **_CALIBRATION},
+        optional={
+            "left": "",
+            "right": "",
+            **_COVARIANCES,
+            **dict.fromkeys(_CALIBRATION, "as the clicks of the calibration give it"),
+            "decimation": "the unit is stepped so often",
+            "detector": "the scenario's detector",
+            **_MARKERS,
+        },
         remarks=(_BASE, "Without covariances, those that the controller gets are zeros."),
     ),
     "servo": Place(
@@ -66,7 +80,7 @@ PLACES = {
             "120 degrees towards +y of B, which is -y of W; all three by as much change the segment's length",
         },
         optional={
-            "closure": "the hand lets go once the gripper has closed around the ball",
+            "closure": "the person lets go once the gripper has closed around the ball",
             **_SEEN,
             **_COVARIANCES,
             "phase": "by it, time and success of the handover are judged: it fails in GIVEN_UP",
@@ -86,6 +100,9 @@ PLACES = {
             "epsilon_control": "by the scenario's tuning",
             "A_pose_upd": "by the scenario's tuning",
             "settle_steps": "by the scenario's tuning",
+            "adaptive_step": "the scenario's step_rule",
+            "jitter": "the scenario's jitter",
+            "seed": "follows from the run's seed",
             **_TUNED,
         },
         remarks=(
@@ -107,7 +124,14 @@ PLACES = {
             "backbone": "in W",
             "grip": "",
         },
-        optional={"closure": "", "f_G": "in W; by it a person guides the gripper", "tension": "shown over time"},
+        optional={
+            "closure": "",
+            "f_G": "in W; by it a person guides the gripper",
+            "tension": "shown over time",
+            "EA": "by the scenario's arm_stiffness",
+            "EI": "by the scenario's arm_stiffness",
+            "gripper_mass": "by the scenario's gripper_load",
+        },
         remarks=(_BASE,),
     ),
     "hand": Place(
@@ -119,10 +143,26 @@ PLACES = {
         },
         optional={
             "f_G": "in W",
+            "f_H": "in W; by it the scenario's hand_force_max is judged",
             "p_WG": "in W",
             "q_WG": "of W's frame, scalar first; z of the gripper points to its tip",
             "grip": "",
             "seed": "follows from the run's seed",
+            "p_WO_1": "in W; where the hand moves on to",
+            **dict.fromkeys(
+                (
+                    "move_from",
+                    "move_for",
+                    "tremor_rms",
+                    "drift_rms",
+                    "guide_stiffness",
+                    "help_speed",
+                    "ball_mass",
+                    "finger_friction",
+                    "force_max",
+                ),
+                "by the scenario's parameters",
+            ),
         },
         remarks=(_BASE,),
     ),

@@ -10,6 +10,7 @@ from matplotlib.patches import Circle
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.plants.helix.bowl import Bowl
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.plotting import figure
@@ -32,12 +33,13 @@ _STROKES: tuple[Stroke, ...] = ("solid", "dashed", "dotted")
 
 
 def figures_of_handover(parameters: Parameters, record: Record) -> list[TimeFigure]:
-    """Return the figures of the distance to the goal, of true and estimated positions, and of tendons and gripper."""
+    """Return the figures of the distance to the goal, of true and estimated positions, of tendons, and of the grasp."""
     phases = phases_of(record, "servo.phase") if "servo.phase" in record else ()
     change, title = 1000 * record["servo.dl_t"], "Commanded tendon lengths, since calibration"
     tendons = [_tendons(title, "change", "mm", change, phases, held=True)]
     if "arm.tension" in record:
         tendons.append(_tendons("Tendon forces", "tension", "N", record["arm.tension"], phases, held=False))
+    hand = [_hand_force(parameters, record, phases)] if "hand.f_H" in record else []
     return [
         TimeFigure(
             name="error",
@@ -51,11 +53,46 @@ def figures_of_handover(parameters: Parameters, record: Record) -> list[TimeFigu
         ),
         TimeFigure(
             name="tendons",
-            caption="Commanded tendon lengths, from calibration, tendon forces, and how far the gripper is closed. A "
-            "slack tendon is at 0 N.",
-            plots=[*tendons, _gripper(record, phases)],
+            caption="Commanded tendon lengths, from calibration, and tendon forces. A slack tendon is at 0 N.",
+            plots=tendons,
+        ),
+        TimeFigure(
+            name="grasp",
+            caption="How far the gripper is closed, and with what ball and fingers press on the hand.",
+            plots=[_gripper(record, phases), *hand],
         ),
     ]
+
+
+def figure_of_delivery(bowl: Bowl, record: Record) -> TimeFigure:
+    """Return the figure of where the ball is over the bowl: how far beside its middle, and how high over its rim."""
+    phases = phases_of(record, "servo.phase") if "servo.phase" in record else ()
+    over = 1000 * (record["hand.p_WO"] - bowl.p_WB)
+    gripper = 1000 * (record["arm.p_WG"] - bowl.p_WB)
+    ways = (
+        ("beside", "Ball beside the bowl's middle", np.linalg.norm(over[:, :2], axis=1), "rim", 1000 * bowl.radius),
+        ("over", "Ball over the bowl's rim", over[:, 2], "rim", 0.0),
+    )
+    of_gripper = (np.linalg.norm(gripper[:, :2], axis=1), gripper[:, 2])
+    plots = [
+        TimePlot(
+            title=title,
+            quantity="distance" if name == "beside" else "height",
+            unit="mm",
+            phases=phases,
+            curves=[
+                Curve(label="ball", values=values, group="ball"),
+                Curve(label="gripper", values=of_it, stroke="dashed", group="gripper"),
+            ],
+            levels=(Level(label=label, value=level),),
+            palette=_PALETTE,
+        )
+        for (name, title, values, label, level), of_it in zip(ways, of_gripper, strict=True)
+    ]
+    caption = (
+        "Where ball and gripper are over the bowl: in the plane of its rim, from its middle, and above that plane."
+    )
+    return TimeFigure(name="delivery", caption=caption, plots=plots)
 
 
 def _known(record: Record, values: Floats) -> Floats:
@@ -135,6 +172,20 @@ def _gripper(record: Record, phases: Sequence[Phase]) -> TimePlot:
         unit="",
         phases=phases,
         curves=curves,
+    )
+
+
+def _hand_force(parameters: Parameters, record: Record, phases: Sequence[Phase]) -> TimePlot:
+    most = parameters.hand_force_max
+    force = np.linalg.norm(record["hand.f_H"], axis=1)
+    return TimePlot(
+        title="Force on the hand",
+        quantity="force",
+        unit="N",
+        phases=phases,
+        limits=(0.0, None),
+        curves=[Curve(label="of ball and fingers", values=force)],
+        levels=(Level(label="what the person bears", value=most),) if force.max() > 0.5 * most else (),
     )
 
 

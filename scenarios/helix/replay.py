@@ -1,20 +1,20 @@
 """A Helix handover in space: arm, gripper, ball, hand, the cameras, and the estimates of ball and gripper."""
 
-from collections.abc import Callable
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.plants.helix.shapes import Limb, gripper, hand
+from handover.plants.helix.bowl import Bowl
+from handover.plants.helix.shapes import Limbs, gripper, hand
 from handover.plants.helix.stereo_camera import Params as CameraParams
 from handover.plants.helix.tendon_parameters import Params as ArmParams
-from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, ball, circle, merged, prism, rod
-from handover.scenarios.helix.cameras import camera_of
+from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, ball, circle, merged, prism, rod, turned
+from handover.scenarios.helix.cameras import camera_of, camera_parameters
 
 _ARM, _PLATE, _COLLAR, _METAL, _FINGER = "#9aa7b5", "#5f6b7a", "#e2e6e8", "#77736f", "#3f74c8"
+_BOWL, _TABLE = "#c9b28a", "#8d8478"
 _SKIN, _SLEEVE, _BALL, _CAMERA, _ESTIMATE = "#dba98a", "#54708f", "#3fb54a", "#8357a8", "#d1602b"
 
 _PLATE_THICKNESS, _PLATE_RADIUS = 0.008, 1.15
@@ -28,18 +28,23 @@ _PICTURE_CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 _OCTAGON = np.radians(np.arange(22.5, 360.0, 45.0))
 
 
-def replay_handover(record: Record) -> Replay:
-    """Return the scene of a run over its time."""
+_BOWL_WALL = 0.004
+"""Thickness of the bowl, m."""
+
+
+def replay_handover(record: Record, bowl: Bowl | None = None) -> Replay:
+    """Return the scene of a run over its time, with a bowl if there is one."""
     arm = Line(label="arm", colour=_ARM, points=record["arm.backbone"], radii=np.full(25, CameraParams().arm_radius))
+    table = [] if bowl is None else _bowl(bowl)
     cameras, estimates = [_frustum(side) for side in ("left", "right")], _estimates(record)
     return Replay(
-        bodies=[*_plates(record), _collar(record), *_gripper_body(record), *_hand_body(record), _ball(record)],
+        bodies=[*_plates(record), _collar(record), *_gripper_body(record), *_hand_body(record), _ball(record), *table],
         lines=[arm, *_fingers(record), *_forearm(record), *estimates],
         fixed=cameras,
         eye=(-0.35, -1.25, 0.35),
         phases="servo.phase" if "servo.phase" in record else "",
         notes=("Where things were; orange: where the controller took ball and gripper to be.",) if estimates else (),
-        window=_window(record, cameras),
+        window=_window(record, cameras, [body.p_WB + p for body in table for p in body.mesh.vertices]),
     )
 
 
@@ -81,24 +86,26 @@ def _collar(record: Record) -> Body:
 
 def _gripper_body(record: Record) -> list[Body]:
     """Return stem and knuckle, which stay as they are in G; the plant draws them first."""
-    stem = gripper(np.array([0.0, 0.0, -ArmParams().d_gripper]), np.zeros(3), np.eye(3), 0.0)[:2]
-    return [Body(label="gripper", colour=_METAL, mesh=_solid(stem), p_WB=record["arm.p_WG"], q_WB=record["arm.q_WG"])]
+    stem = gripper(np.array([0.0, 0.0, -ArmParams().d_gripper]), np.zeros(3), np.eye(3), 0.0)
+    mesh = _solid(stem.points[:2], stem.radii[:2])
+    return [Body(label="gripper", colour=_METAL, mesh=mesh, p_WB=record["arm.p_WG"], q_WB=record["arm.q_WG"])]
 
 
 def _fingers(record: Record) -> list[Line]:
     """Return the three fingers, each from its root over its joint to its tip."""
 
-    def limbs(row: int) -> list[Limb]:
+    def limbs(row: int) -> Limbs:
         p_WG, R_WG = record_at["p_WG"][row], rotation_of(record_at["q_WG"][row])
-        return gripper(record_at["p_WR"][row], p_WG, R_WG, float(record_at["grip"][row]))[2:]
+        return gripper(record_at["p_WR"][row], p_WG, R_WG, float(record_at["grip"][row]))
 
     record_at = {name: record[f"arm.{name}"] for name in ("p_WR", "p_WG", "q_WG", "grip")}
-    seen = _followed(limbs, len(record.time))  # (rows, 9, 3, 3): root to joint, joint to pad, pad to tip, three times
-    first = limbs(0)
+    # (rows, 9, 3, 3): root to joint, joint to pad, pad to tip, three times
+    seen = np.array([limbs(row).points[2:] for row in range(len(record.time))])
+    r = limbs(0).radii[2:]
     fingers: list[Line] = []
-    for k in range(0, len(first), 3):
+    for k in range(0, len(r), 3):
         points = np.stack([seen[:, k, 0], seen[:, k, 2], seen[:, k + 2, 2]], axis=1)
-        radii = np.array([first[k].radii[0], first[k].radii[2], first[k + 2].radii[2]])
+        radii = np.array([r[k, 0], r[k, 2], r[k + 2, 2]])
         fingers.append(Line(label="gripper", colour=_FINGER, points=points, radii=radii))
     return fingers
 
@@ -106,21 +113,19 @@ def _fingers(record: Record) -> list[Line]:
 def _hand_body(record: Record) -> list[Body]:
     """Return palm and fingers, which keep their shape; the hand turns about z with its forearm."""
     p_WH = record["hand.p_WH"]
-    seen = _followed(lambda row: hand(p_WH[row])[2:], len(p_WH)) - p_WH[:, None, None]
+    seen = np.array([hand(p).points[2:] - p for p in p_WH])
     pointing = seen[:, -2, 2] - seen[:, 0, 0]
     yaw = np.unwrap(np.arctan2(pointing[:, 1], pointing[:, 0]))
-    first = [Limb(x.points - p_WH[0], x.radii, x.colour) for x in hand(p_WH[0])[2:]]
     q_WH = Rotation.from_euler("z", (yaw - yaw[0])[:, None]).as_quat(scalar_first=True)
-    return [Body(label="hand", colour=_SKIN, mesh=_solid(first), p_WB=p_WH, q_WB=q_WH)]
+    return [Body(label="hand", colour=_SKIN, mesh=_solid(seen[0], hand(p_WH[0]).radii[2:]), p_WB=p_WH, q_WB=q_WH)]
 
 
 def _forearm(record: Record) -> list[Line]:
     p_WH = record["hand.p_WH"]
-    seen, first = _followed(lambda row: hand(p_WH[row])[:2], len(p_WH)), hand(p_WH[0])[:2]
-    ends = (0, 2)
+    ends = [0, 2]
+    seen, radii = np.array([hand(p).points[:2, ends] for p in p_WH]), hand(p_WH[0]).radii[:2, ends]
     return [
-        Line(label="hand", colour=colour, points=seen[:, k][:, ends], radii=first[k].radii[list(ends)])
-        for k, colour in ((0, _SKIN), (1, _SLEEVE))
+        Line(label="hand", colour=colour, points=seen[:, k], radii=radii[k]) for k, colour in ((0, _SKIN), (1, _SLEEVE))
     ]
 
 
@@ -137,7 +142,7 @@ def _estimates(record: Record) -> list[Line]:
 
 def _frustum(side: str) -> Line:
     """Return the edges of the front part of a camera's frustum."""
-    camera = camera_of(side)
+    camera = camera_of(side, camera_parameters())
     u, v = camera.c
     depth = _FRUSTUM * np.array([[s * u / camera.f[0], t * v / camera.f[1], 1.0] for s, t in _PICTURE_CORNERS])
     corners = camera.p_WC + depth @ np.transpose(camera.R_WC)
@@ -146,18 +151,31 @@ def _frustum(side: str) -> Line:
     return Line(label="cameras", colour=_CAMERA, points=edges, width=2.0)
 
 
-def _followed(limbs: Callable[[int], list[Limb]], rows: int) -> Floats:
-    """Return the points of limbs over time, shape (rows, limbs, 3, 3)."""
-    return np.array([[x.points for x in limbs(row)] for row in range(rows)])
+def _solid(points: Floats, radii: Floats) -> Mesh:
+    """Return limbs, shapes (m, 3, 3) and (m, 3), as one body."""
+    return merged([rod(p, r) for p, r in zip(points, radii, strict=True)])
 
 
-def _solid(limbs: list[Limb]) -> Mesh:
-    return merged([rod(x.points, x.radii) for x in limbs])
+def _bowl(bowl: Bowl) -> list[Body]:
+    """Return the bowl, inside and outside, and the disc on which it stands; they stay where they are."""
+    inner = bowl.profile(9) - np.array([0.0, bowl.p_WB[2]])
+    outer = inner[::-1] + np.array([[_BOWL_WALL, 0.0]])
+    outer[:-1, 1] -= _BOWL_WALL * np.linspace(0.0, 1.0, len(outer))[:-1]
+    outer[-1] = [0.0, inner[0, 1] - _BOWL_WALL]
+    shell = turned(np.vstack([inner, outer]))
+    low = -bowl.depth - _BOWL_WALL
+    disc = prism(circle(1.2 * bowl.radius, 32), low - 0.012, low)
+    at = bowl.p_WB[None]
+    return [
+        Body(label="bowl", colour=_BOWL, mesh=shell, p_WB=at),
+        Body(label="bowl", colour=_TABLE, mesh=disc, p_WB=at),
+    ]
 
 
-def _window(record: Record, cameras: list[Line]) -> Floats:
-    """Return corners around arm, gripper, ball, hand and cameras; the forearm runs out of it."""
+def _window(record: Record, cameras: list[Line], others: list[Floats]) -> Floats:
+    """Return corners around arm, gripper, ball, hand, cameras and other points; the forearm runs out of it."""
     seen = [record[s].reshape(-1, 3) for s in ("arm.backbone", "arm.p_WG", "hand.p_WO", "hand.p_WH")]
     reach = 0.12  # of the gripper's fingers and of the hand, with some room
-    points = np.vstack([*(np.vstack([p - reach, p + reach]) for p in seen), *(c.points[0] for c in cameras)])
+    around = [np.vstack([p - reach, p + reach]) for p in seen]
+    points = np.vstack([*around, *(c.points[0] for c in cameras), *others])
     return np.array([points.min(axis=0), points.max(axis=0)])

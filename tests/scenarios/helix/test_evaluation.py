@@ -1,26 +1,15 @@
-from typing import Any
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from helix_signals import P_WG, P_WR, PICTURE, port, views_and_ports
 
 from handover.controllers.helix.visual_servo import Phase, Verdict
-from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.system.signals import Signals
-from handover.plants.helix.handover_partner import Holder
-from handover.scenarios.helix.cameras import camera_of
+from handover.plants.helix.partner_parameters import Holder
+from handover.scenarios.helix.cameras import camera_of, camera_parameters
+from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.evaluation import HandoverEvaluator
-from handover.scenarios.helix.parameters import Cover, Parameters
-
-PICTURE = np.zeros(720 * 1280 * 3, dtype=np.uint8)
-P_WG = np.array([0.16, 0.0, -0.6])
-CALIBRATED = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.24, 0.0, 0.0, 0.24])
-P_WR = P_WG + np.array([0.0, 0.0, 0.1])
-
-
-Views = dict[str, dict[str, tuple[NDArray[Any], ...]]]
-Ports = dict[str, dict[str, FmuPort]]
+from handover.scenarios.helix.parameters import Parameters
 
 
 def signals(
@@ -30,46 +19,14 @@ def signals(
     along: float = 0.0,
     sees_ball: bool = True,
     verdict: Verdict = Verdict.NONE,
+    hand_force: float = 0.2,
 ) -> Signals:
     """Return what a gripper that hangs down, and a ball at a place in its frame, would show."""
-    units, ports = views_and_ports(phase, holder, beside, along, sees_ball)
+    units, ports = views_and_ports(phase, holder, beside, along, sees_ball, hand_force)
     units["servo"]["verdict"] = (np.array([int(verdict)]),)
     items = tuple((v.name, int(v)) for v in Verdict)
     ports["servo"]["verdict"] = port("verdict", Kind.ENUMERATION, items=items)
     return Signals(units, ports, PICTURE)
-
-
-def views_and_ports(
-    phase: Phase, holder: Holder = Holder.HAND, beside: float = 0.0, along: float = 0.0, sees_ball: bool = True
-) -> tuple[Views, Ports]:
-    """Return what a gripper that hangs down, and a ball at a place in its frame, would show."""
-    reals = {
-        "arm": {"p_WG": P_WG, "q_WG": [0.0, 1.0, 0.0, 0.0]},
-        "hand": {"p_WO": P_WG + np.array([beside, 0.0, -along])},
-        "servo": {"error": [0.01], "p_WO_est": P_WG, "p_WR_est": P_WG, "p_WG_est": P_WG, "q_sys": CALIBRATED},
-        "vision": {"p_WO_meas": P_WG, "p_WR_meas": P_WR, "p_WG_meas": P_WG},
-    }
-    units: Views = {
-        unit: {name: (np.array(value),) for name, value in values.items()} for unit, values in reals.items()
-    }
-    ports: Ports = {
-        unit: {name: port(name, Kind.REAL, shape=v[0].shape if v[0].size > 1 else ()) for name, v in values.items()}
-        for unit, values in units.items()
-    }
-    for name, seen in (("seen_O", sees_ball), ("seen_R", True)):
-        units["vision"][name] = (np.array([seen]),)
-        ports["vision"][name] = port(name, Kind.BOOLEAN)
-    for unit, name, item in (("servo", "phase", phase), ("hand", "holder", holder)):
-        units[unit][name] = (np.array([int(item)]),)
-        ports[unit][name] = port(name, Kind.ENUMERATION, items=tuple((i.name, int(i)) for i in type(item)))
-    pixels = (np.array([PICTURE.ctypes.data]), np.array([PICTURE.size]))
-    units["camera"] = dict.fromkeys(("left", "right"), pixels)
-    ports["camera"] = {side: port(side, Kind.BINARY) for side in ("left", "right")}
-    return units, ports
-
-
-def port(name: str, kind: Kind, **more: Any) -> FmuPort:
-    return FmuPort(name=name, kind=kind, causality=Causality.OUTPUT, fmi_type="", references=(), **more)
 
 
 def follow(*seen: tuple[float, Signals], parameters: Parameters | None = None) -> HandoverEvaluator:
@@ -82,7 +39,7 @@ def follow(*seen: tuple[float, Signals], parameters: Parameters | None = None) -
 
 def test_a_gripper_that_closed_beside_the_ball_fails_and_says_how_far():
     beside = [signals(phase, beside=0.04, along=-0.01) for phase in (Phase.GRASP, Phase.HOLD, Phase.HOLD)]
-    evaluator = follow((8.0, beside[0]), (18.0, beside[1]), (19.1, beside[2]))
+    evaluator = follow((8.0, beside[0]), (18.0, beside[1]), (20.1, beside[2]))
     assert evaluator.over
     outcome = evaluator.outcome()
     assert not outcome.success
@@ -129,7 +86,25 @@ def test_a_ball_that_fell_from_the_gripper_fails():
     taken = signals(Phase.HOLD, Holder.GRIPPER)
     outcome = follow((18.0, taken), (19.1, signals(Phase.HOLD, Holder.FREE, along=0.3))).outcome()
     assert not outcome.success
-    assert "did not keep the ball" in outcome.reason
+    assert "the gripper did not keep it" in outcome.reason
+
+
+def test_a_ball_that_is_pushed_out_of_the_hand_fails_at_once():
+    evaluator = follow((5.0, signals(Phase.APPROACH)), (5.1, signals(Phase.APPROACH, Holder.FREE, beside=0.05)))
+    assert evaluator.over
+    outcome = evaluator.outcome()
+    assert not outcome.success
+    assert "the ball was pushed out of the hand at 5.1 s" in outcome.reason
+
+
+@pytest.mark.parametrize(("force", "success"), [(4.9, True), (5.1, False)])
+def test_an_arm_that_presses_harder_than_the_person_bears_fails(force: float, success: bool):
+    pressed = signals(Phase.GRASP, hand_force=force)
+    taken = [(t, signals(Phase.HOLD, Holder.GRIPPER)) for t in (18.0, 19.1)]
+    outcome = follow((9.0, pressed), *taken).outcome()
+    assert outcome.success is success
+    assert outcome.metrics["hand_force"].value == pytest.approx(force)
+    assert success or "the arm pressed on the hand with 5.1 N, and a person bears 5 N" in outcome.reason
 
 
 def moments(evaluator: HandoverEvaluator) -> dict[str, float]:
@@ -174,7 +149,7 @@ def test_a_covered_lens_is_shown_when_the_first_picture_was_taken_through_it():
 def test_marks_lie_where_the_camera_sees_what_was_measured():
     picture = follow((0.0, signals(Phase.APPROACH))).pictures()[0]
     ball, wrist, gripper = (m for m in picture.marks if m.label.endswith("measured"))
-    camera = camera_of("left")
+    camera = camera_of("left", camera_parameters())
     assert (ball.shape, wrist.shape, gripper.shape) == ("circle", "cross", "plus")
     assert (wrist.u, wrist.v) == pytest.approx(tuple(camera.project(P_WR)))
     edge = camera.project(P_WG + 0.025 * camera.R_WC[:, 1])  # a ball's radius below its middle, as the camera sees it
@@ -199,7 +174,7 @@ def of_a_short_controller(closure: float | None, grip: float, holder: Holder = H
 
 
 def test_a_controller_without_phases_is_judged_by_its_gripper():
-    moments = (0.0, 0.0, 0.0), (8.0, 1.0, 0.1), (9.0, 1.0, 1.0), (10.1, 1.0, 1.0)
+    moments = (0.0, 0.0, 0.0), (8.0, 1.0, 0.1), (9.0, 1.0, 1.0), (11.1, 1.0, 1.0)
     evaluator = follow(*((t, of_a_short_controller(closure, grip)) for t, closure, grip in moments))
     assert evaluator.phases == {"APPROACH": 0.0, "GRASP": 8.0, "HOLD": 9.0}
     assert evaluator.over
@@ -222,3 +197,11 @@ def test_a_controller_without_a_gripper_command_is_told_how_near_it_came_to_the_
 
 def test_a_run_that_failed_before_its_first_sample_has_no_distance():
     assert "final_distance" not in HandoverEvaluator(Parameters()).outcome().metrics
+
+
+def test_a_run_that_was_stopped_while_it_waits_is_not_told_that_nothing_was_seen_for_long():
+    assert (
+        follow((0.0, signals(Phase.WAIT)), (0.3, signals(Phase.WAIT))).outcome().reason.startswith("stopped at 0.3 s")
+    )
+    late = follow((0.0, signals(Phase.WAIT)), (10.0, signals(Phase.WAIT))).outcome().reason
+    assert late.startswith("the cameras did not see both ball and arm within 10 s")

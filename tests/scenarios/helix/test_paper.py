@@ -8,12 +8,14 @@ import pytest
 import tomli
 
 import handover.scenarios.helix
+from handover.controllers.helix.handover_vision import Params as VisionParams
 from handover.controllers.helix.servo_parameters import Params as ServoParams
-from handover.plants.helix.handover_partner import Params as HandParams
+from handover.plants.helix.partner_parameters import Params as HandParams
 from handover.plants.helix.stereo_camera import Params as CameraParams
 from handover.plants.helix.tendon_parameters import Params as ArmParams
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.helix.cameras import calibration
+from handover.scenarios.helix.calibrate_detector import calibrated_detector
+from handover.scenarios.helix.cameras import camera_parameters
 from handover.scenarios.helix.parameters import Parameters, Place, Tuning
 
 STATUS = {"stated", "derived", "assumed", "read off figure"}
@@ -48,6 +50,9 @@ def test_the_scenarios_defaults_have_an_origin(paper: dict[str, dict[str, dict[s
     assert p.height == experiment["height"]["value"]
     assert p.control_period == experiment["control_period"]["value"]
     assert p.alpha == experiment["default_alpha"]["value"]
+    assert p.detector.name.lower() == experiment["default_detector"]["value"]
+    assert p.marker == paper["camera"]["marker"]["value"]
+    assert p.rings == paper["camera"]["rings"]["value"]
     assert [e.name.lower().replace("_", "-") for e in Place] == experiment["places"]["value"]
 
 
@@ -68,15 +73,21 @@ def test_the_plants_defaults_have_an_origin(
 
 
 def test_the_cameras_are_where_the_paper_file_says(paper: dict[str, dict[str, dict[str, Any]]]):
-    c = calibration()
+    c = camera_parameters()
     assert [c["p_WC_left"].tolist(), c["p_WC_right"].tolist()] == paper["camera"]["p_WC"]["value"]
     assert [c["intrinsics_left"][0], c["intrinsics_right"][0]] == paper["camera"]["focal_length"]["value"]
     camera = CameraParams()
-    assert camera.marker == paper["camera"]["marker"]["value"]
-    assert camera.ball_radius == paper["camera"]["ball_radius"]["value"]
+    for name in ("marker", "rings", "apothem", "ball_radius"):
+        assert getattr(camera, name) == paper["camera"][name]["value"], name
 
 
 def test_a_tuning_stands_for_its_settings(paper: dict[str, dict[str, dict[str, Any]]]):
     thesis = Parameters(tuning=Tuning.THESIS).settings
     assert thesis == {name: entry["value"] for name, entry in paper["thesis"].items()}
     assert set(thesis) == set(Parameters().settings)
+
+
+def test_the_detector_s_shifts_are_those_that_pictures_tell():
+    found = calibrated_detector(CameraParams(), pairs=10, seed=1)
+    assert VisionParams().corner_shift == pytest.approx(found.corner_shift.value, abs=0.03)
+    assert VisionParams().edge_shift == pytest.approx(found.edge_shift.value, abs=0.03)

@@ -1,0 +1,137 @@
+"""What may be amiss in a Helix handover: parameters of the scenario, and what they set on the units.
+
+The thesis has none of them as a variable: all are this project's own. At the defaults the plant is as its units have
+it, but for the clicks of the calibration.
+"""
+
+import enum
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from handover.cosim.blocks.ports import Floats, parameter
+from handover.cosim.blocks.units import (
+    Kilogram,
+    Levels,
+    Metre,
+    MetrePerSecond,
+    Newton,
+    NewtonPerMetre,
+    Number,
+    Pixel,
+    Radian,
+    Second,
+)
+from handover.scenarios.experiment.paper import paper_values
+
+
+class Cover(enum.IntEnum):
+    """Which camera's lens is covered for a while."""
+
+    NONE = 0
+    LEFT = 1
+    RIGHT = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disturbances:
+    """What may be amiss with arm, hand, cameras and controller, each by itself."""
+
+    arm_stiffness: Number = parameter(
+        1.0, "stiffness of the arm's material over the usual one", minimum=0.3, maximum=3.0
+    )
+    gripper_load: Number = parameter(1.0, "mass of the gripper over the usual one", minimum=0.1, maximum=4.0)
+    tremor: Metre = parameter(0.001, "root mean square of the hand's tremor", minimum=0.0, maximum=0.05)
+    drift: Metre = parameter(0.003, "root mean square of the hand's drift", minimum=0.0, maximum=0.1)
+    ball_mass: Kilogram = parameter(0.02, "mass of the ball", minimum=0.001, maximum=1.0)
+    finger_friction: Number = parameter(
+        0.8, "friction between the gripper's fingers and the ball", minimum=0.0, maximum=3.0
+    )
+    hand_force_max: Newton = parameter(5.0, "force on the hand that the person bears", minimum=0.1, maximum=1000.0)
+    help_speed: MetrePerSecond = parameter(
+        0.0,
+        "how fast the person brings the ball between the fingers of a gripper that closes; 0: holds it still",
+        minimum=0.0,
+        maximum=1.0,
+    )
+    guidance: NewtonPerMetre = parameter(
+        0.0, "stiffness with which the person draws the gripper to the ball", minimum=0.0, maximum=1000.0
+    )
+    move_azimuth: Radian = parameter(
+        0.0, "turn about the arm's axis by which the hand moves on", minimum=-np.pi, maximum=np.pi
+    )
+    move_height: Metre = parameter(0.0, "rise by which the hand moves on", minimum=-0.5, maximum=0.5)
+    move_from: Second = parameter(4.0, "time at which the hand moves on, if it does", minimum=0.0, maximum=600.0)
+    move_for: Second = parameter(2.0, "how long that takes", minimum=0.1, maximum=600.0)
+    click_noise: Pixel = parameter(0.5, "standard deviation of the calibration's clicks", minimum=0.0, maximum=50.0)
+    box_height: Metre = parameter(-0.8, "height of the calibration box's middle in W", minimum=-3.0, maximum=1.0)
+    camera_turn: Radian = parameter(
+        0.0, "angle by which the right camera was turned after calibration", minimum=-0.2, maximum=0.2
+    )
+    light: Number = parameter(1.0, "brightness over the usual one", minimum=0.0, maximum=5.0)
+    sensor_noise: Levels = parameter(2.2, "standard deviation of the pictures' noise", minimum=0.0, maximum=60.0)
+    lost_pictures: Number = parameter(0.0, "part of the pictures that arrive black", minimum=0.0, maximum=1.0)
+    covered_markers: int = parameter(
+        0, "markers with tape over them, those that face the cameras first", minimum=0, maximum=8
+    )
+    hide_from: Second = parameter(4.0, "time at which a card hides the ball, if it does", minimum=0.0, maximum=600.0)
+    hide_for: Second = parameter(0.0, "how long a card hides the ball from both cameras", minimum=0.0, maximum=600.0)
+    cover: Cover = parameter(Cover.NONE, "camera whose lens is covered for a while")
+    cover_from: Second = parameter(4.0, "time at which the lens is covered", minimum=0.0, maximum=600.0)
+    cover_for: Second = parameter(2.0, "how long the lens is covered", minimum=0.0, maximum=600.0)
+    jitter: Number = parameter(
+        0.0, "largest deviation of a control period, drawn evenly, as a part of it", minimum=0.0, maximum=0.9
+    )
+
+    def covered(self, side: Cover) -> tuple[float, float]:
+        """Return from when until when a lens is covered, in seconds; (0, 0) where it is not."""
+        return (self.cover_from, self.cover_from + self.cover_for) if self.cover is side else (0.0, 0.0)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the hand moves on during the approach."""
+        return self.move_azimuth != 0.0 or self.move_height != 0.0
+
+    def camera_values(self) -> dict[str, Any]:
+        """Return what they set on the camera unit."""
+        hidden = (self.hide_from, self.hide_from + self.hide_for) if self.hide_for > 0.0 else (0.0, 0.0)
+        values: dict[str, Any] = {
+            "light": self.light,
+            "noise": self.sensor_noise,
+            "lost_pictures": self.lost_pictures,
+            "covered_markers": self.covered_markers,
+            "hide_ball_from": hidden[0],
+            "hide_ball_until": hidden[1],
+        }
+        for side in (Cover.LEFT, Cover.RIGHT):
+            name = f"cover_{side.name.lower()}"
+            values[f"{name}_from"], values[f"{name}_until"] = self.covered(side)
+        return values
+
+    def arm_values(self) -> dict[str, Any]:
+        """Return what they set on the arm."""
+        arm = paper_values("helix", "arm")
+        return {
+            "EA": self.arm_stiffness * arm["EA"],
+            "EI": self.arm_stiffness * arm["EI"],
+            "gripper_mass": self.gripper_load * arm["gripper_mass"],
+        }
+
+    def hand_values(self, p_WO: Floats) -> dict[str, Any]:
+        """Return what they set on the hand that offers the ball at p_WO, shape (3,), m."""
+        a = self.move_azimuth
+        turn = np.array([[np.cos(a), -np.sin(a), 0.0], [np.sin(a), np.cos(a), 0.0], [0.0, 0.0, 1.0]])
+        return {
+            "p_WO_0": p_WO,
+            "p_WO_1": turn @ p_WO + np.array([0.0, 0.0, self.move_height]),
+            "move_from": self.move_from,
+            "move_for": self.move_for if self.moves else 0.0,
+            "tremor_rms": self.tremor,
+            "drift_rms": self.drift,
+            "guide_stiffness": self.guidance,
+            "help_speed": self.help_speed,
+            "ball_mass": self.ball_mass,
+            "finger_friction": self.finger_friction,
+            "force_max": self.hand_force_max,
+        }

@@ -1,0 +1,79 @@
+"""Where the Helix can take a ball: what its cameras see of the place, and how far its arm reaches.
+
+[Vervloet2025] sec. 5.4.1 and fig. 14: the workspace was limited by what both cameras see.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from handover.controllers.helix.markers import MarkerRing
+from handover.cosim.blocks.geometry import Pinhole
+from handover.cosim.blocks.ports import Floats
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.helix.cameras import PICTURE, SIDES, CameraPlaces, camera_of, camera_parameters
+
+LEAST_SIDE = 14.0
+"""Side of a marker in a picture from which the ring is found nearly always, px (all of 42 poses at 14.5 px and more, 11
+of 14 at 13, 2 of 14 at 11.7)."""
+
+
+def cameras_that_see(p_WO: Floats, places: CameraPlaces = CameraPlaces.BEHIND) -> int:
+    """Return in how many pictures ball and marker ring are whole, with the gripper at the ball and pointing down.
+
+    What hides them from a camera, such as the arm itself, does not count, since it moves.
+
+    Args:
+        p_WO: the ball in W, shape (3,), m.
+        places: of the cameras.
+    """
+    parameters = camera_parameters(places=places)
+    return sum(_sees(camera_of(side, parameters), p_WO) for side in SIDES)
+
+
+def _sees(camera: Pinhole, p_WO: Floats) -> bool:
+    values, d_gripper = paper_values("helix", "camera"), float(paper_values("helix", "arm")["d_gripper"])
+    p_WR = p_WO + np.array([0.0, 0.0, d_gripper])
+    depth_O, depth_R = (float(camera.depth(p)) for p in (p_WO, p_WR))
+    if min(depth_O, depth_R) <= 0.0:
+        return False
+    ring = p_WR + MarkerRing(values["apothem"], values["marker"]).outline
+    edge = float(camera.f.max()) * values["ball_radius"] / depth_O
+    side = float(camera.f.min()) * values["marker"] / depth_R
+    inside = _is_inside(camera.project(p_WO)[None], edge) and _is_inside(camera.project(ring), 0.0)
+    return inside and side >= LEAST_SIDE
+
+
+def _is_inside(pixels: Floats, margin: float) -> bool:
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    return bool((low >= margin).all() and (high <= PICTURE - 1.0 - margin).all())
+
+
+def reach(height: float) -> float:
+    """Return how far from its axis the arm reaches at a height of the gripper in W, m, in every direction; 0: nowhere.
+
+    Between the heights of `paper.toml`, which `handover paper helix-workspace` found, it is interpolated.
+    """
+    found = paper_values("helix", "reach")
+    heights, radii = (np.array(found[name], dtype=np.float64) for name in ("height", "radius"))
+    return float(np.interp(height, heights, radii, left=0.0, right=0.0))
+
+
+def notes_on_place(p_WO: Floats, places: CameraPlaces = CameraPlaces.BEHIND) -> Sequence[str]:
+    """Return why a handover at a place will hardly succeed, a line for each reason; none where nothing is known.
+
+    Args:
+        p_WO: the ball in W, shape (3,), m.
+        places: of the cameras.
+    """
+    r, height = float(np.hypot(p_WO[0], p_WO[1])), float(p_WO[2])
+    place = f"the ball is offered {r:.2f} m from the arm's axis at a height of {height:.2f} m"
+    notes: list[str] = []
+    far = reach(height)
+    if far == 0.0 or r > far:
+        where = f"only {far:.2f} m far in every direction there" if far > 0.0 else "to no place of that height"
+        notes.append(f"{place}, but the arm reaches {where}")
+    seeing = cameras_that_see(p_WO, places)
+    if seeing < len(SIDES):
+        notes.append(f"{place}, where {('no camera sees', 'one camera alone sees')[seeing]} ball and markers whole")
+    return notes

@@ -1,0 +1,129 @@
+"""What is amiss reaches the units, and nothing else changes."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handover.controllers.helix.handover_vision import Detector
+from handover.controllers.helix.stereo import StereoRig
+from handover.cosim.blocks.geometry import rotation_of
+from handover.cosim.exceptions import WiringError
+from handover.cosim.system.system import System
+from handover.fmus.build import cached
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.helix.cameras import calibrated, camera_of, camera_parameters
+from handover.scenarios.helix.disturbances import Cover
+from handover.scenarios.helix.helix_handover import HelixHandover
+from handover.scenarios.helix.parameters import Filters, Parameters, StepRule, Tuning
+
+
+def built(seed: int = 3, **given: Any) -> System:
+    return HelixHandover().build(Parameters(**given), seed, lambda name: cached(HelixHandover.units[name], 3))
+
+
+@pytest.fixture(scope="module")
+def undisturbed() -> System:
+    return built()
+
+
+def start(system: System) -> dict[str, Any]:
+    return {f"{name}.{port}": value for name, unit in system.units.items() for port, value in unit.start.items()}
+
+
+def changed(a: System, b: System) -> set[str]:
+    before, after = start(a), start(b)
+    return {name for name in before.keys() | after.keys() if not np.array_equal(before[name], after[name])}
+
+
+SET_ON: list[tuple[dict[str, Any], set[str]]] = [
+    ({"arm_stiffness": 0.7}, {"arm.EA", "arm.EI"}),
+    ({"gripper_load": 1.5}, {"arm.gripper_mass"}),
+    ({"tremor": 0.003}, {"hand.tremor_rms"}),
+    ({"drift": 0.01}, {"hand.drift_rms"}),
+    ({"guidance": 30.0}, {"hand.guide_stiffness"}),
+    ({"move_azimuth": 0.5}, {"hand.p_WO_1", "hand.move_for"}),
+    ({"move_height": 0.05}, {"hand.p_WO_1", "hand.move_for"}),
+    ({"camera_turn": 0.02}, {"camera.q_WC_right"}),
+    ({"light": 0.4}, {"camera.light"}),
+    ({"sensor_noise": 8.0}, {"camera.noise"}),
+    ({"lost_pictures": 0.3}, {"camera.lost_pictures"}),
+    ({"detector": Detector.PUBLISHED}, {"vision.detector"}),
+    ({"marker": 0.022}, {"camera.marker", "vision.marker"}),
+    ({"rings": 2}, {"camera.rings", "vision.rings"}),
+    ({"covered_markers": 3}, {"camera.covered_markers"}),
+    ({"hide_for": 2.0}, {"camera.hide_ball_from", "camera.hide_ball_until"}),
+    ({"cover": Cover.LEFT}, {"camera.cover_left_from", "camera.cover_left_until"}),
+    ({"jitter": 0.5}, {"servo.jitter"}),
+    ({"click_noise": 2.0}, {f"vision.{what}_WC_{side}" for what in "pq" for side in ("left", "right")}),
+    ({"step_rule": StepRule.BY_ERROR}, {"servo.adaptive_step"}),
+    ({"decimation": 15}, {"camera.decimation", "vision.decimation"}),
+]
+
+
+@pytest.mark.parametrize(("given", "set_on"), SET_ON, ids=["_".join(given) for given, _ in SET_ON])
+def test_each_sets_what_it_says_and_nothing_else(undisturbed: System, given: dict[str, Any], set_on: set[str]):
+    assert changed(undisturbed, built(**given)) == set_on
+
+
+def test_a_hand_that_moves_on_turns_about_the_arm_and_rises():
+    hand = Parameters(move_azimuth=np.pi / 2, move_height=0.05).hand_values(np.array([0.16, 0.0, -0.6]))
+    np.testing.assert_allclose(hand["p_WO_1"], [0.0, 0.16, -0.55], atol=1e-12)
+
+
+def test_a_turned_camera_sees_what_lay_in_the_middle_farther_to_the_right():
+    point = np.array([[0.0, 0.0, -0.6]])
+    before, after = (camera_of("right", camera_parameters(turned)).project(point)[0] for turned in (0.0, 0.02))
+    assert after[0] - before[0] == pytest.approx(0.02 * 908.5, rel=0.1)
+    assert after[1] == pytest.approx(before[1], abs=0.5)
+
+
+def test_filters_are_chosen_apart_from_the_tuning():
+    thesis, own = (paper_values("helix", name) for name in ("thesis", "own"))
+    mixed = Parameters(filters=Filters.THESIS).settings
+    assert (mixed["Q_wrist"], mixed["gate"], mixed["shaping_time"]) == (thesis["Q_wrist"], 0.0, own["shaping_time"])
+    other = Parameters(tuning=Tuning.THESIS, filters=Filters.OWN).settings
+    assert (other["Q_wrist"], other["settle_steps"]) == (own["Q_wrist"], 1)
+
+
+def test_the_detector_gets_what_the_clicks_give_and_places_come_out_within_millimetres():
+    truth = camera_parameters()
+    places = np.array([[0.16, 0.0, -0.6], [0.0, 0.2, -0.5], [-0.1, -0.1, -0.7]])
+    off: list[float] = []
+    for seed in range(30):
+        found = calibrated(0.5, seed, -0.8)
+        assert not np.array_equal(found["p_WC_left"], truth["p_WC_left"])
+        rig = StereoRig(camera_of("left", found), camera_of("right", found))
+        for p in places:
+            seen = (camera_of(side, truth).project(p) for side in ("left", "right"))
+            off.append(float(np.linalg.norm(rig.triangulate(*seen)[0] - p)))
+    assert 0.0003 < np.sqrt(np.mean(np.square(off))) < 0.003
+
+
+def test_clicks_without_noise_give_the_true_poses():
+    found, truth = calibrated(0.0, 1, -0.8), camera_parameters()
+    for side in ("left", "right"):
+        np.testing.assert_allclose(found[f"p_WC_{side}"], truth[f"p_WC_{side}"], atol=1e-6)
+        R_found, R_true = (rotation_of(c[f"q_WC_{side}"]) for c in (found, truth))
+        np.testing.assert_allclose(R_found, R_true, atol=1e-6)
+
+
+def test_a_box_out_of_sight_is_told_before_anything_starts():
+    with pytest.raises(WiringError, match="box_height = -2 m: the left camera sees 0 corners of the calibration box"):
+        built(box_height=-2.0).check()
+
+
+def test_runs_with_anything_amiss_are_not_compared_with_the_paper():
+    thesis = Parameters(tuning=Tuning.THESIS, alpha=0.4, control_period=1.45)
+    assert HelixHandover().published(thesis)
+    assert not HelixHandover().published(replace(thesis, light=0.4))
+
+
+def test_markers_that_no_camera_resolves_are_refused_with_the_size_that_would_do():
+    with pytest.raises(WiringError, match=r"marker = 0.012 m: no camera resolves it: .* 11.5 px .* 0.0178 to 0.0241 m"):
+        built(marker=0.012).check()
+    with pytest.raises(WiringError, match=r"marker = 0.03 m: it leaves no white .* 0.0178 to 0.0241 m would do"):
+        built(marker=0.03).check()
+    for marker in (0.0178, 0.02, 0.0241):
+        built(marker=marker).check()

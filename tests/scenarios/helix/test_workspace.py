@@ -1,0 +1,105 @@
+"""Where the Helix reaches and its cameras see, and what is told of a place beyond it."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from handover.fmus.build import cached
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.helix.helix_handover import HelixHandover
+from handover.scenarios.helix.parameters import Parameters
+from handover.scenarios.helix.workspace import cameras_that_see, notes_on_place, reach
+from handover.scenarios.published.helix_workspace import HelixWorkspace, reach_by_place
+from handover.scenarios.published.published_experiment import Verdict
+
+
+@pytest.mark.parametrize(
+    ("p_WO", "cameras"),
+    [
+        ([0.16, 0.0, -0.6], 2),
+        ([0.0, 0.28, -0.6], 2),
+        ([0.0, 0.6, -0.6], 1),
+        ([0.0, -0.6, -0.6], 1),
+        ([0.0, 0.0, -0.05], 0),
+        ([-1.5, 0.0, -0.6], 0),
+        ([0.6, 0.0, -0.6], 0),
+    ],
+    ids=["front", "left", "left of a view", "right of a view", "too high", "behind", "too far off"],
+)
+def test_a_ball_is_seen_where_it_and_the_markers_are_whole_and_large_enough(p_WO: list[float], cameras: int):
+    assert cameras_that_see(np.array(p_WO)) == cameras
+
+
+def test_places_within_the_workspace_have_no_notes():
+    for azimuth in np.linspace(-np.pi, np.pi, 12):
+        assert not notes_on_place(np.array([0.12 * np.cos(azimuth), 0.12 * np.sin(azimuth), -0.6]))
+
+
+def test_a_place_beyond_it_is_noted_with_how_far_the_arm_reaches():
+    (note,) = notes_on_place(np.array([0.0, 0.3, -0.6]))
+    assert note == (
+        "the ball is offered 0.30 m from the arm's axis at a height of -0.60 m, but the arm reaches only "
+        f"{reach(-0.6):.2f} m far in every direction there"
+    )
+    high, unseen = notes_on_place(np.array([0.0, 0.0, -0.05]))
+    assert high.endswith("but the arm reaches to no place of that height")
+    assert unseen.endswith("where no camera sees ball and markers whole")
+
+
+def test_the_scenario_passes_the_notes_on():
+    system = HelixHandover().build(Parameters(radius=0.3), 0, lambda name: cached(HelixHandover.units[name], 3))
+    assert any("but the arm reaches only" in note for note in system.notes)
+    assert not HelixHandover().build(Parameters(), 0, lambda name: cached(HelixHandover.units[name], 3)).notes
+
+
+def table_of(reached: dict[tuple[float, float], float]) -> CampaignTable:
+    """Return a place each 0.03 m; those up to a distance are reached."""
+    rows = [
+        {"azimuth": a, "height": z, "radius": r, "success": r <= far, "status": "done", "final_distance": 0.001}
+        for (a, z), far in reached.items()
+        for r in (0.03, 0.06, 0.09, 0.12)
+    ]
+    return CampaignTable(pa.Table.from_pylist(rows))
+
+
+def test_the_reach_is_the_distance_up_to_which_all_places_are_reached():
+    table = table_of({(0.0, -0.6): 0.09, (1.05, -0.6): 0.0, (0.0, -0.5): 0.12})
+    assert reach_by_place(table) == {(0.0, -0.6): 0.09, (1.05, -0.6): 0.0, (0.0, -0.5): 0.12}
+    rows = table.table.to_pylist()
+    rows[0]["success"] = False  # at 0.03 m
+    assert reach_by_place(CampaignTable(pa.Table.from_pylist(rows)))[0.0, -0.6] == 0.0
+
+
+@pytest.mark.parametrize(("off", "verdict"), [(0.0, Verdict.REPRODUCED), (0.03, Verdict.NOT_REPRODUCED)])
+def test_a_reach_that_is_no_longer_the_one_found_is_told(off: float, verdict: Verdict):
+    rows = [
+        {"azimuth": 0.0, "height": -0.6, "radius": r, "success": r <= reach(-0.6) + off + 1e-9, "status": "done"}
+        for r in (reach(-0.6), reach(-0.6) + 0.03)
+    ]
+    assert HelixWorkspace().claims(CampaignTable(pa.Table.from_pylist(rows)))[-1].verdict is verdict
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("radius", "status", "words"), [("0.1", 0, "is there after"), ("0.27", 1, "the gripper stays")]
+)
+def test_the_reach_is_tried_with_exact_measurements(tmp_path: Path, radius: str, status: int, words: str):
+    call = [sys.executable, "-c", "from handover.scenarios.cli.command import main; main()", "run", "helix_reach"]
+    call += [
+        "-p",
+        f"radius={radius}",
+        "-p",
+        "azimuth=1.05",
+        "-p",
+        "height=-0.64",
+        "--no-report",
+        "--out",
+        str(tmp_path / "r"),
+    ]
+    done = subprocess.run(call, capture_output=True, text=True, check=False)
+    assert done.returncode == status, done.stderr
+    assert words in done.stdout
