@@ -3,9 +3,24 @@
 from collections.abc import Mapping
 
 from handover.scenarios.published.helix_1 import Helix1
+from handover.scenarios.published.helix_2 import Helix2
+from handover.scenarios.published.helix_3 import Helix3
+from handover.scenarios.published.helix_disturbances import HelixDisturbances
+from handover.scenarios.published.helix_improvements import HelixImprovements
+from handover.scenarios.published.helix_places import HelixPlaces
+from handover.scenarios.published.helix_workspace import HelixWorkspace
 from handover.scenarios.published.ir_table import IrTable
 from handover.scenarios.published.published_experiment import PublishedExperiment
 
-_ALL: tuple[type[PublishedExperiment], ...] = (Helix1, IrTable)
+_ALL: tuple[type[PublishedExperiment], ...] = (
+    Helix1,
+    Helix2,
+    Helix3,
+    HelixDisturbances,
+    HelixImprovements,
+    HelixPlaces,
+    HelixWorkspace,
+    IrTable,
+)
 
 EXPERIMENTS: Mapping[str, type[PublishedExperiment]] = {e.name: e for e in _ALL}

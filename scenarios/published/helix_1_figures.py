@@ -1,4 +1,4 @@
-"""Figures of `helix-1`: times by step size beside table 1, and the error over time as in fig. 8 of [Vervloet2025]."""
+"""Figures of `helix-1`: times by step size beside table 1, and errors as in figs. 7, 8, 16 and 17 of [Vervloet2025]."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,17 +7,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
-from numpy.typing import NDArray
 
-from handover.controllers.helix.visual_servo import Phase
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure
+from handover.scenarios.published.helix_1_curves import MeanCurve, errors_of, mean_curve
 from handover.scenarios.published.helix_1_runs import Helix1Arm, published
 
 _TICKS = (10, 20, 50, 100, 200, 500)
-_PUBLISHED = COLOURS[5]
+_PUBLISHED, _SHADE = COLOURS[5], "#dfe4ec"
+
+FIGURES_OF_RUNS = ("fig. 7", "fig. 16", "fig. 17")
+"""The thesis's figures of single runs, by step size; fig. 17 says 0.3 where all else of the thesis says 0.4."""
 
 
 def draw_times(arms: Sequence[Helix1Arm], folder: Path) -> list[Figure]:
@@ -35,7 +36,7 @@ def draw_times(arms: Sequence[Helix1Arm], folder: Path) -> list[Figure]:
             axis.set_yticks([t for t in _TICKS if low <= t <= high], [str(t) for t in _TICKS if low <= t <= high])
             axis.yaxis.set_minor_formatter(NullFormatter())
             axis.grid(axis="x", visible=False)
-            axis.set_title(arm.title)
+            axis.set_title(arm.title.replace(", ", ",\n"))
         axes[0].set_ylabel("time until the gripper begins to close (s)")
         axes[0].figure.legend(handles=_times_legend(), loc="outside lower center", ncols=2)
     caption = (
@@ -46,27 +47,71 @@ def draw_times(arms: Sequence[Helix1Arm], folder: Path) -> list[Figure]:
 
 
 def draw_errors(arms: Sequence[Helix1Arm], runs: Path, folder: Path) -> list[Figure]:
-    """Draw the controller's error over time, mean and deviation by step size, from the runs' records."""
-    errors = {arm.tuning: {alpha: _errors(arm, alpha, runs) for alpha in arm.alphas} for arm in arms}
-    drawn = [arm for arm in arms if any(errors[arm.tuning].values())]
+    """Draw the mean error over time with its deviation, by step size and settings, as in fig. 8."""
+    errors = [(arm, {alpha: errors_of(arm.rows[alpha], runs) for alpha in arm.alphas}) for arm in arms]
+    drawn = [(arm, of_arm) for arm, of_arm in errors if any(of_arm.values())]
     if not drawn:
         return []
-    longest = max(float(arm.times(alpha).max(initial=0.0)) for arm in drawn for alpha in arm.alphas)
+    medians = published()["arm_time_median"]
     with figure(folder / "errors", len(drawn), size=(8.0, 0.7 + 2.9 * len(drawn))) as axes:
-        for axis, arm in zip(axes, drawn, strict=True):
-            for colour, (alpha, runs_of_it) in zip(COLOURS, errors[arm.tuning].items(), strict=False):
-                if runs_of_it:
-                    _mean_error(axis, runs_of_it, arm.rows[alpha][0]["control_period"], (colour, f"α = {alpha}"))
-            axis.set(ylabel="error (mm)", ylim=(0, None), xlim=(0, 1.02 * longest))
+        for axis, (arm, of_arm) in zip(axes, drawn, strict=True):
+            for i, (colour, alpha) in enumerate(zip(COLOURS, arm.alphas, strict=False)):
+                if of_alpha := of_arm[alpha]:
+                    style = colour, f"α = {alpha}"
+                    draw_mean_error(axis, of_alpha, arm.rows[alpha][0]["control_period"], style, singles=False)
+                axis.plot(medians[i], 0.0, marker="^", ms=7, color=colour, clip_on=False, zorder=5)
+            axis.plot([], [], "^", ms=7, color=_PUBLISHED, label="published medians of the times")
+            axis.set(ylabel="error (mm)", ylim=(0, None), xlim=(0, None))
             axis.set_title(arm.title)
             axis.legend(loc="upper right")
         axes[-1].set_xlabel("time (s)")
     caption = (
         "Distance to the goal that the controller sees, over wrist and gripper, until the gripper begins to close, "
-        "like fig. 8. Thick: mean of the runs still under way, up to the median length, with its standard deviation; "
-        "thin: the runs. The error jumps where the goal changes from above the ball to the ball."
+        "like fig. 8: mean of the runs still under way, up to the median length, with their standard deviation. The "
+        "error jumps where the goal changes from above the ball to the ball."
     )
     return [Figure("errors", caption)]
+
+
+def draw_single_errors(arm: Helix1Arm, runs: Path, folder: Path) -> list[Figure]:
+    """Draw every run's error over time with mean and deviation, a panel a step size, as in figs. 7, 16 and 17."""
+    errors = {alpha: errors_of(arm.rows[alpha], runs) for alpha in arm.alphas}
+    drawn = [alpha for alpha, of_alpha in errors.items() if of_alpha]
+    if not drawn:
+        return []
+    name = f"single_errors{arm.suffix}"
+    with figure(folder / name, len(drawn), size=(8.0, 0.8 + 2.3 * len(drawn))) as axes:
+        for axis, alpha in zip(axes, drawn, strict=True):
+            i = arm.alphas.index(alpha)
+            draw_mean_error(axis, errors[alpha], arm.rows[alpha][0]["control_period"], (COLOURS[i], ""))
+            _published_span(axis, i)
+            longest = max(float(arm.times(alpha).max()), published()["arm_time_max"][i])
+            axis.set(ylabel="error (mm)", ylim=(0, None), xlim=(0, 1.02 * longest))
+            axis.set_title(f"α = {alpha}, as {FIGURES_OF_RUNS[i]}")
+        axes[-1].set_xlabel("time (s)")
+        axes[0].figure.legend(handles=_single_legend(), loc="outside lower center", ncols=2)
+    caption = (
+        "Distance to the goal that the controller sees, over wrist and gripper, until the gripper begins to close, "
+        f"like figs. 7, 16 and 17, {arm.title}. Thin: the runs; thick: mean of those still under way, up "
+        "to the median length, with their standard deviation. Grey: when the thesis's runs ended."
+    )
+    return [Figure(name, caption)]
+
+
+def _published_span(axis: Axes, i: int) -> None:
+    printed = published()
+    low, high = printed["arm_time_min"][i], printed["arm_time_max"][i]
+    axis.axvspan(low, high, color=_SHADE, lw=0, zorder=0)
+    axis.axvline(printed["arm_time_median"][i], color=_PUBLISHED, lw=1.6, ls="--")
+
+
+def _single_legend() -> list[Line2D]:
+    return [
+        Line2D([], [], color=_PUBLISHED, lw=2.0, label="mean of our runs, with deviation"),
+        Line2D([], [], color=_PUBLISHED, lw=0.6, label="our runs"),
+        Line2D([], [], color=_SHADE, lw=8, label="published: when the runs ended"),
+        Line2D([], [], color=_PUBLISHED, lw=1.6, ls="--", label="published: median of the times"),
+    ]
 
 
 def _published_times(axis: Axes, i: int) -> None:
@@ -105,32 +150,26 @@ def _range_of_times(arms: Sequence[Helix1Arm]) -> tuple[float, float]:
     return 0.85 * float(every.min()), 1.15 * float(every.max())
 
 
-def _errors(arm: Helix1Arm, alpha: float, runs: Path) -> list[Floats]:
-    """Return the error at each control step, m, of each run that has a record, until the gripper began to close."""
-    errors: list[Floats] = []
-    for row in arm.rows[alpha]:
-        path = runs / row["run"] / "signals.parquet"
-        if row.get("arm_time") is None or not path.exists():
-            continue
-        record = Record(path)
-        middle = (np.arange(round(row["steps"]), dtype=np.float64) + 0.5) * row["control_period"]  # between updates
-        after = np.asarray(np.searchsorted(record.time, middle), dtype=np.int64)
-        index = np.minimum(after, len(record.time) - 1)
-        seen: NDArray[np.bool_] = record["servo.phase"][index] != int(Phase.WAIT)
-        errors.append(np.where(seen, record["servo.error"][index], np.nan))
-    return errors
+def draw_mean_error(
+    axis: Axes, runs: Sequence[Floats], period: float, style: tuple[str, str], *, singles: bool = True
+) -> None:
+    """Draw the mean of errors, m, of runs of one control period, s, with its deviation.
+
+    Args:
+        axis: where to.
+        runs: errors at each control step of each run.
+        period: control period, s.
+        style: colour and label.
+        singles: whether to draw each run, too.
+    """
+    for run in runs if singles else ():
+        axis.plot(period * np.arange(len(run)), 1000 * run, color=style[0], lw=0.6, alpha=0.4)
+    draw_mean(axis, mean_curve(runs, period), style)
 
 
-def _mean_error(axis: Axes, runs: Sequence[Floats], period: float, style: tuple[str, str]) -> None:
-    """Draw runs of one control period, s; style is colour and label."""
+def draw_mean(axis: Axes, curve: MeanCurve, style: tuple[str, str], dashes: str = "-") -> None:
+    """Draw a mean, m, in mm, with a band of one standard deviation to either side; style is colour and label."""
     colour, label = style
-    for run in runs:
-        axis.plot(period * np.arange(len(run)), 1000 * run, color=colour, lw=0.6, alpha=0.4)
-    length = int(np.median([len(run) for run in runs]))
-    padded = np.full((len(runs), length), np.nan)
-    for line, run in zip(padded, runs, strict=True):
-        line[: len(run)] = run[:length]
-    known: NDArray[np.int64] = np.flatnonzero(~np.all(np.isnan(padded), axis=0))
-    mean, deviation = 1000 * np.nanmean(padded[:, known], axis=0), 1000 * np.nanstd(padded[:, known], axis=0)
-    axis.fill_between(period * known, mean - deviation, mean + deviation, color=colour, alpha=0.18, lw=0)
-    axis.plot(period * known, mean, color=colour, lw=2.0, label=label)
+    mean, deviation = 1000 * curve.mean, 1000 * curve.deviation
+    axis.fill_between(curve.time, mean - deviation, mean + deviation, color=colour, alpha=0.18, lw=0)
+    axis.plot(curve.time, mean, color=colour, lw=2.0, ls=dashes, label=label)

@@ -13,6 +13,9 @@ from handover.scenarios.helix.parameters import Tuning
 from handover.scenarios.published.published_experiment import Claim
 from handover.scenarios.published.verdicts import nothing_measured
 
+READING = 0.01
+"""Resolution of the lengths of fig. 9 as the thesis tells them, m."""
+
 
 @dataclass(frozen=True)
 class Helix1Arm:
@@ -22,25 +25,33 @@ class Helix1Arm:
         tuning: the settings.
         rows: rows by alpha, in the plan's order: by place, then repetition.
         broken: runs that a unit's failure, a crash or a lost worker ended: they do not count.
+        fitted: whether arm and ball's place are those fitted to fig. 9.
     """
 
     tuning: Tuning
     rows: Mapping[float, Sequence[Mapping[str, Any]]]
     broken: int
+    fitted: bool = False
 
     @classmethod
-    def of(cls, table: CampaignTable, tuning: Tuning) -> "Helix1Arm":
-        """Pick the rows of a tuning."""
+    def of(cls, table: CampaignTable, tuning: Tuning, *, fitted: bool = False) -> "Helix1Arm":
+        """Pick the rows of a tuning, in a table of runs on the one arm or on the fitted one."""
         mine = [row for row in table.rows if row["tuning"] == tuning.name.lower()]
         done = [row for row in mine if row["status"] == "done"]
         alphas: list[float] = paper_values("helix", "experiment")["alpha"]
         rows = {alpha: [row for row in done if row["alpha"] == alpha] for alpha in alphas}
-        return cls(tuning, rows, len(mine) - len(done))
+        return cls(tuning, rows, len(mine) - len(done), fitted)
 
     @property
     def title(self) -> str:
-        """Whose settings, in words."""
-        return "with the thesis's settings" if self.tuning is Tuning.THESIS else "with our settings"
+        """Whose settings, and on which arm, in words."""
+        settings = "with the thesis's settings" if self.tuning is Tuning.THESIS else "with our settings"
+        return f"{settings}, arm fitted to fig. 9" if self.fitted else settings
+
+    @property
+    def suffix(self) -> str:
+        """What is added to the name of a figure that there is for more than one arm."""
+        return "_fitted" if self.fitted else ""
 
     @property
     def alphas(self) -> tuple[float, ...]:

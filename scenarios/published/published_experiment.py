@@ -140,6 +140,10 @@ class PublishedExperiment(abc.ABC):
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
         """Return the paper's claims with their verdicts, those beyond the paper last."""
 
+    def record_claims(self, table: CampaignTable, runs: Path) -> Sequence[Claim]:  # noqa: ARG002
+        """Return claims judged on the runs' records, whose folders are in `runs`; by default there are none."""
+        return ()
+
     @abc.abstractmethod
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return published values beside the campaign's."""
@@ -163,13 +167,14 @@ class PaperResults:
     tables: Sequence[ComparisonTable]
 
     @classmethod
-    def of(cls, experiment: PublishedExperiment, table: CampaignTable) -> "PaperResults":
-        """Judge the claims and fill in the tables.
+    def of(cls, experiment: PublishedExperiment, table: CampaignTable, runs: Path) -> "PaperResults":
+        """Judge the claims, those beyond the paper last, and fill in the tables; the runs' folders are in `runs`.
 
         Raises:
             KeyError: the table is of another version of the experiment, and lacks a column.
         """
-        return cls(claims=experiment.claims(table), tables=experiment.tables(table))
+        claims = [*experiment.claims(table), *experiment.record_claims(table, runs)]
+        return cls(claims=sorted(claims, key=lambda claim: claim.beyond), tables=experiment.tables(table))
 
 
 def write_claims(claims: Sequence[Claim], folder: CampaignFolder) -> None:

@@ -62,6 +62,31 @@ def rate_claim(claim: str, where: str, published: tuple[int, int], measured: tup
     )
 
 
+def every_claim(claim: str, where: str, published: tuple[int, int], measured: tuple[int, int], note: str = "") -> Claim:
+    """Judge that every trial succeeds: it is reproduced if ours all do, however many.
+
+    Beyond the paper, `published` is (0, 0), and it holds or not.
+    """
+    told = format_rate(*published) if published[1] else ""
+    if not measured[1]:
+        return nothing_measured(claim, where, told, beyond=not published[1])
+    interval, all_do = success_interval(*measured), measured[0] == measured[1]
+    rule = f"{'Reproduced' if published[1] else 'Holds'} if every run succeeds; the interval is Clopper and Pearson's."
+    if published[1]:
+        p = two_proportions(*measured, *published)
+        rule += f" Fisher's exact test against the published rate: p = {format_p_value(p)}."
+    return Claim(
+        claim=claim,
+        published=told,
+        measured=format_rate(*measured),
+        interval=(interval.low, interval.high),
+        verdict=Verdict.REPRODUCED if all_do else Verdict.NOT_REPRODUCED,
+        reason=f"{rule} {note}".strip(),
+        where=where,
+        beyond=not published[1],
+    )
+
+
 def order_claim(
     claim: str,
     where: str,
@@ -145,7 +170,11 @@ def rare_claim(claim: str, where: str, published: str, measured: tuple[int, int]
 
 
 def nothing_measured(
-    claim: str, where: str, published: str, beyond: bool = False, reason: str = "None of its runs came to its end."
+    claim: str,
+    where: str = "",
+    published: str = "",
+    beyond: bool = False,
+    reason: str = "None of its runs came to its end.",
 ) -> Claim:
     """Return a claim on which there is no run, or there are too few."""
     return Claim(

@@ -15,7 +15,7 @@ from handover.scenarios.campaign.local_cluster import local_cluster
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.cli.campaign import CampaignProgress
 from handover.scenarios.published.helix_1 import Helix1
-from handover.scenarios.published.published_experiment import Verdict, draw_figures, write_claims
+from handover.scenarios.published.published_experiment import PaperResults, Verdict, draw_figures, write_claims
 
 FAST = {"alpha": "0.4", "control_period": "1.45", "place": "front", "tuning": "thesis"}
 
@@ -27,9 +27,10 @@ def one_run(folder: Path, **fixed: str) -> Mapping[str, object]:
     ready = prepared(replace(plan, points=[point], fixed={**plan.fixed, **fixed}))
     place = CampaignFolder(folder)
     table = run_campaign(ready, place, InProcessPool(), CampaignProgress(StringIO()))
-    write_claims(Helix1().claims(table), place)
+    results = PaperResults.of(Helix1(), table, place.runs)
+    write_claims(results.claims, place)
     draw_figures(Helix1(), table, place.runs, place.figures)
-    assert len(Helix1().tables(table)) == 4
+    assert len(results.tables) == 4
     return {claim["claim"]: claim for claim in json.loads((folder / "claims.json").read_text("utf-8"))}
 
 
@@ -47,7 +48,11 @@ def test_a_run_takes_its_ball_and_is_drawn(tmp_path: Path):
     succeeds = claims["Every handover succeeds"]
     assert isinstance(succeeds, dict)
     assert succeeds["measured"] == "1 of 1"
-    assert {f.stem for f in (tmp_path / "campaign" / "figures").iterdir()} == {"times", "errors"}
+    names = {"times", "errors", "single_errors", "model", "estimate"}
+    assert {f.stem for f in (tmp_path / "campaign" / "figures").iterdir()} == names
+    rises = claims["The error rises at the change from the first goal to the second"]
+    assert isinstance(rises, dict)
+    assert rises["measured"].startswith("in 1/1")
 
 
 @pytest.mark.paper

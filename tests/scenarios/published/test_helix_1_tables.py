@@ -54,8 +54,9 @@ def test_times_are_drawn_and_errors_of_runs_that_left_a_record(tmp_path: Path):
     t = np.arange(0.0, 25.0, 0.02)
     record = {"time": t, "servo.phase": np.where(t < 1.45, 0, 1), "servo.error": 0.3 * np.exp(-t / 10.0)}
     pq.write_table(pa.Table.from_pydict(record), run / "signals.parquet")
-    assert [f.name for f in Helix1().draw(table_of(TIMES), tmp_path / "runs", figures)] == ["times", "errors"]
-    assert {f.name for f in figures.iterdir()} == {f"{n}.{s}" for n in ("times", "errors") for s in ("png", "svg")}
+    names = ["times", "errors", "single_errors"]
+    assert [f.name for f in Helix1().draw(table_of(TIMES), tmp_path / "runs", figures)] == names
+    assert {f.name for f in figures.iterdir()} == {f"{n}.{s}" for n in names for s in ("png", "svg")}
 
 
 def test_nothing_is_drawn_where_no_gripper_closed(tmp_path: Path):

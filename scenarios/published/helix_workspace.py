@@ -1,0 +1,175 @@
+"""Where the Helix can take a ball: how far it reaches, and what its cameras see, as in fig. 14 of [Vervloet2025]."""
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from matplotlib.colors import ListedColormap
+from matplotlib.patches import Patch
+
+from handover.cosim.blocks.ports import Floats
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.plotting import COLOURS, figure
+from handover.scenarios.helix.workspace import cameras_that_see, reach
+from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment, Verdict
+from handover.scenarios.published.verdicts import nothing_measured
+
+AZIMUTHS = (0.0, 1.05, 1.57, 3.14, -1.57)
+"""Directions from the axis, rad: along tendons, between two, and across."""
+HEIGHTS = tuple(round(-0.72 + 0.08 * k, 2) for k in range(5))
+RADII = tuple(round(0.03 * k, 2) for k in range(1, 11))
+
+_QUICK = ((0.0,), (-0.6,), (0.06, 0.15, 0.3))
+_SEEN = ("no camera", "one camera", "both cameras")
+_SHADES = ("#d9dde3", "#f3dcc0", "#d6ead8")
+_TOLERANCE = 0.005
+"""Resolution of the reach that is kept, m."""
+
+
+class HelixWorkspace(PublishedExperiment):
+    """Places around the arm, tried with exact measurements and the fast arm, and what the cameras see of them.
+
+    The quick plan is three places.
+    """
+
+    name: ClassVar[str] = "helix-workspace"
+    title: ClassVar[str] = "where the Helix reaches and its cameras see ([Vervloet2025] fig. 14)"
+    scenario: ClassVar[str] = "helix_reach"
+
+    def plan(self, quick: bool) -> CampaignPlan:
+        """Return a grid of places; if quick, a part of it."""
+        places = product(*(_QUICK if quick else (AZIMUTHS, HEIGHTS, RADII)))
+        points = [{"azimuth": str(a), "height": str(z), "radius": str(r)} for a, z, r in places]
+        units = {"arm": "TendonArmFast"}
+        return CampaignPlan(scenario=self.scenario, points=points, units=units, experiment=self.name)
+
+    def claims(self, table: CampaignTable) -> Sequence[Claim]:
+        """Judge what the thesis says limits the workspace, and whether the reach that is kept is the one found."""
+        return [_limited_by_cameras(table), _kept(table)]
+
+    def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
+        """Return the reach by height and direction."""
+        found = reach_by_place(table)
+        azimuths, heights = sorted({a for a, _ in found}), sorted({z for _, z in found}, reverse=True)
+        rows = [
+            [f"{z:.2f}", *(f"{found[a, z]:.2f}" if (a, z) in found else "" for a in azimuths), f"{reach(z):.2f}"]
+            for z in heights
+        ]
+        return [
+            ComparisonTable(
+                title="How far the arm reaches",
+                header=["height, m", *(f"{np.degrees(a):.0f}°" for a in azimuths), "kept"],
+                rows=rows,
+                note="Largest distance from the arm's axis, m, up to which the gripper settles within 3 mm of every "
+                "tried place, tilted by 34° at most, by direction. Kept is what warns before a handover: the least of "
+                "all directions.",
+            )
+        ]
+
+    def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002
+        """Draw the planes before the cameras and across their view: what is seen, and what is reached."""
+        rows = [row for row in table.rows if row["status"] == "done"]
+        if not rows:
+            return []
+        with figure(folder / "workspace", 1, 2, size=(8.0, 3.5)) as panels:
+            for axes, (title, name, turn) in zip(
+                panels, (("along the cameras' view", "x", 0.0), ("across it", "y", np.pi / 2)), strict=True
+            ):
+                _shade(axes, turn)
+                for reached, (form, colour) in {True: ("o", COLOURS[0]), False: ("x", COLOURS[1])}.items():
+                    tried = [_in_plane(row, turn) for row in rows if bool(row["success"]) is reached]
+                    points = [p for p in tried if p is not None]
+                    axes.plot([p[0] for p in points], [p[1] for p in points], form, ms=4, color=colour)
+                axes.set(title=title, xlabel=f"{name} (m)", ylabel="z (m)", aspect="equal")
+            panels[0].plot([], [], "o", ms=4, color=COLOURS[0], label="reached")
+            panels[0].plot([], [], "x", ms=4, color=COLOURS[1], label="not reached")
+            handles, labels = panels[0].get_legend_handles_labels()
+            handles += [Patch(color=shade) for shade in reversed(_SHADES)]
+            canvas: Any = panels[0].get_figure(root=True)
+            canvas.legend(handles, [*labels, *reversed(_SEEN)], loc="outside lower center", ncols=5)
+        caption = (
+            "Places of the ball in two upright planes through the arm's axis, as in [Vervloet2025] fig. 14: where the "
+            "gripper settles within 3 mm with exact measurements, and how many cameras see ball and markers whole."
+        )
+        return [Figure("workspace", caption)]
+
+
+def reach_by_place(table: CampaignTable) -> dict[tuple[float, float], float]:
+    """Return the largest distance, m, up to which all tried places were reached, by azimuth and height."""
+    tried: dict[tuple[float, float], dict[float, bool]] = {}
+    for row in table.rows:
+        if row["status"] == "done":
+            tried.setdefault((row["azimuth"], row["height"]), {})[row["radius"]] = bool(row["success"])
+    found: dict[tuple[float, float], float] = {}
+    for place, by_radius in tried.items():
+        found[place] = 0.0
+        for radius in sorted(by_radius):
+            if not by_radius[radius]:
+                break
+            found[place] = radius
+    return found
+
+
+def _in_plane(row: Mapping[str, Any], turn: float) -> tuple[float, float] | None:
+    """Return where a place is in an upright plane through the axis; None where it is not in it."""
+    across = row["radius"] * np.sin(row["azimuth"] - turn)
+    if abs(across) > 0.1 * row["radius"]:
+        return None
+    return float(np.sign(np.cos(row["azimuth"] - turn)) * row["radius"]), row["height"]
+
+
+def _shade(axes: Any, turn: float) -> None:
+    """Shade the plane by how many cameras see ball and markers."""
+    s, z = np.linspace(-0.4, 0.4, 81), np.linspace(-0.85, -0.3, 56)
+    seen = np.array([[cameras_that_see(_point(x, y, turn)) for x in s] for y in z])
+    axes.pcolormesh(s, z, seen, cmap=ListedColormap(list(_SHADES)), vmin=-0.5, vmax=2.5, shading="nearest")
+
+
+def _point(s: float, z: float, turn: float) -> Floats:
+    return np.array([s * np.cos(turn), s * np.sin(turn), z])
+
+
+def _limited_by_cameras(table: CampaignTable) -> Claim:
+    facts: dict[str, Any] = {
+        "claim": "The cameras' view, not the arm, limits where a ball can be taken",
+        "published": "limited by what was captured by the two cameras",
+        "where": "sec. 5.4.1, fig. 14",
+    }
+    rows = [row for row in table.rows if row["status"] == "done"]
+    if not rows:
+        return nothing_measured(**facts)
+    seen = [cameras_that_see(_point(row["radius"], row["height"], row["azimuth"])) == 2 for row in rows]
+    reached = [bool(row["success"]) for row in rows]
+    only_seen = sum(a and not b for a, b in zip(seen, reached, strict=True))
+    only_reached = sum(b and not a for a, b in zip(seen, reached, strict=True))
+    return Claim(
+        **facts,
+        measured=f"of {len(rows)} places {only_reached} are reached and not seen, {only_seen} seen and not reached",
+        verdict=Verdict.REPRODUCED if only_reached > only_seen else Verdict.NOT_REPRODUCED,
+        reason="Reproduced if more of the tried places are within reach and out of view than the other way round. "
+        "Where the thesis's cameras stood is known roughly, and of its arm's stiffness and load nothing.",
+    )
+
+
+def _kept(table: CampaignTable) -> Claim:
+    facts: dict[str, Any] = {
+        "claim": "The reach that warns before a handover is the one found",
+        "published": "",
+        "beyond": True,
+    }
+    found = reach_by_place(table)
+    heights = sorted({z for _, z in found})
+    if not heights:
+        return nothing_measured(**facts)
+    least = {z: min(r for (_, height), r in found.items() if height == z) for z in heights}
+    off = max(abs(least[z] - reach(z)) for z in heights)
+    return Claim(
+        **facts,
+        measured=f"{off:.3f} m apart at most, at {len(heights)} heights",
+        verdict=Verdict.REPRODUCED if off <= _TOLERANCE else Verdict.NOT_REPRODUCED,
+        reason=f"Holds if both differ by {_TOLERANCE} m at most at each height.",
+    )

@@ -1,0 +1,68 @@
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from handover.scenarios.campaign.plan_check import checked_plan
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.helix.helix_handover import HelixHandover
+from handover.scenarios.published.helix_improvements import CHANGES, HelixImprovements
+from handover.scenarios.published.published_experiment import Verdict
+
+PLAN = HelixImprovements().plan(quick=False)
+
+
+def table_of(closing: dict[str, float], failing: str = "") -> CampaignTable:
+    """Return a run at each point: 10 mm off, or what is given for a value of a parameter; a value may fail, too."""
+    kinds = {v.name: v for v in HelixHandover.parameters()}
+    names = {name for point in PLAN.points for name in point}
+    rows: list[dict[str, Any]] = []
+    for i, point in enumerate(PLAN.points):
+        p = parse_parameters(HelixHandover, [f"{name}={value}" for name, value in point.items()])
+        values = {name: getattr(p, name) for name in names}
+        plain = {n: v.name.lower() if kinds[n].enumeration else v for n, v in values.items()}
+        distance = next((closing[x] for x in point.values() if x in closing), 0.01) + 1e-5 * i
+        result = {"status": "done", "success": failing not in point.values(), "steps": 20, "reason": "lost ring: far"}
+        rows.append({**plain, **result, "closing_distance": distance, "final_distance": 0.001})
+    return CampaignTable(pa.Table.from_pylist(rows))
+
+
+def test_every_case_is_run_once_at_every_place_with_the_same_seeds():
+    assert checked_plan(PLAN).size == PLAN.size == 13 * 6
+    assert len({frozenset(point.items()) for point in PLAN.points}) == PLAN.size
+    assert len({run.seed for run in PLAN.runs()}) == 6
+
+
+@pytest.mark.parametrize(
+    ("distance", "failing", "verdict"),
+    [
+        (0.002, "", Verdict.REPRODUCED),
+        (0.03, "", Verdict.NOT_REPRODUCED),
+        (0.002, "side", Verdict.NOT_REPRODUCED),
+    ],
+    ids=["nearer", "farther", "nearer and fails"],
+)
+def test_a_change_helps_if_the_gripper_closes_nearer_and_no_handover_is_lost(
+    distance: float, failing: str, verdict: Verdict
+):
+    claims = HelixImprovements().claims(table_of({"side": distance}, failing))
+    of_side = [c.verdict for c, change in zip(claims, CHANGES, strict=True) if "at the side" in change.what]
+    assert of_side == [verdict] * 2
+
+
+def test_rows_are_pairs_without_and_with_the_change():
+    (table,) = HelixImprovements().tables(table_of({"side": 0.002}))
+    assert len(table.rows) == len(CHANGES)
+    row = next(row for row in table.rows if row[0] == "ours" and "side" in row[1])
+    assert row[3] == "6 of 6 → 6 of 6"
+    before, after = (float(x) for x in row[4].split(" → "))
+    assert after < 3.0 < 9.0 < before
+    assert row[6] == "20 → 20"
+
+
+def test_without_runs_nothing_is_claimed():
+    claims = HelixImprovements().claims(CampaignTable(table_of({}).table.slice(0, 0)))
+    assert {c.verdict for c in claims} == {Verdict.NOT_COMPARABLE}
+    assert np.all([c.published == "suggested" for c in claims])
