@@ -49,7 +49,7 @@ def _tell_of_faults(system: System, *, strict: bool) -> None:
         if strict:
             raise InvalidFmu(path, f"its {DESCRIPTION} is not valid: {fault}")
         _log.warning("%s: its %s is not valid, which does not matter here: %s", path, DESCRIPTION, fault)
-    for line in system.left_out:
+    for line in system.notes:
         _log.warning("%s", line)
 
 

@@ -104,8 +104,9 @@ class System:
         self._sources: defaultdict[str, dict[str, PortName]] = defaultdict(dict)  # by unit, by input
         self.followed: defaultdict[str, dict[str, TimeSeries]] = defaultdict(dict)
         """By unit and input, the values over time that inputs follow."""
-        self.left_out: list[str] = []
-        """Which connections and values its units do not have and need not have, in lines for who runs it."""
+        self.notes: list[str] = []
+        """What who runs it should know before it starts, in lines: such as connections and values that its units do not
+        have and need not have."""
         self._faults: list[str] = []
         self._descriptions: dict[Path, FmuDescription] = {}
 

@@ -137,10 +137,13 @@ class RunRow:
 
 
 def row_of(run: PlannedRun, folder: Path) -> RunRow | None:
-    """Return the row of a run by its folder; None if the folder does not say how the run ended."""
+    """Return the row of a run by its folder; None if the folder does not say how the run ended.
+
+    A summary has no seed where the scenario draws no random numbers.
+    """
     try:
         summary: Any = json.loads((folder / "summary.json").read_bytes())
-        if summary["seed"] != run.seed or (summary["failure"] is None and not summary["complete"]):
+        if summary["seed"] not in (run.seed, None) or (summary["failure"] is None and not summary["complete"]):
             return None
         return _row(run, summary)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):

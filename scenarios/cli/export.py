@@ -64,7 +64,7 @@ def export_command(
             write_ssp(system, file, experiment.name, stop, experiment.parallel_step)
         except OSError as e:
             raise UsageError(f"--ssp {file}: it cannot be written: {e.strerror}") from e
-        for line in system.left_out:
+        for line in system.notes:
             click.echo(line, err=True)
     click.echo(file)
 

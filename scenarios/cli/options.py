@@ -91,8 +91,8 @@ _SCENARIO_OPTIONS = (
         "--unit",
         "replaced",
         multiple=True,
-        metavar="NAME=FILE|NAME=MODULE:CLASS",
-        help="Replace a unit by another FMU, or by one that is built of a block of your own.",
+        metavar="NAME=FILE|NAME=UNIT|NAME=MODULE:CLASS",
+        help="Replace a unit by another FMU, by another unit of the catalog, or by a block of your own.",
     ),
 )
 

@@ -94,7 +94,7 @@ class _Finish:
         from handover.scenarios.published.published_experiment import PaperResults, draw_figures, write_claims
 
         try:
-            self.results = PaperResults.of(self._experiment, table)
+            self.results = PaperResults.of(self._experiment, table, folder.runs)
         except KeyError as e:
             fault = f"it is of another version of {self._experiment.name}: its runs have no {e.args[0]}"
             raise InvalidRunFolder(folder.path, fault) from e

@@ -50,8 +50,11 @@ class CampaignEntry:
 
     @cached_property
     def parameters(self) -> Mapping[str, str]:
-        """The texts of the parameters that its points share, those at their defaults included."""
-        return full_parameters(self.results.experiment, self.results.metadata["fixed"])
+        """The texts of the parameters that its points share, varied or not, those at their defaults included."""
+        points: Sequence[Mapping[str, str]] = self.results.metadata["points"]
+        fixed: Mapping[str, str] = self.results.metadata["fixed"]
+        shared = {n: text for n, text in points[0].items() if all(point.get(n) == text for point in points)}
+        return full_parameters(self.results.experiment, {**fixed, **shared})
 
 
 @dataclass(frozen=True)

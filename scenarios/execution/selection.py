@@ -74,7 +74,7 @@ def select_fmus(
 
     Args:
         experiment: the scenario.
-        others: files of FMUs, or paths of blocks, by the units whose place they take.
+        others: files of FMUs, names of the catalog's units, or paths of blocks, by the units whose place they take.
         built: builds a unit by its name or its block's path.
 
     Raises:
@@ -84,7 +84,7 @@ def select_fmus(
     fmus: dict[str, Path] = {}
     for name, unit in experiment.units.items():
         other = others.get(name, "")
-        if other and not _BLOCK.fullmatch(other):
+        if other and not _BLOCK.fullmatch(other) and (other not in UNITS or Path(other).exists()):
             fmus[name] = Path(other)
             continue
         try:

@@ -60,7 +60,7 @@ def ports_of_place(place: Place, unit: Entry) -> list[PlacePort]:
 def fit_places(system: System, places: Mapping[str, Place], units: Mapping[str, str]) -> None:
     """Leave out of a system what the units in its places do not have and need not have; what they must have is a fault.
 
-    The scenario's own units have all of it. What is left out of another one is noted in `System.left_out`, and
+    The scenario's own units have all of it. What is left out of another one is noted in `System.notes`, and
     what is wrong with it in what `System.check` raises.
 
     Args:
@@ -130,13 +130,13 @@ class _Fitting:
     def _note(self, absent: Mapping[Causality, Sequence[str]]) -> None:
         """Note what is left out, and which of the unit's inputs nothing feeds: their names may be misspelled."""
         if parts := [_listed(causality, names) for causality, names in absent.items() if names]:
-            self._system.left_out.append(f"{self._what} does without {'; '.join(parts)}: left out")
+            self._system.notes.append(f"{self._what} does without {'; '.join(parts)}: left out")
         fed = {*self._system.fed_inputs(self._unit.name), *self._unit.start}
         missing = [n for names in absent.values() for n in names]
         for name in self._unit.description.inputs:
             if name not in fed and all(p.declared.name != name for p in self._ports):
                 text = f"{self._unit.name}.{name}: nothing feeds it, so it stays at its start value"
-                self._system.left_out.append(f"{text}{_near(name, missing)}")
+                self._system.notes.append(f"{text}{_near(name, missing)}")
 
 
 def signature(v: Variable) -> str:

@@ -78,6 +78,24 @@ def merged(meshes: Sequence[Mesh]) -> Mesh:
     return Mesh(np.vstack([m.vertices for m in meshes]), np.vstack(triangles))
 
 
+def turned(profile: Floats, corners: int = 32) -> Mesh:
+    """Return the surface that a line about z makes, its radii and heights, shape (n, 2), given from the inside out.
+
+    Its first and last points lie on z. Seen from outside the body that it encloses, a profile that rises along the
+    inside of a bowl and comes down along its outside runs the right way.
+    """
+    angles = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)
+    n = len(profile)
+    rings = [np.column_stack([r * np.cos(angles), r * np.sin(angles), np.full(corners, z)]) for r, z in profile]
+    k = np.arange(corners)
+    beside = (k + 1) % corners
+    triangles: list[NDArray[np.int64]] = []
+    for i in range(n - 1):
+        a, b, c, d = (i * corners + k, i * corners + beside, (i + 1) * corners + k, (i + 1) * corners + beside)
+        triangles += [np.column_stack(t) for t, r in (((a, c, b), profile[i, 0]), ((b, c, d), profile[i + 1, 0])) if r]
+    return Mesh(np.vstack(rings), np.vstack(triangles).astype(np.int64))
+
+
 def faceted(mesh: Mesh) -> Mesh:
     """Return a mesh whose faces share no vertices, for sharp edges in shading; coplanar triangles are one face."""
     a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))

@@ -243,8 +243,8 @@ def begun_run(task: Task, master: Master) -> RunData:
     of_this_run: _OfSomeRuns = {"system": system, "conversions": conversions_of(master.system)}
     if faults := master.system.untouched_faults:
         of_this_run["warnings"] = [f"{path.name}: {fault}" for path, fault in faults.items()]
-    if master.system.left_out:
-        of_this_run["notes"] = master.system.left_out
+    if master.system.notes:
+        of_this_run["notes"] = master.system.notes
     return _run_data(task, fmus, of_this_run)
 
 

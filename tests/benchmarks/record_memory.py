@@ -3,19 +3,15 @@
 In MB, from a run that is warm until the master is left and the record complete.
 """
 
-import resource
 import sys
 import tempfile
 from pathlib import Path
 
 from ring_hosts import recorded
 
+from handover.scenarios.results.system_facts import peak_memory
+
 UNITS, WARM = 50, 500_000
-
-
-def peak() -> float:
-    """Return the largest resident memory that this process had, in MB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
 
 
 def main(fmu: Path, values: int) -> None:
@@ -23,9 +19,9 @@ def main(fmu: Path, values: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         with recorded(UNITS, fmu, Path(folder)) as ring:
             ring.advance(WARM // UNITS)
-            before = peak()
+            before = peak_memory() or 0.0
             ring.advance((values - WARM) // UNITS)
-        print(peak() - before)
+        print(((peak_memory() or 0.0) - before) / 2**20)
 
 
 if __name__ == "__main__":

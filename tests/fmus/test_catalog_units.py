@@ -37,6 +37,7 @@ def test_every_unit_is_valid_or_says_why_it_has_no_such_form(name: str, fmi: int
     ("name", "package"),
     [
         ("TendonArm", "exudyn"),
+        ("TendonArmFast", "scipy"),
         ("StereoCamera", "opencv-python-headless"),
         ("HandoverVision", "opencv-python-headless"),
         ("HandoverPartner", "numpy"),

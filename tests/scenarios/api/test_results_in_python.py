@@ -124,7 +124,7 @@ def test_a_run_of_another_version_is_shown_without_plots(grasp_without_reflex: P
 def test_a_notebook_shows_a_system_as_its_graph():
     html = handover.system("helix_handover")._repr_html_()  # pyright: ignore
     assert html.startswith("<svg")
-    for text in ("camera", "StereoCamera", "FMI 3, 33.3 ms, sampled", "arm → hand", "p_WG (real [3] m)"):
+    for text in ("camera", "StereoCamera", "FMI 3, 100 ms, sampled", "arm → hand", "p_WG (real [3] m)"):
         assert text in html
     assert html.count("<rect") == 5
 

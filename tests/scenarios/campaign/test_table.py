@@ -1,5 +1,6 @@
 """The table of a campaign: what its columns hold, and how they are read."""
 
+import json
 import math
 from pathlib import Path
 from typing import Any, cast
@@ -8,8 +9,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.table import CampaignTable, RunRow
+from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun
+from handover.scenarios.campaign.table import CampaignTable, RunRow, row_of
 from handover.scenarios.campaign.table_writer import TableWriter, table_of
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.results.run_folder import InvalidRunFolder
@@ -131,3 +132,25 @@ def test_a_metric_is_described_as_by_a_run_that_has_a_value():
     ]
     table = CampaignTable(table_of(PLAN, ended))
     assert table.description("distance") == "distance"
+
+
+def test_a_run_of_a_scenario_that_draws_no_random_numbers_has_its_row(tmp_path: Path):
+    run = PlannedRun(name="r", point=0, repetition=0, parameters={}, seed=7)
+    summary: dict[str, Any] = {
+        "seed": None,
+        "failure": None,
+        "complete": True,
+        "success": True,
+        "reason": "there",
+        "metrics": {},
+    }
+    (tmp_path / "summary.json").write_text(
+        json.dumps(summary | dict.fromkeys(("simulated_seconds", "wall_seconds", "cpu_seconds"), 1.0))
+    )
+    row = row_of(run, tmp_path)
+    assert row is not None
+    assert (row.status, row.success) == ("done", True)
+    (tmp_path / "summary.json").write_text(
+        json.dumps(json.loads((tmp_path / "summary.json").read_text()) | {"seed": 8})
+    )
+    assert row_of(run, tmp_path) is None

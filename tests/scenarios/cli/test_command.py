@@ -81,7 +81,7 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("run", "helix_hand"), "did you mean helix_handover?"),
+        (("run", "helix_hand"), "did you mean helix_handover or helix_reach"),
         (("list", "nothing_like_it"), "valid: FreeFlyer, "),
         (("run", "helix_handover", "-p", "alfa=0.2"), "did you mean alpha"),
         (("run", "helix_handover", "-p", "alpha=7"), "from 0.01 to 1"),
@@ -108,7 +108,7 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
         (("run", "helix_handover", "--unit", "arm"), "NAME=FILE"),
         (("run", "helix_handover", "--unit", "arm=a.fmu", "--unit", "arm=b.fmu"), "arm is given twice"),
         (("run", "helix_handover", "--unit", "arm=missing.fmu"), "there is no such file"),
-        (("build", "TendonArms"), "did you mean TendonArm?"),
+        (("build", "TendonArms"), "did you mean TendonArm or TendonArmFast?"),
         (("build", "spring"), "a unit of your own is named MODULE:CLASS"),
         (("build", "nowhere:Spring"), "module 'nowhere' cannot be found"),
         (("build", "failing_arm:Nothing"), "has no class 'Nothing'"),

@@ -137,6 +137,12 @@ def test_settings_in_which_campaigns_differ_are_listed(tmp_path: Path):
     ]
 
 
+def test_campaigns_that_each_swept_one_value_differ_in_it(tmp_path: Path):
+    first, second = (campaign(tmp_path / name, [{"strategy": name}]) for name in ("blind", "forward"))
+    campaigns, _ = read_entries([first, second])
+    assert [(d.name, *d.values) for d in differences_of(campaigns)] == [("strategy", "blind", "forward")]
+
+
 def test_campaigns_without_a_common_point_are_refused_with_their_values(tmp_path: Path):
     first, second = campaign(tmp_path / "a", THINGS), campaign(tmp_path / "b", [{"thing": "baby_cup_a"}])
     third = campaign(tmp_path / "c", [{}], fixed={"thing": "paper_box_a"})

@@ -1,6 +1,7 @@
 """A run's summary: of one declaration however the run ended, with figures as JSON can hold them."""
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -63,5 +64,19 @@ def test_a_metric_is_reported_in_the_unit_in_which_pages_show_it(value: float, u
 
 def test_without_the_system_telling_memory_there_is_no_figure_of_it(monkeypatch: pytest.MonkeyPatch):
     assert (peak_memory() or 0.0) > 1e6
+
+    def on_other_systems(path: Path) -> bool:  # noqa: ARG001
+        return False
+
+    monkeypatch.setattr(Path, "is_file", on_other_systems)
+    assert (peak_memory() or 0.0) > 1e6
     monkeypatch.setitem(sys.modules, "resource", None)
     assert peak_memory() is None
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems tell of the program alone")
+def test_a_small_program_that_a_large_one_started_tells_its_own_memory():
+    ballast = b"x" * 400_000_000
+    call = "from handover.scenarios.results.system_facts import peak_memory; print(peak_memory())"
+    done = subprocess.run([sys.executable, "-c", call], check=True, capture_output=True, text=True)
+    assert 1e7 < float(done.stdout) < len(ballast)

@@ -1,8 +1,9 @@
 import pytest
 
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
+from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.helix_handover import HelixHandover
-from handover.scenarios.helix.parameters import Cover, Place
+from handover.scenarios.helix.parameters import Place
 
 
 def test_values_are_parsed_by_their_declared_kind():

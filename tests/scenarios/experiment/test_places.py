@@ -31,7 +31,7 @@ def test_all_that_is_wired_is_declared_and_none_is_left_out_of_its_own_units(sce
         for make in (experiment.build, experiment.wire)
     ]  # fmt: skip
     plain, fitted = built
-    assert fitted.left_out == []
+    assert fitted.notes == []
     assert fitted.connections == plain.connections
     for name, unit in plain.units.items():
         wired = {end.port for c in plain.connections for end in (c.source, c.target) if end.unit == name}
