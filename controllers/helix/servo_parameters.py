@@ -172,6 +172,13 @@ class Params:
         0.16, "error at which the arm, coming down, returns above the ball (own choice)", minimum=0.0
     )
     d_grasp_offset: Metre = parameter(0.05, "height of the first goal above the ball", minimum=0.0)
+    standoff: Metre = parameter(
+        0.10,
+        "distance beside the ball at which a gripper that is too low goes up before it comes over the ball; 0: straight "
+        "to the goal (own; thesis: 0)",
+        minimum=0.0,
+        maximum=0.3,
+    )
     closing_time: Second = parameter(10.0, "time that the gripper is given to close", minimum=0.0)
     delivers: bool = parameter(False, "carry the ball to p_WG_drop and let it fall there (own choice)")
     p_WG_drop: Vector3[Metre] = parameter(

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from handover.controllers.helix.approach_path import next_place
 from handover.controllers.helix.constant_curvature import forward_kinematics, linearise, tendon_lengths
 from handover.controllers.helix.delivery import Delivery, Phase, Verdict
 from handover.controllers.helix.estimation import optimise_state, weights_of_state
@@ -292,7 +293,7 @@ class VisualServo:
         commanded = control_step(
             self._q_sys,
             self._q_est,
-            blend(self._X_goal(), X_meas, alpha, p.d_gripper),
+            blend(self._X_next(), X_meas, alpha, p.d_gripper),
             X_meas,
             K=p.K_initialize,
             limits=self._limits,
@@ -353,6 +354,16 @@ class VisualServo:
         if p_WG is None:
             above = self._phase in (Phase.WAIT, Phase.APPROACH)
             p_WG = self._tracker.ball.position + (self.params.d_grasp_offset * _UP if above else 0.0)
+        return _W_FROM_B * np.concatenate([p_WG + self.params.d_gripper * _UP, p_WG])
+
+    def _X_next(self) -> Floats:
+        """Pose to go to on the way to the goal, in B."""
+        X_goal = self._X_goal()
+        if self._delivery.p_WG_goal is not None or self._phase is Phase.GRASP:
+            return X_goal
+        p_WG = next_place(
+            self._tracker.p_WG, self._tracker.ball.position, (_W_FROM_B * X_goal)[3:], self.params.standoff
+        )
         return _W_FROM_B * np.concatenate([p_WG + self.params.d_gripper * _UP, p_WG])
 
     def _error(self) -> float:

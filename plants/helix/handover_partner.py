@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -12,8 +12,10 @@ from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.hand_tremor import HandTremor
 from handover.plants.helix.bowl import Bowl
 from handover.plants.helix.guidance import Guidance, GuidanceGains
-from handover.plants.helix.held_ball import HeldBall, bodies
 from handover.plants.helix.partner_parameters import Holder, Inputs, Outputs, Params
+
+if TYPE_CHECKING:
+    from handover.plants.helix.held_ball import HeldBall
 
 _NEAR = 0.12
 """Distance of the gripper from the ball beyond which it touches neither ball nor hand, m."""
@@ -54,8 +56,12 @@ class HandoverPartner:
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     period: ClassVar[Fraction | None] = None
+    deferred: ClassVar[tuple[str, ...]] = ("handover.plants.helix.held_ball",)
 
     def __init__(self, params: Params) -> None:
+        # imported here, since Numba takes long to load, and ports are read without it
+        from handover.plants.helix.held_ball import HeldBall
+
         params.check()
         self._params = params
         self._tremor = HandTremor(
@@ -72,7 +78,7 @@ class HandoverPartner:
         self._p_WO: Floats = np.array(params.p_WO_0, dtype=np.float64)
         self._v_WO: Floats = np.zeros(3)
         self._is_touched = False  # whether the gripper has come so near that the ball moves by contact
-        self._ball = HeldBall(params)
+        self._ball: HeldBall = HeldBall(params)
         self._ball.lie(self._p_WO, self._v_WO)
         self._felt = 0.0  # how long the person has felt a closed gripper's grasp, s
         self._is_let_go = False
@@ -147,7 +153,7 @@ class HandoverPartner:
 
     def _touch(self, dt: float, u: Inputs) -> None:
         p = self._params
-        contact = self._ball.move(bodies(u.p_WG, rotation_of(u.q_WG), u.grip), self._held(), self._pressing(), dt)
+        contact = self._ball.move(u.p_WG, rotation_of(u.q_WG), u.grip, self._held(), self._pressing(), dt)
         self._p_WO, self._v_WO = self._ball.p_WO, self._ball.v_WO
         self._f_G, self._f_H = contact.f_G, contact.f_H
         is_felt = u.grip >= p.closed_grip and contact.by_gripper >= p.felt_grasp

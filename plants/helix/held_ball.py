@@ -79,15 +79,20 @@ class HeldBall:
         self._ends = None
         self._low[:] = p_WO + self._p_OL
 
-    def move(self, ends: Floats, p_WO_held: Floats, f_hold: float, dt: float) -> Contact:
+    def move(
+        self, p_WG: Floats, R_WG: Floats, grip: float, p_WO_held: Floats, f_hold: float, dt: float
+    ) -> Contact:
         """Advance by dt, in which the gripper and the place where the hand holds the ball out come to where they are.
 
         Args:
-            ends: of the gripper's bodies at the end of the step, as `bodies` gives them.
+            p_WG: position of the gripper at the end of the step, in W, shape (3,), m.
+            R_WG: its orientation then, shape (3, 3).
+            grip: its closure then.
             p_WO_held: where the ball would lie at the end of the step if nothing but the hand touched it, in W, m.
             f_hold: force with which the person presses the ball to the palm, N.
             dt: step, s.
         """
+        ends = _bodies(p_WG, R_WG, grip)
         before = ends if self._ends is None else self._ends
         steps = max(1, math.ceil(dt / _STEP - 1e-9))
         low, told = p_WO_held + self._p_OL, np.zeros((3, 3))
@@ -114,7 +119,7 @@ class HeldBall:
         self._ends = None if ends is None else np.array(ends)
 
 
-def bodies(p_WG: Floats, R_WG: Floats, grip: float) -> Floats:
+def _bodies(p_WG: Floats, R_WG: Floats, grip: float) -> Floats:
     """Return the ends of the gripper's bodies in W, shape (CAPSULES, 2, 3), m: links of the fingers, then the palm."""
     joints = finger_joints(p_WG, R_WG, grip)
     links = np.stack([joints[:, :2], joints[:, 1:]], axis=1).reshape(CAPSULES - 1, 2, 3)

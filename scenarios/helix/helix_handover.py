@@ -89,6 +89,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
         "pace_arm",
         "peak_memory",
     )
+    parallel_step: ClassVar[Fraction | None] = Fraction(1, 100)
 
     def build(self, parameters: Parameters, seed: int, fmu: FmuOf) -> System:
         """Wire arm, hand, cameras, vision and controller."""

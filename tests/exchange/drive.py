@@ -17,8 +17,8 @@ STEPS = 10
 """Steps of a run, each as long as the unit proposes."""
 
 CHOSEN: Mapping[str, Mapping[str, Any]] = {
-    "TendonArm": {"internal_step": 0.004},  # a step must be a multiple of it
-    "TendonArmFast": {"internal_step": 0.004},
+    "TendonArm": {"internal_step": 0.0025},  # a step must be a multiple of it
+    "TendonArmFast": {"internal_step": 0.0025},
     "HandoverPartner": {"guide_stiffness": 50.0},
     "TrajectoryPlanner": {"settle": 0.06},
     "HybridKinematics": {"L_1": 0.15, "L_2": 0.225, "L_3": 0.225},  # the model that ships is trained for these

@@ -16,7 +16,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.ball_contact import CAPSULES, advance
 from handover.plants.helix.gripper_fingers import finger_joints
 from handover.plants.helix.handover_partner import HandoverPartner
-from handover.plants.helix.held_ball import HeldBall, bodies, numbers_of
+from handover.plants.helix.held_ball import HeldBall, numbers_of
 from handover.plants.helix.partner_parameters import Holder, Params
 
 G, M, R = 9.81, STILL.ball_mass, STILL.ball_radius
@@ -83,8 +83,7 @@ def test_what_pushes_gripper_and_hand_pushes_the_ball_back():
     ball, impulse = HeldBall(STILL), np.zeros(3)
     ball.lie(P_WO, np.zeros(3))
     for i in range(100):
-        closing = bodies(beside(0.008, 0.003, 0.002), DOWN.as_matrix(), min(1.0, i * 0.02))
-        contact = ball.move(closing, P_WO, STILL.hold_force, 0.02)
+        contact = ball.move(beside(0.008, 0.003, 0.002), DOWN.as_matrix(), min(1.0, i * 0.02), P_WO, STILL.hold_force, 0.02)
         impulse -= 0.02 * (contact.f_G + contact.f_H + np.array([0.0, 0.0, M * G]))
         np.testing.assert_allclose(impulse, M * ball.v_WO, atol=1e-9)
 
@@ -92,8 +91,7 @@ def test_what_pushes_gripper_and_hand_pushes_the_ball_back():
 def test_a_ball_that_lies_in_the_hand_stays_where_it_is():
     ball = HeldBall(STILL)
     ball.lie(P_WO, np.zeros(3))
-    away = bodies(np.zeros(3), DOWN.as_matrix(), 0.0)
-    *_, contact = [ball.move(away, P_WO, STILL.hold_force, 0.02) for _ in range(50)]
+    *_, contact = [ball.move(np.zeros(3), DOWN.as_matrix(), 0.0, P_WO, STILL.hold_force, 0.02) for _ in range(50)]
     np.testing.assert_allclose(ball.p_WO, P_WO, atol=1e-9)
     np.testing.assert_allclose(contact.f_H, [0.0, 0.0, -M * G], atol=1e-6)
     assert contact.by_hand == pytest.approx(M * G + STILL.hold_force)
@@ -135,7 +133,6 @@ def test_fingers_are_where_they_are_painted_and_mirror_nothing():
     np.testing.assert_allclose(np.hypot(seen[..., 0], seen[..., 1]), np.tile([0.012, 0.0365, 0.038], (3, 1)))
     np.testing.assert_allclose(seen[..., 2], np.tile([-0.048, -0.022, 0.011], (3, 1)))
     np.testing.assert_allclose(np.degrees(np.arctan2(seen[:, 2, 1], seen[:, 2, 0])) % 360.0, [60.0, 180.0, 300.0])
-    assert bodies(np.zeros(3), DOWN.as_matrix(), 0.0).shape == (CAPSULES, 2, 3)
 
 
 @pytest.mark.parametrize("compiled", [True, pytest.param(False, marks=pytest.mark.slow)])
