@@ -6,36 +6,41 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 
-_ALONGSIDE = 0.03
-"""How far beside the ball's middle, m, the open fingers pass the ball from above without a touch, and no farther."""
-_CENTRED = 0.01
-"""How far beside the ball's middle the gripper may be and come straight down, m."""
-_CLEAR = 0.04
-"""How high over the ball's middle the open gripper is clear of ball and hand, m."""
-_FUNNEL = 4.0
-"""How much higher the gripper is to be for each metre that it is farther beside than that."""
+_CENTRED = 0.018
+"""How far beside the ball's middle the open fingers come down without a touch, m."""
+_OVER = 0.05
+"""How high over the ball's middle open fingers pass over it, m."""
+_FUNNEL = 3.0
+"""How much higher, m, the gripper is led for each metre that it is farther beside than that, up to there."""
+_LOW, _BESIDE = 0.03, 0.03
+"""Height over the ball's middle, m, below which a gripper that is farther beside than this goes around the ball."""
+_LOW_FUNNEL = 2.0
+"""How much that height grows for each metre beside; the funnel lies above it, so the gripper does not turn back."""
+_TILTED = 0.2
+"""How much higher, m, a gripper stays over the ball for each rad that it is tilted too much."""
 
 
-def next_place(p_WG: Floats, p_WO: Floats, p_WG_goal: Floats, standoff: float) -> Floats:
+def next_place(p_WG: Floats, p_WO: Floats, p_WG_goal: Floats, standoff: float, excess: float) -> Floats:
     """Return where the gripper is to go next on its way to a goal over the ball or at it, in W, shape (3,), m.
 
-    The straight way from below leads the fingers through ball and hand. A gripper that is lower than 4 cm over the ball
-    and farther beside it than 3 cm is therefore sent up first, at `standoff` from the ball, on the side where it is.
-    One that is over the ball comes down in a funnel: 4 m higher for each metre beyond 1 cm beside its middle, as
-    high as 4 cm.
+    The straight way from below leads the fingers through ball and hand. A gripper that is lower than the ball's top
+    and beside it is therefore sent up first, at `standoff` from the ball, on the side where it is. One that is higher
+    comes over the ball and down in a funnel: farther beside than 1.8 cm, 3 m higher for each metre, up to 5 cm. One that
+    is tilted too much to close stays above until it is not: the fingers on its lower side would press on the ball.
 
     Args:
         p_WG: position of the gripper, in W, m.
         p_WO: position of the ball, in W, m.
         p_WG_goal: the goal, in W, m.
         standoff: distance beside the ball at which the gripper goes up, m; 0: the goal is the next place.
+        excess: by how much the gripper is tilted too much, rad.
     """
     if standoff == 0.0:
         return p_WG_goal
-    aside = np.array([*(p_WG - p_WO)[:2], 0.0])
-    beside = math.sqrt(aside @ aside)
-    height = min(max(0.0, _FUNNEL * (beside - _CENTRED)), _CLEAR)
-    over = p_WG_goal + np.array([0.0, 0.0, max(0.0, p_WO[2] + height - p_WG_goal[2])])
-    if beside <= _ALONGSIDE or p_WG[2] >= p_WO[2] + _CLEAR:
-        return over
-    return np.array([*(p_WO + standoff / beside * aside)[:2], over[2] + _CENTRED])
+    aside = (p_WG - p_WO)[:2]
+    beside, height = math.sqrt(aside @ aside), p_WG[2] - p_WO[2]
+    least = p_WO[2] + min(max(_FUNNEL * (beside - _CENTRED), _TILTED * excess, 0.0), _OVER)
+    z = max(p_WG_goal[2], least)
+    if height >= min(_LOW, _LOW_FUNNEL * (beside - _BESIDE)):
+        return np.array([p_WG_goal[0], p_WG_goal[1], z])
+    return np.array([*(p_WO[:2] + standoff / beside * aside), z])

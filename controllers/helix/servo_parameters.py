@@ -174,8 +174,8 @@ class Params:
     d_grasp_offset: Metre = parameter(0.05, "height of the first goal above the ball", minimum=0.0)
     standoff: Metre = parameter(
         0.10,
-        "distance beside the ball at which a gripper that is too low goes up before it comes over the ball; 0: straight "
-        "to the goal (own; thesis: 0)",
+        "distance beside the ball at which a gripper that is too low goes up before it comes over the ball; 0: it goes "
+        "straight to the goal (own; thesis: 0)",
         minimum=0.0,
         maximum=0.3,
     )

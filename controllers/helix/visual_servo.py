@@ -13,6 +13,7 @@ from handover.controllers.helix.constant_curvature import forward_kinematics, li
 from handover.controllers.helix.delivery import Delivery, Phase, Verdict
 from handover.controllers.helix.estimation import optimise_state, weights_of_state
 from handover.controllers.helix.jacobian_control import Damping, Limits, blend, control_step, nearest_pose
+from handover.controllers.helix.progress import Progress
 from handover.controllers.helix.recovery import Recovery
 from handover.controllers.helix.response import Response
 from handover.controllers.helix.servo_parameters import InvalidServoParameters, Params
@@ -31,6 +32,7 @@ _REACH_TOLERANCE = 0.003  # m; of the model, beyond which a goal is out of its r
 _RESPONSE_MEMORY = 1.5  # s
 _LARGEST_STEP = 0.8
 _AT_LIMIT = 1e-6  # rad, m
+_LEVEL = 0.9  # of the tilt with which the gripper closes, with which it comes down onto the ball
 
 
 @dataclass(kw_only=True)
@@ -78,7 +80,8 @@ class VisualServo:
     coordinates, in m, where the source prints its square and compares it with metres.
 
     Own additions: see `Params`. The command is held while the ring is not seen, since there is no feedback; after
-    lost_after without ring or ball, RECOVER goes back and searches. An error above threshold_retreat in DESCEND (the
+    lost_after without ring or ball, RECOVER goes back and searches (or, with a ball but no ring from the start, just
+    that). An error above threshold_retreat in DESCEND (the
     ball was moved), or above threshold_reopen while the gripper closes, leads back to APPROACH. An error that makes no
     progress leads to GIVEN_UP, which does not close; `verdict` says why: OUT_OF_REACH if no state within the limits
     brings the model's gripper to its goal, else LIMITS if the command is at one or at windup, else NO_PROGRESS.
@@ -119,12 +122,8 @@ class VisualServo:
         self._t_filtered = -math.inf
         self._t_close = 0.0
         self._settled = 0
-        self._tilt_share = 1.0
-        self._steps = 0
-        self._stalled = 0
         self._searched = 0
-        self._best = math.inf
-        self._p_WO_best: Floats = self._tracker.ball.position
+        self._progress = Progress(p, self._tracker.ball.position)
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command in force: no time passes, so nothing is filtered or decided."""
@@ -167,8 +166,7 @@ class VisualServo:
 
     def get_state(self) -> bytes:
         """Return filters, states, phase and counters."""
-        best = (self._best, self._p_WO_best)
-        counters = (self._settled, self._tilt_share, self._steps, self._stalled, self._searched, *best)
+        counters = (self._settled, self._searched)
         times = (self._t_next, self._t_filtered, self._t_close)
         believed = (
             self._tracker.get_state(),
@@ -176,6 +174,7 @@ class VisualServo:
             self._response.get_state(),
             self._shaper.get_state(),
             self._delivery.get_state(),
+            self._progress.get_state(),
             self._rng.bit_generator,
         )
         return pack_state((believed, self._q_sys, self._q_est, int(self._phase), int(self._verdict), times, counters))
@@ -184,17 +183,17 @@ class VisualServo:
         """Restore a state that `get_state` gave."""
         saved: Any = unpack_state(state)
         believed, self._q_sys, self._q_est, phase, verdict, times, counters = saved
-        tracker, recovery, response, shaper, delivery, drawn = believed
+        tracker, recovery, response, shaper, delivery, progress, drawn = believed
         self._tracker.set_state(tracker)
         self._recovery.set_state(recovery)
         self._response.set_state(response)
         self._shaper.set_state(shaper)
         self._delivery.set_state(delivery)
+        self._progress.set_state(progress)
         self._rng.bit_generator.state = drawn
         self._phase, self._verdict = Phase(phase), Verdict(verdict)
         self._t_next, self._t_filtered, self._t_close = times
-        self._settled, self._tilt_share, self._steps, self._stalled, self._searched, *best = counters
-        self._best, self._p_WO_best = best
+        self._settled, self._searched = counters
 
     def _draw_period(self) -> float:
         p = self.params
@@ -227,6 +226,8 @@ class VisualServo:
         p, error, tracker = self.params, self._error(), self._tracker
         if self._phase is Phase.WAIT and tracker.ball.seen and tracker.wrist.seen:
             self._enter(Phase.APPROACH)
+        elif self._phase is Phase.WAIT and self._hides_ring(t):
+            self._enter(Phase.RECOVER)
         elif self._phase is Phase.APPROACH and error < p.threshold:
             self._enter(Phase.DESCEND)
         elif self._phase is Phase.DESCEND and error > p.threshold_retreat:
@@ -247,14 +248,18 @@ class VisualServo:
         elif self._phase in (Phase.APPROACH, Phase.DESCEND):
             if self._lost():
                 self._enter(Phase.RECOVER)
-            elif not self._makes_progress(error):
+            elif not self._progress.goes_on(error, tracker.ball.position):
                 self._give_up(self._why_stuck())
-        elif self._phase is Phase.CARRY and not self._makes_progress(error):
+        elif self._phase is Phase.CARRY and not self._progress.goes_on(error, tracker.ball.position):
             self._give_up(Verdict.LOST_RING if self._lost() is Verdict.LOST_RING else self._why_stuck())
         elif self._phase is Phase.RECOVER:
             self._searched += 1
             if self._searched > p.search_steps and (lost := self._lost()):
                 self._give_up(lost)
+
+    def _hides_ring(self, t: float) -> bool:
+        """Return whether a ball is offered, but in front of a ring that has not been seen yet."""
+        return self._tracker.ball.seen and 0.0 < self.params.lost_after <= t and not self._tracker.wrist.seen
 
     def _deliver(self, t: float) -> None:
         following = self._delivery.following(self._phase, t - self._t_close, self._error(), self._tilt())
@@ -300,7 +305,7 @@ class VisualServo:
             epsilon_control=p.epsilon_control,
             N_max_iter=p.N_max_iter,
             d_gripper=p.d_gripper,
-            damping=Damping(p.damping, p.tilt_weight * self._tilt_share) if p.judge_apart else None,
+            damping=Damping(p.damping, p.tilt_weight * self._progress.tilt_share) if p.judge_apart else None,
             dq_0=self._towards_posture() if p.posture > 0.0 else None,
         )
         dq = self._without_windup(commanded.q_sys) - self._q_sys
@@ -361,10 +366,10 @@ class VisualServo:
         X_goal = self._X_goal()
         if self._delivery.p_WG_goal is not None or self._phase is Phase.GRASP:
             return X_goal
-        p_WG = next_place(
-            self._tracker.p_WG, self._tracker.ball.position, (_W_FROM_B * X_goal)[3:], self.params.standoff
-        )
-        return _W_FROM_B * np.concatenate([p_WG + self.params.d_gripper * _UP, p_WG])
+        p, tracker = self.params, self._tracker
+        excess = self._tilt() - _LEVEL * p.threshold_tilt
+        p_WG = next_place(tracker.p_WG, tracker.ball.position, (_W_FROM_B * X_goal)[3:], p.standoff, excess)
+        return _W_FROM_B * np.concatenate([p_WG + p.d_gripper * _UP, p_WG])
 
     def _error(self) -> float:
         e = self._X_goal() - self._X_meas()
@@ -376,26 +381,8 @@ class VisualServo:
 
     def _enter(self, phase: Phase) -> None:
         self._phase = phase
-        self._reset_progress()
+        self._progress.restart(self._tracker.ball.position)
 
     def _give_up(self, verdict: Verdict) -> None:
         self._verdict = verdict
         self._enter(Phase.GIVEN_UP)
-
-    def _reset_progress(self) -> None:
-        self._stalled, self._best, self._p_WO_best = 0, math.inf, self._tracker.ball.position
-
-    def _makes_progress(self, error: float) -> bool:
-        """Count the step and what it gained; return whether to go on. A ball that has moved restarts the count."""
-        p, moved = self.params, self._tracker.ball.position - self._p_WO_best
-        if math.sqrt(moved @ moved) > p.threshold:
-            self._reset_progress()
-        self._steps += 1
-        self._stalled += 1
-        gains = error < self._best - p.progress
-        self._tilt_share = min(
-            max(self._tilt_share * (1.05 if gains or error < p.threshold_grasp else 0.85), 0.05), 1.0
-        )
-        if gains:
-            self._stalled, self._best, self._p_WO_best = 0, error, self._tracker.ball.position
-        return self._stalled < p.patience and self._steps <= p.max_steps

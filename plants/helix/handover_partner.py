@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,13 +14,12 @@ from handover.plants.helix.bowl import Bowl
 from handover.plants.helix.guidance import Guidance, GuidanceGains
 from handover.plants.helix.partner_parameters import Holder, Inputs, Outputs, Params
 
-if TYPE_CHECKING:
-    from handover.plants.helix.held_ball import HeldBall
-
 _NEAR = 0.12
 """Distance of the gripper from the ball beyond which it touches neither ball nor hand, m."""
 _LOST = 0.05
 """How long nothing may touch the ball before nobody holds it, s: it may jump a little."""
+_OVER, _BRING_SPEED = 0.04, 0.1
+"""How much higher than its place the gripper must be for the person to bring the ball there, m, and how fast, m/s."""
 
 
 class HandoverPartner:
@@ -30,6 +29,9 @@ class HandoverPartner:
     still in its palm, held with hold_force, until the gripper comes near; from then on ball, hand, and the gripper's
     fingers and palm are bodies, and what they touch with moves them (`ball_contact`): nothing but contact holds the
     ball.
+
+    Where the arm hangs nobody can hold a ball: a person whose ball is to go nearer than `room` to the arm's axis waits
+    at that distance, in the same direction, until the gripper is 4 cm higher than its place, and brings it there then.
 
     If guide_stiffness k > 0, a person leads the gripper to the ball: see `Guidance`; v_WG is from the last two
     positions.
@@ -74,11 +76,12 @@ class HandoverPartner:
         )
         self._holder = Holder.HAND
         self._help: Floats = np.zeros(3)  # how far the person has brought the ball to the gripper
-        self._place: Floats = np.array(params.p_WO_0, dtype=np.float64)  # where the ball is held out, without tremor
-        self._p_WO: Floats = np.array(params.p_WO_0, dtype=np.float64)
+        self._aside, self._waits = _aside(params.p_WO_0, params.room), True  # how far the ball is held from its place
+        self._place: Floats = params.p_WO_0 + self._aside  # where the ball is held out, without tremor
+        self._p_WO: Floats = np.array(self._place)
         self._v_WO: Floats = np.zeros(3)
         self._is_touched = False  # whether the gripper has come so near that the ball moves by contact
-        self._ball: HeldBall = HeldBall(params)
+        self._ball = HeldBall(params)
         self._ball.lie(self._p_WO, self._v_WO)
         self._felt = 0.0  # how long the person has felt a closed gripper's grasp, s
         self._is_let_go = False
@@ -116,7 +119,8 @@ class HandoverPartner:
         if self._is_let_go:
             self._withdrawing += dt
         else:
-            self._place = self._offered_at(t + dt) + self._helped(dt, u)
+            place = self._offered_at(t + dt)
+            self._place = place + self._brought(place, dt, u) + self._helped(dt, u)
         self._is_touched = self._is_touched or bool(np.linalg.norm(u.p_WG - self._p_WO) < _NEAR)
         if self._holder is Holder.FREE:
             self._fall(dt)
@@ -134,21 +138,23 @@ class HandoverPartner:
 
     def get_state(self) -> bytes:
         """Return the complete state."""
-        arrays = (self._help, self._place, self._p_WO, self._v_WO, self._f_G, self._f_H, self._untouched, self._p_WG)
+        places = (self._aside, self._help, self._place)
+        arrays = (self._p_WO, self._v_WO, self._f_G, self._f_H, self._untouched, self._p_WG)
         times = (self._felt, self._withdrawing, self._elapsed)
-        flags = (self._is_touched, self._is_let_go, self._in_bowl)
+        flags = (self._waits, self._is_touched, self._is_let_go, self._in_bowl)
         parts = (self._tremor.get_state(), self._guidance.get_state(), self._ball.get_state())
-        return pack_state((parts, int(self._holder), flags, arrays, times))
+        return pack_state((parts, int(self._holder), flags, places, arrays, times))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this partner or of one with equal parameters."""
-        (tremor, guidance, ball), holder, flags, arrays, times = unpack_state(state)
+        (tremor, guidance, ball), holder, flags, places, arrays, times = unpack_state(state)
         self._tremor.set_state(tremor)
         self._guidance.set_state(guidance)
         self._ball.set_state(ball)
         self._holder = Holder(holder)
-        self._is_touched, self._is_let_go, self._in_bowl = flags
-        self._help, self._place, self._p_WO, self._v_WO, self._f_G, self._f_H, self._untouched, self._p_WG = arrays
+        self._waits, self._is_touched, self._is_let_go, self._in_bowl = flags
+        self._aside, self._help, self._place = places
+        self._p_WO, self._v_WO, self._f_G, self._f_H, self._untouched, self._p_WG = arrays
         self._felt, self._withdrawing, self._elapsed = times
 
     def _touch(self, dt: float, u: Inputs) -> None:
@@ -187,6 +193,14 @@ class HandoverPartner:
             return p.p_WO_0
         return p.p_WO_0 + _minimum_jerk((t - p.move_from) / p.move_for) * (p.p_WO_1 - p.p_WO_0)
 
+    def _brought(self, place: Floats, dt: float, u: Inputs) -> Floats:
+        """Return how far from its place the ball is held since the arm is there, or was."""
+        self._waits = self._waits and u.p_WG[2] < place[2] + _OVER
+        left = float(np.linalg.norm(self._aside))
+        if left > 0.0 and not self._waits:
+            self._aside = max(0.0, 1.0 - _BRING_SPEED * dt / left) * self._aside
+        return self._aside
+
     def _helped(self, dt: float, u: Inputs) -> Floats:
         """Return how far the person brings the ball to the gripper, evenly in a straight line while that closes."""
         p, way = self._params, u.p_WG - self._place
@@ -209,6 +223,13 @@ class HandoverPartner:
         away = outwards / max(float(np.linalg.norm(outwards)), 1e-9) - np.array([0.0, 0.0, 1.0])
         course = p.withdrawal * _minimum_jerk((self._withdrawing - p.release_time) / p.withdrawal_time)
         return self._place + self._tremor.displacement + course * away / np.linalg.norm(away)
+
+
+def _aside(p_WO: Floats, room: float) -> Floats:
+    """Return the way outwards from the arm's axis, or away from the cameras on it, that leaves room for it, m."""
+    beside = float(np.hypot(p_WO[0], p_WO[1]))
+    outwards = np.array([p_WO[0], p_WO[1], 0.0]) / beside if beside > 0.0 else np.array([1.0, 0.0, 0.0])
+    return max(0.0, room - beside) * outwards
 
 
 def _minimum_jerk(s: float) -> float:

@@ -79,9 +79,7 @@ class HeldBall:
         self._ends = None
         self._low[:] = p_WO + self._p_OL
 
-    def move(
-        self, p_WG: Floats, R_WG: Floats, grip: float, p_WO_held: Floats, f_hold: float, dt: float
-    ) -> Contact:
+    def move(self, p_WG: Floats, R_WG: Floats, grip: float, p_WO_held: Floats, f_hold: float, dt: float) -> Contact:
         """Advance by dt, in which the gripper and the place where the hand holds the ball out come to where they are.
 
         Args:

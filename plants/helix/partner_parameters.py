@@ -50,6 +50,13 @@ class Params:
         minimum=-2.0,
         maximum=2.0,
     )
+    room: Metre = parameter(
+        0.12,
+        "distance from the arm's axis, where the arm hangs, at which the person waits with a ball that goes nearer to "
+        "it, until the gripper is higher",
+        minimum=0.0,
+        maximum=1.0,
+    )
     move_from: Second = parameter(0.0, "time at which the hand begins to move to p_WO_1", minimum=0.0)
     move_for: Second = parameter(0.0, "how long the hand moves; 0: it stays at p_WO_0", minimum=0.0, maximum=600.0)
     p_OH: Vector3[Metre] = parameter(

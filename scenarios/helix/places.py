@@ -29,7 +29,8 @@ _COVARIANCES = {
 _TUNED = dict.fromkeys(
     (
         *("judge_apart", "windup", "follow_until", "lost_after", "use_covariance", "filter_pictures", "predict_motion"),
-        *("shaping_time", "least_response", "posture", "K_initialize", "gate", "Q_ball", "Q_wrist", "Q_direction"),
+        *("shaping_time", "least_response", "posture", "standoff"),
+        *("K_initialize", "gate", "Q_ball", "Q_wrist", "Q_direction"),
     ),
     "by the scenario's tuning",
 )

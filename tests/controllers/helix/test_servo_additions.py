@@ -169,7 +169,7 @@ def test_another_servo_goes_on_from_the_state_bit_for_bit(after: int):
         inputs.append(replace(u, seen_R=not 3.0 < t < 7.0))
         return inputs[-1]
 
-    for _ in range(250):
+    for _ in range(320):
         run.step(ball_at(45.0), keep)
     assert {y.phase for y in run.history} >= {Phase.APPROACH, Phase.RECOVER, Phase.DESCEND, Phase.GRASP}
     begun, other = (VisualServo(Params(closing_time=4.0)) for _ in range(2))

@@ -83,7 +83,9 @@ def test_what_pushes_gripper_and_hand_pushes_the_ball_back():
     ball, impulse = HeldBall(STILL), np.zeros(3)
     ball.lie(P_WO, np.zeros(3))
     for i in range(100):
-        contact = ball.move(beside(0.008, 0.003, 0.002), DOWN.as_matrix(), min(1.0, i * 0.02), P_WO, STILL.hold_force, 0.02)
+        contact = ball.move(
+            beside(0.008, 0.003, 0.002), DOWN.as_matrix(), min(1.0, i * 0.02), P_WO, STILL.hold_force, 0.02
+        )
         impulse -= 0.02 * (contact.f_G + contact.f_H + np.array([0.0, 0.0, M * G]))
         np.testing.assert_allclose(impulse, M * ball.v_WO, atol=1e-9)
 

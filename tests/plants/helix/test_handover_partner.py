@@ -133,6 +133,24 @@ def test_a_ball_that_is_held_resists_a_push_more_than_one_that_lies_there():
     assert resistance(3.0) > 2.5 * resistance(0.0)
 
 
+def test_the_person_waits_beside_the_arm_until_the_gripper_has_made_room():
+    place, hanging = np.array([0.03, 0.04, -0.65]), np.array([0.0, 0.0, -0.7])
+    partner = HandoverPartner(replace(STILL, p_WO_0=place))
+    outside = [0.072, 0.096, -0.65]
+    np.testing.assert_allclose(partner.outputs(0.0, Inputs()).p_WO, outside)
+    np.testing.assert_allclose(walk(partner, inputs(hanging, 0.0), 50)[-1].p_WO, outside)
+    above = walk(partner, inputs(place + [0.0, 0.0, 0.2], 0.0), 40)
+    np.testing.assert_allclose(above[-1].p_WO, place, atol=1e-9)
+    moved = np.diff([y.p_WO for y in above], axis=0)
+    assert np.linalg.norm(moved, axis=1).max() < 0.1 * 0.02 + 1e-9
+    np.testing.assert_allclose(walk(partner, inputs(hanging + [0.2, 0.0, 0.0], 0.0), 5)[-1].p_WO, place, atol=1e-9)
+
+
+def test_on_the_arms_axis_the_person_waits_away_from_the_cameras():
+    partner = HandoverPartner(replace(STILL, p_WO_0=np.array([0.0, 0.0, -0.6])))
+    np.testing.assert_allclose(partner.outputs(0.0, Inputs()).p_WO, [0.12, 0.0, -0.6])
+
+
 def test_the_person_who_helps_brings_the_ball_into_a_closing_gripper():
     aside = np.array([0.025, 0.01, 0.02])
     still = take(HandoverPartner(STILL), P_WO + aside)[-1]
@@ -229,7 +247,7 @@ def test_a_guided_arm_comes_nearer_and_to_rest(stiffness: float):
 
 @pytest.mark.parametrize("dt", [0.005, 0.01])
 def test_an_arm_that_leans_on_the_held_ball_stays_calm(dt: float):
-    under_palm = replace(STILL, p_WO_0=np.array([0.01, 0.0, -0.68]))
+    under_palm = replace(STILL, p_WO_0=np.array([0.01, 0.0, -0.68]), room=0.0)
     arm, partner, pull = TendonArmFast(ArmParams()), HandoverPartner(under_palm), np.array([0.2, 0.0, 0.0])
     arm_y, y = arm.outputs(0.0, ArmInputs()), partner.outputs(0.0, Inputs())
     forces: list[Floats] = []

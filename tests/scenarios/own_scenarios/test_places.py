@@ -136,7 +136,7 @@ def test_list_prints_the_place_of_the_helix_controller(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_the_shortest_controller_of_the_helix_brings_the_gripper_to_the_ball(tmp_path: Path):
+def test_the_shortest_controller_of_the_helix_brings_the_gripper_over_the_ball(tmp_path: Path):
     write_controller(tmp_path, "my_servo", PROPORTIONAL)
     unit = ["--unit", "servo=my_servo:Proportional"]
     sweep = ["sweep", "helix_handover", "place=front,left", *unit, "-p", "patience=15", "--out", "places"]
@@ -149,9 +149,8 @@ def test_the_shortest_controller_of_the_helix_brings_the_gripper_to_the_ball(tmp
         summary = json.loads((run / "summary.json").read_text())
         assert "not judged" not in summary["reason"]
         assert "steps" not in summary["metrics"]  # its gripper never began to close
-        assert summary["metrics"]["final_distance"]["value"] < 0.01
         record = Record(run / "signals.parquet")
-        apart = np.linalg.norm(record["arm.p_WG"] - record["hand.p_WO"], axis=1)
+        apart = np.linalg.norm(record["arm.p_WG"] - record["hand.p_WO"] - [0.0, 0.0, 0.08], axis=1)
         assert apart[0] > 0.15
         assert np.all(apart[record.time > 12.0] < 0.015)
     succeeded(tmp_path, "report", str(runs[0]), "--figures", limit=600)
