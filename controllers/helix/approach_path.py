@@ -25,8 +25,8 @@ def next_place(p_WG: Floats, p_WO: Floats, p_WG_goal: Floats, standoff: float, e
 
     The straight way from below leads the fingers through ball and hand. A gripper that is lower than the ball's top
     and beside it is therefore sent up first, at `standoff` from the ball, on the side where it is. One that is higher
-    comes over the ball and down in a funnel: farther beside than 1.8 cm, 3 m higher for each metre, up to 5 cm. One that
-    is tilted too much to close stays above until it is not: the fingers on its lower side would press on the ball.
+    comes over the ball and down in a funnel: farther beside than 1.8 cm, 3 m higher for each metre, up to 5 cm. One
+    that is tilted too much to close stays above until it is not: the fingers on its lower side would press on the ball.
 
     Args:
         p_WG: position of the gripper, in W, m.

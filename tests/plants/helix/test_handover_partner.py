@@ -139,11 +139,12 @@ def test_the_person_waits_beside_the_arm_until_the_gripper_has_made_room():
     outside = [0.072, 0.096, -0.65]
     np.testing.assert_allclose(partner.outputs(0.0, Inputs()).p_WO, outside)
     np.testing.assert_allclose(walk(partner, inputs(hanging, 0.0), 50)[-1].p_WO, outside)
-    above = walk(partner, inputs(place + [0.0, 0.0, 0.2], 0.0), 40)
+    above = walk(partner, inputs(place + np.array([0.0, 0.0, 0.2]), 0.0), 40)
     np.testing.assert_allclose(above[-1].p_WO, place, atol=1e-9)
     moved = np.diff([y.p_WO for y in above], axis=0)
     assert np.linalg.norm(moved, axis=1).max() < 0.1 * 0.02 + 1e-9
-    np.testing.assert_allclose(walk(partner, inputs(hanging + [0.2, 0.0, 0.0], 0.0), 5)[-1].p_WO, place, atol=1e-9)
+    below = walk(partner, inputs(hanging + np.array([0.2, 0.0, 0.0]), 0.0), 5)
+    np.testing.assert_allclose(below[-1].p_WO, place, atol=1e-9)
 
 
 def test_on_the_arms_axis_the_person_waits_away_from_the_cameras():

@@ -101,7 +101,7 @@ class Outputs:
 
 
 class Proportional(Stateless):
-    \"\"\"Bends and stretches all segments alike, in proportion to what is left of the way: up, then over the ball.\"\"\"
+    \"\"\"Bends and stretches all segments alike, in proportion to what is left of the way: up, then over.\"\"\"
 
     feedthrough = {"dl_t": ("p_WO_meas", "p_WG_meas")}
     period = Fraction(1, 2)
