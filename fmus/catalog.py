@@ -61,24 +61,27 @@ class Entry:
 _ENTRIES = (
     Entry(
         "TendonArm",
-        "handover.plants.helix.tendon_arm:TendonArm",
+        "handover.plants.helix.arm.tendon_arm:TendonArm",
         Fraction(1, 100),
         "tendon-driven soft arm with a gripper",
     ),
     Entry(
         "TendonArmFast",
-        "handover.plants.helix.tendon_arm_fast:TendonArmFast",
+        "handover.plants.helix.arm.tendon_arm_fast:TendonArmFast",
         Fraction(1, 100),
         "the same arm by compiled kernels, without Exudyn",
     ),
     Entry(
         "HandoverPartner",
-        "handover.plants.helix.handover_partner:HandoverPartner",
+        "handover.plants.helix.hand.handover_partner:HandoverPartner",
         Fraction(1, 100),
         "hand that offers a ball",
     ),
     Entry(
-        "StereoCamera", "handover.plants.helix.stereo_camera:StereoCamera", Fraction(1, 30), "pictures of two cameras"
+        "StereoCamera",
+        "handover.plants.helix.cameras.stereo_camera:StereoCamera",
+        Fraction(1, 30),
+        "pictures of two cameras",
     ),
     Entry(
         "HandoverVision",
@@ -210,7 +213,7 @@ def own_unit(path: str, step: Fraction | None = None, name: str = "") -> Entry:
 
 
 def import_class(path: str) -> type[Any]:
-    """Return the class that a path such as `handover.plants.helix.tendon_arm:TendonArm` names.
+    """Return the class that a path such as `handover.plants.helix.arm.tendon_arm:TendonArm` names.
 
     Raises:
         UnknownBlock: the module cannot be loaded, or has no such class.

@@ -43,7 +43,7 @@ class Carried:
     """The Python code of an FMU.
 
     Attributes:
-        files: sources by their paths in the FMU, such as `handover/plants/helix/tendon_arm.py`.
+        files: sources by their paths in the FMU, such as `handover/plants/helix/arm/tendon_arm.py`.
         modules: top-level modules of the environment that they import, sorted.
     """
 
@@ -71,7 +71,7 @@ def closure(block: str) -> Carried:
     """Return the sources and packages that a block's module imports, directly or through others.
 
     Args:
-        block: path of the block's class, such as `handover.plants.helix.tendon_arm:TendonArm`.
+        block: path of the block's class, such as `handover.plants.helix.arm.tendon_arm:TendonArm`.
 
     Raises:
         UnknownBlock: its module cannot be found, or is not Python source.

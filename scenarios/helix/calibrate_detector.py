@@ -13,7 +13,7 @@ from handover.controllers.helix.detector_calibration import DetectorCalibration,
 from handover.controllers.helix.markers import MarkerRing
 from handover.controllers.helix.stereo import Pixels, StereoRig
 from handover.cosim.blocks.geometry import quaternion_of, rotation_by
-from handover.plants.helix.stereo_camera import Inputs, Params, StereoCamera
+from handover.plants.helix.cameras.stereo_camera import Inputs, Params, StereoCamera
 from handover.scenarios.helix.cameras import camera_of, camera_parameters
 
 _HANGING = np.diag([1.0, -1.0, -1.0])  # R_WR

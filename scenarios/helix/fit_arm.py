@@ -25,9 +25,9 @@ from handover.controllers.helix.visual_servo import Inputs as ServoInputs
 from handover.controllers.helix.visual_servo import Params as ServoParams
 from handover.controllers.helix.visual_servo import Phase, VisualServo
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.tendon_arm_fast import TendonArmFast
-from handover.plants.helix.tendon_parameters import InvalidArmParameters, Params
-from handover.plants.helix.tendon_ports import Inputs as ArmInputs
+from handover.plants.helix.arm.tendon_arm_fast import TendonArmFast
+from handover.plants.helix.arm.tendon_parameters import InvalidArmParameters, Params
+from handover.plants.helix.arm.tendon_ports import Inputs as ArmInputs
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.helix.evaluation import ModelMismatch, model_mismatch
 from handover.scenarios.helix.parameters import Place

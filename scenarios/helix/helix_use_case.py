@@ -14,8 +14,8 @@ from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.units import Metre, Radian, Second
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
-from handover.plants.helix.bowl import Bowl
-from handover.plants.helix.partner_parameters import Params as HandParams
+from handover.plants.helix.hand.bowl import Bowl
+from handover.plants.helix.hand.partner_parameters import Params as HandParams
 from handover.scenarios.experiment.experiment import FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.pictures import CameraPicture

@@ -10,7 +10,7 @@ from matplotlib.patches import Circle
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.plants.helix.bowl import Bowl
+from handover.plants.helix.hand.bowl import Bowl
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.plotting import figure

@@ -6,10 +6,10 @@ from scipy.spatial.transform import Rotation
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.plants.helix.bowl import Bowl
-from handover.plants.helix.shapes import Limbs, gripper, hand
-from handover.plants.helix.stereo_camera import Params as CameraParams
-from handover.plants.helix.tendon_parameters import Params as ArmParams
+from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
+from handover.plants.helix.cameras.shapes import Limbs, gripper, hand
+from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
+from handover.plants.helix.hand.bowl import Bowl
 from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, ball, circle, merged, prism, rod, turned
 from handover.scenarios.helix.cameras import camera_of, camera_parameters
 

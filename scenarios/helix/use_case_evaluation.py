@@ -6,7 +6,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
-from handover.plants.helix.bowl import Bowl
+from handover.plants.helix.hand.bowl import Bowl
 from handover.scenarios.experiment.experiment import Metric, Outcome
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.helix.evaluation import HandoverEvaluator

@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping
 
-from handover.scenarios.published.helix_1 import Helix1
-from handover.scenarios.published.helix_2 import Helix2
-from handover.scenarios.published.helix_3 import Helix3
-from handover.scenarios.published.helix_disturbances import HelixDisturbances
-from handover.scenarios.published.helix_improvements import HelixImprovements
-from handover.scenarios.published.helix_places import HelixPlaces
-from handover.scenarios.published.helix_workspace import HelixWorkspace
-from handover.scenarios.published.ir_table import IrTable
+from handover.scenarios.published.helix.helix_1 import Helix1
+from handover.scenarios.published.helix.helix_2 import Helix2
+from handover.scenarios.published.helix.helix_3 import Helix3
+from handover.scenarios.published.helix.helix_disturbances import HelixDisturbances
+from handover.scenarios.published.helix.helix_improvements import HelixImprovements
+from handover.scenarios.published.helix.helix_places import HelixPlaces
+from handover.scenarios.published.helix.helix_workspace import HelixWorkspace
+from handover.scenarios.published.ir_grasp.ir_table import IrTable
 from handover.scenarios.published.published_experiment import PublishedExperiment
 
 _ALL: tuple[type[PublishedExperiment], ...] = (

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from handover.plants.helix.tendon_arm_fast import TendonArmFast
-from handover.plants.helix.tendon_parameters import Params
-from handover.plants.helix.tendon_ports import Inputs
+from handover.plants.helix.arm.tendon_arm_fast import TendonArmFast
+from handover.plants.helix.arm.tendon_parameters import Params
+from handover.plants.helix.arm.tendon_ports import Inputs
 
 FAR = np.array([-15.75, 4.84, -19.09, 1.25, 14.375, 14.375, -2.5, -28.75, -28.75]) * 1e-3
 

@@ -15,12 +15,12 @@ from vision_scenes import anywhere, rising
 from handover.controllers.helix.handover_vision import Detector, HandoverVision, Outputs, Params
 from handover.controllers.helix.handover_vision import Inputs as Pictures
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix import painting
+from handover.plants.helix.cameras import painting
+from handover.plants.helix.cameras.polygon_filling import fill_by_opencv
+from handover.plants.helix.cameras.polygon_kernel import fill_by_kernel
+from handover.plants.helix.cameras.stereo_camera import Inputs, StereoCamera
+from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
 from handover.plants.helix.compiled import IS_COMPILED
-from handover.plants.helix.polygon_filling import fill_by_opencv
-from handover.plants.helix.polygon_kernel import fill_by_kernel
-from handover.plants.helix.stereo_camera import Inputs, StereoCamera
-from handover.plants.helix.stereo_camera import Params as CameraParams
 
 NAMES = ("ball", "wrist", "gripper")
 

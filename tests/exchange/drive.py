@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.description import Description
 from handover.cosim.blocks.variable import Kind, Variable
 from handover.fmus.layout import element_names
-from handover.plants.helix.stereo_camera import Inputs, Params, StereoCamera
+from handover.plants.helix.cameras.stereo_camera import Inputs, Params, StereoCamera
 
 STEPS = 10
 """Steps of a run, each as long as the unit proposes."""

@@ -9,7 +9,7 @@ from fmpy_host import Digests, FmpyHost
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.description import FmuDescription, FmuPort
-from handover.plants.helix.stereo_camera import Inputs, Outputs, Params, StereoCamera
+from handover.plants.helix.cameras.stereo_camera import Inputs, Outputs, Params, StereoCamera
 
 STEPS = 12
 """Steps before a state is taken, and after."""

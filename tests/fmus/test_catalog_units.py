@@ -12,8 +12,8 @@ from fmpy.validation import validate_fmu
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
 from handover.fmus.fmi2_description import NoFmi2Form
-from handover.plants.helix.tendon_arm import Inputs, TendonArm
-from handover.plants.helix.tendon_parameters import Params
+from handover.plants.helix.arm.tendon_arm import Inputs, TendonArm
+from handover.plants.helix.arm.tendon_parameters import Params
 
 DL = np.array([-0.01, 0.005, 0.005, -0.02, 0.01, 0.01, 0.0, -0.015, -0.015])
 

@@ -36,7 +36,8 @@ def test_the_gripper_comes_from_above_wherever_it_starts(angle: float, beside: f
 
 
 def test_the_gripper_does_not_turn_back_once_it_is_over_the_ball():
-    aside = np.hypot(*course(np.array([0.15, 0.02, -0.1]), P_WO)[:, :2].T)
+    places = course(np.array([0.15, 0.02, -0.1]), P_WO)
+    aside = np.hypot(places[:, 0], places[:, 1])
     highest = int(np.argmax(aside < 0.08))
     assert np.all(np.diff(aside[highest:]) <= 1e-12)
 

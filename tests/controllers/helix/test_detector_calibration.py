@@ -10,8 +10,8 @@ from handover.controllers.helix.markers import MarkerReader, MarkerRing
 from handover.controllers.helix.stereo import Pixels, StereoRig
 from handover.cosim.blocks.geometry import Pinhole, rotation_of
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.stereo_camera import Inputs as Scene
-from handover.plants.helix.stereo_camera import Params, StereoCamera
+from handover.plants.helix.cameras.stereo_camera import Inputs as Scene
+from handover.plants.helix.cameras.stereo_camera import Params, StereoCamera
 
 P = Params()
 RIG = StereoRig(

@@ -9,8 +9,8 @@ from vision_scenes import AWAY, anywhere, distances, hanging, look, rising, scen
 from handover.controllers.helix.handover_vision import Detector, HandoverVision, Inputs, Outputs, Params
 from handover.controllers.helix.published_detector import green_middle
 from handover.cosim.blocks.ports import BLACK_1280X720, Floats
-from handover.plants.helix.stereo_camera import Params as CameraParams
-from handover.plants.helix.stereo_camera import StereoCamera
+from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
+from handover.plants.helix.cameras.stereo_camera import StereoCamera
 
 PUBLISHED = Params(detector=Detector.PUBLISHED)
 

@@ -8,8 +8,8 @@ from handover.controllers.helix.handover_vision import HandoverVision, Inputs, O
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import InvalidCalibration
 from handover.cosim.blocks.ports import BLACK_1280X720, Floats
-from handover.plants.helix.stereo_camera import Params as CameraParams
-from handover.plants.helix.stereo_camera import StereoCamera
+from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
+from handover.plants.helix.cameras.stereo_camera import StereoCamera
 
 
 @pytest.fixture(scope="module")

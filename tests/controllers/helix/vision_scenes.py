@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from handover.controllers.helix.handover_vision import HandoverVision, Inputs, Outputs
 from handover.cosim.blocks.geometry import quaternion_of
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.stereo_camera import Inputs as Scene
-from handover.plants.helix.stereo_camera import StereoCamera
+from handover.plants.helix.cameras.stereo_camera import Inputs as Scene
+from handover.plants.helix.cameras.stereo_camera import StereoCamera
 
 R_WB = np.diag([1.0, -1.0, -1.0])
 PLACES = {"front": 0.0, "front-left": 45.0, "left": 90.0, "back-left": 135.0}  # deg from +x to +y

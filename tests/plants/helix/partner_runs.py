@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.handover_partner import HandoverPartner
-from handover.plants.helix.partner_parameters import Inputs, Outputs, Params
+from handover.plants.helix.hand.handover_partner import HandoverPartner
+from handover.plants.helix.hand.partner_parameters import Inputs, Outputs, Params
 
 STILL = Params(tremor_rms=0.0, drift_rms=0.0)
 P_WO = STILL.p_WO_0

@@ -13,11 +13,11 @@ import pytest
 from partner_runs import DOWN, P_WO, STILL, beside, lift, take, taken
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.ball_contact import CAPSULES, advance
 from handover.plants.helix.gripper_fingers import finger_joints
-from handover.plants.helix.handover_partner import HandoverPartner
-from handover.plants.helix.held_ball import HeldBall, numbers_of
-from handover.plants.helix.partner_parameters import Holder, Params
+from handover.plants.helix.hand.ball_contact import CAPSULES, advance
+from handover.plants.helix.hand.handover_partner import HandoverPartner
+from handover.plants.helix.hand.held_ball import HeldBall, numbers_of
+from handover.plants.helix.hand.partner_parameters import Holder, Params
 
 G, M, R = 9.81, STILL.ball_mass, STILL.ball_radius
 NO_GRIPPER = np.full((CAPSULES, 2, 3), 9.0)

@@ -8,12 +8,12 @@ import pytest
 from partner_runs import take
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.bowl import Bowl
-from handover.plants.helix.handover_partner import HandoverPartner
-from handover.plants.helix.partner_parameters import Holder, Inputs, InvalidPartnerParameters, Outputs, Params
-from handover.plants.helix.stereo_camera import Inputs as Seen
-from handover.plants.helix.stereo_camera import Params as CameraParams
-from handover.plants.helix.stereo_camera import StereoCamera
+from handover.plants.helix.cameras.stereo_camera import Inputs as Seen
+from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
+from handover.plants.helix.cameras.stereo_camera import StereoCamera
+from handover.plants.helix.hand.bowl import Bowl
+from handover.plants.helix.hand.handover_partner import HandoverPartner
+from handover.plants.helix.hand.partner_parameters import Holder, Inputs, InvalidPartnerParameters, Outputs, Params
 
 P_WB = np.array([0.0, -0.16, -0.74])
 BOWL = Bowl(P_WB, radius=0.08, depth=0.06, ball_radius=0.025)

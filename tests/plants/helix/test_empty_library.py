@@ -14,7 +14,7 @@ from handover.cosim.native_libraries import zig_cc
 from handover.fmus import interpreter
 from handover.fmus.build import cached
 from handover.fmus.compile import RUNTIME
-from handover.plants.helix.empty_library import empty_library
+from handover.plants.helix.arm.empty_library import empty_library
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="Exudyn's wheel wants these libraries on Linux")
 
@@ -22,13 +22,13 @@ ROOT = Path(__file__).parents[3]
 OF_A_SCREEN = ("libGL.so.1", "libX11.so.6")
 IMPORT_EXUDYN = "import exudyn"
 LOAD_ONE = """
-from handover.plants.helix.empty_library import can_be_loaded, load_empty
+from handover.plants.helix.arm.empty_library import can_be_loaded, load_empty
 print(can_be_loaded("libof_nothing.so.7"))
 load_empty("libof_nothing.so.7")
 print(can_be_loaded("libof_nothing.so.7"))
 """
 LOAD_REAL = f"""
-from handover.plants.helix.empty_library import can_be_loaded
+from handover.plants.helix.arm.empty_library import can_be_loaded
 for name in {OF_A_SCREEN}:
     can_be_loaded(name)
 for line in open("/proc/self/maps"):
@@ -37,7 +37,7 @@ for line in open("/proc/self/maps"):
 COMPARE = """
 import sys
 before = sys.getdlopenflags()
-import handover.plants.helix.exudyn_edge
+import handover.plants.helix.arm.exudyn_edge
 print(sys.getdlopenflags() == before, any("libglfw" in line for line in open("/proc/self/maps")))
 """
 

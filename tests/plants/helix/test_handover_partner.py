@@ -8,11 +8,11 @@ import pytest
 from partner_runs import AWAY, P_WO, STILL, beside, flat, inputs, take, taken, walk
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.handover_partner import HandoverPartner
-from handover.plants.helix.partner_parameters import Holder, Inputs, InvalidPartnerParameters, Params
-from handover.plants.helix.tendon_arm_fast import TendonArmFast
-from handover.plants.helix.tendon_parameters import Params as ArmParams
-from handover.plants.helix.tendon_ports import Inputs as ArmInputs
+from handover.plants.helix.arm.tendon_arm_fast import TendonArmFast
+from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
+from handover.plants.helix.arm.tendon_ports import Inputs as ArmInputs
+from handover.plants.helix.hand.handover_partner import HandoverPartner
+from handover.plants.helix.hand.partner_parameters import Holder, Inputs, InvalidPartnerParameters, Params
 
 
 def test_starts_at_its_place_in_the_hand():

@@ -8,8 +8,8 @@ import pytest
 from numpy.random import Generator
 
 from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
-from handover.plants.helix.painting import Backdrop, Canvas
-from handover.plants.helix.shapes import Decal, Pixels, PolygonLayer
+from handover.plants.helix.cameras.painting import Backdrop, Canvas
+from handover.plants.helix.cameras.shapes import Decal, Pixels, PolygonLayer
 
 WIDTH, HEIGHT = 300, 170  # no multiples of a band or of a cell
 ROUND = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]

@@ -11,8 +11,8 @@ import pytest
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from handover.plants.helix.polygon_filling import SHIFT, Polygons, fill_by_opencv
-from handover.plants.helix.polygon_kernel import fill_by_kernel
+from handover.plants.helix.cameras.polygon_filling import SHIFT, Polygons, fill_by_opencv
+from handover.plants.helix.cameras.polygon_kernel import fill_by_kernel
 
 HOUSE = Path(__file__).parents[3]
 HEIGHT, WIDTH = 60, 90

@@ -13,8 +13,8 @@ import pytest
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import InvalidCalibration, Pinhole
-from handover.plants.helix.shapes import Pixels
-from handover.plants.helix.stereo_camera import Inputs, InvalidCover, Params, StereoCamera
+from handover.plants.helix.cameras.shapes import Pixels
+from handover.plants.helix.cameras.stereo_camera import Inputs, InvalidCover, Params, StereoCamera
 
 HOUSE = Path(__file__).parents[3]
 FAR = np.array([0.3, 1.5, -1.2])  # out of both pictures

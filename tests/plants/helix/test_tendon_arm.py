@@ -11,9 +11,9 @@ import pytest
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.exudyn_edge import SolverFailure
-from handover.plants.helix.tendon_arm import Inputs, Outputs, StepSizeError, TendonArm
-from handover.plants.helix.tendon_parameters import InvalidArmParameters, Params
+from handover.plants.helix.arm.exudyn_edge import SolverFailure
+from handover.plants.helix.arm.tendon_arm import Inputs, Outputs, StepSizeError, TendonArm
+from handover.plants.helix.arm.tendon_parameters import InvalidArmParameters, Params
 
 CALIBRATED = np.repeat([0.12, 0.24, 0.24], 3)
 ANGLES = np.deg2rad([0.0, 120.0, 240.0])
@@ -212,8 +212,8 @@ def test_interleaved_arms_and_another_starting_time_give_the_same_bits():
 def test_says_nothing_leaves_no_file_and_gives_the_same_bits_in_another_process(tmp_path: Path):
     script = (
         "import hashlib, numpy as np\n"
-        "from handover.plants.helix.tendon_arm import Inputs, TendonArm\n"
-        "from handover.plants.helix.tendon_parameters import Params\n"
+        "from handover.plants.helix.arm.tendon_arm import Inputs, TendonArm\n"
+        "from handover.plants.helix.arm.tendon_parameters import Params\n"
         "arm = TendonArm(Params())\n"
         "for i in range(5):\n"
         "    arm.step(i * 0.02, 0.02, Inputs(dl_t=np.array([-6, 3, 2, -4, 0, 4, 3, -6, 2]) * 1e-3))\n"

@@ -13,10 +13,10 @@ from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.fmus.sources import closure
-from handover.plants.helix.tendon_arm import TendonArm
-from handover.plants.helix.tendon_arm_fast import SolverFailure, TendonArmFast
-from handover.plants.helix.tendon_parameters import InvalidArmParameters, Params
-from handover.plants.helix.tendon_ports import Inputs, Outputs, StepSizeError
+from handover.plants.helix.arm.tendon_arm import TendonArm
+from handover.plants.helix.arm.tendon_arm_fast import SolverFailure, TendonArmFast
+from handover.plants.helix.arm.tendon_parameters import InvalidArmParameters, Params
+from handover.plants.helix.arm.tendon_ports import Inputs, Outputs, StepSizeError
 
 ANGLES = np.deg2rad([0.0, 120.0, 240.0])
 LENGTH = np.array([0.12, 0.24, 0.24])
@@ -68,8 +68,8 @@ def test_has_the_ports_and_parameters_of_the_arm_in_exudyn():
 
 
 def test_an_fmu_carries_its_kernels_and_needs_neither_exudyn_nor_numba():
-    carried = closure("handover.plants.helix.tendon_arm_fast:TendonArmFast")
-    assert "handover/plants/helix/fast_motion.py" in carried.files
+    carried = closure("handover.plants.helix.arm.tendon_arm_fast:TendonArmFast")
+    assert "handover/plants/helix/arm/fast_motion.py" in carried.files
     assert not {"exudyn", "numba"} & {*carried.modules}
 
 
@@ -194,7 +194,7 @@ def test_a_state_of_another_arm_is_refused_and_changes_nothing():
 def test_another_process_gives_the_same_bits_and_plain_python_the_same_motion(tmp_path: Path, *, compiled: bool):
     script = (
         "import numpy as np\n"
-        "from handover.plants.helix.tendon_arm_fast import Inputs, Params, TendonArmFast\n"
+        "from handover.plants.helix.arm.tendon_arm_fast import Inputs, Params, TendonArmFast\n"
         "arm = TendonArmFast(Params())\n"
         "for i in range(5):\n"
         "    y = arm.step(i * 0.02, 0.02, Inputs(dl_t=np.array([-6, 3, 2, -4, 0, 4, 3, -6, 2]) * 1e-3))\n"

@@ -2,9 +2,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.tendon_chain import TendonTangent
-from handover.plants.helix.tendon_design import TendonDesign
-from handover.plants.helix.tendon_parameters import Params
+from handover.plants.helix.arm.tendon_chain import TendonTangent
+from handover.plants.helix.arm.tendon_design import TendonDesign
+from handover.plants.helix.arm.tendon_parameters import Params
 
 
 def energy(design: TendonDesign, p: Floats, R: Floats, L0: Floats) -> float:

@@ -1,6 +1,6 @@
 """An arm that fails during a run, to test how the run ends."""
 
-from handover.plants.helix.tendon_arm import Inputs, Outputs, TendonArm
+from handover.plants.helix.arm.tendon_arm import Inputs, Outputs, TendonArm
 
 
 class FailingArm(TendonArm):

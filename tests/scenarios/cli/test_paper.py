@@ -13,7 +13,7 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign_report.campaign_page import write_campaign_page
 from handover.scenarios.cli.command import main
 from handover.scenarios.published.catalog import EXPERIMENTS
-from handover.scenarios.published.ir_table import IrTable
+from handover.scenarios.published.ir_grasp.ir_table import IrTable
 
 
 def paper(*arguments: str | Path) -> Result:

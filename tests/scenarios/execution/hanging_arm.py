@@ -7,7 +7,7 @@ import ctypes
 import os
 from pathlib import Path
 
-from handover.plants.helix.tendon_arm import Inputs, Outputs, TendonArm
+from handover.plants.helix.arm.tendon_arm import Inputs, Outputs, TendonArm
 
 
 class HangingArm(TendonArm):

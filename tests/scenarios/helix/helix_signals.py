@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from handover.controllers.helix.visual_servo import Phase
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
-from handover.plants.helix.partner_parameters import Holder
+from handover.plants.helix.hand.partner_parameters import Holder
 
 PICTURE = np.zeros(720 * 1280 * 3, dtype=np.uint8)
 P_WG = np.array([0.16, 0.0, -0.6])

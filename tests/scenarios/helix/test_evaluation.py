@@ -5,7 +5,7 @@ from helix_signals import P_WG, P_WR, PICTURE, port, views_and_ports
 from handover.controllers.helix.visual_servo import Phase, Verdict
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.system.signals import Signals
-from handover.plants.helix.partner_parameters import Holder
+from handover.plants.helix.hand.partner_parameters import Holder
 from handover.scenarios.helix.cameras import camera_of, camera_parameters
 from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.evaluation import HandoverEvaluator

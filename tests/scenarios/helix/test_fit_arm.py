@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handover.plants.helix.tendon_parameters import Params
+from handover.plants.helix.arm.tendon_parameters import Params
 from handover.scenarios.helix.fit_arm import FACTORS, approach, described, places_at, scaled_arm
 
 FRONT = np.array([0.16, 0.0, -0.6])

@@ -10,9 +10,9 @@ import tomli
 import handover.scenarios.helix
 from handover.controllers.helix.handover_vision import Params as VisionParams
 from handover.controllers.helix.servo_parameters import Params as ServoParams
-from handover.plants.helix.partner_parameters import Params as HandParams
-from handover.plants.helix.stereo_camera import Params as CameraParams
-from handover.plants.helix.tendon_parameters import Params as ArmParams
+from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
+from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
+from handover.plants.helix.hand.partner_parameters import Params as HandParams
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.helix.calibrate_detector import calibrated_detector
 from handover.scenarios.helix.cameras import camera_parameters

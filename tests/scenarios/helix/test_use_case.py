@@ -17,8 +17,8 @@ from handover.cosim.exceptions import WiringError
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.fmus.build import cached
-from handover.plants.helix.partner_parameters import Holder
-from handover.plants.helix.partner_parameters import Params as HandParams
+from handover.plants.helix.hand.partner_parameters import Holder
+from handover.plants.helix.hand.partner_parameters import Params as HandParams
 from handover.scenarios.helix.helix_use_case import BowlPlace, HelixUseCase, UseCaseParameters
 from handover.scenarios.helix.parameters import Tuning
 from handover.scenarios.helix.use_case_evaluation import UseCaseEvaluator

@@ -13,7 +13,7 @@ from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.helix.parameters import Parameters
 from handover.scenarios.helix.workspace import cameras_that_see, notes_on_place, reach
-from handover.scenarios.published.helix_workspace import HelixWorkspace, reach_by_place
+from handover.scenarios.published.helix.helix_workspace import HelixWorkspace, reach_by_place
 from handover.scenarios.published.published_experiment import Verdict
 
 

@@ -5,7 +5,7 @@ from dataclasses import fields
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.published.helix_1_curves import RunCurves
+from handover.scenarios.published.helix.helix_1_curves import RunCurves
 
 PERIOD = 1.45
 

@@ -7,7 +7,7 @@ import pyarrow as pa
 
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.published.ir_table import IrTable
+from handover.scenarios.published.ir_grasp.ir_table import IrTable
 
 DISTANCES = {"final_distance_thumb": 0.011, "final_distance_index": 0.045, "final_distance_ring": 0.012}
 

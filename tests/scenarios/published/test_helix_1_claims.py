@@ -7,7 +7,7 @@ import pytest
 from helix_1_rows import spread, table_of
 
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.published.helix_1 import Helix1
+from handover.scenarios.published.helix.helix_1 import Helix1
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 PUBLISHED = {0.1: spread(104.8, 52.0), 0.2: spread(42.2, 10.8), 0.4: spread(22.4, 4.3)}

@@ -11,10 +11,10 @@ from helix_1_rows import table_of
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.helix.parameters import Tuning
-from handover.scenarios.published.helix_1_curve_claims import error_claims, model_claims
-from handover.scenarios.published.helix_1_curves import RunCurves
-from handover.scenarios.published.helix_1_model_figures import draw_estimate, draw_model
-from handover.scenarios.published.helix_1_runs import Helix1Arm
+from handover.scenarios.published.helix.helix_1_curve_claims import error_claims, model_claims
+from handover.scenarios.published.helix.helix_1_curves import RunCurves
+from handover.scenarios.published.helix.helix_1_model_figures import draw_estimate, draw_model
+from handover.scenarios.published.helix.helix_1_runs import Helix1Arm
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 ALPHAS = (0.1, 0.2, 0.4)

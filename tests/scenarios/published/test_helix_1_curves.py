@@ -11,7 +11,7 @@ from chosen_curves import PERIOD, curves_as
 from handover.controllers.helix.constant_curvature import forward_kinematics
 from handover.controllers.helix.visual_servo import Phase
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.published.helix_1_curves import RunCurves, curves_of, mean_curve
+from handover.scenarios.published.helix.helix_1_curves import RunCurves, curves_of, mean_curve
 
 Q_CALIB = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.24, 0.0, 0.0, 0.24])
 BENT = np.array([0.3, 0.1, 0.11, 0.2, 0.0, 0.25, -0.4, 0.1, 0.22])

@@ -6,8 +6,8 @@ import pytest
 from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.statistics import MIN_SAMPLES
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.published.helix_1 import Helix1
-from handover.scenarios.published.helix_1_spread import fitted_rows, undisturbed
+from handover.scenarios.published.helix.helix_1 import Helix1
+from handover.scenarios.published.helix.helix_1_spread import fitted_rows, undisturbed
 
 PERIODS = {"0.1": "1.38", "0.2": "1.51", "0.4": "1.45"}
 

@@ -14,7 +14,7 @@ from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.local_cluster import local_cluster
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.cli.campaign import CampaignProgress
-from handover.scenarios.published.helix_1 import Helix1
+from handover.scenarios.published.helix.helix_1 import Helix1
 from handover.scenarios.published.published_experiment import PaperResults, Verdict, draw_figures, write_claims
 
 FAST = {"alpha": "0.4", "control_period": "1.45", "place": "front", "tuning": "thesis"}

@@ -9,8 +9,8 @@ import pytest
 from helix_1_rows import spread, table_of
 
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.published.helix_1 import Helix1
-from handover.scenarios.published.helix_1_spread import spread_claims, spread_rows, spread_table, undisturbed
+from handover.scenarios.published.helix.helix_1 import Helix1
+from handover.scenarios.published.helix.helix_1_spread import spread_claims, spread_rows, spread_table, undisturbed
 from handover.scenarios.published.published_experiment import Verdict
 
 PLAIN = {0.1: spread(41.0, 1.0), 0.2: spread(29.0, 1.0), 0.4: spread(16.0, 0.5)}

@@ -6,7 +6,7 @@ import pyarrow.parquet as pq
 from helix_1_rows import spread, table_of
 
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.published.helix_1 import Helix1
+from handover.scenarios.published.helix.helix_1 import Helix1
 
 TIMES = {0.1: spread(100.0, 50.0), 0.2: spread(40.0, 10.0), 0.4: [20.0, 21.0, 22.0, 23.0, 24.0, 25.0, 26.0, None]}
 

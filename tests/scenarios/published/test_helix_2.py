@@ -10,7 +10,7 @@ from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.helix.helix_handover import HelixHandover
-from handover.scenarios.published.helix_2 import Helix2
+from handover.scenarios.published.helix.helix_2 import Helix2
 from handover.scenarios.published.published_experiment import Verdict
 
 

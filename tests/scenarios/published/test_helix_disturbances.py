@@ -8,8 +8,8 @@ from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.helix.helix_handover import HelixHandover
-from handover.scenarios.published.helix_cases import rows_by_case
-from handover.scenarios.published.helix_disturbances import CASES, HelixDisturbances
+from handover.scenarios.published.helix.helix_cases import rows_by_case
+from handover.scenarios.published.helix.helix_disturbances import CASES, HelixDisturbances
 from handover.scenarios.published.published_experiment import Verdict
 
 PLAN = HelixDisturbances().plan(quick=False)

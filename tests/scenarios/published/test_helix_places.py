@@ -7,7 +7,7 @@ import pytest
 from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.helix.workspace import cameras_that_see, reach
-from handover.scenarios.published.helix_places import HelixPlaces, random_places
+from handover.scenarios.published.helix.helix_places import HelixPlaces, random_places
 from handover.scenarios.published.published_experiment import Verdict
 
 

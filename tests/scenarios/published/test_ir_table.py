@@ -12,9 +12,9 @@ from grasp_table import grasp_table
 from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.published.ir_table import IrTable
-from handover.scenarios.published.ir_table_claims import closing_claims, distance_claims, rate_claims
-from handover.scenarios.published.ir_table_runs import BLIND, FORWARD_35, REFLEX, IrTableRuns
+from handover.scenarios.published.ir_grasp.ir_table import IrTable
+from handover.scenarios.published.ir_grasp.ir_table_claims import closing_claims, distance_claims, rate_claims
+from handover.scenarios.published.ir_grasp.ir_table_runs import BLIND, FORWARD_35, REFLEX, IrTableRuns
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 TUNED = range(1000, 1008)

@@ -11,8 +11,8 @@ from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.published.ir_table import IrTable
-from handover.scenarios.published.ir_table_runs import ARMS, BLIND, FORWARD_55, REFLEX, IrTableRuns
+from handover.scenarios.published.ir_grasp.ir_table import IrTable
+from handover.scenarios.published.ir_grasp.ir_table_runs import ARMS, BLIND, FORWARD_55, REFLEX, IrTableRuns
 from handover.scenarios.published.published_experiment import draw_figures, write_claims
 
 

@@ -1,0 +1,1 @@
+"""The tendon-driven soft arm: by Exudyn, and by compiled kernels."""

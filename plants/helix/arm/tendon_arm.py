@@ -1,0 +1,98 @@
+"""Soft arm of three tendon-driven segments with a gripper, after [Vervloet2025] sec. 3.1."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.plants.helix.arm.tendon_parameters import Params
+from handover.plants.helix.arm.tendon_ports import Inputs, Outputs, StepSizeError, centre_line
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+_R_WB = np.diag([1.0, -1.0, -1.0])
+
+
+class TendonArm:
+    """Chain of rigid discs and elastic elements, pulled by nine tendons, after [Vervloet2025] sec. 2.1, 3.1.
+
+    Each element obeys N = EA eps, Q = GA gamma, M = EI kappa, M_z = GJ tau, with damping on all but shear. A tendon is
+    a spring through the discs of its segment that goes slack; it pulls with k L_c (L - L_0) / L_0, L_c its calibrated
+    length. Motors follow dl_t as critically damped systems of second order, between end stops. The gripper closes at a
+    constant rate.
+
+    The arm hangs from the world's origin. It starts at rest for dl_t = 0, with p_WG at z = -(sum of tendon_length +
+    d_gripper). A shortened tendon bends its segment towards its own angle s_k = 0, 120, 240 degrees in the base frame B
+    (z down, R_WB = diag(1, -1, -1)): with l_ik = l_i - d (Dx cos s_k + Dy sin s_k), positive Dx bends towards +x of B
+    and W, positive Dy towards +y of B, which is -y of W.
+
+    Quaternions are continuous: they start at (0, 1, 0, 0) and do not flip however far the arm bends.
+
+    Raises:
+        InvalidArmParameters: by the constructor, for parameters of which no arm can be built.
+        StepSizeError: by `step`, for steps that are no multiple of `internal_step`.
+        SolverFailure: by `step`, if there is no solution; the arm stays where it was.
+    """
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    period: ClassVar[Fraction | None] = None
+    variable_step: ClassVar[bool] = False
+    deferred: ClassVar[tuple[str, ...]] = ("handover.plants.helix.arm.tendon_chain",)
+
+    def __init__(self, params: Params) -> None:
+        # imported here, since Exudyn takes long to load, and ports are read without it
+        from handover.plants.helix.arm.tendon_chain import TendonChain
+        from handover.plants.helix.arm.tendon_design import TendonDesign
+
+        self._params = params
+        self._chain = TendonChain(TendonDesign(params))
+        length = np.repeat(params.tendon_length, 3)
+        self._end_stops = (length * (params.shortest - 1.0), length * (params.longest - 1.0))
+        self._grip = 0.0
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Return where the arm is; no time passes."""
+        p_B, rotations = self._chain.poses()
+        z_B = rotations.as_matrix()[:, :, 2]
+        q_WR = _world_quaternion(rotations)
+        return Outputs(
+            p_WR=_R_WB @ p_B[-1],
+            q_WR=q_WR,
+            p_WG=_R_WB @ (p_B[-1] + self._params.d_gripper * z_B[-1]),
+            q_WG=np.array(q_WR),
+            backbone=centre_line(p_B, z_B) @ _R_WB,
+            tension=np.maximum(self._chain.edge.tensions, 0.0),
+            grip=self._grip,
+        )
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        """Advance from t by dt with u held."""
+        steps = round(dt / self._params.internal_step)
+        if steps < 1 or abs(steps * self._params.internal_step - dt) > 1e-6 * self._params.internal_step:
+            raise StepSizeError(dt, self._params.internal_step)
+        self._chain.pull(np.clip(u.dl_t, *self._end_stops), _R_WB @ u.f_G)
+        self._chain.edge.advance(t, steps)
+        travel = dt / self._params.closing_time
+        self._grip = min(max(self._grip + min(max(u.closure - self._grip, -travel), travel), 0.0), 1.0)
+        return self.outputs(t + dt, u)
+
+    def get_state(self) -> bytes:
+        """Return coordinates and rates of discs and motors, and the grip."""
+        return pack_state((self._chain.edge.get_state(), self._grip))
+
+    def set_state(self, state: bytes) -> None:
+        """Restore a state of this arm or of one with equal parameters."""
+        system, self._grip = unpack_state(state)
+        self._chain.edge.set_state(system)
+
+
+def _world_quaternion(rotations: "Rotation") -> Floats:
+    """Return q_W of the last of rotations in B that start at the identity and turn little from one to the next."""
+    q_B = rotations.as_quat(scalar_first=True)
+    flips = np.count_nonzero(np.sum(q_B[1:] * q_B[:-1], axis=1) < 0.0)
+    w, x, y, z = q_B[-1] if flips % 2 == 0 else -q_B[-1]
+    return np.array([-x, w, -z, y]) + 0.0  # q_WB = (0, 1, 0, 0) times q_B, without negative zeros

@@ -1,0 +1,1 @@
+"""The two cameras, and the scene that they paint."""

@@ -1,0 +1,287 @@
+"""Two cameras behind the arm and the pictures that they take, after [Vervloet2025] sec. 3.2.1, figs. 3, 4 and 14."""
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from fractions import Fraction
+from typing import Any, ClassVar
+
+import cv2
+import numpy as np
+from numpy.random import Generator
+
+from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
+from handover.cosim.blocks.ports import (
+    Picture1280x720,
+    Polyline25,
+    Vector3,
+    Vector4,
+    Vector5,
+    output,
+    parameter,
+    port,
+)
+from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.units import Levels, Metre, Number, Pixel, Second
+from handover.plants.helix.cameras.painting import Backdrop, Canvas, Part
+from handover.plants.helix.cameras.scene import HandoverScene, MarkerCollar
+from handover.plants.helix.cameras.shapes import Decal, Pixels, PolygonLayer
+from handover.plants.helix.hand.bowl import Bowl
+
+_OFFSETS = 1 << 20  # places in the sheet of noise where a picture's part may begin
+
+
+class SensorNoise:
+    """Adds rounded normal noise, drawn once, from an offset that is drawn anew for each picture.
+
+    Drawing 2.8 million normal numbers a picture would cost more than the picture. So a sheet somewhat larger than a
+    picture is drawn at the start, and a picture takes a contiguous part of it: pixels of one picture are independent,
+    and two pictures are, but for a shift of the sheet against itself. The sheet is kept as what brightens and what
+    darkens, so that saturating 8-bit arithmetic does the rest.
+
+    Args:
+        sigma: standard deviation in levels.
+        shape: of the pictures, (height, width, 3).
+        rng: draws the sheet.
+    """
+
+    def __init__(self, sigma: float, shape: tuple[int, int, int], rng: Generator) -> None:
+        self._shape = shape
+        self._size = int(np.prod(shape))
+        sheet = rng.standard_normal(self._size + _OFFSETS, dtype=np.float32)
+        sheet = np.rint(np.clip(sheet * np.float32(sigma), -255.0, 255.0)).astype(np.int16)
+        self._brighter = np.maximum(sheet, 0).astype(np.uint8)
+        self._darker = np.maximum(-sheet, 0).astype(np.uint8)
+
+    @staticmethod
+    def draw(rng: Generator) -> int:
+        """Return an offset into the sheet."""
+        return int(rng.integers(_OFFSETS))
+
+    def added(self, picture: Pixels, parts: Sequence[tuple[Part, Pixels]], offset: int) -> Pixels:
+        """Return the picture, with other pixels in some parts, and with the noise at the offset."""
+        begin, end = offset, offset + self._size
+        brighter, darker = (x[begin:end].reshape(self._shape) for x in (self._brighter, self._darker))
+        noisy = np.asarray(cv2.add(picture, brighter), dtype=np.uint8)
+        for part, pixels in parts:
+            noisy[part] = cv2.add(pixels, brighter[part])
+        cv2.subtract(noisy, darker, dst=noisy)
+        noisy.flags.writeable = False
+        return noisy
+
+
+_WIDTH, _HEIGHT = 1280, 720
+_P_WC_LEFT = np.array([-0.95, 0.25, -0.60])
+_P_WC_RIGHT = np.array([-0.95, -0.25, -0.60])
+_LOOKED_AT = np.array([0.0, 0.0, -0.62])
+_DARK = 5  # level of a picture under a cloth
+_FACING = (4, 3, 5, 2, 6, 1, 7, 0)  # markers, from that which faces the cameras as the arm hangs
+_HANGING = np.array([0.0, 1.0, 0.0, 0.0])  # q_WR of the arm at rest: R_WR = diag(1, -1, -1)
+
+
+class InvalidCover(ValueError):
+    """What covers a lens, or hides the ball, is taken away before it is there."""
+
+    is_refusal = True
+
+    def __init__(self, what: str, start: float, end: float) -> None:
+        super().__init__(f"{what}: covered from {start} s until {end} s; the end must not come first")
+        self.what, self.start, self.end = what, start, end
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    """Calibration, optics and the visible things' sizes.
+
+    [Vervloet2025] states where the cameras stand, about: side by side, behind the arm, at the gripper's height, and the
+    markers' side. All other values are assumed.
+    """
+
+    p_WC_left: Vector3[Metre] = parameter(_P_WC_LEFT, "position of the left camera in the world")
+    p_WC_right: Vector3[Metre] = parameter(_P_WC_RIGHT, "position of the right camera in the world")
+    q_WC_left: Vector4[Number] = parameter(
+        quaternion_of(looking_at(_P_WC_LEFT, _LOOKED_AT)), "orientation of the left camera in the world"
+    )
+    q_WC_right: Vector4[Number] = parameter(
+        quaternion_of(looking_at(_P_WC_RIGHT, _LOOKED_AT)), "orientation of the right camera in the world"
+    )
+    intrinsics_left: Vector4[Pixel] = parameter(
+        np.array([907.0, 906.0, 642.5, 357.0]), "left camera's focal lengths and principal point: fx, fy, cx, cy"
+    )
+    intrinsics_right: Vector4[Pixel] = parameter(
+        np.array([908.5, 907.5, 636.0, 361.5]), "right camera's focal lengths and principal point: fx, fy, cx, cy"
+    )
+    distortion_left: Vector5[Number] = parameter(
+        np.array([0.105, -0.190, 0.0006, -0.0008, 0.060]), "left lens's distortion: k1, k2, p1, p2, k3"
+    )
+    distortion_right: Vector5[Number] = parameter(
+        np.array([0.092, -0.165, -0.0005, 0.0007, 0.045]), "right lens's distortion: k1, k2, p1, p2, k3"
+    )
+    arm_radius: Metre = parameter(0.030, "radius of the soft arm", minimum=0.001, maximum=0.1)
+    apothem: Metre = parameter(0.034, "distance of the markers from the arm's axis", minimum=0.02, maximum=0.1)
+    marker: Metre = parameter(0.020, "side of a marker", minimum=0.005, maximum=0.05)
+    rings: int = parameter(1, "rings of markers: a second one sits above the first", minimum=1, maximum=2)
+    ball_radius: Metre = parameter(0.025, "radius of the ball", minimum=0.005, maximum=0.1)
+    blur: Pixel = parameter(0.7, "standard deviation of the lenses' blur", minimum=0.0, maximum=5.0)
+    noise: Levels = parameter(2.2, "standard deviation of the sensors' noise", minimum=0.0, maximum=60.0)
+    gradient: Number = parameter(0.22, "relative brightness of lit corner over unlit one", minimum=0.0, maximum=0.5)
+    cover_left_from: Second = parameter(0.0, "time at which a cloth covers the left lens", minimum=0.0)
+    cover_left_until: Second = parameter(0.0, "time at which the left lens is free again", minimum=0.0)
+    cover_right_from: Second = parameter(0.0, "time at which a cloth covers the right lens", minimum=0.0)
+    cover_right_until: Second = parameter(0.0, "time at which the right lens is free again", minimum=0.0)
+    light: Number = parameter(1.0, "brightness of the scene over the usual one", minimum=0.0, maximum=5.0)
+    lost_pictures: Number = parameter(0.0, "part of the pictures that arrive black", minimum=0.0, maximum=1.0)
+    decimation: int = parameter(1, "of 30 pictures a second, every so many-th is taken", minimum=1, maximum=300)
+    covered_markers: int = parameter(
+        0,
+        "markers of each ring with tape over them, those that face the cameras as the arm hangs first",
+        minimum=0,
+        maximum=8,
+    )
+    hide_ball_from: Second = parameter(
+        0.0, "time at which a card is held between the ball and the cameras", minimum=0.0
+    )
+    hide_ball_until: Second = parameter(0.0, "time at which the card is taken away", minimum=0.0)
+    p_WB: Vector3[Metre] = parameter(
+        np.array([0.0, -0.16, -0.78]), "middle of the bowl's rim in the world, where there is a bowl"
+    )
+    bowl_radius: Metre = parameter(0.0, "radius of the bowl's rim; 0: there is no bowl", minimum=0.0, maximum=1.0)
+    bowl_depth: Metre = parameter(0.06, "depth of the bowl", minimum=0.001, maximum=1.0)
+    seed: int = parameter(0, "seed of the noise", minimum=0)
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    """Where the visible things are."""
+
+    backbone: Polyline25[Metre] = port(
+        np.linspace([0.0, 0.0, 0.0], [0.0, 0.0, -0.6], 25), "points on the arm's centre line from mount to wrist"
+    )
+    p_WR: Vector3[Metre] = port(np.array([0.0, 0.0, -0.6]), "position of the marker ring in the world")
+    q_WR: Vector4[Number] = port(_HANGING, "orientation of the marker ring in the world")
+    p_WG: Vector3[Metre] = port(np.array([0.0, 0.0, -0.7]), "position of the gripper in the world")
+    q_WG: Vector4[Number] = port(_HANGING, "orientation of the gripper in the world")
+    grip: Number = port(0.0, "closure of the gripper: 0 open, 1 closed")
+    p_WO: Vector3[Metre] = port(np.array([0.18, 0.0, -0.62]), "position of the ball in the world")
+    p_WH: Vector3[Metre] = port(np.array([0.18, 0.0, -0.66]), "position of the palm in the world")
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    """A pair of pictures taken at the same time."""
+
+    left: Picture1280x720 = output("picture of the left camera")
+    right: Picture1280x720 = output("picture of the right camera")
+
+
+class StereoCamera:
+    """Takes a pair of pictures of the arm, its marker ring and gripper, the ball and the hand.
+
+    Pictures are synthesised: solids are projected through either lens's distortion and painted from far to near, then
+    blurred, lit unevenly and given sensor noise. A step shows the scene at its start, as the inputs give it; one that
+    takes no picture (decimation) repeats the last pair.
+
+    What may be amiss: a lens is covered for a while, light is poor, pictures get lost (each by itself), tape covers
+    markers, a card hides the ball.
+
+    The state is that of the noise, and the scene of the last pair: its pictures are painted again from them, unless
+    they are those that were painted last. Pictures cannot be written to, since they may be handed out again.
+
+    Raises:
+        InvalidCalibration: a quaternion is not of unit length or a focal length not positive.
+        InvalidCover: a cover ends before it begins.
+    """
+
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
+        ("left", "right"), ("backbone", "p_WR", "q_WR", "p_WG", "q_WG", "grip", "p_WO", "p_WH")
+    )
+    period: ClassVar[Fraction | None] = Fraction(1, 30)
+
+    def __init__(self, params: Params) -> None:
+        p = self.params = params
+        cameras = (
+            Pinhole("left", p.p_WC_left, p.q_WC_left, p.intrinsics_left, p.distortion_left),
+            Pinhole("right", p.p_WC_right, p.q_WC_right, p.intrinsics_right, p.distortion_right),
+        )
+        collar = MarkerCollar(p.apothem, p.marker, _FACING[: p.covered_markers], p.rings)
+        bowl = Bowl(p.p_WB, p.bowl_radius, p.bowl_depth, p.ball_radius) if p.bowl_radius > 0.0 else None
+        self._scene = HandoverScene(cameras, p.arm_radius, p.ball_radius, collar, bowl)
+        self._canvases = [Canvas(Backdrop(camera, _WIDTH, _HEIGHT, p.blur, p.gradient, p.light)) for camera in cameras]
+        self._black, self._dark = (np.full((_HEIGHT, _WIDTH, 3), level, dtype=np.uint8) for level in (0, _DARK))
+        self._black.flags.writeable = False
+        self._between = 0.5 * (p.p_WC_left + p.p_WC_right)
+        for what, start, end in self._covers():
+            if end < start:
+                raise InvalidCover(what, start, end)
+        self._rng = np.random.default_rng(p.seed)
+        self._noise = SensorNoise(p.noise, (_HEIGHT, _WIDTH, 3), self._rng)
+        self._offsets = self._draw()
+        self._lost = self._lose()
+        self._ticks = 0
+        self._taken: tuple[float, Inputs] | None = None  # when the last pair was taken, and of what
+        self._pair, self._pair_shows = Outputs(left=self._black, right=self._black), b""
+        self._is_current = False  # whether the pair is the last one that was taken
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:
+        """Return the pictures at the start."""
+        *covered, hidden = (start <= t < end for _, start, end in self._covers())
+        views = self._scene.project(u, self._between if hidden else None)
+        left, right = (self._take(side, *views[side], covered[side]) for side in (0, 1))
+        return Outputs(left=left, right=right)
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        """Return the pictures taken at t, or the last ones."""
+        is_due = self._ticks % self.params.decimation == 0
+        self._ticks += 1
+        if is_due or self._taken is None:
+            self._offsets, self._lost = self._draw(), self._lose()
+            self._taken = t, Inputs(**{name: copy.copy(value) for name, value in vars(u).items()})
+            self._is_current = False
+        if not self._is_current:
+            shows = pack_state(self._shown())
+            if shows != self._pair_shows:
+                self._pair, self._pair_shows = self.outputs(*self._taken), shows
+            self._is_current = True
+        return self._pair
+
+    def get_state(self) -> bytes:
+        """Return the noise generator's state, and of the last pair its noise, its time and what it shows."""
+        offsets, lost, taken = self._shown()
+        return pack_state((self._rng.bit_generator, offsets, lost, self._ticks, taken))
+
+    def set_state(self, state: bytes) -> None:
+        """Restore a state that `get_state` gave."""
+        self._rng.bit_generator.state, self._offsets, self._lost, self._ticks, taken = unpack_state(state)
+        names = [f.name for f in fields(Inputs)]
+        self._taken = None if taken is None else (taken[0], Inputs(**dict(zip(names, taken[1], strict=True))))
+        self._is_current = False
+
+    def _shown(self) -> tuple[Any, ...]:
+        """Return on what the last pair depends: its noise, which pictures are lost, its time and what it shows."""
+        taken = None if self._taken is None else (self._taken[0], tuple(vars(self._taken[1]).values()))
+        return self._offsets, self._lost, taken
+
+    def _covers(self) -> list[tuple[str, float, float]]:
+        p = self.params
+        return [
+            ("left lens", p.cover_left_from, p.cover_left_until),
+            ("right lens", p.cover_right_from, p.cover_right_until),
+            ("ball", p.hide_ball_from, p.hide_ball_until),
+        ]
+
+    def _draw(self) -> tuple[int, int]:
+        return self._noise.draw(self._rng), self._noise.draw(self._rng)
+
+    def _lose(self) -> tuple[bool, bool]:
+        """Draw whether the pictures get lost."""
+        part = self.params.lost_pictures
+        return (bool(self._rng.random() < part), bool(self._rng.random() < part)) if part > 0.0 else (False, False)
+
+    def _take(self, side: int, layers: list[PolygonLayer], decals: list[Decal], is_covered: bool) -> Pixels:
+        """Return the left camera's picture (side 0) or the right one's (1) of these things."""
+        if self._lost[side]:
+            return self._black
+        if is_covered:
+            return self._noise.added(self._dark, (), self._offsets[side])
+        canvas = self._canvases[side]
+        return self._noise.added(canvas.backdrop.seen, canvas.paint(layers, decals), self._offsets[side])

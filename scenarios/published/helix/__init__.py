@@ -1,0 +1,1 @@
+"""The Helix's published experiments, and those beyond them."""

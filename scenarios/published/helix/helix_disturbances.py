@@ -1,0 +1,167 @@
+"""What the Helix bears: one thing amiss at a time, at the same places and seeds, until the handover fails.
+
+[Vervloet2025] has no such experiment; sec. 5.4 names camera places, filters and step rules as what could be changed.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.statistics import success_interval
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.plotting import COLOURS, figure
+from handover.scenarios.published.helix.helix_1_claims import ends_near
+from handover.scenarios.published.helix.helix_cases import (
+    PLACES,
+    Case,
+    distances,
+    levels_of,
+    median_and_most,
+    median_steps,
+    rate,
+    reasons_of,
+    rows_by_case,
+)
+from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment, Verdict
+from handover.scenarios.published.verdicts import format_rate, nothing_measured
+
+_QUICK_PLACES, _QUICK_CASES = 1, ("nothing", "light", "arm's stiffness")
+
+
+def _same(*values: str) -> dict[str, str]:
+    return {value: value for value in values}
+
+
+CASES = (
+    Case("nothing", "", {}, mild=True),
+    *levels_of("arm's stiffness", "times", "arm_stiffness", _same("0.5", "0.7", "1.4", "2"), ("0.7", "1.4")),
+    *levels_of("gripper's mass", "times", "gripper_load", _same("1.5", "2.5"), ("1.5",)),
+    *levels_of("hand's tremor", "mm", "tremor", {"3": "0.003", "10": "0.01"}, ("3",)),
+    *levels_of("hand's drift", "mm", "drift", {"10": "0.01", "30": "0.03"}, ("10",)),
+    *levels_of("ball moved on by", "°", "move_azimuth", {"29": "0.5", "86": "1.5"}, ("29",)),
+    *levels_of("ball moved up by", "mm", "move_height", {"50": "0.05", "-50": "-0.05"}, ("50",)),
+    *levels_of("clicks of the calibration off by", "px", "click_noise", _same("2", "5", "15"), ("2",)),
+    *levels_of("ball's mass", "g", "ball_mass", {"40": "0.04", "80": "0.08"}, ("40",)),
+    *levels_of("fingers' friction", "", "finger_friction", _same("0.4", "0.2", "0.05"), ("0.4",)),
+    *levels_of("camera turned by", "°", "camera_turn", {"0.3": "0.005", "1.1": "0.02", "5.7": "0.1"}, ("0.3",)),
+    *levels_of("light", "times", "light", _same("0.15", "0.4", "2", "4"), ("0.4", "2")),
+    *levels_of("pictures' noise", "levels", "sensor_noise", _same("8", "25"), ("8",)),
+    *levels_of("pictures lost", "%", "lost_pictures", {"30": "0.3", "80": "0.8", "95": "0.95"}, ("30",)),
+    *levels_of("markers covered", "", "covered_markers", _same("1", "3", "5"), ("1",)),
+    *levels_of("ball hidden for", "s", "hide_for", _same("2", "6", "60"), ("2",)),
+    *levels_of("one camera covered for", "s", "cover_for", _same("5"), ("5",), cover="left"),
+    Case("one camera lost for good", "", {"cover": "left", "cover_for": "600"}),
+    *levels_of("jitter of the control period", "%", "jitter", {"30": "0.3", "80": "0.8"}, ("30",)),
+    *levels_of("pictures a second", "", "decimation", {"30": "1", "2": "15"}, ("30",)),
+    Case("step size grows with the error", "", {"step_rule": "by_error"}),
+    Case("the thesis's filters", "", {"filters": "thesis"}),
+    Case("all of the thesis's settings", "", {"tuning": "thesis"}),
+    Case("the thesis's settings, and a person who helps", "", {"tuning": "thesis", "help_speed": "0.05"}),
+)
+
+
+class HelixDisturbances(PublishedExperiment):
+    """Each disturbance at several sizes, at four places, all with the same seeds, with the fast arm.
+
+    The quick plan is three of them at one place.
+    """
+
+    name: ClassVar[str] = "helix-disturbances"
+    title: ClassVar[str] = "the Helix with one thing amiss at a time, until it fails (beyond [Vervloet2025])"
+    scenario: ClassVar[str] = "helix_handover"
+
+    def plan(self, quick: bool) -> CampaignPlan:
+        """Return every case at every place; if quick, a part of it."""
+        cases = [c for c in CASES if c.what in _QUICK_CASES] if quick else CASES
+        places = PLACES[:_QUICK_PLACES] if quick else PLACES
+        return CampaignPlan(
+            scenario=self.scenario,
+            points=[{**place, **case.parameters} for case in cases for place in places],
+            seed=16,
+            paired=True,
+            scenes=tuple(PLACES[0]),
+            units={"arm": "TendonArmFast"},
+            experiment=self.name,
+        )
+
+    def claims(self, table: CampaignTable) -> Sequence[Claim]:
+        """Judge whether mild disturbances are borne, and how near the gripper ends."""
+        runs = [row for case, rows in rows_by_case(table, CASES).items() if case.mild for row in rows]
+        taken = [row for row in runs if row["success"]]
+        return [_bears(runs), ends_near("With a mild disturbance", taken)]
+
+    def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
+        """Return success, distance and steps by case, and why handovers failed."""
+        rows = [_row(case, rows) for case, rows in rows_by_case(table, CASES).items() if rows]
+        return [
+            ComparisonTable(
+                title="One thing amiss at a time",
+                header=[
+                    "amiss",
+                    "size",
+                    "success",
+                    "closes at, mm",
+                    "ends at, mm",
+                    "steps",
+                    "failed because",
+                ],
+                rows=rows,
+                note=f"Each at {len(PLACES)} places, with the same seeds. Distances are between gripper and ball "
+                "when the gripper begins to close and at the end, by ground truth, median and in brackets the largest, "
+                "of the handovers that succeeded; steps are control steps until the gripper begins to close.",
+            )
+        ]
+
+    def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002
+        """Draw the final distances by case."""
+        cases = {case: rows for case, rows in rows_by_case(table, CASES).items() if rows}
+        with figure(folder / "disturbances", 1, size=(8.0, 1.2 + 0.24 * len(cases))) as (axes,):
+            for y, rows in enumerate(cases.values()):
+                taken, missed = (distances(rows, success) for success in (True, False))
+                axes.plot(1e3 * taken, np.full(len(taken), y), "o", ms=4, color=COLOURS[0], alpha=0.7)
+                axes.plot(1e3 * missed, np.full(len(missed), y), "x", ms=5, color=COLOURS[1])
+            axes.set_yticks(range(len(cases)), [case.label for case in cases])
+            axes.set(xscale="log", xlabel="gripper to ball at the end (mm)", ylim=(len(cases) - 0.4, -0.6))
+            axes.plot([], [], "o", ms=4, color=COLOURS[0], label="the gripper has the ball")
+            axes.plot([], [], "x", ms=5, color=COLOURS[1], label="it has not")
+            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+        caption = (
+            "Distance of gripper and ball at the end, by ground truth, with one thing amiss at a time: each point is a "
+            f"handover at one of {len(PLACES)} places."
+        )
+        return [Figure("disturbances", caption)]
+
+
+def _row(case: Case, rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    return [
+        case.what,
+        case.size,
+        rate(rows),
+        median_and_most(distances(rows, success=True, metric="closing_distance")),
+        median_and_most(distances(rows, success=True)),
+        median_steps(rows),
+        reasons_of(rows),
+    ]
+
+
+def _bears(runs: Sequence[Mapping[str, Any]]) -> Claim:
+    facts: dict[str, Any] = {
+        "claim": "The Helix bears each mild disturbance",
+        "published": "",
+        "beyond": True,
+    }
+    if not runs:
+        return nothing_measured(**facts, reason="There are no runs.")
+    k, n = sum(bool(row["success"]) for row in runs), len(runs)
+    interval = success_interval(k, n)
+    return Claim(
+        **facts,
+        measured=format_rate(k, n),
+        interval=(interval.low, interval.high),
+        verdict=Verdict.REPRODUCED if k == n else Verdict.NOT_REPRODUCED,
+        reason="Holds if every handover with a mild disturbance succeeds; the interval is Clopper and Pearson's.",
+    )
