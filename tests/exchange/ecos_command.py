@@ -17,7 +17,7 @@ from typing import Any
 
 from drive import STEPS, inputs, parameters, scalars
 from notary import ENTRIES
-from reference import description, variables
+from reference import ARITHMETIC, description, variables
 
 from handover.cosim.blocks.variable import Kind
 from handover.fmus.catalog import UNITS
@@ -56,7 +56,7 @@ class Ecos:
         done = subprocess.run(
             [self.program, "simulate", "--path", path, *sizes, *more],
             cwd=folder,
-            env={**self.environment, "TMPDIR": str(folder)},
+            env={**ARITHMETIC, **self.environment, "TMPDIR": str(folder)},
             capture_output=True,
             text=True,
             timeout=300,

@@ -1,6 +1,7 @@
 """How a unit behaves alone in our own master: what every foreign host must reproduce."""
 
 import functools
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +23,9 @@ from handover.fmus.catalog import UNITS, import_class
 
 TOLERANCE = 1e-12
 """Absolute for values up to 1, relative beyond."""
+
+ARITHMETIC = {name: value for name, value in os.environ.items() if name.startswith("OPENBLAS_")}
+"""What of the environment a host with one of its own must have besides: other kernels of OpenBLAS round otherwise."""
 
 FMI2_UNITS = [n for n in UNITS if n not in ("StereoCamera", "HandoverVision")]
 """FMI 2 knows no pictures."""

@@ -10,7 +10,7 @@ import fmpy
 import numpy as np
 import pytest
 from drive import STEPS, inputs, parameters
-from reference import FMI2_UNITS, Record, References, description, expect_same, variables
+from reference import ARITHMETIC, FMI2_UNITS, Record, References, description, expect_same, variables
 
 from handover.cosim.blocks.variable import Kind, Variable
 from handover.fmus import interpreter
@@ -71,7 +71,7 @@ def run(program: Path, unit: str, fmi: int, folder: Path) -> Record:
             resources.as_uri() if fmi == 2 else f"{resources}/",
             folder / "calls.txt",
         ],
-        env={"PATH": "/nonexistent", "TMPDIR": str(folder)},  # the FMU itself must know its Python
+        env={**ARITHMETIC, "PATH": "/nonexistent", "TMPDIR": str(folder)},  # the FMU itself must know its Python
         capture_output=True,
         text=True,
         timeout=300,
