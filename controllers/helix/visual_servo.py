@@ -248,9 +248,9 @@ class VisualServo:
         elif self._phase in (Phase.APPROACH, Phase.DESCEND):
             if self._lost():
                 self._enter(Phase.RECOVER)
-            elif not self._progress.goes_on(error, tracker.ball.position):
+            elif not self._goes_on(error):
                 self._give_up(self._why_stuck())
-        elif self._phase is Phase.CARRY and not self._progress.goes_on(error, tracker.ball.position):
+        elif self._phase is Phase.CARRY and not self._goes_on(error):
             self._give_up(Verdict.LOST_RING if self._lost() is Verdict.LOST_RING else self._why_stuck())
         elif self._phase is Phase.RECOVER:
             self._searched += 1
@@ -260,6 +260,14 @@ class VisualServo:
     def _hides_ring(self, t: float) -> bool:
         """Return whether a ball is offered, but in front of a ring that has not been seen yet."""
         return self._tracker.ball.seen and 0.0 < self.params.lost_after <= t and not self._tracker.wrist.seen
+
+    def _goes_on(self, error: float) -> bool:
+        levels = self._phase is Phase.DESCEND and self.params.standoff > 0.0 and self._excess() > 0.0
+        return self._progress.goes_on(error, self._tracker.ball.position, levels)
+
+    def _excess(self) -> float:
+        """Return by how much the gripper is tilted too much to come down onto the ball, rad."""
+        return self._tilt() - _LEVEL * self.params.threshold_tilt
 
     def _deliver(self, t: float) -> None:
         following = self._delivery.following(self._phase, t - self._t_close, self._error(), self._tilt())
@@ -367,8 +375,8 @@ class VisualServo:
         if self._delivery.p_WG_goal is not None or self._phase is Phase.GRASP:
             return X_goal
         p, tracker = self.params, self._tracker
-        excess = self._tilt() - _LEVEL * p.threshold_tilt
-        p_WG = next_place(tracker.p_WG, tracker.ball.position, (_W_FROM_B * X_goal)[3:], p.standoff, excess)
+        p_WG_goal = (_W_FROM_B * X_goal)[3:]
+        p_WG = next_place(tracker.p_WG, tracker.ball.position, p_WG_goal, p.standoff, self._excess())
         return _W_FROM_B * np.concatenate([p_WG + p.d_gripper * _UP, p_WG])
 
     def _error(self) -> float:
