@@ -7,17 +7,21 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 
 _CENTRED = 0.018
-"""How far beside the ball's middle the open fingers come down without a touch, m."""
+"""How far beside the ball's middle open fingers come down without a touch, m: where they pass it they are 4.6 cm from
+their axis, and its radius is 2.5 cm."""
 _OVER = 0.05
-"""How high over the ball's middle open fingers pass over it, m."""
+"""How high over the ball's middle the gripper passes over it, m, as d_grasp_offset: open fingers end 0.8 cm lower."""
 _FUNNEL = 3.0
-"""How much higher, m, the gripper is led for each metre that it is farther beside than that, up to there."""
+"""How much higher, m, the gripper is led for each metre that it is farther beside than _CENTRED, up to _OVER (own
+choice)."""
 _LOW, _BESIDE = 0.03, 0.03
-"""Height over the ball's middle, m, below which a gripper that is farther beside than this goes around the ball."""
+"""Height over the ball's middle, m, below which a gripper that is farther beside than this goes around the ball: its
+fingers are lower than the ball's top."""
 _LOW_FUNNEL = 2.0
-"""How much that height grows for each metre beside; the funnel lies above it, so the gripper does not turn back."""
+"""How much that height grows for each metre beside; the funnel lies above it, so the gripper does not turn back (own
+choice)."""
 _TILTED = 0.2
-"""How much higher, m, a gripper stays over the ball for each rad that it is tilted too much."""
+"""How much higher, m, a gripper stays over the ball for each rad that it is tilted too much (own choice)."""
 
 
 def next_place(p_WG: Floats, p_WO: Floats, p_WG_goal: Floats, standoff: float, excess: float) -> Floats:
@@ -43,4 +47,5 @@ def next_place(p_WG: Floats, p_WO: Floats, p_WG_goal: Floats, standoff: float, e
     z = max(p_WG_goal[2], least)
     if height >= min(_LOW, _LOW_FUNNEL * (beside - _BESIDE)):
         return np.array([p_WG_goal[0], p_WG_goal[1], z])
-    return np.array([*(p_WO[:2] + standoff / beside * aside), z])
+    direction = aside / beside if beside > 0.0 else np.array([1.0, 0.0])
+    return np.array([*(p_WO[:2] + standoff * direction), z])

@@ -114,8 +114,6 @@ def corner_shift(seen: Sequence[Markers], ring_fit: RingFit) -> tuple[float, flo
             return None
         near = pose.p_WR, pose.R_WR
         e, J = ring_fit.misfit(moved, *near)
-        if len(e) != len(by_shift):
-            return None
         dx, information = least_squares(np.column_stack([J, -by_shift]), e)
         s, known = s + float(dx[6]), 1.0 / float(np.linalg.inv(information)[6, 6])
     return s, known

@@ -33,13 +33,9 @@ class Recovery:
         self._searched = 0
 
     def keep(self, q_sys: Floats) -> None:
-        """Keep a command with which ring and ball were seen."""
+        """Keep a command that was given while the ring was seen."""
         self._commands = [*self._commands[1 - _LAST :], q_sys]
         self._searched = 0
-
-    def clear(self) -> None:
-        """Forget the commands: others led on from there."""
-        self._commands, self._searched = [], 0
 
     def next(self, q_sys: Floats) -> Floats:
         """Return the command after q_sys, both of shape (9,)."""

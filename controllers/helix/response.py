@@ -23,6 +23,7 @@ class Response:
         self._made: Floats = np.zeros(3)
         self._due: Floats = np.zeros(3)
         self._p_WG: Floats | None = None
+        self._t = 0.0  # of that position
         self.part = 1.0
         """Part of the commanded motion that is made, along its direction: from `least` to 1."""
 
@@ -30,8 +31,10 @@ class Response:
         """Note a commanded motion of the gripper, shape (3,), m."""
         self._due = self._due + motion
 
-    def observe(self, p_WG: Floats, dt: float) -> None:
-        """Note where the gripper is, shape (3,), m, a control period of dt seconds after the last time."""
+    def observe(self, p_WG: Floats, t: float) -> None:
+        """Note where the gripper is, shape (3,), m, at a time, s, later than the last one."""
+        dt = math.inf if self._p_WG is None else t - self._t
+        self._t = t
         fade = math.exp(-dt / self._memory)
         come = self._due * (1.0 - math.exp(-dt / self._delay))
         self._due = self._due - come
@@ -45,11 +48,11 @@ class Response:
 
     def get_state(self) -> tuple[Any, ...]:
         """Return the complete state."""
-        return self._commanded, self._made, self._due, self._p_WG, self.part
+        return self._commanded, self._made, self._due, self._p_WG, self._t, self.part
 
     def set_state(self, state: tuple[Any, ...]) -> None:
         """Restore what `get_state` gave."""
-        self._commanded, self._made, self._due, self._p_WG, self.part = state
+        self._commanded, self._made, self._due, self._p_WG, self._t, self.part = state
 
 
 _LEAST_MOTION = 0.0015

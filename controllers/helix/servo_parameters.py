@@ -148,7 +148,7 @@ class Params:
     )
     windup: Metre = parameter(
         0.7,
-        "largest distance of the commanded state's gripper from the estimated one's; 0: any (own; thesis: 0)",
+        "largest distance of the commanded state's gripper from the measured one; 0: any (own; thesis: 0)",
         minimum=0.0,
     )
     follow_until: Number = parameter(

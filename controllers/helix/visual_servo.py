@@ -29,8 +29,8 @@ _W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])  # R_WB = diag(1, -1, -
 _UP = np.array([0.0, 0.0, 1.0])
 _SAME_TIME = 1e-9  # s; rounding of a time that a host adds up from steps
 _REACH_TOLERANCE = 0.003  # m; of the model, beyond which a goal is out of its reach
-_RESPONSE_MEMORY = 1.5  # s
-_LARGEST_STEP = 0.8
+_RESPONSE_MEMORY = 1.5  # s; one swing of the arm and a half (own choice)
+_LARGEST_STEP, _HALF_STEP_ERROR = 0.8, 0.08  # of the way; m, at which a growing step is half of that (own choices)
 _AT_LIMIT = 1e-6  # rad, m
 _LEVEL = 0.9  # of the tilt with which the gripper closes, with which it comes down onto the ball
 
@@ -57,7 +57,9 @@ class Outputs:
     closure: Number = output("gripper command: 0 open, 1 closed", minimum=0.0, maximum=1.0)
     phase: Phase = output("what the arm is doing")
     q_est: Vector9[Number] = output("state that explains the measured pose: Dx, Dy (rad), l (m) of each segment")
-    q_sys: Vector9[Number] = output("state that is commanded: Dx, Dy (rad), l (m) of each segment")
+    q_sys: Vector9[Number] = output(
+        "state that is commanded, before it is averaged over shaping_time: Dx, Dy (rad), l (m) of each segment"
+    )
     error: Metre = output(
         "distance of the gripper from its goal, or norm over wrist and gripper; of no meaning in WAIT"
     )
@@ -79,12 +81,12 @@ class VisualServo:
     The error is the distance of the gripper from its goal (judge_apart), or the norm |X_goal - X_meas| over all six
     coordinates, in m, where the source prints its square and compares it with metres.
 
-    Own additions: see `Params`. The command is held while the ring is not seen, since there is no feedback; after
-    lost_after without ring or ball, RECOVER goes back and searches (or, with a ball but no ring from the start, just
-    that). An error above threshold_retreat in DESCEND (the
-    ball was moved), or above threshold_reopen while the gripper closes, leads back to APPROACH. An error that makes no
-    progress leads to GIVEN_UP, which does not close; `verdict` says why: OUT_OF_REACH if no state within the limits
-    brings the model's gripper to its goal, else LIMITS if the command is at one or at windup, else NO_PROGRESS.
+    Own additions: see `Params`. The command is held while the ring is not seen, since there is no feedback. Without
+    ring or ball for lost_after the phase is RECOVER: back along the last commands, then a search; a ball without a ring
+    from the start leads there, too. An error above threshold_retreat in DESCEND (the ball was moved), or above
+    threshold_reopen while the gripper closes, leads back to APPROACH. An error that makes no progress leads to
+    GIVEN_UP, which does not close; `verdict` says why: OUT_OF_REACH if no state within the limits brings the model's
+    gripper to its goal, else LIMITS if the command is at one or at windup, else NO_PROGRESS.
 
     With `delivers`, HOLD is followed by CARRY and DROP: see `Delivery`.
 
@@ -112,7 +114,7 @@ class VisualServo:
         self._q_est: Floats = self._q_calib
         self._tracker = Tracker(p)
         self._recovery = Recovery(self._q_calib)
-        self._response = Response(_RESPONSE_MEMORY, 2.0 * p.response_time, p.least_response)
+        self._response = Response(_RESPONSE_MEMORY, p.response_time, p.least_response)
         self._shaper = Shaper(p.shaping_time, self._q_calib)
         self._delivery = Delivery(p)
         self._rng = np.random.default_rng(p.seed)
@@ -155,7 +157,7 @@ class VisualServo:
         sees = self._sees_ring(u)
         if sees:
             self._estimate()
-            self._response.observe(self._tracker.p_WG, self.params.control_period)
+            self._response.observe(self._tracker.p_WG, t)
         self._decide(t)
         if self._phase is Phase.RECOVER:
             self._q_sys = self._recovery.next(self._q_sys)
@@ -226,7 +228,7 @@ class VisualServo:
         p, error, tracker = self.params, self._error(), self._tracker
         if self._phase is Phase.WAIT and tracker.ball.seen and tracker.wrist.seen:
             self._enter(Phase.APPROACH)
-        elif self._phase is Phase.WAIT and self._hides_ring(t):
+        elif self._phase is Phase.WAIT and tracker.ball.seen and 0.0 < p.lost_after <= t:  # it may hide the ring
             self._enter(Phase.RECOVER)
         elif self._phase is Phase.APPROACH and error < p.threshold:
             self._enter(Phase.DESCEND)
@@ -257,11 +259,8 @@ class VisualServo:
             if self._searched > p.search_steps and (lost := self._lost()):
                 self._give_up(lost)
 
-    def _hides_ring(self, t: float) -> bool:
-        """Return whether a ball is offered, but in front of a ring that has not been seen yet."""
-        return self._tracker.ball.seen and 0.0 < self.params.lost_after <= t and not self._tracker.wrist.seen
-
     def _goes_on(self, error: float) -> bool:
+        """Return whether the arm still makes progress."""
         levels = self._phase is Phase.DESCEND and self.params.standoff > 0.0 and self._excess() > 0.0
         return self._progress.goes_on(error, self._tracker.ball.position, levels)
 
@@ -301,7 +300,8 @@ class VisualServo:
 
     def _move(self) -> None:
         p, error, X_meas = self.params, self._error(), self._X_meas()
-        alpha = min(0.8, max(p.alpha, 0.8 * error / (error + 0.08))) if p.adaptive_step else p.alpha
+        growing = _LARGEST_STEP * error / (error + _HALF_STEP_ERROR)
+        alpha = min(_LARGEST_STEP, max(p.alpha, growing)) if p.adaptive_step else p.alpha
         alpha = min(alpha / self._response.part, max(alpha, _LARGEST_STEP))
         commanded = control_step(
             self._q_sys,
@@ -317,7 +317,6 @@ class VisualServo:
             dq_0=self._towards_posture() if p.posture > 0.0 else None,
         )
         dq = self._without_windup(commanded.q_sys) - self._q_sys
-        self._response.command(self._motion(dq)[3:])
         if p.lost_after > 0.0:
             self._recovery.keep(self._q_sys)
         self._q_sys = self._q_sys + dq
@@ -326,8 +325,12 @@ class VisualServo:
         """Average the command, and expect the arm to move as the average does."""
         before = self._shaper.q
         self._shaper.advance(t, self._q_sys)
-        if self.params.predict_motion and not np.array_equal(before, self._shaper.q):
-            moved = self._response.part * self._motion(self._shaper.q - before)
+        if np.array_equal(before, self._shaper.q):
+            return
+        motion = self._motion(self._shaper.q - before)
+        self._response.command(motion[3:])
+        if self.params.predict_motion:
+            moved = self._response.part * motion
             self._tracker.expect(np.concatenate([moved[:3], moved[3:] - moved[:3]]))
 
     def _motion(self, dq: Floats) -> Floats:
@@ -388,7 +391,7 @@ class VisualServo:
         return math.atan2(math.hypot(d[0], d[1]), -d[2])
 
     def _enter(self, phase: Phase) -> None:
-        self._phase = phase
+        self._phase, self._searched = phase, 0
         self._progress.restart(self._tracker.ball.position)
 
     def _give_up(self, verdict: Verdict) -> None:

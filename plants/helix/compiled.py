@@ -64,7 +64,7 @@ def compiled_once(*sources: str) -> Callable[[Callable[P, T]], Callable[P, T]]:
     one goes by what the sources are. Where it cannot be written, each process compiles for itself.
 
     Args:
-        sources: names of all modules of which the function calls compiled ones.
+        sources: names of all modules whose compiled functions or constants the function uses.
     """
 
     def decorate(function: Callable[P, T]) -> Callable[P, T]:

@@ -91,7 +91,7 @@ def _measured(camera: Pinhole, signals: Signals) -> Iterator[Mark]:
 
 def _estimated(camera: Pinhole, signals: Signals) -> Iterator[Mark]:
     given = [name for name in _SHAPES if f"servo.{name}_est" in signals]
-    if not given or not np.any(signals[f"servo.{given[-1]}_est"]):  # the controller has seen nothing yet
+    if phase_of(signals) == "WAIT":  # the controller has not seen both yet
         return
     for name in given:
         yield from _mark(camera, name, signals[f"servo.{name}_est"], "as the controller has it", ESTIMATED)
@@ -239,7 +239,11 @@ class HandoverEvaluator(Evaluator):
 
     @property
     def over(self) -> bool:
-        """Whether the ball changed hands, the gripper closed beside it, or the controller gave up."""
+        """Whether the handover is decided.
+
+        The gripper has kept the ball for a while, the ball fell or stays in the hand, the arm pressed too hard, the
+        controller gave up, or time is over.
+        """
         if self._phase == "GIVEN_UP" or self._t >= self._deadline:
             return True
         if self._released_at is not None:

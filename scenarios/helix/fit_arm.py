@@ -49,7 +49,7 @@ _MAX_STEPS = 200
 _TAUT = 1.0
 """Tension of the slackest tendon, N, on average over the places, that counts as much as a resolution of the lengths."""
 _FAILED = 1.0
-"""Length, m, that stands for those of an arm that cannot be built or never comes to the ball."""
+"""Length, m, that stands for those of an arm that cannot be built; one that never comes to the ball has its last."""
 
 
 class Approach(NamedTuple):

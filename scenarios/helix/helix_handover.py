@@ -3,6 +3,7 @@
 The thesis's own results for such a handover are those of table 1 and sec. 5.2 (`published_values`).
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from fractions import Fraction
@@ -165,7 +166,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
 
     def stop_time(self, parameters: Parameters) -> Fraction:
         """Return the end of the patience for the approach, plus time for closing the gripper."""
-        return Fraction(round(parameters.patience)) + 15
+        return Fraction(math.ceil(parameters.patience)) + 15
 
     def evaluator(self, parameters: Parameters) -> HandoverEvaluator:
         """Return the evaluator of one handover."""

@@ -3,6 +3,7 @@
 What this reaches, no picture keeps it from. [Vervloet2025] sec. 5.4.1 names the workspace as what limits a handover.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -112,7 +113,7 @@ class HelixReach(Experiment[ReachEvaluator]):
             **paper_values("helix", "own"),
         )
         arm = s.add("arm", fmu("arm"))
-        hand = s.add("hand", fmu("hand"), p_WO_0=parameters.p_WO, tremor_rms=0.0, drift_rms=0.0)
+        hand = s.add("hand", fmu("hand"), p_WO_0=parameters.p_WO, room=0.0, tremor_rms=0.0, drift_rms=0.0)
         s.connect(hand.y.p_WO, servo.u.p_WO_meas)
         s.connect(arm.y.p_WR, servo.u.p_WR_meas)
         s.connect(arm.y.p_WG, servo.u.p_WG_meas)
@@ -121,7 +122,7 @@ class HelixReach(Experiment[ReachEvaluator]):
 
     def stop_time(self, parameters: ReachParameters) -> Fraction:
         """Return the end of the patience."""
-        return Fraction(round(parameters.patience))
+        return Fraction(math.ceil(parameters.patience))
 
     def evaluator(self, parameters: ReachParameters) -> ReachEvaluator:
         """Return the evaluator of one place."""
@@ -134,7 +135,7 @@ class HelixReach(Experiment[ReachEvaluator]):
         return replay_handover(record)
 
     def time_figures(self, parameters: ReachParameters, record: Record) -> list[TimeFigure]:  # noqa: ARG002
-        """Return distance and tilt of the gripper over time."""
+        """Return the gripper's distance over time."""
         apart = 1e3 * np.linalg.norm(record["arm.p_WG"] - record["hand.p_WO"], axis=1)
         phases = phases_of(record, "servo.phase") if "servo.phase" in record else ()
         distance = TimePlot(

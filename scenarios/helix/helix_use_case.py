@@ -144,7 +144,7 @@ class HelixUseCase(HelixHandover):
     def stop_time(self, parameters: Any) -> Fraction:
         """Return the end of the patience for the approach and for the carrying, plus time for closing and falling."""
         p: UseCaseParameters = parameters
-        return super().stop_time(p) + Fraction(round(p.carry_patience)) + _END
+        return super().stop_time(p) + Fraction(math.ceil(p.carry_patience)) + _END
 
     def evaluator(self, parameters: Any) -> UseCaseEvaluator:
         """Return the evaluator of one use case."""

@@ -48,7 +48,7 @@ class Filters(enum.IntEnum):
 
 
 class StepRule(enum.IntEnum):
-    """How large a control step is. [Vervloet2025] sec. 5.4.2."""
+    """How large a control step is. [Vervloet2025] sec. 5.4.4."""
 
     CONSTANT = 0
     BY_ERROR = 1

@@ -92,14 +92,15 @@ class UseCaseEvaluator(HandoverEvaluator):
     def outcome(self) -> Outcome:
         """Return whether the ball is in the bowl, why, and the metrics."""
         handover = super().outcome()
-        success = self.is_in_bowl and self._rests
+        success = self.is_in_bowl and self._rests and not self._is_pressed
         metrics = dict(handover.metrics)
         if self._released_at is not None:
             metrics.pop("final_distance", None)  # of a gripper that has let go, it tells nothing
         if self._released_at is not None and self._fell_at is not None:
             carried = self._fell_at - self._released_at
             metrics["carry_time"] = Metric(carried, "s", "from when the hand lets go until the gripper does")
-            metrics["task_time"] = Metric(self._moved_at, "s", "from the start until the ball rests")
+            if self._rests:
+                metrics["task_time"] = Metric(self._moved_at, "s", "from the start until the ball rests")
         if self._crossed is not None:
             metrics["drop_offset"] = Metric(
                 _length(self._crossed), "m", "ball beside the bowl's middle as it falls past the rim, ground truth"
@@ -114,6 +115,8 @@ class UseCaseEvaluator(HandoverEvaluator):
     def _failure(self, handover: Outcome) -> str:
         if self._released_at is None:
             return f"no handover: {handover.reason}"
+        if self._is_pressed:
+            return handover.reason
         if self._fell_at is None:
             return self._why_not_dropped()
         beside = _length((self._p_WO_fell - self._p_WB)[:2])

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.plants.helix import compiled as kernels  # a module: see `polygon_filling`
+from handover.plants.helix.cameras import polygon_filling
 from handover.plants.helix.cameras.polygon_filling import SHIFT, Polygons
 
 _ONE = 1 << 16  # OpenCV's fixed point, in which lines and edges are followed
@@ -157,7 +158,7 @@ def _fill_rows(
         x_b += dx_b
 
 
-@kernels.compiled_once(__name__)
+@kernels.compiled_once(__name__, polygon_filling.__name__)
 def _fill(
     canvas: NDArray[np.uint8],
     corners: NDArray[np.int32],

@@ -128,7 +128,8 @@ def _depth_in_hand(p: Vector, radius: float, bottom: Vector, c: ContactNumbers) 
     to_middle = subtract(add(bottom, (0.0, 0.0, c.cup_radius)), p)
     distance = math.sqrt(dot(to_middle, to_middle))
     if distance > 0.0 and to_middle[2] >= c.cup_cosine * distance:
-        return distance + radius - c.cup_radius, scale(1.0 / distance, to_middle)
+        depth = distance + radius - c.cup_radius
+        return (depth if depth < radius + _DEEPEST else -1.0), scale(1.0 / distance, to_middle)
     beside = math.hypot(to_middle[0], to_middle[1])
     rim = bottom[2] + c.cup_radius * (1.0 - c.cup_cosine)
     depth = rim + radius - p[2]

@@ -251,9 +251,10 @@ def _at_all_steps(
     every = [run for runs in curves.values() for run in runs]
     if not every:
         return too_few(facts, "no run has a record")
-    so = [np.asarray(is_so(run))[~np.isnan(run.pose_sys)] for run in every]
-    k, n = int(sum(x.sum() for x in so)), sum(map(len, so))
-    failing = np.concatenate([np.flatnonzero(~x) for x in so])
+    known = [~np.isnan(run.pose_sys) for run in every]
+    so = [np.asarray(is_so(run), dtype=bool) for run in every]
+    k, n = sum(int((x & y).sum()) for x, y in zip(so, known, strict=True)), sum(int(y.sum()) for y in known)
+    failing = np.concatenate([np.flatnonzero(~x & y) for x, y in zip(so, known, strict=True)])
     where = ""
     if k < n:
         where = f" It is not so at {n - k} steps, the last of which is number {failing.max() + 1} of its run."

@@ -129,8 +129,8 @@ def spread_table(table: CampaignTable) -> list[ComparisonTable]:
             ],
             rows=[first, *(_row(case, rows) for case, rows in found.items())],
             note="One thing amiss at a time, with the thesis's settings at its four places. p: of Welch's test that "
-            "the mean, and of the F test that the standard deviation is the published one, both of eight runs; small "
-            "where it cannot be. The F test takes times as normally distributed.",
+            "the mean, and of the F test that the standard deviation is the published one, of the published "
+            "eight runs and ours; small where it cannot be. The F test takes times as normally distributed.",
         )
     ]
 

@@ -71,8 +71,8 @@ class Helix3(PublishedExperiment):
 
     The thesis states the step size and the number of runs; ours are at the scenario's own step size and period. That
     the hand was at the places of the first experiment, where the bowl stood and how large it was, and that the error
-    at which the gripper opens is that at which it closes, is assumed. The quick
-    plan is a run with either settings at one place.
+    at which the gripper opens is that at which it closes, is assumed. The quick plan is a run with either settings at
+    one place.
     """
 
     name: ClassVar[str] = "helix-3"
@@ -128,10 +128,11 @@ class Helix3(PublishedExperiment):
             "beside the bowl's middle, mm",
             "failed because",
         ]
+        radius = 1e3 * paper_values("helix", "use_case")["bowl_radius"]
         note = (
             "Medians; in brackets: 95 % interval by bootstrap. Beside the bowl's middle: the ball as it falls past the "
-            "rim, by ground truth; the rim's radius is 80 mm. Hand to bowl: from when the hand lets go until the "
-            "gripper does, which takes 5 s of opening. The thesis gives no times; our settings are at their own period."
+            f"rim, by ground truth; the rim's radius is {radius:.0f} mm. Hand to bowl: from when the hand lets go "
+            "until the gripper does, opening included. The thesis gives no times; our settings are at their own period."
         )
         return [ComparisonTable(title="Use case, fig. 13", header=header, rows=rows, note=note)]
 

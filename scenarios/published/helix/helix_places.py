@@ -85,7 +85,8 @@ class HelixPlaces(PublishedExperiment):
                 of_it = [row for row in rows if row["success"] is success]
                 r, z = (np.array([row[name] for row in of_it], dtype=np.float64) for name in ("radius", "height"))
                 over.plot(r, z, mark, ms=4, color=COLOURS[0 if success else 1], alpha=0.8, label=label)
-            heights = np.linspace(-0.72, -0.48, 50)
+            known = paper_values("helix", "reach")["height"]
+            heights = np.linspace(min(known), max(h for h in known if reach(h) > 0.0), 50)
             over.plot([reach(h) for h in heights], heights, color="0.5", lw=1, label="reach")
             over.set(xlabel="distance from the arm's axis (m)", ylabel="height in W (m)", xlim=(0.0, None))
             over.legend(loc="upper left", bbox_to_anchor=(0.0, 1.12), ncols=3)

@@ -16,7 +16,7 @@ from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.helix.cameras import calibrated, camera_of, camera_parameters
 from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.helix_handover import HelixHandover
-from handover.scenarios.helix.parameters import Filters, Parameters, StepRule, Tuning
+from handover.scenarios.helix.parameters import BoundRule, Filters, Parameters, StepRule, Tuning, WeightRule
 
 
 def built(seed: int = 3, **given: Any) -> System:
@@ -59,6 +59,12 @@ SET_ON: list[tuple[dict[str, Any], set[str]]] = [
     ({"click_noise": 2.0}, {f"vision.{what}_WC_{side}" for what in "pq" for side in ("left", "right")}),
     ({"step_rule": StepRule.BY_ERROR}, {"servo.adaptive_step"}),
     ({"decimation": 15}, {"camera.decimation", "vision.decimation"}),
+    ({"ball_mass": 0.04}, {"hand.ball_mass"}),
+    ({"finger_friction": 0.4}, {"hand.finger_friction"}),
+    ({"hand_force_max": 8.0}, {"hand.force_max"}),
+    ({"help_speed": 0.05}, {"hand.help_speed"}),
+    ({"bound_rule": BoundRule.BY_COVARIANCE}, {"servo.bound_by_covariance"}),
+    ({"weight_rule": WeightRule.BY_STATE}, {"servo.weight_fall"}),
 ]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from chosen_curves import PERIOD, curves_as
+from chosen_curves import PERIOD
 
 from handover.controllers.helix.constant_curvature import forward_kinematics
 from handover.controllers.helix.visual_servo import Phase
@@ -88,8 +88,3 @@ def test_a_mean_is_of_the_runs_still_under_way_and_as_long_as_their_median():
 def test_steps_before_anything_is_seen_have_no_mean():
     curve = mean_curve([np.array([np.nan, 2.0]), np.array([np.nan, 4.0])], 1.0)
     assert curve.time.tolist() == [1.0]
-
-
-def test_curves_that_a_test_makes_are_whole():
-    run = curves_as(error=np.array([0.2, 0.1]))
-    assert len(run.way_meas) == len(run.pose_est) == 2
