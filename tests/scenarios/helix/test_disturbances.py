@@ -34,7 +34,7 @@ def start(system: System) -> dict[str, Any]:
 
 def changed(a: System, b: System) -> set[str]:
     before, after = start(a), start(b)
-    return {name for name in before.keys() | after.keys() if not np.array_equal(before[name], after[name])}
+    return {name for name in before.keys() | after.keys() if not np.array_equal(before.get(name), after.get(name))}
 
 
 SET_ON: list[tuple[dict[str, Any], set[str]]] = [
