@@ -247,7 +247,7 @@ class Master:
 
     def _check_can_run(self, stop: Fraction) -> None:
         if self._is_left:
-            raise RuntimeError("the units are freed: run inside of `with Master(system) as master:`")
+            raise RuntimeError("the units are freed: step inside of the `with` block that holds them")
         if self.ended is not None:
             raise RuntimeError(f"{self.ended.summary}: make another master to simulate again")
         for name, instance in self.ensemble.instances.items():

@@ -176,6 +176,7 @@ class HandoverEvaluator(Evaluator):
         self._p_WG: Floats = np.zeros(3)
         self._p_WO: Floats = np.zeros(3)
         self._p_GO: Floats = np.zeros(3)
+        self._p_GO_closed: Floats = np.zeros(3)  # when the gripper was closed, the first time
         self._offset: Floats | None = None  # p_GO when the hand let go
         self._mismatch: ModelMismatch | None = None  # when the gripper began to close
         self._error = 0.0
@@ -208,6 +209,8 @@ class HandoverEvaluator(Evaluator):
             self._mismatch = model_mismatch(signals["servo.q_sys"], signals["servo.p_WG_est"]) if compares else None
         if self._is_first_covered(t):
             self._keep(_COVERED, signals)
+        if phase == "HOLD" and phase not in self.phases:
+            self._p_GO_closed = self._p_GO
         self.phases.setdefault(phase, t)
         if holder == "GRIPPER" and self._released_at is None:
             self._released_at, self._offset = t, self._p_GO
@@ -322,10 +325,10 @@ class HandoverEvaluator(Evaluator):
         if self._holder == "FREE":
             return f"the ball was pushed out of the hand at {self._t:.1f} s; {where}"
         if "HOLD" in self.phases:
-            lateral, axial = _beside_and_along(self._p_GO)
+            lateral, axial = _beside_and_along(self._p_GO_closed)
             return (
                 f"the gripper closed with the ball {lateral:.3f} m beside its axis and {axial:+.3f} m along it, and "
-                "its fingers did not get hold of it; the hand kept the ball"
+                f"its fingers did not keep it; the hand kept the ball, {self.distance:.3f} m away at the end"
             )
         if self._t < self._deadline:
             return f"stopped at {self._t:.1f} s in phase {self._phase}, before the handover was done"

@@ -92,11 +92,11 @@ class UseCaseEvaluator(HandoverEvaluator):
     def outcome(self) -> Outcome:
         """Return whether the ball is in the bowl, why, and the metrics."""
         handover = super().outcome()
-        success = self.is_in_bowl and self._rests and not self._is_pressed
+        success = self.is_in_bowl and self._rests and not self._is_pressed and not self._is_lost
         metrics = dict(handover.metrics)
         if self._released_at is not None:
             metrics.pop("final_distance", None)  # of a gripper that has let go, it tells nothing
-        if self._released_at is not None and self._fell_at is not None:
+        if self._released_at is not None and self._fell_at is not None and not self._is_lost:
             carried = self._fell_at - self._released_at
             metrics["carry_time"] = Metric(carried, "s", "from when the hand lets go until the gripper does")
             if self._rests:

@@ -71,8 +71,8 @@ def notes_on_place(p_WO: Floats, places: CameraPlaces = CameraPlaces.BEHIND) -> 
     notes: list[str] = []
     far = reach(height)
     if far == 0.0 or r > far:
-        where = f"only {far:.2f} m far in every direction there" if far > 0.0 else "to no place of that height"
-        notes.append(f"{place}, but the arm reaches {where}")
+        where = f"is sure to reach {far:.2f} m far there" if far > 0.0 else "is not known to reach that height"
+        notes.append(f"{place}, but the arm {where}, whatever the direction")
     seeing = cameras_that_see(p_WO, places)
     if seeing < len(SIDES):
         notes.append(f"{place}, where {('no camera sees', 'one camera alone sees')[seeing]} ball and markers whole")

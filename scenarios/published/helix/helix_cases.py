@@ -129,8 +129,8 @@ def _reason(reason: str) -> str:
 
 _SHORT = {
     "the arm pressed on the hand": "pressed on the hand",
+    "the hand kept the ball": "closed beside the ball",
     "did not keep it": "lost the ball again",
     "was pushed out of the hand": "pushed the ball out of the hand",
-    "did not get hold of it": "closed beside the ball",
     "did not see both ball and arm": "ball and arm not seen",
 }

@@ -56,9 +56,9 @@ def _changes(
 
 
 CHANGES = (
-    *_changes("the thesis's", _THESIS, [_STEP, _FILTERS, _WEIGHTS, _TOP, _SIDE]),
-    *_changes("the thesis's with covariances", {**_THESIS, "filters": "own"}, [_BOUND]),
-    *_changes("ours", {}, [_STEP, _BOUND, _WEIGHTS, _TOP, _SIDE]),
+    *_changes("the thesis's settings", _THESIS, [_STEP, _FILTERS, _WEIGHTS, _TOP, _SIDE]),
+    *_changes("the thesis's settings and covariances", {**_THESIS, "filters": "own"}, [_BOUND]),
+    *_changes("our settings", {}, [_STEP, _BOUND, _WEIGHTS, _TOP, _SIDE]),
 )
 
 
@@ -103,8 +103,9 @@ class HelixImprovements(PublishedExperiment):
         """Return success, distance and steps with each change beside those without it."""
         header = ["settings", "change", "sec.", "success", "closes at, mm", "p", "control steps", "failed because"]
         cells = [_row(x, *runs_of) for x, runs_of in _runs(table).items() if runs_of[1]]
+        places = max((len(before) for before, _ in _runs(table).values()), default=0)
         note = (
-            f"Without and with the change, at {len(_ALL_PLACES)} places with the same seeds. Distance of gripper and "
+            f"Without and with the change, at {places} places with the same seeds. Distance of gripper and "
             "ball, by ground truth, when the gripper begins to close, and control steps until then: medians over the "
             "places at which both did. p is that of Wilcoxon's signed-rank test of the distances."
         )
@@ -173,10 +174,12 @@ def _row(change: Change, before: Sequence[Mapping[str, Any]], after: Sequence[Ma
 
 def _closes_nearer(change: Change, before: Sequence[Mapping[str, Any]], after: Sequence[Mapping[str, Any]]) -> Claim:
     facts: dict[str, Any] = {
-        "claim": f"With {change.settings} settings, the gripper closes nearer to the ball: {change.what}",
+        "claim": f"With {change.settings}, the gripper closes nearer to the ball: {change.what}",
         "published": "suggested",
         "where": f"sec. {change.section}",
     }
+    if not (before and after):
+        return nothing_measured(**facts, reason="It was not tried.")
     d = pairs(before, after, "closing_distance")
     if not len(d):
         return nothing_measured(**facts, reason="At no place did the gripper close both without and with it.")

@@ -34,7 +34,8 @@ def start(system: System) -> dict[str, Any]:
 
 def changed(a: System, b: System) -> set[str]:
     before, after = start(a), start(b)
-    return {name for name in before.keys() | after.keys() if not np.array_equal(before.get(name), after.get(name))}
+    same = {name for name in before if name in after and np.array_equal(before[name], after[name])}
+    return (before.keys() | after.keys()) - same
 
 
 SET_ON: list[tuple[dict[str, Any], set[str]]] = [

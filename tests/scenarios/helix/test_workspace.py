@@ -42,17 +42,17 @@ def test_places_within_the_workspace_have_no_notes():
 def test_a_place_beyond_it_is_noted_with_how_far_the_arm_reaches():
     (note,) = notes_on_place(np.array([0.0, 0.3, -0.6]))
     assert note == (
-        "the ball is offered 0.30 m from the arm's axis at a height of -0.60 m, but the arm reaches only "
-        f"{reach(-0.6):.2f} m far in every direction there"
+        "the ball is offered 0.30 m from the arm's axis at a height of -0.60 m, but the arm is sure to reach "
+        f"{reach(-0.6):.2f} m far there, whatever the direction"
     )
     high, unseen = notes_on_place(np.array([0.0, 0.0, -0.05]))
-    assert high.endswith("but the arm reaches to no place of that height")
+    assert high.endswith("but the arm is not known to reach that height, whatever the direction")
     assert unseen.endswith("where no camera sees ball and markers whole")
 
 
 def test_the_scenario_passes_the_notes_on():
     system = HelixHandover().build(Parameters(radius=0.3), 0, lambda name: cached(HelixHandover.units[name], 3))
-    assert any("but the arm reaches only" in note for note in system.notes)
+    assert any("but the arm is sure to reach" in note for note in system.notes)
     assert not HelixHandover().build(Parameters(), 0, lambda name: cached(HelixHandover.units[name], 3)).notes
 
 

@@ -55,7 +55,7 @@ def test_a_change_helps_if_the_gripper_closes_nearer_and_no_handover_is_lost(
 def test_rows_are_pairs_without_and_with_the_change():
     (table,) = HelixImprovements().tables(table_of({"side": 0.002}))
     assert len(table.rows) == len(CHANGES)
-    row = next(row for row in table.rows if row[0] == "ours" and "side" in row[1])
+    row = next(row for row in table.rows if row[0] == "our settings" and "side" in row[1])
     assert row[3] == "6 of 6 → 6 of 6"
     before, after = (float(x) for x in row[4].split(" → "))
     assert after < 3.0 < 9.0 < before
