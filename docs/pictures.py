@@ -1,5 +1,7 @@
 """Makes the README's pictures anew, of runs of today: `make pictures`. Needs what the tests need, and chromium.
 
+Those of published experiments take their whole campaigns, half an hour; `python docs/pictures.py NAME...` makes some.
+
 Whoever changes what a figure or the report looks like runs it, looks at the pictures, and commits them.
 """
 
@@ -25,6 +27,11 @@ FIGURES: Mapping[str, tuple[str, str]] = {
     "ir_grasp.png": ("ir_grasp", "scene"),
 }
 """Scenario and figure that a picture shows; the first seed's run, with the scenario's defaults."""
+EXPERIMENTS: Mapping[str, tuple[str, str]] = {
+    "helix_errors.png": ("helix-1", "errors"),
+    "helix_workspace.png": ("helix-workspace", "workspace"),
+}
+"""Published experiment and figure that a picture shows."""
 REPORT = "report.jpg"
 """The report page of `helix_handover`, on a desk and on a phone."""
 
@@ -40,14 +47,26 @@ _EDGE = 24
 
 
 def main() -> None:
-    """Run each scenario once and write the pictures."""
+    """Make the runs and campaigns of the pictures that are asked for, or of all, and write the pictures."""
+    every = {REPORT: ("helix_handover", ""), **FIGURES, **EXPERIMENTS}
+    wanted = sys.argv[1:] or list(every)
+    if unknown := set(wanted) - set(every):
+        sys.exit(f"no picture of the README: {', '.join(sorted(unknown))}; there are {', '.join(every)}")
     with tempfile.TemporaryDirectory(prefix="handover-") as folder:
-        for name, (scenario, figure) in FIGURES.items():
-            run = Path(folder) / scenario
-            command = "from handover.scenarios.cli.command import main; main()"
-            subprocess.run([sys.executable, "-c", command, "run", scenario, "--out", str(run)], check=True)
-            _copy(run / "figures" / f"{figure}.png", DOCS / name)
-        _draw_report(Path(folder) / "helix_handover" / "report.html", DOCS / REPORT)
+        for name in wanted:
+            source, figure = every[name]
+            made = Path(folder) / source
+            if not made.exists():
+                _handover("paper" if name in EXPERIMENTS else "run", source, made)
+            if name == REPORT:
+                _draw_report(made / "report.html", DOCS / REPORT)
+            else:
+                _copy(made / "figures" / f"{figure}.png", DOCS / name)
+
+
+def _handover(command: str, what: str, out: Path) -> None:
+    call = "from handover.scenarios.cli.command import main; main()"
+    subprocess.run([sys.executable, "-c", call, command, what, "--out", str(out)], check=True)
 
 
 def _copy(figure: Path, to: Path) -> None:
