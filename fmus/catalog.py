@@ -5,6 +5,7 @@ by entry points of the group `handover.units`; any other block is named by its p
 """
 
 import functools
+import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -225,7 +226,7 @@ def import_class(path: str) -> type[Any]:
     try:
         module = import_module(module_name)
     except Exception as e:  # a module may raise anything while it is loaded
-        fault = f"its module cannot be loaded: {type(e).__name__}: {one_line(e)}"
+        fault = f"its module cannot be loaded{_line_of(e, module_name)}: {type(e).__name__}: {one_line(e)}"
         if isinstance(e, ModuleNotFoundError) and e.name == module_name:
             fault = f"there is no module {module_name!r}, neither installed nor in {Path.cwd()}"
         elif is_of_a_package(e):
@@ -233,6 +234,16 @@ def import_class(path: str) -> type[Any]:
         raise UnknownBlock(path, fault) from e
     found = getattr(module, name, None)
     if not isinstance(found, type):
-        classes = [n for n, c in vars(module).items() if isinstance(c, type) and c.__module__ == module_name]
+        own = [c for c in vars(module).values() if isinstance(c, type) and c.__module__ == module_name]
+        classes = [c.__name__ for c in own if hasattr(c, "step")] or [c.__name__ for c in own]
         raise UnknownBlock(path, f"module {module_name!r} has no class {name!r}; {nearest(name, classes)}")
     return found
+
+
+def _line_of(e: Exception, module_name: str) -> str:
+    """Return the last line of a module, or of one in its package, that led to a failure, as " (arm.py, line 3)"."""
+    package = module_name.partition(".")[0]
+    for frame, line in reversed(list(traceback.walk_tb(e.__traceback__))):
+        if str(frame.f_globals.get("__name__", "")).partition(".")[0] == package:
+            return f" ({Path(frame.f_code.co_filename).name}, line {line})"
+    return ""

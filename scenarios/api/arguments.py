@@ -77,6 +77,8 @@ def merged(parameters: Mapping[str, Any] | None, named: Mapping[str, Any]) -> di
         InvalidInput: some are given both ways.
     """
     given = parameters or {}
+    if "unit" in named:
+        raise InvalidInput("unit: what takes the place of units is given as units={'servo': 'my_servo:MyServo'}")
     if both := [name for name in named if name in given]:
         raise InvalidInput(f"{', '.join(both)}: given by keyword and in parameters={{...}}; one of both is right")
     return {**given, **named}

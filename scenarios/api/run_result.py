@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
+from handover.cosim.exceptions import nearest
 from handover.cosim.record.reader import Record
 from handover.scenarios.api.arguments import InvalidInput, errors_for_python
 from handover.scenarios.api.pages import Page
@@ -53,6 +54,14 @@ class Quantity(float):
         return display_unit(self.unit, float(self)).text(float(self))
 
     __str__ = __repr__
+
+
+class Metrics(dict[str, Quantity]):
+    """Figures of merit by name; one that is not there is told with the nearest names."""
+
+    def __missing__(self, name: str) -> Quantity:
+        """Raise KeyError."""
+        raise KeyError(f"no metric {name!r}; {nearest(name, self)}")
 
 
 class Run:
@@ -117,15 +126,15 @@ class Run:
         return tuple(self._facts.summary.get("left_out", ()))
 
     @functools.cached_property
-    def metrics(self) -> dict[str, Quantity]:
+    def metrics(self) -> "Metrics":
         """Figures of merit by name, the headline's first, as numbers with `unit` and `description`; maybe NaN."""
         found: Mapping[str, Any] = self._facts.summary["metrics"]
         first = [name for name in self._facts.headline if name in found]
         ordered = {name: found[name] for name in dict.fromkeys([*first, *found])}
-        return {
-            name: Quantity(float("nan") if m["value"] is None else m["value"], m["unit"], m.get("description", ""))
+        return Metrics(
+            (name, Quantity(float("nan") if m["value"] is None else m["value"], m["unit"], m.get("description", "")))
             for name, m in ordered.items()
-        }
+        )
 
     @functools.cached_property
     def signals(self) -> SignalTable:

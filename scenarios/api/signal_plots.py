@@ -8,6 +8,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from handover.cosim.exceptions import nearest
 from handover.scenarios.api.signals import SignalTable
@@ -34,7 +35,7 @@ def plot_signals(signals: SignalTable, names: Sequence[str], axes: Axes | None =
 
     Args:
         signals: of a run.
-        names: which of them.
+        names: which of them, or of their elements, `arm.p_WG[3]`.
         axes: where to draw a single one; by default in a new figure.
 
     Raises:
@@ -43,7 +44,7 @@ def plot_signals(signals: SignalTable, names: Sequence[str], axes: Axes | None =
     """
     if not names:
         raise ValueError("no signal is named: plot('arm.p_WG') draws one")
-    if unknown := [n for n in names if n not in signals]:
+    if unknown := [n for n in names if n not in signals and _element(signals, n) is None]:
         raise KeyError("; ".join(f"no signal {n!r}: {nearest(n, signals)}" for n in unknown))
     if axes is not None and len(names) > 1:
         raise ValueError(f"{len(names)} signals for one pair of axes; one is right")
@@ -65,13 +66,23 @@ def plot_signals(signals: SignalTable, names: Sequence[str], axes: Axes | None =
 
 
 def _draw(axes: Axes, signals: SignalTable, name: str) -> None:
-    values, items = signals[name], signals.item_names(name)
-    elements = list(elements_of(name.rpartition(".")[2], values).items())[: len(COLOURS)]
+    element, whole = _element(signals, name), name if name in signals else name.rpartition("[")[0]
+    values, items = signals[whole], signals.item_names(whole)
+    label = name.rpartition(".")[2]
+    elements = list(elements_of(label, values).items())[: len(COLOURS)] if element is None else [(label, element)]
     held = values.dtype.kind != "f"
     curves = [Curve(label=label, values=column.astype(np.float64), held=held) for label, column in elements]
-    plot = TimePlot(title=name, quantity=name, unit=unit_symbol(signals.unit(name)), curves=curves)
+    plot = TimePlot(title=name, quantity=name, unit=unit_symbol(signals.unit(whole)), curves=curves)
     draw_time_plot(axes, plot, signals.time)
     if items:
         axes.set_yticks(list(items), [text.replace("_", " ").lower() for text in items.values()])
     if len(curves) > 1:
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _element(signals: SignalTable, name: str) -> NDArray[Any] | None:
+    """Return an element of a signal over time, by its name in the record, `arm.p_WG[3]`; None if there is none."""
+    whole = name.rpartition("[")[0]
+    if name in signals or whole not in signals:
+        return None
+    return elements_of(whole, signals[whole]).get(name)

@@ -84,6 +84,9 @@ def select_fmus(
     fmus: dict[str, Path] = {}
     for name, unit in experiment.units.items():
         other = others.get(name, "")
+        if other and re.fullmatch(r"\w+", other) and other not in UNITS and not Path(other).exists():
+            own = "; a file ends in .fmu, and a block of your own is named MODULE:CLASS"
+            raise UsageError(f"unit {name}: no unit {other!r}: {nearest(other, UNITS)}{own}")
         if other and not _BLOCK.fullmatch(other) and (other not in UNITS or Path(other).exists()):
             fmus[name] = Path(other)
             continue

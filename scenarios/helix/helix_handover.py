@@ -14,6 +14,7 @@ import numpy as np
 
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
+from handover.plants.helix.hand.partner_parameters import Params as PartnerParams
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.pictures import CameraPicture
@@ -110,6 +111,9 @@ class HelixHandover(Experiment[HandoverEvaluator]):
         except TooFewCorners as e:
             s.add_fault(f"box_height = {p.box_height:g} m: {e}")
             calibration = camera_parameters(places=p.cameras)
+        weight = p.ball_mass * PartnerParams().gravity
+        if weight >= p.hand_force_max:
+            s.add_fault(f"hand_force_max = {p.hand_force_max:g} N: it must exceed the ball's weight, {weight:.3g} N")
         if fault := marker_fault(p.marker):
             s.add_fault(f"marker = {p.marker:g} m: {fault}")
         camera = s.add(

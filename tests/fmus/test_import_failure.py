@@ -83,7 +83,7 @@ def test_a_module_that_a_block_itself_lacks_is_named_with_the_extra_that_brings_
 def test_an_error_of_the_blocks_own_module_is_told_as_such(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "own_fault.py").write_text("1 / 0\n")
     monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(UnknownBlock, match="its module cannot be loaded: ZeroDivisionError") as failure:
+    with pytest.raises(UnknownBlock, match=r"cannot be loaded \(own_fault\.py, line 1\): ZeroDivisionError") as failure:
         import_class("own_fault:Block")
     assert not isinstance(failure.value, PackageFailure)
 

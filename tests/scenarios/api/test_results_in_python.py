@@ -28,6 +28,8 @@ def test_metrics_are_numbers_with_units(run: handover.Run):
     assert "pushed" in displacement.description
     assert str(handover.Quantity(0.0123, "m")) == "12.3 mm"
     assert copy.copy(displacement).unit == "m"
+    with pytest.raises(KeyError, match="did you mean displacement"):
+        run.metrics["displacements"]
 
 
 def test_signals_are_arrays_by_name(run: handover.Run):
@@ -52,6 +54,14 @@ def test_without_pandas_one_line_says_what_to_install(run: handover.Run, monkeyp
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match=r"^to_pandas needs pandas: python -m pip install pandas$"):
         run.signals.to_pandas()
+
+
+def test_an_element_of_a_signal_is_drawn_by_its_name_in_the_record(run: handover.Run):
+    (axes,) = run.plot("scene.p_WH[2]").axes
+    assert axes.get_ylabel() == "scene.p_WH[2] (m)"
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), run.signals["scene.p_WH"][:, 1])
+    with pytest.raises(KeyError, match=r"no signal 'scene\.p_WH\[3\]'"):
+        run.plot("scene.p_WH[3]")
 
 
 def test_plots_have_names_and_units_at_their_axes(run: handover.Run):

@@ -108,6 +108,11 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
         (("run", "helix_handover", "--unit", "arm"), "NAME=FILE"),
         (("run", "helix_handover", "--unit", "arm=a.fmu", "--unit", "arm=b.fmu"), "arm is given twice"),
         (("run", "helix_handover", "--unit", "arm=missing.fmu"), "there is no such file"),
+        (("run", "helix_handover", "--unit", "arm=TendonArmFst"), "no unit 'TendonArmFst': did you mean TendonArmFast"),
+        (
+            ("run", "helix_handover", "-p", "ball_mass=1"),
+            "hand_force_max = 5 N: it must exceed the ball's weight, 9.81 N",
+        ),
         (("build", "TendonArms"), "did you mean TendonArm or TendonArmFast?"),
         (("build", "spring"), "a unit of your own is named MODULE:CLASS"),
         (("build", "nowhere:Spring"), "module 'nowhere' cannot be found"),
@@ -224,7 +229,7 @@ def test_a_users_module_that_does_not_load_is_reported_in_one_line(tmp_path: Pat
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "own_broken.py").write_text("x = 1\ny = 1 / 0\n")
     result = call("build", "own_broken:Spring", "--out", "made")
-    assert_refused(result, "own_broken:Spring: its module cannot be loaded: ZeroDivisionError", tmp_path / "made")
+    assert_refused(result, "own_broken:Spring: its module cannot be loaded (own_broken.py, line 2): ZeroDivisionError", tmp_path / "made")
     assert len(result.output.splitlines()) == 1
 
 
