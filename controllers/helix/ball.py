@@ -12,7 +12,8 @@ _GREEN_FROM = (38, 60, 25)  # hue (180 a turn), saturation, value
 _GREEN_UNTIL = (85, 255, 255)
 _COARSE = 4  # reduction of a whole picture in a search; the ball is a dozen pixels wide then
 _INSIDE = 0.5  # px; contours run through the middles of the outermost pixels
-_SPECK = 30.0  # px^2; smaller green patches are noise
+SPECK = 30.0
+"""Area of a green patch, px^2, below which it is noise (assumed)."""
 _SPREAD = (0.12, 0.2, 0.33)  # spacings, in shares of the outline, of the three points of a candidate circle
 _ON_CIRCLE = 0.8  # px
 _HULL_POINTS = 16  # points of the hull through which candidate circles go
@@ -47,7 +48,7 @@ class BallFinder:
         if region.empty:
             return None
         part = region.of(picture)
-        contours = _patches(green_mask(part), _SPECK)
+        contours = _patches(green_mask(part), SPECK)
         if not contours:
             return None
         edge = np.concatenate(contours)
@@ -67,7 +68,7 @@ class BallFinder:
         """Return the region of a picture around the largest green patch; empty if there is none."""
         h, w = picture.shape[:2]
         small = cv2.resize(picture, (w // _COARSE, h // _COARSE), interpolation=cv2.INTER_LINEAR)
-        contours = _patches(green_mask(np.asarray(small, dtype=np.uint8)), _SPECK / _COARSE**2)
+        contours = _patches(green_mask(np.asarray(small, dtype=np.uint8)), SPECK / _COARSE**2)
         if not contours:
             return Region(0, 0, 0, 0)
         _, radius = cv2.minEnclosingCircle(contours[0].astype(np.float32))

@@ -17,6 +17,9 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 
+W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+"""Factors that turn both points of a pose from B into W, and back: R_WB = diag(1, -1, -1), the mount at W's origin."""
+
 _SERIES_BELOW = 0.05  # rad; both forms are exact to 1e-13 there
 _TENDON_ANGLES = np.radians([0.0, 120.0, 240.0])
 _TENDON_DIRECTIONS = np.array([np.cos(_TENDON_ANGLES), np.sin(_TENDON_ANGLES)])

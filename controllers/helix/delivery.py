@@ -9,7 +9,8 @@ from typing import Any
 from handover.controllers.helix.servo_parameters import Params
 from handover.cosim.blocks.ports import Floats
 
-_SAME_TIME = 1e-9  # s; rounding of a time that a host adds up from steps
+SAME_TIME = 1e-9
+"""Rounding of a time that a host adds up from steps, s."""
 
 
 class Phase(enum.IntEnum):
@@ -75,7 +76,7 @@ class Delivery:
             tilt: of the gripper from straight down, rad.
         """
         p = self._params
-        if phase is Phase.HOLD and p.delivers and closing_for >= p.closing_time + p.carry_after - _SAME_TIME:
+        if phase is Phase.HOLD and p.delivers and closing_for >= p.closing_time + p.carry_after - SAME_TIME:
             self._has_set_off = True
             return Phase.CARRY
         if phase is not Phase.CARRY:

@@ -1,12 +1,16 @@
 """Jacobian based control with a virtual stiffness that keeps the limits. [Vervloet2025] algorithms 1 and 2."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from handover.controllers.helix.constant_curvature import linearise
 from handover.cosim.blocks.ports import Floats
+
+REACH_TOLERANCE = 0.003
+"""Distance of the model's gripper from a goal, m, beyond which the goal is out of its reach."""
 
 _STIFFENING = 100.0
 _RANK_TOLERANCE = 1e-9
@@ -154,6 +158,11 @@ def nearest_pose(p_BG: Floats, q_start: Floats, K: Floats, limits: Limits, d_gri
         step = damped_step(J, 1.0 / K, np.tile(e, 2), damping)  # whatever the direction
         q, _ = keep_limits(q + step, 1.0 / K, limits)
     return best
+
+
+def is_reached(p_BG: Floats, starts: Sequence[Floats], K: Floats, limits: Limits, d_gripper: float) -> bool:
+    """Return whether the model's gripper comes to a point in B, m, from one of these states, each within the limits."""
+    return min(nearest_pose(p_BG, q, K, limits, d_gripper) for q in starts) <= REACH_TOLERANCE
 
 
 def _size(e: Floats, damping: Damping | None) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from handover.controllers.helix.ball import green_mask
+from handover.controllers.helix.ball import SPECK, green_mask
 from handover.controllers.helix.ball_fit import BallPosition
 from handover.controllers.helix.joint_detector import WristPosition
 from handover.controllers.helix.markers import DICTIONARY, MarkerRing, Markers, read_markers
@@ -18,7 +18,6 @@ from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 
 _BLUR = 1.4  # px; "the image is blurred", assumed
-_SPECK = 30.0  # px^2; smaller green patches are noise, assumed
 
 BALL_DEVIATION = 0.0042
 """Standard deviation of the ball along an axis, in m: 7.3 mm RMS, by tests/benchmarks/test_vision_speed.py."""
@@ -120,7 +119,7 @@ def green_middle(picture: Pixels) -> Floats | None:
     mask = green_mask(np.asarray(cv2.GaussianBlur(picture, (0, 0), _BLUR), dtype=np.uint8))
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     largest = max(contours, key=cv2.contourArea, default=None)
-    if largest is None or cv2.contourArea(largest) < _SPECK:
+    if largest is None or cv2.contourArea(largest) < SPECK:
         return None
     middle, _ = cv2.minEnclosingCircle(largest)
     return np.asarray(middle, dtype=np.float64)

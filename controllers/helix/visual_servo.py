@@ -9,10 +9,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from handover.controllers.helix.approach_path import next_place
-from handover.controllers.helix.constant_curvature import forward_kinematics, linearise, tendon_lengths
-from handover.controllers.helix.delivery import Delivery, Phase, Verdict
+from handover.controllers.helix.constant_curvature import W_FROM_B, forward_kinematics, linearise, tendon_lengths
+from handover.controllers.helix.delivery import SAME_TIME, Delivery, Phase, Verdict
 from handover.controllers.helix.estimation import optimise_state, weights_of_state
-from handover.controllers.helix.jacobian_control import Damping, Limits, blend, control_step, nearest_pose
+from handover.controllers.helix.jacobian_control import Damping, Limits, blend, control_step, is_reached
 from handover.controllers.helix.progress import Progress
 from handover.controllers.helix.recovery import Recovery
 from handover.controllers.helix.response import Response
@@ -25,10 +25,7 @@ from handover.cosim.blocks.units import Metre, Number, Radian, SquareMetre
 
 __all__ = ["Inputs", "InvalidServoParameters", "Outputs", "Params", "Phase", "Verdict", "VisualServo"]
 
-_W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])  # R_WB = diag(1, -1, -1), for both points of a pose
 _UP = np.array([0.0, 0.0, 1.0])
-_SAME_TIME = 1e-9  # s; rounding of a time that a host adds up from steps
-_REACH_TOLERANCE = 0.003  # m; of the model, beyond which a goal is out of its reach
 _RESPONSE_MEMORY = 1.5  # s; one swing of the arm and a half (own choice)
 _LARGEST_STEP, _HALF_STEP_ERROR = 0.8, 0.08  # of the way; m, at which a growing step is half of that (own choices)
 _AT_LIMIT = 1e-6  # rad, m
@@ -145,7 +142,7 @@ class VisualServo:
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Run the main loop of algorithm 3 once if a control period has passed since it ran."""
-        due = t >= self._t_next - _SAME_TIME
+        due = t >= self._t_next - SAME_TIME
         if due or self.params.filter_pictures:
             self._filter(t, u)
         if not due:
@@ -153,7 +150,7 @@ class VisualServo:
             return self.outputs(t + dt, u)
         period = self._draw_period()
         following = self._t_next + period
-        self._t_next = following if following > t + _SAME_TIME else t + period
+        self._t_next = following if following > t + SAME_TIME else t + period
         sees = self._sees_ring(u)
         if sees:
             self._estimate()
@@ -214,7 +211,7 @@ class VisualServo:
         """Return whether the wrist is known: from this picture, or from one since the last control step."""
         if not self.params.filter_pictures:
             return u.seen_R
-        return self._tracker.unseen_R < self.params.control_period - _SAME_TIME
+        return self._tracker.unseen_R < self.params.control_period - SAME_TIME
 
     def _estimate(self) -> None:
         p = self.params
@@ -234,7 +231,7 @@ class VisualServo:
             self._enter(Phase.DESCEND)
         elif self._phase is Phase.DESCEND and error > p.threshold_retreat:
             self._enter(Phase.APPROACH)
-        elif self._phase is Phase.GRASP and t - self._t_close >= p.closing_time - 1e-9:
+        elif self._phase is Phase.GRASP and t - self._t_close >= p.closing_time - SAME_TIME:
             self._enter(Phase.HOLD)
         elif (self._follows(t) and error > p.threshold_reopen) or (self._phase is Phase.RECOVER and not self._lost()):
             self._enter(Phase.APPROACH)
@@ -285,7 +282,7 @@ class VisualServo:
     def _why_stuck(self) -> Verdict:
         p, goal = self.params, self._X_goal()[3:]
         starts = (self._q_calib, self._q_sys, self._q_est)
-        if min(nearest_pose(goal, q, p.K_initialize, self._limits, p.d_gripper) for q in starts) > _REACH_TOLERANCE:
+        if not is_reached(goal, starts, p.K_initialize, self._limits, p.d_gripper):
             return Verdict.OUT_OF_REACH
         d = np.hypot(self._q_sys[0::3], self._q_sys[1::3])
         q_DL = np.column_stack([d, self._q_sys[2::3]]).reshape(6)
@@ -296,7 +293,7 @@ class VisualServo:
     def _follows(self, t: float) -> bool:
         """Return whether the arm follows the ball although the gripper closes."""
         p = self.params
-        return self._phase is Phase.GRASP and t - self._t_close < p.follow_until * p.closing_time - _SAME_TIME
+        return self._phase is Phase.GRASP and t - self._t_close < p.follow_until * p.closing_time - SAME_TIME
 
     def _move(self) -> None:
         p, error, X_meas = self.params, self._error(), self._X_meas()
@@ -335,7 +332,7 @@ class VisualServo:
 
     def _motion(self, dq: Floats) -> Floats:
         """Return by how much a change of the state moves wrist and gripper in W, J dq, shape (6,), m."""
-        return _W_FROM_B * (linearise(self._q_est, self.params.d_gripper)[1] @ dq)
+        return W_FROM_B * (linearise(self._q_est, self.params.d_gripper)[1] @ dq)
 
     def _towards_posture(self) -> Floats:
         """Return the change that shortens the segments, shape (9,)."""
@@ -362,7 +359,7 @@ class VisualServo:
 
     def _X_meas(self) -> Floats:
         """Filtered pose, eq. (12), in B."""
-        return _W_FROM_B * np.concatenate([self._tracker.wrist.position, self._tracker.p_WG])
+        return W_FROM_B * np.concatenate([self._tracker.wrist.position, self._tracker.p_WG])
 
     def _X_goal(self) -> Floats:
         """Goal of the phase, in B."""
@@ -370,7 +367,7 @@ class VisualServo:
         if p_WG is None:
             above = self._phase in (Phase.WAIT, Phase.APPROACH)
             p_WG = self._tracker.ball.position + (self.params.d_grasp_offset * _UP if above else 0.0)
-        return _W_FROM_B * np.concatenate([p_WG + self.params.d_gripper * _UP, p_WG])
+        return W_FROM_B * np.concatenate([p_WG + self.params.d_gripper * _UP, p_WG])
 
     def _X_next(self) -> Floats:
         """Pose to go to on the way to the goal, in B."""
@@ -378,9 +375,9 @@ class VisualServo:
         if self._delivery.p_WG_goal is not None or self._phase is Phase.GRASP:
             return X_goal
         p, tracker = self.params, self._tracker
-        p_WG_goal = (_W_FROM_B * X_goal)[3:]
+        p_WG_goal = (W_FROM_B * X_goal)[3:]
         p_WG = next_place(tracker.p_WG, tracker.ball.position, p_WG_goal, p.standoff, self._excess())
-        return _W_FROM_B * np.concatenate([p_WG + p.d_gripper * _UP, p_WG])
+        return W_FROM_B * np.concatenate([p_WG + p.d_gripper * _UP, p_WG])
 
     def _error(self) -> float:
         e = self._X_goal() - self._X_meas()

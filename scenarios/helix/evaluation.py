@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.controllers.helix.constant_curvature import forward_kinematics
+from handover.controllers.helix.constant_curvature import W_FROM_B, forward_kinematics
 from handover.controllers.helix.vision_parameters import Params as VisionParams
 from handover.cosim.blocks.geometry import Pinhole, rotation_of
 from handover.cosim.blocks.ports import Floats
@@ -22,8 +22,6 @@ from handover.scenarios.experiment.pictures import CameraPicture, Mark
 from handover.scenarios.helix.cameras import CameraPlaces, camera_of, camera_parameters
 from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.parameters import Parameters
-
-_W_FROM_B = np.array([1.0, -1.0, -1.0])  # R_WB = diag(1, -1, -1)
 
 
 class ModelMismatch(NamedTuple):
@@ -43,7 +41,7 @@ def model_mismatch(q_sys: Floats, p_WG_est: Floats) -> ModelMismatch:
     """
     servo = paper_values("helix", "servo")
     d_gripper = float(servo["d_gripper"])
-    p_WG_sys = _W_FROM_B * forward_kinematics(q_sys, d_gripper)[3:]
+    p_WG_sys = (W_FROM_B * forward_kinematics(q_sys, d_gripper))[3:]
     p_WG_calib = np.array([0.0, 0.0, -sum(servo["l_calib"]) - d_gripper])
     between = (p_WG_est - p_WG_calib, p_WG_sys - p_WG_calib, p_WG_sys - p_WG_est)
     return ModelMismatch(*(float(np.linalg.norm(d)) for d in between))

@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from handover.controllers.helix.jacobian_control import Limits, nearest_pose
+from handover.controllers.helix.constant_curvature import W_FROM_B
+from handover.controllers.helix.jacobian_control import REACH_TOLERANCE, Limits, nearest_pose
 from handover.controllers.helix.servo_parameters import Params as ServoParams
 from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.units import Metre, Radian, Second
@@ -26,9 +27,6 @@ from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.helix.parameters import Parameters
 from handover.scenarios.helix.places import PLACES
 from handover.scenarios.helix.use_case_evaluation import UseCaseEvaluator
-
-_REACH_TOLERANCE = 0.003
-"""Distance that the model's gripper may keep from the drop place, m, as in the controller."""
 
 _END = Fraction(10)
 """Time for the last ball to fall and rest, s."""
@@ -132,7 +130,7 @@ class HelixUseCase(HelixHandover):
         """Wire the handover's units, with a bowl; a place to drop the ball that the arm does not reach is a fault."""
         p: UseCaseParameters = parameters
         s = super().build(p, seed, fmu)
-        if (short := distance_out_of_reach(p.p_WG_drop, p.settings)) > _REACH_TOLERANCE:
+        if (short := nearest_approach(p.p_WG_drop, p.settings)) > REACH_TOLERANCE:
             x, y, z = p.p_WG_drop
             s.add_fault(
                 f"bowl_azimuth, bowl_distance, bowl_height, drop_height: the place above the bowl, ({x:.2f}, {y:.2f}, "
@@ -175,11 +173,11 @@ class HelixUseCase(HelixHandover):
         return replay_handover(record, p.bowl)
 
 
-def distance_out_of_reach(p_WG: Floats, settings: Mapping[str, Any]) -> float:
+def nearest_approach(p_WG: Floats, settings: Mapping[str, Any]) -> float:
     """Return how near the controller's model of the arm, hanging in B, comes to a point in W, shape (3,), m."""
     servo = ServoParams(**settings)
     q_calib = np.zeros(9)
     q_calib[2::3] = servo.l_calib
     limits = Limits(servo.L_sys_LB, servo.L_sys_UB)
-    p_BG, K = np.array([1.0, -1.0, -1.0]) * p_WG, np.array(servo.K_initialize)
+    p_BG, K = W_FROM_B[:3] * p_WG, np.array(servo.K_initialize)
     return nearest_pose(p_BG, q_calib, K, limits, servo.d_gripper)

@@ -9,12 +9,10 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.helix.arm.tendon_parameters import Params
-from handover.plants.helix.arm.tendon_ports import Inputs, Outputs, StepSizeError, centre_line
+from handover.plants.helix.arm.tendon_ports import R_WB, Inputs, Outputs, StepSizeError, centre_line
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
-
-_R_WB = np.diag([1.0, -1.0, -1.0])
 
 
 class TendonArm:
@@ -60,11 +58,11 @@ class TendonArm:
         z_B = rotations.as_matrix()[:, :, 2]
         q_WR = _world_quaternion(rotations)
         return Outputs(
-            p_WR=_R_WB @ p_B[-1],
+            p_WR=R_WB @ p_B[-1],
             q_WR=q_WR,
-            p_WG=_R_WB @ (p_B[-1] + self._params.d_gripper * z_B[-1]),
+            p_WG=R_WB @ (p_B[-1] + self._params.d_gripper * z_B[-1]),
             q_WG=np.array(q_WR),
-            backbone=centre_line(p_B, z_B) @ _R_WB,
+            backbone=centre_line(p_B, z_B) @ R_WB,
             tension=np.maximum(self._chain.edge.tensions, 0.0),
             grip=self._grip,
         )
@@ -74,7 +72,7 @@ class TendonArm:
         steps = round(dt / self._params.internal_step)
         if steps < 1 or abs(steps * self._params.internal_step - dt) > 1e-6 * self._params.internal_step:
             raise StepSizeError(dt, self._params.internal_step)
-        self._chain.pull(np.clip(u.dl_t, *self._end_stops), _R_WB @ u.f_G)
+        self._chain.pull(np.clip(u.dl_t, *self._end_stops), R_WB @ u.f_G)
         self._chain.edge.advance(t, steps)
         travel = dt / self._params.closing_time
         self._grip = min(max(self._grip + min(max(u.closure - self._grip, -travel), travel), 0.0), 1.0)

@@ -10,9 +10,7 @@ from handover.cosim.blocks.block import InvalidState
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.helix.arm.tendon_parameters import Params
-from handover.plants.helix.arm.tendon_ports import Inputs, Outputs, StepSizeError, centre_line
-
-_R_WB = np.diag([1.0, -1.0, -1.0])
+from handover.plants.helix.arm.tendon_ports import R_WB, Inputs, Outputs, StepSizeError, centre_line
 
 
 class SolverFailure(RuntimeError):
@@ -66,11 +64,11 @@ class TendonArmFast:
         z_B: Floats = np.column_stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
         q_WR = np.array([-x[-1], w[-1], -z[-1], y[-1]]) + 0.0  # (0, 1, 0, 0) times q_B, without negative zeros
         return Outputs(
-            p_WR=_R_WB @ p_B[-1],
+            p_WR=R_WB @ p_B[-1],
             q_WR=q_WR,
-            p_WG=_R_WB @ (p_B[-1] + self._params.d_gripper * z_B[-1]),
+            p_WG=R_WB @ (p_B[-1] + self._params.d_gripper * z_B[-1]),
             q_WG=np.array(q_WR),
-            backbone=centre_line(p_B, z_B) @ _R_WB,
+            backbone=centre_line(p_B, z_B) @ R_WB,
             tension=np.maximum(self._chain.tensions(), 0.0),
             grip=self._grip,
         )
@@ -80,7 +78,7 @@ class TendonArmFast:
         steps = round(dt / self._params.internal_step)
         if steps < 1 or abs(steps * self._params.internal_step - dt) > 1e-6 * self._params.internal_step:
             raise StepSizeError(dt, self._params.internal_step, "TendonArmFast")
-        failure = self._chain.advance(np.clip(u.dl_t, *self._end_stops), _R_WB @ u.f_G, steps)
+        failure = self._chain.advance(np.clip(u.dl_t, *self._end_stops), R_WB @ u.f_G, steps)
         if failure is not None:
             raise SolverFailure(t + failure)
         travel = dt / self._params.closing_time

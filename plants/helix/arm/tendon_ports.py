@@ -7,6 +7,9 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats, Polyline25, Vector3, Vector4, Vector9, output, port
 from handover.cosim.blocks.units import Metre, Newton, Number
 
+R_WB = np.diag([1.0, -1.0, -1.0])
+"""Orientation of the arm's base frame B, whose z points down, in the world W."""
+
 _POINTS = 25
 
 

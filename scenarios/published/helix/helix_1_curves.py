@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.controllers.helix.constant_curvature import forward_kinematics
+from handover.controllers.helix.constant_curvature import W_FROM_B, forward_kinematics
 from handover.controllers.helix.visual_servo import Phase
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.paper import paper_values
 
-_W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])  # R_WB = diag(1, -1, -1), for both points of a pose
 _ON_BALL = [int(phase) for phase in (Phase.DESCEND, Phase.GRASP, Phase.HOLD)]
 _MODEL_SIGNALS = ("servo.q_sys", "servo.q_est", "servo.p_WO_est", "servo.p_WR_est", "servo.p_WG_est")
 
@@ -72,7 +71,7 @@ class RunCurves:
         q_calib = np.array([x for l in l_calib for x in (0.0, 0.0, l)])
         q_sys: Floats = np.vstack([q_calib, record["servo.q_sys"][index[:-1]]])
         X_meas: Floats = np.hstack([record["servo.p_WR_est"][index], record["servo.p_WG_est"][index]])
-        X_sys, X_est = (_W_FROM_B * np.array([forward_kinematics(q, d_gripper) for q in of]) for of in (q_sys, q_est))
+        X_sys, X_est = (W_FROM_B * np.array([forward_kinematics(q, d_gripper) for q in of]) for of in (q_sys, q_est))
         p_WG_calib = np.array([0.0, 0.0, -sum(l_calib) - d_gripper])
         error: Floats = record["servo.error"][index]
         descents: NDArray[np.int64] = np.flatnonzero(np.isin(phase, _ON_BALL))

@@ -229,7 +229,11 @@ def test_a_users_module_that_does_not_load_is_reported_in_one_line(tmp_path: Pat
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "own_broken.py").write_text("x = 1\ny = 1 / 0\n")
     result = call("build", "own_broken:Spring", "--out", "made")
-    assert_refused(result, "own_broken:Spring: its module cannot be loaded (own_broken.py, line 2): ZeroDivisionError", tmp_path / "made")
+    assert_refused(
+        result,
+        "own_broken:Spring: its module cannot be loaded (own_broken.py, line 2): ZeroDivisionError",
+        tmp_path / "made",
+    )
     assert len(result.output.splitlines()) == 1
 
 
