@@ -36,6 +36,9 @@ _MAX_METRICS = 4
 Key = tuple[tuple[str, str], ...]
 """Names and values by which points are matched."""
 
+EVERY: Key = ()
+"""Stands for all points at once, where there are several."""
+
 
 class ComparedCampaigns(CampaignResults):
     """The runs of several campaigns as those of one, whose points are told apart by the campaign, too.
@@ -259,18 +262,21 @@ class MetricTest:
 
 
 def success_tests(results: ComparedCampaigns) -> list[SuccessTest]:
-    """Return tests of successes of each two campaigns at each point that both have: paired where they share seeds."""
+    """Return tests of successes of each two campaigns: paired where they share seeds.
+
+    The first are over all points at once, where there are several with pairs; the others are at each that both have.
+    """
     success = results.table.column("success")
     tests: list[SuccessTest] = []
     for key, first, second in _pairs_of_campaigns(results):
-        a, b = results.at(key)[first], results.at(key)[second]
-        rows = _shared_rows(results, a, b)
+        rows = _pairs_at(results, key, first, second)
         if rows:
             ours, theirs = ([bool(success[pair[k]]) for pair in rows] for k in (0, 1))
             test = paired_test(ours, theirs)
             counts = (sum(ours), len(rows), sum(theirs), len(rows))
             p = test.p
         else:
+            a, b = results.at(key)[first], results.at(key)[second]
             test, counts = None, (a.successes, len(a.done), b.successes, len(b.done))
             p = two_proportions(*counts)
         tests.append(SuccessTest(key=key, first=first, second=second, counts=counts, pairs=test, p=p))
@@ -289,11 +295,11 @@ def _metric_tests(results: ComparedCampaigns, metric: str) -> list[MetricTest]:
     values = results.table.column(metric)
     tests: list[MetricTest] = []
     for key, first, second in _pairs_of_campaigns(results)[:MAX_TESTS]:
-        a, b = results.at(key)[first], results.at(key)[second]
-        rows = _shared_rows(results, a, b)
+        rows = _pairs_at(results, key, first, second)
         if rows:
             test = paired_difference(*(values[[pair[k] for pair in rows]] for k in (0, 1)))
         else:
+            a, b = results.at(key)[first], results.at(key)[second]
             test = unpaired_difference(values[a.done], values[b.done])
         if test is not None:
             paired = bool(rows)
@@ -303,13 +309,27 @@ def _metric_tests(results: ComparedCampaigns, metric: str) -> list[MetricTest]:
 
 
 def _pairs_of_campaigns(results: ComparedCampaigns) -> list[tuple[Key, str, str]]:
-    """Return the points with each two campaigns that have done runs there, in the campaigns' order."""
+    """Return the points with each two campaigns that have done runs there, in the campaigns' order; first EVERY."""
     pairs: list[tuple[Key, str, str]] = []
+    for first, second in combinations([e.name for e in results.entries], 2):
+        if sum(bool(_pairs_at(results, key, first, second)) for key in results.matched) > 1:
+            pairs.append((EVERY, first, second))
     for key in results.matched:
         here = results.at(key)
         names = [e.name for e in results.entries if e.name in here and len(here[e.name].done)]
         pairs += [(key, first, second) for first, second in combinations(names, 2)]
     return pairs
+
+
+def _pairs_at(results: ComparedCampaigns, key: Key, first: str, second: str) -> list[tuple[int, int]]:
+    """Return the rows of runs with shared seeds at a point, or at EVERY point."""
+    every = key == EVERY and len(results.matched) > 1
+    found: list[tuple[int, int]] = []
+    for at in results.matched if every else (key,):
+        here = results.at(at)
+        if first in here and second in here:
+            found += _shared_rows(results, here[first], here[second])
+    return found
 
 
 def _shared_rows(results: ComparedCampaigns, a: PointResults, b: PointResults) -> list[tuple[int, int]]:

@@ -122,8 +122,9 @@ def tests_section(results: ComparedCampaigns) -> Section | None:
     note = (
         "Runs of two campaigns with the same seed at a point are a pair, and tests are of pairs: McNemar's exact test "
         "of successes, Wilcoxon's signed-rank test of metrics, with the median difference and its 95 % bootstrap "
-        "interval. Without shared seeds: Fisher's exact test, and Mann and Whitney's. p is two-sided; the last column "
-        "is corrected for the number of tests in its table by Holm's method."
+        "interval. 'All runs' are the pairs of all points together. Without shared seeds: Fisher's exact test, and "
+        "Mann and Whitney's. p is two-sided; the last column is corrected for the number of tests in its table by "
+        "Holm's method."
     )
     if len(tests) > MAX_TESTS:
         note += f" Metrics are tested in the first {MAX_TESTS} of {len(tests)} cases only."

@@ -76,6 +76,20 @@ def test_runs_with_one_seed_are_pairs(tmp_path: Path):
     assert 0.002 <= moved.test.interval.low < 0.0045 < moved.test.interval.high <= 0.007
 
 
+def test_points_with_pairs_are_tested_together_too(tmp_path: Path):
+    first = campaign(tmp_path / "a", THINGS, repetitions=3, success=[True] * 6, moved=[0.01] * 3 + [0.02] * 3)
+    second = campaign(tmp_path / "b", THINGS, repetitions=3, success=[False] * 6, moved=[0.02] * 3 + [0.04] * 3)
+    results = compared(first, second)
+    every, *single = success_tests(results)
+    assert (every.key, results.label_of(every.key)) == ((), "all runs")
+    assert (every.counts, every.p) == ((6, 6, 0, 6), pytest.approx(2 / 2**6))
+    assert [t.key for t in single] == list(results.matched)
+    assert all(t.p == pytest.approx(2 / 2**3) for t in single)
+    moved, *at = metric_tests(results, "moved")
+    assert (moved.key, moved.test.n, len(at)) == ((), 6, 2)
+    assert moved.test.difference == pytest.approx(0.015)
+
+
 def test_a_pair_counts_where_both_runs_are_done(tmp_path: Path):
     first = campaign(tmp_path / "a", [{}])
     second = campaign(tmp_path / "b", [{}], repetitions=4, seeds_from=103)  # shares 103 to 105
