@@ -91,6 +91,7 @@ class HelixPlaces(PublishedExperiment):
             heights = np.linspace(min(known), max(h for h in known if reach(h) > 0.0), 50)
             over.plot([reach(h) for h in heights], heights, color="0.5", lw=1, label="reach")
             over.set(xlabel="distance from the arm's axis (m)", ylabel="height in W (m)", xlim=(0.0, None))
+            over.set_xticks(np.arange(0.0, 0.25, 0.05))
             over.legend(loc="upper left", bbox_to_anchor=(0.0, 1.12), ncols=3)
             for metric, label in _SHOWN.items():
                 d = 1e3 * np.sort(distances(rows, success=True, metric=metric))
