@@ -152,7 +152,7 @@ def _named(experiment: type[Experiment[Any]]) -> str:
     return experiment.name if known else f"{experiment.__module__}:{experiment.__name__}"
 
 
-def _own_unit(experiment: type[Experiment[Any]], name: str) -> Entry:
+def own_unit_of_place(experiment: type[Experiment[Any]], name: str) -> Entry:
     """Return the unit that a scenario ships with in a place.
 
     Raises:
@@ -166,7 +166,12 @@ def _own_unit(experiment: type[Experiment[Any]], name: str) -> Entry:
         raise UsageError(f"unit {name}: {e}") from e
 
 
-def _ports_of_place(experiment: type[Experiment[Any]], name: str, own: Entry) -> list[PlacePort]:
+def checked_ports_of_place(experiment: type[Experiment[Any]], name: str, own: Entry) -> list[PlacePort]:
+    """Return a place's ports and parameters.
+
+    Raises:
+        UsageError: the scenario's own unit does not declare one of them, or cannot be imported.
+    """
     try:
         return ports_of_place(experiment.places[name], own)
     except KeyError as e:
@@ -181,7 +186,7 @@ def place_data(experiment: type[Experiment[Any]], name: str) -> dict[str, Any]:
     Raises:
         UsageError: the scenario has no such unit.
     """
-    own, place = _own_unit(experiment, name), experiment.places.get(name)
+    own, place = own_unit_of_place(experiment, name), experiment.places.get(name)
     data = {"scenario": experiment.name, "place": name, "unit": own.name}
     if place is None:
         return {**data, "remarks": [], "ports": None}
@@ -192,7 +197,7 @@ def place_data(experiment: type[Experiment[Any]], name: str) -> dict[str, Any]:
             "required": p.is_required,
             "description": p.sentence,
         }
-        for p in _ports_of_place(experiment, name, own)
+        for p in checked_ports_of_place(experiment, name, own)
     ]
     return {**data, "remarks": list(place.remarks), "ports": ports}
 
@@ -203,7 +208,7 @@ def print_place(experiment: type[Experiment[Any]], name: str) -> None:
     Raises:
         UsageError: the scenario has no such unit.
     """
-    own = _own_unit(experiment, name)
+    own = own_unit_of_place(experiment, name)
     if name not in experiment.places:
         text = f"{experiment.name} does not say what a unit in the place {name} may lack; its own, {own.name}, has:"
         open_console().print(text, markup=False, soft_wrap=True)
@@ -214,7 +219,7 @@ def print_place(experiment: type[Experiment[Any]], name: str) -> None:
     console.print(f"{experiment.name}, place {name}: {own.name} or a unit of your own", style="bold")
     for remark in place.remarks:
         console.print(remark, markup=False)
-    ports = _ports_of_place(experiment, name, own)
+    ports = checked_ports_of_place(experiment, name, own)
     for is_required, needed in ((True, "required"), (False, "optional")):
         for causality, what in (
             (Causality.INPUT, "Inputs"),

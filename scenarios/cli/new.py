@@ -11,6 +11,7 @@ import click
 
 from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.cli.place_start import start_for
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.results.run_folder import check_place, disk_errors_reported
 
@@ -28,6 +29,7 @@ Examples
   handover run reach:Reach
   handover new controller Gentle         gentle.py, test_gentle.py
   handover run reach:Reach --unit controller=gentle:Gentle
+  handover new controller Mine --for helix_handover:servo
 """
 
 
@@ -37,11 +39,14 @@ Examples
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("."), help="Folder for the files.  [default: this one]"
 )
-def new(kind: str, name: str, out: Path) -> None:
+@click.option("--for", "place", metavar="SCENARIO:PLACE", help="Of a unit or controller: with the ports of that place.")
+def new(kind: str, name: str, out: Path, place: str | None) -> None:
     """Write a working start for a unit, a controller or a scenario."""
     with one_line_errors():
         class_name, module = _names(name)
-        files = _files(kind, class_name, module)
+        if place is not None and kind == "scenario":
+            raise UsageError("--for is for a unit or a controller; a scenario has places of its own")
+        files = _files(kind, class_name, module) if place is None else start_for(place, class_name, module)
         check_place(out)
         if there := [file for file in files if (out / file).exists()]:
             raise UsageError(f"{out}: {', '.join(there)} {'is' if len(there) == 1 else 'are'} there already")
@@ -58,6 +63,9 @@ def new(kind: str, name: str, out: Path) -> None:
         "controller": f"handover run SCENARIO --unit NAME={path}",
         "scenario": f"handover run {path}",
     }[kind]
+    if place is not None:
+        scenario, _, taken = place.rpartition(":")
+        what = f"handover run {scenario} --unit {taken}={path}"
     click.echo(f"try: {what}; its test: python -m pytest test_{module}.py", err=True)
 
 

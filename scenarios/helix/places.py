@@ -150,6 +150,7 @@ PLACES = {
             "grip": "",
             "seed": "follows from the run's seed",
             "p_WO_1": "in W; where the hand moves on to",
+            "room": "0 in helix_reach, whose hand does not wait",
             **dict.fromkeys(
                 (
                     "move_from",

@@ -1,0 +1,215 @@
+"""A start for a unit that takes a place of a scenario: with the ports that the scenario's own unit declares there."""
+
+import ast
+import builtins
+import inspect
+import sys
+import textwrap
+import typing
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+from handover.cosim.blocks.variable import Causality, Kind, Variable
+from handover.fmus.catalog import import_class
+from handover.scenarios.cli.list import checked_ports_of_place, own_unit_of_place
+from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.selection import find_scenario
+from handover.scenarios.experiment.places import PlacePort
+
+_WIDTH = 118
+_ZEROS: Mapping[Kind, str] = {Kind.REAL: "0.0", Kind.INTEGER: "0", Kind.BOOLEAN: "False"}
+
+_UNIT = '''"""{class_name} takes the place {place} of {scenario}: a start that does nothing yet.
+
+{remarks}All that is optional, too: handover list {scenario} --unit {place}
+"""
+
+{imports}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+{parameters}
+
+
+@dataclass(kw_only=True)
+class Inputs:
+{inputs}
+
+
+@dataclass(kw_only=True)
+class Outputs:
+{outputs}
+
+
+class {class_name}:
+    """Gives the same all the time."""
+
+    # which outputs depend on which inputs of the same instant
+    feedthrough = {feedthrough}
+    period = {period!r}
+
+    def __init__(self, params: Params) -> None:
+        self.params = params
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:
+        return Outputs({values})
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        return self.outputs(t, u)
+
+    def get_state(self) -> bytes:
+        return b""  # it remembers nothing
+
+    def set_state(self, state: bytes) -> None:
+        pass
+'''
+_TEST = '''"""{class_name} fits into its place."""
+
+import handover
+
+
+def test_it_takes_its_place():
+    with handover.open("{scenario}", units={{"{place}": "{module}:{class_name}"}}) as running:
+        running.step({period!r})
+'''
+
+
+def start_for(place: str, class_name: str, module: str) -> dict[str, str]:
+    """Return the texts of a module and of its test, by file name, for a place such as `helix_handover:servo`.
+
+    It has the inputs of the place, and the outputs and parameters that it must have, declared as the scenario's own
+    unit declares them; what else is known of each stands above it.
+
+    Raises:
+        UsageError: there is no such scenario or place, it does not say what a unit needs, or it needs an output of a
+            kind that has no start, such as a text.
+    """
+    scenario, colon, name = place.rpartition(":")
+    if not colon:
+        raise UsageError(f"--for {place!r} is not of the form SCENARIO:PLACE, such as helix_handover:servo")
+    experiment = find_scenario(scenario)
+    own = own_unit_of_place(experiment, name)
+    if name not in experiment.places:
+        places = ", ".join(experiment.places) or "none"
+        raise UsageError(f"{scenario} does not say what a unit in the place {name} needs; it does of: {places}")
+    ports = checked_ports_of_place(experiment, name, own)
+    block = import_class(own.block)
+    wanted = {
+        c: [p for p in ports if p.declared.causality is c and (p.is_required or c is Causality.INPUT)]
+        for c in (Causality.PARAMETER, Causality.INPUT, Causality.OUTPUT)
+    }
+    if odd := [p.declared.name for p in wanted[Causality.OUTPUT] if _start(p.declared) is None]:
+        raise UsageError(f"{place}: {', '.join(odd)}: no start can be written for outputs of this kind")
+    hints = typing.get_type_hints(block.outputs, include_extras=True)
+    classes = {
+        Causality.PARAMETER: typing.get_type_hints(block.__init__)["params"],
+        Causality.INPUT: hints["u"],
+        Causality.OUTPUT: hints["return"],
+    }
+    fields = {c: [_field(classes[c], p) for p in wanted[c]] for c in wanted}
+    imports = {"from dataclasses import dataclass", "from fractions import Fraction"}
+    for c, declared in fields.items():
+        imports |= _imports_of(classes[c], [text for _, text in declared])
+    values = ", ".join(f"{p.declared.name}={_start(p.declared)}" for p in wanted[Causality.OUTPUT])
+    if "np." in values:
+        imports.add("import numpy as np")
+    inputs = tuple(p.declared.name for p in wanted[Causality.INPUT])
+    period = Fraction(block.period or own.step)
+    names = {"class_name": class_name, "module": module, "scenario": scenario, "place": name}
+    text = _UNIT.format(
+        **names,
+        imports=_sorted(imports),
+        parameters=_body(fields[Causality.PARAMETER]),
+        inputs=_body(fields[Causality.INPUT]),
+        outputs=_body(fields[Causality.OUTPUT]),
+        feedthrough=_feedthrough([p.declared.name for p in wanted[Causality.OUTPUT]], inputs),
+        remarks="".join(f"{textwrap.fill(r, _WIDTH)}\n\n" for r in experiment.places[name].remarks),
+        period=period,
+        values=values,
+    )
+    return {f"{module}.py": text, f"test_{module}.py": _TEST.format(**names, period=float(period))}
+
+
+def _start(v: Variable) -> str | None:
+    """Return an output's value that says nothing, as Python's text; None for texts, pictures and enumerations."""
+    zero, shape = _ZEROS.get(v.kind), [*v.shape]
+    if zero is None or not shape:
+        return zero
+    return f"np.zeros({tuple(shape) if len(shape) > 1 else shape[0]})"
+
+
+def _feedthrough(outputs: Sequence[str], inputs: Sequence[str]) -> str:
+    """Return that every output depends on every input, as Python's text."""
+    names = ", ".join(f'"{n}"' for n in inputs) + ("," if len(inputs) == 1 else "")
+    depends = f"({textwrap.fill(names, _WIDTH - 16, subsequent_indent=8 * ' ', break_on_hyphens=False)})"
+    if not outputs:
+        return "{}"
+    if len(outputs) == 1:
+        return f'{{"{outputs[0]}": {depends}}}'
+    return f"dict.fromkeys(({', '.join(map(repr, outputs))}), {depends})".replace("'", '"')
+
+
+def _field(declaring: type[Any], port: PlacePort) -> tuple[str, str]:
+    """Return what the place adds to a port's description, and the port's declaration in the source."""
+    text = _declarations(declaring)[port.declared.name]
+    return port.sentence.removeprefix(port.declared.description).lstrip("; "), text
+
+
+def _declarations(declaring: type[Any]) -> dict[str, str]:
+    """Return the source of a dataclass's fields by name, those of its bases, too."""
+    found: dict[str, str] = {}
+    for c in reversed(declaring.__mro__[:-1]):
+        source = textwrap.dedent(inspect.getsource(c))
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+                found[node.target.id] = textwrap.dedent(ast.get_source_segment(source, node, padded=True) or "")
+    return found
+
+
+def _imports_of(declaring: type[Any], texts: Iterable[str]) -> set[str]:
+    """Return the imports of all names in declarations, as the module that declares them has them."""
+    known: dict[str, str] = {}
+    for c in declaring.__mro__[:-1]:
+        for node in ast.parse(inspect.getsource(sys.modules[c.__module__])).body:
+            if isinstance(node, (ast.Import, ast.ImportFrom)):
+                begin = f"from {node.module} import " if isinstance(node, ast.ImportFrom) else "import "
+                for alias in node.names:
+                    as_name = f" as {alias.asname}" if alias.asname else ""
+                    known.setdefault(alias.asname or alias.name, f"{begin}{alias.name}{as_name}")
+        known |= {n: f"from {c.__module__} import {n}" for n in vars(sys.modules[c.__module__]) if n not in known}
+    nodes = [n for text in texts for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name)]
+    used = {n.id for n in nodes if isinstance(n.ctx, ast.Load) and not hasattr(builtins, n.id)}
+    return {known[name] for name in used}
+
+
+def _sorted(imports: Iterable[str]) -> str:
+    """Return imports as they are usually sorted: the standard library's, others', handover's; names of one together."""
+    names: dict[str, set[str]] = {}
+    for line in imports:
+        begin, _, name = line.rpartition(" import ")
+        names.setdefault(begin or line, set()).update({name} if begin else ())
+    lines = [f"{begin} import {', '.join(sorted(of, key=_order))}" if of else begin for begin, of in names.items()]
+    groups: dict[int, list[str]] = {0: [], 1: [], 2: []}
+    for line in sorted(lines):
+        package = line.split()[1].partition(".")[0]
+        groups[2 if package == "handover" else 0 if package in sys.stdlib_module_names else 1].append(line)
+    return "\n\n".join("\n".join(group) for group in groups.values() if group)
+
+
+def _order(name: str) -> tuple[bool, str]:
+    """Return what sorts imported names: classes and constants first."""
+    return not name[0].isupper(), name.lower()
+
+
+def _body(fields: Sequence[tuple[str, str]]) -> str:
+    """Return the body of a dataclass, what is known of each field above it."""
+    if not fields:
+        return "    pass"
+    lines: list[str] = []
+    for remark, text in fields:
+        if remark:
+            lines += textwrap.wrap(remark, _WIDTH - 4, initial_indent="# ", subsequent_indent="# ")
+        lines += text.strip().splitlines()
+    return textwrap.indent("\n".join(lines), "    ")
