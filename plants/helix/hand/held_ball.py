@@ -54,7 +54,6 @@ class HeldBall:
         self._xi = np.zeros((CAPSULES + 2, 3))
         self._ends: Floats | None = None  # of the capsules, where the last contact left them
         self._low, self._low_rate = np.zeros(3), np.zeros(3)
-        self._call(np.zeros((CAPSULES, 2, 3)), 0.0, 0.0, 0, np.zeros((3, 3)))  # loads the machine code
 
     @property
     def p_WO(self) -> Floats:
@@ -144,3 +143,7 @@ def numbers_of(p: Params) -> ContactNumbers:
         arm_stiffness=p.hold_stiffness,
         arm_damping=p.hold_damping,
     )
+
+
+# Loads the machine code, or makes it: hosts grant loading more time than a step.
+HeldBall(Params()).move(np.zeros(3), np.eye(3), 0.0, np.zeros(3), 0.0, _STEP)

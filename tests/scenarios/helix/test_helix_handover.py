@@ -40,9 +40,9 @@ def test_a_command_acts_in_the_step_that_follows_its_picture():
 
 @pytest.mark.slow
 def test_the_arm_comes_nearer_to_a_ball_that_it_has_seen(tmp_path: Path):
-    status, summary = run(tmp_path / "r", "--seed", "3", "--stop", "3", "--no-report")
+    status, summary = run(tmp_path / "r", "--seed", "3", "--stop", "5", "--no-report")
     assert status == 1
-    assert "ended at 3 s, as asked" in summary["reason"]
+    assert "ended at 5 s, as asked" in summary["reason"]
     record = Record(tmp_path / "r" / "signals.parquet")
     apart = np.linalg.norm(record["arm.p_WG"] - record["hand.p_WO"], axis=1)
     assert apart[-1] < 0.6 * apart[0]
