@@ -21,7 +21,7 @@ def test_every_picture_of_the_readme_is_made_by_the_command():
     assert spec.loader is not None
     pictures = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(pictures)
-    made = {*pictures.FIGURES, pictures.REPORT}
+    made = {*pictures.FIGURES, *pictures.EXPERIMENTS, pictures.REPORT}
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert set(re.findall(r"docs/(\w+\.(?:png|jpg))", readme)) == made
     assert {p.name for p in DOCS.iterdir() if p.suffix in (".png", ".jpg")} == made
