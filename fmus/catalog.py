@@ -86,13 +86,13 @@ _ENTRIES = (
     ),
     Entry(
         "HandoverVision",
-        "handover.controllers.helix.handover_vision:HandoverVision",
+        "handover.controllers.helix.vision.handover_vision:HandoverVision",
         Fraction(1, 30),
         "finds ball and markers",
     ),
     Entry(
         "VisualServo",
-        "handover.controllers.helix.visual_servo:VisualServo",
+        "handover.controllers.helix.servo.visual_servo:VisualServo",
         Fraction(1, 10),
         "moves the arm by what vision sees",
     ),

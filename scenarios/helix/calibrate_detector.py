@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from handover.controllers.helix.detector_calibration import DetectorCalibration, calibrate_detector
-from handover.controllers.helix.markers import MarkerRing
-from handover.controllers.helix.stereo import Pixels, StereoRig
+from handover.controllers.helix.vision.detector_calibration import DetectorCalibration, calibrate_detector
+from handover.controllers.helix.vision.markers import MarkerRing
+from handover.controllers.helix.vision.stereo import Pixels, StereoRig
 from handover.cosim.blocks.geometry import quaternion_of, rotation_by
 from handover.plants.helix.cameras.stereo_camera import Inputs, Params, StereoCamera
 from handover.scenarios.helix.cameras import camera_of, camera_parameters

@@ -85,7 +85,9 @@ def calibrated(
     Raises:
         TooFewCorners: a camera sees fewer than four of the corners.
     """
-    from handover.controllers.helix.calibration import camera_pose  # OpenCV is slow to import, and lists import this
+    from handover.controllers.helix.vision.calibration import (
+        camera_pose,  # OpenCV is slow to import, and lists import this
+    )
 
     rng = np.random.default_rng(seed)
     found, corners = camera_parameters(places=places), box_corners(box_height)

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.controllers.helix.constant_curvature import W_FROM_B, forward_kinematics
-from handover.controllers.helix.vision_parameters import Params as VisionParams
+from handover.controllers.helix.servo.constant_curvature import W_FROM_B, forward_kinematics
+from handover.controllers.helix.vision.vision_parameters import Params as VisionParams
 from handover.cosim.blocks.geometry import Pinhole, rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals

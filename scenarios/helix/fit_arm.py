@@ -21,9 +21,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from handover.controllers.helix.visual_servo import Inputs as ServoInputs
-from handover.controllers.helix.visual_servo import Params as ServoParams
-from handover.controllers.helix.visual_servo import Phase, VisualServo
+from handover.controllers.helix.servo.visual_servo import Inputs as ServoInputs
+from handover.controllers.helix.servo.visual_servo import Params as ServoParams
+from handover.controllers.helix.servo.visual_servo import Phase, VisualServo
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.arm.tendon_arm_fast import TendonArmFast
 from handover.plants.helix.arm.tendon_parameters import InvalidArmParameters, Params

@@ -99,7 +99,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
         hand_seed, camera_seed, click_seed, servo_seed = (
             int(n) for n in np.random.SeedSequence(seed).generate_state(4) >> 1
         )
-        from handover.controllers.helix.calibration import (
+        from handover.controllers.helix.vision.calibration import (
             TooFewCorners,  # OpenCV is slow to import, and lists import this
         )
         from handover.scenarios.helix.workspace import notes_on_place  # likewise

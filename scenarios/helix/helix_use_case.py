@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from handover.controllers.helix.constant_curvature import W_FROM_B
-from handover.controllers.helix.jacobian_control import REACH_TOLERANCE, Limits, nearest_pose
-from handover.controllers.helix.servo_parameters import Params as ServoParams
+from handover.controllers.helix.servo.constant_curvature import W_FROM_B
+from handover.controllers.helix.servo.jacobian_control import REACH_TOLERANCE, Limits, nearest_pose
+from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.units import Metre, Radian, Second
 from handover.cosim.record.reader import Record

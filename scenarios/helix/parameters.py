@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.controllers.helix.vision_parameters import Detector
+from handover.controllers.helix.vision.vision_parameters import Detector
 from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.units import Metre, Number, Radian, Second
 from handover.scenarios.experiment.paper import paper_values

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from handover.controllers.helix.markers import MarkerRing
+from handover.controllers.helix.vision.markers import MarkerRing
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.paper import paper_values

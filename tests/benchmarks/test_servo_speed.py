@@ -9,8 +9,8 @@ import time
 import numpy as np
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from handover.controllers.helix.constant_curvature import forward_kinematics
-from handover.controllers.helix.visual_servo import Inputs, Params, Phase, VisualServo
+from handover.controllers.helix.servo.constant_curvature import forward_kinematics
+from handover.controllers.helix.servo.visual_servo import Inputs, Params, Phase, VisualServo
 
 W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 

@@ -12,8 +12,8 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 from vision_scenes import anywhere, rising
 
-from handover.controllers.helix.handover_vision import Detector, HandoverVision, Outputs, Params
-from handover.controllers.helix.handover_vision import Inputs as Pictures
+from handover.controllers.helix.vision.handover_vision import Detector, HandoverVision, Outputs, Params
+from handover.controllers.helix.vision.handover_vision import Inputs as Pictures
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.cameras import painting
 from handover.plants.helix.cameras.polygon_filling import fill_by_opencv

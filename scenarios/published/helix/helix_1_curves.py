@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.controllers.helix.constant_curvature import W_FROM_B, forward_kinematics
-from handover.controllers.helix.visual_servo import Phase
+from handover.controllers.helix.servo.constant_curvature import W_FROM_B, forward_kinematics
+from handover.controllers.helix.servo.visual_servo import Phase
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.paper import paper_values

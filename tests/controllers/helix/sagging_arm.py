@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from handover.controllers.helix.constant_curvature import forward_kinematics
-from handover.controllers.helix.visual_servo import Inputs
+from handover.controllers.helix.servo.constant_curvature import forward_kinematics
+from handover.controllers.helix.servo.visual_servo import Inputs
 from handover.cosim.blocks.ports import Floats
 
 W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])

@@ -2,8 +2,8 @@ import cv2
 import numpy as np
 import pytest
 
-from handover.controllers.helix.ball import BallFinder
-from handover.controllers.helix.stereo import Pixels, Region
+from handover.controllers.helix.vision.ball import BallFinder
+from handover.controllers.helix.vision.stereo import Pixels, Region
 
 GREEN, GREY = (50, 170, 45), (150, 150, 150)
 CENTRE, RADIUS = np.array([160.3, 121.7]), 20.4

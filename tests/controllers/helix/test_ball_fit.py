@@ -2,10 +2,10 @@ import cv2
 import numpy as np
 import pytest
 
-from handover.controllers.helix.ball import Disc
-from handover.controllers.helix.ball_edges import edges, green_ends, outline_of
-from handover.controllers.helix.ball_fit import BallFit
-from handover.controllers.helix.stereo import Pixels, StereoRig
+from handover.controllers.helix.vision.ball import Disc
+from handover.controllers.helix.vision.ball_edges import edges, green_ends, outline_of
+from handover.controllers.helix.vision.ball_fit import BallFit
+from handover.controllers.helix.vision.stereo import Pixels, StereoRig
 from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
 from handover.cosim.blocks.ports import Floats
 

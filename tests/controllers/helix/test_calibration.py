@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from handover.controllers.helix.calibration import TooFewCorners, camera_pose
+from handover.controllers.helix.vision.calibration import TooFewCorners, camera_pose
 from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of, rotation_of
 from handover.cosim.blocks.ports import Floats
 

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from handover.controllers.helix.constant_curvature import (
+from handover.controllers.helix.servo.constant_curvature import (
     forward_kinematics,
     linearise,
     segment_transform,

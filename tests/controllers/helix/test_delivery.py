@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.helix.delivery import Delivery, Phase, Verdict
-from handover.controllers.helix.servo_parameters import InvalidServoParameters
-from handover.controllers.helix.visual_servo import Inputs, Outputs, Params, VisualServo
+from handover.controllers.helix.servo.delivery import Delivery, Phase, Verdict
+from handover.controllers.helix.servo.servo_parameters import InvalidServoParameters
+from handover.controllers.helix.servo.visual_servo import Inputs, Outputs, Params, VisualServo
 
 P_WG_DROP = np.array([0.0, -0.16, -0.64])
 DELIVERS = Params(delivers=True, p_WG_drop=P_WG_DROP, shaping_time=0.0)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from vision_scenes import anywhere
 
-from handover.controllers.helix.ball_edges import edges, outline_of
-from handover.controllers.helix.detector_calibration import Shift, TooFewPictures, calibrate_detector
-from handover.controllers.helix.markers import MarkerReader, MarkerRing
-from handover.controllers.helix.stereo import Pixels, StereoRig
+from handover.controllers.helix.vision.ball_edges import edges, outline_of
+from handover.controllers.helix.vision.detector_calibration import Shift, TooFewPictures, calibrate_detector
+from handover.controllers.helix.vision.markers import MarkerReader, MarkerRing
+from handover.controllers.helix.vision.stereo import Pixels, StereoRig
 from handover.cosim.blocks.geometry import Pinhole, rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.cameras.stereo_camera import Inputs as Scene

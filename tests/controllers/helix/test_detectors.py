@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from vision_scenes import AWAY, anywhere, distances, hanging, look, rising, scene
 
-from handover.controllers.helix.handover_vision import Detector, HandoverVision, Inputs, Outputs, Params
-from handover.controllers.helix.published_detector import green_middle
+from handover.controllers.helix.vision.handover_vision import Detector, HandoverVision, Inputs, Outputs, Params
+from handover.controllers.helix.vision.published_detector import green_middle
 from handover.cosim.blocks.ports import BLACK_1280X720, Floats
 from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
 from handover.plants.helix.cameras.stereo_camera import StereoCamera

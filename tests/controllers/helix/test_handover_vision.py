@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from vision_scenes import AWAY, PLACES, anywhere, distances, hanging, look, over_ball, reaching
 
-from handover.controllers.helix.handover_vision import HandoverVision, Inputs, Outputs, Params
+from handover.controllers.helix.vision.handover_vision import HandoverVision, Inputs, Outputs, Params
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import InvalidCalibration
 from handover.cosim.blocks.ports import BLACK_1280X720, Floats

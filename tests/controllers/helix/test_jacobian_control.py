@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.controllers.helix.constant_curvature import forward_kinematics
-from handover.controllers.helix.jacobian_control import ControlStep, Limits, blend, control_step, keep_limits
+from handover.controllers.helix.servo.constant_curvature import forward_kinematics
+from handover.controllers.helix.servo.jacobian_control import ControlStep, Limits, blend, control_step, keep_limits
 from handover.cosim.blocks.ports import Floats
 
 D_GRIPPER = 0.10

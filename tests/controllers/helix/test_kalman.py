@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from handover.controllers.helix.estimation import InvalidMeasurement, PositionFilter
+from handover.controllers.helix.servo.estimation import InvalidMeasurement, PositionFilter
 
 HERE, THERE = np.array([0.1, -0.2, -0.6]), np.array([0.3, 0.1, -0.5])
 

@@ -2,8 +2,8 @@ import cv2
 import numpy as np
 import pytest
 
-from handover.controllers.helix.markers import MarkerReader, MarkerRing
-from handover.controllers.helix.stereo import Pixels, Region
+from handover.controllers.helix.vision.markers import MarkerReader, MarkerRing
+from handover.controllers.helix.vision.stereo import Pixels, Region
 from handover.cosim.blocks.ports import Floats
 
 H = np.array([[1.4, 0.12, 301.7], [-0.2, 1.35, 222.4], [0.0008, 0.0004, 1.0]])  # mm on the marker to px

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.controllers.helix.markers import MarkerRing, Markers
-from handover.controllers.helix.ring_fit import RingFit
-from handover.controllers.helix.stereo import covariance
+from handover.controllers.helix.vision.markers import MarkerRing, Markers
+from handover.controllers.helix.vision.ring_fit import RingFit
+from handover.controllers.helix.vision.stereo import covariance
 from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
 from handover.cosim.blocks.ports import Floats
 

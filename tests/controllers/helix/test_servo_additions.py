@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from sagging_arm import W_FROM_B, SaggingArm, ball_at
 
-from handover.controllers.helix.constant_curvature import forward_kinematics
-from handover.controllers.helix.visual_servo import Inputs, Outputs, Params, Phase, Verdict, VisualServo
+from handover.controllers.helix.servo.constant_curvature import forward_kinematics
+from handover.controllers.helix.servo.visual_servo import Inputs, Outputs, Params, Phase, Verdict, VisualServo
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
 

@@ -4,8 +4,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.helix.servo_parameters import InvalidServoParameters, Params
-from handover.controllers.helix.visual_servo import VisualServo
+from handover.controllers.helix.servo.servo_parameters import InvalidServoParameters, Params
+from handover.controllers.helix.servo.visual_servo import VisualServo
 
 
 @pytest.mark.parametrize(

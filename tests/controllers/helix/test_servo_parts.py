@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.optimize import NonlinearConstraint, minimize
 
-from handover.controllers.helix.constant_curvature import forward_kinematics, linearise
-from handover.controllers.helix.jacobian_control import Damping, Limits, damped_step, nearest_pose
-from handover.controllers.helix.recovery import Recovery
-from handover.controllers.helix.response import Response
-from handover.controllers.helix.servo_parameters import Params
-from handover.controllers.helix.shaping import Shaper
+from handover.controllers.helix.servo.constant_curvature import forward_kinematics, linearise
+from handover.controllers.helix.servo.jacobian_control import Damping, Limits, damped_step, nearest_pose
+from handover.controllers.helix.servo.recovery import Recovery
+from handover.controllers.helix.servo.response import Response
+from handover.controllers.helix.servo.servo_parameters import Params
+from handover.controllers.helix.servo.shaping import Shaper
 from handover.cosim.blocks.ports import Floats
 
 P = Params()

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.optimize import NonlinearConstraint, minimize
 
-from handover.controllers.helix.constant_curvature import forward_kinematics, linearise
-from handover.controllers.helix.estimation import StateEstimate, optimise_state
+from handover.controllers.helix.servo.constant_curvature import forward_kinematics, linearise
+from handover.controllers.helix.servo.estimation import StateEstimate, optimise_state
 from handover.cosim.blocks.ports import Floats
 
 D_GRIPPER = 0.10

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from sagging_arm import Q_CALIB, W_FROM_B, SaggingArm, ball_at
 
-from handover.controllers.helix.constant_curvature import forward_kinematics, tendon_lengths
-from handover.controllers.helix.visual_servo import Inputs, Outputs, Params, Phase, VisualServo
+from handover.controllers.helix.servo.constant_curvature import forward_kinematics, tendon_lengths
+from handover.controllers.helix.servo.visual_servo import Inputs, Outputs, Params, Phase, VisualServo
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.paper import paper_values

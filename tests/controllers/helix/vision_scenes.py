@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handover.controllers.helix.handover_vision import HandoverVision, Inputs, Outputs
+from handover.controllers.helix.vision.handover_vision import HandoverVision, Inputs, Outputs
 from handover.cosim.blocks.geometry import quaternion_of
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.cameras.stereo_camera import Inputs as Scene

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.controllers.helix.visual_servo import Phase
+from handover.controllers.helix.servo.visual_servo import Phase
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.plants.helix.hand.partner_parameters import Holder

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.helix.handover_vision import Detector
-from handover.controllers.helix.stereo import StereoRig
+from handover.controllers.helix.vision.handover_vision import Detector
+from handover.controllers.helix.vision.stereo import StereoRig
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.exceptions import WiringError
 from handover.cosim.system.system import System

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from helix_signals import P_WG, P_WR, PICTURE, port, views_and_ports
 
-from handover.controllers.helix.visual_servo import Phase, Verdict
+from handover.controllers.helix.servo.visual_servo import Phase, Verdict
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.system.signals import Signals
 from handover.plants.helix.hand.partner_parameters import Holder

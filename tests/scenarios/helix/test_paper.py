@@ -8,8 +8,8 @@ import pytest
 import tomli
 
 import handover.scenarios.helix
-from handover.controllers.helix.handover_vision import Params as VisionParams
-from handover.controllers.helix.servo_parameters import Params as ServoParams
+from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
+from handover.controllers.helix.vision.handover_vision import Params as VisionParams
 from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
 from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
 from handover.plants.helix.hand.partner_parameters import Params as HandParams

@@ -11,7 +11,7 @@ from helix_signals import PICTURE, port, views_and_ports
 from parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.helix
-from handover.controllers.helix.visual_servo import Phase, Verdict
+from handover.controllers.helix.servo.visual_servo import Phase, Verdict
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import WiringError
 from handover.cosim.record.reader import Record

@@ -8,8 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 from chosen_curves import PERIOD
 
-from handover.controllers.helix.constant_curvature import forward_kinematics
-from handover.controllers.helix.visual_servo import Phase
+from handover.controllers.helix.servo.constant_curvature import forward_kinematics
+from handover.controllers.helix.servo.visual_servo import Phase
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.published.helix.helix_1_curves import RunCurves, curves_of, mean_curve
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from handover.controllers.helix.stereo import Pixels, Region
+from handover.controllers.helix.vision.stereo import Pixels, Region
 from handover.cosim.blocks.ports import Floats
 
 _GREEN_FROM = (38, 60, 25)  # hue (180 a turn), saturation, value

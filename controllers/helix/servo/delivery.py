@@ -6,7 +6,7 @@ Besides, the phases of the whole task and the reasons for which it is given up, 
 import enum
 from typing import Any
 
-from handover.controllers.helix.servo_parameters import Params
+from handover.controllers.helix.servo.servo_parameters import Params
 from handover.cosim.blocks.ports import Floats
 
 SAME_TIME = 1e-9

@@ -7,13 +7,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.helix.ball_fit import BallFit
-from handover.controllers.helix.joint_detector import Bounds, JointDetector
-from handover.controllers.helix.markers import MarkerReader, MarkerRing
-from handover.controllers.helix.published_detector import PublishedDetector
-from handover.controllers.helix.ring_fit import RingFit
-from handover.controllers.helix.stereo import Pixels, StereoRig
-from handover.controllers.helix.vision_parameters import Detector, Params
+from handover.controllers.helix.vision.ball_fit import BallFit
+from handover.controllers.helix.vision.joint_detector import Bounds, JointDetector
+from handover.controllers.helix.vision.markers import MarkerReader, MarkerRing
+from handover.controllers.helix.vision.published_detector import PublishedDetector
+from handover.controllers.helix.vision.ring_fit import RingFit
+from handover.controllers.helix.vision.stereo import Pixels, StereoRig
+from handover.controllers.helix.vision.vision_parameters import Detector, Params
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import (
     BLACK_1280X720,

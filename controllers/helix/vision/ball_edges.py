@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.controllers.helix.stereo import Pixels
+from handover.controllers.helix.vision.stereo import Pixels
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 

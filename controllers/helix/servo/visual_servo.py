@@ -8,17 +8,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from handover.controllers.helix.approach_path import next_place
-from handover.controllers.helix.constant_curvature import W_FROM_B, forward_kinematics, linearise, tendon_lengths
-from handover.controllers.helix.delivery import SAME_TIME, Delivery, Phase, Verdict
-from handover.controllers.helix.estimation import optimise_state, weights_of_state
-from handover.controllers.helix.jacobian_control import Damping, Limits, blend, control_step, is_reached
-from handover.controllers.helix.progress import Progress
-from handover.controllers.helix.recovery import Recovery
-from handover.controllers.helix.response import Response
-from handover.controllers.helix.servo_parameters import InvalidServoParameters, Params
-from handover.controllers.helix.shaping import Shaper
-from handover.controllers.helix.tracking import Tracker
+from handover.controllers.helix.servo.approach_path import next_place
+from handover.controllers.helix.servo.constant_curvature import W_FROM_B, forward_kinematics, linearise, tendon_lengths
+from handover.controllers.helix.servo.delivery import SAME_TIME, Delivery, Phase, Verdict
+from handover.controllers.helix.servo.estimation import optimise_state, weights_of_state
+from handover.controllers.helix.servo.jacobian_control import Damping, Limits, blend, control_step, is_reached
+from handover.controllers.helix.servo.progress import Progress
+from handover.controllers.helix.servo.recovery import Recovery
+from handover.controllers.helix.servo.response import Response
+from handover.controllers.helix.servo.servo_parameters import InvalidServoParameters, Params
+from handover.controllers.helix.servo.shaping import Shaper
+from handover.controllers.helix.servo.tracking import Tracker
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, Vector9, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, Number, Radian, SquareMetre

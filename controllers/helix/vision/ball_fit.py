@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.controllers.helix.ball import Disc
-from handover.controllers.helix.ball_edges import Edges, edges, green_ends, outline_of
-from handover.controllers.helix.stereo import Pixels, StereoRig, covariance
+from handover.controllers.helix.vision.ball import Disc
+from handover.controllers.helix.vision.ball_edges import Edges, edges, green_ends, outline_of
+from handover.controllers.helix.vision.stereo import Pixels, StereoRig, covariance
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from handover.controllers.helix.ball import BallFinder
-from handover.controllers.helix.ball_fit import BallFit, BallPosition
-from handover.controllers.helix.markers import NO_MARKERS, MarkerReader, MarkerRing, Markers
-from handover.controllers.helix.ring_fit import RingFit, RingPose
-from handover.controllers.helix.stereo import Pixels, Region, StereoRig, covariance
+from handover.controllers.helix.vision.ball import BallFinder
+from handover.controllers.helix.vision.ball_fit import BallFit, BallPosition
+from handover.controllers.helix.vision.markers import NO_MARKERS, MarkerReader, MarkerRing, Markers
+from handover.controllers.helix.vision.ring_fit import RingFit, RingPose
+from handover.controllers.helix.vision.stereo import Pixels, Region, StereoRig, covariance
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from handover.controllers.helix.servo_parameters import Params
+from handover.controllers.helix.servo.servo_parameters import Params
 from handover.cosim.blocks.ports import Floats
 
 _REGAIN, _FADE, _RISE, _LEAST = 1.05, 0.85, 1.5, 0.05

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from handover.controllers.helix.constant_curvature import linearise
+from handover.controllers.helix.servo.constant_curvature import linearise
 from handover.cosim.blocks.ports import Floats
 
 REACH_TOLERANCE = 0.003

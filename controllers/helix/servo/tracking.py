@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from handover.controllers.helix.estimation import PositionFilter
-from handover.controllers.helix.servo_parameters import Params
+from handover.controllers.helix.servo.estimation import PositionFilter
+from handover.controllers.helix.servo.servo_parameters import Params
 from handover.cosim.blocks.ports import Floats
 
 _UP = np.array([0.0, 0.0, 1.0])

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.controllers.helix.stereo import Pixels, Region
+from handover.controllers.helix.vision.stereo import Pixels, Region
 from handover.cosim.blocks.ports import Floats
 
 SIDES = 8

@@ -9,11 +9,11 @@ from typing import Any
 import cv2
 import numpy as np
 
-from handover.controllers.helix.ball import SPECK, green_mask
-from handover.controllers.helix.ball_fit import BallPosition
-from handover.controllers.helix.joint_detector import WristPosition
-from handover.controllers.helix.markers import DICTIONARY, MarkerRing, Markers, read_markers
-from handover.controllers.helix.stereo import Pixels, StereoRig
+from handover.controllers.helix.vision.ball import SPECK, green_mask
+from handover.controllers.helix.vision.ball_fit import BallPosition
+from handover.controllers.helix.vision.joint_detector import WristPosition
+from handover.controllers.helix.vision.markers import DICTIONARY, MarkerRing, Markers, read_markers
+from handover.controllers.helix.vision.stereo import Pixels, StereoRig
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from handover.controllers.helix.markers import MarkerRing, Markers
-from handover.controllers.helix.stereo import least_squares
+from handover.controllers.helix.vision.markers import MarkerRing, Markers
+from handover.controllers.helix.vision.stereo import least_squares
 from handover.cosim.blocks.geometry import Pinhole, rotation_by
 from handover.cosim.blocks.ports import Floats
 

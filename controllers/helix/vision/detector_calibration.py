@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.controllers.helix.ball import BallFinder
-from handover.controllers.helix.ball_fit import BallFit
-from handover.controllers.helix.markers import MarkerReader, MarkerRing, Markers
-from handover.controllers.helix.ring_fit import RingFit
-from handover.controllers.helix.stereo import Pixels, StereoRig, least_squares
+from handover.controllers.helix.vision.ball import BallFinder
+from handover.controllers.helix.vision.ball_fit import BallFit
+from handover.controllers.helix.vision.markers import MarkerReader, MarkerRing, Markers
+from handover.controllers.helix.vision.ring_fit import RingFit
+from handover.controllers.helix.vision.stereo import Pixels, StereoRig, least_squares
 from handover.cosim.blocks.ports import Floats
 
 _ITERATIONS = 4

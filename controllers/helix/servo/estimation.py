@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from handover.controllers.helix.constant_curvature import linearise
+from handover.controllers.helix.servo.constant_curvature import linearise
 from handover.cosim.blocks.ports import Floats
 
 

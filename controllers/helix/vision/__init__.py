@@ -1,0 +1,1 @@
+"""What the Helix sees: ball, wrist and gripper in the pictures of calibrated cameras."""
