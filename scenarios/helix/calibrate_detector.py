@@ -11,10 +11,10 @@ import numpy as np
 
 from handover.controllers.helix.vision.detector_calibration import DetectorCalibration, calibrate_detector
 from handover.controllers.helix.vision.markers import MarkerRing
-from handover.controllers.helix.vision.stereo import Pixels, StereoRig
+from handover.controllers.helix.vision.stereo import Pixels
 from handover.cosim.blocks.geometry import quaternion_of, rotation_by
 from handover.plants.helix.cameras.stereo_camera import Inputs, Params, StereoCamera
-from handover.scenarios.helix.cameras import camera_of, camera_parameters
+from handover.scenarios.helix.cameras import pinholes
 
 _HANGING = np.diag([1.0, -1.0, -1.0])  # R_WR
 
@@ -27,10 +27,9 @@ def calibrated_detector(camera: Params, pairs: int, seed: int) -> DetectorCalibr
         pairs: of pictures.
         seed: draws the poses.
     """
-    found = camera_parameters()
-    rig = StereoRig(camera_of("left", found), camera_of("right", found))
+    cameras = list(pinholes().values())
     ring = MarkerRing(camera.apothem, camera.marker, camera.rings)
-    return calibrate_detector(_taken(StereoCamera(camera), pairs, seed), rig, ring, camera.ball_radius)
+    return calibrate_detector(_taken(StereoCamera(camera), pairs, seed), cameras, ring, camera.ball_radius)
 
 
 def _taken(camera: StereoCamera, pairs: int, seed: int) -> Iterator[tuple[Pixels, Pixels]]:

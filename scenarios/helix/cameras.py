@@ -1,6 +1,6 @@
-"""The two cameras of the experiment: where they are, and where the calibration finds them.
+"""The two cameras of the experiment, or three: where they are, and where the calibration finds them.
 
-As in the thesis ([Vervloet2025] sec. 3.2.2), somebody clicks on six corners of a box in both pictures, and the detector
+As in the thesis ([Vervloet2025] sec. 3.2.2), somebody clicks on six corners of a box in each picture, and the detector
 gets the poses that follow from these clicks alone. Lenses are calibrated separately, which is taken as perfect (an
 assumption). The values are those of `paper.toml`.
 """
@@ -15,15 +15,22 @@ from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of, r
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.paper import paper_values
 
-SIDES = ("left", "right")
-
 
 class CameraPlaces(enum.IntEnum):
-    """Where the right camera is: beside the left one behind the arm, or as [Vervloet2025] sec. 5.4.1 suggests."""
+    """Where the cameras are: two behind the arm, or as [Vervloet2025] sec. 5.4.1 suggests.
+
+    Either the right one is above or at the side, or a third one is above.
+    """
 
     BEHIND = 0
     TOP = 1
     SIDE = 2
+    THREE = 3
+
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """The cameras' names, as the units' parameters end with them."""
+        return ("left", "right", "third") if self is CameraPlaces.THREE else ("left", "right")
 
 
 PICTURE = np.array([1280.0, 720.0])
@@ -34,17 +41,21 @@ _MARGIN = 1.0 / 12.0  # of a marker's side, on each side of it: half a cell of w
 
 
 def camera_parameters(turned: float = 0.0, places: CameraPlaces = CameraPlaces.BEHIND) -> dict[str, Any]:
-    """Return both cameras' true poses and lenses under the names of the units' parameters.
+    """Return the cameras' true poses and lenses under the names of the units' parameters.
 
     Args:
         turned: angle by which the right camera was turned to its left about its upright axis, rad.
         places: of the cameras.
     """
     camera = {name: np.array(value) for name, value in paper_values("helix", "camera").items()}
-    parameters: dict[str, Any] = {}
-    for i, side in enumerate(SIDES):
-        moved = side == "right" and places is not CameraPlaces.BEHIND
-        p_WC = camera[f"p_WC_{places.name.lower()}"] if moved else camera["p_WC"][i]
+    parameters: dict[str, Any] = {"has_third": True} if places is CameraPlaces.THREE else {}
+    elsewhere = {
+        CameraPlaces.TOP: {"right": camera["p_WC_top"]},
+        CameraPlaces.SIDE: {"right": camera["p_WC_side"]},
+        CameraPlaces.THREE: {"third": camera["p_WC_top"]},
+    }.get(places, {})
+    for i, side in enumerate(places.sides):
+        p_WC = elsewhere[side] if side in elsewhere else camera["p_WC"][i]
         turn = rotation_by(np.array([0.0, -turned if side == "right" else 0.0, 0.0]))
         parameters[f"p_WC_{side}"] = p_WC
         parameters[f"q_WC_{side}"] = quaternion_of(looking_at(p_WC, camera["looked_at"]) @ turn)
@@ -53,8 +64,14 @@ def camera_parameters(turned: float = 0.0, places: CameraPlaces = CameraPlaces.B
     return parameters
 
 
+def pinholes(turned: float = 0.0, places: CameraPlaces = CameraPlaces.BEHIND) -> dict[str, Pinhole]:
+    """Return the cameras as they are, by their names; the arguments are those of `camera_parameters`."""
+    parameters = camera_parameters(turned, places)
+    return {side: camera_of(side, parameters) for side in places.sides}
+
+
 def camera_of(side: str, parameters: Mapping[str, Any]) -> Pinhole:
-    """Return the camera of one side, `left` or `right`, of what `camera_parameters` or `calibrated` returned."""
+    """Return the camera `left`, `right` or `third` of what `camera_parameters` or `calibrated` returned."""
     return Pinhole(side, *(parameters[f"{what}_{side}"] for what in ("p_WC", "q_WC", "intrinsics", "distortion")))
 
 
@@ -92,7 +109,7 @@ def calibrated(
     rng = np.random.default_rng(seed)
     found, corners = camera_parameters(places=places), box_corners(box_height)
     outwards = np.sign(corners - np.array([0.0, 0.0, box_height]))
-    for side in SIDES:
+    for side in places.sides:
         camera = camera_of(side, found)
         pixels = camera.project(corners)
         seen = np.all((pixels >= 0.0) & (pixels <= PICTURE - 1.0), axis=1)

@@ -1,7 +1,7 @@
 """Evaluates a Helix handover by ground truth, which the arm's controller does not see.
 
 Besides the verdict, `HandoverEvaluator` measures how far the controller's model of the arm is from the arm that
-the cameras see ([Vervloet2025] sec. 4.2, fig. 9), and keeps marked pictures of both cameras.
+the cameras see ([Vervloet2025] sec. 4.2, fig. 9), and keeps marked pictures of all cameras.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,7 +19,7 @@ from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
-from handover.scenarios.helix.cameras import CameraPlaces, camera_of, camera_parameters
+from handover.scenarios.helix.cameras import pinholes
 from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.parameters import Parameters
 
@@ -54,7 +54,7 @@ _SEEN_BY = {"p_WO": "vision.seen_O", "p_WR": "vision.seen_R", "p_WG": "vision.se
 
 
 def take_pictures(t: float, role: str, parameters: Parameters, signals: Signals) -> list[CameraPicture]:
-    """Return the current pictures of both cameras at a time, with marks.
+    """Return the cameras' current pictures at a time, with marks.
 
     Vision processes a picture at the instant at which it is taken, so its measurements belong to the current pictures.
     The controller's estimates are those of its last period.
@@ -62,16 +62,21 @@ def take_pictures(t: float, role: str, parameters: Parameters, signals: Signals)
     return [
         CameraPicture.take(
             t=t,
-            camera=side.name.lower(),
+            camera=side,
             role=role,
-            pixels=signals[f"camera.{side.name.lower()}"].reshape(_SHAPE),
+            pixels=signals[f"camera.{side}"].reshape(_SHAPE),
             marks=[
                 *_estimated(camera, signals),
-                *([] if is_covered(t, side, parameters) else _measured(camera, signals)),
+                *([] if _is_covered(t, side, parameters) else _measured(camera, signals)),
             ],
         )
         for side, camera in _cameras(parameters.camera_turn, parameters.cameras).items()
     ]
+
+
+def _is_covered(t: float, side: str, parameters: Parameters) -> bool:
+    lens = {"left": Cover.LEFT, "right": Cover.RIGHT}.get(side)
+    return lens is not None and is_covered(t, lens, parameters)
 
 
 def is_covered(t: float, side: Cover, parameters: Parameters) -> bool:
@@ -105,10 +110,7 @@ def _mark(camera: Pinhole, name: str, p_WP: Floats, source: str, colour: str) ->
         yield Mark(label=f"{what}, {source}", shape=shape, u=u, v=v, radius=radius, colour=colour)
 
 
-@cache
-def _cameras(turned: float, places: CameraPlaces) -> dict[Cover, Pinhole]:
-    found = camera_parameters(turned, places)
-    return {side: camera_of(side.name.lower(), found) for side in (Cover.LEFT, Cover.RIGHT)}
+_cameras = cache(pinholes)
 
 
 _SETTLING = 1.0

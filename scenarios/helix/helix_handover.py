@@ -21,7 +21,7 @@ from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
-from handover.scenarios.helix.cameras import calibrated, camera_parameters, marker_fault
+from handover.scenarios.helix.cameras import calibrated, camera_parameters, marker_fault, pinholes
 from handover.scenarios.helix.disturbances import Disturbances
 from handover.scenarios.helix.evaluation import HandoverEvaluator
 from handover.scenarios.helix.parameters import Parameters, StepRule, Tuning
@@ -33,7 +33,7 @@ _PAPER = "helix"
 def published_values(p: Parameters) -> Sequence[PublishedValue]:
     """Return the times and steps of table 1 for its step sizes, and for the smallest of them the model's error.
 
-    Nothing for other step sizes, other places of the ball, other markers, or where anything is amiss.
+    Nothing for other step sizes, other places of ball or cameras, other markers, or where anything is amiss.
     """
     published, default = paper_values(_PAPER, "experiment"), Parameters()
     matches = np.flatnonzero(np.isclose(published["alpha"], p.alpha))
@@ -43,6 +43,7 @@ def published_values(p: Parameters) -> Sequence[PublishedValue]:
         "height",
         "marker",
         "rings",
+        "cameras",
     ]
     if not len(matches) or any(getattr(p, name) != getattr(default, name) for name in compared):
         return ()
@@ -157,8 +158,8 @@ class HelixHandover(Experiment[HandoverEvaluator]):
             s.connect(getattr(arm.y, name), getattr(camera.u, name))
         for name in ("p_WO", "p_WH"):
             s.connect(getattr(hand.y, name), getattr(camera.u, name))
-        s.connect(camera.y.left, vision.u.left)
-        s.connect(camera.y.right, vision.u.right)
+        for side in p.cameras.sides:
+            s.connect(getattr(camera.y, side), getattr(vision.u, side))
         for name in ("p_WO_meas", "p_WR_meas", "p_WG_meas", "cov_O", "cov_R", "cov_G", "seen_O", "seen_R"):
             s.connect(getattr(vision.y, name), getattr(servo.u, name))
         s.connect(servo.y.dl_t, arm.u.dl_t)
@@ -201,8 +202,8 @@ class HelixHandover(Experiment[HandoverEvaluator]):
 
         return figures_of_handover(parameters, record)
 
-    def replay(self, parameters: Parameters, record: Record) -> Replay:  # noqa: ARG002
+    def replay(self, parameters: Parameters, record: Record) -> Replay:
         """Return arm, gripper, hand, ball and cameras in space."""
         from handover.scenarios.helix.replay import replay_handover
 
-        return replay_handover(record)
+        return replay_handover(record, pinholes(parameters.camera_turn, parameters.cameras).values())

@@ -23,6 +23,7 @@ from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
+from handover.scenarios.helix.cameras import pinholes
 from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.helix.parameters import Parameters
 from handover.scenarios.helix.places import PLACES
@@ -170,7 +171,7 @@ class HelixUseCase(HelixHandover):
         from handover.scenarios.helix.replay import replay_handover
 
         p: UseCaseParameters = parameters
-        return replay_handover(record, p.bowl)
+        return replay_handover(record, pinholes(p.camera_turn, p.cameras).values(), p.bowl)
 
 
 def nearest_approach(p_WG: Floats, settings: Mapping[str, Any]) -> float:

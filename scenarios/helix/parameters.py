@@ -97,10 +97,11 @@ class Task:
         WeightRule.CONSTANT, "weights of the estimate: those of the tuning, or less where segments are long and bent"
     )
     cameras: CameraPlaces = parameter(
-        CameraPlaces.BEHIND, "right camera: beside the left one behind the arm, above them, or at the side"
+        CameraPlaces.BEHIND,
+        "two behind the arm, the right one of them above or at the side instead, or a third one above",
     )
     detector: Detector = parameter(
-        Detector.JOINT, "how ball and wrist are found: one fit to all that both cameras see, or the thesis's averages"
+        Detector.JOINT, "how ball and wrist are found: one fit to all that the cameras see, or the thesis's averages"
     )
     marker: Metre = parameter(0.02, "side of the wrist's markers", minimum=0.005, maximum=0.05)
     rings: int = parameter(1, "rings of markers: a second one sits above the first", minimum=1, maximum=2)

@@ -9,9 +9,10 @@ _BASE = (
 )
 _CALIBRATION = {
     f"{what}_{side}": ""
-    for side in ("left", "right")
+    for side in ("left", "right", "third")
     for what in ("p_WC", "q_WC", "intrinsics", "distortion")
 }  # fmt: skip
+_THIRD = "with cameras=three alone"
 _MARKERS = {"marker": "the scenario's marker", "rings": "the scenario's rings"}
 _SEEN = {
     "p_WO_meas": "in W; while it is not seen, the last one, zeros before any",
@@ -47,6 +48,7 @@ PLACES = {
             "grip": "",
             "p_WO": "in W",
             "p_WH": "in W",
+            "third": _THIRD,
             **_CALIBRATION,
             "seed": "follows from the run's seed",
             "decimation": "the unit is stepped so often",
@@ -66,6 +68,7 @@ PLACES = {
         optional={
             "left": "",
             "right": "",
+            "third": _THIRD,
             **_COVARIANCES,
             **dict.fromkeys(_CALIBRATION, "as the clicks of the calibration give it"),
             "decimation": "the unit is stepped so often",

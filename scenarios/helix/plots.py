@@ -189,22 +189,22 @@ def _hand_force(parameters: Parameters, record: Record, phases: Sequence[Phase])
     )
 
 
-_SHOWN_COLUMNS, _SHOWN_ROWS = (240, 1040), (620, 150)
-"""The part of the pictures that is shown, px."""
+_SHOWN_COLUMNS, _SHOWN_ROWS, _SHOWN_ROWS_FROM_ABOVE = (240, 1040), (620, 150), (490, 20)
+"""The part of the pictures that is shown, px; those of a camera above show farther off, which is up in them."""
 
 
 def draw_pictures(pictures: Sequence[CameraPicture], folder: Path) -> Figure:
-    """Draw the pictures of both cameras into a folder, the moments side by side."""
-    moments = list(dict.fromkeys(p.t for p in pictures))
+    """Draw the cameras' pictures into a folder, a camera a row, the moments side by side."""
+    moments, cameras = list(dict.fromkeys(p.t for p in pictures)), list(dict.fromkeys(p.camera for p in pictures))
     n = len(moments)
-    with figure(folder / "pictures", 2, n, size=(3.2 * n, 3.9)) as axes:
+    with figure(folder / "pictures", len(cameras), n, size=(3.2 * n, 1.95 * len(cameras))) as axes:
         for p in pictures:
             i = moments.index(p.t)
-            _show(axes[i if p.camera == "left" else i + n], p)
+            _show(axes[i + n * cameras.index(p.camera)], p)
             axes[i].set_title(f"{p.t:.1f} s, {p.role}")
     caption = (
-        "Left (above) and right camera. Ball (circle), wrist (cross) and gripper (plus), yellow as measured in the "
-        "pictures, blue as the controller has them."
+        f"Cameras from above: {', '.join(cameras)}. Ball (circle), wrist (cross) and gripper (plus), yellow as "
+        "measured in the pictures, blue as the controller has them."
     )
     return Figure("pictures", caption)
 
@@ -212,7 +212,7 @@ def draw_pictures(pictures: Sequence[CameraPicture], folder: Path) -> Figure:
 def _show(axis: Axes, picture: CameraPicture) -> None:
     axis.imshow(picture.pixels[:, :, ::-1])
     axis.set_axis_off()
-    axis.set(xlim=_SHOWN_COLUMNS, ylim=_SHOWN_ROWS)
+    axis.set(xlim=_SHOWN_COLUMNS, ylim=_SHOWN_ROWS_FROM_ABOVE if picture.camera == "third" else _SHOWN_ROWS)
     for mark in picture.marks:
         style: dict[str, Any] = {"color": mark.colour, "lw": 1.2}
         if mark.shape == "circle":

@@ -1,9 +1,11 @@
 """A Helix handover in space: arm, gripper, ball, hand, the cameras, and the estimates of ball and gripper."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.blocks.geometry import rotation_of
+from handover.cosim.blocks.geometry import Pinhole, rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
@@ -11,7 +13,6 @@ from handover.plants.helix.cameras.shapes import Limbs, gripper, hand
 from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
 from handover.plants.helix.hand.bowl import Bowl
 from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, ball, circle, merged, prism, rod, turned
-from handover.scenarios.helix.cameras import camera_of, camera_parameters
 
 _ARM, _PLATE, _COLLAR, _METAL, _FINGER = "#9aa7b5", "#5f6b7a", "#e2e6e8", "#77736f", "#3f74c8"
 _BOWL, _TABLE = "#c9b28a", "#8d8478"
@@ -32,11 +33,11 @@ _BOWL_WALL = 0.004
 """Thickness of the bowl, m."""
 
 
-def replay_handover(record: Record, bowl: Bowl | None = None) -> Replay:
-    """Return the scene of a run over its time, with a bowl if there is one."""
+def replay_handover(record: Record, watching: Iterable[Pinhole] = (), bowl: Bowl | None = None) -> Replay:
+    """Return the scene of a run over its time, with the cameras that watch it, and a bowl if there is one."""
     arm = Line(label="arm", colour=_ARM, points=record["arm.backbone"], radii=np.full(25, CameraParams().arm_radius))
     table = [] if bowl is None else _bowl(bowl)
-    cameras, estimates = [_frustum(side) for side in ("left", "right")], _estimates(record)
+    cameras, estimates = [_frustum(camera) for camera in watching], _estimates(record)
     return Replay(
         bodies=[*_plates(record), _collar(record), *_gripper_body(record), *_hand_body(record), _ball(record), *table],
         lines=[arm, *_fingers(record), *_forearm(record), *estimates],
@@ -140,9 +141,8 @@ def _estimates(record: Record) -> list[Line]:
     ]
 
 
-def _frustum(side: str) -> Line:
+def _frustum(camera: Pinhole) -> Line:
     """Return the edges of the front part of a camera's frustum."""
-    camera = camera_of(side, camera_parameters())
     u, v = camera.c
     depth = _FRUSTUM * np.array([[s * u / camera.f[0], t * v / camera.f[1], 1.0] for s, t in _PICTURE_CORNERS])
     corners = camera.p_WC + depth @ np.transpose(camera.R_WC)

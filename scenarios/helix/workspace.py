@@ -11,7 +11,7 @@ from handover.controllers.helix.vision.markers import MarkerRing
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.helix.cameras import PICTURE, SIDES, CameraPlaces, camera_of, camera_parameters
+from handover.scenarios.helix.cameras import PICTURE, CameraPlaces, pinholes
 
 LEAST_SIDE = 14.0
 """Side of a marker in a picture from which the ring is found nearly always, px (all of 42 poses at 14.5 px and more, 11
@@ -27,8 +27,7 @@ def cameras_that_see(p_WO: Floats, places: CameraPlaces = CameraPlaces.BEHIND) -
         p_WO: the ball in W, shape (3,), m.
         places: of the cameras.
     """
-    parameters = camera_parameters(places=places)
-    return sum(_sees(camera_of(side, parameters), p_WO) for side in SIDES)
+    return sum(_sees(camera, p_WO) for camera in pinholes(places=places).values())
 
 
 def _sees(camera: Pinhole, p_WO: Floats) -> bool:
@@ -74,6 +73,6 @@ def notes_on_place(p_WO: Floats, places: CameraPlaces = CameraPlaces.BEHIND) -> 
         where = f"is sure to reach {far:.2f} m far there" if far > 0.0 else "is not known to reach that height"
         notes.append(f"{place}, but the arm {where}, whatever the direction")
     seeing = cameras_that_see(p_WO, places)
-    if seeing < len(SIDES):
+    if seeing < 2:
         notes.append(f"{place}, where {('no camera sees', 'one camera alone sees')[seeing]} ball and markers whole")
     return notes

@@ -1,22 +1,23 @@
-"""The ball's position by the sphere whose outline lies on the edges in both pictures, its radius being known.
+"""The ball's position by the sphere whose outline lies on the edges in all pictures, its radius being known.
 
 [Vervloet2025] sec. 3.2.3 triangulates the middles of two circles; this is own.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from handover.controllers.helix.vision.ball import Disc
 from handover.controllers.helix.vision.ball_edges import Edges, edges, green_ends, outline_of
-from handover.controllers.helix.vision.stereo import Pixels, StereoRig, covariance
+from handover.controllers.helix.vision.stereo import Pixels, covariance, triangulate
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 
 _PASSES = 8
 _CAPTURED = 1.0  # px; step of the outline after which it is known roughly
-_SETTLED = {1: 0.1, 2: 0.2}  # px; likewise well enough, by cameras: a tenth of it is 2 mm where size tells depth
+_SETTLED, _SETTLED_ALONE = 0.2, 0.1  # px; likewise well enough: a tenth of it is 2 mm where size alone tells depth
 _ROUGHLY, _EXACTLY = (5.0, 2.5), (1.0, 0.4)  # px; tolerances of the first and the second solution of a pass
 _STRIDE = 0.02  # m; standard deviation that is expected of a step: it holds what few edges leave free
 _FEWEST = 4.0  # sum of the edges' weights; less is no ball
@@ -45,19 +46,22 @@ class BallFit:
     weights (1 - (e / c)^2)^2 of the distances e times the edges' own. The tolerance c shrinks from 5 px to 0.4 px, so
     that edges of fingers, which hide a part of the ball, drop out.
 
-    Blur and light may move the whole edge in or out; so this shift, in px, is estimated too. Seen by two cameras, the
-    ball's depth then comes from the angle between them; seen by one, from its size, as uncertain as the shift makes it.
+    Blur and light may move the whole edge in or out; so this shift, in px, is estimated too. Seen by several cameras,
+    the ball's depth then comes from the angles between them; seen by one, from its size, as uncertain as the shift
+    makes it.
 
     Args:
-        rig: the cameras.
+        cameras: two or more.
         radius: of the ball, in m.
         noise: standard deviation of an edge that counts fully, in px, as if they were independent.
         shift: mean and standard deviation of the edges' shift outwards, in px.
-        gap: largest distance, in m, at which the two cameras' rays through the ball's middle may pass each other.
+        gap: largest distance, in m, at which the cameras' rays through the ball's middle may pass each other.
     """
 
-    def __init__(self, rig: StereoRig, radius: float, noise: float, shift: tuple[float, float], gap: float) -> None:
-        self._rig = rig
+    def __init__(
+        self, cameras: Sequence[Pinhole], radius: float, noise: float, shift: tuple[float, float], gap: float
+    ) -> None:
+        self._cameras = cameras
         self._radius = radius
         self._noise = noise
         self._shift = shift
@@ -68,36 +72,27 @@ class BallFit:
     ) -> BallPosition | None:
         """Return the ball's position, or None if no picture shows it.
 
-        Where the pictures contradict each other, the one with more of the disc counts.
+        Where the pictures contradict each other, most of those that agree count, or else that with most of the disc.
 
         Args:
-            pictures: of the left and the right camera.
+            pictures: of each camera.
             discs: as which they show the ball, roughly.
-            near: p_WO of a moment ago, at which to begin if both discs are still there, or None.
+            near: p_WO of a moment ago, at which to begin if all discs are still there, or None.
         """
-        left, right = discs
-        if left and right:
-            if near is not None and self._are_at((left, right), near):
-                return self._solve(self._rig.cameras, pictures, near)
-            start, gap = self._rig.triangulate(left.centre, right.centre)
-            if gap <= self._gap and min(float(c.depth(start)) for c in self._rig.cameras) > 0.0:
-                return self._solve(self._rig.cameras, pictures, start)
-            left, right = (left, None) if left.arc >= right.arc else (None, right)
-        for disc, camera, picture in zip((left, right), self._rig.cameras, pictures, strict=True):
-            if disc:
-                d = camera.rays(disc.centre[None])[0]
-                f = float(camera.f.mean())
-                return self._solve([camera], [picture], camera.p_WC + d * self._radius * f / disc.radius)
-        return None
+        views = [_View(c, p, d) for c, p, d in zip(self._cameras, pictures, discs, strict=True) if d]
+        if len(views) > 1 and near is not None and all(view.shows(near) for view in views):
+            return self._solve(views, near)
+        for n in range(len(views), 1, -1):
+            starts = [(*_meeting(some), some) for some in combinations(views, n)]
+            gap, start, some = min(starts, key=lambda found: found[0])
+            if gap <= self._gap:
+                return self._solve(some, start)
+        alone = max(views, key=lambda view: view.disc.arc, default=None)
+        return alone and self._solve([alone], alone.by_size(self._radius))
 
-    def _are_at(self, discs: Sequence[Disc], p_WO: Floats) -> bool:
-        """Return whether discs are where a ball at p_WO would be: near enough to find its edges from there."""
-        return all(
-            float(np.abs(d.centre - c.project(p_WO)).max()) < _STILL_THERE
-            for d, c in zip(discs, self._rig.cameras, strict=True)
-        )
-
-    def _solve(self, cameras: Sequence[Pinhole], pictures: Sequence[Pixels], p_WO: Floats) -> BallPosition | None:
+    def _solve(self, views: Sequence["_View"], p_WO: Floats) -> BallPosition | None:
+        cameras, pictures = [view.camera for view in views], [view.picture for view in views]
+        settled = _SETTLED if len(views) > 1 else _SETTLED_ALONE
         mean, deviation = self._shift
         doubt = (self._noise / np.array([_STRIDE, _STRIDE, _STRIDE, deviation])) ** 2
         x, captured = np.array([*p_WO, mean]), False
@@ -112,12 +107,40 @@ class BallFit:
             if counted < _FEWEST or behind or abs(x[3] - mean) > _MAX_SHIFT:
                 return None
             moved = float(np.abs(np.einsum("ij,j->i", J[:, :3], dx[:3])).max())
-            if captured and moved < _SETTLED[len(cameras)]:
+            if captured and moved < settled:
                 cov = covariance(information, self._noise)
                 return BallPosition(x[:3], cov[:3, :3], float(x[3]), float(cov[3, 3]))
             captured = captured or moved < _CAPTURED
             outlines = [o.moved_to(c, x[:3], self._radius) for o, c in zip(outlines, cameras, strict=True)]
         return None
+
+
+@dataclass(frozen=True)
+class _View:
+    """A camera, its picture, and the disc as which it shows the ball."""
+
+    camera: Pinhole
+    picture: Pixels
+    disc: Disc
+
+    def shows(self, p_WO: Floats) -> bool:
+        """Return whether the disc is where a ball at p_WO would be: near enough to find its edges from there."""
+        return float(np.abs(self.disc.centre - self.camera.project(p_WO)).max()) < _STILL_THERE
+
+    def by_size(self, radius: float) -> Floats:
+        """Return where a ball of a radius, m, would be seen as large as the disc."""
+        d = self.camera.rays(self.disc.centre[None])[0]
+        return self.camera.p_WC + d * radius * float(self.camera.f.mean()) / self.disc.radius
+
+
+def _meeting(views: Sequence[_View]) -> tuple[float, Floats]:
+    """Return how far the rays through the discs' middles pass each other, m, and the point between them.
+
+    Rays that meet behind a camera do not meet.
+    """
+    cameras = [view.camera for view in views]
+    p_WO, gap = triangulate(cameras, [view.disc.centre for view in views])
+    return (gap if min(float(c.depth(p_WO)) for c in cameras) > 0.0 else float("inf")), p_WO
 
 
 def _step(

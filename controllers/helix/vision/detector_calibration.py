@@ -16,7 +16,8 @@ from handover.controllers.helix.vision.ball import BallFinder
 from handover.controllers.helix.vision.ball_fit import BallFit
 from handover.controllers.helix.vision.markers import MarkerReader, MarkerRing, Markers
 from handover.controllers.helix.vision.ring_fit import RingFit
-from handover.controllers.helix.vision.stereo import Pixels, StereoRig, least_squares
+from handover.controllers.helix.vision.stereo import Pixels, least_squares
+from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 
 _ITERATIONS = 4
@@ -58,7 +59,7 @@ class DetectorCalibration:
 
 
 def calibrate_detector(
-    pairs: Iterable[tuple[Pixels, Pixels]], rig: StereoRig, ring: MarkerRing, ball_radius: float
+    pairs: Iterable[Sequence[Pixels]], cameras: Sequence[Pinhole], ring: MarkerRing, ball_radius: float
 ) -> DetectorCalibration:
     """Return both shifts, estimated from pairs of pictures of ring and ball in several unknown poses.
 
@@ -68,7 +69,7 @@ def calibrate_detector(
 
     Args:
         pairs: pictures of the left and the right camera, shape (h, w, 3), of the same time.
-        rig: both cameras, calibrated.
+        cameras: both, calibrated.
         ring: the markers.
         ball_radius: in m.
 
@@ -78,8 +79,8 @@ def calibrate_detector(
     corners: list[tuple[float, float]] = []
     edges: list[tuple[float, float]] = []
     reader, finder = MarkerReader(0.0, len(ring.corners) // 8), BallFinder()
-    ring_fit = RingFit(ring, rig.cameras, _TOLERANCE)
-    ball_fit = BallFit(rig, ball_radius, 1.0, (0.0, _FREE), _FAR)
+    ring_fit = RingFit(ring, cameras, _TOLERANCE)
+    ball_fit = BallFit(cameras, ball_radius, 1.0, (0.0, _FREE), _FAR)
     for pictures in pairs:
         corner = corner_shift([reader.read(p, reader.search(p)) for p in pictures], ring_fit)
         discs = [finder.find(p, finder.search(p)) for p in pictures]

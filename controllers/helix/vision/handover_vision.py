@@ -1,6 +1,6 @@
-"""Finds ball, wrist and gripper in a pair of pictures, after [Vervloet2025] sec. 3.2."""
+"""Finds ball, wrist and gripper in the pictures of two or three cameras, after [Vervloet2025] sec. 3.2."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from fractions import Fraction
 from typing import ClassVar
@@ -12,7 +12,7 @@ from handover.controllers.helix.vision.joint_detector import Bounds, JointDetect
 from handover.controllers.helix.vision.markers import MarkerReader, MarkerRing
 from handover.controllers.helix.vision.published_detector import PublishedDetector
 from handover.controllers.helix.vision.ring_fit import RingFit
-from handover.controllers.helix.vision.stereo import Pixels, StereoRig
+from handover.controllers.helix.vision.stereo import Pixels
 from handover.controllers.helix.vision.vision_parameters import Detector, Params
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import (
@@ -33,10 +33,11 @@ _UNKNOWN = np.eye(3)  # m^2; covariance of what is not seen
 
 @dataclass(kw_only=True)
 class Inputs:
-    """A pair of pictures taken at the same time."""
+    """Pictures taken at the same time."""
 
     left: Picture1280x720 = port(BLACK_1280X720, "picture of the left camera")
     right: Picture1280x720 = port(BLACK_1280X720, "picture of the right camera")
+    third: Picture1280x720 = port(BLACK_1280X720, "picture of the third camera, if there is one")
 
 
 @dataclass(kw_only=True)
@@ -56,7 +57,7 @@ class Outputs:
 class HandoverVision:
     """Measures ball, wrist and gripper: p_WG = p_WR + d_gripper z_R, eqs. (12)-(13).
 
-    Two detectors do it: `JointDetector` fits one pose to all marker corners in both pictures, and a sphere to the
+    Two detectors do it: `JointDetector` fits one pose to all marker corners in all pictures, and a sphere to the
     ball's outlines; `PublishedDetector` averages single markers and triangulates circles, as the thesis has it. A step
     that looks at no pictures (decimation) repeats the last measurement.
 
@@ -67,13 +68,15 @@ class HandoverVision:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
-        ("p_WO_meas", "p_WR_meas", "p_WG_meas", "cov_O", "cov_R", "cov_G", "seen_O", "seen_R"), ("left", "right")
+        ("p_WO_meas", "p_WR_meas", "p_WG_meas", "cov_O", "cov_R", "cov_G", "seen_O", "seen_R"),
+        ("left", "right", "third"),
     )
     period: ClassVar[Fraction | None] = Fraction(1, 30)
 
     def __init__(self, params: Params) -> None:
         self.params = params
-        self._detector = _detector(params)
+        self._cameras = _cameras(params)
+        self._detector = _detector(params, self._cameras)
         self._ticks = 0
         self._seen: Outputs | None = None
 
@@ -89,7 +92,7 @@ class HandoverVision:
         is_due = self._ticks % self.params.decimation == 0
         self._ticks += 1
         if is_due or self._seen is None:
-            self._seen = self._look(t, (u.left, u.right), self._seen)
+            self._seen = self._look(t, (u.left, u.right, u.third)[: len(self._cameras)], self._seen)
         return self._seen
 
     def get_state(self) -> bytes:
@@ -104,7 +107,7 @@ class HandoverVision:
         names = [f.name for f in fields(Outputs)]
         self._seen = None if seen is None else Outputs(**dict(zip(names, seen, strict=True)))
 
-    def _look(self, t: float, pictures: tuple[Pixels, Pixels], last: Outputs | None) -> Outputs:
+    def _look(self, t: float, pictures: Sequence[Pixels], last: Outputs | None) -> Outputs:
         ball, wrist = self._detector.find_ball(pictures), self._detector.find_wrist(t, pictures)
         p_WO, p_WR, p_WG = (last.p_WO_meas, last.p_WR_meas, last.p_WG_meas) if last else np.zeros((3, 3))
         return Outputs(
@@ -119,20 +122,26 @@ class HandoverVision:
         )
 
 
-def _detector(p: Params) -> JointDetector | PublishedDetector:
-    rig = StereoRig(
+def _cameras(p: Params) -> Sequence[Pinhole]:
+    cameras = [
         Pinhole("left", p.p_WC_left, p.q_WC_left, p.intrinsics_left, p.distortion_left),
         Pinhole("right", p.p_WC_right, p.q_WC_right, p.intrinsics_right, p.distortion_right),
-    )
+    ]
+    if p.has_third:
+        cameras.append(Pinhole("third", p.p_WC_third, p.q_WC_third, p.intrinsics_third, p.distortion_third))
+    return cameras
+
+
+def _detector(p: Params, cameras: Sequence[Pinhole]) -> JointDetector | PublishedDetector:
     ring = MarkerRing(p.apothem, p.marker, p.rings)
     if p.detector is Detector.PUBLISHED:
-        return PublishedDetector(rig, ring, p.d_gripper)
+        return PublishedDetector(cameras, ring, p.d_gripper)
     return JointDetector(
-        rig,
+        cameras,
         ring,
         MarkerReader(p.corner_shift, p.rings),
-        RingFit(ring, rig.cameras, p.corner_tolerance),
-        BallFit(rig, p.ball_radius, p.outline_noise, (p.edge_shift, p.edge_doubt), p.ray_tolerance),
+        RingFit(ring, cameras, p.corner_tolerance),
+        BallFit(cameras, p.ball_radius, p.outline_noise, (p.edge_shift, p.edge_doubt), p.ray_tolerance),
         Bounds(p.largest_speed, p.largest_turn, p.largest_deviation),
         corner_noise=p.corner_noise,
         ball_radius=p.ball_radius,

@@ -15,7 +15,7 @@ from handover.controllers.helix.vision.ball import BallFinder
 from handover.controllers.helix.vision.ball_fit import BallFit, BallPosition
 from handover.controllers.helix.vision.markers import NO_MARKERS, MarkerReader, MarkerRing, Markers
 from handover.controllers.helix.vision.ring_fit import RingFit, RingPose
-from handover.controllers.helix.vision.stereo import Pixels, Region, StereoRig, covariance
+from handover.controllers.helix.vision.stereo import Pixels, Region, covariance
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 
@@ -75,7 +75,7 @@ class JointDetector:
     an arm that was hidden for long is found again wherever it is.
 
     Args:
-        rig: both cameras.
+        cameras: two or more.
         ring: the markers.
         reader: reads markers of that many rings.
         ring_fit: fits the ring's pose.
@@ -88,7 +88,7 @@ class JointDetector:
 
     def __init__(
         self,
-        rig: StereoRig,
+        cameras: Sequence[Pinhole],
         ring: MarkerRing,
         reader: MarkerReader,
         ring_fit: RingFit,
@@ -99,15 +99,15 @@ class JointDetector:
         ball_radius: float,
         d_gripper: float,
     ) -> None:
-        self._rig, self._ring, self._reader = rig, ring, reader
+        self._cameras, self._ring, self._reader = cameras, ring, reader
         self._ring_fit, self._ball_fit, self._finder = ring_fit, ball_fit, BallFinder()
         self._bounds = bounds
         self._corner_noise, self._ball_radius, self._d_gripper = corner_noise, ball_radius, d_gripper
-        self._p_WO: Floats | None = None  # where the ball was in the last pair
+        self._p_WO: Floats | None = None  # where the ball was in the last pictures
         self._fitted: _Fitted | None = None
-        self._sees_ring = False  # whether the last pair showed it
+        self._sees_ring = False  # whether the last pictures showed it
 
-    def find_ball(self, pictures: tuple[Pixels, Pixels]) -> BallPosition | None:
+    def find_ball(self, pictures: Sequence[Pixels]) -> BallPosition | None:
         """Return the ball's position, or None."""
         ball = None
         if self._p_WO is not None:
@@ -119,7 +119,7 @@ class JointDetector:
         self._p_WO = None if ball is None else ball.p_WO
         return ball
 
-    def find_wrist(self, t: float, pictures: tuple[Pixels, Pixels]) -> WristPosition | None:
+    def find_wrist(self, t: float, pictures: Sequence[Pixels]) -> WristPosition | None:
         """Return wrist and gripper at time t, in s, or None."""
         accepted = None
         if self._fitted and self._sees_ring:
@@ -141,12 +141,12 @@ class JointDetector:
         self._p_WO, self._sees_ring, fitted = state
         self._fitted = None if fitted is None else _Fitted(*fitted)
 
-    def _ball_near(self, pictures: tuple[Pixels, Pixels], p_WO: Floats) -> BallPosition | None:
-        regions = [self._ball_region(c, p, p_WO) for c, p in zip(self._rig.cameras, pictures, strict=True)]
+    def _ball_near(self, pictures: Sequence[Pixels], p_WO: Floats) -> BallPosition | None:
+        regions = [self._ball_region(c, p, p_WO) for c, p in zip(self._cameras, pictures, strict=True)]
         return self._ball_in(pictures, regions, p_WO)
 
     def _ball_in(
-        self, pictures: tuple[Pixels, Pixels], regions: Sequence[Region], near: Floats | None
+        self, pictures: Sequence[Pixels], regions: Sequence[Region], near: Floats | None
     ) -> BallPosition | None:
         return self._ball_fit.fit(
             pictures, [self._finder.find(p, r) for p, r in zip(pictures, regions, strict=True)], near
@@ -162,24 +162,24 @@ class JointDetector:
         outline = p_WR + self._ring.outline @ np.transpose(R_WR)
         return Region.around(camera.project(outline), _RING_MARGIN, picture)
 
-    def _track(self, pictures: tuple[Pixels, Pixels], near: tuple[Floats, Floats]) -> RingPose | None:
-        regions = [self._ring_region(c, p, near) for c, p in zip(self._rig.cameras, pictures, strict=True)]
+    def _track(self, pictures: Sequence[Pixels], near: tuple[Floats, Floats]) -> RingPose | None:
+        regions = [self._ring_region(c, p, near) for c, p in zip(self._cameras, pictures, strict=True)]
         return self._ring_fit.fit([self._reader.read(p, r) for p, r in zip(pictures, regions, strict=True)], near)
 
-    def _search(self, pictures: tuple[Pixels, Pixels]) -> RingPose | None:
-        """Return the pose of a ring that may be anywhere: what the left picture tells says where to look in the right.
+    def _search(self, pictures: Sequence[Pixels]) -> RingPose | None:
+        """Return the pose of a ring that may be anywhere: what one picture tells says where to look in the next.
 
         A search of a whole picture costs several times a look into a region.
         """
-        left = self._reader.read(pictures[0], self._reader.search(pictures[0]))
-        pose = self._ring_fit.fit([left, NO_MARKERS], None)
-        right = NO_MARKERS
-        near = None if pose is None else (pose.p_WR, pose.R_WR)
-        if near:
-            right = self._reader.read(pictures[1], self._ring_region(self._rig.right, pictures[1], near))
-        if not len(right.ids):
-            right = self._reader.read(pictures[1], self._reader.search(pictures[1]))
-        return self._fit_from([left, right], near)
+        seen = [NO_MARKERS] * len(pictures)
+        near: tuple[Floats, Floats] | None = None
+        for i, (camera, picture) in enumerate(zip(self._cameras, pictures, strict=True)):
+            if pose := self._ring_fit.fit(seen, near):
+                near = pose.p_WR, pose.R_WR
+                seen[i] = self._reader.read(picture, self._ring_region(camera, picture, near))
+            if not len(seen[i].ids):
+                seen[i] = self._reader.read(picture, self._reader.search(picture))
+        return self._fit_from(seen, near)
 
     def _fit_from(self, seen: Sequence[Markers], near: tuple[Floats, Floats] | None) -> RingPose | None:
         pose = self._ring_fit.fit(seen, near)

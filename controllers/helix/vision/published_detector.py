@@ -4,6 +4,7 @@ Each picture is looked at by itself, and whole, and each marker gives a pose by 
 marked below as assumed. `joint_detector` is this project's own way.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
@@ -13,7 +14,7 @@ from handover.controllers.helix.vision.ball import SPECK, green_mask
 from handover.controllers.helix.vision.ball_fit import BallPosition
 from handover.controllers.helix.vision.joint_detector import WristPosition
 from handover.controllers.helix.vision.markers import DICTIONARY, MarkerRing, Markers, read_markers
-from handover.controllers.helix.vision.stereo import Pixels, StereoRig
+from handover.controllers.helix.vision.stereo import Pixels, triangulate
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 
@@ -31,7 +32,8 @@ class PublishedDetector:
     """The smallest circle around what is green, triangulated, and the mean of the poses of single markers.
 
     The ball is the point nearest to the rays through the middles of both circles (sec. 3.2.2); so a ball that only one
-    camera sees is not found. The rays may pass each other as far as they will: the thesis names no bound.
+    camera sees is not found; of three cameras, all that see it count (an assumption). The rays may pass each other as
+    far as they will: the thesis names no bound.
 
     Of the ring, each marker in each picture gives a pose by `cv2.solvePnP`; its position, shifted by the apothem along
     its own -z, is the wrist, its y is the direction to the gripper. p_WR is the mean of all positions, and p_WG is p_WR
@@ -47,32 +49,34 @@ class PublishedDetector:
     are not refined lie half a pixel inside, so that each marker looks smaller, and 5 % farther away, than it is.
 
     Args:
-        rig: both cameras.
+        cameras: two or more.
         ring: the markers.
         d_gripper: distance of the gripper from the wrist, in m, eq. (13).
     """
 
-    def __init__(self, rig: StereoRig, ring: MarkerRing, d_gripper: float) -> None:
-        self._rig = rig
+    def __init__(self, cameras: Sequence[Pinhole], ring: MarkerRing, d_gripper: float) -> None:
+        self._cameras = cameras
         self._ring = ring
         self._d_gripper = d_gripper
         self._reader = cv2.aruco.ArucoDetector(DICTIONARY, cv2.aruco.DetectorParameters())
 
-    def find_ball(self, pictures: tuple[Pixels, Pixels]) -> BallPosition | None:
-        """Return the ball's position, or None unless both pictures show it before their cameras."""
-        left, right = (green_middle(p) for p in pictures)
-        if left is None or right is None:
+    def find_ball(self, pictures: Sequence[Pixels]) -> BallPosition | None:
+        """Return the ball's position, or None unless two pictures show it before their cameras."""
+        found = ((camera, green_middle(p)) for camera, p in zip(self._cameras, pictures, strict=True))
+        seen = [(camera, middle) for camera, middle in found if middle is not None]
+        if len(seen) < 2:
             return None
-        p_WO, _ = self._rig.triangulate(left, right)
-        if not np.isfinite(p_WO).all() or min(float(c.depth(p_WO)) for c in self._rig.cameras) <= 0.0:
+        cameras, middles = zip(*seen, strict=True)
+        p_WO, _ = triangulate(cameras, middles)
+        if not np.isfinite(p_WO).all() or min(float(c.depth(p_WO)) for c in cameras) <= 0.0:
             return None
         return BallPosition(p_WO, BALL_DEVIATION**2 * np.eye(3))
 
-    def find_wrist(self, t: float, pictures: tuple[Pixels, Pixels]) -> WristPosition | None:  # noqa: ARG002
+    def find_wrist(self, t: float, pictures: Sequence[Pixels]) -> WristPosition | None:  # noqa: ARG002
         """Return wrist and gripper, or None where no marker is read."""
         positions: list[Floats] = []
         directions: list[Floats] = []
-        for camera, picture in zip(self._rig.cameras, pictures, strict=True):
+        for camera, picture in zip(self._cameras, pictures, strict=True):
             markers = self._read(picture)
             for k in range(len(markers.ids)):
                 p_WR, direction = self._wrist(camera, int(markers.ids[k]), markers.corners[k])

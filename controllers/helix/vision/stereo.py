@@ -1,5 +1,6 @@
-"""Two calibrated cameras, regions of their pictures, and least squares, after [Vervloet2025] sec. 3.2.2."""
+"""Points by the pictures of calibrated cameras, regions of pictures, and least squares; [Vervloet2025] sec. 3.2.2."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,35 +12,31 @@ from handover.cosim.blocks.ports import Floats
 Pixels = NDArray[np.uint8]
 """A picture, shape (h, w, 3), blue, green, red, or one channel, shape (h, w)."""
 
+_PARALLEL = 1e-12  # squared angle, rad^2, about, within which all rays are parallel
 
-@dataclass(frozen=True)
-class StereoRig:
-    """The left and the right camera."""
 
-    left: Pinhole
-    right: Pinhole
+def triangulate(cameras: Sequence[Pinhole], pixels: Sequence[Floats]) -> tuple[Floats, float]:
+    """Return the point p_WP, shape (3,), nearest to the rays of pixels, one a camera, and how far they pass each other.
 
-    @property
-    def cameras(self) -> tuple[Pinhole, Pinhole]:
-        """Both cameras, the left one first."""
-        return self.left, self.right
+    It minimises the sum of squared distances from the rays a_i + s d_i: sum (1 - d_i d_i^T) (p - a_i) = 0; for two rays
+    it is the middle of the shortest line between them. The rays pass each other at twice the largest of these
+    distances, m, which for two rays is the length of that line. NaN and infinity if all rays are parallel.
 
-    def triangulate(self, pixel_left: Floats, pixel_right: Floats) -> tuple[Floats, float]:
-        """Return the point p_WP, shape (3,), nearest to the rays of two pixels, shape (2,), and the rays' distance.
-
-        It is the middle of the shortest line between the rays a + s d and b + t e; |a + s d - b - t e| is least for
-        s = (c.d - (d.e) c.e) / (1 - (d.e)^2) and t = ((d.e) c.d - c.e) / (1 - (d.e)^2), with c = b - a. NaN if the rays
-        are parallel.
-        """
-        a, b = self.left.p_WC, self.right.p_WC
-        d, e = self.left.rays(pixel_left[None])[0], self.right.rays(pixel_right[None])[0]
-        along, along_d, along_e = float(d @ e), float((b - a) @ d), float((b - a) @ e)
-        squared = 1.0 - along * along
-        if squared < 1e-12:
-            return np.full(3, np.nan), float("inf")
-        on_left = a + (along_d - along * along_e) / squared * d
-        on_right = b + (along * along_d - along_e) / squared * e
-        return 0.5 * (on_left + on_right), float(np.linalg.norm(on_left - on_right))
+    Args:
+        cameras: two or more.
+        pixels: in each camera's picture, shape (2,) each.
+    """
+    across: list[Floats] = []  # 1 - d d^T
+    for camera, pixel in zip(cameras, pixels, strict=True):
+        d = camera.rays(pixel[None])[0]
+        across.append(np.eye(3) - np.outer(d, d))
+    total = np.sum(across, axis=0)
+    if float(np.linalg.eigvalsh(total)[0]) < _PARALLEL:
+        return np.full(3, np.nan), float("inf")
+    towards = np.sum([P @ camera.p_WC for P, camera in zip(across, cameras, strict=True)], axis=0)
+    p_WP = np.asarray(np.linalg.solve(total, towards), dtype=np.float64)
+    distances = [float(np.linalg.norm(P @ (p_WP - c.p_WC))) for P, c in zip(across, cameras, strict=True)]
+    return p_WP, 2.0 * max(distances)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Pixel, Ra
 
 _P_WC_LEFT = np.array([-0.95, 0.25, -0.60])
 _P_WC_RIGHT = np.array([-0.95, -0.25, -0.60])
+_P_WC_THIRD = np.array([-0.55, 0.0, 0.1])
 _LOOKED_AT = np.array([0.0, 0.0, -0.62])
 _CORNER_SHIFT, _EDGE_SHIFT = 0.24, -0.005  # px; as scenarios/helix/calibrate_detector.py estimates them from pictures
 
@@ -46,7 +47,18 @@ class Params:
     distortion_right: Vector5[Number] = parameter(
         np.array([0.092, -0.165, -0.0005, 0.0007, 0.045]), "right lens's distortion: k1, k2, p1, p2, k3"
     )
-    detector: Detector = parameter(Detector.JOINT, "one fit to all that both cameras see, or the thesis's averages")
+    has_third: bool = parameter(False, "whether there is a third camera")
+    p_WC_third: Vector3[Metre] = parameter(_P_WC_THIRD, "position of the third camera in the world")
+    q_WC_third: Vector4[Number] = parameter(
+        quaternion_of(looking_at(_P_WC_THIRD, _LOOKED_AT)), "orientation of the third camera in the world"
+    )
+    intrinsics_third: Vector4[Pixel] = parameter(
+        np.array([906.0, 905.5, 639.0, 358.5]), "third camera's focal lengths and principal point: fx, fy, cx, cy"
+    )
+    distortion_third: Vector5[Number] = parameter(
+        np.array([0.098, -0.178, 0.0002, 0.0004, 0.052]), "third lens's distortion: k1, k2, p1, p2, k3"
+    )
+    detector: Detector = parameter(Detector.JOINT, "one fit to all that the cameras see, or the thesis's averages")
     apothem: Metre = parameter(0.034, "distance of the markers from the arm's axis", minimum=0.02, maximum=0.1)
     marker: Metre = parameter(0.020, "side of a marker", minimum=0.005, maximum=0.05)
     rings: int = parameter(1, "rings of markers: a second one sits above the first", minimum=1, maximum=2)
@@ -63,7 +75,7 @@ class Params:
     edge_shift: Pixel = parameter(_EDGE_SHIFT, "mean shift of the ball's edge outwards", minimum=-3.0, maximum=3.0)
     edge_doubt: Pixel = parameter(0.04, "standard deviation of the edge's shift", minimum=0.001, maximum=3.0)
     corner_tolerance: Pixel = parameter(1.2, "RMS misfit beyond which a marker is left out", minimum=0.1, maximum=20.0)
-    ray_tolerance: Metre = parameter(0.012, "largest distance between both cameras' rays to the ball", minimum=0.0)
+    ray_tolerance: Metre = parameter(0.012, "largest distance between the cameras' rays to the ball", minimum=0.0)
     largest_speed: MetrePerSecond = parameter(
         0.5, "speed of the wrist beyond which a pose contradicts the last one", minimum=0.0, maximum=100.0
     )

@@ -1,4 +1,4 @@
-"""Two cameras behind the arm and the pictures that they take, after [Vervloet2025] sec. 3.2.1, figs. 3, 4 and 14."""
+"""Two cameras or three and the pictures that they take, after [Vervloet2025] sec. 3.2.1, figs. 3, 4 and 14."""
 
 import copy
 from collections.abc import Mapping, Sequence
@@ -73,6 +73,7 @@ class SensorNoise:
 _WIDTH, _HEIGHT = 1280, 720
 _P_WC_LEFT = np.array([-0.95, 0.25, -0.60])
 _P_WC_RIGHT = np.array([-0.95, -0.25, -0.60])
+_P_WC_THIRD = np.array([-0.55, 0.0, 0.1])
 _LOOKED_AT = np.array([0.0, 0.0, -0.62])
 _DARK = 5  # level of a picture under a cloth
 _FACING = (4, 3, 5, 2, 6, 1, 7, 0)  # markers, from that which faces the cameras as the arm hangs
@@ -116,6 +117,17 @@ class Params:
     )
     distortion_right: Vector5[Number] = parameter(
         np.array([0.092, -0.165, -0.0005, 0.0007, 0.045]), "right lens's distortion: k1, k2, p1, p2, k3"
+    )
+    has_third: bool = parameter(False, "whether there is a third camera; its picture is black without")
+    p_WC_third: Vector3[Metre] = parameter(_P_WC_THIRD, "position of the third camera in the world")
+    q_WC_third: Vector4[Number] = parameter(
+        quaternion_of(looking_at(_P_WC_THIRD, _LOOKED_AT)), "orientation of the third camera in the world"
+    )
+    intrinsics_third: Vector4[Pixel] = parameter(
+        np.array([906.0, 905.5, 639.0, 358.5]), "third camera's focal lengths and principal point: fx, fy, cx, cy"
+    )
+    distortion_third: Vector5[Number] = parameter(
+        np.array([0.098, -0.178, 0.0002, 0.0004, 0.052]), "third lens's distortion: k1, k2, p1, p2, k3"
     )
     arm_radius: Metre = parameter(0.030, "radius of the soft arm", minimum=0.001, maximum=0.1)
     apothem: Metre = parameter(0.034, "distance of the markers from the arm's axis", minimum=0.02, maximum=0.1)
@@ -168,23 +180,24 @@ class Inputs:
 
 @dataclass(kw_only=True)
 class Outputs:
-    """A pair of pictures taken at the same time."""
+    """Pictures taken at the same time."""
 
     left: Picture1280x720 = output("picture of the left camera")
     right: Picture1280x720 = output("picture of the right camera")
+    third: Picture1280x720 = output("picture of the third camera, if there is one")
 
 
 class StereoCamera:
-    """Takes a pair of pictures of the arm, its marker ring and gripper, the ball and the hand.
+    """Takes pictures of the arm, its marker ring and gripper, the ball and the hand, with two cameras or three.
 
     Pictures are synthesised: solids are projected through either lens's distortion and painted from far to near, then
     blurred, lit unevenly and given sensor noise. A step shows the scene at its start, as the inputs give it; one that
-    takes no picture (decimation) repeats the last pair.
+    takes no pictures (decimation) repeats the last ones.
 
-    What may be amiss: a lens is covered for a while, light is poor, pictures get lost (each by itself), tape covers
-    markers, a card hides the ball.
+    What may be amiss: the left or the right lens is covered for a while, light is poor, pictures get lost (each by
+    itself), tape covers markers, a card hides the ball from the left and the right camera.
 
-    The state is that of the noise, and the scene of the last pair: its pictures are painted again from them, unless
+    The state is that of the noise, and the scene of the last pictures: they are painted again from both, unless
     they are those that were painted last. Pictures cannot be written to, since they may be handed out again.
 
     Raises:
@@ -193,16 +206,18 @@ class StereoCamera:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
-        ("left", "right"), ("backbone", "p_WR", "q_WR", "p_WG", "q_WG", "grip", "p_WO", "p_WH")
+        ("left", "right", "third"), ("backbone", "p_WR", "q_WR", "p_WG", "q_WG", "grip", "p_WO", "p_WH")
     )
     period: ClassVar[Fraction | None] = Fraction(1, 30)
 
     def __init__(self, params: Params) -> None:
         p = self.params = params
-        cameras = (
+        cameras = [
             Pinhole("left", p.p_WC_left, p.q_WC_left, p.intrinsics_left, p.distortion_left),
             Pinhole("right", p.p_WC_right, p.q_WC_right, p.intrinsics_right, p.distortion_right),
-        )
+        ]
+        if p.has_third:
+            cameras.append(Pinhole("third", p.p_WC_third, p.q_WC_third, p.intrinsics_third, p.distortion_third))
         collar = MarkerCollar(p.apothem, p.marker, _FACING[: p.covered_markers], p.rings)
         bowl = Bowl(p.p_WB, p.bowl_radius, p.bowl_depth, p.ball_radius) if p.bowl_radius > 0.0 else None
         self._scene = HandoverScene(cameras, p.arm_radius, p.ball_radius, collar, bowl)
@@ -218,16 +233,17 @@ class StereoCamera:
         self._offsets = self._draw()
         self._lost = self._lose()
         self._ticks = 0
-        self._taken: tuple[float, Inputs] | None = None  # when the last pair was taken, and of what
-        self._pair, self._pair_shows = Outputs(left=self._black, right=self._black), b""
-        self._is_current = False  # whether the pair is the last one that was taken
+        self._taken: tuple[float, Inputs] | None = None  # when the last pictures were taken, and of what
+        self._pictures, self._picture_shows = Outputs(left=self._black, right=self._black, third=self._black), b""
+        self._is_current = False  # whether the pictures are the last ones that were taken
 
     def outputs(self, t: float, u: Inputs) -> Outputs:
         """Return the pictures at the start."""
-        *covered, hidden = (start <= t < end for _, start, end in self._covers())
+        left_is_covered, right_is_covered, hidden = (start <= t < end for _, start, end in self._covers())
         views = self._scene.project(u, self._between if hidden else None)
-        left, right = (self._take(side, *views[side], covered[side]) for side in (0, 1))
-        return Outputs(left=left, right=right)
+        covered = (left_is_covered, right_is_covered, False)
+        taken = [self._take(i, *view, covered[i]) for i, view in enumerate(views)]
+        return Outputs(left=taken[0], right=taken[1], third=taken[2] if self.params.has_third else self._black)
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the pictures taken at t, or the last ones."""
@@ -239,13 +255,13 @@ class StereoCamera:
             self._is_current = False
         if not self._is_current:
             shows = pack_state(self._shown())
-            if shows != self._pair_shows:
-                self._pair, self._pair_shows = self.outputs(*self._taken), shows
+            if shows != self._picture_shows:
+                self._pictures, self._picture_shows = self.outputs(*self._taken), shows
             self._is_current = True
-        return self._pair
+        return self._pictures
 
     def get_state(self) -> bytes:
-        """Return the noise generator's state, and of the last pair its noise, its time and what it shows."""
+        """Return the noise generator's state, and of the last pictures their noise, their time and what they show."""
         offsets, lost, taken = self._shown()
         return pack_state((self._rng.bit_generator, offsets, lost, self._ticks, taken))
 
@@ -257,7 +273,7 @@ class StereoCamera:
         self._is_current = False
 
     def _shown(self) -> tuple[Any, ...]:
-        """Return on what the last pair depends: its noise, which pictures are lost, its time and what it shows."""
+        """Return on what the last pictures depend: noise, which of them are lost, their time and what they show."""
         taken = None if self._taken is None else (self._taken[0], tuple(vars(self._taken[1]).values()))
         return self._offsets, self._lost, taken
 
@@ -269,19 +285,19 @@ class StereoCamera:
             ("ball", p.hide_ball_from, p.hide_ball_until),
         ]
 
-    def _draw(self) -> tuple[int, int]:
-        return self._noise.draw(self._rng), self._noise.draw(self._rng)
+    def _draw(self) -> tuple[int, ...]:
+        return tuple(self._noise.draw(self._rng) for _ in self._canvases)
 
-    def _lose(self) -> tuple[bool, bool]:
+    def _lose(self) -> tuple[bool, ...]:
         """Draw whether the pictures get lost."""
         part = self.params.lost_pictures
-        return (bool(self._rng.random() < part), bool(self._rng.random() < part)) if part > 0.0 else (False, False)
+        return tuple(part > 0.0 and bool(self._rng.random() < part) for _ in self._canvases)
 
-    def _take(self, side: int, layers: list[PolygonLayer], decals: list[Decal], is_covered: bool) -> Pixels:
-        """Return the left camera's picture (side 0) or the right one's (1) of these things."""
-        if self._lost[side]:
+    def _take(self, i: int, layers: list[PolygonLayer], decals: list[Decal], is_covered: bool) -> Pixels:
+        """Return camera i's picture of these things: that of the left one (0), the right one (1), or the third one."""
+        if self._lost[i]:
             return self._black
         if is_covered:
-            return self._noise.added(self._dark, (), self._offsets[side])
-        canvas = self._canvases[side]
-        return self._noise.added(canvas.backdrop.seen, canvas.paint(layers, decals), self._offsets[side])
+            return self._noise.added(self._dark, (), self._offsets[i])
+        canvas = self._canvases[i]
+        return self._noise.added(canvas.backdrop.seen, canvas.paint(layers, decals), self._offsets[i])

@@ -31,6 +31,7 @@ _BOUND = ("estimate's bound by the covariance", "5.4.3", {"bound_rule": "by_cova
 _WEIGHTS = ("estimate's weights by the state", "5.4.3", {"weight_rule": "by_state"})
 _TOP = ("right camera above", "5.4.1", {"cameras": "top"})
 _SIDE = ("right camera at the side", "5.4.1", {"cameras": "side"})
+_THREE = ("a third camera above", "5.4.1", {"cameras": "three"})
 _FILTERS = ("filters by the measurements' covariances", "5.4.2", {"filters": "own"})
 
 
@@ -56,9 +57,9 @@ def _changes(
 
 
 CHANGES = (
-    *_changes("the thesis's settings", _THESIS, [_STEP, _FILTERS, _WEIGHTS, _TOP, _SIDE]),
+    *_changes("the thesis's settings", _THESIS, [_STEP, _FILTERS, _WEIGHTS, _TOP, _SIDE, _THREE]),
     *_changes("the thesis's settings and covariances", {**_THESIS, "filters": "own"}, [_BOUND]),
-    *_changes("our settings", {}, [_STEP, _BOUND, _WEIGHTS, _TOP, _SIDE]),
+    *_changes("our settings", {}, [_STEP, _BOUND, _WEIGHTS, _TOP, _SIDE, _THREE]),
 )
 
 
@@ -73,8 +74,8 @@ _CASES = tuple({_key(c): c for x in CHANGES for c in (x.without, x.changed)}.val
 class HelixImprovements(PublishedExperiment):
     """Each change beside the same settings without it, at six places with the same seeds, with the fast arm.
 
-    The thesis's settings are at its middle step size, and a person helps: see `HandoverPartner`. A third camera, which
-    the thesis names, too, is not among them. The quick plan is a change of ours at two places.
+    The thesis's settings are at its middle step size, and a person helps: see `HandoverPartner`. The quick plan is a
+    change of ours at two places.
     """
 
     name: ClassVar[str] = "helix-improvements"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from vision_scenes import AWAY, PLACES, anywhere, distances, hanging, look, over_ball, reaching
 
-from handover.controllers.helix.vision.handover_vision import HandoverVision, Inputs, Outputs, Params
+from handover.controllers.helix.vision.handover_vision import Detector, HandoverVision, Inputs, Outputs, Params
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import InvalidCalibration
 from handover.cosim.blocks.ports import BLACK_1280X720, Floats
@@ -24,15 +24,15 @@ def one_eyed() -> StereoCamera:
 
 def test_calibration_is_the_camera_s():
     ours, theirs = Params(), CameraParams()
-    names = [f.name for f in fields(Params) if f.name.endswith(("_left", "_right"))]
-    assert len(names) == 8
+    names = [f.name for f in fields(Params) if f.name.endswith(("_left", "_right", "_third"))]
+    assert len(names) == 13
     for name in [*names, "apothem", "marker", "rings", "ball_radius"]:
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
 
 
-def test_every_output_feeds_through_from_both_pictures():
+def test_every_output_feeds_through_from_all_pictures():
     d = describe(HandoverVision)
-    assert d.feedthrough == {v.name: ("left", "right") for v in d.outputs}
+    assert d.feedthrough == {v.name: ("left", "right", "third") for v in d.outputs}
 
 
 def test_accuracy_over_many_poses(camera: StereoCamera):
@@ -58,6 +58,50 @@ def test_accuracy_over_many_poses(camera: StereoCamera):
     assert balls.max() < 0.01
     assert wrist < 0.6
     assert gripper < 1.25
+
+
+def seen_with(covered: tuple[str, ...], has_third: bool, detector: Detector = Detector.JOINT) -> Floats:
+    """Return errors of ball and wrist in 12 scenes, shape (12, 2), m; NaN where one is not seen."""
+    until = [1e9 if side in covered else 0.0 for side in ("left", "right")]
+    camera = StereoCamera(CameraParams(has_third=has_third, cover_left_until=until[0], cover_right_until=until[1]))
+    rng, errors = np.random.default_rng(5), np.full((12, 2), np.nan)
+    for e in errors:
+        u = anywhere(rng)
+        y = look(camera, HandoverVision(Params(has_third=has_third, detector=detector)), u)
+        ball, wrist, _ = distances(y, u)
+        e[:] = ball if y.seen_O else np.nan, wrist if y.seen_R else np.nan
+    return errors
+
+
+@pytest.mark.parametrize("covered", ["left", "right"])
+def test_a_third_camera_makes_up_for_a_covered_one(covered: str):
+    alone, beside = seen_with((covered,), has_third=False), seen_with((covered,), has_third=True)
+    assert np.count_nonzero(np.isfinite(beside).all(axis=1)) >= 10
+    ball, wrist = np.nanmedian(beside, axis=0)
+    ball_alone, wrist_alone = np.nanmedian(alone, axis=0)
+    assert ball < min(0.3 * ball_alone, 0.0002)
+    assert wrist < min(0.6 * wrist_alone, 0.0006)
+
+
+def test_a_third_camera_alone_sees_ball_and_ring_where_the_arm_does_not_hide_them():
+    errors = seen_with(("left", "right"), has_third=True)
+    seen = np.isfinite(errors)
+    assert np.all(np.count_nonzero(seen, axis=0) >= [8, 4])
+    assert np.nanmax(errors) < 0.015
+
+
+def test_the_published_detector_takes_the_ball_by_the_two_cameras_that_see_it():
+    assert np.isnan(seen_with(("left",), has_third=False, detector=Detector.PUBLISHED)[:, 0]).all()
+    balls = seen_with(("left",), has_third=True, detector=Detector.PUBLISHED)[:, 0]
+    assert np.count_nonzero(np.isfinite(balls)) >= 10
+    assert np.nanmedian(balls) < 0.005
+
+
+def test_without_a_third_camera_its_picture_does_not_count():
+    y = StereoCamera(CameraParams(has_third=True)).step(0.0, 1 / 30, hanging("front"))
+    with_third, pair = Inputs(left=y.left, right=y.right, third=y.third), Inputs(left=y.left, right=y.right)
+    a, b = (HandoverVision(Params()).step(0.0, 1 / 30, u) for u in (with_third, pair))
+    assert a.p_WR_meas.tobytes() == b.p_WR_meas.tobytes()
 
 
 @pytest.mark.parametrize("place", PLACES)

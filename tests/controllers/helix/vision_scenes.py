@@ -77,7 +77,7 @@ def rising(rng: np.random.Generator, steps: int) -> Iterator[Scene]:
 
 def look(camera: StereoCamera, vision: HandoverVision, u: Scene, t: float = 0.0) -> Outputs:
     y = camera.step(t, 1 / 30, u)
-    return vision.step(t, 1 / 30, Inputs(left=y.left, right=y.right))
+    return vision.step(t, 1 / 30, Inputs(left=y.left, right=y.right, third=y.third))
 
 
 def distances(y: Outputs, u: Scene) -> Floats:

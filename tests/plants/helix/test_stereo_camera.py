@@ -51,8 +51,9 @@ def test_declares_pictures_that_feed_through_at_30_hz():
     assert [(v.name, v.raster.mime if v.raster else "") for v in d.outputs] == [
         ("left", "image/x-raw-bgr; width=1280; height=720"),
         ("right", "image/x-raw-bgr; width=1280; height=720"),
+        ("third", "image/x-raw-bgr; width=1280; height=720"),
     ]
-    assert d.feedthrough == {side: tuple(v.name for v in d.inputs) for side in ("left", "right")}
+    assert d.feedthrough == {side: tuple(v.name for v in d.inputs) for side in ("left", "right", "third")}
     assert d.period is not None
     assert float(d.period) == pytest.approx(1 / 30)
 
@@ -155,10 +156,10 @@ def test_a_scene_out_of_sight_leaves_the_backdrop(clean: StereoCamera):
     assert green(clean.outputs(0.0, gone).left) == 0
 
 
-@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("side", ["left", "right", "third"])
 def test_a_quaternion_not_of_unit_length_is_refused(side: str):
     with pytest.raises(InvalidCalibration, match=f"'{side}': q_WC"):
-        StereoCamera(replace(Params(), **{f"q_WC_{side}": np.array([1.0, 1.0, 0.0, 0.0])}))
+        StereoCamera(replace(Params(has_third=True), **{f"q_WC_{side}": np.array([1.0, 1.0, 0.0, 0.0])}))
 
 
 def test_a_focal_length_that_is_not_positive_is_refused():
@@ -204,6 +205,29 @@ def test_a_card_hides_the_ball_from_both_cameras_while_it_is_held():
     pairs = [camera.outputs(t, Inputs()) for t in (0.9, 1.0, 1.9, 2.0)]
     seen = [[green(p) > 500 for p in (y.left, y.right)] for y in pairs]
     assert seen == [[True, True], [False, False], [False, False], [True, True]]
+
+
+def test_a_third_camera_leaves_the_others_pictures_as_they_are_and_sees_the_ball_from_above(clean: StereoCamera):
+    u = Inputs(p_WO=np.array([0.0, 0.16, -0.62]))  # beside the arm, which hides nothing there
+    two, three = clean.outputs(0.0, u), StereoCamera(Params(noise=0.0, has_third=True)).outputs(0.0, u)
+    np.testing.assert_array_equal(three.left, two.left)
+    np.testing.assert_array_equal(three.right, two.right)
+    assert not two.third.any()
+    p = Params()
+    third = Pinhole("third", p.p_WC_third, p.q_WC_third, p.intrinsics_third, p.distortion_third)
+    column, row = np.rint(third.project(u.p_WO)).astype(int)
+    blue, green_level, red = three.third[row, column].astype(int)
+    assert green_level > max(blue, red) + 30
+
+
+def test_three_pictures_continue_bit_identically_from_a_state():
+    camera, other = (StereoCamera(Params(has_third=True, lost_pictures=0.3, seed=1)) for _ in range(2))
+    camera.step(0.0, 1 / 30, Inputs())
+    other.set_state(camera.get_state())
+    for k in range(1, 6):
+        a, b = (c.step(k / 30, 1 / 30, Inputs(grip=0.1 * k)) for c in (camera, other))
+        for side in ("left", "right", "third"):
+            np.testing.assert_array_equal(getattr(a, side), getattr(b, side))
 
 
 def test_of_three_pictures_one_is_taken_and_repeated():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from handover.controllers.helix.vision.handover_vision import Detector
-from handover.controllers.helix.vision.stereo import StereoRig
+from handover.controllers.helix.vision.stereo import triangulate
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.exceptions import WiringError
 from handover.cosim.system.system import System
@@ -101,10 +101,10 @@ def test_the_detector_gets_what_the_clicks_give_and_places_come_out_within_milli
     for seed in range(30):
         found = calibrated(0.5, seed, -0.8)
         assert not np.array_equal(found["p_WC_left"], truth["p_WC_left"])
-        rig = StereoRig(camera_of("left", found), camera_of("right", found))
+        cameras = camera_of("left", found), camera_of("right", found)
         for p in places:
-            seen = (camera_of(side, truth).project(p) for side in ("left", "right"))
-            off.append(float(np.linalg.norm(rig.triangulate(*seen)[0] - p)))
+            seen = [camera_of(side, truth).project(p) for side in ("left", "right")]
+            off.append(float(np.linalg.norm(triangulate(cameras, seen)[0] - p)))
     assert 0.0003 < np.sqrt(np.mean(np.square(off))) < 0.003
 
 

@@ -16,6 +16,7 @@ import pytest
 from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
+from handover.scenarios.helix.cameras import CameraPlaces
 from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.helix.parameters import Parameters
 
@@ -36,6 +37,25 @@ def test_a_command_acts_in_the_step_that_follows_its_picture():
     schedule = Schedule(system)
     assert [s.unit for s in schedule.sampled] == ["camera", "vision", "servo"]
     assert [s.unit for s in schedule.continuous] == ["arm", "hand"]
+
+
+def test_a_third_picture_is_wired_where_there_is_a_third_camera():
+    for cameras in (CameraPlaces.BEHIND, CameraPlaces.THREE):
+        system = HelixHandover().build(Parameters(cameras=cameras), 0, lambda n: cached(HelixHandover.units[n], 3))
+        pairs = {(f"{c.source.unit}.{c.source.port}", f"{c.target.unit}.{c.target.port}") for c in system.connections}
+        assert (("camera.third", "vision.third") in pairs) is (cameras is CameraPlaces.THREE)
+
+
+@pytest.mark.slow
+def test_three_cameras_take_the_ball_though_one_is_covered_for_ever(tmp_path: Path):
+    options = ["-p", "cameras=three", "-p", "cover=left", "-p", "cover_from=0", "-p", "cover_for=100"]
+    status, summary = run(tmp_path / "r", *options, "--unit", "arm=TendonArmFast", "--seed", "3")
+    assert status == 0
+    assert summary["metrics"]["closing_distance"]["value"] < 0.005
+    pictures = (tmp_path / "r" / "pictures").glob("*.jpg")
+    assert {p.stem.rsplit("_", 1)[-1] for p in pictures} == {"left", "right", "third"}
+    record = Record(tmp_path / "r" / "signals.parquet")
+    assert len(HelixHandover().replay(Parameters(cameras=CameraPlaces.THREE), record).fixed) == 3
 
 
 @pytest.mark.slow

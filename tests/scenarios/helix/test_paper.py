@@ -15,7 +15,7 @@ from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
 from handover.plants.helix.hand.partner_parameters import Params as HandParams
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.helix.calibrate_detector import calibrated_detector
-from handover.scenarios.helix.cameras import camera_parameters
+from handover.scenarios.helix.cameras import CameraPlaces, camera_parameters
 from handover.scenarios.helix.parameters import Parameters, Place, Tuning
 
 STATUS = {"stated", "derived", "assumed", "read off figure"}
@@ -73,10 +73,14 @@ def test_the_plants_defaults_have_an_origin(
 
 
 def test_the_cameras_are_where_the_paper_file_says(paper: dict[str, dict[str, dict[str, Any]]]):
-    c = camera_parameters()
+    c, sides = camera_parameters(places=CameraPlaces.THREE), CameraPlaces.THREE.sides
     assert [c["p_WC_left"].tolist(), c["p_WC_right"].tolist()] == paper["camera"]["p_WC"]["value"]
-    assert [c["intrinsics_left"][0], c["intrinsics_right"][0]] == paper["camera"]["focal_length"]["value"]
+    assert c["p_WC_third"].tolist() == paper["camera"]["p_WC_top"]["value"]
+    assert [c[f"intrinsics_{side}"][0] for side in sides] == paper["camera"]["focal_length"]["value"]
     camera = CameraParams()
+    for side in sides:
+        for what in ("p_WC", "q_WC", "intrinsics", "distortion"):
+            np.testing.assert_allclose(getattr(camera, f"{what}_{side}"), c[f"{what}_{side}"], atol=1e-12)
     for name in ("marker", "rings", "apothem", "ball_radius"):
         assert getattr(camera, name) == paper["camera"][name]["value"], name
 

@@ -10,6 +10,7 @@ import pytest
 
 from handover.fmus.build import cached
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.helix.cameras import CameraPlaces
 from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.helix.parameters import Parameters
 from handover.scenarios.helix.workspace import cameras_that_see, notes_on_place, reach
@@ -32,6 +33,14 @@ from handover.scenarios.published.published_experiment import Verdict
 )
 def test_a_ball_is_seen_where_it_and_the_markers_are_whole_and_large_enough(p_WO: list[float], cameras: int):
     assert cameras_that_see(np.array(p_WO)) == cameras
+
+
+def test_a_third_camera_sees_a_place_besides():
+    place = np.array([0.16, 0.0, -0.6])
+    assert cameras_that_see(place, CameraPlaces.THREE) == 3
+    (far, seen) = notes_on_place(np.array([0.0, 0.6, -0.6]), CameraPlaces.THREE)
+    assert "but the arm is sure to reach" in far
+    assert seen.endswith("where one camera alone sees ball and markers whole")
 
 
 def test_places_within_the_workspace_have_no_notes():

@@ -30,7 +30,7 @@ def table_of(closing: dict[str, float], failing: str = "") -> CampaignTable:
 
 
 def test_every_case_is_run_once_at_every_place_with_the_same_seeds():
-    assert checked_plan(PLAN).size == PLAN.size == 13 * 6
+    assert checked_plan(PLAN).size == PLAN.size == 15 * 6
     assert len({frozenset(point.items()) for point in PLAN.points}) == PLAN.size
     assert len({run.seed for run in PLAN.runs()}) == 6
 
