@@ -1,6 +1,6 @@
 """Makes the README's pictures anew, of runs of today: `make pictures`. Needs what the tests need, and chromium.
 
-Those of published experiments take their whole campaigns, minutes; `python docs/pictures.py NAME...` makes some.
+Those of published experiments take their whole campaigns, up to an hour; `python docs/pictures.py NAME...` makes some.
 
 Whoever changes what a figure or the report looks like runs it, looks at the pictures, and commits them.
 """
@@ -28,6 +28,7 @@ FIGURES: Mapping[str, tuple[str, str]] = {
 }
 """Scenario and figure that a picture shows; the first seed's run, with the scenario's defaults."""
 EXPERIMENTS: Mapping[str, tuple[str, str]] = {
+    "helix_errors.png": ("helix-1", "errors"),
     "helix_workspace.png": ("helix-workspace", "workspace"),
 }
 """Published experiment and figure that a picture shows."""
