@@ -35,8 +35,14 @@ class RecordColumns:
         columns: list[NDArray[Any]] = [block.time[begin:end].copy()]
         for kind, (part, place) in zip(self.schema.types[1:], self.places, strict=True):
             columns.append(turned[part][place].astype(_WIDE[kind], copy=False))
-        arrays: list[pa.Array[Any]] = [pa.array(column) for column in columns]
+        arrays = [_array(kind, column) for kind, column in zip(self.schema.types, columns, strict=True)]
         return pa.RecordBatch.from_arrays(arrays, schema=self.schema)
+
+
+def _array(kind: "pa.DataType", values: NDArray[Any]) -> "pa.Array[Any]":
+    """Return values of a column, shape (n,), of the type's own kind; `pa.array` would import pandas to look at them."""
+    buffer = pa.py_buffer(np.packbits(values, bitorder="little") if pa.types.is_boolean(kind) else values)
+    return pa.Array.from_buffers(kind, len(values), [None, buffer])
 
 
 def record_columns(columns: Sequence[Column]) -> tuple[RecordColumns, list[NDArray[Any]]]:

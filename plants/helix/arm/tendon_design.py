@@ -1,10 +1,14 @@
 """What follows from the parameters of the tendon-driven arm: discs, stiffnesses, masses, and the arm at rest."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.arm.tendon_parameters import InvalidArmParameters, Params
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 _MOTOR_MASS = 1e3  # kg; a servo that a tendon's pull hardly moves (5 N: 8 um)
 
@@ -65,12 +69,14 @@ class TendonDesign:
         loaded = np.repeat(self.params.tendon_length, 3)
         return loaded * self.tendon_EA / (self.tendon_EA + np.repeat(self.rest_tension, 3)) - self.rest_motor
 
-    def poses(self, q: Floats) -> tuple[Floats, Rotation]:
+    def poses(self, q: Floats) -> "tuple[Floats, Rotation]":
         """Return the n + 1 nodes' positions, (n + 1, 3), and rotations in B from the discs' coordinates.
 
         Args:
             q: six a disc: displacement from rest and rotation vector; what follows them is ignored.
         """
+        from scipy.spatial.transform import Rotation  # slow to import, and TendonArmFast does without
+
         coordinates = np.zeros((self.count + 1, 6))
         coordinates[1:] = q[: 6 * self.count].reshape(self.count, 6)
         p = coordinates[:, :3]

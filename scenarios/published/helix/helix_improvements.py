@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -15,15 +16,19 @@ from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure
 from handover.scenarios.published.helix.helix_cases import PLACES, Case, rate, reasons_of, rows_by_case
+from handover.scenarios.published.helix.helix_places import random_places
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment, Verdict
 from handover.scenarios.published.verdicts import format_p_value, nothing_measured
 
-_ALL_PLACES = [
-    *PLACES,
-    {"azimuth": "1.2", "radius": "0.14", "height": "-0.6"},
-    {"azimuth": "-2.8", "radius": "0.12", "height": "-0.58"},
-]
-"""Where the ball is offered; six differences of one sign are the fewest by which the paired test can reject."""
+_RANDOM_PLACES, _SEED = 12, 54
+"""Where the ball is offered besides: the thesis's settings miss some, and the paired test needs six pairs."""
+
+
+@cache
+def places() -> list[dict[str, str]]:
+    """Return where the ball is offered."""
+    return [*PLACES, *random_places(_RANDOM_PLACES, _SEED)]
+
 
 _THESIS = {"tuning": "thesis", "alpha": "0.2", "control_period": "1.51", "help_speed": "0.05", "patience": "300"}
 _STEP = ("step size grows with the error", "5.4.4", {"step_rule": "by_error"})
@@ -72,7 +77,7 @@ _CASES = tuple({_key(c): c for x in CHANGES for c in (x.without, x.changed)}.val
 
 
 class HelixImprovements(PublishedExperiment):
-    """Each change beside the same settings without it, at six places with the same seeds, with the fast arm.
+    """Each change beside the same settings without it, at sixteen places with the same seeds, with the fast arm.
 
     The thesis's settings are at its middle step size, and a person helps: see `HandoverPartner`. The quick plan is a
     change of ours at two places.
@@ -85,11 +90,11 @@ class HelixImprovements(PublishedExperiment):
     def plan(self, quick: bool) -> CampaignPlan:
         """Return every case at every place; if quick, a part of it."""
         quick_cases = [c for c in _CASES if c.parameters in ({}, _SIDE[2])]
-        cases, places = (quick_cases, _ALL_PLACES[:2]) if quick else (_CASES, _ALL_PLACES)
+        cases, offered = (quick_cases, places()[:2]) if quick else (_CASES, places())
         return CampaignPlan(
             scenario=self.scenario,
-            points=[{**place, **case.parameters} for case in cases for place in places],
-            seed=54,
+            points=[{**place, **case.parameters} for case in cases for place in offered],
+            seed=_SEED,
             paired=True,
             scenes=tuple(PLACES[0]),
             units={"arm": "TendonArmFast"},
@@ -104,9 +109,9 @@ class HelixImprovements(PublishedExperiment):
         """Return success, distance and steps with each change beside those without it."""
         header = ["settings", "change", "sec.", "success", "closes at, mm", "p", "control steps", "failed because"]
         cells = [_row(x, *runs_of) for x, runs_of in _runs(table).items() if runs_of[1]]
-        places = max((len(before) for before, _ in _runs(table).values()), default=0)
+        tried = max((len(before) for before, _ in _runs(table).values()), default=0)
         note = (
-            f"Without and with the change, at {places} places with the same seeds. Distance of gripper and "
+            f"Without and with the change, at {tried} places with the same seeds. Distance of gripper and "
             "ball, by ground truth, when the gripper begins to close, and control steps until then: medians over the "
             "places at which both did. p is that of Wilcoxon's signed-rank test of the distances."
         )

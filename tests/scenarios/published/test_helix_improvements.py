@@ -30,9 +30,9 @@ def table_of(closing: dict[str, float], failing: str = "") -> CampaignTable:
 
 
 def test_every_case_is_run_once_at_every_place_with_the_same_seeds():
-    assert checked_plan(PLAN).size == PLAN.size == 15 * 6
+    assert checked_plan(PLAN).size == PLAN.size == 15 * 16
     assert len({frozenset(point.items()) for point in PLAN.points}) == PLAN.size
-    assert len({run.seed for run in PLAN.runs()}) == 6
+    assert len({run.seed for run in PLAN.runs()}) == 16
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_rows_are_pairs_without_and_with_the_change():
     (table,) = HelixImprovements().tables(table_of({"side": 0.002}))
     assert len(table.rows) == len(CHANGES)
     row = next(row for row in table.rows if row[0] == "our settings" and "side" in row[1])
-    assert row[3] == "6 of 6 → 6 of 6"
+    assert row[3] == "16 of 16 → 16 of 16"
     before, after = (float(x) for x in row[4].split(" → "))
     assert after < 3.0 < 9.0 < before
     assert row[6] == "20 → 20"
