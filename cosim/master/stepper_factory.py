@@ -69,7 +69,10 @@ class StepperFactory:
             case Algorithm.JACOBI:
                 return Jacobi(ensemble, self.schedule.groups, self._solver)
             case Algorithm.GAUSS_SEIDEL | Algorithm.FIXED_POINT | Algorithm.NEWTON:
-                return GaussSeidel(ensemble, self.schedule.sampled_groups, self._continuous, self._solver)
+                groups = self.schedule.sampled_groups, self._continuous
+                interpolates = self._options.extrapolation is Extrapolation.LINEAR  # up to a value at a step's end
+                late = () if interpolates else self.schedule.spanning
+                return GaussSeidel(ensemble, *groups, self._solver, late)
 
     def stepper(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
         """Return a stepper for initialised units, which is a compiled plan where that does the same."""

@@ -169,6 +169,8 @@ class PlanMaker:
             self._begun = ()
             self._add(self.depart, isolated, self._step, self._charge)
         else:
+            self._late = schedule.spanning
+            self._add(self.arrive, [slot for slot in schedule.continuous if slot.unit in self._late], self._publish)
             for phase, slots in ((self.arrive, schedule.sampled), (self.depart, schedule.continuous)):
                 self._start_clock(phase)
                 self._add_in_order(phase, slots)
@@ -190,16 +192,16 @@ class PlanMaker:
         begun: list[Slot] = []
         for slot in slots:
             n = n_sources(self._ensemble, slot.unit, begun)
-            self._add(phase, begun[:n], self._step, self._publish, self._charge)
+            self._add(phase, begun[:n], self._step, self._publish_in_time, self._charge)
             begun = begun[n:]
             self._begun = tuple(begun)
             if self._is_isolated(slot):
                 self._add(phase, [slot], self._feed, self._begin)
                 begun.append(slot)
             else:
-                self._add(phase, [slot], self._feed, self._step, self._publish, self._charge)
+                self._add(phase, [slot], self._feed, self._step, self._publish_in_time, self._charge)
             self._begun = ()
-        self._add(phase, begun, self._step, self._publish, self._charge)
+        self._add(phase, begun, self._step, self._publish_in_time, self._charge)
 
     def _is_isolated(self, slot: Slot) -> bool:
         return self._ensemble.instances[slot.unit].isolated
@@ -265,6 +267,10 @@ class PlanMaker:
         code = self._ensemble.heartbeat.code(slot.unit, call)
         self.calls[len(self._packed)] = slot.unit, call
         self._note(step(self._units[slot.unit], instance.native_step, slot.period, code), judge)
+
+    def _publish_in_time(self, slot: Slot) -> None:
+        if slot.unit not in self._late:
+            self._publish(slot)
 
     def _publish(self, slot: Slot) -> None:
         for buffer in self._ensemble.instances[slot.unit].getters:

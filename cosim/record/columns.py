@@ -41,7 +41,8 @@ class RecordColumns:
 
 def _array(kind: "pa.DataType", values: NDArray[Any]) -> "pa.Array[Any]":
     """Return values of a column, shape (n,), of the type's own kind; `pa.array` would import pandas to look at them."""
-    buffer = pa.py_buffer(np.packbits(values, bitorder="little") if pa.types.is_boolean(kind) else values)
+    packed: Any = np.packbits(values, bitorder="little") if pa.types.is_boolean(kind) else values
+    buffer = pa.py_buffer(packed)
     return pa.Array.from_buffers(kind, len(values), [None, buffer])
 
 

@@ -1,7 +1,7 @@
 """Gauss-Seidel coupling: units step one after another, each from the newest values; those of a cycle iterate."""
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 from handover.cosim.stepping.ensemble import Ensemble, LastStep
@@ -24,15 +24,22 @@ class GroupStepping:
         groups: all units that may be due.
         make_solver: makes a solver for each cycle.
         count: counts the iterated steps.
+        late: units whose results are not published after their step, unless they iterate.
     """
 
     def __init__(
-        self, ensemble: Ensemble, groups: Sequence[Group], make_solver: MakeSolver, count: IterationCount
+        self,
+        ensemble: Ensemble,
+        groups: Sequence[Group],
+        make_solver: MakeSolver,
+        count: IterationCount,
+        late: Collection[str] = (),
     ) -> None:
         self._ensemble = ensemble
         self._groups = groups
         self._make_solver = make_solver
         self._count = count
+        self._late = late
         self._place = {name: (i, j) for i, group in enumerate(groups) for j, name in enumerate(group.units)}
         self._iterated: dict[tuple[str, ...], IteratedStep | None] = {}
         for name, (i, _) in self._place.items():
@@ -93,7 +100,8 @@ class GroupStepping:
             def finish(slot: Slot) -> None:
                 with last.completed():
                     self._ensemble.step(slot.unit, t, slot.period)
-                self._ensemble.publish(slot.unit)
+                if slot.unit not in self._late:
+                    self._ensemble.publish(slot.unit)
                 charge(slot.unit)
 
             pending = PendingSteps(self._ensemble, finish)
@@ -120,17 +128,27 @@ class GaussSeidel:
         ensemble: the units.
         sampled, continuous: groups of all units, each in the order in which they step.
         make_solver: makes a solver for each cycle.
+        late: units whose steps may span communication points of others, so that their results count when they end.
     """
 
     def __init__(
-        self, ensemble: Ensemble, sampled: Sequence[Group], continuous: Sequence[Group], make_solver: MakeSolver
+        self,
+        ensemble: Ensemble,
+        sampled: Sequence[Group],
+        continuous: Sequence[Group],
+        make_solver: MakeSolver,
+        late: Collection[str] = (),
     ) -> None:
         self.count = IterationCount()
+        self._ensemble, self._late = ensemble, late
         self._sampled = GroupStepping(ensemble, sampled, make_solver, self.count)
-        self._continuous = GroupStepping(ensemble, continuous, make_solver, self.count)
+        self._continuous = GroupStepping(ensemble, continuous, make_solver, self.count, late)
 
-    def arrive(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:  # noqa: ARG002
-        """Step the sampled units, whose outputs count at t itself."""
+    def arrive(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:
+        """Fetch results that count from t on, and step the sampled units, whose outputs count at t itself."""
+        for slot in continuous:
+            if slot.unit in self._late:
+                self._ensemble.publish(slot.unit)
         self._sampled.step(t, sampled)
 
     def depart(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:  # noqa: ARG002

@@ -48,10 +48,14 @@ class Schedule:
     that cannot be solved. Units may need each other's outputs in a cycle that is no algebraic loop, because each single
     output can be computed after others: one of the units then gets values of the previous step. Both cases are logged.
 
+    The results of a step count at once for the units after it, as values at the end of the step. Those of a unit whose
+    step may span a communication point of others would count before their time: they count from the step's end on.
+
     In initialization mode, dependencies may be others, and all loops can be solved.
 
     Attributes:
         loops: the algebraic loops that are solved at the steps.
+        spanning: the units in `continuous` whose steps may span a communication point at which another unit is due.
         declared_loops: those that FMUs declare, which have to be solved.
         initial_groups: all units in an order in which their outputs can be computed at the start.
         initial_passes: how often to go through all units in order until all values at the start are computed.
@@ -82,6 +86,8 @@ class Schedule:
         self.initial_passes = 1 + sum(arrangement.late_ports for arrangement in start)
         self.sampled = self._slots(system, self.sampled_groups)
         self.continuous = self._slots(system, self.continuous_groups)
+        others = {slot.every for slot in self.slots}
+        self.spanning = frozenset(s.unit for s in self.continuous if any(every % s.every for every in others))
 
     @property
     def groups(self) -> tuple[Group, ...]:
