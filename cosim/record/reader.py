@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from handover.cosim.exceptions import nearest
 from handover.cosim.system.signals import Signals
 
-_SUBSCRIPT = re.compile(r"\[(\d+(?:,\d+)*)\]$")
+SUBSCRIPT = re.compile(r"\[(\d+(?:,\d+)*)\]$")
+"""The end of a column's name that is an entry of an array, counted from 1."""
 
 
 class Record:
@@ -25,7 +26,7 @@ class Record:
         self._table = pq.read_table(path)
         self._columns: dict[str, list[str]] = {}
         for name in self._table.column_names:
-            self._columns.setdefault(_SUBSCRIPT.sub("", name), []).append(name)
+            self._columns.setdefault(SUBSCRIPT.sub("", name), []).append(name)
         self.time = self._values("time")
 
     def __contains__(self, signal: object) -> bool:
@@ -41,7 +42,7 @@ class Record:
         if signal not in self._columns:
             raise KeyError(f"no signal {signal!r}; {nearest(signal, self._columns)}")
         names = self._columns[signal]
-        last_subscript = _SUBSCRIPT.search(names[-1])
+        last_subscript = SUBSCRIPT.search(names[-1])
         if last_subscript is None:
             return self._values(names[0])
         shape = tuple(int(i) for i in last_subscript[1].split(","))

@@ -117,7 +117,7 @@ class Run:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Units of which calls answered Warning: which, how often and from when on, a line each."""
+        """Units of which calls answered Warning, and outputs that were not finite, a line each with the first time."""
         return tuple(warning_lines(self._facts.summary))
 
     @property

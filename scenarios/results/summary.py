@@ -20,7 +20,8 @@ from handover.cosim.fmu.unit_warnings import WarningData
 from handover.cosim.master.master import Master
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Metric, Outcome
-from handover.scenarios.results.run_folder import sha256_of, versions
+from handover.scenarios.results.not_finite import NotFiniteData, outputs_not_finite
+from handover.scenarios.results.run_folder import disk_errors_reported, sha256_of, versions
 from handover.scenarios.results.system_facts import describe_system, own_period, run_metrics
 from handover.scenarios.results.tables import conversions_of, format_value
 from handover.scenarios.results.task import Task
@@ -66,6 +67,7 @@ class _OfSomeSummaries(TypedDict, total=False):
     pace: dict[str, Any]
     ended: dict[str, Any]
     warnings: list[WarningData]
+    not_finite: list[NotFiniteData]
     left_out: list[str]
 
 
@@ -74,8 +76,8 @@ class Summary(Configuration, _OfSomeSummaries):
 
     Runs with adaptive steps have `steps`, see `StepStatistics`; those paced by real time have `pace`, see `PaceReport`;
     those that a unit ended have its request in `ended`, as `UnitTerminated.as_data`. `warnings` has the calls that
-    answered Warning, by unit, where there are any. `left_out` says, a line each, which figures, pictures or parts of
-    the report could not be made.
+    answered Warning, by unit, and `not_finite` the outputs that are NaN or infinite in the record, where there are any.
+    `left_out` says, a line each, which figures, pictures or parts of the report could not be made.
     """
 
     complete: bool
@@ -178,6 +180,10 @@ def finished_summary(
         summary["ended"] = master.ended.as_data()
     if warned := master.warnings:
         summary["warnings"] = [warnings.as_data(unit) for unit, warnings in warned.items()]
+    if task.folder.signals.exists():  # else it failed before there was a row
+        with disk_errors_reported(task.folder.signals):
+            if outputs := outputs_not_finite(task.folder.signals, master.system):
+                summary["not_finite"] = outputs
     return summary
 
 

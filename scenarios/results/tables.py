@@ -11,6 +11,7 @@ from handover.cosim.stepping.options import Algorithm
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.display_unit import display_unit
+from handover.scenarios.results.not_finite import not_finite_lines
 
 
 def master_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -43,8 +44,12 @@ def pace_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def warning_lines(summary: Mapping[str, Any]) -> list[str]:
-    """Return a line for each unit of which calls answered Warning, from what is in `summary.json`."""
-    return [_warning_line(warned) for warned in summary.get("warnings", [])]
+    """Return what a run warned of, a line each, from what is in `summary.json`.
+
+    These are the units of which calls answered Warning, then the outputs that were not finite.
+    """
+    warned = [_warning_line(warned) for warned in summary.get("warnings", [])]
+    return [*warned, *not_finite_lines(summary.get("not_finite", []))]
 
 
 def _warning_line(warned: Mapping[str, Any]) -> str:

@@ -1,0 +1,109 @@
+"""Outputs of a run that are NaN or infinite in its record: which, from when on, and the lines that tell of them.
+
+The master checks what feeds a unit, and a value that is not finite there ends the run. What feeds no unit harms none of
+them: the run goes on, and who looks at its results is told at its end.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypedDict
+
+import numpy as np
+
+from handover.cosim.record.reader import SUBSCRIPT
+from handover.cosim.system.system import System
+
+MAX_LINES = 5
+"""Outputs that are told a line each; of more there is the number."""
+
+
+class NotFiniteData(TypedDict):
+    """An output that was not finite: its instance, its name, and the first entry of an array that was not, else "".
+
+    `entries` is how many of its entries were not finite, `time` the first recorded time at which one was not, in s,
+    and `value` what it was then: NaN, infinity or -infinity. `feeds` says whether it feeds a unit, which would have
+    failed at its next step.
+    """
+
+    instance: str
+    output: str
+    index: str
+    entries: int
+    value: str
+    time: float
+    feeds: bool
+
+
+def outputs_not_finite(signals: Path, system: System) -> list[NotFiniteData]:
+    """Return the outputs of a system that are not finite somewhere in the record of its run, in the record's order.
+
+    The record is read a part at a time, and of it only the real numbers.
+    """
+    fed = {(c.source.unit, c.source.port) for c in system.connections}
+    found: dict[tuple[str, str], NotFiniteData] = {}
+    for name, row_time, value in _first_not_finite(signals):
+        index = SUBSCRIPT.search(name)
+        unit, port = _ends(name if index is None else name[: index.start()], system)
+        begun = found.get((unit, port))
+        entries = 1 if begun is None else begun["entries"] + 1
+        if begun is None or row_time < begun["time"]:
+            begun = NotFiniteData(
+                instance=unit, output=port, index=index[0] if index else "", entries=entries, value=_in_words(value),
+                time=row_time,
+                feeds=bool(fed & {(unit, port), (unit, name.removeprefix(f"{unit}."))}),
+            )  # fmt: skip
+        found[unit, port] = {**begun, "entries": entries}
+    return list(found.values())
+
+
+def _ends(name: str, system: System) -> tuple[str, str]:
+    """Return the unit and the port of a signal; names of units may have dots in them, as those of nested systems."""
+    units = [unit for unit in system.units if name.startswith(f"{unit}.")]
+    unit = max(units, key=len)
+    return unit, name.removeprefix(f"{unit}.")
+
+
+def _first_not_finite(signals: Path) -> Iterator[tuple[str, float, float]]:
+    """Yield each column of real numbers that is not finite somewhere, with the time of the first such value, and it."""
+    import pyarrow as pa  # slow to import
+    import pyarrow.parquet as pq
+
+    file = pq.ParquetFile(signals)
+    schema = file.schema_arrow
+    real = [field.name for field in schema if field.type == pa.float64()]
+    first: dict[str, tuple[float, float]] = {}
+    for batch in file.iter_batches(columns=real):
+        time = batch.column("time").to_numpy()
+        for name in real:
+            if name == "time" or name in first:
+                continue
+            values = batch.column(name).to_numpy()
+            finite = np.isfinite(values)
+            if not finite.all():
+                row = int(np.argmin(finite))
+                first[name] = float(time[row]), float(values[row])
+    yield from ((name, *first[name]) for name in real if name in first)
+
+
+def _in_words(value: float) -> str:
+    if np.isnan(value):
+        return "NaN"
+    return "infinity" if value > 0 else "-infinity"
+
+
+def not_finite_lines(outputs: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return a line for each output that was not finite; of many, for the first few, and how many more there are."""
+    lines = [_line(output) for output in outputs[:MAX_LINES]]
+    more = len(outputs) - MAX_LINES
+    if more > 0:
+        which = "output is" if more == 1 else "outputs are"
+        lines.append(f'{more} more {which} not finite: summary.json has them all, by "not_finite"')
+    return lines
+
+
+def _line(output: Mapping[str, Any]) -> str:
+    name = f"{output['output']}{output['index']}"
+    others = output["entries"] - 1
+    and_others = "" if not others else f" ({others} more of its entries too)" if others > 1 else " (another entry too)"
+    read = "which feeds a unit, though no step followed" if output["feeds"] else "which no unit reads"
+    return f"unit {output['instance']}: {name} = {output['value']} at t = {output['time']:.6g} s{and_others}, {read}"

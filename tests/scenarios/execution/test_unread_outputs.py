@@ -1,0 +1,92 @@
+"""Outputs that feed nothing and are NaN or infinite: the run goes on, and its end tells them."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner, Result
+from native_units import native_fmu
+from ssp_of import component, described, pack_ssp, system
+
+import handover
+from handover.cosim.system.system import System
+from handover.scenarios.cli.command import main
+from handover.scenarios.results.not_finite import MAX_LINES, not_finite_lines, outputs_not_finite
+
+NAN_LINE = "unit gives_nan: y = NaN at t = 0.3 s, which no unit reads"
+
+
+def run(file: Path, out: Path, *arguments: str) -> Result:
+    return CliRunner().invoke(main, ["run", str(file), "--out", str(out), *arguments])
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("coupling", [(), ("--algorithm", "fixed-point")], ids=["plan", "general"])
+def test_a_run_ends_with_a_line_and_goes_on_until_then(tmp_path: Path, fmi: int, coupling: tuple[str, ...]):
+    result = run(native_fmu("gives_nan", fmi), tmp_path / "r", "--stop", "1", "--no-report", *coupling)
+    assert result.exit_code == 0, result.output
+    assert NAN_LINE in result.output.splitlines()
+    summary = json.loads((tmp_path / "r" / "summary.json").read_text())
+    assert summary["complete"]
+    (told,) = summary["not_finite"]
+    assert (told["instance"], told["output"], told["value"]) == ("gives_nan", "y", "NaN")
+    assert told["time"] == pytest.approx(0.3)
+
+
+def test_page_and_result_have_the_line(tmp_path: Path):
+    ran = handover.run(native_fmu("gives_infinity", 3), stop=1, out=tmp_path / "r")
+    line = "unit gives_infinity: y = -infinity at t = 0.3 s, which no unit reads"
+    assert ran.warnings == (line,)
+    ran.report()
+    page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
+    assert line in page.replace("\u202f", " ").replace("\u00a0", " ")
+
+
+def test_a_run_of_an_ssp_tells_them_too(tmp_path: Path):
+    parts = {"resources/unit.fmu": native_fmu("gives_nan", 2)}
+    file = pack_ssp(tmp_path / "a.ssp", described(system(component("bad"))), parts)
+    result = run(file, tmp_path / "r", "--stop", "1", "--no-report")
+    assert result.exit_code == 0, result.output
+    assert "unit bad: y = NaN at t = 0.3 s, which no unit reads" in result.output
+
+
+def test_a_run_with_finite_outputs_tells_nothing(tmp_path: Path):
+    result = run(native_fmu("gives_nan", 3), tmp_path / "r", "--stop", "0.2", "--no-report")
+    assert result.exit_code == 0, result.output
+    assert "no unit reads" not in result.output
+    assert "not_finite" not in json.loads((tmp_path / "r" / "summary.json").read_text())
+
+
+def record(file: Path, **columns: list[float]) -> Path:
+    pq.write_table(pa.table({name: np.array(values, float) for name, values in columns.items()}), file)
+    return file
+
+
+def test_of_an_array_the_first_entry_is_named_and_the_others_counted(tmp_path: Path):
+    wired = System()
+    for name in ("a", "a.b"):  # as of a nested system
+        wired.add(name, native_fmu("gives_nan", 3))
+    wired.connect(wired.units["a"].y.y, wired.units["a.b"].u.u)
+    nan, inf = float("nan"), float("inf")
+    file = record(
+        tmp_path / "signals.parquet",
+        **{"time": [0.0, 0.1, 0.2], "a.y": [0.0, 0.0, inf], "a.fine": [1.0, 2.0, 3.0]},
+        **{"a.b.p[1]": [0.0, 0.0, nan], "a.b.p[2]": [0.0, nan, 0.0], "a.b.p[3]": [0.0, 0.0, 0.0]},
+    )
+    assert not_finite_lines(outputs_not_finite(file, wired)) == [
+        "unit a: y = infinity at t = 0.2 s, which feeds a unit, though no step followed",
+        "unit a.b: p[2] = NaN at t = 0.1 s (another entry too), which no unit reads",
+    ]
+
+
+def test_a_long_list_is_shortened(tmp_path: Path):
+    wired = System()
+    wired.add("a", native_fmu("gives_nan", 3))
+    columns = {f"a.y{n}": [float("nan")] for n in range(MAX_LINES + 3)}
+    found = outputs_not_finite(record(tmp_path / "signals.parquet", time=[0.0], **columns), wired)
+    lines = not_finite_lines(found)
+    assert len(lines) == MAX_LINES + 1
+    assert lines[-1].startswith("3 more outputs are not finite")
