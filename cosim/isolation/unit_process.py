@@ -8,10 +8,12 @@ import ctypes
 import functools
 import itertools
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
+import sysconfig
 import tempfile
 import weakref
 from collections.abc import Callable, Iterator
@@ -83,7 +85,7 @@ class UnitProcess:
             if not self._connection:
                 raise NoUnitProcess("the memory that it shares with this one cannot be mapped")
             self._process = subprocess.Popen(
-                [str(program), str(memory), str(_SIZE), str(os.getpid()), str(other)],
+                [str(program), str(memory), str(_SIZE), str(os.getpid()), str(other), _libpython(), _path_of_python()],
                 stdin=subprocess.DEVNULL,
                 pass_fds=[fd for fd in (memory, other) if fd >= 0],
                 start_new_session=True,  # Ctrl-C is for this process
@@ -114,7 +116,7 @@ class UnitProcess:
         if status > 1:
             for line in lines[:-1]:
                 log(status, line)
-            raise OSError(lines[-1] if lines else "its process ended")
+            raise OSError(_explained(lines[-1]) if lines else "its process ended")
 
     def select(self) -> None:
         """Let the next instance that this thread makes through the proxy be the one of this process."""
@@ -188,6 +190,43 @@ def unavailable() -> str:
     if isolation_files() is not None:
         return ""
     return "units can be isolated on Linux and macOS only, with the program that is compiled with this package"
+
+
+_OF_PYTHON = re.compile(r"(?:undefined symbol: |flat namespace '_)(_?Py\w+)")
+
+
+def _explained(message: str) -> str:
+    """Return the linker's message; where a library uses Python and this one has no library, the cause and the cure."""
+    symbol = _OF_PYTHON.search(message)
+    if symbol is None or _libpython():
+        return message
+    cause = f"it uses Python ({symbol[1]}), but names no library of Python that it needs: its host is to be Python"
+    here = (
+        f"the process of an isolated unit is not, and the Python here, {sys.executable}, has no shared library for it"
+    )
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
+    cure = f"run it without isolation, or install Debian's libpython{version} or a Python built with --enable-shared"
+    return f"{cause}; {here}. Cure: {cure}"
+
+
+@functools.cache
+def _libpython() -> str:
+    """Return the path of this Python's shared library, or an empty string.
+
+    It is found as `handover.fmus.interpreter` finds it, which FMUs carry and which stands above this.
+    """
+    names = [str(sysconfig.get_config_var(name) or "") for name in ("INSTSONAME", "LDLIBRARY")]
+    libdir, *others = (str(sysconfig.get_config_var(v) or "") for v in ("LIBDIR", "LIBPL", "PYTHONFRAMEWORKPREFIX"))
+    multiarch = os.path.join(libdir, str(sysconfig.get_config_var("MULTIARCH") or ""))
+    places = [
+        Path(p) / n for n in names for p in (libdir, multiarch, *others, os.path.join(sys.base_prefix, "lib")) if p
+    ]
+    return next((str(p) for p in places if p.name and p.suffix != ".a" and p.is_file()), "")
+
+
+def _path_of_python() -> str:
+    """Return a PATH on which this Python comes first: one that a library starts finds its packages by that."""
+    return os.pathsep.join(p for p in (os.path.dirname(sys.executable), os.environ.get("PATH", "")) if p)
 
 
 def _end(process: "subprocess.Popen[bytes]", memory: int, sockets: _Sockets) -> None:
