@@ -21,11 +21,12 @@ class Kind(enum.Enum):
 
 
 class Causality(enum.Enum):
-    """Role of a variable."""
+    """Role of a variable. A block declares no locals; those of FMUs matter where they have start values."""
 
     PARAMETER = "parameter"
     INPUT = "input"
     OUTPUT = "output"
+    LOCAL = "local"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -98,7 +98,7 @@ def indices_of(shape: tuple[int, ...]) -> list[tuple[int, ...]]:
 
 @dataclass(frozen=True, kw_only=True)
 class FmuPort(Declared):
-    """A parameter, input or output of an FMU.
+    """A parameter, input or output of an FMU, or another variable whose start value can be given.
 
     Attributes:
         references: one value reference in all, or one for each entry.
@@ -108,6 +108,7 @@ class FmuPort(Declared):
         nominal: the usual magnitude of its values, in its unit, where the FMU declares it.
         clocks: it can be accessed only while one of these ticks; always where there are none.
         tunable: whether a parameter may be changed at communication points; else it is fixed from the start on.
+        guess: its start value is one from which the unit finds the true one as it is initialised (`approx`).
     """
 
     fmi_type: str
@@ -118,6 +119,7 @@ class FmuPort(Declared):
     nominal: float | None = None
     clocks: tuple[str, ...] = ()
     tunable: bool = False
+    guess: bool = False
 
     @property
     def is_continuous(self) -> bool:
@@ -146,6 +148,8 @@ class FmuDescription:
     hosts with event mode: so its results are the same in all hosts. That needs ports that can be accessed without a
     clock, so a unit with clocked ports, or with clocks that are not constant, is not sampled in this sense.
 
+    `initial` are outputs and local variables whose start values may be given (`initial` is `exact` or `approx`).
+
     `step` is the communication step that it proposes, in seconds. `untouched_fault` says how its model description
     breaks the standard in parts that co-simulation does not touch; a run warns of it.
     """
@@ -168,6 +172,12 @@ class FmuDescription:
     experiment: DefaultExperiment = DefaultExperiment()
     untouched_fault: str = ""
     clocks: Mapping[str, FmuClock] = field(default_factory=dict[str, FmuClock])
+    initial: Mapping[str, FmuPort] = field(default_factory=dict[str, FmuPort])
+
+    @property
+    def settable(self) -> dict[str, FmuPort]:
+        """All variables that can be given start values."""
+        return {**self.parameters, **self.inputs, **self.initial}
 
     def _repr_html_(self) -> str:
         from handover.cosim.fmu.port_table import description_html  # of notebooks alone
@@ -203,6 +213,7 @@ def describe_fmu(path: Path) -> FmuDescription:
     units = {u.name: _unit(u) for u in md.unitDefinitions}
     mimes = {} if is_fmi2 else mime_types(root)
     ports = [_port(v, units, mimes) for v in md.modelVariables if v.causality in ("parameter", "input", "output")]
+    starting = [_port(v, units, mimes) for v in md.modelVariables if _is_started(v)]
     ports = [p for p in ports if p is not None]
     grouped = _group_elements(ports)
     owner = {r: p.name for p in grouped for r in p.references}
@@ -242,7 +253,14 @@ def describe_fmu(path: Path) -> FmuDescription:
         sampled=is_discrete and not capabilities.varies_step and not is_clocked,
         capabilities=capabilities,
         clocks=clocks,
+        initial={p.name: p for p in _group_elements([p for p in starting if p is not None])},
     )
+
+
+def _is_started(v: "ModelVariable") -> bool:
+    """Return whether an output or a local variable can be set before the start (FMI 2.0.4, sec. 2.2.7: `initial`)."""
+    given = v.initial in ("exact", "approx") and v.start is not None
+    return given and v.causality in ("output", "local") and v.variability != "constant"
 
 
 def _clocks(path: Path, root: XmlElement) -> dict[str, FmuClock]:
@@ -292,6 +310,7 @@ def _port(v: "ModelVariable", units: Mapping[str, Unit], mimes: Mapping[str, str
         description=v.description or "",
         clocks=tuple(c.name for c in v.clocks or ()),
         tunable=v.causality == "parameter" and v.variability == "tunable",
+        guess=v.initial == "approx",
     )
 
 

@@ -31,6 +31,7 @@ class ModelVariable(Protocol):
     type: str
     causality: str
     variability: str | None
+    initial: str | None
     valueReference: int
     shape: tuple[int, ...] | None
     unit: str | None

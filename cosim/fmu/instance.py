@@ -56,8 +56,8 @@ class Instance(CheckedCalls):
         self._do_step, self._step_call = self._function("DoStep"), f"{self._prefix}DoStep"
 
     def set_start(self, values: Mapping[str, Any]) -> None:
-        """Set parameters or start values of inputs, before initialisation."""
-        ports = {**self.description.parameters, **self.description.inputs}
+        """Set parameters or start values of other variables, before initialisation."""
+        ports = self.description.settable
         for name, value in values.items():
             self._set_one(ports[name], value)
 

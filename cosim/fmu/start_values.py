@@ -45,7 +45,7 @@ class Initializing(Protocol):
         ...
 
     def set_start(self, values: Mapping[str, Any]) -> None:
-        """Set parameters or start values of inputs."""
+        """Set parameters or start values of other variables."""
         ...
 
     def read(self, ports: Sequence[FmuPort]) -> Sequence[SignalBuffer]:
@@ -57,13 +57,13 @@ def keep_start(unit: Initializing, values: Mapping[str, Any], fed: Collection[st
     """Set values that did not hold once more, in initialization mode, and return those that do not hold there either.
 
     Reals are equal up to rounding in their own width. What cannot be read is not judged, nor is an input that is `fed`
-    by another unit, or one that can be reached only while a clock ticks.
+    by another unit, or a variable that is a guess or can be reached only while a clock ticks.
 
     Raises:
         UnitFailure: the unit answered Fatal.
     """
-    ports = {**unit.description.parameters, **unit.description.inputs}
-    judged = [ports[name] for name in values if name not in fed and not ports[name].clocks]
+    ports = unit.description.settable
+    judged = [p for p in (ports[name] for name in values if name not in fed) if not (p.clocks or p.guess)]
     lost = _lost(unit, judged, values)
     if not lost:
         return []

@@ -44,7 +44,12 @@ def variable_names(d: FmuDescription) -> list[str]:
 
 def settable_names(d: FmuDescription) -> list[str]:
     """Return the names that start values of an FMU can have."""
-    return [name for port in (*d.parameters.values(), *d.inputs.values()) for name in entry_names(port)]
+    return [name for port in d.settable.values() for name in entry_names(port)]
+
+
+def unfed(d: FmuDescription) -> dict[str, FmuPort]:
+    """Return what can be set and cannot be fed: parameters, and outputs and locals with start values."""
+    return {**d.parameters, **d.initial}
 
 
 def split_arrays(d: FmuDescription, names: Collection[str]) -> FmuDescription:
@@ -64,6 +69,7 @@ def split_arrays(d: FmuDescription, names: Collection[str]) -> FmuDescription:
         parameters=ports(d.parameters),
         inputs=ports(d.inputs),
         outputs=ports(d.outputs),
+        initial=ports(d.initial),
         feedthrough=feedthrough(d.feedthrough),
         presumed_feedthrough=feedthrough(d.presumed_feedthrough),
         initial_feedthrough=feedthrough(d.initial_feedthrough),

@@ -13,7 +13,7 @@ from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.description import FmuDescription, FmuPort
-from handover.cosim.ssp.connected_ports import find_entry, ports_of, settable_names, variable_names
+from handover.cosim.ssp.connected_ports import find_entry, ports_of, settable_names, unfed, variable_names
 from handover.cosim.ssp.given_parameters import put
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.ssp.start_values import Given, chained, converted
@@ -120,7 +120,7 @@ class _Flattening:
             if path in descriptions:
                 self.flat.given.setdefault(path, {}).setdefault(name, Given(value))
         for (path, name), value in asked.items():
-            entry = find_entry(descriptions[path].parameters, name) if path in descriptions else None
+            entry = find_entry(unfed(descriptions[path]), name) if path in descriptions else None
             if entry is not None:
                 put(self.flat.given.setdefault(path, {}), entry, name, value)
         self.flat.values_of_systems = {node: v for node, v in self._values.items() if node[0] not in descriptions}
@@ -145,13 +145,13 @@ class _Flattening:
             for name, value in binding.items():
                 if not self._assign(element, path, name, value):
                     near = nearest(name, self._names(element, path))
-                    _log.warning("%sno variable is called %r; %s; its value is left out", value.where, name, near)
+                    what = f"{path or element.name} has nothing called {name!r} that can be set"
+                    _log.warning("%s%s; %s; its value is left out", value.where, what, near)
 
     def _assign(self, element: SspElement, path: str, name: str, value: SspValue) -> bool:
         """Give a value to a name as seen from an element; return False if there is none of that name."""
         if isinstance(element, SspComponent):
-            d = self._descriptions[path]
-            assigned = find_entry({**d.parameters, **d.inputs}, name) is not None
+            assigned = find_entry(self._descriptions[path].settable, name) is not None
         else:
             assigned = name in element.connectors
         if assigned:

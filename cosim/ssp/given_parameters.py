@@ -15,7 +15,7 @@ from handover.cosim.blocks.units import UNKNOWN
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.description import FmuDescription, FmuPort
-from handover.cosim.ssp.connected_ports import Entry, entry_names, find_entry
+from handover.cosim.ssp.connected_ports import Entry, entry_names, find_entry, unfed
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.ssp.start_values import Given
 from handover.cosim.ssp.structure import SspComponent, SspConnector, SspNestedSystem
@@ -94,7 +94,8 @@ def named_parameters(
 ) -> tuple[dict[tuple[str, str], SspValue], list[str]]:
     """Return values by path and name of the parameters that texts name, and what is wrong with the names.
 
-    A name such as `arm.p[1]` is a parameter by itself: that entry of an array.
+    A name such as `arm.p[1]` is a parameter by itself: that entry of an array. So is that of an output or a local
+    variable whose start value can be given; these are many in some FMUs, so they are not among the known.
     """
     values: dict[tuple[str, str], SspValue] = {}
     faults: list[str] = []
@@ -127,10 +128,10 @@ def put(given: dict[str, Given], entry: Entry, name: str, value: SspValue) -> No
 
 
 def _entry(descriptions: Mapping[str, FmuDescription], name: str) -> SettableParameter | None:
-    """Return an entry of a component's array by its name."""
+    """Return an entry of a component's array, or an output or local with a start value, by its name."""
     for path, d in descriptions.items():
         variable = name.removeprefix(f"{path}.")
-        if variable != name and (found := find_entry(d.parameters, variable)) is not None:
+        if variable != name and (found := find_entry(unfed(d), variable)) is not None:
             return SettableParameter(path, variable, found[0])
     return None
 

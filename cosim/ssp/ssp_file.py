@@ -116,7 +116,7 @@ class Grouping:
         for unit, names in self.apart.items():
             d = self._descriptions[unit]
             for name in sorted(names):
-                port = {**d.parameters, **d.inputs, **d.outputs}[name]
+                port = {**d.settable, **d.outputs}[name]
                 if len(port.references) == 1:
                     fault = f"{unit}.{name} is one array variable (FMI 3); its entries cannot be connected one by one"
                     self.faults.append(fault)
@@ -227,7 +227,7 @@ class SspFile:
         faults = list(flat.faults)
         starts, partly = dict[str, dict[str, object]](), dict[str, set[str]]()
         for unit, given in flat.given.items():
-            ports = {**descriptions[unit].parameters, **descriptions[unit].inputs}
+            ports = descriptions[unit].settable
             known = {name: (entry, g) for name, g in given.items() if (entry := find_entry(ports, name)) is not None}
             starts[unit], partly[unit], start_faults = start_values(known)
             faults += start_faults

@@ -14,7 +14,7 @@ from handover.cosim.exceptions import NotExportable
 from handover.cosim.fmu.archive import write_archive
 from handover.cosim.fmu.default_experiment import proposed_step
 from handover.cosim.fmu.description import FmuPort
-from handover.cosim.ssp.connected_ports import entry_names, ports_of
+from handover.cosim.ssp.connected_ports import entry_names
 from handover.cosim.ssp.xml import (
     OMS_ANNOTATION,
     OMS_NAMESPACE,
@@ -91,7 +91,7 @@ def bound_values(unit: PlacedUnit) -> dict[str, tuple[FmuPort, Any]]:
 
     An enumeration that equals the FMU's start value is left out: see `bound_enumerations`.
     """
-    ports = ports_of(unit.description)
+    ports = unit.description.settable
     values = {name: (ports[name], value) for name, value in unit.start.items()}
     return {
         name: (port, value)

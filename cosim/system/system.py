@@ -307,7 +307,7 @@ class System:
 
 
 def _value_faults(unit: PlacedUnit) -> list[str]:
-    ports = {**unit.description.parameters, **unit.description.inputs}
+    ports = unit.description.settable
     faults: list[str] = []
     for name, value in unit.start.items():
         if name not in ports:

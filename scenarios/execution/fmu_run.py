@@ -53,7 +53,7 @@ class FmuRun:
         system = System()
         unit = system.add("unit", self.path, period=self.step)
         d = system.units.pop(unit.name).description
-        start, faults = start_values({**d.parameters, **d.inputs}, self.parameters)
+        start, faults = start_values(d.settable, self.parameters)
         if faults:
             raise UsageError(f"{self.path}: {'; '.join(faults)}")
         system.units[d.identifier] = replace(unit, name=d.identifier, start=start)

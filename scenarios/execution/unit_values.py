@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.blocks.variable import Kind
+from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.system import PlacedUnit, System
@@ -25,7 +25,7 @@ def start_values(ports: Mapping[str, FmuPort], given: Sequence[str]) -> tuple[di
     """Return start values by port, and what is wrong with the texts.
 
     Args:
-        ports: the parameters or inputs that can be given.
+        ports: the parameters, inputs and other variables that can be given.
         given: texts `NAME=VALUE`; an array's values stand with commas between them, or `NAME[1]=VALUE` gives one.
     """
     entries, faults = columns_of(ports), list[str]()
@@ -50,7 +50,8 @@ def start_values(ports: Mapping[str, FmuPort], given: Sequence[str]) -> tuple[di
 
 
 def _kinds(ports: Mapping[str, FmuPort]) -> str:
-    return " or ".join(dict.fromkeys(p.causality.value for p in ports.values())) or "parameter"
+    kinds = dict.fromkeys(p.causality for p in ports.values())
+    return " or ".join(k.value for k in kinds if k in (Causality.PARAMETER, Causality.INPUT)) or "parameter"
 
 
 def _set(start: dict[str, Any], port: FmuPort, k: int | None, text: str) -> None:
@@ -157,7 +158,8 @@ def set_values(system: System, values: Mapping[str, str]) -> None:
     units: dict[str, PlacedUnit] = {}
     for name, unit in system.units.items():
         given = [f"{n.partition('.')[2]}={text}" for n, text in values.items() if n.partition(".")[0] == name]
-        start, of_unit = start_values(unit.description.parameters, given)
+        d = unit.description
+        start, of_unit = start_values({**d.parameters, **d.initial}, given)
         units[name] = replace(unit, start={**unit.start, **start}) if start else unit
         faults += [f"unit {name}: {fault}" for fault in of_unit]
     if faults:

@@ -137,7 +137,7 @@ def test_a_name_that_nothing_has_is_left_out_and_reported(started: Open, caplog:
     with caplog.at_level(logging.WARNING):
         assert started(one("y|Real|1", "nothing|Real|1", "mode|Integer|2")) == {"a": {"mode": 2}}
     text = caplog.text
-    assert "SystemStructure.ssd, line 3: no variable is called 'nothing'" in text
+    assert "SystemStructure.ssd, line 3: a has nothing called 'nothing' that can be set" in text
     assert "'y'" in text
 
 
@@ -161,8 +161,33 @@ def test_a_value_that_a_variable_cannot_have_is_refused(started: Open, given: st
 def test_a_name_that_nothing_has_is_reported_with_the_nearest(started: Open, caplog: pytest.LogCaptureFixture):
     middle = system(component("a", bindings(parameters("moed|Integer|1"))), name="m")
     assert started(system(middle, before=bindings(parameters("m.a.p[3]|Real|1")))) == {"m.a": {}}
-    assert "no variable is called 'moed'; did you mean mode?; its value is left out" in caplog.text
-    assert "no variable is called 'm.a.p[3]'; did you mean m.a.p[1] or m.a.p[2]" in caplog.text
+    assert "m.a has nothing called 'moed' that can be set; did you mean mode?; its value is left out" in caplog.text
+    assert "whole has nothing called 'm.a.p[3]' that can be set; did you mean m.a.p[1] or m.a.p[2]" in caplog.text
+
+
+@pytest.mark.parametrize("initial", ["exact", "approx"])
+def test_a_local_variable_with_a_start_value_can_be_given_one(tmp_path: Path, initial: str):
+    with_start = ('"local" variability="continuous"><Real', f'"local" initial="{initial}"><Real start="1"')
+    fmu = decay.pack(tmp_path / "unit.fmu", b"", decay.edited(*MORE_PARAMETERS, with_start))
+    file = pack_ssp(tmp_path / "a.ssp", described(one("x|Real|3")), {"resources/unit.fmu": fmu})
+    with SspFile(file) as ssp:
+        assert ssp.system.units["a"].start == {"x": 3.0}
+    with SspFile(file, parameters={"a.x": "4"}) as ssp:  # comes before what the file gives
+        assert ssp.system.units["a"].start == {"x": 4.0}
+        assert "a.x" not in ssp.parameters
+
+
+@pytest.mark.parametrize("more", ['initial="calculated"', ""])
+def test_a_local_variable_that_is_computed_cannot_be_set(tmp_path: Path, more: str, caplog: pytest.LogCaptureFixture):
+    computed = ('"local" variability="continuous"><Real', f'"local" {more}><Real')
+    fmu = decay.pack(tmp_path / "unit.fmu", b"", decay.edited(*MORE_PARAMETERS, computed))
+    two = system("".join(component(name, bindings(parameters("x|Real|3"))) for name in ("a", "b")))
+    with SspFile(pack_ssp(tmp_path / "a.ssp", described(two), {"resources/unit.fmu": fmu})) as ssp:
+        assert ssp.system.units["a"].start == {}
+    lines = [record.getMessage() for record in caplog.records]
+    assert [line.partition(": ")[2].partition(";")[0] for line in lines] == [
+        f"{name} has nothing called 'x' that can be set" for name in ("a", "b")
+    ]
 
 
 def bound(inside: str, more: str = "") -> str:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import decay
 import fmpy
 import numpy as np
 import pytest
@@ -129,6 +130,17 @@ def test_a_table_of_another_form_is_refused_by_line_and_column(tmp_path: Path, t
     for part in wanted:
         assert part in line
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("initial", ["exact", "approx"])
+def test_a_local_variable_starts_from_what_is_given(tmp_path: Path, initial: str):
+    """x' = -x from the given x; where that is a guess, the unit may find another one."""
+    local = ('"local" variability="continuous"><Real', f'"local" initial="{initial}"><Real start="1"')
+    file = decay.pack(tmp_path / "decay.fmu", decay.compiled(tmp_path), decay.edited(local))
+    result = run(file, "-p", "x=3", "--no-report", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    record = Record(tmp_path / "out" / "signals.parquet")
+    assert record["Decay.y"][1:] == pytest.approx(3.0 * np.exp(-record.time[1:]))
 
 
 @pytest.mark.parametrize(
