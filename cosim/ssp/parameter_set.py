@@ -1,12 +1,19 @@
 """Parameter sets (SSV) and mappings of their names (SSM), in files of their own or in the system's description."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
+from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.xml import XmlElement
 from handover.cosim.ssp.xml import SspPart, local, short_name
 from handover.cosim.system.conversion import LinearTransformation
+
+_log = logging.getLogger(__name__)
+
+_MAX_NAMES = 5
+"""Parameters that a mapping leaves out which a warning names; of more there is the number."""
 
 _SINGLE = ("String", "Enumeration", "Binary")
 """Types whose value is one text; of others it is a list with blanks between."""
@@ -34,11 +41,12 @@ class SspValue:
 
 @dataclass(frozen=True)
 class Mapped:
-    """The name that a mapping gives a parameter, and how it transforms the value."""
+    """The name that a mapping gives a parameter, and how it transforms the value; `where` it does so."""
 
     target: str
     linear: LinearTransformation | None
     keeps_units: bool
+    where: str
 
 
 def read_units(part: SspPart, parent: XmlElement, prefix: str) -> dict[str, Unit]:
@@ -107,7 +115,8 @@ def read_mapping(part: SspPart, root: XmlElement) -> dict[str, list[Mapped]]:
         if target in targets:
             raise part.fault(entry, f"two parameters are mapped to {target!r}")
         targets.add(target)
-        mapped = Mapped(target, read_linear(part, entry), part.flag(entry, "suppressUnitConversion"))
+        keeps_units = part.flag(entry, "suppressUnitConversion")
+        mapped = Mapped(target, read_linear(part, entry), keeps_units, part.where(entry, ""))
         mapping.setdefault(source, []).append(mapped)
     return mapping
 
@@ -127,8 +136,23 @@ def read_linear(part: SspPart, owner: XmlElement) -> LinearTransformation | None
     return None
 
 
-def mapped_values(values: Mapping[str, SspValue], mapping: Mapping[str, Sequence[Mapped]]) -> dict[str, SspValue]:
-    """Return the values under the names that they are mapped to; others are left out, as the standard has it."""
+def mapped_values(
+    values: Mapping[str, SspValue], mapping: Mapping[str, Sequence[Mapped]], owner: str
+) -> dict[str, SspValue]:
+    """Return the values under the names that they are mapped to; others are left out, as the standard has it.
+
+    What of one has no counterpart in the other is warned of, as of the element `owner` that the values are for.
+    """
+    for source in (name for name in mapping if name not in values):
+        for m in mapping[source]:
+            near = nearest(source, values)
+            text = "%s%s: no parameter is called %r; %s; its mapping to %r is left out"
+            _log.warning(text, m.where, owner, source, near, m.target)
+    left_out = [name for name in values if name not in mapping]
+    if left_out:
+        names = ", ".join(repr(name) for name in left_out[:_MAX_NAMES])
+        more = f" and {len(left_out) - _MAX_NAMES} more" if len(left_out) > _MAX_NAMES else ""
+        _log.warning("%s%s: no entry maps %s, left out", values[left_out[0]].where, owner, names + more)
     return {
         m.target: replace(values[source], linear=m.linear, keeps_units=m.keeps_units)
         for source, targets in mapping.items()

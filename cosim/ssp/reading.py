@@ -202,14 +202,16 @@ class _Reader:
         )
 
     def _bindings(self, e: XmlElement) -> tuple[Mapping[str, SspValue], ...]:
-        return tuple(map(self._binding, self._part.children(e, "ssd:ParameterBindings", "ssd:ParameterBinding")))
+        listed = self._part.children(e, "ssd:ParameterBindings", "ssd:ParameterBinding")
+        return tuple(self._binding(binding, e.get("name")) for binding in listed)
 
-    def _binding(self, e: XmlElement) -> Mapping[str, SspValue]:
+    def _binding(self, e: XmlElement, owner: str) -> Mapping[str, SspValue]:
         part, root = self._content(e, "ssv:ParameterSet", SET_TYPE, "ssd:ParameterValues")
         prefix = e.get("prefix")
         values = {prefix + name: v for name, v in read_parameter_set(part, root, self._units).items()}
         for mapping in self._part.children(e, "ssd:ParameterMapping"):
-            values = mapped_values(values, read_mapping(*self._content(mapping, "ssm:ParameterMapping", MAPPING_TYPE)))
+            entries = read_mapping(*self._content(mapping, "ssm:ParameterMapping", MAPPING_TYPE))
+            values = mapped_values(values, entries, owner)
         return values
 
     def _content(self, e: XmlElement, wanted: str, type_name: str, *holder: str) -> tuple[SspPart, XmlElement]:

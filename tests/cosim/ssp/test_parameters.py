@@ -92,6 +92,22 @@ def test_sets_and_mappings_can_be_files_of_their_own(started: Open):
     assert started(inside, files=files) == {"a": {"u": 2 * 1.5 + 1, "p[1]": 1500.0}}
 
 
+def test_what_a_mapping_and_its_set_do_not_have_of_each_other_is_reported(
+    started: Open, caplog: pytest.LogCaptureFixture
+):
+    entries = '<ssm:MappingEntry source="modus" target="mode"/>\n<ssm:MappingEntry source="x" target="u"/>'
+    mapping = f'<ssm:ParameterMapping {NAMESPACES} version="1.0">{entries}</ssm:ParameterMapping>'
+    inside = '<ssd:ParameterMapping source="m.ssm"/>'
+    whole = bound(inside, 'source="s.ssv"')
+    values = parameters("x|Real|1", "mode|Integer|3", *(f"other{n}|Real|1" for n in range(6)))
+    assert started(whole, files={"m.ssm": mapping, "s.ssv": values}) == {"a": {"u": 1.0}}
+    left_out = "'mode', 'other0', 'other1', 'other2', 'other3' and 2 more"
+    assert [record.getMessage() for record in caplog.records] == [
+        "m.ssm, line 1: a: no parameter is called 'modus'; did you mean mode?; its mapping to 'mode' is left out",
+        f"s.ssv, line 1: a: no entry maps {left_out}, left out",
+    ]
+
+
 def test_a_mapping_can_stand_inside(started: Open):
     entry = '<ssm:MappingEntry source="x" target="mode"/>'
     mapping = f'<ssm:ParameterMapping {NAMESPACES} version="1.0">{entry}</ssm:ParameterMapping>'
