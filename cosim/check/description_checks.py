@@ -13,6 +13,7 @@ from itertools import pairwise
 from handover.cosim.check.described_variable import REALS, DescribedVariable
 from handover.cosim.check.finding import Finding, fault, note, warning
 from handover.cosim.fmu.default_experiment import default_experiment
+from handover.cosim.fmu.model_structure import lost_references
 from handover.cosim.fmu.xml import XmlElement
 
 _KINDS = {
@@ -70,26 +71,16 @@ def _experiment_findings(root: XmlElement) -> Iterator[Finding]:
             yield fault("stopTime is before startTime", where=f"DefaultExperiment (line {experiment.line})")
 
 
-_FMI3_UNKNOWNS = ("Output", "ContinuousStateDerivative", "ClockedState", "InitialUnknown", "EventIndicator")
-
-
 def structure_findings(root: XmlElement, fmi: int, variables: Sequence[DescribedVariable]) -> Iterator[Finding]:
     """Yield references in ModelStructure and of derivatives that lead to no variable, and unlisted outputs."""
+    for lost in lost_references(root, fmi):
+        yield fault(lost.what, where=lost.where, cure=lost.cure)
     if fmi == 2:
-        valid: Collection[str] = {str(i + 1) for i in range(len(list(root.named("ModelVariables", "ScalarVariable"))))}
-        unknowns = [
-            u for group in root.named("ModelStructure") for part in group.children for u in part.named("Unknown")
-        ]
-        key, entries = "index", f"there are variables 1 to {len(valid)}"
+        count = len(list(root.named("ModelVariables", "ScalarVariable")))
+        valid: Collection[str] = {str(i + 1) for i in range(count)}
+        entries = f"there are variables 1 to {count}"
     else:
-        valid = {v.reference for v in variables}
-        unknowns = [u for group in root.named("ModelStructure") for u in group.children if u.tag in _FMI3_UNKNOWNS]
-        key, entries = "valueReference", "no variable has it"
-    for u in unknowns:
-        for name in (key, "dependencies"):
-            for missing in (r for r in u.get(name).split() if r not in valid):
-                where = f"ModelStructure (line {u.line})"
-                yield fault(f"{name} {missing} leads to no variable", where=where, cure=entries)
+        valid, entries = {v.reference for v in variables}, "no variable has it"
     for v in variables:
         derivative = v.values.get("derivative")
         if derivative and derivative not in valid:

@@ -4,6 +4,7 @@ FMPy has no types, so units are read only here and loaded only in `handover.cosi
 Every file that FMPy opens is checked before: its parser would follow entities, and its unpacking paths out of a folder.
 """
 
+from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple, Protocol, cast
 
@@ -16,6 +17,7 @@ from fmpy.validation import validate_model_description
 from handover.cosim.exceptions import InvalidFmu, one_line
 from handover.cosim.fmu.archive import DESCRIPTION, FmuArchive
 from handover.cosim.fmu.library_format import HEAD, shortage
+from handover.cosim.fmu.model_structure import lost_references
 from handover.cosim.fmu.reduced_description import reduced_fmu
 from handover.cosim.fmu.xml import UnsafeXml, XmlElement, check_xml, parse_xml
 
@@ -71,12 +73,11 @@ def read_description(path: Path) -> tuple[ModelDescription, XmlElement, str]:
     """
     archive = FmuArchive(path)
     root = checked_xml(archive)
-    version_of(path, root)
-    fault = ""
+    fmi, fault = version_of(path, root), ""
     try:
         md: Any = fmpy.read_model_description(archive.xml_source())
     except Exception as e:  # FMPy raises plain Exception for unknown elements, lxml its own for malformed XML
-        fault = _fault_of(e)
+        fault = _fault_of(e, root, fmi)
         try:
             md = fmpy.read_model_description(reduced_fmu(archive.description()))
         except Exception:  # as above: the fault is in what co-simulation reads
@@ -86,13 +87,19 @@ def read_description(path: Path) -> tuple[ModelDescription, XmlElement, str]:
     return cast(ModelDescription, md), root, fault
 
 
-def _fault_of(e: Exception) -> str:
+def _fault_of(e: Exception, root: XmlElement, fmi: int) -> str:
     """Return why FMPy rejects a description, in one line."""
+    if isinstance(e, LookupError) and (lost := [reference.line for reference in lost_references(root, fmi)]):
+        return _in_one_line(lost)
     if isinstance(e, LookupError):  # its text alone is a name or a number
         return f"{type(e).__name__}: {one_line(e)}"
     if not isinstance(e, ValidationError):
         return one_line(e)
-    problems = [" ".join(str(p).split()).rstrip(".") for p in cast(list[Any], e.problems)]
+    return _in_one_line([" ".join(str(p).split()).rstrip(".") for p in cast(list[Any], e.problems)])
+
+
+def _in_one_line(problems: Sequence[str]) -> str:
+    """Return the first problems, and how many more there are."""
     more = f"; and {len(problems) - _MAX_PROBLEMS} more" if len(problems) > _MAX_PROBLEMS else ""
     return "; ".join(problems[:_MAX_PROBLEMS]) + more
 

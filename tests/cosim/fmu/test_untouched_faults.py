@@ -158,8 +158,8 @@ def test_an_enumeration_that_is_said_to_be_continuous_changes_at_events(tmp_path
         ('<Real start="0" unit="m"/>', '<Real start="0" unit="parsec"/>', 'unit "parsec" of variable "u"'),
         (' guid="decay"', "", "attribute 'guid' is required but missing"),
         ('modelIdentifier="Decay"', "", "attribute 'modelIdentifier' is required but missing"),
-        ('<Outputs><Unknown index="3"', '<Outputs><Unknown index="7"', "list index out of range"),
-        ('<Outputs><Unknown index="3" dependencies=""', '<Outputs><Unknown index="3" dependencies="9"', "out of range"),
+        ('<Outputs><Unknown index="3"', '<Outputs><Unknown index="7"', "index 7 leads to no variable"),
+        ('<Outputs><Unknown index="3" dependencies=""', '<Outputs><Unknown index="3" dependencies="9"', "encies 9 lead"),
         ('"output" variability="continuous"', '"output" variability="fixed"', "illegal combination"),
     ],
 )  # fmt: skip
@@ -167,6 +167,31 @@ def test_a_fault_in_what_co_simulation_reads_is_refused(tmp_path: Path, old: str
     file = decay.pack(tmp_path / "a.fmu", b"", decay.edited((old, new)))
     with pytest.raises(InvalidFmu, match=f"its modelDescription.xml is not valid: .*{wanted}"):
         describe_fmu(file)
+
+
+@pytest.mark.parametrize(
+    ("fmi", "old", "new", "what"),
+    [
+        (2, '<Outputs><Unknown index="3"', '<Outputs><Unknown index="7"', "index 7"),
+        (2, 'index="3" dependencies=""/></Outputs>', 'index="3" dependencies="9"/></Outputs>', "dependencies 9"),
+        (3, '<Output valueReference="2"', '<Output valueReference="77"', "valueReference 77"),
+        (
+            3,
+            '<Output valueReference="2" dependencies=""',
+            '<Output valueReference="2" dependencies="4 78"',
+            "dependencies 78",
+        ),
+    ],
+)
+def test_a_run_and_a_check_say_the_same_of_what_leads_to_no_variable(
+    edited: Edited, tmp_path: Path, fmi: int, old: str, new: str, what: str
+):
+    file = decay.pack(tmp_path / "a.fmu", b"", decay.edited((old, new))) if fmi == 2 else edited("mass", 3, (old, new))
+    with pytest.raises(InvalidFmu) as refused:
+        describe_fmu(file)
+    findings = [f for section in check_fmu(file, timeout=60.0).sections for f in section.findings]
+    (found,) = [f for f in findings if f"{what} leads to no variable" in f.what]
+    assert f"is not valid: {found.where}: {found.what}; {found.cure}" in str(refused.value)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
