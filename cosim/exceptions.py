@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
+_STATUS = re.compile(r"^\[\w+\] ")
 _STATUS_AND_CALL = re.compile(r"^\[\w+\] fmi[23]\w+: ")
 _SYNTAX = re.compile(r"(?:SyntaxError|IndentationError|TabError): ")
 _LOCATION = re.compile(r'File "(?:.*?/resources/sources/)?([^"]+)", line (\d+)')
@@ -163,11 +164,16 @@ class UnitFailure(CosimError):
 
 
 class InitializationError(CosimError):
-    """A unit did not accept its parameters or did not initialise; nothing has run yet."""
+    """A unit did not accept its parameters or did not initialise; nothing has run yet.
+
+    What it logged comes first, as it says what is wrong, then the call that answered the error.
+    """
 
     def __init__(self, failure: UnitFailure) -> None:
         is_status = failure.message == failure.status and failure.status.isalpha()  # one word, such as Discard
         how = f"{failure.call} {failure.what}" if is_status else failure.message
+        if not is_status and failure.kind in ("error", "fatal", "discard"):
+            how = f"{_STATUS.sub('', how)} ({failure.call} {failure.what})"
         super().__init__(f"{failure.unit} does not start: {how}")
         self.failure = failure
 

@@ -159,7 +159,7 @@ def test_an_enumeration_that_is_said_to_be_continuous_changes_at_events(tmp_path
         (' guid="decay"', "", "attribute 'guid' is required but missing"),
         ('modelIdentifier="Decay"', "", "attribute 'modelIdentifier' is required but missing"),
         ('<Outputs><Unknown index="3"', '<Outputs><Unknown index="7"', "index 7 leads to no variable"),
-        ('<Outputs><Unknown index="3" dependencies=""', '<Outputs><Unknown index="3" dependencies="9"', "encies 9 lead"),
+        ('"3" dependencies=""/></Outputs>', '"3" dependencies="9"/></Outputs>', "dependencies 9 leads to no variable"),
         ('"output" variability="continuous"', '"output" variability="fixed"', "illegal combination"),
     ],
 )  # fmt: skip
