@@ -11,7 +11,7 @@ import click
 from handover.scenarios.cli.master_options import isolate_option, isolated
 from handover.scenarios.cli.options import limit_options, limits, log_option
 from handover.scenarios.cli.summaries.run import exit_with
-from handover.scenarios.execution.errors import one_line_errors, require_extra
+from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import log_told, progress_bar
 from handover.scenarios.execution.resume import InterruptedRun
@@ -41,9 +41,12 @@ def resume(
 ) -> None:
     """Resume a run from its last checkpoint."""
     with Interruption() as interruption, one_line_errors(), log_told(log_level), contextlib.ExitStack() as opened:
+        if not folder.is_dir():
+            raise UsageError(f"{folder} is no folder; name that of a run")
+        run_folder = RunFolder.of_run(folder)
+        run_folder.read_run()  # what is no run's folder is told before what is missing here
         if not no_report:
             require_extra("reports", "report and figures", "--no-report")
-        run_folder = RunFolder.of_run(folder)
         opened.enter_context(run_folder.held())
         interrupted = InterruptedRun(run_folder)
         task = interrupted.task(opened)

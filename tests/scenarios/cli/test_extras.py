@@ -8,7 +8,11 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from packaging.requirements import Requirement
+
+from handover.scenarios.cli.command import main
+from handover.scenarios.execution.errors import UsageError
 
 ROOT = Path(__file__).parents[3]
 MAIN = "from handover.scenarios.cli.entry import main; main()"
@@ -33,6 +37,18 @@ def size(names: Iterable[str]) -> int:
     """Return how many bytes distributions have installed."""
     files = [file for name in names for file in metadata.files(name) or []]
     return sum(Path(str(file.locate())).stat().st_size for file in files if Path(str(file.locate())).is_file())
+
+
+def test_a_folder_that_is_none_is_told_before_an_extra_that_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def lacking(*_: str) -> None:
+        raise UsageError("matplotlib missing")
+
+    monkeypatch.setattr("handover.scenarios.cli.resume.require_extra", lacking)
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    for folder, told in ((tmp_path / "nosuch", "is no folder"), (empty, "it has no run.json")):
+        result = CliRunner().invoke(main, ["resume", str(folder)])
+        assert (result.exit_code, told in result.output) == (2, True), result.output
 
 
 @pytest.fixture(scope="module")
