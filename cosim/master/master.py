@@ -40,7 +40,7 @@ def never() -> bool:
 
 
 def _tell_of_faults(system: System, *, strict: bool) -> None:
-    """Warn of model descriptions that break the standard where it does not matter here, and of what is left out.
+    """Warn of descriptions that break the standard where it does not matter here, or start from NaN, and tell notes.
 
     Raises:
         InvalidFmu: `strict` does not let them pass.
@@ -49,7 +49,7 @@ def _tell_of_faults(system: System, *, strict: bool) -> None:
         if strict:
             raise InvalidFmu(path, f"its {DESCRIPTION} is not valid: {fault}")
         _log.warning("%s: its %s is not valid, which does not matter here: %s", path, DESCRIPTION, fault)
-    for line in system.notes:
+    for line in (*system.undefined_starts, *system.notes):
         _log.warning("%s", line)
 
 

@@ -222,6 +222,20 @@ class System:
         return faults
 
     @property
+    def undefined_starts(self) -> list[str]:
+        """Which variables start from NaN, as their FMUs say and nobody else does, a line each.
+
+        Infinity is no fault: limits begin with it.
+        """
+        return [
+            f"{unit.name}.{name} starts from NaN, as its FMU says: give it a value, or see that the unit computes one"
+            for unit in self.units.values()
+            for name, port in unit.description.settable.items()
+            if port.kind is Kind.REAL and "nan" in (port.start or "").lower()
+            if name not in unit.start and name not in self.fed_inputs(unit.name)
+        ]
+
+    @property
     def has_events(self) -> bool:
         """Whether a unit runs in event mode: then steps may end at any time, not only on the schedule's grid."""
         return any(u.uses_events for u in self.units.values())

@@ -247,8 +247,9 @@ def begun_run(task: Task, master: Master) -> RunData:
     system = describe_system(master.system, adaptive=master.steps is not None)
     fmus = {name: unit.description.path for name, unit in master.system.units.items()}
     of_this_run: _OfSomeRuns = {"system": system, "conversions": conversions_of(master.system)}
-    if faults := master.system.untouched_faults:
-        of_this_run["warnings"] = [f"{path.name}: {fault}" for path, fault in faults.items()]
+    faults = [f"{path.name}: {fault}" for path, fault in master.system.untouched_faults.items()]
+    if warned := [*faults, *master.system.undefined_starts]:
+        of_this_run["warnings"] = warned
     if master.system.notes:
         of_this_run["notes"] = master.system.notes
     return _run_data(task, fmus, of_this_run)

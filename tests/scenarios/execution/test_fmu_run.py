@@ -132,6 +132,20 @@ def test_a_table_of_another_form_is_refused_by_line_and_column(tmp_path: Path, t
     assert not (tmp_path / "out").exists()
 
 
+def test_a_start_value_that_is_nan_is_warned_of_unless_another_is_given(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+):
+    undefined = ('<Real start="0"', '<Real start="NaN"')
+    file = decay.pack(tmp_path / "decay.fmu", decay.compiled(tmp_path), decay.edited(undefined))
+    line = "Decay.u starts from NaN, as its FMU says"
+    for given in ((), ("-p", "u=0")):
+        caplog.clear()
+        result = run(file, *given, "--no-report", "--out", tmp_path / f"out{len(given)}")
+        assert result.exit_code == 0, result.output
+        warned = json.loads((tmp_path / f"out{len(given)}" / "run.json").read_text()).get("warnings", [])
+        assert [line in text for text in (caplog.text, " ".join(warned))] == [not given] * 2
+
+
 @pytest.mark.parametrize("initial", ["exact", "approx"])
 def test_a_local_variable_starts_from_what_is_given(tmp_path: Path, initial: str):
     """x' = -x from the given x; where that is a guess, the unit may find another one."""
