@@ -1,10 +1,11 @@
 """What commands print to: the console; rows in columns; data as JSON."""
 
+import contextlib
 import json
 import os
 import sys
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TextIO
 
 import click
 from rich.console import Console
@@ -28,6 +29,36 @@ def print_rows(console: Console, rows: list[tuple[str, ...]]) -> None:
 def print_json(data: Mapping[str, Any]) -> None:
     """Print data as JSON, for programs."""
     click.echo(json.dumps(data, indent=2))
+
+
+def reserve_stdout() -> TextIO:
+    """Return standard output for this command alone: what units print there from now on goes to standard error.
+
+    It stays so until the process ends, as units may print until then, and what C libraries keep is written last.
+    """
+    try:
+        if sys.stdout.fileno() != _STDOUT:
+            return sys.stdout
+    except (OSError, ValueError):  # it is no file of the system, as where a program calls the command
+        return sys.stdout
+    sys.stdout.flush()
+    kept = _copy(_STDOUT)
+    os.dup2(_STDERR, _STDOUT)
+    return open(kept, "w", encoding="utf-8")
+
+
+_STDOUT, _STDERR = 1, 2
+_OUT_OF_THE_WAY = 500
+"""Where the copy of a descriptor is: some units close all that have small numbers."""
+
+
+def _copy(number: int) -> int:
+    if sys.platform != "win32":
+        import fcntl
+
+        with contextlib.suppress(OSError, ValueError):  # a process may have fewer
+            return fcntl.fcntl(number, fcntl.F_DUPFD_CLOEXEC, _OUT_OF_THE_WAY)
+    return os.dup(number)
 
 
 class _Console(Console):

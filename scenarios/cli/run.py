@@ -14,6 +14,7 @@ import click
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.cli.config_file import ConfiguredCommand, config_option
+from handover.scenarios.cli.console import reserve_stdout
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import (
     HeadedOption,
@@ -122,6 +123,7 @@ def run(
     **coupling: Any,
 ) -> None:
     """Run a SCENARIO, an SSP or an FMU once."""
+    json_to = reserve_stdout() if as_json else None
     with Interruption() as interruption, one_line_errors(), log_told(log_level), contextlib.ExitStack() as opened:
         if not no_report:
             require_extra("reports", "report and figures", "--no-report")
@@ -143,4 +145,4 @@ def run(
         task = replace(request, options=options).task(opened)
         with progress_bar(sys.stderr) as progress:
             result = run_task(task, progress, interruption)
-    exit_with(result, task, as_json=as_json)
+    exit_with(result, task, json_to=json_to)

@@ -4,7 +4,7 @@ import json
 import shlex
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import NoReturn, TextIO
 
 import click
 
@@ -24,9 +24,9 @@ _MAX_CONVERSIONS = 8
 """Conversions of physical units that are listed at the end of a run."""
 
 
-def print_summary_as_json(result: RunResult, folder: RunFolder) -> None:
-    """Print what `summary.json` says, with the run's folder."""
-    click.echo(json.dumps({**result.summary, "folder": str(folder.shown)}, indent=2, allow_nan=False))
+def print_summary_as_json(result: RunResult, folder: RunFolder, out: TextIO | None = None) -> None:
+    """Print what `summary.json` says, with the run's folder; to standard output, unless `out` is given."""
+    click.echo(json.dumps({**result.summary, "folder": str(folder.shown)}, indent=2, allow_nan=False), file=out)
 
 
 def print_summary(result: RunResult, headline: Sequence[str], folder: RunFolder) -> None:
@@ -57,14 +57,14 @@ def _conversion_rows(folder: RunFolder) -> list[tuple[str, str]]:
     return [(f"converted: {ends}", change) for ends, change in conversions[:_MAX_CONVERSIONS]] + more
 
 
-def exit_with(result: RunResult, task: Task, *, as_json: bool = False) -> NoReturn:
-    """Print how a run ended, as JSON or for people, and exit with the status for that."""
+def exit_with(result: RunResult, task: Task, *, json_to: TextIO | None = None) -> NoReturn:
+    """Print how a run ended, for people or, where `json_to` is given, as JSON there; exit with the status for that."""
     if result.failure:
         click.echo(str(result.failure), err=True)
     for line in (*warning_lines(result.summary), *result.left_out):
         click.echo(line, err=True)
-    if as_json:
-        print_summary_as_json(result, task.folder)
+    if json_to is not None:
+        print_summary_as_json(result, task.folder, json_to)
     else:
         print_summary(result, task.experiment.headline, task.folder)
     sys.exit(status_of_run(unit_failed=result.failure is not None, succeeded=result.outcome.success))

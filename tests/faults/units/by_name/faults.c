@@ -202,7 +202,9 @@ static int go_wrong(const char *where, Unit *unit) {
     else if (is("chdir")) {
         if (chdir("/"))
             abort();
-    } else if (is("close_output"))
+    } else if (is("print"))
+        puts("a unit's own words");
+    else if (is("close_output"))
         close(1);
     else if (is("close_all"))
         for (int i = 3; i < 1024; i++)
