@@ -1,6 +1,6 @@
 """Runs an experiment once: all is checked, then the folder is made, then it runs, then its results are written."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from handover.scenarios.execution.resumption import Resumption, pack
 from handover.scenarios.execution.supervisor import heartbeat_of_run, is_supervised
 from handover.scenarios.execution.unit_values import built_system
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, Outcome
+from handover.scenarios.results.not_finite import NotFiniteData, outputs_not_finite
 from handover.scenarios.results.pictures import write_picture_files
 from handover.scenarios.results.run_facts import record_of
 from handover.scenarios.results.run_folder import disk_errors_reported
@@ -81,7 +82,7 @@ def run_task(
     master = Master(system, replace(task.options, cpu_times=True), heartbeat_of_run())
     if is_supervised():
         note_crashes(master.heartbeat)
-    began = False
+    began, not_finite = False, list[NotFiniteData]()
     try:
         with master:
             if resumption is not None:
@@ -90,11 +91,14 @@ def run_task(
             began = True
             _begin_folder(task, master, resumption)
             failure = _run(task, master, evaluator, resumption, _Surroundings(progress, interruption, clock))
+            with disk_errors_reported(task.folder.signals):  # before units end: one may hang as its library is unloaded
+                not_finite = outputs_not_finite(task.folder.signals, master.system)
     except UnitFailure as e:  # as units were loaded, terminated or freed
         if not began:
             raise
         failure = failure or e
-    return _conclude(task, master, evaluator, failure, interruption.asked, clock())
+    ended = _Ended(failure, interruption.asked, not_finite, clock())
+    return _conclude(task, master, evaluator, ended)
 
 
 @dataclass(frozen=True)
@@ -167,15 +171,22 @@ def _checkpoints(
     return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, packed)]
 
 
-def _conclude(
-    task: Task, master: Master, evaluator: GuardedEvaluator[Evaluator], failure: UnitFailure | None, interrupted: bool,
-    spent: ElapsedTime,
-) -> RunResult:  # fmt: skip
+@dataclass(frozen=True)
+class _Ended:
+    """How a run ended: its failure, whether Ctrl-C ended it, the outputs that were not finite, and what it took."""
+
+    failure: UnitFailure | None
+    interrupted: bool
+    not_finite: Sequence[NotFiniteData]
+    spent: ElapsedTime
+
+
+def _conclude(task: Task, master: Master, evaluator: GuardedEvaluator[Evaluator], ended: _Ended) -> RunResult:
     """Write the summary of a run at its end, its pictures and its report."""
-    interrupted = interrupted and master.ended is None
+    failure, interrupted = ended.failure, ended.interrupted and master.ended is None
     outcome = _outcome(task, evaluator, failure, interrupted, master)
     complete = failure is None and (evaluator.over or not interrupted)
-    summary = finished_summary(task, outcome, master, spent, failure, complete)
+    summary = finished_summary(task, outcome, master, ended.spent, failure, complete, ended.not_finite)
     task.folder.write_summary(summary)
     status = status_of_run(unit_failed=failure is not None, succeeded=outcome.success)
     master.heartbeat.record_facts(concluded=status)  # whatever crashes from here on, this is how it ended

@@ -37,8 +37,10 @@ class NotFiniteData(TypedDict):
 def outputs_not_finite(signals: Path, system: System) -> list[NotFiniteData]:
     """Return the outputs of a system that are not finite somewhere in the record of its run, in the record's order.
 
-    The record is read a part at a time, and of it only the real numbers.
+    The record is read a part at a time, and of it only the real numbers. A run that has none recorded nothing.
     """
+    if not signals.exists():
+        return []
     fed = {(c.source.unit, c.source.port) for c in system.connections}
     found: dict[tuple[str, str], NotFiniteData] = {}
     for name, row_time, value in _first_not_finite(signals):
@@ -72,7 +74,7 @@ def _first_not_finite(signals: Path) -> Iterator[tuple[str, float, float]]:
     schema = file.schema_arrow
     real = [field.name for field in schema if field.type == pa.float64()]
     first: dict[str, tuple[float, float]] = {}
-    for batch in file.iter_batches(columns=real):
+    for batch in file.iter_batches(columns=real, use_threads=False):
         time = batch.column("time").to_numpy()
         for name in real:
             if name == "time" or name in first:

@@ -20,8 +20,8 @@ from handover.cosim.fmu.unit_warnings import WarningData
 from handover.cosim.master.master import Master
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Metric, Outcome
-from handover.scenarios.results.not_finite import NotFiniteData, outputs_not_finite
-from handover.scenarios.results.run_folder import disk_errors_reported, sha256_of, versions
+from handover.scenarios.results.not_finite import NotFiniteData
+from handover.scenarios.results.run_folder import sha256_of, versions
 from handover.scenarios.results.system_facts import describe_system, own_period, run_metrics
 from handover.scenarios.results.tables import conversions_of, format_value
 from handover.scenarios.results.task import Task
@@ -156,8 +156,9 @@ def configuration(task: Task) -> Configuration:
 
 
 def finished_summary(
-    task: Task, outcome: Outcome, master: Master, spent: ElapsedTime, failure: UnitFailure | None, complete: bool
-) -> Summary:
+    task: Task, outcome: Outcome, master: Master, spent: ElapsedTime, failure: UnitFailure | None, complete: bool,
+    not_finite: Sequence[NotFiniteData] = (),
+) -> Summary:  # fmt: skip
     """Return the summary of a run that came to its end, failed, or was interrupted."""
     metrics = {**outcome.metrics, **run_metrics(task.experiment, master)}
     steps: _OfSomeSummaries = {} if master.steps is None else {"steps": asdict(master.steps)}
@@ -180,10 +181,8 @@ def finished_summary(
         summary["ended"] = master.ended.as_data()
     if warned := master.warnings:
         summary["warnings"] = [warnings.as_data(unit) for unit, warnings in warned.items()]
-    if task.folder.signals.exists():  # else it failed before there was a row
-        with disk_errors_reported(task.folder.signals):
-            if outputs := outputs_not_finite(task.folder.signals, master.system):
-                summary["not_finite"] = outputs
+    if not_finite:
+        summary["not_finite"] = list(not_finite)
     return summary
 
 

@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -61,7 +60,7 @@ def test_a_run_with_finite_outputs_tells_nothing(tmp_path: Path):
 
 
 def record(file: Path, **columns: list[float]) -> Path:
-    pq.write_table(pa.table({name: np.array(values, float) for name, values in columns.items()}), file)
+    pq.write_table(pa.Table.from_arrays([pa.array(v, pa.float64()) for v in columns.values()], list(columns)), file)
     return file
 
 
