@@ -30,8 +30,9 @@ _MADV_WIPEONFORK = 18  # Linux 4.14
 _SIZE = 256  # bytes, more than a `struct sigaction` or a `fenv_t` has on any system
 _SIGNALS = [n for n in range(1, 32) if _POSIX and n not in (signal.SIGKILL, signal.SIGSTOP)]
 _STREAMS = (0, 1, 2)
-_OUT_OF_THE_WAY = 200
-"""Descriptors of the copies of the standard streams: some units close those next to the ones that they open."""
+_OUT_OF_THE_WAY = (700, 200)
+"""Descriptors from which on the standard streams are copied: some units close those next to the ones that they open, or
+the first few hundred. Where a process may have fewer (macOS: 256), the second."""
 _INTERVAL = 0.2  # s
 
 
@@ -199,8 +200,9 @@ def _copied(number: int) -> int | None:
         return None
     import fcntl
 
-    with contextlib.suppress(OSError, ValueError):
-        return fcntl.fcntl(number, fcntl.F_DUPFD_CLOEXEC, _OUT_OF_THE_WAY)
+    for least in _OUT_OF_THE_WAY:
+        with contextlib.suppress(OSError, ValueError):
+            return fcntl.fcntl(number, fcntl.F_DUPFD_CLOEXEC, least)
     return None
 
 

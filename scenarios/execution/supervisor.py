@@ -101,7 +101,7 @@ def run_to_end(command: Callable[[], Any]) -> NoReturn:
     except SystemExit as e:
         status = e.code if isinstance(e.code, int) else int(e.code is not None)
     except OSError as e:  # not even an error could be printed, as where a unit took the right to write files
-        heartbeat.record_facts(unsaid=f"the run's process could not go on: {one_line(e)}")
+        heartbeat.record_facts(unsaid=one_line(e))
         status = UNIT_FAILED
     finally:
         heartbeat.status = status
@@ -161,13 +161,20 @@ def _forward_signals(child: ForkedChild) -> _Asks:
 
 
 def _end_as(end: ChildEnd, wall: float, report_crash: Callable[[Heartbeat, ChildEnd, float], int]) -> NoReturn:
-    """End as the child did; where it had not set its exit status, report how it crashed."""
+    """End as the child did; where it had not set its exit status, report how it crashed.
+
+    Where it had concluded its run and could not tell, what it left is reported in its place.
+    """
     if end.signal is not None and end.signal in TERMINATION_SIGNALS:
         signal.signal(end.signal, signal.SIG_DFL)
         os.kill(os.getpid(), end.signal)
-    if "unsaid" in heartbeat.facts:
-        print(f"Error: {heartbeat.facts['unsaid']}", file=sys.stderr)
-    if heartbeat.status is not None:
+    unsaid, ended = heartbeat.facts.get("unsaid"), "concluded" in heartbeat.facts
+    if unsaid and ended:
+        why = "as where a unit has closed its standard streams"
+        print(f"the run ended, but its process could not tell so ({unsaid}), {why}; its folder says:", file=sys.stderr)
+    elif unsaid:
+        print(f"Error: the run's process could not go on: {unsaid}", file=sys.stderr)
+    if heartbeat.status is not None and not (unsaid and ended):
         sys.exit(heartbeat.status if end.signal is not None else end.status)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     sys.exit(report_crash(heartbeat, end, wall))

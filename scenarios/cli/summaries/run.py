@@ -4,7 +4,7 @@ import json
 import shlex
 import sys
 from collections.abc import Sequence
-from typing import NoReturn, TextIO
+from typing import NoReturn, TextIO, cast
 
 import click
 
@@ -14,8 +14,9 @@ from handover.scenarios.cli.console import open_console, print_rows
 from handover.scenarios.execution.child_process import ChildEnd
 from handover.scenarios.execution.crash import Crash
 from handover.scenarios.execution.exit_status import UNIT_FAILED, status_of_run
+from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.results.run_folder import RunFolder, disk_errors_reported
-from handover.scenarios.results.summary import RunResult
+from handover.scenarios.results.summary import RunResult, Summary
 from handover.scenarios.results.tables import format_conversion, format_metric, pace_rows, warning_lines
 from handover.scenarios.results.task import Task
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
@@ -79,9 +80,13 @@ _SIGNAL_STATUS = 128  # shells add it to a signal's number
 def report_crash(heartbeat: Heartbeat, end: ChildEnd, wall: float) -> int:
     """Complete the folder of a run that crashed, print how it did, and return the exit status.
 
-    For the arguments see `Crash`.
+    A run that had ended, but whose process could not print, as where a unit has closed all that is open, is printed as
+    its folder has it. For the arguments see `Crash`.
     """
     crash = Crash(heartbeat, end, wall)
+    if crash.concluded is not None and crash.folder is not None and "unsaid" in heartbeat.facts:
+        _report_concluded(crash.folder)
+        return crash.concluded
     if crash.concluded is not None:
         sys.stderr.write(f"{crash.message}; the run had ended before, and stays as it is\n")
         return crash.concluded
@@ -99,6 +104,18 @@ def report_crash(heartbeat: Heartbeat, end: ChildEnd, wall: float) -> int:
     except RecordNotWritten as e:
         sys.stderr.write(f"{e}\n")
     return UNIT_FAILED
+
+
+def _report_concluded(folder: RunFolder) -> None:
+    """Print what a run left that had ended."""
+    summary, headline = cast(Summary, folder.read_summary()), folder.read_run().get("headline", ())
+    result = RunResult(outcome=Outcome(success=summary["success"], reason=summary["reason"]), summary=summary)
+    for line in (*warning_lines(summary), *summary.get("left_out", ())):
+        click.echo(line, err=True)
+    if AS_JSON in sys.argv:
+        print_summary_as_json(result, folder)
+    else:
+        print_summary(result, headline, folder)
 
 
 def _write_page(folder: RunFolder) -> None:

@@ -30,14 +30,34 @@ def test_closed_streams_lead_nowhere(closed: str, tmp_path: Path):
     assert made.read_text() == "only what is meant for it"
 
 
+def ran(fmu: Path, folder: Path, *options: str) -> "subprocess.CompletedProcess[str]":
+    call = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()", "run", str(fmu)]
+    given = ("--stop", "1", "--no-report", "--out", "r", *options)
+    return subprocess.run([*call, *given], cwd=folder, capture_output=True, text=True, check=False)
+
+
 @pytest.mark.parametrize("isolated", [(), ("--isolate", "all")], ids=["", "isolated"])
 @pytest.mark.parametrize("when", ["step", "unload"])
 def test_what_units_print_is_not_in_the_json(when: str, isolated: tuple[str, ...], tmp_path: Path):
     fmu = faulty_fmu(f"print_in_{when}", 2, tmp_path)
-    call = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()", "run", str(fmu)]
-    options = ("--stop", "1", "--no-report", "--out", "r", "--json", *isolated)
-    done = subprocess.run([*call, *options], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = ran(fmu, tmp_path, "--json", *isolated)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == json.loads((tmp_path / "r" / "summary.json").read_text()) | {"folder": "r"}
     if not isolated:  # its process ends without writing what its C library has kept
         assert "a unit's own words\n" in done.stderr
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the run has no process of its own")
+@pytest.mark.parametrize("options", [(), ("--json",)], ids=["", "json"])
+@pytest.mark.parametrize("closed", ["close_low", "close_any"])
+def test_status_and_summary_agree_where_a_unit_closes_the_streams(
+    closed: str, options: tuple[str, ...], tmp_path: Path
+):
+    done = ran(faulty_fmu(f"{closed}_in_step", 2, tmp_path), tmp_path, *options)
+    summary = json.loads((tmp_path / "r" / "summary.json").read_text())
+    assert (done.returncode, summary["success"], summary["failure"]) == (0, True, None), done.stderr
+    if options:
+        assert json.loads(done.stdout) == summary | {"folder": "r"}
+    else:
+        assert f"{closed}_in_step.fmu succeeded: ran to 1 s" in done.stdout
+    assert ("its process could not tell so" in done.stderr) == (closed == "close_any")

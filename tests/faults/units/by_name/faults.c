@@ -202,7 +202,13 @@ static int go_wrong(const char *where, Unit *unit) {
     else if (is("chdir")) {
         if (chdir("/"))
             abort();
-    } else if (is("print"))
+    } else if (is("close_low"))
+        for (int i = 0; i < 256; i++)
+            close(i);
+    else if (is("close_any"))
+        for (int i = 0; i < 1024; i++)
+            close(i);
+    else if (is("print"))
         puts("a unit's own words");
     else if (is("close_output"))
         close(1);
