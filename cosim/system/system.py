@@ -223,10 +223,7 @@ class System:
 
     @property
     def undefined_starts(self) -> list[str]:
-        """Which variables start from NaN, as their FMUs say and nobody else does, a line each.
-
-        Infinity is no fault: limits begin with it.
-        """
+        """Variables that start from NaN, as their FMUs say and nobody else does, a line each; infinity is a limit."""
         return [
             f"{unit.name}.{name} starts from NaN, as its FMU says: give it a value, or see that the unit computes one"
             for unit in self.units.values()

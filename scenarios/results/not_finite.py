@@ -72,7 +72,7 @@ def _first_not_finite(signals: Path) -> Iterator[tuple[str, float, float]]:
 
     file = pq.ParquetFile(signals)
     schema = file.schema_arrow
-    real = [field.name for field in schema if field.type == pa.float64()]
+    real = [name for name, kind in zip(schema.names, schema.types, strict=True) if kind == pa.float64()]
     first: dict[str, tuple[float, float]] = {}
     for batch in file.iter_batches(columns=real, use_threads=False):
         time = batch.column("time").to_numpy()
