@@ -136,14 +136,18 @@ def _rates(results: CampaignResults, layout: PointLayout, group: int, name: str)
 
 
 def place_axis(figure: Any, layout: PointLayout) -> None:
-    """Set the axis of a figure along which points stand."""
-    axis: dict[str, Any] = {"title": {"text": layout.title}, "range": list(layout.limits)}
+    """Set the axis of a figure along which points stand; places and values are numbers.
+
+    Plotly would guess an axis's type by its first trace, and takes one of boxes without data for names.
+    """
+    axis: dict[str, Any] = {"title": {"text": layout.title}, "range": list(layout.limits), "type": "linear"}
     if layout.ticks is not None:
         names = [name for _, name in layout.ticks]
         if layout.listed:
             names = [_broken(name) for name in names]
         axis |= {"tickmode": "array", "tickvals": [place for place, _ in layout.ticks], "ticktext": names}
-    figure.update_layout({"yaxis" if layout.listed else "xaxis": axis})
+    along, across = ("yaxis", "xaxis") if layout.listed else ("xaxis", "yaxis")
+    figure.update_layout({along: axis, across: {"type": "linear"}})
     if layout.listed and len(layout.places) > _SCREEN:
         figure.update_layout({"xaxis": {"side": "top"}})
 

@@ -1,9 +1,10 @@
 """A campaign's page in a browser: its metric can be chosen, its tables sorted and filtered, also on a phone."""
 
+from itertools import product
 from pathlib import Path
 
 import pytest
-from campaigns import carried_out
+from campaigns import campaign_metadata, carried_out, folder_of, table_of
 from opened_page import opened, overflow, wait_until
 from playwright.sync_api import Browser
 
@@ -51,6 +52,21 @@ def test_a_metric_is_chosen_and_runs_are_sorted_and_filtered(browser: Browser, c
         page.set_viewport_size({"width": 400, "height": 800})
         wait_until(page, "[...document.querySelectorAll('.plot svg.main-svg')].every(s => s.clientWidth < 400)")
         assert overflow(page) <= 0
+
+
+@pytest.mark.parametrize("varied", [1, 3], ids=["side by side", "listed"])
+def test_values_stand_along_an_axis_of_numbers(browser: Browser, tmp_path: Path, varied: int):
+    names = ("forward", "standoff", "run_up")[:varied]
+    points = [dict(zip(names, values, strict=True)) for values in product(("0.01", "0.02"), repeat=varied)]
+    distances = ([0.03, 0.01, 0.06, 0.05] * 4)[: 2 * len(points)]
+    table = table_of([{n: float(v) for n, v in p.items()} for p in points], final_distance_thumb=distances)
+    folder = folder_of(tmp_path, campaign_metadata("ir_grasp", points), table)
+    write_campaign_page(folder)
+    with opened(browser, folder.report) as page:
+        types = page.evaluate(
+            "[...document.querySelectorAll('.plot')].flatMap(p => [p._fullLayout.xaxis.type, p._fullLayout.yaxis.type])"
+        )
+        assert types == ["linear"] * 4
 
 
 @pytest.mark.slow
