@@ -82,6 +82,7 @@ class Session:
         self.stop = float(experiment.stop_time(parameters))
         """When a run of the scenario ends at the latest, s."""
         self._evaluator: GuardedEvaluator[Evaluator] = GuardedEvaluator(experiment.evaluator(parameters))
+        self._evaluator.note_units(self._open.system.units)
         self._asked, self._seen = Fraction(0), -1.0
         self._master = Master(self._open.system, options)
         self._master.__enter__()

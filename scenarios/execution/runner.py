@@ -76,6 +76,7 @@ def run_task(
         )
         experiment.stop_time(parameters)
     system = experiment_system(experiment, parameters, task.seed, task.fmus, task.unit_values, task.options)
+    evaluator.note_units(system.units)
     failure: UnitFailure | None = None
     if task.every is not None:
         check_states(system)

@@ -18,7 +18,7 @@ from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.variable import Causality, Variable
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
-from handover.cosim.system.system import System
+from handover.cosim.system.system import PlacedUnit, System
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place, fit_places
@@ -56,6 +56,12 @@ class Evaluator(abc.ABC):
 
     records: ClassVar[tuple[type[Any], ...]] = ()
     """Dataclasses, named tuples and enumerations of which its attributes are made, besides plain data."""
+
+    def note_units(self, units: Mapping[str, PlacedUnit]) -> None:  # noqa: B027 (most tasks are judged by the signals alone)
+        """Take in, before a run begins or is resumed, which units are there and what they are set to, by name.
+
+        Another unit may stand in the place of one of the scenario's, or none; of a record nobody knows.
+        """
 
     @abc.abstractmethod
     def __call__(self, t: float, signals: Signals) -> None:

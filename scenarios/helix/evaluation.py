@@ -4,7 +4,7 @@ Besides the verdict, `HandoverEvaluator` measures how far the controller's model
 the cameras see ([Vervloet2025] sec. 4.2, fig. 9), and keeps marked pictures of all cameras.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ from handover.controllers.helix.vision.vision_parameters import Params as Vision
 from handover.cosim.blocks.geometry import Pinhole, rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
@@ -186,6 +187,14 @@ class HandoverEvaluator(Evaluator):
         self._closing_distance = 0.0  # then
         self._released_at: float | None = None
         self._hand_force = 0.0  # largest on the hand
+        self._control_period: float | None = float(parameters.period)  # s; None: the controller tells of none
+
+    def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
+        """Take in by which period the controller counts its steps; another one than `VisualServo` may have none."""
+        servo = units.get("servo")
+        period = None if servo is None else servo.start.get("control_period")
+        ticks_otherwise = servo is not None and servo.description.sampled and servo.description.step != period
+        self._control_period = None if ticks_otherwise else period
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Follow phases and positions."""
@@ -284,9 +293,10 @@ class HandoverEvaluator(Evaluator):
         ):  # else the controller never saw ball and arm, and its error means nothing
             metrics["controller_error"] = Metric(self._error, "m", "error that the controller saw last")
         if grasp_began is not None:
-            steps = round(grasp_began / float(self.parameters.period)) + 1
             metrics["arm_time"] = Metric(grasp_began, "s", "from the start until the gripper begins to close")
-            metrics["steps"] = Metric(steps, "1", "control steps until the gripper begins to close")
+            if self._control_period is not None:
+                steps = round(grasp_began / self._control_period) + 1
+                metrics["steps"] = Metric(steps, "1", "control steps until the gripper begins to close")
             metrics["closing_distance"] = Metric(
                 self._closing_distance, "m", "gripper to ball when the gripper begins to close, ground truth"
             )

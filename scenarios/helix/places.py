@@ -96,7 +96,7 @@ PLACES = {
             "p_WO_est": "in W; shown in plots, pictures and replay",
             "p_WR_est": "in W; shown in pictures",
             "p_WG_est": "in W; shown in plots, pictures and replay",
-            "control_period": "the unit is stepped so often",
+            "control_period": "the unit is stepped so often; by it, control steps are counted",
             "alpha": "the scenario's alpha",
             "threshold": "the scenario's threshold",
             "threshold_grasp": "by the scenario's tuning",

@@ -5,13 +5,14 @@ figures, replay, pictures) may then raise anything. The run, its record and the 
 """
 
 import traceback
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Generic
 
 from handover.cosim.exceptions import CosimError, one_line
 from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import AnyEvaluator, Evaluator, Experiment, Outcome
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.pictures import CameraPicture
@@ -103,6 +104,11 @@ class GuardedEvaluator(Evaluator, Generic[AnyEvaluator]):
         self.evaluator = evaluator
         self.fault = ""
         self._t = 0.0
+
+    def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
+        """Let the evaluator know the units, unless it has failed."""
+        with self._guarded("the evaluation failed before the run began"):
+            self.evaluator.note_units(units)
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Let the evaluator see the signals at time t, unless it has failed."""

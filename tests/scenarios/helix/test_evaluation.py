@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helix_signals import P_WG, P_WR, PICTURE, port, views_and_ports
@@ -5,6 +7,8 @@ from helix_signals import P_WG, P_WR, PICTURE, port, views_and_ports
 from handover.controllers.helix.servo.visual_servo import Phase, Verdict
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
+from handover.fmus.build import cached
 from handover.plants.helix.hand.partner_parameters import Holder
 from handover.scenarios.helix.cameras import camera_of, camera_parameters
 from handover.scenarios.helix.disturbances import Cover
@@ -205,3 +209,22 @@ def test_a_run_that_was_stopped_while_it_waits_is_not_told_that_nothing_was_seen
     )
     late = follow((0.0, signals(Phase.WAIT)), (10.0, signals(Phase.WAIT))).outcome().reason
     assert late.startswith("the cameras did not see both ball and arm within 10 s")
+
+
+def test_control_steps_are_counted_by_the_period_that_the_controller_is_set_to():
+    own = System()
+    own.add("servo", cached("VisualServo", 3), control_period=0.4)
+    another = {"servo": replace(own.units["servo"], start={})}
+    ticking = replace(own.units["servo"].description, sampled=True, step=0.1)
+    for units, steps in (
+        (own.units, 21),
+        (another, None),
+        ({"servo": replace(own.units["servo"], description=ticking)}, None),
+        ({}, None),  # a program takes its place
+    ):
+        evaluator = HandoverEvaluator(Parameters())
+        evaluator.note_units(units)
+        evaluator(8.0, signals(Phase.GRASP))
+        metrics = evaluator.outcome().metrics
+        assert metrics["arm_time"].value == 8.0
+        assert (metrics["steps"].value if "steps" in metrics else None) == steps
