@@ -81,7 +81,7 @@ class Session:
         self._open = OpenSystem(system, left_out)
         self.stop = float(experiment.stop_time(parameters))
         """When a run of the scenario ends at the latest, s."""
-        self._evaluator: GuardedEvaluator[Evaluator] = GuardedEvaluator(experiment.evaluator(parameters))
+        self._evaluator: GuardedEvaluator[Evaluator] = GuardedEvaluator(experiment.bound_evaluator(parameters))
         self._evaluator.note_units(self._open.system.units)
         self._asked, self._seen = Fraction(0), -1.0
         self._master = Master(self._open.system, options)
@@ -188,11 +188,12 @@ class Session:
         """
         with errors_for_python():
             check_states(self._open.system)
+            seen = self._evaluator.packed()
         free: dict[str, NDArray[Any]] = {name: held.entries.copy() for name, held in self._open.free.items()}
         if (place := self._open.place) is not None:
             free |= {f"{place.unit.name}.{name}": views[0].copy() for name, views in place.outputs.items()}
         checkpoint = self._master.call_units(lambda: take_checkpoint(self._master, 0))
-        return SavedState(checkpoint, self._evaluator.evaluator.get_state(), free, self._asked)
+        return SavedState(checkpoint, seen, free, self._asked)
 
     def restore(self, state: SavedState) -> None:
         """Go back to a state; the steps that follow are those that followed it, bit for bit.

@@ -85,7 +85,7 @@ class Resumption:
         Raises:
             InvalidCheckpoint: it is that of another scenario.
         """
-        evaluator: Evaluator = experiment.evaluator(parameters)
+        evaluator: Evaluator = experiment.bound_evaluator(parameters)
         try:
             evaluator.set_state(self._kept.evaluator)
         except InvalidState as e:
@@ -97,9 +97,9 @@ class Resumption:
 
 
 def pack(
-    experiment: Experiment[Any], evaluator: Evaluator, parameters: Any, options: MasterOptions, spent: ElapsedTime
+    experiment: Experiment[Any], evaluator: bytes, parameters: Any, options: MasterOptions, spent: ElapsedTime
 ) -> bytes:
-    """Return what a checkpoint keeps besides the units' states."""
+    """Return what a checkpoint keeps besides the units' states; of the evaluator, its state."""
     texts = {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()}
-    kept = _Kept(evaluator=evaluator.get_state(), parameters=texts, options=options, spent=spent)
+    kept = _Kept(evaluator=evaluator, parameters=texts, options=options, spent=spent)
     return pack_state(kept, RECORDS)

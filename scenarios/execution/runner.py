@@ -72,8 +72,12 @@ def run_task(
     clock = spent.clock()
     with scenario_code(experiment):
         evaluator = GuardedEvaluator(
-            experiment.evaluator(parameters) if resumption is None else resumption.evaluator(experiment, parameters)
+            experiment.bound_evaluator(parameters)
+            if resumption is None
+            else resumption.evaluator(experiment, parameters)
         )
+        if task.every is not None:
+            evaluator.packed()
         experiment.stop_time(parameters)
     system = experiment_system(experiment, parameters, task.seed, task.fmus, task.unit_values, task.options)
     evaluator.note_units(system.units)
@@ -167,7 +171,7 @@ def _checkpoints(
         return []
 
     def packed() -> bytes:
-        return pack(task.experiment, evaluator.evaluator, task.parameters, task.options, clock())
+        return pack(task.experiment, evaluator.packed(), task.parameters, task.options, clock())
 
     return [Checkpointer(task.folder.checkpoint, task.every, master, recorder, packed)]
 

@@ -5,9 +5,10 @@ point, and reports are made of what `time_figures`, `draw`, `replay` and `publis
 """
 
 import abc
+import enum
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar, cast
@@ -50,8 +51,9 @@ class Outcome:
 class Evaluator(abc.ABC):
     """Follows one run as the experimenter does, by ground truth: decides when the task is over and how it went.
 
-    A checkpoint keeps its attributes, which are plain data (see `handover.cosim.blocks.state`) or of the types in
-    `records`, but for `parameters`: an evaluator of the same parameters takes the others over.
+    A checkpoint keeps its attributes, which are plain data (see `handover.cosim.blocks.state`), the scenario's
+    parameters, wherever they stand, or of the types in `records`. `parameters` itself is left out: an evaluator of the
+    same parameters takes the others over.
     """
 
     records: ClassVar[tuple[type[Any], ...]] = ()
@@ -90,9 +92,9 @@ class Evaluator(abc.ABC):
         """Return what it has seen: after `set_state` with it, another evaluator continues in the same way.
 
         Raises:
-            NotPlainData: an attribute is neither plain data nor one of `records`.
+            NotPlainData: an attribute is neither plain data, nor the scenario's parameters, nor one of `records`.
         """
-        return pack_state({n: value for n, value in vars(self).items() if n != _PARAMETERS}, self.records)
+        return pack_state({n: value for n, value in vars(self).items() if n not in _NOT_KEPT}, self._all_records)
 
     def set_state(self, state: bytes) -> None:
         """Take over what another evaluator of the same parameters has seen.
@@ -100,13 +102,25 @@ class Evaluator(abc.ABC):
         Raises:
             InvalidState: it is not the state of such an evaluator; nothing is changed.
         """
-        attributes = unpack_state(state, self.records)
-        if not isinstance(attributes, dict) or {_PARAMETERS, *attributes} != {_PARAMETERS, *vars(self)}:
+        attributes = unpack_state(state, self._all_records)
+        if not isinstance(attributes, dict) or {*_NOT_KEPT, *attributes} != {*_NOT_KEPT, *vars(self)}:
             raise InvalidState(f"it is not the state of a {type(self).__name__}")
         vars(self).update(cast(dict[str, Any], attributes))
 
+    def bind(self, parameters: Any) -> None:
+        """Let states hold the scenario's parameters, and their enumerations, wherever they stand in it."""
+        values = [getattr(parameters, f.name) for f in fields(parameters)] if is_dataclass(parameters) else []
+        vars(self)[_BOUND] = (type(parameters), *dict.fromkeys(type(v) for v in values if isinstance(v, enum.Enum)))
 
-_PARAMETERS = "parameters"
+    @property
+    def _all_records(self) -> tuple[type[Any], ...]:
+        """Its own records, which come first where names are the same, and those that `bind` found."""
+        own = {kind.__name__: kind for kind in (*vars(self).get(_BOUND, ()), *self.records)}
+        return tuple(own.values())
+
+
+_BOUND = "_bound"
+_NOT_KEPT = ("parameters", _BOUND)
 
 
 AnyEvaluator = TypeVar("AnyEvaluator", bound=Evaluator)
@@ -180,6 +194,12 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
     @abc.abstractmethod
     def evaluator(self, parameters: Any) -> AnyEvaluator:
         """Return the evaluator of one run."""
+
+    def bound_evaluator(self, parameters: Any) -> AnyEvaluator:
+        """Return the evaluator of one run, whose states may hold the parameters."""
+        evaluator = self.evaluator(parameters)
+        evaluator.bind(parameters)
+        return evaluator
 
     def evaluator_of_record(self, parameters: Any, pictures: Sequence[CameraPicture]) -> AnyEvaluator:  # noqa: ARG002
         """Return an evaluator to which a finished run is replayed from its record.

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Generic
 
+from handover.cosim.blocks.state import NotPlainData
 from handover.cosim.exceptions import CosimError, one_line
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
@@ -66,6 +67,17 @@ def scenario_code(experiment: Experiment[Any]) -> Generator[None, None, None]:
         if type(experiment).__module__.partition(".")[0] == __name__.partition(".")[0]:
             raise
         raise ScenarioFailed(f"the scenario {experiment.name} failed as it was set up: {fault_line(e)}") from e
+
+
+class EvaluatorNotSaved(CosimError):
+    """An evaluator holds what no checkpoint can keep."""
+
+    def __init__(self, evaluator: Evaluator, reason: NotPlainData) -> None:
+        kind = type(evaluator)
+        super().__init__(
+            f"what {kind.__module__}:{kind.__qualname__} has seen cannot be kept in a checkpoint: {reason}; "
+            "dataclasses, named tuples and enumerations too, if its `records` names them"
+        )
 
 
 class ToleratedFaults:
@@ -135,6 +147,17 @@ class GuardedEvaluator(Evaluator, Generic[AnyEvaluator]):
         with self._guarded(f"the evaluation failed at its end, t = {t:.6g} s"):
             if not self.fault:
                 self.evaluator.note_end(unit, t)
+
+    def packed(self) -> bytes:
+        """Return the evaluator's state.
+
+        Raises:
+            EvaluatorNotSaved: it has attributes that no checkpoint can keep.
+        """
+        try:
+            return self.evaluator.get_state()
+        except NotPlainData as e:
+            raise EvaluatorNotSaved(self.evaluator, e) from e
 
     def pictures(self) -> Sequence[CameraPicture]:
         """Return what cameras saw until now; an evaluator that failed may still have some.

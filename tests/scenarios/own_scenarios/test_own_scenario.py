@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tutorial import COMMAND, SOFTER, TUTORIAL, call, refused, succeeded, write_files
+from tutorial import COMMAND, SOFTER, TUTORIAL, call, ran, refused, succeeded, write_files
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.campaign.table import CampaignTable
@@ -82,6 +82,18 @@ def test_a_run_that_was_interrupted_is_resumed_and_not_with_other_code(here: Pat
     succeeded(tmp_path, "resume", str(here / "cut"), "--no-report")
     signals = [(here / name / "signals.parquet").read_bytes() for name in ("whole", "cut")]
     assert signals[0] == signals[1]
+
+
+def test_an_evaluators_checkpoints_are_written_or_refused_before_the_run(here: Path):
+    code = (here / "reach.py").read_text()
+    (here / "reach.py").write_text(code.replace("self.parameters", "self.p"))
+    checkpoints = ("--no-report", "--checkpoint", "0.05", "-p", "patience=0.1")
+    ran(here, "run", SCENE, *checkpoints, "--out", "named")
+    with_set = code.replace("self.is_there = False", "self.is_there, self.ever = False, set()", 1)
+    assert with_set != code
+    (here / "reach.py").write_text(with_set)
+    line = refused(here, "run", SCENE, *checkpoints, "--out", "odd")
+    assert "what reach:ReachEvaluator has seen cannot be kept in a checkpoint: a state cannot hold builtins.set" in line
 
 
 @pytest.mark.slow
