@@ -14,12 +14,25 @@ def describe() -> str:
     """Return lines `name = value`: executable, library (empty if Python was built without one), version, site."""
     folders = [p for p in sys.path if os.path.basename(p) in ("site-packages", "dist-packages") and os.path.isdir(p)]
     properties = [
-        ("executable", sys.executable),
+        ("executable", executable()),
         ("library", library()),
         ("version", f"{sys.version_info.major}.{sys.version_info.minor}"),
         *[("site", folder) for folder in folders],
     ]
     return "".join(f"{name} = {value}\n" for name, value in properties)
+
+
+def executable() -> str:
+    """Return the interpreter's path: one name of it, whichever of its names it was called by.
+
+    An environment has it as python, python3 and python3.11. The links are not followed: by its place in the environment
+    it finds the environment's packages.
+    """
+    name = os.path.join(sys.prefix, "bin", "python3")
+    try:
+        return name if os.path.samefile(name, sys.executable) else sys.executable
+    except OSError:  # there is none, as on Windows, or nobody knows what runs
+        return sys.executable
 
 
 def library() -> str:

@@ -1,4 +1,7 @@
 import json
+import os
+import subprocess
+import sys
 import zipfile
 from fractions import Fraction
 from pathlib import Path
@@ -61,6 +64,21 @@ def test_the_same_sources_give_the_same_bytes(workshop: Workshop, tmp_path: Path
     first = workshop.fmu("every_kind:EveryKind", 3)
     again = build_block("sample_units.every_kind:EveryKind", 3, tmp_path)
     assert again.read_bytes() == first.read_bytes()
+
+
+_BUILD = "import sys; from handover.fmus.build import cached; print(cached('Push', 3), sys.prefix)"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there an environment has one name of its interpreter")
+def test_a_unit_is_the_same_by_whatever_name_the_interpreter_is_called(tmp_path: Path):
+    names = [name for n in ("python", "python3") if (name := Path(sys.prefix, "bin", n)).exists()]
+    environment = {**os.environ, "HANDOVER_CACHE": str(tmp_path)}
+    built = {subprocess.check_output([name, "-c", _BUILD], env=environment, text=True) for name in names}
+    (printed,) = built
+    fmu, prefix = printed.split()
+    with zipfile.ZipFile(fmu) as archive:
+        (line,) = [w for w in archive.read("resources/python.txt").decode().splitlines() if w.startswith("executable")]
+    assert line.removeprefix("executable = ").startswith(prefix)  # not where the environment's links lead to
 
 
 def test_an_fmu_carries_its_sources_and_lists_its_packages(workshop: Workshop):
