@@ -66,7 +66,8 @@ def new(kind: str, name: str, out: Path, place: str | None) -> None:
     if place is not None:
         scenario, _, taken = place.rpartition(":")
         what = f"handover run {scenario} --unit {taken}={path}"
-    click.echo(f"try: {what}; its test: python -m pytest test_{module}.py", err=True)
+    bring = "" if find_spec("pytest") else "python -m pip install pytest, then "
+    click.echo(f"try: {what}; its test: {bring}python -m pytest test_{module}.py", err=True)
 
 
 def _names(name: str) -> tuple[str, str]:

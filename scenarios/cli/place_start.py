@@ -6,9 +6,12 @@ import inspect
 import sys
 import textwrap
 import typing
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
+from enum import IntEnum
 from fractions import Fraction
 from typing import Any
+
+import numpy as np
 
 from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.fmus.catalog import import_class
@@ -18,7 +21,8 @@ from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.places import PlacePort
 
 _WIDTH = 118
-_ZEROS: Mapping[Kind, str] = {Kind.REAL: "0.0", Kind.INTEGER: "0", Kind.BOOLEAN: "False"}
+_MOST_ENTRIES = 16
+"""Entries of an array that are written out; a larger one starts as zeros."""
 
 _UNIT = '''"""{class_name} takes the place {place} of {scenario}: a start that does nothing yet.
 
@@ -26,7 +30,7 @@ _UNIT = '''"""{class_name} takes the place {place} of {scenario}: a start that d
 """
 
 {imports}
-
+{enumerations}
 
 @dataclass(frozen=True, kw_only=True)
 class Params:
@@ -48,7 +52,7 @@ class {class_name}:
 
     # which outputs depend on which inputs of the same instant
     feedthrough = {feedthrough}
-    period = {period!r}
+    {period}
 
     def __init__(self, params: Params) -> None:
         self.params = params
@@ -57,7 +61,7 @@ class {class_name}:
         return Outputs({values})
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
-        return self.outputs(t, u)
+        return {stepped}
 
     def get_state(self) -> bytes:
         return b""  # it remembers nothing
@@ -65,6 +69,7 @@ class {class_name}:
     def set_state(self, state: bytes) -> None:
         pass
 '''
+_OF_AN_INSTANT = "self.outputs(t, u)  # of the instant at which the step begins"
 _TEST = '''"""{class_name} fits into its place."""
 
 import handover
@@ -72,7 +77,7 @@ import handover
 
 def test_it_takes_its_place():
     with handover.open("{scenario}", units={{"{place}": "{module}:{class_name}"}}) as running:
-        running.step({period!r})
+        running.step({step!r})
 '''
 
 
@@ -80,11 +85,12 @@ def start_for(place: str, class_name: str, module: str) -> dict[str, str]:
     """Return the texts of a module and of its test, by file name, for a place such as `helix_handover:servo`.
 
     It has the inputs of the place, and the outputs and parameters that it must have, declared as the scenario's own
-    unit declares them; what else is known of each stands above it.
+    unit declares them; what else is known of each stands above it. Outputs depend on inputs as those of that unit do,
+    so that no algebraic loop arises where it has none, and stay where that unit's begin.
 
     Raises:
         UsageError: there is no such scenario or place, it does not say what a unit needs, or it needs an output of a
-            kind that has no start, such as a text.
+            kind that has no start, such as a text or a picture.
     """
     scenario, colon, name = place.rpartition(":")
     if not colon:
@@ -100,7 +106,9 @@ def start_for(place: str, class_name: str, module: str) -> dict[str, str]:
         c: [p for p in ports if p.declared.causality is c and (p.is_required or c is Causality.INPUT)]
         for c in (Causality.PARAMETER, Causality.INPUT, Causality.OUTPUT)
     }
-    if odd := [p.declared.name for p in wanted[Causality.OUTPUT] if _start(p.declared) is None]:
+    first = _first_outputs(block)
+    starts = {p.declared.name: _start(p.declared, first) for p in wanted[Causality.OUTPUT]}
+    if odd := [output for output, start in starts.items() if start is None]:
         raise UsageError(f"{place}: {', '.join(odd)}: no start can be written for outputs of this kind")
     hints = typing.get_type_hints(block.outputs, include_extras=True)
     classes = {
@@ -109,14 +117,18 @@ def start_for(place: str, class_name: str, module: str) -> dict[str, str]:
         Causality.OUTPUT: hints["return"],
     }
     fields = {c: [_field(classes[c], p) for p in wanted[c]] for c in wanted}
-    imports = {"from dataclasses import dataclass", "from fractions import Fraction"}
+    enumerations = {e.__name__: e for of in wanted.values() for p in of if (e := p.declared.enumeration) is not None}
+    depends = _dependencies(block, wanted)
+    sampled = block.period is not None or bool(depends)
+    imports = {"from dataclasses import dataclass"} | ({"from fractions import Fraction"} if sampled else set())
     for c, declared in fields.items():
-        imports |= _imports_of(classes[c], [text for _, text in declared])
-    values = ", ".join(f"{p.declared.name}={_start(p.declared)}" for p in wanted[Causality.OUTPUT])
+        imports |= _imports_of(classes[c], [text for _, text in declared], enumerations)
+    if enumerations:
+        imports.add("from enum import IntEnum")
+    values = _arguments(starts)
     if "np." in values:
         imports.add("import numpy as np")
-    inputs = tuple(p.declared.name for p in wanted[Causality.INPUT])
-    period = Fraction(block.period or own.step)
+    step = Fraction(block.period or own.step)
     names = {"class_name": class_name, "module": module, "scenario": scenario, "place": name}
     text = _UNIT.format(
         **names,
@@ -124,31 +136,86 @@ def start_for(place: str, class_name: str, module: str) -> dict[str, str]:
         parameters=_body(fields[Causality.PARAMETER]),
         inputs=_body(fields[Causality.INPUT]),
         outputs=_body(fields[Causality.OUTPUT]),
-        feedthrough=_feedthrough([p.declared.name for p in wanted[Causality.OUTPUT]], inputs),
+        enumerations="".join(map(_class_of, enumerations.values())),
+        feedthrough=_feedthrough(depends),
         remarks="".join(f"{textwrap.fill(r, _WIDTH)}\n\n" for r in experiment.places[name].remarks),
-        period=period,
+        period=f"period = {step!r}" if sampled else "period = None  # steps of any size",
+        stepped=_OF_AN_INSTANT if sampled else "self.outputs(t + dt, u)",
         values=values,
     )
-    return {f"{module}.py": text, f"test_{module}.py": _TEST.format(**names, period=float(period))}
+    return {f"{module}.py": text, f"test_{module}.py": _TEST.format(**names, step=float(step))}
 
 
-def _start(v: Variable) -> str | None:
-    """Return an output's value that says nothing, as Python's text; None for texts, pictures and enumerations."""
-    zero, shape = _ZEROS.get(v.kind), [*v.shape]
-    if zero is None or not shape:
-        return zero
-    return f"np.zeros({tuple(shape) if len(shape) > 1 else shape[0]})"
+def _first_outputs(block: type[Any]) -> Any:
+    """Return the outputs with which the scenario's own unit begins, with its default parameters and inputs.
+
+    None where it begins with nothing: without pictures to look at, or on a machine that lacks what it needs.
+    """
+    hints = typing.get_type_hints(block.outputs)
+    try:
+        return block(typing.get_type_hints(block.__init__)["params"]()).outputs(0.0, hints["u"]())
+    except Exception:  # anybody's block may raise anything of inputs that it never has
+        return None
 
 
-def _feedthrough(outputs: Sequence[str], inputs: Sequence[str]) -> str:
-    """Return that every output depends on every input, as Python's text."""
-    names = ", ".join(f'"{n}"' for n in inputs) + ("," if len(inputs) == 1 else "")
-    depends = f"({textwrap.fill(names, _WIDTH - 16, subsequent_indent=8 * ' ', break_on_hyphens=False)})"
-    if not outputs:
+def _start(v: Variable, first: Any) -> str | None:
+    """Return an output's value that says nothing, as Python's text; None for texts, pictures and the like."""
+    if v.enumeration is not None and not v.shape:
+        return f"{v.enumeration.__name__}.{v.items[0][0]}"
+    if v.kind not in (Kind.REAL, Kind.INTEGER, Kind.BOOLEAN):
+        return None
+    value = np.asarray(getattr(first, v.name, v.start))
+    if v.kind is Kind.REAL:
+        value = np.where(np.isfinite(value), np.round(value, 6), 0.0) + 0.0  # without zeros below zero
+    if not v.shape:
+        return repr(value.item())
+    if v.size <= _MOST_ENTRIES and value.any():
+        return f"np.array({value.tolist()})"
+    kind = {Kind.REAL: "", Kind.INTEGER: ", int", Kind.BOOLEAN: ", bool"}[v.kind]
+    return f"np.zeros({v.shape if len(v.shape) > 1 or kind else v.shape[0]}{kind})"
+
+
+def _arguments(values: Mapping[str, str | None]) -> str:
+    """Return named arguments, on lines of their own where one is too short."""
+    named = [f"{name}={value}" for name, value in values.items()]
+    line = ", ".join(named)
+    if len(line) < _WIDTH - 24:
+        return line
+    return "".join(f"\n            {argument}," for argument in named) + "\n        "
+
+
+def _class_of(enumeration: type[IntEnum]) -> str:
+    """Return the source of an enumeration with the same items."""
+    items = "".join(f"    {item.name} = {item.value}\n" for item in enumeration)
+    return f"\n\nclass {enumeration.__name__}(IntEnum):\n{items}"
+
+
+def _dependencies(block: type[Any], wanted: Mapping[Causality, Sequence[PlacePort]]) -> dict[str, tuple[str, ...]]:
+    """Return the inputs of which outputs depend directly, by output; without outputs that depend on none."""
+    outputs, inputs = ([p.declared.name for p in wanted[c]] for c in (Causality.OUTPUT, Causality.INPUT))
+    depends = {o: tuple(i for i in inputs if i in block.feedthrough.get(o, ())) for o in outputs}
+    return {o: on for o, on in depends.items() if on}
+
+
+def _feedthrough(depends: Mapping[str, tuple[str, ...]]) -> str:
+    """Return on which inputs outputs depend, as Python's text."""
+    if not depends:
         return "{}"
-    if len(outputs) == 1:
-        return f'{{"{outputs[0]}": {depends}}}'
-    return f"dict.fromkeys(({', '.join(map(repr, outputs))}), {depends})".replace("'", '"')
+    of_inputs: dict[tuple[str, ...], list[str]] = {}
+    for name, inputs in depends.items():
+        of_inputs.setdefault(inputs, []).append(name)
+    if len(of_inputs) == 1 and len(depends) > 1:
+        ((inputs, outputs),) = of_inputs.items()
+        return f"dict.fromkeys(({', '.join(map(repr, outputs))}), {_tuple(inputs)})".replace("'", '"')
+    if len(depends) == 1:
+        ((name, inputs),) = depends.items()
+        return f'{{"{name}": {_tuple(inputs)}}}'
+    return "{\n" + "".join(f'        "{n}": {_tuple(inputs)},\n' for n, inputs in depends.items()) + "    }"
+
+
+def _tuple(inputs: Sequence[str]) -> str:
+    names = ", ".join(f'"{n}"' for n in inputs) + ("," if len(inputs) == 1 else "")
+    return f"({textwrap.fill(names, _WIDTH - 16, subsequent_indent=8 * ' ', break_on_hyphens=False)})"
 
 
 def _field(declaring: type[Any], port: PlacePort) -> tuple[str, str]:
@@ -168,8 +235,8 @@ def _declarations(declaring: type[Any]) -> dict[str, str]:
     return found
 
 
-def _imports_of(declaring: type[Any], texts: Iterable[str]) -> set[str]:
-    """Return the imports of all names in declarations, as the module that declares them has them."""
+def _imports_of(declaring: type[Any], texts: Iterable[str], own: Container[str]) -> set[str]:
+    """Return the imports of all names in declarations but its own, as the module that declares them has them."""
     known: dict[str, str] = {}
     for c in declaring.__mro__[:-1]:
         for node in ast.parse(inspect.getsource(sys.modules[c.__module__])).body:
@@ -181,7 +248,7 @@ def _imports_of(declaring: type[Any], texts: Iterable[str]) -> set[str]:
         known |= {n: f"from {c.__module__} import {n}" for n in vars(sys.modules[c.__module__]) if n not in known}
     nodes = [n for text in texts for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name)]
     used = {n.id for n in nodes if isinstance(n.ctx, ast.Load) and not hasattr(builtins, n.id)}
-    return {known[name] for name in used}
+    return {known[name] for name in used if name not in own}
 
 
 def _sorted(imports: Iterable[str]) -> str:

@@ -4,13 +4,17 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from click.testing import CliRunner
 from tutorial import refused, succeeded
 
+import handover
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.fmus.catalog import find_unit, import_class
 from handover.scenarios.catalog import SCENARIOS, named_scenario
+from handover.scenarios.cli.command import main
 from handover.scenarios.cli.place_start import start_for
 from handover.scenarios.experiment.places import ports_of_place
 
@@ -19,7 +23,7 @@ def has_start(scenario: str, place: str) -> bool:
     experiment = named_scenario(scenario)
     ports = ports_of_place(experiment.places[place], find_unit(experiment.units[place]))
     kinds = {p.declared.kind for p in ports if p.is_required and p.declared.causality is Causality.OUTPUT}
-    return kinds <= {Kind.REAL, Kind.INTEGER, Kind.BOOLEAN}
+    return kinds <= {Kind.REAL, Kind.INTEGER, Kind.BOOLEAN, Kind.ENUMERATION}
 
 
 PLACES = [(name, place) for name in SCENARIOS for place in named_scenario(name).places if has_start(name, place)]
@@ -38,8 +42,36 @@ def test_each_place_has_a_start_that_declares_its_ports_as_the_shipped_unit_does
         v = p.declared
         if p.is_required or v.causality is Causality.INPUT:
             assert (found[v.name].kind, found[v.name].shape, found[v.name].unit) == (v.kind, v.shape, v.unit)
+            assert found[v.name].items == v.items
         else:
             assert v.name not in found
+
+
+_FAST = ("ir_grasp:reflex", "vsl_hybrid:arm", "flyer_impedance:robot", "flyer_robot_to_human:decision")
+_RUN = [f"{name}:{place}" for name, place in PLACES if name in ("helix_handover", "vsl_hybrid", "flyer_robot_to_human")]
+_SLOW = [pytest.param(p, marks=pytest.mark.slow) for p in (*_RUN, "ir_grasp:scene") if p not in _FAST]
+
+
+@pytest.mark.parametrize("taken", [*_FAST, *_SLOW])
+def test_the_start_of_each_place_runs(taken: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    scenario, _, place = taken.partition(":")
+    module = f"running_{scenario}_{place}"
+    (tmp_path / f"{module}.py").write_text(start_for(taken, "Mine", module)[f"{module}.py"])
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    with handover.open(scenario, units={place: f"{module}:Mine"}) as running:
+        running.step(0.2)
+        assert running.outcome.reason
+        for output in (o for o in running.outputs if o.startswith(f"{place}.q_W")):
+            np.testing.assert_allclose(np.linalg.norm(running[output]), 1.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_how_to_run_its_test_is_told_also_without_pytest(there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("handover.scenarios.cli.new.find_spec", lambda name: there if name == "pytest" else None)
+    told = CliRunner().invoke(main, ["new", "controller", "Quick", "--out", str(tmp_path)]).stderr
+    assert ("its test: python -m pytest test_quick.py" in told) is there
+    assert ("its test: python -m pip install pytest, then python -m pytest test_quick.py" in told) is not there
 
 
 @pytest.mark.slow
