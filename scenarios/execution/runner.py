@@ -221,7 +221,7 @@ def _outcome(
         return replace(seen, success=False, reason=f"interrupted: {seen.reason}")
     if master.ended is not None:
         return replace(seen, reason=f"{seen.reason}; {master.ended.summary}")
-    if task.is_cut_short and not evaluator.over:
+    if task.is_cut_short and not evaluator.over and master.time >= float(task.stop_time):
         return replace(seen, success=False, reason=f"ended at {master.time:g} s, as asked: {seen.reason}")
     return seen
 

@@ -193,10 +193,15 @@ class GraspEvaluator(Evaluator):
     def _reason(self, success: bool) -> str:
         if not self.over:
             return f"stopped at {self._t:.1f} s in phase {self._phase}, before the grasp was tried"
-        refined = f"closed at {self.moments['before closing']:.1f} s{f' ({self._stop})' if self._stop else ''}"
+        closed, closed_at = self._p_HO_closed, self.moments.get("before closing")
+        if closed is None and closed_at is None:
+            return f"done at {self._entered['DONE']:.1f} s, before the hand closed"
+        if closed_at is None:  # a controller of somebody's own, without the phase CLOSE
+            refined = f"pulled back at {self._entered['PULL']:.1f} s"
+        else:
+            refined = f"closed at {closed_at:.1f} s{f' ({self._stop})' if self._stop else ''}"
         if success:
             return f"{refined}; the object came along with the hand and stayed in it"
-        closed = self._p_HO_closed
         if closed is None:
             return f"{refined}; the hand was not pulled back"
         where = f"{1000 * closed[0]:.0f} mm ahead of the wrist and {1000 * closed[1]:+.0f} mm beside it"

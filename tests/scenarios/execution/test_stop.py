@@ -20,6 +20,8 @@ from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.resume import InterruptedRun
 from handover.scenarios.execution.runner import run_task
+from handover.scenarios.experiment.experiment import Outcome
+from handover.scenarios.ir_grasp.evaluation import GraspEvaluator
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 
 
@@ -50,6 +52,18 @@ def test_what_is_over_before_is_judged_as_ever(tmp_path: Path):
     records = [(run.folder / "signals.parquet").read_bytes() for run in (whole, later)]
     assert records[0] == records[1]
     assert "stop" not in read(whole.folder, "run.json")
+
+
+def test_what_ended_by_itself_was_not_asked_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def fail(_self: GraspEvaluator) -> Outcome:
+        raise KeyError("of the evaluation")
+
+    own_end = handover.run("ir_grasp", strategy="blind", out=tmp_path / "whole", progress=False).signals.time[-1]
+    monkeypatch.setattr(GraspEvaluator, "outcome", fail)
+    done = call("run", "ir_grasp", "-p", "strategy=blind", "--stop", f"{own_end + 1:.1f}", "--out", tmp_path / "r")
+    assert "not judged: the verdict failed: KeyError" in done.output
+    assert "as asked" not in done.output
+    assert Record(tmp_path / "r" / "signals.parquet").time[-1] == own_end
 
 
 class _AskedAt(Interruption):

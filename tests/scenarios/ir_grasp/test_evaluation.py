@@ -95,6 +95,21 @@ def test_a_hand_that_closed_beside_the_object_says_where_it_is():
     assert "without touching the object, 170 mm ahead of the wrist and +30 mm beside it" in outcome.reason
 
 
+def test_a_controller_that_is_done_before_its_hand_closed_has_failed():
+    evaluator = follow((0.0, signals(Phase.REACH)), *((t, signals(Phase.DONE)) for t in (1.0, 1.4)))
+    assert evaluator.over
+    outcome = evaluator.outcome()
+    assert not outcome.success
+    assert outcome.reason == "done at 1.0 s, before the hand closed"
+
+
+def test_a_controller_without_a_phase_of_closing_is_judged_by_the_pull():
+    seen = ((1.0, Phase.PULL), (5.0, Phase.SHAKE), (7.0, Phase.DONE), (7.4, Phase.DONE))
+    outcome = follow((0.0, signals(Phase.REACH)), *((t, signals(phase)) for t, phase in seen)).outcome()
+    assert outcome.success
+    assert outcome.reason == "pulled back at 1.0 s; the object came along with the hand and stayed in it"
+
+
 def test_a_finger_that_sees_nothing_is_distinguished_from_one_at_the_end_of_its_range():
     def stop_reasons(seen: float, true: float) -> list[str]:
         closing = signals(Phase.CLOSE, index=(seen, true))
