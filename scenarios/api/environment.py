@@ -89,7 +89,7 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
         with errors_for_python():
             system = self._system(drawn)
             experiment, parameters = self._asked.experiment, self._asked.parameters
-            self.session = Session(experiment, parameters, system, self._request.options, self._unit)
+            self.session = Session(experiment, parameters, system, self._request.options, self._unit, [*self._actions])
         self._left = positive_seconds("stop", self.session.stop)
         self.session.start()
         self._last = self._observed(self.session)

@@ -2,7 +2,7 @@
 
 import contextlib
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -53,12 +53,14 @@ class SavedState:
         evaluator: what the evaluation has seen.
         free: values of the free inputs, and of the outputs of the unit that is left out.
         asked: the time until which it was stepped, s.
+        given: outputs of the unit that is left out which the evaluation sees.
     """
 
     checkpoint: Checkpoint
     evaluator: bytes
     free: Mapping[str, NDArray[Any]]
     asked: Fraction
+    given: frozenset[str] = frozenset()
 
 
 class Session:
@@ -71,9 +73,12 @@ class Session:
 
     def __init__(
         self, experiment: Experiment[Any], parameters: Any, system: System, options: MasterOptions,
-        left_out: str | None = None,
+        left_out: str | None = None, given: Sequence[str] = (),
     ) -> None:  # fmt: skip
         """Load and initialise a checked system; nothing is stepped yet.
+
+        Of the unit that is left out, the evaluation sees the outputs that feed others or that the scenario needs, and
+        those that are given or set, as it does of a unit that has no others.
 
         Raises:
             InvalidInput: see `OpenSystem`. CosimError: see `Master`.
@@ -86,7 +91,9 @@ class Session:
         self._asked, self._seen = Fraction(0), -1.0
         self._master = Master(self._open.system, options)
         self._master.__enter__()
+        self._given = self._needed_outputs(experiment, left_out) | {*given}
         self._signals = self._all_signals()
+        self._judged = self._judged_signals()
 
     @property
     def time(self) -> float:
@@ -102,7 +109,7 @@ class Session:
     def outcome(self) -> Outcome:
         """The verdict on what has happened until now, with its reason and metrics."""
         evaluator = copy.deepcopy(self._evaluator)
-        evaluator.finish(self._signals)
+        evaluator.finish(self._judged)
         return evaluator.outcome()
 
     @property
@@ -167,6 +174,7 @@ class Session:
             if port not in self._open.place.ports:
                 raise KeyError(f"no output {name!r} that can be set; {nearest(port, self._open.place.ports)}")
             self._open.set_output(port, value)
+            self._give({port})
         elif name in self._open.free:
             self._open.set(name, value)
         else:
@@ -193,7 +201,7 @@ class Session:
         if (place := self._open.place) is not None:
             free |= {f"{place.unit.name}.{name}": views[0].copy() for name, views in place.outputs.items()}
         checkpoint = self._master.call_units(lambda: take_checkpoint(self._master, 0))
-        return SavedState(checkpoint, seen, free, self._asked)
+        return SavedState(checkpoint, seen, free, self._asked, frozenset(self._given))
 
     def restore(self, state: SavedState) -> None:
         """Go back to a state; the steps that follow are those that followed it, bit for bit.
@@ -216,6 +224,7 @@ class Session:
         if self._open.place is not None:
             for name, views in self._open.place.outputs.items():
                 views[0][:] = state.free[f"{self._open.place.unit.name}.{name}"]
+        self._give(state.given)
         self._asked, self._seen = state.asked, state.checkpoint.time if state.asked else -1.0
 
     def close(self) -> None:
@@ -250,15 +259,36 @@ class Session:
         """Let the evaluation see a communication point once."""
         if t > self._seen:
             self._seen = t
-            self._evaluator(t, self._signals)
+            self._evaluator(t, self._judged)
 
-    def _all_signals(self) -> Signals:
-        """Return the outputs of all units, and those of the unit that is left out as they were set."""
+    def _needed_outputs(self, experiment: Experiment[Any], left_out: str | None) -> set[str]:
+        """Return the outputs of the unit that is left out which any unit in its place must have, or which are wired."""
+        place = self._open.place
+        if place is None or left_out is None:
+            return set()
+        if left_out not in experiment.places:  # a unit there must have all
+            return {*place.ports}
+        return {*place.targets, *experiment.places[left_out].required}
+
+    def _give(self, outputs: Collection[str]) -> None:
+        """Let the evaluation see outputs of the unit that is left out."""
+        if not self._given.issuperset(outputs):
+            self._given |= {*outputs}
+            self._judged = self._judged_signals()
+
+    def _judged_signals(self) -> Signals:
+        """Return what the evaluation sees."""
+        return self._all_signals(self._given)
+
+    def _all_signals(self, given: Collection[str] | None = None) -> Signals:
+        """Return the outputs of all units, and those of the unit that is left out as they were set, or some of them."""
         ensemble, place = self._master.ensemble, self._open.place
         views = {name: i.y for name, i in ensemble.instances.items()}
         ports = {name: u.description.outputs for name, u in self._open.system.units.items()}
         if place is not None:
-            views, ports = {**views, place.unit.name: dict(place.outputs)}, {**ports, place.unit.name: place.ports}
+            shown = {name: port for name, port in place.ports.items() if given is None or name in given}
+            views = {**views, place.unit.name: {name: place.outputs[name] for name in shown}}
+            ports = {**ports, place.unit.name: shown}
         return Signals(views, ports, ensemble)
 
     def _parameter(self, unit: str, port: FmuPort) -> Any:

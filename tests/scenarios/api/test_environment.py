@@ -155,3 +155,19 @@ def test_without_gymnasium_one_line_says_what_to_install(tmp_path: Path):
     assert done.stderr.splitlines()[-1] == (
         "ImportError: handover.environment needs gymnasium: python -m pip install 'handover-cosim[gym]'"
     )
+
+
+def test_what_nobody_gives_is_no_metric():
+    poles = ("pole_radius", "damping_ratio", "pole_frequency")
+    with handover.open("flyer_impedance", place="impedance") as session:
+        session.step(0.1)
+        assert not [name for name in session.outcome.metrics if name.endswith("_impedance")]
+    with handover.open("flyer_impedance", place="impedance") as session:
+        for name, value in zip(poles, (0.99, 0.7, 0.4), strict=True):
+            session[f"impedance.{name}"] = value
+        session.step(0.1)
+        saved, metrics = session.save(), session.outcome.metrics
+    assert metrics["pole_margin_impedance"].value == pytest.approx(0.01)
+    with handover.open("flyer_impedance", place="impedance") as session:
+        session.restore(saved)
+        assert session.outcome.metrics["damping_ratio_impedance"].value == pytest.approx(0.7)
