@@ -23,6 +23,10 @@ from handover.scenarios.execution.errors import (
     WorkersLost,
     one_line_errors,
 )
+from handover.scenarios.execution.fmu_run import is_fmu
+from handover.scenarios.execution.selection import find_scenario
+from handover.scenarios.execution.ssp_run import is_ssp
+from handover.scenarios.experiment.experiment import Experiment
 
 Seconds = float | Fraction
 """A time in seconds; a number with a point is taken as it is written, 0.1 as one tenth."""
@@ -68,6 +72,29 @@ def text_of_value(value: Any) -> str:
 def texts_of(values: Mapping[str, Any]) -> list[str]:
     """Return parameters as texts `NAME=VALUE`."""
     return [f"{name}={text_of_value(value)}" for name, value in values.items()]
+
+
+def single_texts(subject: object, values: Mapping[str, Any]) -> list[str]:
+    """Return parameters of one run as texts `NAME=VALUE`.
+
+    Raises:
+        InvalidInput: a list is given for a scenario's parameter that is no array.
+        UsageError: there is no such scenario.
+    """
+    if is_scenario(subject):
+        experiment = find_scenario(subject) if isinstance(subject, str) else cast(type[Experiment[Any]], subject)
+        scalars = {v.name for v in experiment.parameters() if not v.shape}
+        for name, value in values.items():
+            if name in scalars and np.ndim(value) and not isinstance(value, str):
+                raise InvalidInput(f"{name} = {value!r}: a run has one value; handover.sweep varies lists of them")
+    return texts_of(values)
+
+
+def is_scenario(subject: object) -> bool:
+    """Return whether something is to be a scenario: a class of one, or a name that is no file's."""
+    if isinstance(subject, str):
+        return not is_ssp(subject) and not is_fmu(subject)
+    return isinstance(subject, type) and issubclass(subject, Experiment)
 
 
 def merged(parameters: Mapping[str, Any] | None, named: Mapping[str, Any]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from handover.scenarios.api.arguments import (
     formats_of,
     master_options,
     merged,
-    texts_of,
+    single_texts,
     unit_texts,
     whole_number,
 )
@@ -23,7 +23,7 @@ from handover.scenarios.api.progress import bar
 from handover.scenarios.api.run_result import Run
 from handover.scenarios.execution.errors import require_extra
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.execution.request import RunRequest, check_subject
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.experiment.experiment import Experiment
 
@@ -89,7 +89,7 @@ def run(
             require_extra("reports", "reports", "report=False")
         request = RunRequest(
             subject=str(subject) if isinstance(subject, Path) else subject,
-            parameters=texts_of(merged(parameters, named)),
+            parameters=single_texts(str(subject) if isinstance(subject, Path) else subject, merged(parameters, named)),
             seed=whole_number("seed", seed),
             units=unit_texts(units),
             out=None if out is None else Path(out),
@@ -130,7 +130,8 @@ def environment(
         scenario: its name or its class.
         place: the unit whose place the agent takes.
         actions: outputs of the unit that the agent sets, by default those that are wired. The others keep their
-            values; where the evaluation reads one of them, such as a phase, name it too.
+            values, and the evaluation does without those that it does not need; where it reads one of them, such as
+            a phase, name it too.
         observations: inputs of the unit that the agent sees, by default those that are wired, without pictures.
         reward: of a step, by the running session; by default 1 for an episode that ends with success, else 0.
         period: time between two actions, s, by default the step of the unit.
@@ -145,12 +146,14 @@ def environment(
     """
     from handover.scenarios.api.environment import ScenarioEnvironment  # needs Gymnasium, an extra
 
-    request = RunRequest(
-        subject=scenario,
-        parameters=texts_of(merged(parameters, named)),
-        units=unit_texts(units),
-        options=options or MasterOptions(),
-    )
+    with errors_for_python():
+        check_subject(scenario)
+        request = RunRequest(
+            subject=scenario,
+            parameters=single_texts(scenario, merged(parameters, named)),
+            units=unit_texts(units),
+            options=options or MasterOptions(),
+        )
     return ScenarioEnvironment(request, place, actions, observations, reward, period)
 
 

@@ -29,13 +29,13 @@ from handover.scenarios.api.arguments import (
     master_options,
     merged,
     positive_seconds,
-    texts_of,
+    single_texts,
     unit_texts,
     whole_number,
 )
 from handover.scenarios.api.open_inputs import OpenSystem
 from handover.scenarios.execution.fmu_run import is_fmu
-from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.execution.request import RunRequest, check_subject
 from handover.scenarios.execution.ssp_run import is_ssp
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, Outcome
 from handover.scenarios.results.tolerated_faults import GuardedEvaluator
@@ -351,10 +351,11 @@ def open(  # noqa: A001 (handover.open is named like it)
     """
     with errors_for_python(), contextlib.ExitStack() as opened:
         name = str(subject) if isinstance(subject, Path) else subject
+        check_subject(name)
         endless = isinstance(name, System) or (isinstance(name, str) and (is_ssp(name) or is_fmu(name)))
         request = RunRequest(
             subject=name,
-            parameters=texts_of(merged(parameters, named)),
+            parameters=single_texts(name, merged(parameters, named)),
             seed=whole_number("seed", seed),
             units=unit_texts(units),
             stop=_ANY_STOP if endless else None,

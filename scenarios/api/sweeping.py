@@ -32,12 +32,13 @@ from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.pool_config import LazyPool, PoolConfig
 from handover.scenarios.campaign.worker_pool import RunCounts
 from handover.scenarios.execution.errors import require_extra
-from handover.scenarios.execution.request import RunRequest
-from handover.scenarios.execution.selection import find_scenario
+from handover.scenarios.execution.request import RunRequest, check_subject
+from handover.scenarios.execution.selection import find_scenario, path_of_class
+from handover.scenarios.experiment.experiment import Experiment
 
 
 def sweep(
-    scenario: str,
+    scenario: str | type[Experiment[Any]],
     /,
     *,
     seeds: int = 1,
@@ -63,7 +64,7 @@ def sweep(
     is done.
 
     Args:
-        scenario: its name.
+        scenario: its name, or its class in a module, from which each run's process imports it.
         seeds: runs of each combination.
         seed: of the campaign, from which those of the runs follow.
         paired: whether all combinations get the same seeds, so that they can be compared run by run.
@@ -91,8 +92,9 @@ def sweep(
         require_extra("campaigns", "campaigns")
         if workers is not None and scheduler is not None:
             raise InvalidInput("workers and scheduler: a scheduler has workers of its own; one of both is right")
-        RunRequest(subject=scenario).check_sweepable()
-        experiment = find_scenario(scenario)
+        name = _name_of(scenario)
+        RunRequest(subject=name).check_sweepable()
+        experiment = find_scenario(name)
         shapes = {v.name: v.shape for v in experiment.parameters()}
         varied = {name: value for name, value in given.items() if _is_varied(value, shapes.get(name, ()))}
         texts = [f"{name}={_values_text(value, shapes.get(name, ()))}" for name, value in varied.items()]
@@ -100,7 +102,7 @@ def sweep(
         points = vary_units(parse_grid(experiment, texts), choices)
         fixed = texts_of({name: value for name, value in given.items() if name not in varied})
         plan = CampaignPlan(
-            scenario=scenario,
+            scenario=name,
             points=points,
             fixed=set_parameters(experiment, fixed, points),
             repetitions=whole_number("seeds", seeds, 1),
@@ -112,6 +114,26 @@ def sweep(
             stop=exact("stop", stop),
         )
         return _carried_out(plan, None if out is None else Path(out), PoolConfig(workers, scheduler), progress)
+
+
+def _name_of(scenario: object) -> str:
+    """Return the name by which the processes of runs find a scenario.
+
+    Raises:
+        UsageError: it is none. InvalidInput: it is a class that they cannot find.
+    """
+    check_subject(scenario)
+    if isinstance(scenario, type):
+        path = path_of_class(cast(type[Experiment[Any]], scenario))
+        if path is None or path.startswith("__main__:"):
+            where = "a module in the working directory, or an installed package"
+            raise InvalidInput(
+                f"{scenario.__name__}: each run of a sweep imports its scenario, so it must be in {where}"
+            )
+        return path
+    if not isinstance(scenario, str):
+        raise InvalidInput("a system has no parameters that could be swept; a scenario has")
+    return scenario
 
 
 def _carried_out(plan: CampaignPlan, out: Path | None, workers: PoolConfig, shown: bool) -> Campaign:

@@ -120,7 +120,9 @@ def start_for(place: str, class_name: str, module: str) -> dict[str, str]:
     enumerations = {e.__name__: e for of in wanted.values() for p in of if (e := p.declared.enumeration) is not None}
     depends = _dependencies(block, wanted)
     sampled = block.period is not None or bool(depends)
-    imports = {"from dataclasses import dataclass"} | ({"from fractions import Fraction"} if sampled else set())
+    imports = {"from dataclasses import dataclass"}
+    if sampled:
+        imports.add("from fractions import Fraction")
     for c, declared in fields.items():
         imports |= _imports_of(classes[c], [text for _, text in declared], enumerations)
     if enumerations:
@@ -161,7 +163,7 @@ def _first_outputs(block: type[Any]) -> Any:
 def _start(v: Variable, first: Any) -> str | None:
     """Return an output's value that says nothing, as Python's text; None for texts, pictures and the like."""
     if v.enumeration is not None and not v.shape:
-        return f"{v.enumeration.__name__}.{v.items[0][0]}"
+        return f"{v.enumeration.__name__}.{next(iter(v.enumeration)).name}"
     if v.kind not in (Kind.REAL, Kind.INTEGER, Kind.BOOLEAN):
         return None
     value = np.asarray(getattr(first, v.name, v.start))
@@ -172,7 +174,8 @@ def _start(v: Variable, first: Any) -> str | None:
     if v.size <= _MOST_ENTRIES and value.any():
         return f"np.array({value.tolist()})"
     kind = {Kind.REAL: "", Kind.INTEGER: ", int", Kind.BOOLEAN: ", bool"}[v.kind]
-    return f"np.zeros({v.shape if len(v.shape) > 1 or kind else v.shape[0]}{kind})"
+    shape = v.shape if len(v.shape) > 1 or kind else v.size
+    return f"np.zeros({shape}{kind})"
 
 
 def _arguments(values: Mapping[str, str | None]) -> str:

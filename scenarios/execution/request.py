@@ -13,11 +13,10 @@ from typing import Any
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
-from handover.scenarios.catalog import SCENARIOS, InvalidScenario, named_scenario
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.fmu_run import FmuRun, is_fmu
 from handover.scenarios.execution.runner import experiment_system
-from handover.scenarios.execution.selection import find_scenario, own_source, replacements, select_fmus
+from handover.scenarios.execution.selection import find_scenario, own_source, path_of_class, replacements, select_fmus
 from handover.scenarios.execution.ssp_run import is_ssp, open_experiment, source_of, system_experiment
 from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.experiment.experiment import Experiment, NoParameters
@@ -99,11 +98,12 @@ class RunRequest:
         )
 
     def check_options(self) -> None:
-        """Reject options that are for another kind of run than this one.
+        """Reject what cannot be run at all, and options that are for another kind of run than this one.
 
         Raises:
-            UsageError: one of them is given.
+            UsageError: it is of another type, or one of them is given.
         """
+        check_subject(self.subject)
         of_scenarios = {"-p": self.parameters, "--seed": self.seed, "--unit": self.units}
         of_files = {"--stop": self.stop, "--step": self.step, "--input": self.inputs}
         used = [name for name, value in {**of_scenarios, **of_files}.items() if value]
@@ -184,16 +184,25 @@ class RunRequest:
         if missing := sorted(getattr(scenario, "__abstractmethods__", ())):
             raise UsageError(f"{scenario.__name__} is not complete: it has no {', '.join(missing)}")
         values = split_parameters(scenario, self.parameters)
-        try:
-            path = f"{scenario.__module__}:{scenario.__qualname__}"
-            is_ours = scenario.name in SCENARIOS and SCENARIOS[scenario.name] is scenario
-            source = {} if is_ours or named_scenario(path) is not scenario else own_source(path)
-        except (KeyError, InvalidScenario):
-            source = {}
-        return OpenedSubject(scenario(), *values, source, self.stop)
+        path = path_of_class(scenario)
+        return OpenedSubject(scenario(), *values, {} if path is None else own_source(path), self.stop)
 
     def _is_file(self, is_of_kind: Callable[[str], bool]) -> bool:
         return isinstance(self.subject, str) and is_of_kind(self.subject)
+
+
+def check_subject(subject: object) -> None:
+    """Reject what is neither a text, nor a system, nor a scenario's class.
+
+    Raises:
+        UsageError: it is something else.
+    """
+    if isinstance(subject, type):
+        if not issubclass(subject, Experiment):
+            raise UsageError(f"{subject.__name__} is no scenario: a subclass of Experiment is")
+    elif not isinstance(subject, (str, System)):
+        right = "a scenario's name or class, a system, or the path of an SSP or FMU is right"
+        raise UsageError(f"{subject!r} cannot be run: {right}")
 
 
 def default_run_folder(stem: str) -> Path:

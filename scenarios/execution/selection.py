@@ -42,6 +42,17 @@ def find_scenario(name: str) -> type[Experiment[Any]]:
         raise UsageError(f"no scenario {name!r}: {nearest(name, valid)}{own}") from None
 
 
+def path_of_class(scenario: type[Experiment[Any]]) -> str | None:
+    """Return the name or the path by which a scenario's class is found again, None if it is not, as of a notebook."""
+    if scenario.name in SCENARIOS and SCENARIOS[scenario.name] is scenario:
+        return scenario.name
+    path = f"{scenario.__module__}:{scenario.__qualname__}"
+    try:
+        return path if named_scenario(path) is scenario else None
+    except (KeyError, InvalidScenario):
+        return None
+
+
 def own_source(name: str) -> dict[str, Any]:
     """Return what a run's folder keeps of a scenario that is not this package's, to find it again; else nothing."""
     source = ScenarioSource.of(name)

@@ -139,6 +139,8 @@ def test_a_bad_action_is_refused():
     with pytest.raises(RuntimeError, match="call reset first"):
         env.step({})
     env.reset(seed=0)
+    with pytest.raises(handover.InvalidInput, match="action = 3: a mapping is right, with p_WH_cmd, yaw_cmd"):
+        env.step(3)  # pyright: ignore[reportArgumentType]
     with pytest.raises(handover.InvalidInput, match="the action has no p_WH_cmd"):
         env.step({"yaw_cmd": 0.0})
     with pytest.raises(handover.InvalidInput, match=r"reflex\.sigma_cmd: 2\.0 is out of range: from 0 to 1"):

@@ -1,6 +1,7 @@
 """A run from Python is that of the command, byte for byte, and refuses what that refuses."""
 
 import threading
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
@@ -156,3 +157,35 @@ def test_other_threads_may_run(tmp_path: Path):
 def test_no_shipped_parameter_has_the_name_of_an_option():
     for scenario in SCENARIOS.values():
         assert not {v.name for v in scenario.parameters()} & OPTIONS, scenario.name
+
+
+class NoScenario:
+    pass
+
+
+class Incomplete(IrGrasp):
+    """Is in no module that a worker could import by its path."""
+
+
+Incomplete.__qualname__ = "nowhere.Incomplete"
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: handover.run(3), "3 cannot be run: a scenario's name or class, a system, or the path of"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.open(None), "None cannot be run: "),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.run(NoScenario), "NoScenario is no scenario: a subclass of Experiment is"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.environment(NoScenario, "reflex"), "NoScenario is no scenario"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.sweep(NoScenario), "NoScenario is no scenario"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.sweep(4), "4 cannot be run"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.sweep(Incomplete), "Incomplete: each run of a sweep imports its scenario"),
+        (lambda: handover.run("ir_grasp", strategy=["blind"]), r"strategy = \['blind'\]: a run has one value"),
+        (lambda: handover.run(IrGrasp, forward=np.array([0.1])), "forward = .*handover.sweep varies lists"),
+        (lambda: handover.environment("ir_grasp", "reflex", thing=("cup",)), "thing = .*a run has one value"),
+    ],
+)
+def test_what_is_no_subject_or_no_single_value_is_told_in_one_sentence(call: Callable[[], object], told: str):
+    with pytest.raises(handover.InvalidInput, match=told) as raised:
+        call()
+    assert "\n" not in str(raised.value)

@@ -9,6 +9,7 @@ from campaigns import campaign_metadata, folder_of, table_of
 
 import handover
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 
 PROGRAM = """
 import handover
@@ -56,7 +57,7 @@ def test_its_runs_are_runs(folder: Path):
 
 def test_the_same_call_repeats_nothing(folder: Path):
     before = {path: path.stat().st_mtime_ns for path in (folder / "runs").glob("*/summary.json")}
-    campaign = handover.sweep("ir_grasp", seeds=2, strategy=["blind", "reflex"], standoff=0.06, out=folder)
+    campaign = handover.sweep(IrGrasp, seeds=2, strategy=["blind", "reflex"], standoff=0.06, out=folder)
     assert {path: path.stat().st_mtime_ns for path in (folder / "runs").glob("*/summary.json")} == before
     assert len(campaign.rows) == 4
 

@@ -1,5 +1,6 @@
 """A campaign's page in a browser: its metric can be chosen, its tables sorted and filtered, also on a phone."""
 
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 
@@ -56,8 +57,10 @@ def test_a_metric_is_chosen_and_runs_are_sorted_and_filtered(browser: Browser, c
 
 @pytest.mark.parametrize("varied", [1, 3], ids=["side by side", "listed"])
 def test_values_stand_along_an_axis_of_numbers(browser: Browser, tmp_path: Path, varied: int):
-    names = ("forward", "standoff", "run_up")[:varied]
-    points = [dict(zip(names, values, strict=True)) for values in product(("0.01", "0.02"), repeat=varied)]
+    names: Sequence[str] = ("forward", "standoff", "run_up")[:varied]
+    points: list[dict[str, str]] = [
+        dict(zip(names, values, strict=True)) for values in product(("0.01", "0.02"), repeat=varied)
+    ]
     distances = ([0.03, 0.01, 0.06, 0.05] * 4)[: 2 * len(points)]
     table = table_of([{n: float(v) for n, v in p.items()} for p in points], final_distance_thumb=distances)
     folder = folder_of(tmp_path, campaign_metadata("ir_grasp", points), table)

@@ -68,7 +68,10 @@ def test_the_start_of_each_place_runs(taken: str, tmp_path: Path, monkeypatch: p
 
 @pytest.mark.parametrize("there", [True, False])
 def test_how_to_run_its_test_is_told_also_without_pytest(there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("handover.scenarios.cli.new.find_spec", lambda name: there if name == "pytest" else None)
+    def find_spec(name: str) -> bool | None:
+        return there if name == "pytest" else None
+
+    monkeypatch.setattr("handover.scenarios.cli.new.find_spec", find_spec)
     told = CliRunner().invoke(main, ["new", "controller", "Quick", "--out", str(tmp_path)]).stderr
     assert ("its test: python -m pytest test_quick.py" in told) is there
     assert ("its test: python -m pip install pytest, then python -m pytest test_quick.py" in told) is not there
