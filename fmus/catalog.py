@@ -225,10 +225,12 @@ def import_class(path: str) -> type[Any]:
         raise UnknownBlock(path, "there is no ':' between module and class, as in my_arm:MyArm")
     try:
         module = import_module(module_name)
-    except Exception as e:  # a module may raise anything while it is loaded
+    except (Exception, SystemExit) as e:  # a module may raise anything while it is loaded
         fault = f"its module cannot be loaded{_line_of(e, module_name)}: {type(e).__name__}: {one_line(e)}"
         if isinstance(e, ModuleNotFoundError) and e.name == module_name:
             fault = f"there is no module {module_name!r}, neither installed nor in {Path.cwd()}"
+        elif isinstance(e, SystemExit):
+            fault = f"its module calls sys.exit({e.code!r}) as it is loaded{_line_of(e, module_name)}"
         elif is_of_a_package(e):
             raise PackageFailure(path, explain_import(e)) from e
         raise UnknownBlock(path, fault) from e
@@ -240,7 +242,7 @@ def import_class(path: str) -> type[Any]:
     return found
 
 
-def _line_of(e: Exception, module_name: str) -> str:
+def _line_of(e: BaseException, module_name: str) -> str:
     """Return the last line of a module, or of one in its package, that led to a failure, as " (arm.py, line 3)"."""
     package = module_name.partition(".")[0]
     for frame, line in reversed(list(traceback.walk_tb(e.__traceback__))):

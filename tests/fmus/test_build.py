@@ -36,6 +36,15 @@ def test_an_unknown_block_is_refused(path: str, tmp_path: Path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_module_that_ends_its_process_as_it_is_loaded_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "ends_itself.py").write_text("import sys\n\nsys.exit(5)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(
+        UnknownBlock, match=r"its module calls sys\.exit\(5\) as it is loaded \(ends_itself\.py, line 3\)"
+    ):
+        find_unit("ends_itself:Block")
+
+
 def test_a_name_that_is_no_identifier_and_an_unknown_version_are_refused(tmp_path: Path):
     with pytest.raises(InvalidName, match="two words"):
         build_block("sample_units.every_kind:EveryKind", 3, tmp_path, name="two words")
