@@ -13,9 +13,11 @@ from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
 from typing import Any
 
+from handover.cosim.fmu.description import describe_fmu
 from handover.scenarios.campaign.identity import differences, identity_of
 from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun, safe_name
 from handover.scenarios.catalog import named_scenario
+from handover.scenarios.execution.unit_values import is_unit_value
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
     check_place,
@@ -28,6 +30,9 @@ from handover.scenarios.results.run_folder import (
 )
 
 _FILE = "campaign.json"
+
+PARAMETER_UNITS = "parameter_units"
+"""Key of the units of measurement of units' parameters, by `UNIT.NAME`, as their FMUs declare them."""
 
 OF_NEITHER = f"is the folder of neither a run (no run.json) nor a campaign (no {_FILE})"
 """What is said of a folder where a run's or a campaign's is right."""
@@ -212,7 +217,7 @@ class CampaignFolder:
         """Write `campaign.json`, before anything else is there: without it, the campaign could not be resumed."""
         experiment = named_scenario(plan.scenario)
         display = {"title": experiment.title, "headline": list(experiment.headline), "platform": platform.platform()}
-        content = {**identity_of(plan, fmus), **display}
+        content = {**identity_of(plan, fmus), **display, PARAMETER_UNITS: _parameter_units(plan, fmus)}
         if not (self.path / _FILE).exists() or self.read() != content:
             write_whole(self.path / _FILE, json.dumps(content, indent=2, allow_nan=False) + "\n")
 
@@ -265,3 +270,15 @@ def _stem(plan: CampaignPlan) -> str:
 
 def _new_folder(plan: CampaignPlan) -> CampaignFolder:
     return CampaignFolder(dated_folder(PLACE, _stem(plan)))
+
+
+def _parameter_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, str]:
+    """Return the units of measurement of the units' parameters that a plan sets, of any FMU in the unit's place."""
+    names = dict.fromkeys(n for values in (*plan.points, plan.fixed) for n in values if is_unit_value(n))
+    units: dict[str, str] = {}
+    for name in names:
+        unit, _, parameter = name.partition(".")
+        for path in (path for key, path in fmus.items() if key.partition("=")[0] == unit):
+            if port := describe_fmu(path).parameters.get(parameter):
+                units.setdefault(name, port.unit.symbol)
+    return units

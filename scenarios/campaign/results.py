@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind, Variable
-from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.campaign.folder import PARAMETER_UNITS, CampaignFolder
 from handover.scenarios.campaign.plan import is_number
 from handover.scenarios.campaign.statistics import Interval, success_interval, time_interval
 from handover.scenarios.campaign.table import CampaignTable
@@ -119,9 +119,11 @@ class CampaignResults:
         return variable is not None and variable.kind is Kind.BOOLEAN
 
     def unit(self, parameter: str) -> str:
-        """Return a parameter's unit, "1" if it has none."""
+        """Return a parameter's unit, "1" if it has none; of a unit's parameter as its FMU declares it."""
         variable = self.declared.get(parameter)
-        return "1" if variable is None else variable.unit.symbol
+        if variable is None:
+            return str(self.metadata.get(PARAMETER_UNITS, {}).get(parameter, "1"))
+        return variable.unit.symbol
 
     @cached_property
     def headline(self) -> tuple[str, ...]:
@@ -211,13 +213,18 @@ class CampaignResults:
         return self.words(parameter, text)
 
     def words(self, parameter: str, text: str) -> str:  # noqa: ARG002 (a name may be shown as it was given)
-        """Return a value that is no number as one reads it."""
-        return text.replace("_", " ")
+        """Return a value that is no number as one reads it; paths of files and of blocks as they are."""
+        return text if any(mark in text for mark in ":/.") else text.replace("_", " ")
 
     def label(self, point: PointResults) -> str:
         """Return a point's label: the values in which it differs from the others."""
-        texts = [self.value_text(name, point.values[name]) for name in self.independent if name in point.values]
+        texts = [self.named_value(name, point.values[name]) for name in self.independent if name in point.values]
         return ", ".join(texts) or "all runs"
+
+    def named_value(self, parameter: str, text: str) -> str:
+        """Return a parameter's value as one reads it by itself: a number with the parameter's name."""
+        value = self.value_text(parameter, text)
+        return f"{parameter.replace('_', ' ')} {value}" if self.is_number(parameter) else value
 
 
 _FORMS: Mapping[str, type] = {"scenario": str, "points": list, "fixed": dict, "repetitions": int, "seed": int}

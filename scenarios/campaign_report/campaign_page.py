@@ -102,7 +102,7 @@ def _values(results: CampaignResults, name: str) -> str:
         shown = [f"{float(t) * unit.factor:.4g}" for t in texts]
         symbol = f" {unit.symbol}" if unit.symbol else ""
     else:
-        shown, symbol = [t.replace("_", " ") for t in texts], ""
+        shown, symbol = [results.words(name, t) for t in texts], ""
     if len(shown) > _MAX_VALUES:
         shown = [*shown[:4], "…", shown[-1]]
     return ", ".join(shown) + symbol

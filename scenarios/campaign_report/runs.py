@@ -31,7 +31,7 @@ def runs_section(results: CampaignResults, folder: Path) -> Section | None:
     columns = {n: table.column(n) for n in varied}
     set_to = {n: display_unit(table.unit(n), x) if x.dtype == np.float64 else None for n, x in columns.items()}
     digits = {n: digits_after_point(table.column(n) * unit.factor) for n, unit in units.items()}
-    rows = [_row(row, set_to, units, digits, folder) for row in table.rows[:_MAX_ROWS]]
+    rows = [_row(results, row, set_to, units, digits, folder) for row in table.rows[:_MAX_ROWS]]
     header = (
         "run",
         *(n.replace("_", " ") for n in varied),
@@ -71,6 +71,7 @@ def _page_of(name: str, folder: Path) -> str:
 
 
 def _row(
+    results: CampaignResults,
     row: dict[str, Any],
     set_to: Mapping[str, DisplayUnit | None],
     units: Mapping[str, DisplayUnit],
@@ -79,21 +80,21 @@ def _row(
 ) -> Sequence[str | Markup | Cell]:
     return (
         run_html(row["run"], folder),
-        *(_parameter(row[name], unit) for name, unit in set_to.items()),
+        *(_parameter(results, name, row[name], unit) for name, unit in set_to.items()),
         Cell(str(row["seed"]), row["seed"]),
         _verdict(row),
         *(_number(row[name], unit, digits[name]) for name, unit in units.items()),
     )
 
 
-def _parameter(value: Any, unit: DisplayUnit | None) -> Cell:
+def _parameter(results: CampaignResults, name: str, value: Any, unit: DisplayUnit | None) -> Cell:
     if value is None:
         return Cell("–")
     if unit is not None:
         return Cell(unit.text(value), value)
     if isinstance(value, bool):
         return Cell(str(value).lower())
-    return Cell(str(value).replace("_", " "), value if isinstance(value, int) else None)
+    return Cell(results.words(name, str(value)), value if isinstance(value, int) else None)
 
 
 def _verdict(row: dict[str, Any]) -> Markup:

@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from handover.cosim.exceptions import nearest
+from handover.scenarios.campaign.folder import PARAMETER_UNITS
 from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign.statistics import (
     DifferenceTest,
@@ -76,6 +77,7 @@ class ComparedCampaigns(CampaignResults):
             "points": [{**dict(key), ENTRY: entries[k].name} for key, k in pairs],
             "fixed": {},
             "repetitions": 1,
+            PARAMETER_UNITS: {n: u for e in entries for n, u in e.metadata.get(PARAMETER_UNITS, {}).items()},
         }
         super().__init__(metadata, _merged(entries, [_numbers(by_entry[k], k, numbers) for k in range(len(entries))]))
 
@@ -110,7 +112,7 @@ class ComparedCampaigns(CampaignResults):
 
     def label_of(self, key: Key) -> str:
         """Return what a matched point is called."""
-        return ", ".join(self.value_text(name, text) for name, text in key) or "all runs"
+        return ", ".join(self.named_value(name, text) for name, text in key) or "all runs"
 
     @property
     def layout(self) -> PointLayout:

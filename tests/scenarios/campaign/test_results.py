@@ -1,12 +1,17 @@
 """Medians of points: one value for figures and tables, with an interval where it says something."""
 
 import math
+from pathlib import Path
 
 import pytest
-from campaigns import results_of
+from campaigns import results_of, table_of
 
+from handover.fmus.build import cached
+from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.campaign.statistics import time_interval
+from handover.scenarios.campaign_report.point_layout import layout_of
 
 
 def moved(points: int, values: list[float]) -> CampaignResults:
@@ -26,6 +31,28 @@ def test_there_is_no_interval_that_says_nothing_or_takes_too_long(points: int, v
     results = moved(points, values)
     assert results.median(results.points[0], "moved") == pytest.approx(0.2)
     assert results.median_interval(results.points[0], "moved") is None
+
+
+def test_labels_have_the_names_of_numbers_and_paths_as_they_are():
+    numbers = [{"forward": a, "standoff": b} for a in ("0.03", "0.05") for b in ("0.06", "0.1")]
+    results = results_of("ir_grasp", numbers)
+    assert results.label(results.points[0]) == "forward 30 mm, standoff 60 mm"
+    paths = ("my_own:Reflex", "b_1.fmu")
+    units = [{"thing": thing, "reflex": path} for thing in ("baby_cup_a", "cylinder") for path in paths]
+    results = results_of("ir_grasp", units)
+    assert [results.label(p) for p in results.points[:2]] == ["baby cup a, my_own:Reflex", "baby cup a, b_1.fmu"]
+
+
+def test_units_parameters_have_the_units_that_their_fmus_declare(tmp_path: Path):
+    plan = CampaignPlan(scenario="ir_grasp", points=[{"scene.wrist_speed": value} for value in ("0.05", "0.1", "0.2")])
+    folder = CampaignFolder(tmp_path / "c")
+    with folder.opened(plan, {"scene": cached("GraspScene", 3)}, lambda _path: None):
+        pass
+    metadata = folder.read()
+    assert metadata["parameter_units"] == {"scene.wrist_speed": "m/s"}
+    results = CampaignResults(metadata, table_of(metadata["points"], 1))
+    assert layout_of(results).title == "scene.wrist speed (m/s)"
+    assert results.label(results.points[0]) == "scene.wrist speed 0.05 m/s"
 
 
 def test_there_is_no_median_of_no_values():
