@@ -122,6 +122,8 @@ def read_config(path: Path, ctx: click.Context) -> ConfigFile:
                 texts[tables[key]] = list(_texts(key, value))
             elif key in options:
                 defaults[str(options[key].name)] = _checked(options[key], ctx, value)
+            elif key in _TABLES:
+                faults.append(f"no option {key!r}; the table [{key}] is for `handover sweep`")
             else:
                 faults.append(f"no option {key!r}; {nearest(key, {**options, **tables})}")
         except click.BadParameter as e:

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
-from handover.scenarios.cli.options import HeadedOption, Seconds
+from handover.scenarios.cli.options import HeadedOption, Seconds, WholeNumber
 from handover.scenarios.execution.errors import UsageError
 
 _PLAIN = MasterOptions()
@@ -63,7 +63,7 @@ _OPTIONS = (
     ),
     _coupling_option(
         "--iterations",
-        type=click.IntRange(min=1),
+        type=WholeNumber(min=1),
         default=_PLAIN.max_iterations,
         help="After so many iterations of one step, the run fails.",
     ),

@@ -54,6 +54,20 @@ class FiniteRange(click.FloatRange):
         return number
 
 
+class WholeNumber(click.IntRange):
+    """A whole number in a range."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Return the number."""
+        try:
+            is_whole = int(value) == value or isinstance(value, str)
+        except (TypeError, ValueError, OverflowError):
+            is_whole = False
+        if not is_whole:
+            self.fail(f"{value!r} is no whole number.", param, ctx)
+        return int(super().convert(value, param, ctx))
+
+
 _FORM = re.compile(r"[\d.]+(e[-+]?\d{1,3})?|\d+/\d+", re.IGNORECASE)
 """Exact fractions of larger exponents would take long to compute."""
 
@@ -86,7 +100,7 @@ _SCENARIO_OPTIONS = (
         metavar="NAME=VALUE",
         help="Set a parameter of the scenario, see `handover list SCENARIO`; or of a unit: UNIT.NAME=VALUE.",
     ),
-    click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers."),
+    click.option("--seed", type=WholeNumber(min=0), default=0, help="Seed of all random numbers."),
     click.option(
         "--unit",
         "replaced",
@@ -163,7 +177,7 @@ _CAMPAIGN_OPTIONS = (
     click.help_option("-h", "--help"),
     _worker_option(
         "--workers",
-        type=click.IntRange(min=1),
+        type=WholeNumber(min=1),
         metavar="N",
         help="Runs at the same time, on this machine.  [default: one a core]",
     ),

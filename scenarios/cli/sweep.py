@@ -18,6 +18,7 @@ from handover.scenarios.cli.campaign import pool_config, run_campaign_command
 from handover.scenarios.cli.config_file import ConfiguredCommand, config_option
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import (
+    WholeNumber,
     campaign_options,
     limit_options,
     limits,
@@ -69,7 +70,7 @@ Exit status
 @click.command("sweep", cls=ConfiguredCommand, help=_HELP, context_settings={"show_default": True})
 @click.argument("scenario", metavar="SCENARIO")
 @click.argument("grid", nargs=-1, metavar="[NAME=VALUES]...")
-@click.option("--repeat", type=click.IntRange(1, MAX_REPETITIONS), default=1, help="Runs of each combination.")
+@click.option("--repeat", type=WholeNumber(1, MAX_REPETITIONS), default=1, help="Runs of each combination.")
 @click.option(
     "--paired", is_flag=True, help="Let all combinations of a repetition share a seed, to compare them run by run."
 )

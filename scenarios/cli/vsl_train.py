@@ -15,6 +15,7 @@ from handover.cosim.exceptions import CosimError, UnitFailure
 from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import cached
 from handover.fmus.compile import CompilationError, UnknownPlatform
+from handover.scenarios.cli.options import WholeNumber
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import progress_bar
@@ -32,8 +33,8 @@ class _ArmFailed(click.ClickException):
 
 
 @click.command("vsl-train", context_settings={"show_default": True})
-@click.option("--points", type=click.IntRange(min=MIN_POINTS, max=1_000_000), default=1500, help="Points to measure.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of all random numbers.")
+@click.option("--points", type=WholeNumber(min=MIN_POINTS, max=1_000_000), default=1500, help="Points to measure.")
+@click.option("--seed", type=WholeNumber(min=0), default=0, help="Seed of all random numbers.")
 @click.option("--elbow", type=_ELBOW, default="up", help="Which way the elbow points.")
 @click.option("--plant", type=_PATH, help="FMU of the arm [default: VslArm, built from its sources].")
 @click.option(

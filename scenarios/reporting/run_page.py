@@ -51,7 +51,7 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> list[str]:
         master_section(facts),
         files_section(facts),
     ]
-    heading = f"{facts.scenario}: {'succeeded' if facts.summary['success'] else 'failed'}"
+    heading = f"{facts.scenario}: {_verdict(facts).lower()}"
     left_out = list(dict.fromkeys([*facts.summary.get("left_out", ()), *faults.lines]))
     write_page(file or folder.report, heading, run_header(facts, left_out), [s for s in sections if s is not None])
     return faults.lines

@@ -76,4 +76,5 @@ def _print_table(console: Console, header: Sequence[str], rows: Sequence[Sequenc
         table.add_row(*map(Text, row))
     console.print(table)
     if len(rows) > _MAX_ROWS:
-        console.print(f"  and {len(rows) - _MAX_ROWS} rows more, in the report")
+        more = len(rows) - _MAX_ROWS
+        console.print(f"  and {more} more {'row' if more == 1 else 'rows'}, in the report")

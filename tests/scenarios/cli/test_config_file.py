@@ -240,3 +240,17 @@ def test_a_run_of_an_fmu_or_an_ssp_is_repeated(tmp_path: Path):
         assert done.exit_code == 0, done.output
         for name in ("run.json", "signals.parquet"):
             assert (out / "1" / name).read_bytes() == (out / "2" / name).read_bytes()
+
+
+@pytest.mark.parametrize("seed", ["3.5", "many", "1e3"])
+def test_a_seed_that_is_no_whole_number_is_told_as_that(seed: str):
+    done = CliRunner().invoke(main, ["run", "ir_grasp", "--seed", seed])
+    assert done.exit_code == 2
+    assert f"Invalid value for '--seed': '{seed}' is no whole number." in done.stderr
+
+
+def test_a_table_of_another_command_is_told_as_that(tmp_path: Path):
+    (tmp_path / "c.toml").write_text('[sweep]\nstrategy = ["reflex", "blind"]\n')
+    done = CliRunner().invoke(main, ["run", "ir_grasp", "--config", str(tmp_path / "c.toml")])
+    assert done.exit_code == 2
+    assert "no option 'sweep'; the table [sweep] is for `handover sweep`" in done.stderr

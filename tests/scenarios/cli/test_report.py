@@ -74,6 +74,7 @@ def test_a_run_that_was_killed_with_all_that_watched_it_has_a_page(copy: Path):
     assert report(copy)[0] == 0
     lead = (copy / "report.html").read_text().partition("<main>")[0]
     assert "<b>Not ended</b>: it has no summary" in lead
+    assert "ir_grasp: not ended</h1>" in lead
     assert not (copy / "summary.json").exists()
 
 
