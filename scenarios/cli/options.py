@@ -60,12 +60,12 @@ class WholeNumber(click.IntRange):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
         """Return the number."""
         try:
-            is_whole = int(value) == value or isinstance(value, str)
+            number = int(value)
         except (TypeError, ValueError, OverflowError):
-            is_whole = False
-        if not is_whole:
+            number = None
+        if number is None or (isinstance(value, float) and not value.is_integer()):
             self.fail(f"{value!r} is no whole number.", param, ctx)
-        return int(super().convert(value, param, ctx))
+        return int(super().convert(number, param, ctx))
 
 
 _FORM = re.compile(r"[\d.]+(e[-+]?\d{1,3})?|\d+/\d+", re.IGNORECASE)
