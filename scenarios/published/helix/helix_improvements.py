@@ -40,6 +40,9 @@ _THREE = ("a third camera above", "5.4.1", {"cameras": "three"})
 _FILTERS = ("filters by the measurements' covariances", "5.4.2", {"filters": "own"})
 
 
+_TICKS = (0.5, 1, 2, 5, 10, 20, 50, 100)  # mm
+
+
 @dataclass(frozen=True)
 class Change:
     """A change of the settings, and the settings that it is compared with, both with a name; where it is suggested."""
@@ -123,14 +126,16 @@ class HelixImprovements(PublishedExperiment):
         drawn = [(x, d) for x, d in drawn if len(d)]
         if not drawn:
             return []
-        with figure(folder / "improvements", 1, size=(8.0, 1.2 + 0.3 * len(drawn))) as (axes,):
+        with figure(folder / "improvements", 1, size=(9.0, 1.2 + 0.3 * len(drawn))) as (axes,):
             for y, (_, d) in enumerate(drawn):
                 for before, after in 1e3 * d:
                     axes.plot([before, after], [y - 0.15, y + 0.15], "-", lw=0.7, color="0.7", zorder=1)
                 axes.plot(1e3 * d[:, 0], np.full(len(d), y - 0.15), "o", ms=4, color=COLOURS[0])
                 axes.plot(1e3 * d[:, 1], np.full(len(d), y + 0.15), "o", ms=4, color=COLOURS[1])
             axes.set_yticks(range(len(drawn)), [f"{x.settings}: {x.what}" for x, _ in drawn])
-            axes.set(xscale="log", xlabel="gripper to ball as it begins to close (mm)", ylim=(len(drawn) - 0.4, -0.6))
+            axes.set(xscale="log", xlabel="distance at closing (mm)", ylim=(len(drawn) - 0.4, -0.6))
+            axes.set_xticks(_TICKS, [f"{x:g}" for x in _TICKS])
+            axes.minorticks_off()
             axes.plot([], [], "o", ms=4, color=COLOURS[0], label="without")
             axes.plot([], [], "o", ms=4, color=COLOURS[1], label="with the change")
             axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
