@@ -1,9 +1,11 @@
 import hashlib
+import importlib
 import math
 import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -123,8 +125,27 @@ def elastica(force: float, EI: float, l: float) -> tuple[float, float]:
     return shoot(low)[1:]
 
 
+def exudyn_beam(force: float, EI: float, l: float, elements: int = 20) -> tuple[float, float]:
+    """Return the like of Exudyn's beam by absolute nodal coordinates, in its static solution."""
+    TendonArm(Params())  # loads Exudyn also where OpenGL is missing
+    exudyn, beams = (importlib.import_module(name) for name in ("exudyn", "exudyn.beams"))
+    items: Any = importlib.import_module("exudyn.itemInterface")
+    system: Any = exudyn.SystemContainer().AddSystem()
+    cable = items.Cable2D(massPerLength=1.0, bendingStiffness=EI, axialStiffness=1e5)
+    line = (system, [0, 0, 0], [l, 0, 0], elements, cable, [0, 0, 0], [1, 1, 0, 1], [0, 0, 0, 0])
+    tip = beams.GenerateStraightLineANCFCable2D(*line)[0][-1]
+    marker = system.AddMarker(items.MarkerNodePosition(nodeNumber=tip))
+    system.AddLoad(items.Force(markerNumber=marker, loadVector=[0, force, 0]))
+    system.Assemble()
+    settings = exudyn.SimulationSettings()
+    settings.staticSolver.numberOfLoadSteps, settings.staticSolver.verboseMode = 10, 0
+    system.SolveStatic(settings)
+    along, across, _ = system.GetNodeOutput(tip, exudyn.OutputVariableType.Position)
+    return float(along), float(across)
+
+
 @pytest.mark.slow
-def test_bends_as_the_planar_elastica():
+def test_bends_as_the_planar_elastica_and_exudyns_beam():
     # nearly without tendons, gravity and stretch: all tendons let go, a stiff axis, and force at the wrist
     stiff = Params(
         EA=1e5,
@@ -142,6 +163,7 @@ def test_bends_as_the_planar_elastica():
     y = run(TendonArmFast(stiff), Inputs(dl_t=np.full(9, 0.2), f_G=np.array([force, 0.0, 0.0])), 400, dt=0.04)
     along, across = elastica(force, stiff.EI, 0.6)
     assert across > 0.1
+    assert exudyn_beam(force, stiff.EI, 0.6) == pytest.approx((along, across), abs=1e-5)
     np.testing.assert_allclose(y.p_WR, [across, 0.0, -along], atol=1e-3)
 
 
