@@ -132,8 +132,9 @@ def exudyn_beam(force: float, EI: float, l: float, elements: int = 20) -> tuple[
     items: Any = importlib.import_module("exudyn.itemInterface")
     system: Any = exudyn.SystemContainer().AddSystem()
     cable = items.Cable2D(massPerLength=1.0, bendingStiffness=EI, axialStiffness=1e5)
-    line = (system, [0, 0, 0], [l, 0, 0], elements, cable, [0, 0, 0], [1, 1, 0, 1], [0, 0, 0, 0])
-    tip = beams.GenerateStraightLineANCFCable2D(*line)[0][-1]
+    clamped = [1, 1, 0, 1]
+    line = (system, [0, 0, 0], [l, 0, 0], elements, cable)
+    tip = beams.GenerateBeamElementsAlongLine(*line, groundConstraintsStart=clamped)["nodes"][-1]
     marker = system.AddMarker(items.MarkerNodePosition(nodeNumber=tip))
     system.AddLoad(items.Force(markerNumber=marker, loadVector=[0, force, 0]))
     system.Assemble()
