@@ -82,7 +82,7 @@ class HostProcess:
         """Note how all is from here on, as before calls of units: the host's own program may have changed it."""
         self._close_copies()
         self._directory = _directory()
-        self._streams = {n: copy for n in _STREAMS if (copy := _copied(n)) is not None}
+        self._streams = {n: copy for n in _STREAMS if (copy := copied(n)) is not None}
         self._handlers = {n: (self._handler(n), signal.getsignal(n)) for n in _SIGNALS}
         self._arithmetic = self._environment()
         self._limits = _limits()
@@ -194,7 +194,7 @@ def _directory() -> str | None:
         return None
 
 
-def _copied(number: int) -> int | None:
+def copied(number: int) -> int | None:
     """Return a copy of a descriptor, out of the way; None where it is closed, or where there is no room for one."""
     if not _POSIX:
         return None

@@ -48,11 +48,16 @@ static void start_watching(void) {
 /* Whether the linker's message is of a symbol of Python's C API, as `undefined symbol: _Py_NoneStruct` (Linux) or `symbol
  * not found in flat namespace '_PyBool_FromLong'` (macOS, where each name begins with another underscore). */
 static bool lacks_python(const char *message) {
-    const char *name = strstr(message, "undefined symbol: ");
-    name = name ? name + strlen("undefined symbol: ") : strstr(message, "flat namespace '_");
-    if (name && !strncmp(name, "flat", 4))
-        name += strlen("flat namespace '_");
-    return name && (!strncmp(name, "Py", 2) || !strncmp(name, "_Py", 3));
+    static const char *const before[] = {"undefined symbol: ", "flat namespace '_"};
+    for (int i = 0; i < 2; i++) {
+        const char *name = strstr(message, before[i]);
+        if (!name)
+            continue;
+        name += strlen(before[i]);
+        if (!strncmp(name, "Py", 2) || !strncmp(name, "_Py", 3))
+            return true;
+    }
+    return false;
 }
 
 /* Load a library, and Python's before it if it takes for granted that its host is Python, which has that loaded. */

@@ -200,7 +200,9 @@ def _explained(message: str) -> str:
     symbol = _OF_PYTHON.search(message)
     if symbol is None or _libpython():
         return message
-    cause = f"it uses Python ({symbol[1]}), but names no library of Python that it needs: its host is to be Python"
+    cause = (
+        f"it uses Python ({symbol[1]}), but names no library of Python that it needs: it expects to be loaded by Python"
+    )
     here = (
         f"the process of an isolated unit is not, and the Python here, {sys.executable}, has no shared library for it"
     )

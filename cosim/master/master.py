@@ -40,7 +40,7 @@ def never() -> bool:
 
 
 def _tell_of_faults(system: System, *, strict: bool) -> None:
-    """Warn of descriptions that break the standard where it does not matter here, or start from NaN, and tell notes.
+    """Warn of invalid descriptions, of start values that are NaN, and of what the system notes.
 
     Raises:
         InvalidFmu: `strict` does not let them pass.

@@ -71,7 +71,8 @@ class StepperFactory:
             case Algorithm.GAUSS_SEIDEL | Algorithm.FIXED_POINT | Algorithm.NEWTON:
                 groups = self.schedule.sampled_groups, self._continuous
                 interpolates = self._options.extrapolation is Extrapolation.LINEAR  # up to a value at a step's end
-                late = () if interpolates else self.schedule.spanning
+                steps_together = self._options.adaptive is not None
+                late = () if interpolates or steps_together else self.schedule.spanning
                 return GaussSeidel(ensemble, *groups, self._solver, late)
 
     def stepper(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:

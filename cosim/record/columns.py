@@ -40,7 +40,7 @@ class RecordColumns:
 
 
 def _array(kind: "pa.DataType", values: NDArray[Any]) -> "pa.Array[Any]":
-    """Return values of a column, shape (n,), of the type's own kind; `pa.array` would import pandas to look at them."""
+    """Return values of a column, shape (n,), contiguous and of its dtype; `pa.array` would import pandas for them."""
     packed: Any = np.packbits(values, bitorder="little") if pa.types.is_boolean(kind) else values
     buffer = pa.py_buffer(packed)
     return pa.Array.from_buffers(kind, len(values), [None, buffer])

@@ -152,7 +152,7 @@ class GaussSeidel:
         self._sampled.step(t, sampled)
 
     def depart(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:  # noqa: ARG002
-        """Step the others, each with the outputs of those before it at the end of the step."""
+        """Step the others, each with the outputs of those before it at the end of the step, but for late ones."""
         self._continuous.step(t, continuous)
 
     def get_state(self) -> Mapping[str, Any]:

@@ -49,7 +49,8 @@ class Schedule:
     output can be computed after others: one of the units then gets values of the previous step. Both cases are logged.
 
     The results of a step count at once for the units after it, as values at the end of the step. Those of a unit whose
-    step may span a communication point of others would count before their time: they count from the step's end on.
+    step may span a communication point of others would count before their time: they count from the step's end on,
+    but in an algebraic loop, whose units are iterated, at once.
 
     In initialization mode, dependencies may be others, and all loops can be solved.
 

@@ -223,7 +223,7 @@ class System:
 
     @property
     def undefined_starts(self) -> list[str]:
-        """Variables that start from NaN, as their FMUs say and nobody else does, a line each; infinity is a limit."""
+        """Variables whose start value in the FMU is NaN and that get no other, a line each."""
         return [
             f"{unit.name}.{name} starts from NaN, as its FMU says: give it a value, or see that the unit computes one"
             for unit in self.units.values()

@@ -85,13 +85,13 @@ def single_texts(subject: object, values: Mapping[str, Any]) -> list[str]:
         experiment = find_scenario(subject) if isinstance(subject, str) else cast(type[Experiment[Any]], subject)
         scalars = {v.name for v in experiment.parameters() if not v.shape}
         for name, value in values.items():
-            if name in scalars and np.ndim(value) and not isinstance(value, str):
+            if name in scalars and (isinstance(value, (list, tuple)) or getattr(value, "ndim", 0)):
                 raise InvalidInput(f"{name} = {value!r}: a run has one value; handover.sweep varies lists of them")
     return texts_of(values)
 
 
 def is_scenario(subject: object) -> bool:
-    """Return whether something is to be a scenario: a class of one, or a name that is no file's."""
+    """Return whether a subject names or is a scenario, not a file or a system."""
     if isinstance(subject, str):
         return not is_ssp(subject) and not is_fmu(subject)
     return isinstance(subject, type) and issubclass(subject, Experiment)

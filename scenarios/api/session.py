@@ -60,7 +60,7 @@ class SavedState:
     evaluator: bytes
     free: Mapping[str, NDArray[Any]]
     asked: Fraction
-    given: frozenset[str] = frozenset()
+    given: frozenset[str]
 
 
 class Session:
@@ -224,7 +224,7 @@ class Session:
         if self._open.place is not None:
             for name, views in self._open.place.outputs.items():
                 views[0][:] = state.free[f"{self._open.place.unit.name}.{name}"]
-        self._give(state.given)
+        self._given, self._judged = set(state.given), self._all_signals(state.given)
         self._asked, self._seen = state.asked, state.checkpoint.time if state.asked else -1.0
 
     def close(self) -> None:

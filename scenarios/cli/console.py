@@ -1,6 +1,5 @@
 """What commands print to: the console; rows in columns; data as JSON."""
 
-import contextlib
 import json
 import os
 import sys
@@ -11,6 +10,8 @@ import click
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
+
+from handover.cosim.fmu.host_process import copied
 
 
 def open_console() -> Console:
@@ -42,23 +43,13 @@ def reserve_stdout() -> TextIO:
     except (OSError, ValueError):  # it is no file of the system, as where a program calls the command
         return sys.stdout
     sys.stdout.flush()
-    kept = _copy(_STDOUT)
+    kept = copied(_STDOUT)
+    kept = os.dup(_STDOUT) if kept is None else kept
     os.dup2(_STDERR, _STDOUT)
     return open(kept, "w", encoding="utf-8")
 
 
 _STDOUT, _STDERR = 1, 2
-_OUT_OF_THE_WAY = 500
-"""Where the copy of a descriptor is: some units close all that have small numbers."""
-
-
-def _copy(number: int) -> int:
-    if sys.platform != "win32":
-        import fcntl
-
-        with contextlib.suppress(OSError, ValueError):  # a process may have fewer
-            return fcntl.fcntl(number, fcntl.F_DUPFD_CLOEXEC, _OUT_OF_THE_WAY)
-    return os.dup(number)
 
 
 class _Console(Console):

@@ -163,7 +163,8 @@ def _first_outputs(block: type[Any]) -> Any:
 def _start(v: Variable, first: Any) -> str | None:
     """Return an output's value that says nothing, as Python's text; None for texts, pictures and the like."""
     if v.enumeration is not None and not v.shape:
-        return f"{v.enumeration.__name__}.{next(iter(v.enumeration)).name}"
+        item = v.enumeration(int(getattr(first, v.name, next(iter(v.enumeration)))))
+        return f"{v.enumeration.__name__}.{item.name}"
     if v.kind not in (Kind.REAL, Kind.INTEGER, Kind.BOOLEAN):
         return None
     value = np.asarray(getattr(first, v.name, v.start))
@@ -179,7 +180,7 @@ def _start(v: Variable, first: Any) -> str | None:
 
 
 def _arguments(values: Mapping[str, str | None]) -> str:
-    """Return named arguments, on lines of their own where one is too short."""
+    """Return named arguments, on lines of their own where one line does not hold them."""
     named = [f"{name}={value}" for name, value in values.items()]
     line = ", ".join(named)
     if len(line) < _WIDTH - 24:

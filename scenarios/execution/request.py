@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.system import System
@@ -181,8 +181,6 @@ class RunRequest:
 
     def _of_class(self, scenario: type[Experiment[Any]]) -> OpenedSubject:
         """Return a scenario by its class; that of a program or a notebook has no path by which it is found again."""
-        if missing := sorted(getattr(scenario, "__abstractmethods__", ())):
-            raise UsageError(f"{scenario.__name__} is not complete: it has no {', '.join(missing)}")
         values = split_parameters(scenario, self.parameters)
         path = path_of_class(scenario)
         return OpenedSubject(scenario(), *values, {} if path is None else own_source(path), self.stop)
@@ -200,6 +198,8 @@ def check_subject(subject: object) -> None:
     if isinstance(subject, type):
         if not issubclass(subject, Experiment):
             raise UsageError(f"{subject.__name__} is no scenario: a subclass of Experiment is")
+        if missing := sorted(getattr(cast(Any, subject), "__abstractmethods__", ())):
+            raise UsageError(f"{subject.__name__} is not complete: it has no {', '.join(missing)}")
     elif not isinstance(subject, (str, System)):
         right = "a scenario's name or class, a system, or the path of an SSP or FMU is right"
         raise UsageError(f"{subject!r} cannot be run: {right}")

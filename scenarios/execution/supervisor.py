@@ -170,8 +170,9 @@ def _end_as(end: ChildEnd, wall: float, report_crash: Callable[[Heartbeat, Child
         os.kill(os.getpid(), end.signal)
     unsaid, ended = heartbeat.facts.get("unsaid"), "concluded" in heartbeat.facts
     if unsaid and ended:
-        why = "as where a unit has closed its standard streams"
-        print(f"the run ended, but its process could not tell so ({unsaid}), {why}; its folder says:", file=sys.stderr)
+        print(
+            f"the run ended, but its process could not print its summary ({unsaid}); from its folder:", file=sys.stderr
+        )
     elif unsaid:
         print(f"Error: the run's process could not go on: {unsaid}", file=sys.stderr)
     if heartbeat.status is not None and not (unsaid and ended):

@@ -32,6 +32,11 @@ class CameraPlaces(enum.IntEnum):
         """The cameras' names, as the units' parameters end with them."""
         return ("left", "right", "third") if self is CameraPlaces.THREE else ("left", "right")
 
+    @property
+    def above(self) -> tuple[str, ...]:
+        """Those of the cameras that look down."""
+        return {CameraPlaces.TOP: ("right",), CameraPlaces.THREE: ("third",)}.get(self, ())
+
 
 PICTURE = np.array([1280.0, 720.0])
 """Width and height of a picture, px."""

@@ -76,7 +76,9 @@ class Disturbances:
         0, "markers with tape over them, those that face the cameras first", minimum=0, maximum=8
     )
     hide_from: Second = parameter(4.0, "time at which a card hides the ball, if it does", minimum=0.0, maximum=600.0)
-    hide_for: Second = parameter(0.0, "how long a card hides the ball from both cameras", minimum=0.0, maximum=600.0)
+    hide_for: Second = parameter(
+        0.0, "how long a card hides the ball from left and right camera", minimum=0.0, maximum=600.0
+    )
     cover: Cover = parameter(Cover.NONE, "camera whose lens is covered for a while")
     cover_from: Second = parameter(4.0, "time at which the lens is covered", minimum=0.0, maximum=600.0)
     cover_for: Second = parameter(2.0, "how long the lens is covered", minimum=0.0, maximum=600.0)

@@ -194,7 +194,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
         from handover.scenarios.helix.plots import draw_pictures  # matplotlib is slow to import
 
         pictures = evaluator.pictures()
-        return [draw_pictures(pictures, folder)] if pictures else []
+        return [draw_pictures(pictures, parameters.cameras.above, folder)] if pictures else []
 
     def time_figures(self, parameters: Parameters, record: Record) -> list[TimeFigure]:
         """Return distance to the goal, positions, tendons and gripper over time."""

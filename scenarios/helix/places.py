@@ -18,8 +18,8 @@ _SEEN = {
     "p_WO_meas": "in W; while it is not seen, the last one, zeros before any",
     "p_WR_meas": "in W; the wrist carries the marker ring, at the end of the arm's centre line",
     "p_WG_meas": "in W; the gripper is 0.1 m beyond the wrist, along the ring's axis",
-    "seen_O": "in this pair of pictures",
-    "seen_R": "in this pair of pictures",
+    "seen_O": "in these pictures",
+    "seen_R": "in these pictures",
 }
 _COVARIANCES = {
     "cov_O": "in W; large while it is not seen",

@@ -1,6 +1,6 @@
 """Figures of a Helix handover: distance, positions, tendons and gripper over time, and camera pictures."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -189,18 +189,18 @@ def _hand_force(parameters: Parameters, record: Record, phases: Sequence[Phase])
     )
 
 
-_SHOWN_COLUMNS, _SHOWN_ROWS, _SHOWN_ROWS_FROM_ABOVE = (240, 1040), (620, 150), (490, 20)
+_COLUMNS, _ROWS, _ROWS_FROM_ABOVE = (240, 1040), (620, 150), (490, 20)
 """The part of the pictures that is shown, px; those of a camera above show farther off, which is up in them."""
 
 
-def draw_pictures(pictures: Sequence[CameraPicture], folder: Path) -> Figure:
-    """Draw the cameras' pictures into a folder, a camera a row, the moments side by side."""
+def draw_pictures(pictures: Sequence[CameraPicture], above: Collection[str], folder: Path) -> Figure:
+    """Draw the cameras' pictures, some from above, into a folder: a camera a row, the moments side by side."""
     moments, cameras = list(dict.fromkeys(p.t for p in pictures)), list(dict.fromkeys(p.camera for p in pictures))
     n = len(moments)
     with figure(folder / "pictures", len(cameras), n, size=(3.2 * n, 1.95 * len(cameras))) as axes:
         for p in pictures:
             i = moments.index(p.t)
-            _show(axes[i + n * cameras.index(p.camera)], p)
+            _show(axes[i + n * cameras.index(p.camera)], p, _ROWS_FROM_ABOVE if p.camera in above else _ROWS)
             axes[i].set_title(f"{p.t:.1f} s, {p.role}")
     caption = (
         f"Cameras from above: {', '.join(cameras)}. Ball (circle), wrist (cross) and gripper (plus), yellow as "
@@ -209,10 +209,10 @@ def draw_pictures(pictures: Sequence[CameraPicture], folder: Path) -> Figure:
     return Figure("pictures", caption)
 
 
-def _show(axis: Axes, picture: CameraPicture) -> None:
+def _show(axis: Axes, picture: CameraPicture, rows: tuple[int, int]) -> None:
     axis.imshow(picture.pixels[:, :, ::-1])
     axis.set_axis_off()
-    axis.set(xlim=_SHOWN_COLUMNS, ylim=_SHOWN_ROWS_FROM_ABOVE if picture.camera == "third" else _SHOWN_ROWS)
+    axis.set(xlim=_COLUMNS, ylim=rows)
     for mark in picture.marks:
         style: dict[str, Any] = {"color": mark.colour, "lw": 1.2}
         if mark.shape == "circle":

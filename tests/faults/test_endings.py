@@ -106,13 +106,12 @@ def test_of_two_requests_in_a_step_the_first_counts(fmi: int, compiled: bool, tm
 
 
 @pytest.mark.parametrize("compiled", [True, False])
-def test_a_unit_that_is_already_farther_keeps_its_signals(compiled: bool, tmp_path: Path):
+def test_a_unit_that_is_already_farther_keeps_the_signals_of_that_time(compiled: bool, tmp_path: Path):
     s = around("ends", 3)
     s.add("slow", native_fmu("integrator", 3), u=1.0, period=Fraction(1, 2))
     record, _, _, _ = run(s, MasterOptions(compiled=compiled), tmp_path / "r.parquet")
     assert record.time[-1] == 0.3
-    assert record["slow.x"][-1] == pytest.approx(0.5)  # the end of its step, as at all points before
-    assert record["slow.x"][1] == pytest.approx(0.5)
+    assert not record["slow.x"].any()  # its first step leads to 0.5 s
 
 
 PATHS = {

@@ -72,7 +72,7 @@ class BallFit:
     ) -> BallPosition | None:
         """Return the ball's position, or None if no picture shows it.
 
-        Where the pictures contradict each other, most of those that agree count, or else that with most of the disc.
+        Where pictures contradict each other, the largest set that agrees counts, or else the one with most of the disc.
 
         Args:
             pictures: of each camera.
@@ -136,7 +136,7 @@ class _View:
 def _meeting(views: Sequence[_View]) -> tuple[float, Floats]:
     """Return how far the rays through the discs' middles pass each other, m, and the point between them.
 
-    Rays that meet behind a camera do not meet.
+    The distance is infinite if the point is behind a camera.
     """
     cameras = [view.camera for view in views]
     p_WO, gap = triangulate(cameras, [view.disc.centre for view in views])

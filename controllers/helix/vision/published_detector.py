@@ -1,4 +1,4 @@
-"""The thesis's own way to find ball and wrist in a pair of pictures. [Vervloet2025] sec. 3.2.2 to 3.2.4.
+"""The thesis's own way to find ball and wrist in pictures. [Vervloet2025] sec. 3.2.2 to 3.2.4.
 
 Each picture is looked at by itself, and whole, and each marker gives a pose by itself. What the thesis leaves open is
 marked below as assumed. `joint_detector` is this project's own way.
@@ -95,7 +95,7 @@ class PublishedDetector:
         )
 
     def get_state(self) -> Any:
-        """Return None: each pair of pictures is looked at by itself."""
+        """Return None: pictures of one time are looked at by themselves."""
 
     def set_state(self, state: Any) -> None:
         """Restore a state that `get_state` gave."""

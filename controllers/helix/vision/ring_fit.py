@@ -1,4 +1,4 @@
-"""The wrist's pose from all marker corners that both cameras see, in one fit."""
+"""The wrist's pose from all marker corners that the cameras see, in one fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """What there is to paint before each camera: arm, gripper, ball and hand, as polygons and decals with depths.
 
 `Tube` is the ribbed soft arm, `ShadedBall` the glossy green ball, `MarkerCollar` the octagonal collar at the wrist with
-one fiducial marker or two on each side; `HandoverScene` puts them together, for both cameras at once: most of the
+one fiducial marker or two on each side; `HandoverScene` puts them together, for all cameras at once: most of the
 time goes into calls of numpy with a few numbers each.
 """
 

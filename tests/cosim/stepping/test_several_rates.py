@@ -8,7 +8,7 @@ from observed_rows import observed_rows
 
 from handover.cosim.master.checkpoint import take_checkpoint
 from handover.cosim.master.master import Master
-from handover.cosim.stepping.options import Algorithm, MasterOptions
+from handover.cosim.stepping.options import AdaptiveStep, Algorithm, MasterOptions
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
@@ -48,12 +48,27 @@ def test_no_algorithm_lets_a_result_count_before_its_time(algorithm: Algorithm):
     assert [x for t, (x,) in seen.items() if t < 0.5] == [0.0] * 5
 
 
-def test_units_in_processes_of_their_own_have_the_same_values():
+def test_the_general_path_and_units_in_processes_of_their_own_have_the_same_values():
     rows = [
         observed_rows(integrators(Fraction(1, 4), Fraction(1, 10)), Fraction(2), *SIGNALS, options=options)
-        for options in (MasterOptions(), MasterOptions(isolated=("slow",)), MasterOptions(isolated=("all",)))
+        for options in (
+            MasterOptions(),
+            MasterOptions(compiled=False),
+            MasterOptions(isolated=("slow",)),
+            MasterOptions(isolated=("all",)),
+            MasterOptions(isolated=("all",), compiled=False),
+        )
     ]
-    assert rows[0] == rows[1] == rows[2]
+    assert rows == rows[:1] * len(rows)
+
+
+def test_where_the_step_adapts_results_do_not_depend_on_the_rates_that_units_ask_for():
+    step = AdaptiveStep(initial=Fraction(1, 10), largest=Fraction(1, 10))
+    rows = [
+        observed_rows(integrators(slow, Fraction(1, 10)), Fraction(1), "fast.x", options=MasterOptions(adaptive=step))
+        for slow in (Fraction(1, 10), Fraction(1, 2))
+    ]
+    assert rows[0] == rows[1]
 
 
 def test_a_run_goes_on_from_a_checkpoint_amid_a_slow_step():

@@ -14,6 +14,7 @@ import handover
 from handover.controllers.ir_grasp.parameters import Strategy
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import main
+from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 
 OPTIONS = set(handover.run.__kwdefaults__ or {}) | set(handover.sweep.__kwdefaults__ or {})
@@ -163,11 +164,11 @@ class NoScenario:
     pass
 
 
-class Incomplete(IrGrasp):
+class Unfindable(IrGrasp):
     """Is in no module that a worker could import by its path."""
 
 
-Incomplete.__qualname__ = "nowhere.Incomplete"
+Unfindable.__qualname__ = "nowhere.Unfindable"
 
 
 @pytest.mark.parametrize(
@@ -178,8 +179,11 @@ Incomplete.__qualname__ = "nowhere.Incomplete"
         (lambda: handover.run(NoScenario), "NoScenario is no scenario: a subclass of Experiment is"),  # pyright: ignore[reportArgumentType]
         (lambda: handover.environment(NoScenario, "reflex"), "NoScenario is no scenario"),  # pyright: ignore[reportArgumentType]
         (lambda: handover.sweep(NoScenario), "NoScenario is no scenario"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.run(Experiment), "Experiment is not complete: it has no build"),
+        (lambda: handover.sweep(Experiment), "Experiment is not complete: it has no build"),
+        (lambda: handover.run("ir_grasp", strategy=[["a"], ["b", "c"]]), "strategy = .*a run has one value"),
         (lambda: handover.sweep(4), "4 cannot be run"),  # pyright: ignore[reportArgumentType]
-        (lambda: handover.sweep(Incomplete), "Incomplete: each run of a sweep imports its scenario"),
+        (lambda: handover.sweep(Unfindable), "Unfindable: each run of a sweep imports its scenario"),
         (lambda: handover.run("ir_grasp", strategy=["blind"]), r"strategy = \['blind'\]: a run has one value"),
         (lambda: handover.run(IrGrasp, forward=np.array([0.1])), "forward = .*handover.sweep varies lists"),
         (lambda: handover.environment("ir_grasp", "reflex", thing=("cup",)), "thing = .*a run has one value"),

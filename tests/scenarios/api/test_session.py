@@ -119,6 +119,18 @@ def test_the_whole_state_is_saved_and_restored(other: bool):
             assert again.outcome == outcome
 
 
+def test_what_the_evaluation_sees_of_a_vacant_place_is_restored_too():
+    with handover.environment("flyer_impedance", "impedance") as agent:
+        agent.reset(seed=1)
+        session = agent.session
+        assert session is not None
+        state, metrics = session.save(), set(session.outcome.metrics)
+        session["impedance.pole_radius"] = 0.5
+        session.step(0.1)
+        session.restore(state)
+        assert set(session.outcome.metrics) == metrics
+
+
 def test_a_state_of_another_system_is_refused():
     with handover.open("flyer_impedance") as a:
         state = a.save()

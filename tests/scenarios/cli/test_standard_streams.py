@@ -60,4 +60,4 @@ def test_status_and_summary_agree_where_a_unit_closes_the_streams(
         assert json.loads(done.stdout) == summary | {"folder": "r"}
     else:
         assert f"{closed}_in_step.fmu succeeded: ran to 1 s" in done.stdout
-    assert ("its process could not tell so" in done.stderr) == (closed == "close_any")
+    assert ("its process could not print its summary" in done.stderr) == (closed == "close_any")

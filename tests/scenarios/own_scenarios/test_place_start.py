@@ -61,7 +61,7 @@ def test_the_start_of_each_place_runs(taken: str, tmp_path: Path, monkeypatch: p
     monkeypatch.chdir(tmp_path)
     with handover.open(scenario, units={place: f"{module}:Mine"}) as running:
         running.step(0.2)
-        assert running.outcome.reason
+        assert not running.outcome.reason.startswith("not judged")
         for output in (o for o in running.outputs if o.startswith(f"{place}.q_W")):
             np.testing.assert_allclose(np.linalg.norm(running[output]), 1.0, atol=1e-5)
 
