@@ -196,7 +196,8 @@ def test_a_run_that_is_stopped_for_a_while_does_not_hang(server: ServerProcess, 
                 os.kill(process, signal.SIGCONT)
         return True
 
-    limited = replace(job(tmp_path / "runs"), options=MasterOptions(call_limit=0.5))
+    # paced, so that the run lasts longer than the time between two calls of stop_once
+    limited = replace(job(tmp_path / "runs"), options=MasterOptions(call_limit=0.5, pace=5.0))
     assert server.run_job(limited, stop_once).lost == ""
     assert len(stopped) == 1
     summary = json.loads((tmp_path / "runs" / "run" / "summary.json").read_text())
