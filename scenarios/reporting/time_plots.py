@@ -197,8 +197,7 @@ def _column(values: Floats, time: NDArray[np.float32], max_rows: int) -> Mapping
     if len(changes) == 0:
         return {"value": float(values[0]) if np.isfinite(values[0]) else None}
     held = len(changes) < 0.7 * len(values)
-    few = held and len(changes) < max_rows
-    rows = np.union1d(changes, [0, len(values) - 1]) if few else rows_of_curve(values, max_rows)
+    rows = rows_of_steps(values, max_rows) if held else rows_of_curve(values, max_rows)
     return {"t": _packed(time[rows]), "y": _packed(values[rows].astype(np.float32)), "held": held}
 
 

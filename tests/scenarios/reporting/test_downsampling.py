@@ -1,9 +1,15 @@
 """Few rows that look like all: extremes, gaps and every change of what is held are among them."""
 
+import base64
+from pathlib import Path
+
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
-from handover.scenarios.reporting.time_plots import rows_of_curve, rows_of_steps
+from handover.cosim.record.reader import Record
+from handover.scenarios.reporting.time_plots import explorer_section, rows_of_curve, rows_of_steps
 
 T = np.linspace(0.0, 10.0, 100_000)
 
@@ -47,3 +53,14 @@ def test_a_held_value_is_drawn_until_the_gap_after_it():
 def test_few_rows_are_all_kept():
     assert rows_of_curve(T[:5], 900).tolist() == [0, 1, 2, 3, 4]
     assert rows_of_steps(T[:0], 900).tolist() == []
+
+
+def test_a_signal_of_any_record_is_drawn_until_it_is_no_number(tmp_path: Path):
+    time, y = np.linspace(0.0, 1.0, 11), np.where(np.arange(11) < 6, 0.0, np.nan)
+    rows = [{"time": t, "a.y": value} for t, value in zip(time.tolist(), y.tolist(), strict=True)]
+    pq.write_table(pa.Table.from_pylist(rows), tmp_path / "signals.parquet")
+    section = explorer_section(Record(tmp_path / "signals.parquet"))
+    assert section is not None
+    packed = section.html.partition('"t":"')[2].partition('"')[0].replace("\\u002f", "/")
+    times = np.frombuffer(base64.b64decode(packed), dtype="<f4")
+    assert times.tolist() == pytest.approx([0.0, 0.5, 0.6, 1.0])
