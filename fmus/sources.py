@@ -100,7 +100,8 @@ def closure(block: str) -> Carried:
             if _is_source(spec) and path not in files:
                 files[path] = Path(spec.origin or "")
                 is_package = spec.submodule_search_locations is not None
-                waiting += _imports(files[path], part if is_package else part.rpartition(".")[0])
+                package = part if is_package else part.rpartition(".")[0]
+                waiting += _imports(files[path].read_bytes(), package, str(files[path]))
     return Carried(dict(sorted(files.items())), tuple(sorted(environment)))
 
 
@@ -146,10 +147,14 @@ def _path_in_fmu(module: str, spec: ModuleSpec) -> str:
     return f"{path}/__init__.py" if spec.submodule_search_locations is not None else f"{path}.py"
 
 
-def _imports(source: Path, package: str) -> list[str]:
-    """Return the absolute names that a source may import; of `from a import b` both a and a.b, as b may be a module."""
+@cache
+def _imports(source: bytes, package: str, filename: str) -> list[str]:
+    """Return the absolute names that a source may import; of `from a import b` both a and a.b, as b may be a module.
+
+    Kept by the source's text, as units share most of their modules and the runs of a campaign all of them.
+    """
     names: list[str] = []
-    for node in _running(ast.parse(source.read_bytes(), filename=str(source))):
+    for node in _running(ast.parse(source, filename=filename)):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -161,9 +166,11 @@ def _imports(source: Path, package: str) -> list[str]:
 
 
 def _running(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield a tree's nodes, but not those that only type checkers see."""
+    """Yield a tree's statements with what holds them, but not those that only type checkers see."""
     yield node
     for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.expr):
+            continue  # no import stands within an expression
         if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):
             for other in child.orelse:
                 yield from _running(other)
