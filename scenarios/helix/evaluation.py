@@ -4,25 +4,26 @@ Besides the verdict, `HandoverEvaluator` measures how far the controller's model
 the cameras see ([Vervloet2025] sec. 4.2, fig. 9), and keeps marked pictures of all cameras.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from handover.controllers.helix.servo.constant_curvature import W_FROM_B, forward_kinematics
-from handover.controllers.helix.vision.vision_parameters import Params as VisionParams
-from handover.cosim.blocks.geometry import Pinhole, rotation_of
+from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
-from handover.scenarios.helix.cameras import pinholes
 from handover.scenarios.helix.disturbances import Cover
+from handover.scenarios.helix.marked_pictures import is_covered, take_pictures
 from handover.scenarios.helix.parameters import Parameters
+
+FIG_9_RESOLUTION = 0.01
+"""To which the thesis tells the lengths of fig. 9, m."""
 
 
 class ModelMismatch(NamedTuple):
@@ -46,72 +47,6 @@ def model_mismatch(q_sys: Floats, p_WG_est: Floats) -> ModelMismatch:
     p_WG_calib = np.array([0.0, 0.0, -sum(servo["l_calib"]) - d_gripper])
     between = (p_WG_est - p_WG_calib, p_WG_sys - p_WG_calib, p_WG_sys - p_WG_est)
     return ModelMismatch(*(float(np.linalg.norm(d)) for d in between))
-
-
-MEASURED, ESTIMATED = "#ffd23f", "#4fe3ff"
-_SHAPE = (720, 1280, 3)
-_SHAPES = {"p_WO": ("ball", "circle"), "p_WR": ("wrist", "cross"), "p_WG": ("gripper", "plus")}
-_SEEN_BY = {"p_WO": "vision.seen_O", "p_WR": "vision.seen_R", "p_WG": "vision.seen_R"}
-
-
-def take_pictures(t: float, role: str, parameters: Parameters, signals: Signals) -> list[CameraPicture]:
-    """Return the cameras' current pictures at a time, with marks.
-
-    Vision processes a picture at the instant at which it is taken, so its measurements belong to the current pictures.
-    The controller's estimates are those of its last period.
-    """
-    return [
-        CameraPicture.take(
-            t=t,
-            camera=side,
-            role=role,
-            pixels=signals[f"camera.{side}"].reshape(_SHAPE),
-            marks=[
-                *_estimated(camera, signals),
-                *([] if _is_covered(t, side, parameters) else _measured(camera, signals)),
-            ],
-        )
-        for side, camera in _cameras(parameters.camera_turn, parameters.cameras).items()
-    ]
-
-
-def _is_covered(t: float, side: str, parameters: Parameters) -> bool:
-    lens = {"left": Cover.LEFT, "right": Cover.RIGHT}.get(side)
-    return lens is not None and is_covered(t, lens, parameters)
-
-
-def is_covered(t: float, side: Cover, parameters: Parameters) -> bool:
-    """Return whether a lens was covered when the picture that is current at time t was taken."""
-    begin, end = parameters.covered(side)
-    taken = float(int(t / float(parameters.picture_period) + 1e-6) * parameters.picture_period)
-    return begin <= taken < end
-
-
-def _measured(camera: Pinhole, signals: Signals) -> Iterator[Mark]:
-    for name in _SHAPES:
-        if signals[_SEEN_BY[name]]:
-            yield from _mark(camera, name, signals[f"vision.{name}_meas"], "as measured", MEASURED)
-
-
-def _estimated(camera: Pinhole, signals: Signals) -> Iterator[Mark]:
-    given = [name for name in _SHAPES if f"servo.{name}_est" in signals]
-    if phase_of(signals) == "WAIT":  # the controller has not seen both yet
-        return
-    for name in given:
-        yield from _mark(camera, name, signals[f"servo.{name}_est"], "as the controller has it", ESTIMATED)
-
-
-def _mark(camera: Pinhole, name: str, p_WP: Floats, source: str, colour: str) -> Iterator[Mark]:
-    """Yield the mark of a point, unless it is behind the camera."""
-    u, v = camera.project(p_WP).tolist()
-    if np.isfinite(u) and np.isfinite(v):
-        what, shape = _SHAPES[name]
-        ball = float(camera.f[0]) * VisionParams().ball_radius / float(camera.depth(p_WP))
-        radius = ball if shape == "circle" else 9.0
-        yield Mark(label=f"{what}, {source}", shape=shape, u=u, v=v, radius=radius, colour=colour)
-
-
-_cameras = cache(pinholes)
 
 
 _SETTLING = 1.0
@@ -284,6 +219,9 @@ class HandoverEvaluator(Evaluator):
     def outcome(self) -> Outcome:
         """Return whether the gripper has the ball, why, and the metrics."""
         success = self._holder == "GRIPPER" and not self._is_pressed
+        return Outcome(success=success, reason=self._reason(success), metrics=self._metrics())
+
+    def _metrics(self) -> dict[str, Metric]:
         grasp_began = self._grasp_began
         metrics: dict[str, Metric] = {}
         if self._has_seen:  # else the run failed before anything was there to be measured
@@ -314,7 +252,7 @@ class HandoverEvaluator(Evaluator):
             metrics["grasp_offset_axial"] = Metric(
                 axial, "m", "ball along the gripper's axis, towards its tip, when it left the hand, ground truth"
             )
-        return Outcome(success=success, reason=self._reason(success), metrics=metrics)
+        return metrics
 
     def _why_given_up(self) -> str:
         return _WHY_GIVEN_UP.get(self._verdict, "given up")

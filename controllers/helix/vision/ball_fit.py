@@ -11,7 +11,7 @@ import numpy as np
 
 from handover.controllers.helix.vision.ball import Disc
 from handover.controllers.helix.vision.ball_edges import Edges, edges, green_ends, outline_of
-from handover.controllers.helix.vision.stereo import Pixels, covariance, triangulate
+from handover.controllers.helix.vision.stereo import BallPosition, Pixels, covariance, triangulate
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 
@@ -23,19 +23,6 @@ _STRIDE = 0.02  # m; standard deviation that is expected of a step: it holds wha
 _FEWEST = 4.0  # sum of the edges' weights; less is no ball
 _STILL_THERE = 4.0  # px; the fit finds edges within 7 px
 _MAX_SHIFT = 2.0  # px; an edge that is farther off is that of something larger or smaller
-
-
-@dataclass(frozen=True)
-class BallPosition:
-    """Centre p_WO, shape (3,), in m, its covariance, shape (3, 3), in m^2, and how far its edge is found outwards.
-
-    The shift is in px, with its variance in px^2; a detector that estimates none leaves both at 0.
-    """
-
-    p_WO: Floats
-    covariance: Floats
-    shift: float = 0.0
-    shift_variance: float = 0.0
 
 
 class BallFit:

@@ -12,28 +12,18 @@ from typing import Any
 import numpy as np
 
 from handover.controllers.helix.vision.ball import BallFinder
-from handover.controllers.helix.vision.ball_fit import BallFit, BallPosition
+from handover.controllers.helix.vision.ball_fit import BallFit
 from handover.controllers.helix.vision.markers import NO_MARKERS, MarkerReader, MarkerRing, Markers
 from handover.controllers.helix.vision.ring_fit import RingFit, RingPose
-from handover.controllers.helix.vision.stereo import Pixels, Region, covariance
+from handover.controllers.helix.vision.stereo import BallPosition, Pixels, Region, WristPosition, covariance
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 
-_BALL_MARGIN = 22.0  # px around where the ball was; a hand moves 10 px a picture at 0.3 m/s
+_BALL_MARGIN = 22.0  # px around where the ball was; at ten pictures a second, one faster than 0.2 m/s is searched anew
 _BALL_MOVED = 0.012  # m; from there on, the region around where it was may show a part of it only
 _RING_MARGIN = 16.0  # px
 _LEVER = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # w -> w x e_z
 _DEVIATIONS = 3.0  # standard deviations of both fits, by which they may differ besides the motion
-
-
-@dataclass(frozen=True)
-class WristPosition:
-    """Wrist p_WR and gripper p_WG, shape (3,), in m, and their covariances, shape (3, 3), in m^2."""
-
-    p_WR: Floats
-    p_WG: Floats
-    cov_R: Floats
-    cov_G: Floats
 
 
 @dataclass(frozen=True)

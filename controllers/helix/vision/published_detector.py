@@ -11,10 +11,8 @@ import cv2
 import numpy as np
 
 from handover.controllers.helix.vision.ball import SPECK, green_mask
-from handover.controllers.helix.vision.ball_fit import BallPosition
-from handover.controllers.helix.vision.joint_detector import WristPosition
 from handover.controllers.helix.vision.markers import DICTIONARY, MarkerRing, Markers, read_markers
-from handover.controllers.helix.vision.stereo import Pixels, triangulate
+from handover.controllers.helix.vision.stereo import BallPosition, Pixels, WristPosition, triangulate
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 
@@ -45,8 +43,9 @@ class PublishedDetector:
     second ring's markers are shifted along their y as well.
 
     The thesis gives no covariance of a measurement (its filter has fixed ones). Own choice: fixed ones, measured over
-    poses in the workspace. They are not divided by the number of markers, because averaging hardly helps: corners that
-    are not refined lie half a pixel inside, so that each marker looks smaller, and 5 % farther away, than it is.
+    poses in the workspace against the simulation's truth. They are not divided by the number of markers, because
+    averaging hardly helps: corners that are not refined lie half a pixel inside, so that each marker looks smaller, and
+    5 % farther away, than it is.
 
     Args:
         cameras: two or more.

@@ -1,4 +1,7 @@
-"""Points by the pictures of calibrated cameras, regions of pictures, and least squares; [Vervloet2025] sec. 3.2.2."""
+"""What both detectors share: points by pictures of calibrated cameras, regions, and what a detector measures.
+
+[Vervloet2025] sec. 3.2.2.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +16,29 @@ Pixels = NDArray[np.uint8]
 """A picture, shape (h, w, 3), blue, green, red, or one channel, shape (h, w)."""
 
 _PARALLEL = 1e-12  # squared angle, rad^2, about, within which all rays are parallel
+
+
+@dataclass(frozen=True)
+class BallPosition:
+    """Centre p_WO, shape (3,), in m, its covariance, shape (3, 3), in m^2, and how far its edge is found outwards.
+
+    The shift is in px, with its variance in px^2; a detector that estimates none leaves both at 0.
+    """
+
+    p_WO: Floats
+    covariance: Floats
+    shift: float = 0.0
+    shift_variance: float = 0.0
+
+
+@dataclass(frozen=True)
+class WristPosition:
+    """Wrist p_WR and gripper p_WG, shape (3,), in m, and their covariances, shape (3, 3), in m^2."""
+
+    p_WR: Floats
+    p_WG: Floats
+    cov_R: Floats
+    cov_G: Floats
 
 
 def triangulate(cameras: Sequence[Pinhole], pixels: Sequence[Floats]) -> tuple[Floats, float]:
