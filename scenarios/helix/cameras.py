@@ -40,8 +40,9 @@ class CameraPlaces(enum.IntEnum):
 
 PICTURE = np.array([1280.0, 720.0])
 """Width and height of a picture, px."""
-_READ = 17.0  # px; markers whose side is smaller are read rarely
-_DISTANCE = 0.95  # m; from the cameras to the hanging arm
+MIN_MARKER_SIDE = 14.0
+"""Side of a marker in a picture from which the ring is found nearly always, px (all of 42 poses at 14.5 px and more, 11
+of 14 at 13, 2 of 14 at 11.7)."""
 _MARGIN = 1.0 / 12.0  # of a marker's side, on each side of it: half a cell of white
 
 
@@ -129,20 +130,24 @@ def calibrated(
 def marker_fault(marker: float) -> str | None:
     """Return what is wrong with markers of a size, and which would do; None if the cameras resolve them.
 
-    A marker's side is f marker / 0.95 m wide where the arm hangs, f being the larger focal length. It must also leave
-    white around itself on the collar's side, which is 2 apothem tan(22.5 degrees) wide.
+    At the place within reach that is farthest from the two cameras a marker's side is f marker / depth wide, f being
+    the larger focal length. It must also leave white around itself on the collar's side, which is 2 apothem tan(22.5
+    degrees) wide.
 
     Args:
         marker: side of a marker, m.
     """
-    camera = paper_values("helix", "camera")
-    f = max(camera["focal_length"])
-    least, most = _READ * _DISTANCE / f, 2.0 * camera["apothem"] * np.tan(np.pi / 8.0) / (1.0 + 2.0 * _MARGIN)
+    two, reach = pinholes().values(), paper_values("helix", "reach")
+    f = max(float(camera.f.max()) for camera in two)
+    farthest = [np.array([r, 0.0, z]) for z, r in zip(reach["height"], reach["radius"], strict=True)]
+    depth = max(float(camera.depth(p_WG)) for camera in two for p_WG in farthest)
+    side_of_collar = 2.0 * paper_values("helix", "camera")["apothem"] * np.tan(np.pi / 8.0)
+    least, most = MIN_MARKER_SIDE * depth / f, side_of_collar / (1.0 + 2.0 * _MARGIN)
     would_do = f"{np.ceil(1e4 * least) / 1e4:g} to {np.floor(1e4 * most) / 1e4:g} m would do"
     if marker < least:
         return (
-            f"no camera resolves it: its side is {f * marker / _DISTANCE:.1f} px wide at {_DISTANCE:g} m, and markers "
-            f"below {_READ:g} px are read rarely; {would_do}"
+            f"no camera resolves it: its side is {f * marker / depth:.1f} px wide where the arm is farthest from the "
+            f"cameras, at {depth:.2f} m, and markers below {MIN_MARKER_SIDE:g} px are often not read; {would_do}"
         )
     if marker > most:
         return f"it leaves no white around itself on the sides of the collar; {would_do}"

@@ -11,11 +11,7 @@ from handover.controllers.helix.vision.markers import MarkerRing
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.helix.cameras import PICTURE, CameraPlaces, pinholes
-
-LEAST_SIDE = 14.0
-"""Side of a marker in a picture from which the ring is found nearly always, px (all of 42 poses at 14.5 px and more, 11
-of 14 at 13, 2 of 14 at 11.7)."""
+from handover.scenarios.helix.cameras import MIN_MARKER_SIDE, PICTURE, CameraPlaces, pinholes
 
 
 def cameras_that_see(p_WO: Floats, places: CameraPlaces = CameraPlaces.BEHIND) -> int:
@@ -40,7 +36,7 @@ def _sees(camera: Pinhole, p_WO: Floats) -> bool:
     edge = float(camera.f.max()) * values["ball_radius"] / depth_O
     side = float(camera.f.min()) * values["marker"] / depth_R
     inside = _is_inside(camera.project(p_WO)[None], edge) and _is_inside(camera.project(ring), 0.0)
-    return inside and side >= LEAST_SIDE
+    return inside and side >= MIN_MARKER_SIDE
 
 
 def _is_inside(pixels: Floats, margin: float) -> bool:

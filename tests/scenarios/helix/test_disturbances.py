@@ -128,9 +128,9 @@ def test_runs_with_anything_amiss_are_not_compared_with_the_paper():
 
 
 def test_markers_that_no_camera_resolves_are_refused_with_the_size_that_would_do():
-    with pytest.raises(WiringError, match=r"marker = 0.012 m: no camera resolves it: .* 11.5 px .* 0.0178 to 0.0241 m"):
+    with pytest.raises(WiringError, match=r"marker = 0.012 m: no camera resolves it: .* 9.2 px .* 0.0183 to 0.0241 m"):
         built(marker=0.012).check()
-    with pytest.raises(WiringError, match=r"marker = 0.03 m: it leaves no white .* 0.0178 to 0.0241 m would do"):
+    with pytest.raises(WiringError, match=r"marker = 0.03 m: it leaves no white .* 0.0183 to 0.0241 m would do"):
         built(marker=0.03).check()
-    for marker in (0.0178, 0.02, 0.0241):
+    for marker in (0.0183, 0.02, 0.0241):
         built(marker=marker).check()
