@@ -29,17 +29,14 @@ from handover.plants.helix.arm.tendon_arm_fast import TendonArmFast
 from handover.plants.helix.arm.tendon_parameters import InvalidArmParameters, Params
 from handover.plants.helix.arm.tendon_ports import Inputs as ArmInputs
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.helix.evaluation import ModelMismatch, model_mismatch
-from handover.scenarios.helix.parameters import Place
+from handover.scenarios.helix.evaluation import FIG_9_RESOLUTION, ModelMismatch, model_mismatch
+from handover.scenarios.helix.parameters import HandPlace
 
 FACTORS = ("EI", "EA", "excess length", "mass")
 """Of bending and axial stiffness, of the length by which segments are longer than their tendons, and of all masses."""
 
 SPREAD = np.log(2.0)
 """How far, as a logarithm, a factor may be from 1 at the price of one resolution of the lengths."""
-
-RESOLUTION = 0.01
-"""To which the thesis tells the lengths, m."""
 
 _BOUNDS = (np.array([0.2, 0.2, 0.05, 0.4]), np.array([3.0, 3.0, 3.0, 3.0]))
 _STARTS = ((1.0, 1.0, 1.0, 1.0), (1.0, 0.5, 0.7, 1.0))
@@ -144,12 +141,12 @@ def fit_arm(places: Sequence[Floats], arm: Params | None = None) -> ArmFit:
         try:
             approaches = [approach(scaled_arm(factors, given), p_WO) for p_WO in places]
         except InvalidArmParameters:
-            return np.concatenate([np.full(5, _FAILED / RESOLUTION), held])
+            return np.concatenate([np.full(5, _FAILED / FIG_9_RESOLUTION), held])
         ends = np.mean([a.end for a in approaches], axis=0)
         falls = [float(np.maximum(-np.diff(a.lengths[:, 2]), 0.0).sum()) for a in approaches]
         tension = float(np.mean([a.tension for a in approaches]))
-        others = [float(np.mean(falls)) / RESOLUTION, tension / _TAUT]
-        return np.concatenate([(ends - target) / RESOLUTION, others, held])
+        others = [float(np.mean(falls)) / FIG_9_RESOLUTION, tension / _TAUT]
+        return np.concatenate([(ends - target) / FIG_9_RESOLUTION, others, held])
 
     solutions = [
         least_squares(
@@ -169,7 +166,7 @@ def described(factors: Floats, places: Sequence[Floats], arm: Params) -> ArmFit:
 
 def places_at(radius: float, height: float) -> list[Floats]:
     """Return the scenario's four places of the ball in W, each of shape (3,), at a distance from the axis, m."""
-    return [np.array([radius * np.cos(p.azimuth), radius * np.sin(p.azimuth), height]) for p in Place]
+    return [np.array([radius * np.cos(p.azimuth), radius * np.sin(p.azimuth), height]) for p in HandPlace]
 
 
 def main() -> None:

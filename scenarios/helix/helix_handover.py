@@ -67,6 +67,10 @@ def published_values(p: Parameters) -> Sequence[PublishedValue]:
     return values
 
 
+_CLOSING = 15
+"""Time after the approach, s: 10 to close, 3 for person and ball (`HandoverEvaluator`), and 2 to spare."""
+
+
 class HelixHandover(Experiment[HandoverEvaluator]):
     """The thesis's first experiment: one automated human-to-robot handover."""
 
@@ -171,7 +175,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
 
     def stop_time(self, parameters: Parameters) -> Fraction:
         """Return the end of the patience for the approach, plus time for closing the gripper."""
-        return Fraction(math.ceil(parameters.patience)) + 15
+        return Fraction(math.ceil(parameters.patience)) + _CLOSING
 
     def evaluator(self, parameters: Parameters) -> HandoverEvaluator:
         """Return the evaluator of one handover."""

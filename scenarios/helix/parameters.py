@@ -18,7 +18,7 @@ CAMERA_PERIOD = Fraction(1, 30)
 """Period of the cameras, s."""
 
 
-class Place(enum.IntEnum):
+class HandPlace(enum.IntEnum):
     """Where the hand is, seen from the cameras behind the arm. [Vervloet2025] sec. 3.5.1."""
 
     FRONT = 0
@@ -76,7 +76,7 @@ class Task:
     """Where the ball is offered, what the wrist carries, and how detector and controller are set."""
 
     alpha: Number = parameter(0.25, "step size of the Jacobian control, eq. (21)", minimum=0.01, maximum=1.0)
-    place: Place = parameter(Place.FRONT, "where the hand offers the ball")
+    place: HandPlace = parameter(HandPlace.FRONT, "where the hand offers the ball")
     azimuth: Radian = parameter(
         0.0, "turn of the offered ball about the arm's axis from that place, to the left", minimum=-np.pi, maximum=np.pi
     )

@@ -69,7 +69,7 @@ def _plates(record: Record) -> list[Body]:
 
 
 def _turned_to(along: Floats) -> Floats:
-    """Return orientations, shape (rows, 4), that turn z the shortest way to directions, shape (rows, 3)."""
+    """Return orientations, shape (rows, 4), that turn -z of W the shortest way to directions, shape (rows, 3)."""
     z = along / np.linalg.norm(along, axis=1, keepdims=True)
     about = np.cross([0.0, 0.0, -1.0], z)  # the arm hangs, so that no direction is opposite
     q = np.column_stack([1.0 - z[:, 2], about])

@@ -1,8 +1,9 @@
 """Estimates from pictures how far the detector's corners and edges lie off the true ones.
 
 Blur and thresholds move what is found: refined corners come out inside of the printed ones, by `corner_shift` along the
-diagonal, and the ball's edge comes out farther out, by `edge_shift`. Both show without anybody knowing where ring and
-ball are, because the angle between two cameras tells how far away they are and so how large they should look.
+diagonal, and the ball's edge comes out shifted outwards by `edge_shift` (inwards where it is negative). Both show
+without anybody knowing where ring and ball are, because the angle between two cameras tells how far away they are and
+so how large they should look.
 
 [Vervloet2025] calibrates lenses and poses of the cameras (sec. 3.2.2), but not the detector: this is own.
 """

@@ -32,7 +32,8 @@ class Params:
     """The arm as built; three entries are of the three segments from the mount down.
 
     [Vervloet2025] states `tendon_length` (sec. 3.1), `d_gripper` (appendix A) and `closing_time` (sec. 3.5). The rest
-    is assumed, such that the sagged arm is as far from the constant-curvature model as in fig. 9.
+    is assumed, such that for one commanded state far forward the arm at rest is as far from the constant-curvature
+    model as in fig. 9; in the closed loop it ends nearer to it.
     """
 
     discs_1: int = parameter(4, "discs in the first segment", minimum=1, maximum=64)

@@ -11,13 +11,13 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.helix.parameters import Place, Tuning
+from handover.scenarios.helix.parameters import HandPlace, Tuning
 from handover.scenarios.published.helix.helix_1_claims import fitted_claims, on_fitted_arm, own_claims, thesis_claims
 from handover.scenarios.published.helix.helix_1_curve_claims import error_claims, model_claims
 from handover.scenarios.published.helix.helix_1_curves import RunCurves, curves_of
 from handover.scenarios.published.helix.helix_1_figures import draw_errors, draw_single_errors, draw_times
 from handover.scenarios.published.helix.helix_1_model_figures import draw_estimate, draw_model
-from handover.scenarios.published.helix.helix_1_runs import Helix1Arm
+from handover.scenarios.published.helix.helix_1_runs import Helix1Runs
 from handover.scenarios.published.helix.helix_1_spread import (
     draw_spread,
     fitted_rows,
@@ -32,7 +32,7 @@ from handover.scenarios.published.published_experiment import Claim, ComparisonT
 _PATIENCE = 600.0
 """Time by which the gripper must begin to close, s: as long as the scenario allows; the longest published is 214.9."""
 
-_QUICK_PLACES = (Place.FRONT, Place.LEFT, Place.BACK_LEFT)
+_QUICK_PLACES = (HandPlace.FRONT, HandPlace.LEFT, HandPlace.BACK_LEFT)
 """Where a quick plan offers the ball: as many places as a bootstrap needs values (`MIN_SAMPLES`)."""
 
 
@@ -62,7 +62,7 @@ class Helix1(PublishedExperiment):
             }
             for tuning in ((Tuning.THESIS,) if quick else (Tuning.THESIS, Tuning.OWN))
             for alpha, period in zip(setup["alpha"], published["timestep_mean"], strict=True)
-            for place in (_QUICK_PLACES if quick else Place)
+            for place in (_QUICK_PLACES if quick else HandPlace)
         ]
         if not quick:
             points += spread_points(dict(zip(setup["alpha"], published["timestep_mean"], strict=True)))
@@ -105,17 +105,17 @@ class Helix1(PublishedExperiment):
         return [*figures, *draw_spread(table, folder)]
 
 
-def _arms(table: CampaignTable) -> tuple[Helix1Arm, Helix1Arm, Helix1Arm]:
+def _arms(table: CampaignTable) -> tuple[Helix1Runs, Helix1Runs, Helix1Runs]:
     """Return the runs with the thesis's settings, the same on the arm fitted to fig. 9, and those with ours."""
     plain = undisturbed(table)
-    fitted = Helix1Arm.of(fitted_rows(table), Tuning.THESIS, fitted=True)
-    return Helix1Arm.of(plain, Tuning.THESIS), fitted, Helix1Arm.of(plain, Tuning.OWN)
+    fitted = Helix1Runs.of(fitted_rows(table), Tuning.THESIS, fitted=True)
+    return Helix1Runs.of(plain, Tuning.THESIS), fitted, Helix1Runs.of(plain, Tuning.OWN)
 
 
-def _curves(arm: Helix1Arm, runs: Path) -> dict[float, list[RunCurves]]:
+def _curves(arm: Helix1Runs, runs: Path) -> dict[float, list[RunCurves]]:
     return {alpha: curves_of(arm.rows[alpha], runs) for alpha in arm.alphas}
 
 
-def _curve_claims(arm: Helix1Arm, runs: Path) -> list[Claim]:
+def _curve_claims(arm: Helix1Runs, runs: Path) -> list[Claim]:
     curves = _curves(arm, runs)
     return [*error_claims(curves), *model_claims(curves)]

@@ -21,7 +21,8 @@ from handover.scenarios.campaign.statistics import (
     two_proportions,
 )
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.published.helix.helix_1_runs import READING, Helix1Arm, missing, published, too_few
+from handover.scenarios.helix.evaluation import FIG_9_RESOLUTION
+from handover.scenarios.published.helix.helix_1_runs import Helix1Runs, missing, published, too_few
 from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.published.verdicts import format_p_value, ratio_interval
 
@@ -29,7 +30,7 @@ NEAR = 0.005
 """How near to the ball the gripper is to end, m."""
 
 
-def thesis_claims(arm: Helix1Arm) -> list[Claim]:
+def thesis_claims(arm: Helix1Runs) -> list[Claim]:
     """Judge the thesis's claims on the runs with its settings."""
     return [_closes(arm), _succeeds(arm), *time_claims(arm), _mismatch(arm), _timestep(arm)]
 
@@ -42,12 +43,12 @@ def on_fitted_arm(claims: Sequence[Claim]) -> list[Claim]:
     ]
 
 
-def fitted_claims(arm: Helix1Arm) -> list[Claim]:
+def fitted_claims(arm: Helix1Runs) -> list[Claim]:
     """Judge what the thesis says of success and times on the arm fitted to fig. 9, if there are runs with it."""
     return on_fitted_arm([_closes(arm), _succeeds(arm), *time_claims(arm)]) if arm.tried else []
 
 
-def own_claims(thesis: Helix1Arm, own: Helix1Arm) -> list[Claim]:
+def own_claims(thesis: Helix1Runs, own: Helix1Runs) -> list[Claim]:
     """Judge this project's claims about its own settings, if there are runs with them."""
     if not own.tried:
         return []
@@ -74,18 +75,17 @@ def ends_near(when: str, taken: Sequence[Mapping[str, Any]]) -> Claim:
         **facts,
         measured=f"{1e3 * np.median(distances):.1f} mm in the median, {1e3 * distances.max():.1f} mm at most",
         verdict=Verdict.REPRODUCED if distances.max() <= NEAR else Verdict.NOT_REPRODUCED,
-        reason=f"Holds if each of the {len(distances)} handovers that succeeded ends so near, by ground truth. Its "
-        "fingers get hold of a ball that is three times as far off.",
+        reason=f"Holds if each of the {len(distances)} handovers that succeeded ends so near, by ground truth.",
     )
 
 
-def time_claims(arm: Helix1Arm) -> list[Claim]:
+def time_claims(arm: Helix1Runs) -> list[Claim]:
     """Judge order, ratios, means and spreads of the times until the gripper begins to close."""
     halved = [_halves(arm, small, large) for small, large in pairwise(arm.alphas)]
     return [_falls(arm), *halved, _halves_unevenly(arm), *(_takes(arm, alpha) for alpha in arm.alphas), _narrows(arm)]
 
 
-def _falls(arm: Helix1Arm) -> Claim:
+def _falls(arm: Helix1Runs) -> Claim:
     medians = published()["arm_time_median"]
     facts: dict[str, Any] = {
         "claim": "The arm's time falls with the step size",
@@ -108,7 +108,7 @@ def _falls(arm: Helix1Arm) -> Claim:
     )
 
 
-def _halves(arm: Helix1Arm, small: float, large: float) -> Claim:
+def _halves(arm: Helix1Runs, small: float, large: float) -> Claim:
     medians, half = published()["arm_time_median"], published()["halving"]
     i, j = arm.alphas.index(small), arm.alphas.index(large)
     facts: dict[str, Any] = {
@@ -135,7 +135,7 @@ def _halves(arm: Helix1Arm, small: float, large: float) -> Claim:
     )
 
 
-def _halves_unevenly(arm: Helix1Arm) -> Claim:
+def _halves_unevenly(arm: Helix1Runs) -> Claim:
     medians = published()["arm_time_median"]
     ratio = medians[0] * medians[2] / medians[1] ** 2
     facts: dict[str, Any] = {
@@ -169,7 +169,7 @@ def _uneven_interval(times: Sequence[Any]) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _takes(arm: Helix1Arm, alpha: float) -> Claim:
+def _takes(arm: Helix1Runs, alpha: float) -> Claim:
     printed, i = published(), arm.alphas.index(alpha)
     mean, std, median = (printed[f"arm_time_{name}"][i] for name in ("mean", "std", "median"))
     facts: dict[str, Any] = {
@@ -195,7 +195,7 @@ def _takes(arm: Helix1Arm, alpha: float) -> Claim:
     )
 
 
-def _stall(arm: Helix1Arm, alpha: float) -> str:
+def _stall(arm: Helix1Runs, alpha: float) -> str:
     """Return a sentence on a step size at which the error can stall above the threshold; "" for the others."""
     settings = paper_values("helix", arm.tuning.name.lower())
     stall = round(settings["epsilon_pose_bound"] / alpha, 6)
@@ -207,7 +207,7 @@ def _stall(arm: Helix1Arm, alpha: float) -> str:
     )
 
 
-def _narrows(arm: Helix1Arm) -> Claim:
+def _narrows(arm: Helix1Runs) -> Claim:
     std = published()["arm_time_std"]
     facts: dict[str, Any] = {
         "claim": "The spread of the arm's time falls with the step size",
@@ -234,15 +234,15 @@ def _spread(values: Any, axis: int = -1) -> Any:
     return np.std(values, axis=axis, ddof=1)
 
 
-def _closes(arm: Helix1Arm) -> Claim:
+def _closes(arm: Helix1Runs) -> Claim:
     return _rate(arm, "The arm reaches the ball and the gripper begins to close in every run", arm.closed)
 
 
-def _succeeds(arm: Helix1Arm) -> Claim:
+def _succeeds(arm: Helix1Runs) -> Claim:
     return _rate(arm, "Every handover succeeds", arm.succeeded)
 
 
-def _rate(arm: Helix1Arm, claim: str, successes: int) -> Claim:
+def _rate(arm: Helix1Runs, claim: str, successes: int) -> Claim:
     k, n = published()["success"]
     facts: dict[str, Any] = {"claim": claim, "published": f"{k} of {n}", "where": "sec. 4"}
     if not arm.tried:
@@ -258,7 +258,7 @@ def _rate(arm: Helix1Arm, claim: str, successes: int) -> Claim:
     )
 
 
-def _mismatch(arm: Helix1Arm) -> Claim:
+def _mismatch(arm: Helix1Runs) -> Claim:
     printed, alpha = published(), arm.alphas[0]
     named = ("model_mismatch", "arm_travel", "model_travel")
     facts: dict[str, Any] = {
@@ -270,7 +270,7 @@ def _mismatch(arm: Helix1Arm) -> Claim:
     interval = time_interval(values[0], np.mean)
     if interval is None:
         return too_few(facts, f"{len(values[0])} runs at step size {alpha}")
-    agrees = interval.low - READING <= printed["model_mismatch"] <= interval.high + READING
+    agrees = interval.low - FIG_9_RESOLUTION <= printed["model_mismatch"] <= interval.high + FIG_9_RESOLUTION
     return Claim(
         **facts,
         measured="{:.3f} m (arm {:.3f} m, model {:.3f} m from the start)".format(*map(np.mean, values)),
@@ -279,12 +279,12 @@ def _mismatch(arm: Helix1Arm) -> Claim:
         verdict=Verdict.NOT_COMPARABLE if agrees else Verdict.NOT_REPRODUCED,
         reason="The arm's stiffness and masses were chosen such that it is as far off as in fig. 9 in one state at "
         "rest, so that agreement would prove nothing and would not be comparable. Not reproduced if the interval of "
-        f"the mean, widened by the figure's resolution of {READING} m, leaves the published length out. Where the "
-        "ball is offered is assumed, and with it how far the arm goes.",
+        f"the mean, widened by the figure's resolution of {FIG_9_RESOLUTION} m, leaves the published length out. Where "
+        "the ball is offered is assumed, and with it how far the arm goes.",
     )
 
 
-def _timestep(arm: Helix1Arm) -> Claim:
+def _timestep(arm: Helix1Runs) -> Claim:
     mean, std = published()["timestep_mean"], published()["timestep_std"]
     periods = {alpha: sorted({row["control_period"] for row in arm.rows[alpha]}) for alpha in arm.alphas}
     return Claim(
@@ -298,7 +298,7 @@ def _timestep(arm: Helix1Arm) -> Claim:
     )
 
 
-def _own_success(own: Helix1Arm) -> Claim:
+def _own_success(own: Helix1Runs) -> Claim:
     interval = success_interval(own.succeeded, own.tried)
     return Claim(
         claim="With our settings every handover succeeds",
@@ -311,7 +311,7 @@ def _own_success(own: Helix1Arm) -> Claim:
     )
 
 
-def _nearer(thesis: Helix1Arm, own: Helix1Arm) -> Claim:
+def _nearer(thesis: Helix1Runs, own: Helix1Runs) -> Claim:
     facts: dict[str, Any] = {
         "claim": "With our settings the gripper takes the ball nearer to its axis than with the thesis's",
         "published": "",
@@ -332,5 +332,5 @@ def _nearer(thesis: Helix1Arm, own: Helix1Arm) -> Claim:
     )
 
 
-def _broken(arm: Helix1Arm) -> str:
+def _broken(arm: Helix1Runs) -> str:
     return f" {arm.broken} runs that did not come to their end do not count." if arm.broken else ""

@@ -14,8 +14,9 @@ from scipy.stats import binomtest
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.statistics import LEVEL, MIN_SAMPLES, success_interval, time_interval
 from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.helix.evaluation import FIG_9_RESOLUTION
 from handover.scenarios.published.helix.helix_1_curves import RunCurves, mean_curve
-from handover.scenarios.published.helix.helix_1_runs import READING, too_few
+from handover.scenarios.published.helix.helix_1_runs import too_few
 from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.published.verdicts import format_p_value, format_rate
 
@@ -28,7 +29,7 @@ _MIN_SIGNS = next(n for n in range(1, 64) if 2.0 ** (1 - n) < LEVEL)
 _AT_BOUND = 0.01
 """How near to a bound counts as at it, as a part of it: to no more digits a length can be read off a figure."""
 
-_SIMILAR = 2 * READING
+_SIMILAR = 2 * FIG_9_RESOLUTION
 """How much two lengths of fig. 9 and its likes may differ that are told as very similar, m."""
 
 
@@ -153,10 +154,10 @@ def _starts_off(curves: Curves) -> Claim:
         measured=f"{1e3 * np.mean(starts):.1f} mm away on average",
         interval=(interval.low, interval.high),
         unit="m",
-        verdict=Verdict.REPRODUCED if interval.low > READING else Verdict.NOT_REPRODUCED,
-        reason=f"Reproduced if the interval of the mean lies above {1e3 * READING:.0f} mm, to which the thesis tells "
-        "the lengths of fig. 9. Here the tendons' zeros are exact: the arm hangs as its model does, and what is left "
-        "are the cameras' calibration and the measurement.",
+        verdict=Verdict.REPRODUCED if interval.low > FIG_9_RESOLUTION else Verdict.NOT_REPRODUCED,
+        reason=f"Reproduced if the interval of the mean lies above {1e3 * FIG_9_RESOLUTION:.0f} mm, to which the "
+        "thesis tells the lengths of fig. 9. Here the tendons' zeros are exact: the arm hangs as its model does, and "
+        "what is left are the cameras' calibration and the measurement.",
     )
 
 

@@ -12,16 +12,16 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure
 from handover.scenarios.published.helix.helix_1_curves import MeanCurve, errors_of, mean_curve
-from handover.scenarios.published.helix.helix_1_runs import Helix1Arm, published
+from handover.scenarios.published.helix.helix_1_runs import Helix1Runs, published
 
 _TICKS = (10, 20, 50, 100, 200, 500)
 _PUBLISHED, _SHADE = COLOURS[5], "#dfe4ec"
 
 FIGURES_OF_RUNS = ("fig. 7", "fig. 16", "fig. 17")
-"""The thesis's figures of single runs, by step size; fig. 17 says 0.3 where all else of the thesis says 0.4."""
+"""The thesis's figures of single runs, by step size. Figs. 17, 20, 21 and appendix A say 0.3, text and table 0.4."""
 
 
-def draw_times(arms: Sequence[Helix1Arm], folder: Path) -> list[Figure]:
+def draw_times(arms: Sequence[Helix1Runs], folder: Path) -> list[Figure]:
     """Draw every run's time until the gripper begins to close beside the published minimum, median and maximum."""
     if not any(arm.closed for arm in arms):
         return []
@@ -46,7 +46,7 @@ def draw_times(arms: Sequence[Helix1Arm], folder: Path) -> list[Figure]:
     return [Figure("times", caption)]
 
 
-def draw_errors(arms: Sequence[Helix1Arm], runs: Path, folder: Path) -> list[Figure]:
+def draw_errors(arms: Sequence[Helix1Runs], runs: Path, folder: Path) -> list[Figure]:
     """Draw the mean error over time with its deviation, by step size and settings, as in fig. 8."""
     errors = [(arm, {alpha: errors_of(arm.rows[alpha], runs) for alpha in arm.alphas}) for arm in arms]
     drawn = [(arm, of_arm) for arm, of_arm in errors if any(of_arm.values())]
@@ -73,7 +73,7 @@ def draw_errors(arms: Sequence[Helix1Arm], runs: Path, folder: Path) -> list[Fig
     return [Figure("errors", caption)]
 
 
-def draw_single_errors(arm: Helix1Arm, runs: Path, folder: Path) -> list[Figure]:
+def draw_single_errors(arm: Helix1Runs, runs: Path, folder: Path) -> list[Figure]:
     """Draw every run's error over time with mean and deviation, a panel a step size, as in figs. 7, 16 and 17."""
     errors = {alpha: errors_of(arm.rows[alpha], runs) for alpha in arm.alphas}
     drawn = [alpha for alpha, of_alpha in errors.items() if of_alpha]
@@ -122,7 +122,7 @@ def _published_times(axis: Axes, i: int) -> None:
     axis.plot([x - width / 2, x + width / 2], [printed["arm_time_median"][i]] * 2, color=_PUBLISHED, lw=2.0)
 
 
-def _our_times(axis: Axes, i: int, arm: Helix1Arm, alpha: float) -> None:
+def _our_times(axis: Axes, i: int, arm: Helix1Runs, alpha: float) -> None:
     rows = [row for row in arm.rows[alpha] if row.get("arm_time") is not None]
     if not rows:
         return
@@ -143,7 +143,7 @@ def _times_legend() -> list[Line2D]:
     ]
 
 
-def _range_of_times(arms: Sequence[Helix1Arm]) -> tuple[float, float]:
+def _range_of_times(arms: Sequence[Helix1Runs]) -> tuple[float, float]:
     printed = published()
     ours = np.concatenate([arm.times(alpha) for arm in arms for alpha in arm.alphas])
     every = np.concatenate([ours, printed["arm_time_min"], printed["arm_time_max"]])

@@ -14,7 +14,7 @@ from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure
 from handover.scenarios.published.helix.helix_1_curves import RunCurves, mean_curve
 from handover.scenarios.published.helix.helix_1_figures import draw_mean
-from handover.scenarios.published.helix.helix_1_runs import Helix1Arm, published
+from handover.scenarios.published.helix.helix_1_runs import Helix1Runs, published
 
 _MODEL, _MEASURED, _APART = COLOURS[0], COLOURS[1], COLOURS[2]
 _FIGURES_OF_MODEL = ("fig. 9", "fig. 18", "fig. 20")
@@ -22,7 +22,7 @@ _FIGURES_OF_ESTIMATE = ("fig. 10", "fig. 19", "fig. 21")
 _WAY = "distance (mm)"
 
 
-def draw_model(arm: Helix1Arm, curves: Mapping[float, Sequence[RunCurves]], folder: Path) -> list[Figure]:
+def draw_model(arm: Helix1Runs, curves: Mapping[float, Sequence[RunCurves]], folder: Path) -> list[Figure]:
     """Draw how far the gripper is from its start by the commanded state and as measured, and how far these are apart.
 
     Args:
@@ -57,7 +57,7 @@ def draw_model(arm: Helix1Arm, curves: Mapping[float, Sequence[RunCurves]], fold
     return [Figure(f"model{arm.suffix}", caption)]
 
 
-def draw_estimate(arm: Helix1Arm, curves: Mapping[float, Sequence[RunCurves]], folder: Path) -> list[Figure]:
+def draw_estimate(arm: Helix1Runs, curves: Mapping[float, Sequence[RunCurves]], folder: Path) -> list[Figure]:
     """Draw the same by the estimated state instead of the commanded one, with the distance that eq. (16) bounds.
 
     Args:

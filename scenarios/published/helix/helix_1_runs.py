@@ -13,12 +13,9 @@ from handover.scenarios.helix.parameters import Tuning
 from handover.scenarios.published.published_experiment import Claim
 from handover.scenarios.published.verdicts import nothing_measured
 
-READING = 0.01
-"""Resolution of the lengths of fig. 9 as the thesis tells them, m."""
-
 
 @dataclass(frozen=True)
-class Helix1Arm:
+class Helix1Runs:
     """Rows of a campaign's table of runs that came to their end with one tuning, by step size.
 
     Attributes:
@@ -34,7 +31,7 @@ class Helix1Arm:
     fitted: bool = False
 
     @classmethod
-    def of(cls, table: CampaignTable, tuning: Tuning, *, fitted: bool = False) -> "Helix1Arm":
+    def of(cls, table: CampaignTable, tuning: Tuning, *, fitted: bool = False) -> "Helix1Runs":
         """Pick the rows of a tuning, in a table of runs on the one arm or on the fitted one."""
         mine = [row for row in table.rows if row["tuning"] == tuning.name.lower()]
         done = [row for row in mine if row["status"] == "done"]
@@ -112,7 +109,7 @@ def too_few(facts: dict[str, Any], what: str) -> Claim:
     return nothing_measured(**facts, reason=f"Too few runs to tell: {what}.")
 
 
-def missing(arm: Helix1Arm, *alphas: float) -> str:
+def missing(arm: Helix1Runs, *alphas: float) -> str:
     """Return a sentence on how many runs have no time, as the gripper never began to close; "" if all have one."""
     number = sum(len(arm.rows[alpha]) - len(arm.times(alpha)) for alpha in alphas)
     return f" Without {number} runs in which the gripper never began to close." if number else ""

@@ -6,8 +6,8 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.statistics import Statistic
-from handover.scenarios.helix.parameters import Place, Tuning
-from handover.scenarios.published.helix.helix_1_runs import Helix1Arm, published
+from handover.scenarios.helix.parameters import HandPlace, Tuning
+from handover.scenarios.published.helix.helix_1_runs import Helix1Runs, published
 from handover.scenarios.published.published_experiment import ComparisonTable
 from handover.scenarios.published.verdicts import format_median
 
@@ -27,7 +27,7 @@ _ON_FITTED = (
 )
 
 
-def table_1(arm: Helix1Arm) -> ComparisonTable:
+def table_1(arm: Helix1Runs) -> ComparisonTable:
     """Return the times for the arm's movement by step size, published beside ours."""
     printed = published()
     header = ["α", *(f"{alpha} {whose}" for alpha in arm.alphas for whose in ("published", "ours"))]
@@ -53,7 +53,7 @@ def table_1(arm: Helix1Arm) -> ComparisonTable:
     return ComparisonTable(title=f"Table 1, {arm.title}", header=header, rows=rows, note=note)
 
 
-def steps(arm: Helix1Arm) -> ComparisonTable:
+def steps(arm: Helix1Runs) -> ComparisonTable:
     """Return how many control steps the arm takes, which does not depend on the time of a step."""
     printed = published()
     rows: list[Sequence[str]] = []
@@ -69,17 +69,17 @@ def steps(arm: Helix1Arm) -> ComparisonTable:
     return ComparisonTable(title=f"Control steps, {arm.title}", header=header, rows=rows, note=note)
 
 
-def by_place(arm: Helix1Arm) -> ComparisonTable:
+def by_place(arm: Helix1Runs) -> ComparisonTable:
     """Return the times at each place, which the paper does not give."""
     rows = [
-        [place.name.lower().replace("_", "-"), *(_at(arm, place, alpha) for alpha in arm.alphas)] for place in Place
+        [place.name.lower().replace("_", "-"), *(_at(arm, place, alpha) for alpha in arm.alphas)] for place in HandPlace
     ]
     note = "Time of each run until the gripper begins to close, in s. ✗: the handover did not succeed."
     header = ["place", *(f"α = {alpha}" for alpha in arm.alphas)]
     return ComparisonTable(title=f"Times by place, {arm.title}", header=header, rows=rows, note=note)
 
 
-def fig_9(arm: Helix1Arm) -> ComparisonTable:
+def fig_9(arm: Helix1Runs) -> ComparisonTable:
     """Return how far the model is from the arm at the end, in the words of sec. 5.2."""
     printed = published()
     lengths = (("model to arm", "model_mismatch"), ("arm", "arm_travel"), ("model", "model_travel"))
@@ -95,12 +95,12 @@ def fig_9(arm: Helix1Arm) -> ComparisonTable:
     return ComparisonTable(title=f"Model and arm as in fig. 9, {arm.title}", header=header, rows=rows, note=note)
 
 
-def _row(name: str, printed: Sequence[float | str], arm: Helix1Arm, text: Callable[[Floats], str]) -> list[str]:
+def _row(name: str, printed: Sequence[float | str], arm: Helix1Runs, text: Callable[[Floats], str]) -> list[str]:
     ours = [text(arm.times(alpha)) for alpha in arm.alphas]
     return [name, *(str(cell) for pair in zip(printed, ours, strict=True) for cell in pair)]
 
 
-def _at(arm: Helix1Arm, place: Place, alpha: float) -> str:
+def _at(arm: Helix1Runs, place: HandPlace, alpha: float) -> str:
     here = [row for row in arm.rows[alpha] if row["place"] == place.name.lower()]
     times = ("never" if row.get("arm_time") is None else f"{row['arm_time']:.1f}" for row in here)
     return ", ".join(time if row["success"] else f"{time} ✗" for time, row in zip(times, here, strict=True))

@@ -16,7 +16,7 @@ from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure
-from handover.scenarios.helix.parameters import Place, Tuning
+from handover.scenarios.helix.parameters import HandPlace, Tuning
 from handover.scenarios.published.helix.helix_1_curves import errors_of
 from handover.scenarios.published.helix.helix_1_figures import draw_mean_error
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment, Verdict
@@ -60,8 +60,8 @@ class Helix2(PublishedExperiment):
         setup, published = paper_values("helix", "experiment"), paper_values("helix", "published")
         periods = dict(zip(setup["alpha"], published["timestep_mean"], strict=True))
         alphas: list[float] = published["guided_alpha"][:1] if quick else published["guided_alpha"]
-        unguided = (Place.FRONT,) if quick else tuple(Place)
-        ways = [(0.0, place) for place in unguided] + [(setup["guidance"], Place.FRONT)]
+        unguided = (HandPlace.FRONT,) if quick else tuple(HandPlace)
+        ways = [(0.0, place) for place in unguided] + [(setup["guidance"], HandPlace.FRONT)]
         return CampaignPlan(
             scenario=self.scenario,
             points=[

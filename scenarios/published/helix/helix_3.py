@@ -19,7 +19,7 @@ from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure
 from handover.scenarios.helix.helix_use_case import UseCaseParameters
-from handover.scenarios.helix.parameters import Place, Tuning
+from handover.scenarios.helix.parameters import HandPlace, Tuning
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 from handover.scenarios.published.verdicts import every_claim, format_median
 
@@ -30,7 +30,7 @@ _WHERE = "secs. 3.5.3 and 4.4, fig. 13"
 
 
 @dataclass(frozen=True)
-class UseCaseArm:
+class UseCaseRuns:
     """Rows of a campaign's table of runs that came to their end with one tuning.
 
     Attributes:
@@ -44,7 +44,7 @@ class UseCaseArm:
     broken: int
 
     @classmethod
-    def of(cls, table: CampaignTable, tuning: Tuning) -> "UseCaseArm":
+    def of(cls, table: CampaignTable, tuning: Tuning) -> "UseCaseRuns":
         """Pick the rows of a tuning."""
         mine = [row for row in table.rows if row["tuning"] == tuning.name.lower()]
         done = [row for row in mine if row["status"] == "done"]
@@ -84,7 +84,7 @@ class Helix3(PublishedExperiment):
         published = paper_values("helix", "published")
         alphas: list[float] = paper_values("helix", "experiment")["alpha"]
         period = published["timestep_mean"][alphas.index(published["use_case_alpha"])]
-        places, usual = (Place.FRONT,) if quick else tuple(Place), UseCaseParameters()
+        places, usual = (HandPlace.FRONT,) if quick else tuple(HandPlace), UseCaseParameters()
         steps = {
             Tuning.THESIS: {"alpha": str(published["use_case_alpha"]), "control_period": str(period)},
             Tuning.OWN: {"alpha": str(usual.alpha), "control_period": str(usual.control_period)},
@@ -101,7 +101,7 @@ class Helix3(PublishedExperiment):
                 "carry_patience": str(_PATIENCE),
                 "help_speed": str(paper_values("helix", "experiment")["help_speed"]),
             },
-            repetitions=1 if quick else int(published["use_case_success"][1]) // len(Place),
+            repetitions=1 if quick else int(published["use_case_success"][1]) // len(HandPlace),
             seed=1,
             experiment=self.name,
         )
@@ -110,10 +110,11 @@ class Helix3(PublishedExperiment):
         """Judge the thesis's success on the runs with its settings; beyond it, that of ours."""
         thesis, own = _arms(table)
         k, n = paper_values("helix", "published")["use_case_success"]
-        told = [every_claim("The ball is taken from the hand and dropped into the bowl", _WHERE, (k, n), thesis.count)]
+        taken = "The ball is taken from the hand and dropped into the bowl"
+        claims = [every_claim(taken, _WHERE, (k, n), thesis.count)]
         if own.rows:
-            told.append(every_claim("With our settings the ball gets into the bowl", "", (0, 0), own.count))
-        return told
+            claims.append(every_claim("With our settings the ball gets into the bowl", "", (0, 0), own.count))
+        return claims
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return success, times and distances for both settings, and why runs failed."""
@@ -147,7 +148,7 @@ class Helix3(PublishedExperiment):
             for i, (tuning, found) in enumerate(drawn.items()):
                 _draw_ways(axes[i], found)
                 _draw_drops(axes[i + n], found)
-                axes[i].set_title(UseCaseArm(tuning, (), 0).title)
+                axes[i].set_title(UseCaseRuns(tuning, (), 0).title)
             for axis in (axes[0], axes[n]):
                 axis.set_ylabel("y in W (mm)")
         caption = (
@@ -158,11 +159,11 @@ class Helix3(PublishedExperiment):
         return [Figure("ways", caption)]
 
 
-def _arms(table: CampaignTable) -> tuple[UseCaseArm, UseCaseArm]:
-    return UseCaseArm.of(table, Tuning.THESIS), UseCaseArm.of(table, Tuning.OWN)
+def _arms(table: CampaignTable) -> tuple[UseCaseRuns, UseCaseRuns]:
+    return UseCaseRuns.of(table, Tuning.THESIS), UseCaseRuns.of(table, Tuning.OWN)
 
 
-def _row(arm: UseCaseArm) -> list[str]:
+def _row(arm: UseCaseRuns) -> list[str]:
     succeeded, tried = arm.count
     failures = Counter(str(row["reason"]).partition(":")[0] for row in arm.rows if not row["success"])
     return [
@@ -182,7 +183,7 @@ class BallWay(NamedTuple):
     colour: str
 
 
-def _ways(arm: UseCaseArm, runs: Path) -> list[BallWay]:
+def _ways(arm: UseCaseRuns, runs: Path) -> list[BallWay]:
     """Return the balls' ways of the runs that have a record."""
     p_WB = UseCaseParameters().p_WB
     found: list[BallWay] = []
@@ -193,7 +194,7 @@ def _ways(arm: UseCaseArm, runs: Path) -> list[BallWay]:
         record = Record(path)
         p_WO, holder = record["hand.p_WO"], record["hand.holder"]
         below = np.flatnonzero((p_WO[:, 2] < p_WB[2]) & (holder == int(Holder.FREE)))
-        colour = COLOURS[Place[row["place"].upper()]]
+        colour = COLOURS[HandPlace[row["place"].upper()]]
         found.append(BallWay(p_WO[holder == int(Holder.GRIPPER)], p_WO[below[0]] if len(below) else None, colour))
     return found
 

@@ -12,9 +12,10 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.plan import is_number
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.helix.helix_handover import HelixHandover
 
-PLACES = [
+OFFERED_AT = [
     {"azimuth": azimuth, "radius": radius, "height": height}
     for azimuth, radius, height in (
         ("0", "0.16", "-0.6"),
@@ -51,10 +52,22 @@ class Case:
 def levels_of(
     what: str, unit: str, name: str, sizes: Mapping[str, str], mild: Sequence[str], **others: str
 ) -> list[Case]:
-    """Return a case for each of a parameter's values, `sizes`, which are told in another unit."""
+    """Return a case for each of a parameter's values, `sizes`, by what is shown for it, in another unit."""
     return [
-        Case(what, f"{told} {unit}".strip(), {name: value, **others}, told in mild) for told, value in sizes.items()
+        Case(what, f"{shown} {unit}".strip(), {name: value, **others}, shown in mild) for shown, value in sizes.items()
     ]
+
+
+def thesis_settings(alpha: float) -> dict[str, str]:
+    """Return the thesis's tuning at one of its step sizes, with the period that its loop took, and a person who helps.
+
+    Raises:
+        ValueError: the thesis has no such step size.
+    """
+    setup, published = paper_values("helix", "experiment"), paper_values("helix", "published")
+    period = published["timestep_mean"][setup["alpha"].index(alpha)]
+    helped = {"help_speed": str(setup["help_speed"])}
+    return {"tuning": "thesis", "alpha": str(alpha), "control_period": str(period), **helped}
 
 
 def rows_by_case(table: CampaignTable, cases: Sequence[Case]) -> dict[Case, list[Mapping[str, Any]]]:
@@ -62,13 +75,13 @@ def rows_by_case(table: CampaignTable, cases: Sequence[Case]) -> dict[Case, list
     by_values = {frozenset((name, _plain(text)) for name, text in case.parameters.items()): case for case in cases}
     found: dict[Case, list[Mapping[str, Any]]] = {case: [] for case in cases}
     for row in table.rows:
-        case = by_values.get(what_is_amiss(row, cases))
+        case = by_values.get(deviations_from_defaults(row, cases))
         if case is not None and row["status"] == "done":
             found[case].append(row)
     return found
 
 
-def what_is_amiss(row: Mapping[str, Any], cases: Sequence[Case]) -> frozenset[tuple[str, float | str]]:
+def deviations_from_defaults(row: Mapping[str, Any], cases: Sequence[Case]) -> frozenset[tuple[str, float | str]]:
     """Return what a row has otherwise than the scenario's defaults, of all that the cases set.
 
     A unit's parameter has no default: any value of it counts. None and NaN are no values.

@@ -13,10 +13,11 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import success_interval
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure
 from handover.scenarios.published.helix.helix_1_claims import ends_near
 from handover.scenarios.published.helix.helix_cases import (
-    PLACES,
+    OFFERED_AT,
     Case,
     distances,
     levels_of,
@@ -36,6 +37,7 @@ def _same(*values: str) -> dict[str, str]:
     return {value: value for value in values}
 
 
+_HELP_SPEED = str(paper_values("helix", "experiment")["help_speed"])
 CASES = (
     Case("nothing", "", {}, mild=True),
     *levels_of("arm's stiffness", "times", "arm_stiffness", _same("0.5", "0.7", "1.4", "2"), ("0.7", "1.4")),
@@ -60,7 +62,11 @@ CASES = (
     Case("step size grows with the error", "", {"step_rule": "by_error"}),
     Case("the thesis's filters", "", {"filters": "thesis"}),
     Case("all of the thesis's settings", "", {"tuning": "thesis"}),
-    Case("the thesis's settings, and a person who helps", "", {"tuning": "thesis", "help_speed": "0.05"}),
+    Case(
+        "the thesis's settings, and a person who helps",
+        "",
+        {"tuning": "thesis", "help_speed": _HELP_SPEED},
+    ),
 )
 
 
@@ -77,13 +83,13 @@ class HelixDisturbances(PublishedExperiment):
     def plan(self, quick: bool) -> CampaignPlan:
         """Return every case at every place; if quick, a part of it."""
         cases = [c for c in CASES if c.what in _QUICK_CASES] if quick else CASES
-        places = PLACES[:_QUICK_PLACES] if quick else PLACES
+        places = OFFERED_AT[:_QUICK_PLACES] if quick else OFFERED_AT
         return CampaignPlan(
             scenario=self.scenario,
             points=[{**place, **case.parameters} for case in cases for place in places],
             seed=16,
             paired=True,
-            scenes=tuple(PLACES[0]),
+            scenes=tuple(OFFERED_AT[0]),
             units={"arm": "TendonArmFast"},
             experiment=self.name,
         )
@@ -110,7 +116,7 @@ class HelixDisturbances(PublishedExperiment):
                     "failed because",
                 ],
                 rows=rows,
-                note=f"Each at {len(PLACES)} places, with the same seeds. Distances are between gripper and ball "
+                note=f"Each at {len(OFFERED_AT)} places, with the same seeds. Distances are between gripper and ball "
                 "when the gripper begins to close and at the end, by ground truth, median and in brackets the largest, "
                 "of the handovers that succeeded; steps are control steps until the gripper begins to close.",
             )
@@ -131,7 +137,7 @@ class HelixDisturbances(PublishedExperiment):
             axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
         caption = (
             "Distance of gripper and ball at the end, by ground truth, with one thing amiss at a time: each point is a "
-            f"handover at one of {len(PLACES)} places."
+            f"handover at one of {len(OFFERED_AT)} places."
         )
         return [Figure("disturbances", caption)]
 

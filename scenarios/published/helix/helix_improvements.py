@@ -15,7 +15,14 @@ from handover.scenarios.campaign.statistics import LEVEL
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure
-from handover.scenarios.published.helix.helix_cases import PLACES, Case, rate, reasons_of, rows_by_case
+from handover.scenarios.published.helix.helix_cases import (
+    OFFERED_AT,
+    Case,
+    rate,
+    reasons_of,
+    rows_by_case,
+    thesis_settings,
+)
 from handover.scenarios.published.helix.helix_places import random_places
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment, Verdict
 from handover.scenarios.published.verdicts import format_p_value, nothing_measured
@@ -27,10 +34,10 @@ _RANDOM_PLACES, _SEED = 12, 54
 @cache
 def places() -> list[dict[str, str]]:
     """Return where the ball is offered."""
-    return [*PLACES, *random_places(_RANDOM_PLACES, _SEED)]
+    return [*OFFERED_AT, *random_places(_RANDOM_PLACES, _SEED)]
 
 
-_THESIS = {"tuning": "thesis", "alpha": "0.2", "control_period": "1.51", "help_speed": "0.05", "patience": "300"}
+_THESIS = {**thesis_settings(0.2), "patience": "300"}
 _STEP = ("step size grows with the error", "5.4.4", {"step_rule": "by_error"})
 _BOUND = ("estimate's bound by the covariance", "5.4.3", {"bound_rule": "by_covariance"})
 _WEIGHTS = ("estimate's weights by the state", "5.4.3", {"weight_rule": "by_state"})
@@ -99,7 +106,7 @@ class HelixImprovements(PublishedExperiment):
             points=[{**place, **case.parameters} for case in cases for place in offered],
             seed=_SEED,
             paired=True,
-            scenes=tuple(PLACES[0]),
+            scenes=tuple(OFFERED_AT[0]),
             units={"arm": "TendonArmFast"},
             experiment=self.name,
         )
@@ -153,7 +160,7 @@ def _runs(table: CampaignTable) -> dict[Change, tuple[Sequence[Mapping[str, Any]
 
 def pairs(before: Sequence[Mapping[str, Any]], after: Sequence[Mapping[str, Any]], metric: str) -> Floats:
     """Return a metric's values without and with a change, shape (n, 2), of the places at which both have it."""
-    place = tuple(PLACES[0])
+    place = tuple(OFFERED_AT[0])
     changed = {tuple(row[name] for name in place): row for row in after}
     found: list[tuple[float, float]] = []
     for row in before:

@@ -22,7 +22,7 @@ _COUNT, _QUICK_COUNT = 200, 3
 _SEED = 2016
 """Draws the places; nothing was tuned on them."""
 _LEAST_SUCCESS = 0.98
-_FEWEST = 50
+_MIN_RUNS = 50
 """Runs in which a robot that fails at one place in fifty fails once, on average."""
 _MEDIAN, _MOST = 0.002, 0.005
 """How near the gripper is to be when the ball leaves the hand, m: in the median, and at most."""
@@ -124,8 +124,8 @@ def _succeeds(rows: Sequence[Mapping[str, Any]]) -> Claim:
         **facts,
         measured=format_rate(k, n),
         interval=(interval.low, interval.high),
-        verdict=verdict if n >= _FEWEST else Verdict.NOT_COMPARABLE,
-        reason=f"Holds if {100 * _LEAST_SUCCESS:.0f} % or more of the {n} did, of {_FEWEST} or more; the interval is "
+        verdict=verdict if n >= _MIN_RUNS else Verdict.NOT_COMPARABLE,
+        reason=f"Holds if {100 * _LEAST_SUCCESS:.0f} % or more of the {n} did, of {_MIN_RUNS} or more; the interval is "
         "Clopper and Pearson's.",
     )
 

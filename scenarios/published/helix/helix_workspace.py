@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
+from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
@@ -23,6 +24,9 @@ AZIMUTHS = (0.0, 1.05, 1.57, 3.14, -1.57)
 HEIGHTS = tuple(round(-0.72 + 0.08 * k, 2) for k in range(5))
 RADII = tuple(round(0.03 * k, 2) for k in range(1, 11))
 
+_SERVO = ServoParams()
+_SETTLED = f"{1e3 * _SERVO.threshold_grasp:g} mm"
+_TILTED = f"{np.degrees(_SERVO.threshold_tilt):.0f}°"
 _QUICK = ((0.0,), (-0.6,), (0.06, 0.15, 0.3))
 _SEEN = ("no camera", "one camera", "both cameras")
 _SHADES = ("#d9dde3", "#f3dcc0", "#d6ead8")
@@ -64,9 +68,9 @@ class HelixWorkspace(PublishedExperiment):
                 title="How far the arm reaches",
                 header=["height, m", *(f"{np.degrees(a):.0f}°" for a in azimuths), "kept"],
                 rows=rows,
-                note="Largest distance from the arm's axis, m, up to which the gripper settles within 3 mm of every "
-                "tried place, tilted by 34° at most, by direction. Kept is what warns before a handover: the least of "
-                "all directions.",
+                note="Largest distance from the arm's axis, m, up to which the gripper settles within "
+                f"{_SETTLED} of every tried place, tilted by {_TILTED} at most, by direction. Kept is what warns "
+                "before a handover: the least of all directions.",
             )
         ]
 
@@ -93,7 +97,8 @@ class HelixWorkspace(PublishedExperiment):
             canvas.legend(handles, [*labels, *reversed(_SEEN)], loc="outside lower center", ncols=5)
         caption = (
             "Places of the ball in two upright planes through the arm's axis, as in [Vervloet2025] fig. 14: where the "
-            "gripper settles within 3 mm with exact measurements, and how many cameras see ball and markers whole."
+            f"gripper settles within {_SETTLED} with exact measurements, and how many cameras see ball and markers "
+            "whole."
         )
         return [Figure("workspace", caption)]
 

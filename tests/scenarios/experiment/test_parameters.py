@@ -3,12 +3,12 @@ import pytest
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
 from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.helix_handover import HelixHandover
-from handover.scenarios.helix.parameters import Place
+from handover.scenarios.helix.parameters import HandPlace
 
 
 def test_values_are_parsed_by_their_declared_kind():
     p = parse_parameters(HelixHandover, ["alpha=0.1", "place=back_left", "cover=right"])
-    assert (p.alpha, p.place, p.cover) == (0.1, Place.BACK_LEFT, Cover.RIGHT)
+    assert (p.alpha, p.place, p.cover) == (0.1, HandPlace.BACK_LEFT, Cover.RIGHT)
 
 
 def test_what_is_not_given_has_its_default():

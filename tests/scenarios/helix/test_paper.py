@@ -16,7 +16,7 @@ from handover.plants.helix.hand.partner_parameters import Params as HandParams
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.helix.calibrate_detector import calibrated_detector
 from handover.scenarios.helix.cameras import CameraPlaces, camera_parameters
-from handover.scenarios.helix.parameters import Parameters, Place, Tuning
+from handover.scenarios.helix.parameters import HandPlace, Parameters, Tuning
 
 STATUS = {"stated", "derived", "assumed", "read off figure"}
 
@@ -53,7 +53,7 @@ def test_the_scenarios_defaults_have_an_origin(paper: dict[str, dict[str, dict[s
     assert p.detector.name.lower() == experiment["default_detector"]["value"]
     assert p.marker == paper["camera"]["marker"]["value"]
     assert p.rings == paper["camera"]["rings"]["value"]
-    assert [e.name.lower().replace("_", "-") for e in Place] == experiment["places"]["value"]
+    assert [e.name.lower().replace("_", "-") for e in HandPlace] == experiment["places"]["value"]
 
 
 def test_the_controllers_defaults_have_an_origin(paper: dict[str, dict[str, dict[str, Any]]]):
@@ -76,7 +76,7 @@ def test_the_cameras_are_where_the_paper_file_says(paper: dict[str, dict[str, di
     c, sides = camera_parameters(places=CameraPlaces.THREE), CameraPlaces.THREE.sides
     assert [c["p_WC_left"].tolist(), c["p_WC_right"].tolist()] == paper["camera"]["p_WC"]["value"]
     assert c["p_WC_third"].tolist() == paper["camera"]["p_WC_top"]["value"]
-    assert [c[f"intrinsics_{side}"][0] for side in sides] == paper["camera"]["focal_length"]["value"]
+    assert [c[f"intrinsics_{side}"].tolist() for side in sides] == paper["camera"]["intrinsics"]["value"]
     camera = CameraParams()
     for side in sides:
         for what in ("p_WC", "q_WC", "intrinsics", "distortion"):

@@ -14,7 +14,7 @@ from handover.scenarios.helix.parameters import Tuning
 from handover.scenarios.published.helix.helix_1_curve_claims import error_claims, model_claims
 from handover.scenarios.published.helix.helix_1_curves import RunCurves
 from handover.scenarios.published.helix.helix_1_model_figures import draw_estimate, draw_model
-from handover.scenarios.published.helix.helix_1_runs import Helix1Arm
+from handover.scenarios.published.helix.helix_1_runs import Helix1Runs
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 ALPHAS = (0.1, 0.2, 0.4)
@@ -114,7 +114,7 @@ def test_without_records_nothing_is_judged():
 
 
 def test_model_and_estimate_are_drawn_for_the_step_sizes_that_have_records(tmp_path: Path):
-    arm = Helix1Arm.of(table_of({0.1: [40.0] * 8, 0.2: [30.0] * 8, 0.4: [20.0] * 8}), Tuning.THESIS)
+    arm = Helix1Runs.of(table_of({0.1: [40.0] * 8, 0.2: [30.0] * 8, 0.4: [20.0] * 8}), Tuning.THESIS)
     curves = {0.1: outward(0.14), 0.2: [], 0.4: outward(0.14)}
     drawn = [*draw_model(arm, curves, tmp_path), *draw_estimate(arm, curves, tmp_path)]
     assert [figure.name for figure in drawn] == ["model", "estimate"]
