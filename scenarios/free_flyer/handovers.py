@@ -26,7 +26,7 @@ from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
 from handover.scenarios.free_flyer.parameters import HandoverParameters
 from handover.scenarios.free_flyer.places import PLACES_OF_HANDOVER
 from handover.scenarios.free_flyer.published import published_of_giving, published_of_receiving
-from handover.scenarios.free_flyer.robot_wiring import arm, expected_lag, wire_handover
+from handover.scenarios.free_flyer.robot_wiring import expected_lag, wire_handover
 
 _FLIGHT = 120
 """Time for flying, fetching and retreating, without the waiting for the person, s (assumed)."""
@@ -81,23 +81,23 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         robot_seed, person_seed = (int(n) for n in np.random.SeedSequence(seed).generate_state(2) >> 1)
         at = {name: np.array(value) for name, value in paper_values("free_flyer", "handover_place").items()}
         p_WO_0, behaviour = at["p_WO_0"], p.behaviour.item
-        p_BG, lag = arm(), expected_lag(p.ideal)
+        robot, model, lag = p.robot, vars(p.model), expected_lag(p.ideal)
         s = System()
         s.add(
             "decision",
             fmu("decision"),
             task=self.task,
             behaviour=behaviour,
-            p_BG=p_BG,
+            p_BG=p.model.p_BG,
             p_WG_handover=p.p_WG_handover,
             p_WO_0=p_WO_0,
             p_OG=at["p_OG"],
             patience=p.patience,
         )
-        s.add("impedance", fmu("impedance"), behaviour=behaviour, p_BG=p_BG, delay=p.delay, lag=lag)
-        s.add("pose", fmu("pose"), p_BG=p_BG, delay=p.delay, lag=lag)
+        s.add("impedance", fmu("impedance"), behaviour=behaviour, **model, delay=p.delay, lag=lag)
+        s.add("pose", fmu("pose"), **model, delay=p.delay, lag=lag)
         s.add("thrusters", fmu("thrusters"), ideal=p.ideal, delay=p.delay)
-        s.add("robot", fmu("robot"), seed=robot_seed, p_BG=p_BG, p_WB_0=at["p_WG_0"] - p_BG)
+        s.add("robot", fmu("robot"), seed=robot_seed, **vars(robot), p_WB_0=at["p_WG_0"] - robot.p_BG)
         s.add(
             "person",
             fmu("person"),

@@ -18,7 +18,7 @@ from handover.scenarios.free_flyer.impedance_evaluation import ImpedanceEvaluato
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Wrench
 from handover.scenarios.free_flyer.places import PLACES_OF_PUSH
 from handover.scenarios.free_flyer.published import published_of_push
-from handover.scenarios.free_flyer.robot_wiring import arm, expected_lag, wire_controller, wire_forces
+from handover.scenarios.free_flyer.robot_wiring import expected_lag, wire_controller, wire_forces
 
 
 class FlyerImpedance(Experiment[ImpedanceEvaluator]):
@@ -51,7 +51,7 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
     def build(self, parameters: ImpedanceParameters, seed: int, fmu: FmuOf) -> System:
         """Wire robot, thrusters, impedance controller and push; the gripper starts at its place of rest."""
         p = parameters
-        p_WG, p_BG = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"]), arm()
+        p_WG, robot_body = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"]), p.robot
         s = System()
         impedance = s.add(
             "impedance",
@@ -59,7 +59,7 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
             behaviour=p.behaviour.item,
             delay=p.delay if p.delay_known else 0.0,
             lag=expected_lag(p.ideal),
-            p_BG=p_BG,
+            **vars(p.model),
             p_WG_goal=p_WG,
             q_WG_goal=np.array([1.0, 0.0, 0.0, 0.0]),
             active=True,
@@ -74,7 +74,7 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
             start=p.begin,
             duration=p.duration,
         )
-        robot = s.add("robot", fmu("robot"), seed=seed, p_BG=p_BG, p_WB_0=p_WG - p_BG)
+        robot = s.add("robot", fmu("robot"), seed=seed, **vars(robot_body), p_WB_0=p_WG - robot_body.p_BG)
         wire_controller(s, impedance, robot, thrusters)
         wire_forces(s, robot, thrusters, push)
         return s

@@ -15,7 +15,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.free_flyer.parameters import Behaviour, ImpedanceParameters
+from handover.scenarios.free_flyer.parameters import Behaviour, Body, ImpedanceParameters
 from handover.scenarios.free_flyer.robot_wiring import stability_metrics
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class Errors:
         return both
 
 
-def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour) -> Errors:
+def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour, model: Body) -> Errors:
     """Return the errors by eq. (4.4), k_D xt' = B_x x'' + (C_x + k_B) x' - f_ext, with rest at no rotation.
 
     Velocities are twists, so B_x x'' + C_x x' - f_ext is the propulsion's wrench, taken at the gripper: what changes
@@ -89,22 +89,26 @@ def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour) -> Errors
     is of the instant at which the step begins, as for the controller; since thrust is held in the robot's frame,
     the mean is turned back by half the step's turn. Whether the push acted at once or a step later is seen in the
     motion: where it begins, the wrong one is off by the whole push.
+
+    Args:
+        motion: of a run.
+        p_WG_goal: the gripper's place of rest in W, shape (3,), m.
+        behaviour: whose gains of table 4.1 are taken.
+        model: the robot as its controllers assume it to be; where it is another, the errors disagree.
     """
-    at_once = _errors(motion, motion.f_G[1:], motion.tau_G[1:], p_WG_goal, behaviour)
-    later = _errors(motion, motion.f_G[:-1], motion.tau_G[:-1], p_WG_goal, behaviour)
+    at_once = _errors(motion, motion.f_G[1:], motion.tau_G[1:], p_WG_goal, behaviour, model)
+    later = _errors(motion, motion.f_G[:-1], motion.tau_G[:-1], p_WG_goal, behaviour, model)
     return min(at_once, later, key=lambda errors: sum(errors.disagreement))
 
 
-def _errors(motion: Motion, f_G: Floats, tau_G: Floats, p_WG_goal: Floats, behaviour: Behaviour) -> Errors:
+def _errors(motion: Motion, f_G: Floats, tau_G: Floats, p_WG_goal: Floats, behaviour: Behaviour, model: Body) -> Errors:
     """Return the errors where this push acted, one row a step."""
     from scipy.spatial.transform import Rotation
 
-    body = paper_values("free_flyer", "robot")
     gains = paper_values("free_flyer", f"gains_{behaviour.item}")
-    m: float = body["mass"]
-    I_B: Floats = np.array(body["I_B"])
+    m, I_B = model.mass, model.I_B
     R_WB = Rotation.from_quat(motion.q_WB, scalar_first=True)
-    r_W: Floats = R_WB.apply(np.array(body["p_BG"]))
+    r_W: Floats = R_WB.apply(model.p_BG)
     force, torque = _propulsion(motion, f_G, tau_G, R_WB, r_W, m, I_B)
     v, w = motion.v_WG[:-1], motion.w_WB[:-1]
     torque_G: Floats = torque - np.cross(r_W[:-1], force) + gains["k_B_rotational"] * w
@@ -213,7 +217,7 @@ class ImpedanceEvaluator(Evaluator):
 
     def errors(self) -> Errors:
         """Return the errors, actual and by the model."""
-        return errors_of(Motion.of(self._rows), self.p_WG_goal, self.parameters.behaviour)
+        return errors_of(Motion.of(self._rows), self.p_WG_goal, self.parameters.behaviour, self.parameters.model)
 
     def outcome(self) -> Outcome:
         """Return whether the robot rests again and agreed with the model, why, and the metrics."""

@@ -1,13 +1,14 @@
 """Parameters of the free-flyer's handovers, and of a push against its gripper; `paper.toml` has their origins."""
 
 import enum
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 
 import numpy as np
 
-from handover.cosim.blocks.ports import Vector3, parameter
-from handover.cosim.blocks.units import Metre, Newton, NewtonMetre, Second
+from handover.cosim.blocks.ports import Floats, Vector3, parameter
+from handover.cosim.blocks.units import Metre, Newton, NewtonMetre, Number, Second
+from handover.scenarios.experiment.paper import paper_values
 
 
 class Behaviour(enum.IntEnum):
@@ -22,8 +23,53 @@ class Behaviour(enum.IntEnum):
         return self.name.lower()
 
 
+@dataclass(frozen=True)
+class Body:
+    """Mass, kg, inertia about the centre of mass, (3, 3), kg m^2, and gripper seen from it, m, both in B."""
+
+    mass: float
+    I_B: Floats
+    p_BG: Floats
+
+
+def _factor(of_what: str) -> float:
+    return parameter(1.0, f"{of_what}, times the public value", minimum=0.2, maximum=5.0)
+
+
 @dataclass(frozen=True, kw_only=True)
-class HandoverParameters:
+class RobotAndModel:
+    """What the robot is, and what its controllers take it for: each times the public values of `paper.toml`."""
+
+    mass_factor: Number = _factor("robot's mass")
+    inertia_factor: Number = _factor("robot's inertia")
+    arm_factor: Number = _factor("length of the robot's arm")
+    model_mass_factor: Number = _factor("mass that the robot's controllers assume")
+    model_inertia_factor: Number = _factor("inertia that the robot's controllers assume")
+    model_arm_factor: Number = _factor("length of the arm that the robot's controllers assume")
+
+    @property
+    def robot(self) -> Body:
+        """The robot as it is."""
+        return _body(self.mass_factor, self.inertia_factor, self.arm_factor)
+
+    @property
+    def model(self) -> Body:
+        """The robot as its controllers assume it to be."""
+        return _body(self.model_mass_factor, self.model_inertia_factor, self.model_arm_factor)
+
+    @property
+    def is_published(self) -> bool:
+        """Whether robot and model are as published."""
+        return all(getattr(self, f.name) == f.default for f in fields(RobotAndModel))
+
+
+def _body(mass: float, inertia: float, arm: float) -> Body:
+    public = paper_values("free_flyer", "robot")
+    return Body(mass * float(public["mass"]), inertia * np.array(public["I_B"]), arm * np.array(public["p_BG"]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandoverParameters(RobotAndModel):
     """One handover. Bounds of the place keep it within the person's and the robot's part of the cabin (assumed)."""
 
     behaviour: Behaviour = parameter(Behaviour.RIGID, "setting of the impedance controller, [Fernandes2020] table 4.1")
@@ -54,7 +100,7 @@ class Wrench(enum.IntEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ImpedanceParameters:
+class ImpedanceParameters(RobotAndModel):
     """One push."""
 
     behaviour: Behaviour = parameter(Behaviour.RIGID, "setting of the impedance controller, [Fernandes2020] table 4.1")

@@ -15,6 +15,7 @@ _ESTIMATE = {
 _WRENCH = {"f_B": "at the centre of mass, in B", "tau_B": "in B"}
 _ON_GRIPPER = {"f_G": "at G, in W", "tau_G": "in W"}
 _MOTION = {"p_WG": "in W", "q_WG": "scalar first", "v_WG": "in W", "w_WB": ""}
+_BODY = {"mass": "as the scenario's factors make it", "I_B": "in B, likewise", "p_BG": "in B, likewise"}
 _CONTROLLER = Place(
     required={"f_cmd": "at the centre of mass, in B", "tau_cmd": "in B"},
     optional={
@@ -28,7 +29,7 @@ _CONTROLLER = Place(
         "damping_ratio": "see pole_radius",
         "pole_frequency": "see pole_radius",
         "behaviour": "the scenario's parameter",
-        "p_BG": "in B",
+        **_BODY,
         "delay": "the scenario's parameter",
         "lag": "of the thrusters, as a controller may expect it",
     },
@@ -52,7 +53,7 @@ def _thrusters(*controllers: str) -> Place:
 
 _ROBOT = Place(
     required={**_WRENCH, **_ON_GRIPPER, **_ESTIMATE, **_MOTION, "p_WB": "in W", "q_WB": "scalar first"},
-    optional={"v_WB": "in W", "seed": "follows from the run's seed", "p_BG": "in B", "p_WB_0": "in W"},
+    optional={"v_WB": "in W", "seed": "follows from the run's seed", **_BODY, "p_WB_0": "in W"},
     remarks=_FRAMES,
 )
 

@@ -217,7 +217,7 @@ def figures_of_push(parameters: ImpedanceParameters, record: Record) -> list[Tim
         return []
     motion = Motion(record.time, *(record[name] for name in MOTION_SIGNALS))
     p_WG_goal = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])
-    errors = errors_of(motion, p_WG_goal, parameters.behaviour)
+    errors = errors_of(motion, p_WG_goal, parameters.behaviour, parameters.model)
     turned, turned_model = (np.degrees(values) for values in errors.without_jumps)
     phases = phases_of_push(parameters, record)
     return [

@@ -14,7 +14,7 @@ def published_of_push(p: ImpedanceParameters) -> Sequence[PublishedValue]:
     """Return the bounds of how far robot and impedance model differ; nothing for other pushes than the published."""
     default = ImpedanceParameters()
     same = p.force == default.force if p.kind is Wrench.FORCE else p.torque == default.torque
-    if not same or not p.ideal or p.delay:
+    if not same or not p.ideal or p.delay or not p.is_published:
         return ()
     note = "over all pushes and twists; how long they lasted is not stated"
     return [
@@ -69,4 +69,4 @@ def _threshold(p: HandoverParameters, name: str) -> PublishedValue:
 
 
 def _is_published(p: HandoverParameters) -> bool:
-    return np.array_equal(p.p_WG_handover, HandoverParameters().p_WG_handover)
+    return p.is_published and np.array_equal(p.p_WG_handover, HandoverParameters().p_WG_handover)

@@ -6,9 +6,6 @@ Also the metrics of the controllers' closed loops, which they compute by their o
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
-from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
 from handover.scenarios.experiment.experiment import Metric
@@ -16,11 +13,6 @@ from handover.scenarios.experiment.paper import paper_values
 
 _MEASURED = ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")
 _SEEN = ("p_WG", "q_WG", "v_WG", "w_WB")
-
-
-def arm() -> Floats:
-    """Return p_BG, m, the same for the robot and for the controllers' models of it."""
-    return np.array(paper_values("free_flyer", "robot")["p_BG"])
 
 
 def expected_lag(ideal: bool) -> float:

@@ -10,6 +10,7 @@ from handover.cosim.exceptions import InitializationError
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.impedance import FlyerImpedance
+from handover.scenarios.free_flyer.parameters import ImpedanceParameters
 
 
 def test_a_pushed_robot_comes_back_and_moves_as_the_impedance_model_says(tmp_path: Path):
@@ -81,3 +82,31 @@ def test_every_published_push_agrees_with_the_model(tmp_path: Path, behaviour: s
             given = f"behaviour={behaviour}", f"kind={kind}", f"axis={axis}"
             ended = run(FlyerImpedance, tmp_path / f"{kind}-{axis}", *given, seed=seed)
             assert ended.outcome.success, (given, ended.outcome.reason)
+
+
+@pytest.mark.parametrize(
+    ("behaviour", "factor", "apart"),
+    [
+        ("rigid", "mass_factor=1.3", 0.010),
+        ("compliant", "mass_factor=1.3", 0.100),
+        ("rigid", "model_mass_factor=1.3", 0.010),
+    ],
+)
+def test_a_robot_that_is_not_what_its_controller_assumes_departs_from_the_impedance_model(
+    tmp_path: Path, behaviour: str, factor: str, apart: float
+):
+    ended = run(FlyerImpedance, tmp_path / "r", f"behaviour={behaviour}", factor)
+    assert not ended.outcome.success
+    assert "departed from the impedance model" in ended.outcome.reason
+    assert metric(ended, "disagreement_position") > apart
+
+
+def test_robot_and_controller_that_are_both_heavier_agree(tmp_path: Path):
+    ended = run(FlyerImpedance, tmp_path / "r", "mass_factor=1.3", "model_mass_factor=1.3")
+    assert metric(ended, "disagreement_position") < 0.007
+
+
+def test_nothing_published_stands_beside_another_robot():
+    published = FlyerImpedance().published
+    assert published(ImpedanceParameters())
+    assert not published(ImpedanceParameters(arm_factor=1.2))

@@ -6,10 +6,11 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.free_flyer.impedance_evaluation import Errors, Motion, errors_of
-from handover.scenarios.free_flyer.parameters import Behaviour
+from handover.scenarios.free_flyer.parameters import Behaviour, Body
 
 MASS, INERTIA, ARM = 9.584, np.array([0.1534, 0.1427, 0.1623]), np.array([-0.30, 0.0, 0.0])
 GOAL = np.array([0.0, -0.07, 0.0])
+BODY = Body(MASS, np.diag(INERTIA), ARM)
 TIMES: Floats = np.arange(6, dtype=np.float64) * 0.016
 NOTHING = np.zeros((6, 3))
 
@@ -25,7 +26,7 @@ def moving(p_WB: Floats, v_WB: Floats, phi: Floats, w_WB: Floats, f_G: Floats = 
 def test_at_rest_away_from_the_goal_the_spring_alone_calls_for_the_pushs_balance():
     push = np.tile([2.0, 0.0, 0.0], (6, 1))
     held = np.tile(GOAL - ARM, (6, 1))
-    errors = errors_of(moving(held, NOTHING, NOTHING, NOTHING, push), GOAL, Behaviour.RIGID)
+    errors = errors_of(moving(held, NOTHING, NOTHING, NOTHING, push), GOAL, Behaviour.RIGID, BODY)
     assert errors.p == pytest.approx(np.zeros((5, 3)), abs=1e-12)
     assert errors.p_model == pytest.approx(np.tile([-2.0 / (7.0 * MASS), 0.0, 0.0], (5, 1)))
 
@@ -33,7 +34,7 @@ def test_at_rest_away_from_the_goal_the_spring_alone_calls_for_the_pushs_balance
 def test_steady_translation_is_braked_by_the_damper():
     v = np.array([0.0, 0.1, 0.0])
     p = GOAL - ARM + TIMES[:, np.newaxis] * v
-    errors = errors_of(moving(p, np.tile(v, (6, 1)), NOTHING, NOTHING), GOAL, Behaviour.COMPLIANT)
+    errors = errors_of(moving(p, np.tile(v, (6, 1)), NOTHING, NOTHING), GOAL, Behaviour.COMPLIANT, BODY)
     assert errors.p_model == pytest.approx(np.tile([0.0, 5.0 * 0.1 / (0.7 * MASS), 0.0], (5, 1)))
     assert errors.p == pytest.approx(-TIMES[:5, np.newaxis] * v, abs=1e-12)
 
@@ -41,7 +42,7 @@ def test_steady_translation_is_braked_by_the_damper():
 def test_acceleration_of_the_base_turns_the_gripper_by_its_lever():
     a = np.array([0.0, 0.0, 0.5])
     v = TIMES[:, np.newaxis] * a
-    errors = errors_of(moving(np.tile(GOAL - ARM, (6, 1)), v, NOTHING, NOTHING), GOAL, Behaviour.RIGID)
+    errors = errors_of(moving(np.tile(GOAL - ARM, (6, 1)), v, NOTHING, NOTHING), GOAL, Behaviour.RIGID, BODY)
     torque = -np.cross(ARM, MASS * a)
     assert errors.R_model == pytest.approx(np.tile(torque / (70.0 * INERTIA), (5, 1)))
 
@@ -49,7 +50,9 @@ def test_acceleration_of_the_base_turns_the_gripper_by_its_lever():
 def test_a_spin_about_a_principal_axis_needs_no_torque_but_the_force_that_leads_the_centre_of_mass():
     w = np.array([0.0, 0.0, 0.4])
     phi = TIMES[:, np.newaxis] * w
-    errors = errors_of(moving(np.tile(GOAL - ARM, (6, 1)), NOTHING, phi, np.tile(w, (6, 1))), GOAL, Behaviour.RIGID)
+    errors = errors_of(
+        moving(np.tile(GOAL - ARM, (6, 1)), NOTHING, phi, np.tile(w, (6, 1))), GOAL, Behaviour.RIGID, BODY
+    )
     assert np.allclose(errors.R, -phi[:5])
     assert errors.R_model == pytest.approx(np.tile([0.0, 0.0, 5.0 * 0.4 / (70.0 * INERTIA[2])], (5, 1)))
 
@@ -59,7 +62,7 @@ def test_thrust_that_turns_with_the_robot_is_reported_as_at_the_beginning_of_the
     phi = TIMES[:, np.newaxis] * w
     angle = phi[:, 2]  # integral of the thrust's direction, held for a step and turned with it
     v = 2.0 / MASS / 3.0 * np.column_stack([np.sin(angle), 1.0 - np.cos(angle), np.zeros(6)])
-    errors = errors_of(moving(np.tile(GOAL - ARM, (6, 1)), v, phi, np.tile(w, (6, 1))), GOAL, Behaviour.COMPLIANT)
+    errors = errors_of(moving(np.tile(GOAL - ARM, (6, 1)), v, phi, np.tile(w, (6, 1))), GOAL, Behaviour.COMPLIANT, BODY)
     R_WB = Rotation.from_rotvec(phi[:5])
     v_WG = v[:5] + np.cross(w, R_WB.apply(ARM))
     assert errors.p_model == pytest.approx((R_WB.apply(f_B) + 5.0 * v_WG) / (0.7 * MASS), rel=1e-3, abs=1e-5)
@@ -67,7 +70,7 @@ def test_thrust_that_turns_with_the_robot_is_reported_as_at_the_beginning_of_the
 
 def test_disagreement_is_the_greatest_along_any_axis():
     held = np.tile(GOAL - ARM + np.array([0.03, 0.0, -0.04]), (6, 1))
-    errors = errors_of(moving(held, NOTHING, NOTHING, NOTHING), GOAL, Behaviour.RIGID)
+    errors = errors_of(moving(held, NOTHING, NOTHING, NOTHING), GOAL, Behaviour.RIGID, BODY)
     assert errors.disagreement == pytest.approx((0.04, 0.0), abs=1e-12)
 
 
