@@ -7,6 +7,7 @@ import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector3, Vector6, Vector9, parameter
+from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import Metre, Number, Radian, Second, SquareMetre
 
 _ROTATIONS, _LENGTHS = slice(0, None, 2), slice(1, None, 2)  # in q_DL, eq. (8)
@@ -87,7 +88,7 @@ class Params:
     )
     weight_fall: Number = parameter(
         0.0,
-        "by which part of themselves A_pose_upd falls for a segment twice as long, or bent by 1 rad with those above, "
+        "c of the weights A_pose_upd / (1 + c (max(0, l / l_calib - 1) + bending of it and those above, rad)), "
         "sec. 5.4.3 (thesis: 0)",
         minimum=0.0,
         maximum=10.0,
@@ -119,7 +120,8 @@ class Params:
     )
     damping: Metre = parameter(
         0.02,
-        "error of position that weighs as much as a state's change by one, where they are judged apart (own choice)",
+        "error of position that weighs as much as a change dq of the state with dq^T K dq = 1, where position and tilt "
+        "are judged apart (own choice)",
         minimum=1e-6,
         maximum=1.0,
     )
@@ -230,53 +232,16 @@ class Params:
 
     def check(self) -> None:
         """Raise InvalidServoParameters, with all faults, if the servo cannot work with these values."""
-        faults = self._value_faults() + self._limit_faults() + self._threshold_faults()
+        faults = parameter_faults(self) or self._zero_faults() + self._limit_faults() + self._threshold_faults()
         if faults:
             raise InvalidServoParameters(faults)
 
-    def _value_faults(self) -> list[str]:
+    def _zero_faults(self) -> list[str]:
         values = {f.name: getattr(self, f.name) for f in fields(self)}
-        infinite = [n for n, v in values.items() if not np.all(np.isfinite(v))]
-        positive = ["d_gripper", "d", "l_calib", "A_pose_upd", "K_initialize", "epsilon_pose_bound", "epsilon_control"]
-        positive += [
-            "control_period",
-            "N_max_iter",
-            "threshold",
-            "threshold_grasp",
-            "settle_steps",
-            "patience",
-            "max_steps",
-            "search_steps",
-            "threshold_drop",
-            "gate_steps",
-            "response_time",
-            "damping",
-            "tilt_weight",
-            "least_response",
-        ]
+        positive = ["alpha", "d_gripper", "d", "l_calib", "A_pose_upd", "K_initialize"]
+        positive += ["epsilon_pose_bound", "epsilon_control", "threshold", "threshold_grasp", "threshold_drop"]
         positive += [n for n in values if n.startswith(("P_", "Q_", "R_"))]
-        negative = [n for n in positive if np.any(np.asarray(values[n]) <= 0.0)]
-        faults = [f"{n} = {_text(values[n])} is not finite" for n in infinite]
-        faults += [f"{n} = {_text(values[n])} must be positive" for n in negative]
-        at_least_0 = [
-            "d_grasp_offset",
-            "closing_time",
-            "progress",
-            "windup",
-            "follow_until",
-            "lost_after",
-            "gate",
-            "posture",
-        ]
-        at_least_0 += ["shaping_time", "ball_motion", "jitter", "carry_after"]
-        faults += [f"{n} = {values[n]} must not be negative" for n in at_least_0 if values[n] < 0.0]
-        if not 0.0 < self.alpha <= 1.0:
-            faults.append(f"alpha = {self.alpha} is outside (0, 1]")
-        if self.jitter >= 1.0:
-            faults.append(f"jitter = {self.jitter} is a part of the control period, less than 1")
-        if self.least_response > 1.0:
-            faults.append(f"least_response = {self.least_response} is a part, at most 1")
-        return faults
+        return [f"{n} = {_text(values[n])} must be positive" for n in positive if np.any(np.asarray(values[n]) <= 0.0)]
 
     def _limit_faults(self) -> list[str]:
         LB, UB, l = self.L_sys_LB, self.L_sys_UB, self.l_calib
@@ -292,12 +257,14 @@ class Params:
         return faults
 
     def _threshold_faults(self) -> list[str]:
-        after_switch = self.threshold + math.sqrt(2.0) * self.d_grasp_offset
+        points, factor = ("the gripper", 1.0) if self.judge_apart else ("wrist and gripper", math.sqrt(2.0))
+        after_switch = self.threshold + factor * self.d_grasp_offset
         faults: list[str] = []
         if self.threshold_retreat <= after_switch:
+            law = "threshold + d_grasp_offset" if self.judge_apart else "threshold + sqrt(2) d_grasp_offset"
             faults.append(
-                f"threshold_retreat = {self.threshold_retreat} must exceed threshold + sqrt(2) d_grasp_offset = "
-                f"{after_switch:.4g}, the largest error when the goal changes to the ball, or the arm rises at once"
+                f"threshold_retreat = {self.threshold_retreat} must exceed {law} = {after_switch:.4g}, the largest "
+                f"error, over {points}, when the goal changes to the ball, or the arm rises at once"
             )
         if self.threshold_retreat <= self.threshold_grasp:
             faults.append(
