@@ -16,19 +16,22 @@ from handover.cosim.blocks.ports import Floats
 class InvalidMeasurement(ValueError):
     """A measurement that is marked as seen holds numbers that are not finite."""
 
-    def __init__(self, X_new: Floats) -> None:
-        super().__init__(f"measurement {X_new.tolist()} is not finite; clear its `seen` flag where nothing is seen")
-        self.X_new = X_new
+    def __init__(self, what: str, X_new: Floats) -> None:
+        super().__init__(
+            f"measurement {X_new.tolist()} of the {what} is not finite; clear its `seen` flag where nothing is seen"
+        )
+        self.what, self.X_new = what, X_new
 
 
 class PositionFilter:
     """Position X, shape (3,), in m, and its covariance P, shape (3, 3), in m^2, from measurements.
 
     Q, P and R start as multiples of the identity, in m^2. In the long run only Q/R acts on X, as long as R is constant.
-    `seen` says whether there ever was a measurement.
+    `seen` says whether there ever was a measurement; `what` whose position it is, for errors.
     """
 
-    def __init__(self, X: Floats, P: float, Q: float, R: float) -> None:
+    def __init__(self, what: str, X: Floats, P: float, Q: float, R: float) -> None:
+        self._what = what
         self.position: Floats = np.array(X)
         self.covariance: Floats = P * np.eye(3)
         self.seen = False
@@ -55,7 +58,7 @@ class PositionFilter:
             InvalidMeasurement: X_new is not finite.
         """
         if not np.isfinite(X_new).all():
-            raise InvalidMeasurement(X_new)
+            raise InvalidMeasurement(self._what, X_new)
         X, P = self.position, self.covariance
         K = np.transpose(np.linalg.solve(P + (self._R if R is None else R), P))  # P and R are symmetric
         P_new = P - K @ P

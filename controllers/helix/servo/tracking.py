@@ -26,9 +26,9 @@ class Tracker:
 
     def __init__(self, p: Params) -> None:
         self._params = p
-        self.ball = PositionFilter(np.zeros(3), p.P_init, p.Q_ball, p.R_ball)
-        self.wrist = PositionFilter(-p.l_calib.sum() * _UP, p.P_init, p.Q_wrist, p.R_wrist)
-        self.direction = PositionFilter(-p.d_gripper * _UP, p.P_init, p.Q_direction, p.R_direction)
+        self.ball = PositionFilter("ball", np.zeros(3), p.P_init, p.Q_ball, p.R_ball)
+        self.wrist = PositionFilter("wrist", -p.l_calib.sum() * _UP, p.P_init, p.Q_wrist, p.R_wrist)
+        self.direction = PositionFilter("direction", -p.d_gripper * _UP, p.P_init, p.Q_direction, p.R_direction)
         self.unseen_O = self.unseen_R = math.inf
         self._due: Floats = np.zeros(6)  # of wrist and direction: movement that was commanded and is to come
         self._refused = [0, 0]
@@ -70,7 +70,11 @@ class Tracker:
             self.unseen_O = 0.0
 
     def see_ring(self, p_WR: Floats, p_WG: Floats, cov_R: Floats, cov_G: Floats) -> None:
-        """Take a measurement of wrist and gripper; the gripper keeps its length, eq. (13)."""
+        """Take a measurement of wrist and gripper; the gripper keeps its length, eq. (13).
+
+        Assumed: errors of wrist and gripper are independent; they come from one fit, so this overstates the
+        direction's.
+        """
         uses = self._params.use_covariance
         if self._is_taken(1, self.wrist, p_WR, cov_R if uses else None):
             self.wrist.update(p_WR, cov_R if uses else None)
