@@ -376,7 +376,14 @@ class VisualServo:
             return X_goal
         p, tracker = self.params, self._tracker
         p_WG_goal = (W_FROM_B * X_goal)[3:]
-        p_WG = next_place(tracker.p_WG, tracker.ball.position, p_WG_goal, p.standoff, self._excess())
+        p_WG = next_place(
+            tracker.p_WG,
+            tracker.ball.position,
+            p_WG_goal,
+            standoff=p.standoff,
+            over=p.d_grasp_offset,
+            excess=self._excess(),
+        )
         return W_FROM_B * np.concatenate([p_WG + p.d_gripper * _UP, p_WG])
 
     def _error(self) -> float:

@@ -19,7 +19,7 @@ def course(start: Floats, goal: Floats, excess: float = 0.0, steps: int = 400) -
     """Return a course of a gripper that goes 3 mm at a time to where it is to go next, seen from the ball."""
     p, places = P_WO + start, list[Floats]()
     for _ in range(steps):
-        way = next_place(p, P_WO, goal, 0.1, excess) - p
+        way = next_place(p, P_WO, goal, standoff=0.1, over=ABOVE[2], excess=excess) - p
         p = p + way * min(1.0, 0.003 / max(float(np.linalg.norm(way)), 1e-12))
         places.append(p - P_WO)
     return np.array(places)
@@ -48,4 +48,4 @@ def test_a_tilted_gripper_stays_above(excess: float, height: float):
 
 
 def test_without_standoff_the_goal_is_the_next_place():
-    np.testing.assert_array_equal(next_place(P_WO - ABOVE, P_WO, P_WO, 0.0, 1.0), P_WO)
+    np.testing.assert_array_equal(next_place(P_WO - ABOVE, P_WO, P_WO, standoff=0.0, over=0.05, excess=1.0), P_WO)
