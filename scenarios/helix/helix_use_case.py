@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from handover.controllers.helix.servo.constant_curvature import W_FROM_B
-from handover.controllers.helix.servo.jacobian_control import REACH_TOLERANCE, Limits, nearest_pose
+from handover.controllers.helix.servo.jacobian_control import REACH_TOLERANCE, Limits, nearest_distance
 from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.units import Metre, Radian, Second
@@ -181,4 +181,4 @@ def nearest_approach(p_WG: Floats, settings: Mapping[str, Any]) -> float:
     q_calib[2::3] = servo.l_calib
     limits = Limits(servo.L_sys_LB, servo.L_sys_UB)
     p_BG, K = W_FROM_B[:3] * p_WG, np.array(servo.K_initialize)
-    return nearest_pose(p_BG, q_calib, K, limits, servo.d_gripper)
+    return nearest_distance(p_BG, q_calib, K, limits, servo.d_gripper)

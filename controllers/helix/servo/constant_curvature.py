@@ -3,12 +3,12 @@
 The state is q = [Dx_1, Dy_1, l_1, ..., Dx_3, Dy_3, l_3], shape (9,): the rotation of a segment along its x and y axes,
 in rad, and its length, in m. Positions are in the base frame B, z along the hanging arm.
 
-With D = sqrt(Dx^2 + Dy^2), A = (1 - cos D) / D^2 and S = sin D / D, eqs. (4) and (5) read (the printed ones have the 1
-in the wrong entry)
+With D = sqrt(Dx^2 + Dy^2), A = (1 - cos D) / D^2 and S = sin D / D, eqs. (4) and (5) read
 
     R = [[1 - A Dx^2, -A Dx Dy, S Dx], [-A Dx Dy, 1 - A Dy^2, S Dy], [-S Dx, -S Dy, cos D]],   t = l [A Dx, A Dy, S],
 
-which is regular at D = 0.
+which is regular at D = 0. In the print, (1) and (4) have the second 1 in entry (2, 1), and (5) a prefactor l / theta
+and factors d_i.
 """
 
 import math
@@ -23,12 +23,6 @@ W_FROM_B = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 _SERIES_BELOW = 0.05  # rad; both forms are exact to 1e-13 there
 _TENDON_ANGLES = np.radians([0.0, 120.0, 240.0])
 _TENDON_DIRECTIONS = np.array([np.cos(_TENDON_ANGLES), np.sin(_TENDON_ANGLES)])
-
-
-def segment_transform(Dx: float, Dy: float, l: float) -> tuple[Floats, Floats]:
-    """Return rotation (3, 3) and translation (3,), in m, from a segment's end to its start, eqs. (4) and (5)."""
-    A, S, C, _, _ = _curvature_functions(Dx, Dy)
-    return _rotation(Dx, Dy, A, S, C), np.array([l * A * Dx, l * A * Dy, l * S])
 
 
 def forward_kinematics(q: Floats, d_gripper: float) -> Floats:

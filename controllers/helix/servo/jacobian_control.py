@@ -12,7 +12,9 @@ from handover.cosim.blocks.ports import Floats
 REACH_TOLERANCE = 0.003
 """Distance of the model's gripper from a goal, m, beyond which the goal is out of its reach."""
 
-_STIFFENING = 100.0
+STIFFENING = 100.0
+"""How much stiffer a state becomes that is at its limit, sec. 3.3.3."""
+
 _RANK_TOLERANCE = 1e-9
 _MAX_REACH_STEPS, _REACHED = 200, 0.001
 _INSIDE = 1.0 - 1e-15  # a cropped rotation is not to exceed its bound by rounding
@@ -22,7 +24,7 @@ class Damping(NamedTuple):
     """How much of the error is left for a shorter step, where the goal cannot be met: position first, then tilt.
 
     Attributes:
-        length: error of the gripper's position, m, that weighs as much as a change of the state by one.
+        length: error of the gripper's position, m, that weighs as much as a change dq of the state with dq^T K dq = 1.
         tilt_weight: weight of the error of the vector from the wrist to the gripper, beside the position's 1.
     """
 
@@ -41,7 +43,7 @@ class ControlStep(NamedTuple):
     """Command q_sys, shape (9,), estimate q_est, shape (9,), that follows it, error |X_goal_alpha - f(q_est)|, in m.
 
     `converged` says whether the error is below epsilon_control; if not, this is the best iterate, or where the arm is
-    if no iterate is nearer to the goal.
+    if no iterate is nearer to the goal. Algorithm 1 returns nothing when it does not converge.
     """
 
     q_sys: Floats
@@ -145,8 +147,8 @@ def damped_step(J: Floats, K_inv: Floats, e: Floats, damping: Damping, dq_0: Flo
     return dq_0 + np.linalg.solve(M, z - J_z @ dq_0) @ JK
 
 
-def nearest_pose(p_BG: Floats, q_start: Floats, K: Floats, limits: Limits, d_gripper: float) -> float:
-    """Return how near the model's gripper comes to a point in B, in m, with any state within the limits."""
+def nearest_distance(p_BG: Floats, q_start: Floats, K: Floats, limits: Limits, d_gripper: float) -> float:
+    """Return how near the model's gripper comes to a point in B, in m, within the limits, by a search from q_start."""
     q, best = q_start, math.inf
     damping = Damping(length=0.003, tilt_weight=0.001)
     for _ in range(_MAX_REACH_STEPS):
@@ -160,9 +162,9 @@ def nearest_pose(p_BG: Floats, q_start: Floats, K: Floats, limits: Limits, d_gri
     return best
 
 
-def is_reached(p_BG: Floats, starts: Sequence[Floats], K: Floats, limits: Limits, d_gripper: float) -> bool:
-    """Return whether the model's gripper comes to a point in B, m, from one of these states, each within the limits."""
-    return min(nearest_pose(p_BG, q, K, limits, d_gripper) for q in starts) <= REACH_TOLERANCE
+def is_reachable(p_BG: Floats, starts: Sequence[Floats], K: Floats, limits: Limits, d_gripper: float) -> bool:
+    """Return whether the model's gripper comes to a point in B, m, within the limits, by searches from these states."""
+    return min(nearest_distance(p_BG, q, K, limits, d_gripper) for q in starts) <= REACH_TOLERANCE
 
 
 def _size(e: Floats, damping: Damping | None) -> float:
@@ -177,7 +179,8 @@ def keep_limits(q_sys: Floats, K_inv: Floats, limits: Limits) -> tuple[Floats, F
     """SKU, algorithm 2: return q_sys cropped to its limits, and K^-1 divided by 100 where it was cropped, both (9,).
 
     Of a rotation that is too large the component of greater magnitude is cropped, and keeps its sign; where the other
-    one alone exceeds the bound, both are scaled alike.
+    one alone exceeds the bound, both are scaled alike. The printed one compares signed components and does not return
+    K^-1.
     """
     q, k = q_sys.tolist(), K_inv.tolist()
     LB, UB = limits.LB.tolist(), limits.UB.tolist()
@@ -185,7 +188,7 @@ def keep_limits(q_sys: Floats, K_inv: Floats, limits: Limits) -> tuple[Floats, F
         x, y, l = 3 * i, 3 * i + 1, 3 * i + 2
         if not LB[2 * i + 1] <= q[l] <= UB[2 * i + 1]:
             q[l] = min(max(q[l], LB[2 * i + 1]), UB[2 * i + 1])
-            k[l] /= _STIFFENING
+            k[l] /= STIFFENING
         D, D_max = math.hypot(q[x], q[y]), UB[2 * i]
         if D_max >= D:
             continue
@@ -193,8 +196,8 @@ def keep_limits(q_sys: Floats, K_inv: Floats, limits: Limits) -> tuple[Floats, F
         D_max *= _INSIDE
         if abs(q[small]) < D_max:
             q[large] = math.copysign(math.sqrt(D_max * D_max - q[small] * q[small]), q[large])
-            k[large] /= _STIFFENING
+            k[large] /= STIFFENING
         else:
             q[x], q[y] = q[x] * (D_max / D), q[y] * (D_max / D)
-            k[x], k[y] = k[x] / _STIFFENING, k[y] / _STIFFENING
+            k[x], k[y] = k[x] / STIFFENING, k[y] / STIFFENING
     return np.array(q), np.array(k)

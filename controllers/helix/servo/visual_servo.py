@@ -12,7 +12,7 @@ from handover.controllers.helix.servo.approach_path import next_place
 from handover.controllers.helix.servo.constant_curvature import W_FROM_B, forward_kinematics, linearise, tendon_lengths
 from handover.controllers.helix.servo.delivery import SAME_TIME, Delivery, Phase, Verdict
 from handover.controllers.helix.servo.estimation import optimise_state, weights_of_state
-from handover.controllers.helix.servo.jacobian_control import Damping, Limits, blend, control_step, is_reached
+from handover.controllers.helix.servo.jacobian_control import Damping, Limits, blend, control_step, is_reachable
 from handover.controllers.helix.servo.progress import Progress
 from handover.controllers.helix.servo.recovery import Recovery
 from handover.controllers.helix.servo.response import Response
@@ -282,7 +282,7 @@ class VisualServo:
     def _why_stuck(self) -> Verdict:
         p, goal = self.params, self._X_goal()[3:]
         starts = (self._q_calib, self._q_sys, self._q_est)
-        if not is_reached(goal, starts, p.K_initialize, self._limits, p.d_gripper):
+        if not is_reachable(goal, starts, p.K_initialize, self._limits, p.d_gripper):
             return Verdict.OUT_OF_REACH
         d = np.hypot(self._q_sys[0::3], self._q_sys[1::3])
         q_DL = np.column_stack([d, self._q_sys[2::3]]).reshape(6)

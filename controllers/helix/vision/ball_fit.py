@@ -20,7 +20,7 @@ _CAPTURED = 1.0  # px; step of the outline after which it is known roughly
 _SETTLED, _SETTLED_ALONE = 0.2, 0.1  # px; likewise well enough: a tenth of it is 2 mm where size alone tells depth
 _ROUGHLY, _EXACTLY = (5.0, 2.5), (1.0, 0.4)  # px; tolerances of the first and the second solution of a pass
 _STRIDE = 0.02  # m; standard deviation that is expected of a step: it holds what few edges leave free
-_FEWEST = 4.0  # sum of the edges' weights; less is no ball
+_MIN_WEIGHT = 4.0  # sum of the edges' weights; less is no ball
 _STILL_THERE = 4.0  # px; the fit finds edges within 7 px
 _MAX_SHIFT = 2.0  # px; an edge that is farther off is that of something larger or smaller
 
@@ -91,7 +91,7 @@ class BallFit:
             dx, information, counted = _step(J, find(pictures, outlines), x[3], (expected, doubt), tolerances)
             x = x + dx
             behind = not min(float(c.depth(x[:3])) for c in cameras) > self._radius
-            if counted < _FEWEST or behind or abs(x[3] - mean) > _MAX_SHIFT:
+            if counted < _MIN_WEIGHT or behind or abs(x[3] - mean) > _MAX_SHIFT:
                 return None
             moved = float(np.abs(np.einsum("ij,j->i", J[:, :3], dx[:3])).max())
             if captured and moved < settled:

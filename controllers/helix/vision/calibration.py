@@ -8,7 +8,7 @@ import numpy as np
 from handover.cosim.blocks.geometry import Pinhole, quaternion_of, rotation_by
 from handover.cosim.blocks.ports import Floats
 
-FEWEST_CORNERS = 4
+MIN_CORNERS = 4
 """Corners that fix a camera's pose; the thesis clicks on six."""
 
 
@@ -17,7 +17,7 @@ class TooFewCorners(ValueError):
 
     def __init__(self, camera: str, seen: int) -> None:
         super().__init__(
-            f"the {camera} camera sees {seen} corners of the calibration box; its pose takes {FEWEST_CORNERS} at least"
+            f"the {camera} camera sees {seen} corners of the calibration box; its pose takes {MIN_CORNERS} at least"
         )
         self.camera, self.seen = camera, seen
 
@@ -51,7 +51,7 @@ def camera_pose(camera: str, clicked: Floats, p_WP: Floats, intrinsics: Floats, 
         TooFewCorners: fewer than four are seen.
     """
     seen = np.isfinite(clicked).all(axis=1)
-    if np.count_nonzero(seen) < FEWEST_CORNERS:
+    if np.count_nonzero(seen) < MIN_CORNERS:
         raise TooFewCorners(camera, int(np.count_nonzero(seen)))
     points, pixels = p_WP[seen], clicked[seen]
     lens = Pinhole(camera, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), intrinsics, distortion)

@@ -7,7 +7,6 @@ from scipy.spatial.transform import Rotation
 from handover.controllers.helix.servo.constant_curvature import (
     forward_kinematics,
     linearise,
-    segment_transform,
     tendon_lengths,
 )
 from handover.cosim.blocks.ports import Floats
@@ -16,6 +15,14 @@ D_GRIPPER, D_TENDON = 0.10, 0.035
 angles = st.floats(-np.pi / 2, np.pi / 2)
 lengths = st.floats(0.08, 0.3)
 states = st.lists(st.tuples(angles, angles, lengths), min_size=3, max_size=3).map(lambda s: np.array(s).ravel())
+
+
+def segment_transform(Dx: float, Dy: float, l: float) -> tuple[Floats, Floats]:
+    """Return rotation (3, 3) and translation (3,), in m, from a segment's end to its start, eqs. (4) and (5)."""
+    D = np.hypot(Dx, Dy)
+    A, S = 0.5 * np.sinc(D / (2 * np.pi)) ** 2, np.sinc(D / np.pi)
+    R = [[1 - A * Dx**2, -A * Dx * Dy, S * Dx], [-A * Dx * Dy, 1 - A * Dy**2, S * Dy], [-S * Dx, -S * Dy, np.cos(D)]]
+    return np.array(R), l * np.array([A * Dx, A * Dy, S])
 
 
 @given(angles, angles, lengths)

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import NonlinearConstraint, minimize
 
 from handover.controllers.helix.servo.constant_curvature import forward_kinematics, linearise
-from handover.controllers.helix.servo.jacobian_control import Damping, Limits, damped_step, nearest_pose
+from handover.controllers.helix.servo.jacobian_control import Damping, Limits, damped_step, nearest_distance
 from handover.controllers.helix.servo.recovery import Recovery
 from handover.controllers.helix.servo.response import Response
 from handover.controllers.helix.servo.servo_parameters import Params
@@ -93,7 +93,7 @@ def test_the_models_reach_is_that_of_a_general_optimiser(p_BG: tuple[float, floa
         Q_CALIB + np.tile([0.3 * p[0], 0.3 * p[1], 0.0], 3),
         Q_CALIB + np.tile([0.8 * p[0], 0.8 * p[1], -0.02], 3),
     ]
-    found = min(nearest_pose(p, q, P.K_initialize, LIMITS, 0.1) for q in starts)
+    found = min(nearest_distance(p, q, P.K_initialize, LIMITS, 0.1) for q in starts)
 
     def distance(q: Floats) -> float:
         return float(np.linalg.norm(forward_kinematics(q, 0.1)[3:] - p))
