@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from handover.controllers.helix.servo.arm_motion import FirstOrderLag
 from handover.controllers.helix.servo.estimation import PositionFilter
 from handover.controllers.helix.servo.servo_parameters import Params
 from handover.cosim.blocks.ports import Floats
@@ -16,7 +17,7 @@ class Tracker:
     """Filters of ball, wrist and the gripper's direction, [Vervloet2025] eqs. (14)-(15), in W.
 
     With `predict_motion` the wrist and the direction are expected to move as they are commanded to: by J dq, which the
-    motors let come with the response time. With `gate`, what is farther from what is expected than so many standard
+    motors let arrive with the response time. With `gate`, what is farther from what is expected than so many standard
     deviations is refused, unless `gate_steps` measurements in a row are.
 
     Attributes:
@@ -30,7 +31,7 @@ class Tracker:
         self.wrist = PositionFilter("wrist", -p.l_calib.sum() * _UP, p.P_init, p.Q_wrist, p.R_wrist)
         self.direction = PositionFilter("direction", -p.d_gripper * _UP, p.P_init, p.Q_direction, p.R_direction)
         self.unseen_O = self.unseen_R = math.inf
-        self._due: Floats = np.zeros(6)  # of wrist and direction: movement that was commanded and is to come
+        self._motion = FirstOrderLag(6, p.response_time)  # of wrist and direction, as commanded
         self._refused = [0, 0]
 
     @property
@@ -46,7 +47,7 @@ class Tracker:
 
     def expect(self, moved: Floats) -> None:
         """Expect the wrist and the direction to move by J dq, shape (6,), in W, m."""
-        self._due = self._due + moved
+        self._motion.add(moved)
 
     def advance(self, dt: float) -> None:
         """Let time pass, s; the variances grow by the part of Q that belongs to it, eq. (14)."""
@@ -54,11 +55,10 @@ class Tracker:
         share = dt / p.control_period if p.filter_pictures else 1.0
         for f in (self.ball, self.wrist, self.direction):
             f.predict(share)
-        if self._due.any():
-            come = self._due * (1.0 - math.exp(-dt / p.response_time))
-            self._due = self._due - come
-            self.wrist.position = self.wrist.position + come[:3]
-            self._turn(self.direction.position + come[3:])
+        if self._motion.pending.any():
+            arrived = self._motion.advance(dt)
+            self.wrist.position = self.wrist.position + arrived[:3]
+            self._turn(self.direction.position + arrived[3:])
         self.unseen_O += dt
         self.unseen_R += dt
 
@@ -87,11 +87,11 @@ class Tracker:
     def get_state(self) -> tuple[Any, ...]:
         """Return the complete state."""
         filters = [f.get_state() for f in (self.ball, self.wrist, self.direction)]
-        return filters, self.unseen_O, self.unseen_R, self._due, list(self._refused)
+        return filters, self.unseen_O, self.unseen_R, self._motion.pending, list(self._refused)
 
     def set_state(self, state: tuple[Any, ...]) -> None:
         """Restore what `get_state` gave."""
-        filters, self.unseen_O, self.unseen_R, self._due, self._refused = state
+        filters, self.unseen_O, self.unseen_R, self._motion.pending, self._refused = state
         for f, kept in zip((self.ball, self.wrist, self.direction), filters, strict=True):
             f.set_state(kept)
 

@@ -9,15 +9,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from handover.controllers.helix.servo.approach_path import next_place
+from handover.controllers.helix.servo.arm_motion import Response, Shaper
 from handover.controllers.helix.servo.constant_curvature import W_FROM_B, forward_kinematics, linearise, tendon_lengths
 from handover.controllers.helix.servo.delivery import SAME_TIME, Delivery, Phase, Verdict
 from handover.controllers.helix.servo.estimation import optimise_state, weights_of_state
 from handover.controllers.helix.servo.jacobian_control import Damping, Limits, blend, control_step, is_reachable
 from handover.controllers.helix.servo.progress import Progress
 from handover.controllers.helix.servo.recovery import Recovery
-from handover.controllers.helix.servo.response import Response
 from handover.controllers.helix.servo.servo_parameters import InvalidServoParameters, Params
-from handover.controllers.helix.servo.shaping import Shaper
 from handover.controllers.helix.servo.tracking import Tracker
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, Vector9, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
@@ -29,7 +28,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 _RESPONSE_MEMORY = 1.5  # s; one swing of the arm and a half (own choice)
 _LARGEST_STEP, _HALF_STEP_ERROR = 0.8, 0.08  # of the way; m, at which a growing step is half of that (own choices)
 _AT_LIMIT = 1e-6  # rad, m
-_LEVEL = 0.9  # of the tilt with which the gripper closes, with which it comes down onto the ball
+_TILT_MARGIN = 0.9  # of threshold_tilt, below which the gripper comes down onto the ball (own choice)
 
 
 @dataclass(kw_only=True)
@@ -263,7 +262,7 @@ class VisualServo:
 
     def _excess(self) -> float:
         """Return by how much the gripper is tilted too much to come down onto the ball, rad."""
-        return self._tilt() - _LEVEL * self.params.threshold_tilt
+        return self._tilt() - _TILT_MARGIN * self.params.threshold_tilt
 
     def _deliver(self, t: float) -> None:
         following = self._delivery.following(self._phase, t - self._t_close, self._error(), self._tilt())

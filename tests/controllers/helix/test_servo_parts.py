@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import NonlinearConstraint, minimize
 
+from handover.controllers.helix.servo.arm_motion import FirstOrderLag, Response, Shaper
 from handover.controllers.helix.servo.constant_curvature import forward_kinematics, linearise
 from handover.controllers.helix.servo.jacobian_control import Damping, Limits, damped_step, nearest_distance
 from handover.controllers.helix.servo.recovery import Recovery
-from handover.controllers.helix.servo.response import Response
 from handover.controllers.helix.servo.servo_parameters import Params
-from handover.controllers.helix.servo.shaping import Shaper
 from handover.cosim.blocks.ports import Floats
 
 P = Params()
@@ -40,15 +39,24 @@ def test_an_averaged_command_excites_no_swing_of_that_period(duration: float, mo
     assert max(swing) < most if duration else max(swing) > most
 
 
+def test_a_lag_lets_all_arrive_whatever_the_steps():
+    lag, arrived = FirstOrderLag(2, 0.3), np.zeros(2)
+    lag.add(np.array([1.0, -2.0]))
+    for dt in (0.1, 0.05, 0.25, 0.2):
+        arrived += lag.advance(dt)
+    np.testing.assert_allclose(arrived, (1 - np.exp(-2.0)) * np.array([1.0, -2.0]), rtol=1e-12)
+    np.testing.assert_allclose(arrived + lag.advance(np.inf), [1.0, -2.0], rtol=1e-12)
+    assert not lag.pending.any()
+
+
 @pytest.mark.parametrize("part", [1.0, 0.5, 0.3])
 def test_the_part_of_the_motion_that_is_made_is_found(part: float):
-    response, p, going = Response(1.5, 0.3, 0.1), np.zeros(3), np.zeros(3)
+    response, p, arm = Response(1.5, 0.3, 0.1), np.zeros(3), FirstOrderLag(3, 0.3)
     for n in range(30):
         motion = np.array([0.004, -0.002, 0.001])
-        going = going + part * motion
+        arm.add(part * motion)
         response.command(motion)
-        come = going * (1 - np.exp(-0.5 / 0.3))
-        going, p = going - come, p + come
+        p = p + arm.advance(0.5)
         if n % 4 < 3:  # else the ring is hidden
             response.observe(p, 0.5 * n)
     assert response.part == pytest.approx(part, abs=0.03)
