@@ -10,7 +10,7 @@ from handover.controllers.helix.servo.estimation import PositionFilter
 from handover.controllers.helix.servo.servo_parameters import Params
 from handover.cosim.blocks.ports import Floats
 
-_UP = np.array([0.0, 0.0, 1.0])
+UP = np.array([0.0, 0.0, 1.0])
 
 
 class Tracker:
@@ -28,8 +28,8 @@ class Tracker:
     def __init__(self, p: Params) -> None:
         self._params = p
         self.ball = PositionFilter("ball", np.zeros(3), p.P_init, p.Q_ball, p.R_ball)
-        self.wrist = PositionFilter("wrist", -p.l_calib.sum() * _UP, p.P_init, p.Q_wrist, p.R_wrist)
-        self.direction = PositionFilter("direction", -p.d_gripper * _UP, p.P_init, p.Q_direction, p.R_direction)
+        self.wrist = PositionFilter("wrist", -p.l_calib.sum() * UP, p.P_init, p.Q_wrist, p.R_wrist)
+        self.direction = PositionFilter("direction", -p.d_gripper * UP, p.P_init, p.Q_direction, p.R_direction)
         self.unseen_O = self.unseen_R = math.inf
         self._motion = FirstOrderLag(6, p.response_time)  # of wrist and direction, as commanded
         self._refused = [0, 0]

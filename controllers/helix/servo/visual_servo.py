@@ -8,27 +8,23 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from handover.controllers.helix.servo.approach_path import next_place
 from handover.controllers.helix.servo.arm_motion import Response, Shaper
+from handover.controllers.helix.servo.arm_paths import Recovery
 from handover.controllers.helix.servo.constant_curvature import W_FROM_B, forward_kinematics, linearise, tendon_lengths
-from handover.controllers.helix.servo.delivery import SAME_TIME, Delivery, Phase, Verdict
 from handover.controllers.helix.servo.estimation import optimise_state, weights_of_state
 from handover.controllers.helix.servo.jacobian_control import Damping, Limits, blend, control_step, is_reachable
-from handover.controllers.helix.servo.progress import Progress
-from handover.controllers.helix.servo.recovery import Recovery
 from handover.controllers.helix.servo.servo_parameters import InvalidServoParameters, Params
-from handover.controllers.helix.servo.tracking import Tracker
+from handover.controllers.helix.servo.task import SAME_TIME, Phase, Task, Verdict
+from handover.controllers.helix.servo.tracking import UP, Tracker
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, Vector9, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, Number, Radian, SquareMetre
 
 __all__ = ["Inputs", "InvalidServoParameters", "Outputs", "Params", "Phase", "Verdict", "VisualServo"]
 
-_UP = np.array([0.0, 0.0, 1.0])
 _RESPONSE_MEMORY = 1.5  # s; one swing of the arm and a half (own choice)
 _LARGEST_STEP, _HALF_STEP_ERROR = 0.8, 0.08  # of the way; m, at which a growing step is half of that (own choices)
 _AT_LIMIT = 1e-6  # rad, m
-_TILT_MARGIN = 0.9  # of threshold_tilt, below which the gripper comes down onto the ball (own choice)
 
 
 @dataclass(kw_only=True)
@@ -81,10 +77,10 @@ class VisualServo:
     ring or ball for lost_after the phase is RECOVER: back along the last commands, then a search; a ball without a ring
     from the start leads there, too. An error above threshold_retreat in DESCEND (the ball was moved), or above
     threshold_reopen while the gripper closes, leads back to APPROACH. An error that makes no progress leads to
-    GIVEN_UP, which does not close; `verdict` says why: OUT_OF_REACH if no state within the limits brings the model's
+    GIVEN_UP, which does not close; `verdict` says why: OUT_OF_REACH if no search within the limits brings the model's
     gripper to its goal, else LIMITS if the command is at one or at windup, else NO_PROGRESS.
 
-    With `delivers`, HOLD is followed by CARRY and DROP: see `Delivery`.
+    With `delivers`, HOLD is followed by CARRY and DROP: see `Delivery`. `Task` has the phases.
 
     Raises:
         InvalidServoParameters: values that contradict each other or are out of range; all faults are named.
@@ -109,31 +105,25 @@ class VisualServo:
         self._q_sys: Floats = self._q_calib
         self._q_est: Floats = self._q_calib
         self._tracker = Tracker(p)
+        self._task = Task(p, self._tracker)
         self._recovery = Recovery(self._q_calib)
         self._response = Response(_RESPONSE_MEMORY, p.response_time, p.least_response)
         self._shaper = Shaper(p.shaping_time, self._q_calib)
-        self._delivery = Delivery(p)
         self._rng = np.random.default_rng(p.seed)
-        self._phase = Phase.WAIT
-        self._verdict = Verdict.NONE
         self._t_next = -math.inf
         self._t_filtered = -math.inf
-        self._t_close = 0.0
-        self._settled = 0
-        self._searched = 0
-        self._progress = Progress(p, self._tracker.ball.position)
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command in force: no time passes, so nothing is filtered or decided."""
         return Outputs(
             dl_t=tendon_lengths(self._shaper.q, self.params.d) - self._l_t_calib,
-            closure=1.0 if self._phase in (Phase.GRASP, Phase.HOLD) or self._delivery.keeps_closed else 0.0,
-            phase=self._phase,
+            closure=1.0 if self._task.closes else 0.0,
+            phase=self._task.phase,
             q_est=np.array(self._q_est),
             q_sys=np.array(self._q_sys),
-            error=self._error(),
-            tilt=self._tilt(),
-            verdict=self._verdict,
+            error=self._task.error,
+            tilt=self._task.tilt,
+            verdict=self._task.verdict,
             p_WO_est=np.array(self._tracker.ball.position),
             p_WR_est=np.array(self._tracker.wrist.position),
             p_WG_est=self._tracker.p_WG,
@@ -154,44 +144,39 @@ class VisualServo:
         if sees:
             self._estimate()
             self._response.observe(self._tracker.p_WG, t)
-        self._decide(t)
-        if self._phase is Phase.RECOVER:
+        self._task.decide(t, self._why_stuck)
+        if self._task.phase is Phase.RECOVER:
             self._q_sys = self._recovery.next(self._q_sys)
-        elif sees and (self._phase in (Phase.APPROACH, Phase.DESCEND, Phase.CARRY) or self._follows(t)):
+        elif sees and self._task.moves(t):
             self._move()
         self._shape(t)
         return self.outputs(t + dt, u)
 
     def get_state(self) -> bytes:
-        """Return filters, states, phase and counters."""
-        counters = (self._settled, self._searched)
-        times = (self._t_next, self._t_filtered, self._t_close)
+        """Return filters, states, phase and times."""
+        times = (self._t_next, self._t_filtered)
         believed = (
             self._tracker.get_state(),
+            self._task.get_state(),
             self._recovery.get_state(),
             self._response.get_state(),
             self._shaper.get_state(),
-            self._delivery.get_state(),
-            self._progress.get_state(),
             self._rng.bit_generator,
         )
-        return pack_state((believed, self._q_sys, self._q_est, int(self._phase), int(self._verdict), times, counters))
+        return pack_state((believed, self._q_sys, self._q_est, times))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state that `get_state` gave."""
         saved: Any = unpack_state(state)
-        believed, self._q_sys, self._q_est, phase, verdict, times, counters = saved
-        tracker, recovery, response, shaper, delivery, progress, drawn = believed
+        believed, self._q_sys, self._q_est, times = saved
+        tracker, task, recovery, response, shaper, drawn = believed
         self._tracker.set_state(tracker)
+        self._task.set_state(task)
         self._recovery.set_state(recovery)
         self._response.set_state(response)
         self._shaper.set_state(shaper)
-        self._delivery.set_state(delivery)
-        self._progress.set_state(progress)
         self._rng.bit_generator.state = drawn
-        self._phase, self._verdict = Phase(phase), Verdict(verdict)
-        self._t_next, self._t_filtered, self._t_close = times
-        self._settled, self._searched = counters
+        self._t_next, self._t_filtered = times
 
     def _draw_period(self) -> float:
         p = self.params
@@ -220,66 +205,8 @@ class VisualServo:
             self._q_sys, self._X_meas(), self._q_est, A=A, bound=bound, d_gripper=p.d_gripper
         ).q_est
 
-    def _decide(self, t: float) -> None:
-        p, error, tracker = self.params, self._error(), self._tracker
-        if self._phase is Phase.WAIT and tracker.ball.seen and tracker.wrist.seen:
-            self._enter(Phase.APPROACH)
-        elif self._phase is Phase.WAIT and tracker.ball.seen and 0.0 < p.lost_after <= t:  # it may hide the ring
-            self._enter(Phase.RECOVER)
-        elif self._phase is Phase.APPROACH and error < p.threshold:
-            self._enter(Phase.DESCEND)
-        elif self._phase is Phase.DESCEND and error > p.threshold_retreat:
-            self._enter(Phase.APPROACH)
-        elif self._phase is Phase.GRASP and t - self._t_close >= p.closing_time - SAME_TIME:
-            self._enter(Phase.HOLD)
-        elif (self._follows(t) and error > p.threshold_reopen) or (self._phase is Phase.RECOVER and not self._lost()):
-            self._enter(Phase.APPROACH)
-        else:
-            self._deliver(t)
-        error = self._error()
-        near = self._phase is Phase.DESCEND and error < p.threshold_grasp
-        near = near and not (p.judge_apart and self._tilt() > p.threshold_tilt)
-        self._settled = self._settled + 1 if near else 0
-        if self._settled >= p.settle_steps:
-            self._t_close = t
-            self._enter(Phase.GRASP)
-        elif self._phase in (Phase.APPROACH, Phase.DESCEND):
-            if self._lost():
-                self._enter(Phase.RECOVER)
-            elif not self._goes_on(error):
-                self._give_up(self._why_stuck())
-        elif self._phase is Phase.CARRY and not self._goes_on(error):
-            self._give_up(Verdict.LOST_RING if self._lost() is Verdict.LOST_RING else self._why_stuck())
-        elif self._phase is Phase.RECOVER:
-            self._searched += 1
-            if self._searched > p.search_steps and (lost := self._lost()):
-                self._give_up(lost)
-
-    def _goes_on(self, error: float) -> bool:
-        """Return whether the arm still makes progress."""
-        levels = self._phase is Phase.DESCEND and self.params.standoff > 0.0 and self._excess() > 0.0
-        return self._progress.goes_on(error, self._tracker.ball.position, levels)
-
-    def _excess(self) -> float:
-        """Return by how much the gripper is tilted too much to come down onto the ball, rad."""
-        return self._tilt() - _TILT_MARGIN * self.params.threshold_tilt
-
-    def _deliver(self, t: float) -> None:
-        following = self._delivery.following(self._phase, t - self._t_close, self._error(), self._tilt())
-        if following is not self._phase:
-            self._enter(following)
-
-    def _lost(self) -> Verdict:
-        """Return whether ring or ball are lost, by the verdict for it, else NONE."""
-        lost_after = self.params.lost_after
-        if lost_after == 0.0:
-            return Verdict.NONE
-        if self._tracker.unseen_R >= lost_after:
-            return Verdict.LOST_RING
-        return Verdict.LOST_BALL if self._tracker.unseen_O >= lost_after else Verdict.NONE
-
     def _why_stuck(self) -> Verdict:
-        p, goal = self.params, self._X_goal()[3:]
+        p, goal = self.params, self._pointing_down(self._task.p_WG_goal)[3:]
         starts = (self._q_calib, self._q_sys, self._q_est)
         if not is_reachable(goal, starts, p.K_initialize, self._limits, p.d_gripper):
             return Verdict.OUT_OF_REACH
@@ -289,27 +216,22 @@ class VisualServo:
         wound_up = p.windup > 0.0 and self._ahead(self._q_sys) > 0.95 * p.windup
         return Verdict.LIMITS if wound_up or room.min() < _AT_LIMIT else Verdict.NO_PROGRESS
 
-    def _follows(self, t: float) -> bool:
-        """Return whether the arm follows the ball although the gripper closes."""
-        p = self.params
-        return self._phase is Phase.GRASP and t - self._t_close < p.follow_until * p.closing_time - SAME_TIME
-
     def _move(self) -> None:
-        p, error, X_meas = self.params, self._error(), self._X_meas()
+        p, error, X_meas = self.params, self._task.error, self._X_meas()
         growing = _LARGEST_STEP * error / (error + _HALF_STEP_ERROR)
         alpha = min(_LARGEST_STEP, max(p.alpha, growing)) if p.adaptive_step else p.alpha
         alpha = min(alpha / self._response.part, max(alpha, _LARGEST_STEP))
         commanded = control_step(
             self._q_sys,
             self._q_est,
-            blend(self._X_next(), X_meas, alpha, p.d_gripper),
+            blend(self._pointing_down(self._task.p_WG_next), X_meas, alpha, p.d_gripper),
             X_meas,
             K=p.K_initialize,
             limits=self._limits,
             epsilon_control=p.epsilon_control,
             N_max_iter=p.N_max_iter,
             d_gripper=p.d_gripper,
-            damping=Damping(p.damping, p.tilt_weight * self._progress.tilt_share) if p.judge_apart else None,
+            damping=Damping(p.damping, p.tilt_weight * self._task.progress.tilt_share) if p.judge_apart else None,
             dq_0=self._towards_posture() if p.posture > 0.0 else None,
         )
         dq = self._without_windup(commanded.q_sys) - self._q_sys
@@ -360,43 +282,6 @@ class VisualServo:
         """Filtered pose, eq. (12), in B."""
         return W_FROM_B * np.concatenate([self._tracker.wrist.position, self._tracker.p_WG])
 
-    def _X_goal(self) -> Floats:
-        """Goal of the phase, in B."""
-        p_WG = self._delivery.p_WG_goal
-        if p_WG is None:
-            above = self._phase in (Phase.WAIT, Phase.APPROACH)
-            p_WG = self._tracker.ball.position + (self.params.d_grasp_offset * _UP if above else 0.0)
-        return W_FROM_B * np.concatenate([p_WG + self.params.d_gripper * _UP, p_WG])
-
-    def _X_next(self) -> Floats:
-        """Pose to go to on the way to the goal, in B."""
-        X_goal = self._X_goal()
-        if self._delivery.p_WG_goal is not None or self._phase is Phase.GRASP:
-            return X_goal
-        p, tracker = self.params, self._tracker
-        p_WG_goal = (W_FROM_B * X_goal)[3:]
-        p_WG = next_place(
-            tracker.p_WG,
-            tracker.ball.position,
-            p_WG_goal,
-            standoff=p.standoff,
-            over=p.d_grasp_offset,
-            excess=self._excess(),
-        )
-        return W_FROM_B * np.concatenate([p_WG + p.d_gripper * _UP, p_WG])
-
-    def _error(self) -> float:
-        e = self._X_goal() - self._X_meas()
-        return math.sqrt(e[3:] @ e[3:] if self.params.judge_apart else e @ e)
-
-    def _tilt(self) -> float:
-        d = self._tracker.direction.position
-        return math.atan2(math.hypot(d[0], d[1]), -d[2])
-
-    def _enter(self, phase: Phase) -> None:
-        self._phase, self._searched = phase, 0
-        self._progress.restart(self._tracker.ball.position)
-
-    def _give_up(self, verdict: Verdict) -> None:
-        self._verdict = verdict
-        self._enter(Phase.GIVEN_UP)
+    def _pointing_down(self, p_WG: Floats) -> Floats:
+        """Return the pose of a gripper at a place in W that points down, in B."""
+        return W_FROM_B * np.concatenate([p_WG + self.params.d_gripper * UP, p_WG])

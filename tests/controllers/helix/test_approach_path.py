@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.controllers.helix.servo.approach_path import next_place
+from handover.controllers.helix.servo.arm_paths import next_place
 from handover.cosim.blocks.ports import Floats
 
 P_WO = np.array([0.1, -0.05, -0.6])

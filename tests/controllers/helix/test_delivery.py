@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.helix.servo.delivery import Delivery, Phase, Verdict
 from handover.controllers.helix.servo.servo_parameters import InvalidServoParameters
+from handover.controllers.helix.servo.task import Delivery, Phase, Verdict
 from handover.controllers.helix.servo.visual_servo import Inputs, Outputs, Params, VisualServo
 
 P_WG_DROP = np.array([0.0, -0.16, -0.64])

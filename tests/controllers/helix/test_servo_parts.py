@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import NonlinearConstraint, minimize
 
 from handover.controllers.helix.servo.arm_motion import FirstOrderLag, Response, Shaper
+from handover.controllers.helix.servo.arm_paths import Recovery
 from handover.controllers.helix.servo.constant_curvature import forward_kinematics, linearise
 from handover.controllers.helix.servo.jacobian_control import Damping, Limits, damped_step, nearest_distance
-from handover.controllers.helix.servo.recovery import Recovery
 from handover.controllers.helix.servo.servo_parameters import Params
 from handover.cosim.blocks.ports import Floats
 
