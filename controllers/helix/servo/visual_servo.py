@@ -60,6 +60,8 @@ class Outputs:
     p_WO_est: Vector3[Metre] = output("filtered position of the ball")
     p_WR_est: Vector3[Metre] = output("filtered position of the wrist")
     p_WG_est: Vector3[Metre] = output("filtered position of the gripper")
+    estimate_converged: bool = output("the last state optimisation, if any, came to its optimum, eq. (16)")
+    step_converged: bool = output("the last loop of algorithm 1, if any, came within epsilon_control of its goal")
 
 
 class VisualServo:
@@ -80,6 +82,9 @@ class VisualServo:
     GIVEN_UP, which does not close; `verdict` says why: OUT_OF_REACH if no search within the limits brings the model's
     gripper to its goal, else LIMITS if the command is at one or at windup, else NO_PROGRESS.
 
+    A state optimisation or a loop of algorithm 1 that does not converge is used as far as it came, and told by
+    `estimate_converged` and `step_converged`.
+
     With `delivers`, HOLD is followed by CARRY and DROP: see `Delivery`. `Task` has the phases.
 
     Raises:
@@ -90,7 +95,7 @@ class VisualServo:
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
         (
             *("dl_t", "closure", "phase", "q_est", "q_sys", "error", "tilt", "verdict"),
-            *("p_WO_est", "p_WR_est", "p_WG_est"),
+            *("p_WO_est", "p_WR_est", "p_WG_est", "estimate_converged", "step_converged"),
         ),
         ("p_WO_meas", "p_WR_meas", "p_WG_meas", "cov_O", "cov_R", "cov_G", "seen_O", "seen_R"),
     )
@@ -104,6 +109,7 @@ class VisualServo:
         self._l_t_calib = np.repeat(p.l_calib, 3)
         self._q_sys: Floats = self._q_calib
         self._q_est: Floats = self._q_calib
+        self._estimate_converged = self._step_converged = True
         self._tracker = Tracker(p)
         self._task = Task(p, self._tracker)
         self._recovery = Recovery(self._q_calib)
@@ -127,6 +133,8 @@ class VisualServo:
             p_WO_est=np.array(self._tracker.ball.position),
             p_WR_est=np.array(self._tracker.wrist.position),
             p_WG_est=self._tracker.p_WG,
+            estimate_converged=self._estimate_converged,
+            step_converged=self._step_converged,
         )
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
@@ -163,12 +171,13 @@ class VisualServo:
             self._shaper.get_state(),
             self._rng.bit_generator,
         )
-        return pack_state((believed, self._q_sys, self._q_est, times))
+        converged = (self._estimate_converged, self._step_converged)
+        return pack_state((believed, self._q_sys, self._q_est, times, converged))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state that `get_state` gave."""
         saved: Any = unpack_state(state)
-        believed, self._q_sys, self._q_est, times = saved
+        believed, self._q_sys, self._q_est, times, converged = saved
         tracker, task, recovery, response, shaper, drawn = believed
         self._tracker.set_state(tracker)
         self._task.set_state(task)
@@ -177,6 +186,7 @@ class VisualServo:
         self._shaper.set_state(shaper)
         self._rng.bit_generator.state = drawn
         self._t_next, self._t_filtered = times
+        self._estimate_converged, self._step_converged = converged
 
     def _draw_period(self) -> float:
         p = self.params
@@ -201,9 +211,8 @@ class VisualServo:
         p = self.params
         A = weights_of_state(p.A_pose_upd, self._q_sys, p.l_calib, p.weight_fall)
         bound = self._tracker.pose_deviation if p.bound_by_covariance else p.epsilon_pose_bound
-        self._q_est = optimise_state(
-            self._q_sys, self._X_meas(), self._q_est, A=A, bound=bound, d_gripper=p.d_gripper
-        ).q_est
+        found = optimise_state(self._q_sys, self._X_meas(), self._q_est, A=A, bound=bound, d_gripper=p.d_gripper)
+        self._q_est, self._estimate_converged = found.q_est, found.converged
 
     def _why_stuck(self) -> Verdict:
         p, goal = self.params, self._pointing_down(self._task.p_WG_goal)[3:]
@@ -234,6 +243,7 @@ class VisualServo:
             damping=Damping(p.damping, p.tilt_weight * self._task.progress.tilt_share) if p.judge_apart else None,
             dq_0=self._towards_posture() if p.posture > 0.0 else None,
         )
+        self._step_converged = commanded.converged
         dq = self._without_windup(commanded.q_sys) - self._q_sys
         if p.lost_after > 0.0:
             self._recovery.keep(self._q_sys)

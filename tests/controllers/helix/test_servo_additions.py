@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from sagging_arm import W_FROM_B, SaggingArm, ball_at
 
+from handover.controllers.helix.servo import estimation
 from handover.controllers.helix.servo.constant_curvature import forward_kinematics
 from handover.controllers.helix.servo.visual_servo import Inputs, Outputs, Params, Phase, Verdict, VisualServo
 from handover.cosim.blocks.description import describe
@@ -195,3 +196,16 @@ def test_jitter_draws_each_control_period_evenly_about_the_nominal_one():
     assert jittered.min() < 0.3
     assert jittered.max() > 0.7
     assert jittered.mean() == pytest.approx(0.5, abs=0.12)
+
+
+@pytest.mark.parametrize("most", [60, 1])
+def test_a_state_optimisation_that_fails_is_told(most: int, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(estimation, "_MAX_ITERATIONS", most)
+    y = own().run(Phase.DESCEND, ball_at(0.0))
+    assert y.estimate_converged is (most > 1)
+
+
+@pytest.mark.parametrize("epsilon_control", [0.05, 1e-9])
+def test_a_control_loop_that_does_not_come_to_its_goal_is_told(epsilon_control: float):
+    y = own(epsilon_control=epsilon_control).run(Phase.DESCEND, ball_at(0.0))
+    assert y.step_converged is (epsilon_control > 1e-3)
