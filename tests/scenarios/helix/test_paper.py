@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli
+from parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.helix
+from handover.controllers.helix.servo.jacobian_control import STIFFENING
 from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.controllers.helix.vision.handover_vision import Params as VisionParams
 from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
@@ -16,7 +18,96 @@ from handover.plants.helix.hand.partner_parameters import Params as HandParams
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.helix.calibrate_detector import calibrated_detector
 from handover.scenarios.helix.cameras import CameraPlaces, camera_parameters
-from handover.scenarios.helix.parameters import HandPlace, Parameters, Tuning
+from handover.scenarios.helix.disturbances import Disturbances
+from handover.scenarios.helix.helix_reach import ReachParameters
+from handover.scenarios.helix.parameters import Parameters, HandPlace, Task, Tuning
+
+Paper = dict[str, dict[str, dict[str, Any]]]
+
+CODE = {
+    "servo": ServoParams,
+    "arm": ArmParams,
+    "hand": HandParams,
+    "camera": CameraParams,
+    "vision": VisionParams,
+    "task": Task,
+    "disturbances": Disturbances,
+    "reach": ReachParameters,
+}
+
+GROUPS: dict[str, tuple[str, ...]] = {
+    "servo": ("servo", "own"),
+    "arm": ("arm",),
+    "hand": ("hand",),
+    "camera": ("pictures",),
+    "vision": ("vision",),
+    "task": ("task",),
+    "disturbances": ("disturbances",),
+    "reach": (),
+}
+"""Groups that have a class's parameters alone."""
+
+_OPTICS: dict[str, tuple[Any, ...]] = {
+    "p_WC_left": ("camera", "p_WC", 0),
+    "p_WC_right": ("camera", "p_WC", 1),
+    "p_WC_third": ("camera", "p_WC_top"),
+    **{
+        f"{lens}_{side}": ("camera", lens, k)
+        for lens in ("intrinsics", "distortion")
+        for k, side in enumerate(CameraPlaces.THREE.sides)
+    },
+    **{name: ("camera", name) for name in ("apothem", "marker", "rings", "ball_radius")},
+}
+_PLACE: dict[str, tuple[Any, ...]] = {
+    "alpha": ("experiment", "default_alpha"),
+    "radius": ("experiment", "radius"),
+    "height": ("experiment", "height"),
+}
+
+SHARED: dict[str, dict[str, tuple[Any, ...]]] = {
+    "servo": {
+        "alpha": ("experiment", "default_alpha"),
+        "control_period": ("experiment", "control_period"),
+        "carry_after": ("delivery", "carry_after"),
+        "threshold_drop": ("delivery", "threshold_drop", Tuning.OWN),
+    },
+    "arm": {},
+    "hand": {"bowl_depth": ("bowl", "bowl_depth")},
+    "camera": _OPTICS
+    | {"p_WB": ("hand", "p_WB"), "bowl_radius": ("hand", "bowl_radius"), "bowl_depth": ("bowl", "bowl_depth")},
+    "vision": _OPTICS
+    | {
+        "has_third": ("pictures", "has_third"),
+        "decimation": ("pictures", "decimation"),
+        "detector": ("experiment", "default_detector"),
+        "d_gripper": ("servo", "d_gripper"),
+    },
+    "task": _PLACE
+    | {
+        "control_period": ("experiment", "control_period"),
+        "threshold": ("servo", "threshold"),
+        "detector": ("experiment", "default_detector"),
+        "marker": ("camera", "marker"),
+        "rings": ("camera", "rings"),
+    },
+    "disturbances": {
+        "tremor": ("hand", "tremor_rms"),
+        "drift": ("hand", "drift_rms"),
+        "ball_mass": ("hand", "ball_mass"),
+        "finger_friction": ("hand", "finger_friction"),
+        "hand_force_max": ("hand", "force_max"),
+        "help_speed": ("hand", "help_speed"),
+        "guidance": ("hand", "guide_stiffness"),
+        "box_height": ("calibration", "box_height"),
+        "light": ("pictures", "light"),
+        "sensor_noise": ("pictures", "noise"),
+        "lost_pictures": ("pictures", "lost_pictures"),
+        "covered_markers": ("pictures", "covered_markers"),
+        "jitter": ("servo", "jitter"),
+    },
+    "reach": _PLACE | {"azimuth": ("task", "azimuth"), "patience": ("task", "patience")},
+}
+"""Parameters whose origin is that of another one: its group, its name there, and where it is a list, which element."""
 
 STATUS = {"stated", "derived", "assumed", "read off figure"}
 
@@ -24,7 +115,7 @@ FILES = sorted((Path(handover.scenarios.helix.__file__).parent.parent).glob("*/p
 
 
 @pytest.fixture(scope="module")
-def paper() -> dict[str, dict[str, dict[str, Any]]]:
+def paper() -> Paper:
     file = Path(handover.scenarios.helix.__file__).parent / "paper.toml"
     return tomli.loads(file.read_text(encoding="utf-8"))
 
@@ -44,48 +135,45 @@ def test_every_robot_has_its_paper_file():
     assert {file.parent.name for file in FILES} == experiments
 
 
-def test_the_scenarios_defaults_have_an_origin(paper: dict[str, dict[str, dict[str, Any]]]):
-    p, experiment = Parameters(), paper["experiment"]
-    assert p.radius == experiment["radius"]["value"]
-    assert p.height == experiment["height"]["value"]
-    assert p.control_period == experiment["control_period"]["value"]
-    assert p.alpha == experiment["default_alpha"]["value"]
-    assert p.detector.name.lower() == experiment["default_detector"]["value"]
-    assert p.marker == paper["camera"]["marker"]["value"]
-    assert p.rings == paper["camera"]["rings"]["value"]
-    assert [e.name.lower().replace("_", "-") for e in HandPlace] == experiment["places"]["value"]
+def origins_of(paper: Paper, name: str) -> dict[str, Any]:
+    """Return the origins of a unit's or a scenario's parameters: groups of its own, and what it shares with others."""
+    origins = {parameter: entry for group in GROUPS[name] for parameter, entry in paper[group].items()}
+    for parameter, (group, key, *index) in SHARED[name].items():
+        entry = paper[group][key]
+        origins[parameter] = entry | {"value": entry["value"][index[0]]} if index else entry
+    return origins
 
 
-def test_the_controllers_defaults_have_an_origin(paper: dict[str, dict[str, dict[str, Any]]]):
-    servo, scenario = ServoParams(), Parameters()
-    for name, entry in (paper["servo"] | paper["own"]).items():
-        assert np.array_equal(getattr(servo, name), entry["value"]), name
-        if hasattr(scenario, name):
-            assert getattr(scenario, name) == entry["value"], name
+@pytest.mark.parametrize("name", GROUPS)
+def test_every_default_has_its_origin(paper: Paper, name: str):
+    origins = origins_of(paper, name)
+    if name in ("camera", "vision"):  # turned to what all cameras look at
+        poses = camera_parameters(places=CameraPlaces.THREE)
+        for side in CameraPlaces.THREE.sides:
+            origins[f"q_WC_{side}"] = paper["camera"]["looked_at"] | {"value": poses[f"q_WC_{side}"], "unit": "1"}
+    assert_every_default_has_its_origin(origins, CODE[name])
 
 
-@pytest.mark.parametrize(("group", "plant"), [("arm", ArmParams()), ("hand", HandParams())])
-def test_the_plants_defaults_have_an_origin(
-    paper: dict[str, dict[str, dict[str, Any]]], group: str, plant: ArmParams | HandParams
-):
-    for name, entry in paper[group].items():
-        assert np.array_equal(getattr(plant, name), entry["value"]), name
+def test_the_places_are_the_published_ones(paper: Paper):
+    assert [e.name.lower().replace("_", "-") for e in HandPlace] == paper["experiment"]["places"]["value"]
 
 
-def test_the_cameras_are_where_the_paper_file_says(paper: dict[str, dict[str, dict[str, Any]]]):
-    c, sides = camera_parameters(places=CameraPlaces.THREE), CameraPlaces.THREE.sides
+def test_a_state_at_its_limit_becomes_as_stiff_as_published(paper: Paper):
+    assert paper["jacobian_control"]["stiffening"]["value"] == STIFFENING
+
+
+def test_the_ball_s_motion_along_an_axis_is_the_hand_s_tremor(paper: Paper):
+    tremor = paper["hand"]["tremor_rms"]["value"]
+    assert paper["servo"]["ball_motion"]["value"] == pytest.approx(tremor / np.sqrt(3.0), abs=5e-5)
+
+
+def test_the_cameras_are_where_the_paper_file_says(paper: Paper):
+    c = camera_parameters(places=CameraPlaces.THREE)
     assert [c["p_WC_left"].tolist(), c["p_WC_right"].tolist()] == paper["camera"]["p_WC"]["value"]
     assert c["p_WC_third"].tolist() == paper["camera"]["p_WC_top"]["value"]
-    assert [c[f"intrinsics_{side}"].tolist() for side in sides] == paper["camera"]["intrinsics"]["value"]
-    camera = CameraParams()
-    for side in sides:
-        for what in ("p_WC", "q_WC", "intrinsics", "distortion"):
-            np.testing.assert_allclose(getattr(camera, f"{what}_{side}"), c[f"{what}_{side}"], atol=1e-12)
-    for name in ("marker", "rings", "apothem", "ball_radius"):
-        assert getattr(camera, name) == paper["camera"][name]["value"], name
 
 
-def test_a_tuning_stands_for_its_settings(paper: dict[str, dict[str, dict[str, Any]]]):
+def test_a_tuning_stands_for_its_settings(paper: Paper):
     thesis = Parameters(tuning=Tuning.THESIS).settings
     assert thesis == {name: entry["value"] for name, entry in paper["thesis"].items()}
     assert set(thesis) == set(Parameters().settings)
