@@ -20,7 +20,7 @@ from handover.scenarios.helix.calibrate_detector import calibrated_detector
 from handover.scenarios.helix.cameras import CameraPlaces, camera_parameters
 from handover.scenarios.helix.disturbances import Disturbances
 from handover.scenarios.helix.helix_reach import ReachParameters
-from handover.scenarios.helix.parameters import Parameters, HandPlace, Task, Tuning
+from handover.scenarios.helix.parameters import HandPlace, Parameters, Task, Tuning
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 
