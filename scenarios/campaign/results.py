@@ -217,15 +217,18 @@ class CampaignResults:
         return text if any(mark in text for mark in ":/.") else text.replace("_", " ")
 
     def label(self, point: PointResults) -> str:
-        """Return a point's label: the values in which it differs from the others."""
+        """Return a point's label: the values in which it differs from the others, which may be none."""
         texts = [self.named_value(name, point.values[name]) for name in self.independent if name in point.values]
-        return ", ".join(texts) or "all runs"
+        return ", ".join(texts) or (DEFAULTS if self.varied else "all runs")
 
     def named_value(self, parameter: str, text: str) -> str:
         """Return a parameter's value as one reads it by itself: a number with the parameter's name."""
         value = self.value_text(parameter, text)
         return f"{parameter.replace('_', ' ')} {value}" if self.is_number(parameter) else value
 
+
+DEFAULTS = "nothing changed"
+"""Label of a point at which no varied parameter is set."""
 
 _FORMS: Mapping[str, type] = {"scenario": str, "points": list, "fixed": dict, "repetitions": int, "seed": int}
 _COLUMNS = ("run", "point", "repetition", "seed", "status", "success", "reason", "cpu_seconds", "wall_seconds")

@@ -61,7 +61,13 @@ _NOTHING_SEEN = 10.0
 _GRIP_CLOSED = 0.999
 """Closure at which a gripper has closed, of a controller that does not say so."""
 
-_MOMENTS = {"APPROACH": "approach", "DESCEND": "descent", "GRASP": "at the ball", "CARRY": "carrying"}
+_RECENT = 10.0
+"""Time before the end for which a run that ran out of time is told how near the arm came, s: once or twice as long."""
+
+_BROUGHT = 0.01
+"""Distance of ball and closing gripper from which a success tells that the person brought the ball, m."""
+
+_MOMENTS = {"APPROACH": "approach", "DESCEND": "descent", "GRASP": "gripper begins to close", "CARRY": "carrying"}
 _COVERED = "lens covered"
 
 
@@ -117,11 +123,16 @@ class HandoverEvaluator(Evaluator):
         self._mismatch: ModelMismatch | None = None  # when the gripper began to close
         self._error = 0.0
         self._gives_error = False
-        self._nearest = np.inf
+        self._nearest = [np.inf, np.inf]  # error in the present interval of _RECENT, and in the one before
+        self._unseen = {"ball": 0.0, "ring": 0.0}  # time for which vision did not see them, s
+        self._ever_seen = {"ball": False, "ring": False}
+        self._tilt = 0.0
+        self._threshold_grasp = 0.0
         self._grasp_began: float | None = None  # the last time
         self._closing_distance = 0.0  # then
         self._released_at: float | None = None
         self._hand_force = 0.0  # largest on the hand
+        self._pressing = 0.0  # likewise, while the arm touches the hand or what it holds
         self._control_period: float | None = float(parameters.period)  # s; None: the controller tells of none
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
@@ -130,6 +141,7 @@ class HandoverEvaluator(Evaluator):
         period = None if servo is None else servo.start.get("control_period")
         ticks_otherwise = servo is not None and servo.description.sampled and servo.description.step != period
         self._control_period = None if ticks_otherwise else period
+        self._threshold_grasp = 0.0 if servo is None else float(servo.start.get("threshold_grasp", 0.0))
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Follow phases and positions."""
@@ -140,8 +152,7 @@ class HandoverEvaluator(Evaluator):
         self._p_GO = np.transpose(rotation_of(signals["arm.q_WG"])) @ (self._p_WO - self._p_WG)
         self._gives_error = "servo.error" in signals
         self._error = float(signals["servo.error"]) if self._gives_error else self.distance
-        if phase in ("APPROACH", "DESCEND"):
-            self._nearest = min(self._nearest, self._error)
+        self._follow_approach(t, phase, signals)
         self._t = t
         if not self._pictures:
             self._keep("start", signals)
@@ -160,7 +171,23 @@ class HandoverEvaluator(Evaluator):
             self._released_at, self._offset = t, self._p_GO
         self._phase, self._holder = phase, holder
         if "hand.f_H" in signals:
-            self._hand_force = max(self._hand_force, float(np.linalg.norm(signals["hand.f_H"])))
+            force = float(np.linalg.norm(signals["hand.f_H"]))
+            self._hand_force = max(self._hand_force, force)
+            if "hand.f_G" not in signals or np.any(signals["hand.f_G"]):
+                self._pressing = max(self._pressing, force)
+
+    def _follow_approach(self, t: float, phase: str, signals: Signals) -> None:
+        """Keep how near the arm has come of late, how it is tilted, and for how long ball and ring were not seen."""
+        if t // _RECENT > self._t // _RECENT:
+            self._nearest = [np.inf, self._nearest[0]]
+        if phase in ("APPROACH", "DESCEND"):
+            self._nearest[0] = min(self._nearest[0], self._error)
+        self._tilt = float(signals["servo.tilt"]) if "servo.tilt" in signals else 0.0
+        for what, signal in (("ball", "vision.seen_O"), ("ring", "vision.seen_R")):
+            if signal not in signals or signals[signal]:
+                self._ever_seen[what] = True
+            else:
+                self._unseen[what] += t - self._t
 
     def finish(self, signals: Signals) -> None:
         """Keep the last picture."""
@@ -209,7 +236,7 @@ class HandoverEvaluator(Evaluator):
     @property
     def _is_pressed(self) -> bool:
         """Whether the arm has pressed harder on the hand than the person lets it."""
-        return self._hand_force > self.parameters.hand_force_max
+        return self._pressing > self.parameters.hand_force_max
 
     @property
     def distance(self) -> float:
@@ -226,13 +253,12 @@ class HandoverEvaluator(Evaluator):
         metrics: dict[str, Metric] = {}
         if self._has_seen:  # else the run failed before anything was there to be measured
             metrics["final_distance"] = Metric(self.distance, "m", "gripper to ball at the end, ground truth")
-        if self._gives_error and np.isfinite(
-            self._nearest
-        ):  # else the controller never saw ball and arm, and its error means nothing
+        approached = bool(self.phases.keys() & {"APPROACH", "DESCEND"})
+        if self._gives_error and approached:  # else it never saw ball and arm, and its error means nothing
             metrics["controller_error"] = Metric(self._error, "m", "error that the controller saw last")
         if grasp_began is not None:
             metrics["arm_time"] = Metric(grasp_began, "s", "from the start until the gripper begins to close")
-            if self._control_period is not None:
+            if self._control_period is not None and not self.parameters.jitter:
                 steps = round(grasp_began / self._control_period) + 1
                 metrics["steps"] = Metric(steps, "1", "control steps until the gripper begins to close")
             metrics["closing_distance"] = Metric(
@@ -259,15 +285,19 @@ class HandoverEvaluator(Evaluator):
 
     def _reason(self, success: bool) -> str:
         if success:
-            return f"the ball left the hand at {self._released_at:.1f} s and the gripper holds it"
+            taken = f"the ball left the hand at {self._released_at:.1f} s and the gripper holds it"
+            if self.parameters.help_speed > 0.0 and self._closing_distance > _BROUGHT:
+                taken += f"; it was {self._closing_distance:.3f} m away as the gripper began to close, and was brought"
+            return taken
         where = f"ball at {_format_point(self._p_WO)} m, gripper at {_format_point(self._p_WG)} m"
         if self._phase == "WAIT" and self._t >= self._deadline:
-            return f"the cameras did not see both ball and arm within {self._deadline:.0f} s; {where}"
+            unseen = " and ".join(what for what, seen in self._ever_seen.items() if not seen) or "ball and ring at once"
+            return f"the cameras did not see {unseen} within {self._deadline:.0f} s; {where}"
         if self._phase == "GIVEN_UP":
             return f"{self._why_given_up()}: the gripper stays {self._error:.3f} m from its goal; {where}"
         if self._is_pressed:
             most = self.parameters.hand_force_max
-            return f"the arm pressed on the hand with {self._hand_force:.1f} N, and a person bears {most:g} N; {where}"
+            return f"the arm pressed on the hand with {self._pressing:.1f} N, and a person bears {most:g} N; {where}"
         if self._released_at is not None:
             return f"the ball left the hand at {self._released_at:.1f} s, and the gripper did not keep it; {where}"
         if self._holder == "FREE":
@@ -280,10 +310,21 @@ class HandoverEvaluator(Evaluator):
             )
         if self._t < self._deadline:
             return f"stopped at {self._t:.1f} s in phase {self._phase}, before the handover was done"
-        reach = "out of reach or too slow" if self._nearest > 2 * self.parameters.threshold else "no grasp"
+        return f"{self._why_too_late()}; {where}"
+
+    def _why_too_late(self) -> str:
+        """Return why a run's patience ended before the gripper closed for good."""
+        patience, nearest = self.parameters.patience, min(self._nearest)
+        lost, unseen = max(self._unseen.items(), key=lambda item: item[1])
+        if self._phase == "RECOVER" or unseen > 0.5 * self._t:
+            return f"lost {lost}: of {patience:.0f} s it was not seen for {unseen:.0f} s"
         goal = "its goal" if self._gives_error else "the ball"
-        within = f"within {self.parameters.patience:.0f} s"
-        return f"{reach}: {within} the arm came no nearer than {self._nearest:.3f} m to {goal}; {where}"
+        if nearest < self._threshold_grasp:
+            tilted = f", tilted by {np.degrees(self._tilt):.0f}° at the end" if self._tilt else ""
+            came = f"of late the gripper came within {nearest:.3f} m of {goal}"
+            return f"no grasp: {came}, but did not stay there{tilted}"
+        reach = "out of reach or too slow" if nearest > 2 * self.parameters.threshold else "no grasp"
+        return f"{reach}: after {patience:.0f} s the arm came no nearer than {nearest:.3f} m to {goal}"
 
 
 def _mismatch_metrics(m: ModelMismatch) -> dict[str, Metric]:

@@ -87,6 +87,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
     places: ClassVar[Mapping[str, Place]] = PLACES
     headline: ClassVar[tuple[str, ...]] = (
         "final_distance",
+        "closing_distance",
         "grasp_offset_lateral",
         "grasp_offset_axial",
         "steps",
@@ -110,7 +111,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
         from handover.scenarios.helix.workspace import notes_on_place  # likewise
 
         s = System()
-        s.notes += notes_on_place(p.p_WO, p.cameras)
+        s.notes += notes_on_place(p.p_WO, p.cameras, p.marker)
         try:
             calibration = calibrated(p.click_noise, click_seed, p.box_height, p.cameras)
         except TooFewCorners as e:

@@ -110,7 +110,7 @@ class HelixReach(Experiment[ReachEvaluator]):
             cov_O=known,
             cov_R=known,
             cov_G=known,
-            **paper_values("helix", "own"),
+            **{**paper_values("helix", "own"), "threshold_accept": 0.0},  # near is not there
         )
         arm = s.add("arm", fmu("arm"))
         hand = s.add("hand", fmu("hand"), p_WO_0=parameters.p_WO, room=0.0, tremor_rms=0.0, drift_rms=0.0)

@@ -30,7 +30,7 @@ _COVARIANCES = {
 _TUNED = dict.fromkeys(
     (
         *("judge_apart", "windup", "follow_until", "lost_after", "use_covariance", "filter_pictures", "predict_motion"),
-        *("shaping_time", "least_response", "posture", "standoff"),
+        *("shaping_time", "least_response", "posture", "standoff", "threshold_accept"),
         *("K_initialize", "gate", "Q_ball", "Q_wrist", "Q_direction"),
     ),
     "by the scenario's tuning",

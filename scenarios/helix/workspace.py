@@ -13,6 +13,9 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.helix.cameras import MIN_MARKER_SIDE, PICTURE, CameraPlaces, pinholes
 
+_OUTSIDE = "ball or markers lie outside of the picture"
+_TOO_SMALL = f"markers are less than {MIN_MARKER_SIDE:g} px wide"
+
 
 def cameras_that_see(p_WO: Floats, places: CameraPlaces = CameraPlaces.BEHIND) -> int:
     """Return in how many pictures ball and marker ring are whole, with the gripper at the ball and pointing down.
@@ -26,17 +29,25 @@ def cameras_that_see(p_WO: Floats, places: CameraPlaces = CameraPlaces.BEHIND) -
     return sum(_sees(camera, p_WO) for camera in pinholes(places=places).values())
 
 
-def _sees(camera: Pinhole, p_WO: Floats) -> bool:
+def _sees(camera: Pinhole, p_WO: Floats, marker: float | None = None) -> bool:
+    """Return whether a camera sees ball and ring whole, with markers of this side, m, or the usual one."""
+    return not _hidden(camera, p_WO, marker)
+
+
+def _hidden(camera: Pinhole, p_WO: Floats, marker: float | None) -> str:
+    """Return why a camera does not see ball and ring whole; "" if it does."""
     values, d_gripper = paper_values("helix", "camera"), float(paper_values("helix", "arm")["d_gripper"])
     p_WR = p_WO + np.array([0.0, 0.0, d_gripper])
     depth_O, depth_R = (float(camera.depth(p)) for p in (p_WO, p_WR))
     if min(depth_O, depth_R) <= 0.0:
-        return False
-    ring = p_WR + MarkerRing(values["apothem"], values["marker"]).outline
+        return _OUTSIDE
+    side_length = values["marker"] if marker is None else marker
+    ring = p_WR + MarkerRing(values["apothem"], side_length).outline
     edge = float(camera.f.max()) * values["ball_radius"] / depth_O
-    side = float(camera.f.min()) * values["marker"] / depth_R
-    inside = _is_inside(camera.project(p_WO)[None], edge) and _is_inside(camera.project(ring), 0.0)
-    return inside and side >= MIN_MARKER_SIDE
+    side = float(camera.f.min()) * side_length / depth_R
+    if not (_is_inside(camera.project(p_WO)[None], edge) and _is_inside(camera.project(ring), 0.0)):
+        return _OUTSIDE
+    return "" if side >= MIN_MARKER_SIDE else _TOO_SMALL
 
 
 def _is_inside(pixels: Floats, margin: float) -> bool:
@@ -54,21 +65,36 @@ def reach(height: float) -> float:
     return float(np.interp(height, heights, radii, left=0.0, right=0.0))
 
 
-def notes_on_place(p_WO: Floats, places: CameraPlaces = CameraPlaces.BEHIND) -> Sequence[str]:
+def notes_on_place(
+    p_WO: Floats, places: CameraPlaces = CameraPlaces.BEHIND, marker: float | None = None
+) -> Sequence[str]:
     """Return why a handover at a place will hardly succeed, a line for each reason; none where nothing is known.
 
     Args:
         p_WO: the ball in W, shape (3,), m.
         places: of the cameras.
+        marker: side of a marker, m; None: the usual one.
     """
     r, height = float(np.hypot(p_WO[0], p_WO[1])), float(p_WO[2])
     place = f"the ball is offered {r:.2f} m from the arm's axis at a height of {height:.2f} m"
-    notes: list[str] = []
-    far = reach(height)
-    if far == 0.0 or r > far:
-        where = f"is sure to reach {far:.2f} m far there" if far > 0.0 else "is not known to reach that height"
-        notes.append(f"{place}, but the arm {where}, whatever the direction")
-    seeing = cameras_that_see(p_WO, places)
-    if seeing < 2:
-        notes.append(f"{place}, where {('no camera sees', 'one camera alone sees')[seeing]} ball and markers whole")
+    notes = [f"{place}, but the arm {short}"] if (short := short_of_reach(p_WO)) else []
+    cameras = pinholes(places=places)
+    hidden = {name: why for name, camera in cameras.items() if (why := _hidden(camera, p_WO, marker))}
+    if len(cameras) - len(hidden) < 2:
+        seen = "no camera sees" if len(hidden) == len(cameras) else "one camera alone sees"
+        reasons = "; ".join(f"{name}: {why}" for name, why in hidden.items())
+        notes.append(f"{place}, where {seen} ball and markers whole ({reasons})")
     return notes
+
+
+def short_of_reach(p_WG: Floats) -> str:
+    """Return how far the arm is sure to reach at a place's height, if the place is farther; "" if it is not.
+
+    Args:
+        p_WG: where the gripper is to be in W, pointing down, shape (3,), m.
+    """
+    far, r = reach(float(p_WG[2])), float(np.hypot(p_WG[0], p_WG[1]))
+    if far > 0.0 and r <= far:
+        return ""
+    where = f"is sure to reach {far:.2f} m far there" if far > 0.0 else "is not known to reach that height"
+    return f"{where}, whatever the direction"

@@ -29,6 +29,9 @@ from handover.scenarios.published.published_experiment import Claim, Verdict
 FEW = 0.10
 """Share of runs below which something counts as not happening."""
 
+_MIN_FOR_EVERY = 4
+"""Trials of which something is concluded that is to succeed every time."""
+
 _MIN_DIFFERING = next(k for k in range(1, 64) if 2.0 ** (1 - k) < LEVEL)
 """Pairs that must differ, all in one direction, for McNemar's exact test to reject."""
 
@@ -63,7 +66,7 @@ def rate_claim(claim: str, where: str, published: tuple[int, int], measured: tup
 
 
 def every_claim(claim: str, where: str, published: tuple[int, int], measured: tuple[int, int], note: str = "") -> Claim:
-    """Judge that every trial succeeds: it is reproduced if ours all do, however many.
+    """Judge that every trial succeeds: it is reproduced if ours all do; of fewer than four nothing is concluded.
 
     Beyond the paper, `published` is (0, 0), and it holds or not.
     """
@@ -80,8 +83,8 @@ def every_claim(claim: str, where: str, published: tuple[int, int], measured: tu
         published=told,
         measured=format_rate(*measured),
         interval=(interval.low, interval.high),
-        verdict=Verdict.REPRODUCED if all_do else Verdict.NOT_REPRODUCED,
-        reason=f"{rule} {note}".strip(),
+        verdict=_verdict(all_do, could_be_either=measured[1] >= _MIN_FOR_EVERY),
+        reason=_with_shortfall(f"{rule} {note}", measured[1], _MIN_FOR_EVERY),
         where=where,
         beyond=not published[1],
     )

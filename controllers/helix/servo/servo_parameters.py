@@ -193,6 +193,11 @@ class Params:
         0.015, "error at which the gripper opens above the place (own; thesis: 0.05)", minimum=0.0
     )
     patience: int = parameter(60, "control steps without progress before the arm gives up (own choice)", minimum=1)
+    threshold_accept: Metre = parameter(
+        0.01,
+        "error at which the gripper closes where it makes no more progress; 0: it gives up (own; thesis: 0)",
+        minimum=0.0,
+    )
     progress: Metre = parameter(0.001, "change of the error that is progress (own choice)", minimum=0.0)
     max_steps: int = parameter(1000, "control steps before the arm gives up (own choice)", minimum=1)
     P_init: SquareMetre = parameter(2000.0, "variance of all three filters before the first measurement", minimum=0.0)

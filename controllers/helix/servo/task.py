@@ -234,17 +234,18 @@ class Task:
         if following is not self.phase:
             self._enter(following)
         error, p = self.error, self._params
-        near = self.phase is Phase.DESCEND and error < p.threshold_grasp
-        near = near and not (p.judge_apart and self.tilt > p.threshold_tilt)
-        self._settled = self._settled + 1 if near else 0
+        may_close = self.phase is Phase.DESCEND and not (p.judge_apart and self.tilt > p.threshold_tilt)
+        self._settled = self._settled + 1 if may_close and error < p.threshold_grasp else 0
         if self._settled >= p.settle_steps:
-            self._t_close = t
-            self._enter(Phase.GRASP)
+            self._close(t)
         elif self.phase in (Phase.APPROACH, Phase.DESCEND):
             if self._lost():
                 self._enter(Phase.RECOVER)
             elif not self._goes_on(error):
-                self._give_up(why_stuck())
+                if may_close and error < p.threshold_accept:
+                    self._close(t)
+                else:
+                    self._give_up(why_stuck())
         elif self.phase is Phase.CARRY and not self._goes_on(error):
             self._give_up(Verdict.LOST_RING if self._lost() is Verdict.LOST_RING else why_stuck())
         elif self.phase is Phase.RECOVER:
@@ -305,6 +306,10 @@ class Task:
         if self._tracker.unseen_R >= lost_after:
             return Verdict.LOST_RING
         return Verdict.LOST_BALL if self._tracker.unseen_O >= lost_after else Verdict.NONE
+
+    def _close(self, t: float) -> None:
+        self._t_close = t
+        self._enter(Phase.GRASP)
 
     def _enter(self, phase: Phase) -> None:
         self.phase, self._searched = phase, 0

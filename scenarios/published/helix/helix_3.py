@@ -1,6 +1,5 @@
 """The use case of [Vervloet2025], fig. 13: the Helix takes a ball from a hand and drops it into a bowl."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure
 from handover.scenarios.helix.helix_use_case import UseCaseParameters
 from handover.scenarios.helix.parameters import HandPlace, Tuning
+from handover.scenarios.published.helix.helix_cases import reasons_of
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 from handover.scenarios.published.verdicts import every_claim, format_median
 
@@ -165,13 +165,12 @@ def _arms(table: CampaignTable) -> tuple[UseCaseRuns, UseCaseRuns]:
 
 def _row(arm: UseCaseRuns) -> list[str]:
     succeeded, tried = arm.count
-    failures = Counter(str(row["reason"]).partition(":")[0] for row in arm.rows if not row["success"])
     return [
         arm.title,
         f"{succeeded} of {tried}",
         *(format_median(arm.metric(name), 1) for name in ("arm_time", "carry_time", "task_time")),
         format_median(1000 * arm.metric("drop_offset"), 1),
-        ", ".join(f"{why} ({n})" for why, n in failures.items()),
+        reasons_of(arm.rows),
     ]
 
 

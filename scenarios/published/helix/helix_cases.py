@@ -137,7 +137,7 @@ def _reason(reason: str) -> str:
     for words, short in _SHORT.items():
         if words in reason:
             return short
-    return reason.partition(":")[0]
+    return reason.removeprefix("no handover: ").partition(":")[0]
 
 
 _SHORT = {
@@ -145,5 +145,5 @@ _SHORT = {
     "the hand kept the ball": "closed beside the ball",
     "did not keep it": "lost the ball again",
     "was pushed out of the hand": "pushed the ball out of the hand",
-    "did not see both ball and arm": "ball and arm not seen",
+    "the cameras did not see": "ball or ring not seen",
 }

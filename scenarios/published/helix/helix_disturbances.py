@@ -116,7 +116,7 @@ class HelixDisturbances(PublishedExperiment):
                     "failed because",
                 ],
                 rows=rows,
-                note=f"Each at {len(OFFERED_AT)} places, with the same seeds. Distances are between gripper and ball "
+                note="All at the same places, with the same seeds. Distances are between gripper and ball "
                 "when the gripper begins to close and at the end, by ground truth, median and in brackets the largest, "
                 "of the handovers that succeeded; steps are control steps until the gripper begins to close.",
             )
@@ -137,7 +137,7 @@ class HelixDisturbances(PublishedExperiment):
             axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
         caption = (
             "Distance of gripper and ball at the end, by ground truth, with one thing amiss at a time: each point is a "
-            f"handover at one of {len(OFFERED_AT)} places."
+            "handover, all at the same places."
         )
         return [Figure("disturbances", caption)]
 

@@ -27,14 +27,17 @@ def views_and_ports(
     along: float = 0.0,
     sees_ball: bool = True,
     hand_force: float = 0.2,
+    error: float = 0.01,
+    touching: bool = True,
 ) -> tuple[Views, Ports]:
     """Return what a gripper that hangs down, and a ball at a place in its frame, would show."""
     reals = {
         "arm": {"p_WG": P_WG, "q_WG": [0.0, 1.0, 0.0, 0.0]},
         "hand": {"p_WO": P_WG + np.array([beside, 0.0, -along]), "f_H": np.array([0.0, 0.0, -hand_force])},
-        "servo": {"error": [0.01], "p_WO_est": P_WG, "p_WR_est": P_WG, "p_WG_est": P_WG, "q_sys": CALIBRATED},
+        "servo": {"error": [error], "p_WO_est": P_WG, "p_WR_est": P_WG, "p_WG_est": P_WG, "q_sys": CALIBRATED},
         "vision": {"p_WO_meas": P_WG, "p_WR_meas": P_WR, "p_WG_meas": P_WG},
     }
+    reals["hand"]["f_G"] = np.array([0.0, 0.0, 0.1 if touching else 0.0])
     units: Views = {
         unit: {name: (np.array(value),) for name, value in values.items()} for unit, values in reals.items()
     }

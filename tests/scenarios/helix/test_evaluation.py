@@ -24,9 +24,11 @@ def signals(
     sees_ball: bool = True,
     verdict: Verdict = Verdict.NONE,
     hand_force: float = 0.2,
+    error: float = 0.01,
+    touching: bool = True,
 ) -> Signals:
     """Return what a gripper that hangs down, and a ball at a place in its frame, would show."""
-    units, ports = views_and_ports(phase, holder, beside, along, sees_ball, hand_force)
+    units, ports = views_and_ports(phase, holder, beside, along, sees_ball, hand_force, error, touching)
     units["servo"]["verdict"] = (np.array([int(verdict)]),)
     items = tuple((v.name, int(v)) for v in Verdict)
     ports["servo"]["verdict"] = port("verdict", Kind.ENUMERATION, items=items)
@@ -121,7 +123,13 @@ def moments(evaluator: HandoverEvaluator) -> dict[str, float]:
 def test_pictures_are_of_the_start_the_first_entries_into_phases_and_the_end():
     course = (Phase.WAIT, Phase.APPROACH, Phase.DESCEND, Phase.APPROACH, Phase.DESCEND, Phase.GRASP, Phase.DESCEND)
     evaluator = follow(*((float(t), signals(phase)) for t, phase in enumerate((*course, Phase.GRASP, Phase.HOLD))))
-    assert moments(evaluator) == {"start": 0.0, "approach": 1.0, "descent": 2.0, "at the ball": 5.0, "end": 8.0}
+    assert moments(evaluator) == {
+        "start": 0.0,
+        "approach": 1.0,
+        "descent": 2.0,
+        "gripper begins to close": 5.0,
+        "end": 8.0,
+    }
 
 
 def test_a_run_that_timed_out_has_a_start_and_an_end():
@@ -208,7 +216,48 @@ def test_a_run_that_was_stopped_while_it_waits_is_not_told_that_nothing_was_seen
         follow((0.0, signals(Phase.WAIT)), (0.3, signals(Phase.WAIT))).outcome().reason.startswith("stopped at 0.3 s")
     )
     late = follow((0.0, signals(Phase.WAIT)), (10.0, signals(Phase.WAIT))).outcome().reason
-    assert late.startswith("the cameras did not see both ball and arm within 10 s")
+    assert late.startswith("the cameras did not see ball and ring at once within 10 s")
+    blind = signals(Phase.WAIT, sees_ball=False)
+    assert follow((0.0, blind), (10.0, blind)).outcome().reason.startswith("the cameras did not see ball within 10 s")
+
+
+@pytest.mark.parametrize(
+    ("error", "seen", "why"),
+    [
+        (0.3, True, "out of reach or too slow: after 60 s the arm came no nearer than 0.300 m to its goal; "),
+        (0.02, True, "no grasp: after 60 s the arm came no nearer than 0.020 m to its goal; "),
+        (0.002, True, "no grasp: of late the gripper came within 0.002 m of its goal, but did not stay there; "),
+        (0.02, False, "lost ball: of 60 s it was not seen for 60 s; "),
+    ],
+)
+def test_a_run_out_of_time_says_why_by_what_was_so_at_its_end(error: float, seen: bool, why: str):
+    begin, end = signals(Phase.APPROACH, error=0.001), signals(Phase.DESCEND, sees_ball=seen, error=error)
+    evaluator = HandoverEvaluator(Parameters())
+    system = System()
+    system.add("servo", cached("VisualServo", 3), threshold_grasp=0.003)
+    evaluator.note_units(system.units)
+    evaluator(0.0, begin if seen else end)
+    for t in range(1, 61):
+        evaluator(float(t), end)
+    assert evaluator.over
+    assert evaluator.outcome().reason.startswith(why)
+
+
+def test_a_ball_that_the_person_brought_is_told():
+    course = ((8.0, signals(Phase.GRASP, beside=0.071)), (20.0, signals(Phase.HOLD, Holder.GRIPPER)))
+    brought = follow(*course, parameters=Parameters(help_speed=0.05)).outcome()
+    assert brought.success
+    assert brought.reason.endswith("it was 0.071 m away as the gripper began to close, and was brought")
+    assert "brought" not in follow(*course).outcome().reason
+
+
+def test_what_the_hand_bears_without_being_touched_is_no_pressing():
+    untouched = follow((1.0, signals(Phase.APPROACH, hand_force=5.2, touching=False)))
+    assert not untouched.over
+    assert untouched.outcome().metrics["hand_force"].value == pytest.approx(5.2)
+    pressed = follow((1.0, signals(Phase.APPROACH, hand_force=5.2)))
+    assert pressed.over
+    assert pressed.outcome().reason.startswith("the arm pressed on the hand with 5.2 N")
 
 
 def test_control_steps_are_counted_by_the_period_that_the_controller_is_set_to():

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from handover.scenarios.helix.cameras import CameraPlaces
 from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.helix.parameters import Parameters
 from handover.scenarios.helix.workspace import cameras_that_see, notes_on_place, reach
-from handover.scenarios.published.helix.helix_workspace import HelixWorkspace, reach_by_place
+from handover.scenarios.published.helix.helix_workspace import AZIMUTHS, HEIGHTS, RADII, HelixWorkspace, reach_by_place
 from handover.scenarios.published.published_experiment import Verdict
 
 
@@ -40,7 +41,15 @@ def test_a_third_camera_sees_a_place_besides():
     assert cameras_that_see(place, CameraPlaces.THREE) == 3
     (far, seen) = notes_on_place(np.array([0.0, 0.6, -0.6]), CameraPlaces.THREE)
     assert "but the arm is sure to reach" in far
-    assert seen.endswith("where one camera alone sees ball and markers whole")
+    outside = "ball or markers lie outside of the picture"
+    assert seen.endswith(f"where one camera alone sees ball and markers whole (left: {outside}; third: {outside})")
+
+
+def test_markers_that_are_too_small_to_read_are_told_apart_from_those_out_of_the_picture():
+    far, small = notes_on_place(np.array([0.5, 0.0, -0.6]))
+    assert "but the arm is sure to reach" in far
+    assert small.endswith("(left: markers are less than 14 px wide; right: markers are less than 14 px wide)")
+    assert len(notes_on_place(np.array([0.5, 0.0, -0.6]), marker=0.024)) == 1
 
 
 def test_places_within_the_workspace_have_no_notes():
@@ -56,7 +65,7 @@ def test_a_place_beyond_it_is_noted_with_how_far_the_arm_reaches():
     )
     high, unseen = notes_on_place(np.array([0.0, 0.0, -0.05]))
     assert high.endswith("but the arm is not known to reach that height, whatever the direction")
-    assert unseen.endswith("where no camera sees ball and markers whole")
+    assert "where no camera sees ball and markers whole (left: ball or markers lie outside" in unseen
 
 
 def test_the_scenario_passes_the_notes_on():
@@ -86,10 +95,12 @@ def test_the_reach_is_the_distance_up_to_which_all_places_are_reached():
 @pytest.mark.parametrize(("off", "verdict"), [(0.0, Verdict.REPRODUCED), (0.03, Verdict.NOT_REPRODUCED)])
 def test_a_reach_that_is_no_longer_the_one_found_is_told(off: float, verdict: Verdict):
     rows = [
-        {"azimuth": 0.0, "height": -0.6, "radius": r, "success": r <= reach(-0.6) + off + 1e-9, "status": "done"}
-        for r in (reach(-0.6), reach(-0.6) + 0.03)
+        {"azimuth": a, "height": z, "radius": r, "success": r <= reach(z) + off + 1e-9, "status": "done"}
+        for a, z, r in product(AZIMUTHS, HEIGHTS, RADII)
     ]
     assert HelixWorkspace().claims(CampaignTable(pa.Table.from_pylist(rows)))[-1].verdict is verdict
+    part = HelixWorkspace().claims(CampaignTable(pa.Table.from_pylist(rows[:-1])))
+    assert [claim.verdict for claim in part] == [Verdict.NOT_COMPARABLE] * 2
 
 
 @pytest.mark.slow
