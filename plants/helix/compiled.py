@@ -49,6 +49,11 @@ def compiled(function: Callable[P, T]) -> Callable[P, T]:
     return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
+def compiled_inline(function: Callable[P, T]) -> Callable[P, T]:
+    """Compile a function into those that call it, for parts of one: passing many numbers costs as much as a contact."""
+    return _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
+
+
 def _compile(function: Callable[P, T], **options: bool) -> Callable[P, T]:
     if _numba is None:
         return function

@@ -10,12 +10,13 @@ and along the surface by friction with a spring xi of Cundall and Strack, which 
 
     f_t = -k xi - c v_t,  |f_t| <= mu f_n,  xi' = v_t while it sticks,  c = sqrt(k m_O) / 2.
 
-The hand's soft skin resists rolling likewise, M = -k r^2 theta - c_r w with |M| <= r (mu_r f_n + mu_H f_hold) and
-theta' = w while it sticks (K. Iwashita, M. Oda, J. Eng. Mech. 124 (1998)). As long as the person holds the ball, thumb
-and fingers press it with f_hold to the palm, which raises the palm's f_n, and with it its friction. The ball, a solid
-sphere of mass m_O, moves and turns freely, I = 2/5 m_O r^2. A person holds the hand as a mass on a damped spring about
-the place where it is held out, m_H x'' = f_H - c_H x' - k_H x. Finger tips that come to the hand's surface press on it
-without friction; the hand's own fingers, and the backs of links, touch nothing.
+The hand's soft skin resists rolling and spinning likewise, M = -k r^2 theta - r^2 c w with
+|M| <= r (mu_r f_n + mu f_hold), k and mu the hand's, and theta' = w while it sticks (K. Iwashita, M. Oda, J. Eng.
+Mech. 124 (1998)). As long as the person holds the ball, thumb and fingers press it with f_hold to the palm, which
+raises the palm's f_n, and with it its friction. The ball, a solid sphere of mass m_O, moves and turns freely,
+I = 2/5 m_O r^2. A person holds the hand as a mass on a damped spring about the place where it is held out,
+m_H x'' = f_H - c_H x' - k_H x. Finger tips that come to the hand's surface press on it without friction; the hand's
+own fingers, and the backs of links, touch nothing.
 
 K. H. Hunt, F. R. E. Crossley, J. Appl. Mech. 42 (1975); P. A. Cundall, O. D. L. Strack, Geotechnique 29 (1979).
 """
@@ -25,7 +26,7 @@ from typing import NamedTuple
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix import se3
-from handover.plants.helix.compiled import compiled, compiled_once
+from handover.plants.helix.compiled import compiled, compiled_inline, compiled_once
 from handover.plants.helix.se3 import Vector, add, cross, dot, scale, subtract, vector
 
 CAPSULES = 7
@@ -36,7 +37,7 @@ _DEEPEST = 0.02
 
 
 class ContactNumbers(NamedTuple):
-    """What does not change; all are numbers, so that an array can carry them into the kernel.
+    """What does not change; all are numbers, so that a plain tuple can carry them into the kernel.
 
     Attributes:
         ball_mass: m_O, kg.
@@ -136,9 +137,114 @@ def _depth_in_hand(p: Vector, radius: float, bottom: Vector, c: ContactNumbers) 
     return (depth if beside <= c.palm_radius and depth < _DEEPEST else -1.0), (0.0, 0.0, 1.0)
 
 
+@compiled_inline
+def _gripper_contacts(
+    c: ContactNumbers,
+    p: Vector,
+    v: Vector,
+    w: Vector,
+    xi: Floats,
+    ends: Floats,
+    end_rates: Floats,
+    radii: Floats,
+    h: float,
+) -> tuple[float, Vector, Vector]:
+    """Return the sum of f_n of the gripper's bodies on the ball, the force on the gripper, and the ball's moment."""
+    pressure, on_gripper, torque = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for i in range(CAPSULES):
+        a, b = vector(ends[i], 0), vector(ends[i], 1)
+        s = _nearest(p, a, b)
+        away = subtract(p, add(scale(1.0 - s, a), scale(s, b)))
+        distance = math.sqrt(dot(away, away))
+        depth = c.ball_radius + radii[i] - distance
+        if depth > 0.0 and distance > 0.0:
+            n = scale(1.0 / distance, away)
+            lever = scale(-c.ball_radius, n)
+            of_body = add(scale(1.0 - s, vector(end_rates[i], 0)), scale(s, vector(end_rates[i], 1)))
+            slip = subtract(add(v, cross(w, lever)), of_body)
+            f_n, f, spring = _touch(c.finger_stiffness, c.finger_friction, c, depth, n, slip, vector(xi, i), h)
+            pressure += f_n
+            on_gripper, torque = subtract(on_gripper, f), add(torque, cross(lever, f))
+            xi[i, 0], xi[i, 1], xi[i, 2] = spring
+        else:
+            xi[i, 0], xi[i, 1], xi[i, 2] = 0.0, 0.0, 0.0
+    return pressure, on_gripper, torque
+
+
+@compiled_inline
+def _hand_contact(
+    c: ContactNumbers,
+    p: Vector,
+    v: Vector,
+    w: Vector,
+    xi: Floats,
+    bottom: Vector,
+    bottom_rate: Vector,
+    f_hold: float,
+    h: float,
+    on_ball: Vector,
+    torque: Vector,
+) -> tuple[float, Vector, Vector, Vector]:
+    """Return f_n of the hand on the ball, the force on the hand, and the ball's force and moment with the hand's."""
+    on_hand = (0.0, 0.0, 0.0)
+    depth, n = _depth_in_hand(p, c.ball_radius, bottom, c)
+    if not depth > 0.0:
+        for i in range(3):
+            xi[CAPSULES, i], xi[CAPSULES + 1, i] = 0.0, 0.0
+        return 0.0, on_hand, on_ball, torque
+    lever = scale(-c.ball_radius, n)
+    slip = subtract(add(v, cross(w, lever)), bottom_rate)
+    f_n, f, spring = _touch(c.hand_stiffness, c.hand_friction, c, depth, n, slip, vector(xi, CAPSULES), h)
+    most = c.ball_radius * (c.rolling_friction * f_n + c.hand_friction * f_hold)
+    moment, theta = _roll(most, c, w, vector(xi, CAPSULES + 1), h)
+    xi[CAPSULES, 0], xi[CAPSULES, 1], xi[CAPSULES, 2] = spring
+    xi[CAPSULES + 1, 0], xi[CAPSULES + 1, 1], xi[CAPSULES + 1, 2] = theta
+    held = scale(f_hold, n)
+    on_hand = add(subtract(on_hand, f), held)
+    on_ball = subtract(add(on_ball, f), held)
+    torque = add(add(torque, cross(lever, f)), moment)
+    return f_n, on_hand, on_ball, torque
+
+
+@compiled_inline
+def _tip_contacts(
+    c: ContactNumbers,
+    ends: Floats,
+    end_rates: Floats,
+    radii: Floats,
+    bottom: Vector,
+    bottom_rate: Vector,
+    on_gripper: Vector,
+    on_hand: Vector,
+) -> tuple[Vector, Vector]:
+    """Return the forces on gripper and hand with those of the finger tips that press on the hand."""
+    for i in range(1, CAPSULES - 1, 2):
+        depth, n = _depth_in_hand(vector(ends[i], 1), radii[i], bottom, c)
+        if depth > 0.0:
+            v_n = dot(subtract(vector(end_rates[i], 1), bottom_rate), n)
+            f = scale(max(0.0, c.hand_stiffness * depth * (1.0 - c.dissipation * v_n)), n)
+            on_gripper, on_hand = add(on_gripper, f), subtract(on_hand, f)
+    return on_gripper, on_hand
+
+
+@compiled_inline
+def _integrate(
+    c: ContactNumbers, ball: Floats, arm: Floats, on_ball: Vector, torque: Vector, on_hand: Vector, h: float
+) -> None:
+    """Advance ball and hand by a step of semi-implicit Euler."""
+    inertia = 0.4 * c.ball_mass * c.ball_radius * c.ball_radius
+    for i in range(3):
+        fall = -c.gravity if i == 2 else 0.0
+        ball[1, i] += h * (on_ball[i] / c.ball_mass + fall)
+        ball[0, i] += h * ball[1, i]
+        ball[2, i] += h * torque[i] / inertia
+        arm[1, i] += h * (on_hand[i] - c.arm_damping * arm[1, i] - c.arm_stiffness * arm[0, i]) / c.arm_mass
+        arm[0, i] += h * arm[1, i]
+
+
 @compiled_once(__name__, se3.__name__)
 def advance(
-    numbers: Floats,
+    numbers: tuple[float, ...],
     ball: Floats,
     arm: Floats,
     xi: Floats,
@@ -150,14 +256,15 @@ def advance(
     f_hold: float,
     h: float,
     steps: int,
-    told: Floats,
+    forces: Floats,
+    pressures: Floats,
 ) -> None:
     """Advance ball and hand by steps h (semi-implicit Euler), while gripper and place of the hand move evenly.
 
-    All are plain arrays and numbers, so that machine code which is kept depends on no module's name.
+    All are plain arrays, tuples and numbers, so that machine code which is kept depends on no module's name.
 
     Args:
-        numbers: those of `ContactNumbers`, (15,).
+        numbers: those of `ContactNumbers`.
         ball: p_WO, v_WO and angular velocity, in W, (3, 3); advanced.
         arm: displacement of the hand from where it is held out, and its rate, in W, (2, 3); advanced.
         xi: springs of the friction with the gripper's bodies and with the hand, m, then theta, rad:
@@ -170,108 +277,27 @@ def advance(
         f_hold: force with which the person presses the ball to the palm, N.
         h: length of a step, s.
         steps: their number.
-        told: filled with means over the steps: force on the gripper and on the hand in W, (2, 3), N; then the sum of
-            f_n of the gripper's bodies on the ball, that of the hand, and that of finger tips on the hand: (3, 3).
+        forces: filled with means over the steps: force on the gripper and on the hand in W, (2, 3), N.
+        pressures: likewise: sum of f_n of the gripper's bodies on the ball, and f_n of the hand, (2,), N.
     """
-    c = ContactNumbers(
-        numbers[0],
-        numbers[1],
-        numbers[2],
-        numbers[3],
-        numbers[4],
-        numbers[5],
-        numbers[6],
-        numbers[7],
-        numbers[8],
-        numbers[9],
-        numbers[10],
-        numbers[11],
-        numbers[12],
-        numbers[13],
-        numbers[14],
-    )
-    inertia = 0.4 * c.ball_mass * c.ball_radius * c.ball_radius
-    for i in range(3):
-        for j in range(3):
-            told[i, j] = 0.0
+    c = ContactNumbers(*numbers)
+    forces[:], pressures[:] = 0.0, 0.0
     for _ in range(steps):
         p, v, w = vector(ball, 0), vector(ball, 1), vector(ball, 2)
         x, x_rate = vector(arm, 0), vector(arm, 1)
         low = (bottom[0] + x[0], bottom[1] + x[1], bottom[2] + x[2])
         low_rate = (bottom_rate[0] + x_rate[0], bottom_rate[1] + x_rate[1], bottom_rate[2] + x_rate[2])
-        on_gripper, on_hand, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        by_gripper, by_hand, by_tips = 0.0, 0.0, 0.0
-        for i in range(CAPSULES):
-            a, b = vector(ends[i], 0), vector(ends[i], 1)
-            s = _nearest(p, a, b)
-            away = subtract(p, add(scale(1.0 - s, a), scale(s, b)))
-            distance = math.sqrt(dot(away, away))
-            depth = c.ball_radius + radii[i] - distance
-            if depth > 0.0 and distance > 0.0:
-                n = scale(1.0 / distance, away)
-                of_body = add(scale(1.0 - s, vector(end_rates[i], 0)), scale(s, vector(end_rates[i], 1)))
-                arm_to = scale(-c.ball_radius, n)
-                f_n, f, new = _touch(
-                    c.finger_stiffness,
-                    c.finger_friction,
-                    c,
-                    depth,
-                    n,
-                    subtract(add(v, cross(w, arm_to)), of_body),
-                    vector(xi, i),
-                    h,
-                )
-                by_gripper += f_n
-                on_gripper, torque = subtract(on_gripper, f), add(torque, cross(arm_to, f))
-                xi[i, 0], xi[i, 1], xi[i, 2] = new
-            else:
-                xi[i, 0], xi[i, 1], xi[i, 2] = 0.0, 0.0, 0.0
+        by_gripper, on_gripper, torque = _gripper_contacts(c, p, v, w, xi, ends, end_rates, radii, h)
         on_ball = scale(-1.0, on_gripper)
-        depth, n = _depth_in_hand(p, c.ball_radius, low, c)
-        if depth > 0.0:
-            arm_to = scale(-c.ball_radius, n)
-            f_n, f, new = _touch(
-                c.hand_stiffness,
-                c.hand_friction,
-                c,
-                depth,
-                n,
-                subtract(add(v, cross(w, arm_to)), low_rate),
-                vector(xi, CAPSULES),
-                h,
-            )
-            by_hand = f_n
-            on_hand, on_ball, torque = subtract(on_hand, f), add(on_ball, f), add(torque, cross(arm_to, f))
-            xi[CAPSULES, 0], xi[CAPSULES, 1], xi[CAPSULES, 2] = new
-            most = c.ball_radius * (c.rolling_friction * f_n + c.hand_friction * f_hold)
-            moment, turned = _roll(most, c, w, vector(xi, CAPSULES + 1), h)
-            on_hand, on_ball = add(on_hand, scale(f_hold, n)), subtract(on_ball, scale(f_hold, n))
-            torque = add(torque, moment)
-            xi[CAPSULES + 1, 0], xi[CAPSULES + 1, 1], xi[CAPSULES + 1, 2] = turned
-        else:
-            for i in range(3):
-                xi[CAPSULES, i], xi[CAPSULES + 1, i] = 0.0, 0.0
-        for i in range(1, CAPSULES - 1, 2):
-            tip = vector(ends[i], 1)
-            depth, n = _depth_in_hand(tip, radii[i], low, c)
-            if depth > 0.0:
-                v_n = dot(subtract(vector(end_rates[i], 1), low_rate), n)
-                f_n = max(0.0, c.hand_stiffness * depth * (1.0 - c.dissipation * v_n))
-                by_tips += f_n
-                on_gripper, on_hand = add(on_gripper, scale(f_n, n)), subtract(on_hand, scale(f_n, n))
+        by_hand, on_hand, on_ball, torque = _hand_contact(c, p, v, w, xi, low, low_rate, f_hold, h, on_ball, torque)
+        on_gripper, on_hand = _tip_contacts(c, ends, end_rates, radii, low, low_rate, on_gripper, on_hand)
+        _integrate(c, ball, arm, on_ball, torque, on_hand, h)
+        pressures[0] += by_gripper / steps
+        pressures[1] += by_hand / steps
         for i in range(3):
-            fall = -c.gravity if i == 2 else 0.0
-            ball[1, i] += h * (on_ball[i] / c.ball_mass + fall)
-            ball[0, i] += h * ball[1, i]
-            ball[2, i] += h * torque[i] / inertia
-            arm[1, i] += h * (on_hand[i] - c.arm_damping * arm[1, i] - c.arm_stiffness * arm[0, i]) / c.arm_mass
-            arm[0, i] += h * arm[1, i]
             bottom[i] += h * bottom_rate[i]
-            told[0, i] += on_gripper[i] / steps
-            told[1, i] += on_hand[i] / steps
-        told[2, 0] += by_gripper / steps
-        told[2, 1] += by_hand / steps
-        told[2, 2] += by_tips / steps
+            forces[0, i] += on_gripper[i] / steps
+            forces[1, i] += on_hand[i] / steps
         for i in range(CAPSULES):
             for j in range(2):
                 for m in range(3):

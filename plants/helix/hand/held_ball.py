@@ -42,7 +42,7 @@ class HeldBall:
     """
 
     def __init__(self, params: Params) -> None:
-        self._numbers = np.array(numbers_of(params))
+        self._numbers = tuple(numbers_of(params))
         weight = params.ball_mass * params.gravity
         self._rest = np.array([0.0, 0.0, -weight / params.hold_stiffness])
         depth = (weight + params.hold_force) / params.palm_stiffness - self._rest[2]
@@ -53,7 +53,7 @@ class HeldBall:
         self._hand = np.array([self._rest, np.zeros(3)])  # displacement of the hand, and its rate
         self._xi = np.zeros((CAPSULES + 2, 3))
         self._ends: Floats | None = None  # of the capsules, where the last contact left them
-        self._low, self._low_rate = np.zeros(3), np.zeros(3)
+        self._low = np.zeros(3)  # the cup's lowest point, were the hand not displaced
 
     @property
     def p_WO(self) -> Floats:
@@ -92,18 +92,14 @@ class HeldBall:
         ends = _bodies(p_WG, R_WG, grip)
         before = ends if self._ends is None else self._ends
         steps = max(1, math.ceil(dt / _STEP - 1e-9))
-        low, told = p_WO_held + self._p_OL, np.zeros((3, 3))
-        self._low_rate = (low - self._low) / dt
-        rates = (ends - before) / dt
+        low, forces, pressures = p_WO_held + self._p_OL, np.zeros((2, 3)), np.zeros(2)
+        rates, low_rate = (ends - before) / dt, (low - self._low) / dt
         self._ends = np.array(before)
-        self._call(rates, f_hold, dt / steps, steps, told)
+        moved = (self._ball, self._hand, self._xi, self._ends, rates, _RADII, self._low, low_rate)
+        advance(self._numbers, *moved, f_hold, dt / steps, steps, forces, pressures)
         self._ends[:], self._low[:] = ends, low
-        return Contact(told[0], told[1], float(told[2, 0]), float(told[2, 1]))
-
-    def _call(self, rates: Floats, f_hold: float, h: float, steps: int, told: Floats) -> None:
-        ends = np.zeros((CAPSULES, 2, 3)) if self._ends is None else self._ends
-        moved = (self._ball, self._hand, self._xi, ends, rates, _RADII, self._low, self._low_rate)
-        advance(self._numbers, *moved, f_hold, h, steps, told)
+        by_gripper, by_hand = pressures.tolist()
+        return Contact(forces[0], forces[1], by_gripper, by_hand)
 
     def get_state(self) -> Any:
         """Return the complete state."""

@@ -26,16 +26,16 @@ NO_GRIPPER = np.full((CAPSULES, 2, 3), 9.0)
 def rolled(ball: Floats, seconds: float, h: float = 5e-5, **changes: Any) -> tuple[Floats, Floats]:
     """Return what becomes of a ball on a hand that is held hard, and the last means of the forces."""
     values: dict[str, Any] = {"palm_stiffness": 1e4, "dissipation": 0.0, "hold_stiffness": 1e4, "hold_damping": 200.0}
-    numbers = np.array(numbers_of(replace(Params(), **values | changes)))
-    ball, told = np.array(ball), np.zeros((3, 3))
+    numbers = tuple(numbers_of(replace(Params(), **values | changes)))
+    ball, forces = np.array(ball), np.zeros((2, 3))
     sag = M * G / values["palm_stiffness"]
     hand, bottom = np.zeros((2, 3)), np.array([0.0, 0.0, sag - R])
     still = np.zeros_like(NO_GRIPPER)
     xi = np.zeros((CAPSULES + 2, 3))
     steps = round(seconds / h)
     moved = (numbers, ball, hand, xi, np.array(NO_GRIPPER), still, np.zeros(CAPSULES), bottom, np.zeros(3))
-    advance(*moved, 0.0, h, steps, told)
-    return ball, told
+    advance(*moved, 0.0, h, steps, forces, np.zeros(2))
+    return ball, forces
 
 
 def test_a_ball_that_slides_is_slowed_by_friction_and_then_rolls_with_five_sevenths_of_its_speed():
