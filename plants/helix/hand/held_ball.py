@@ -10,8 +10,8 @@ from handover.plants.helix.gripper_fingers import KNUCKLE, finger_joints
 from handover.plants.helix.hand.ball_contact import CAPSULES, ContactNumbers, advance
 from handover.plants.helix.hand.partner_parameters import Params
 
-_STEP = 5e-4
-"""Longest internal step, s: a tenth of the time constant of the ball on its stiffest contact."""
+_LONGEST_STEP, _STEPS = 5e-4, 8.0
+"""Longest internal step, s, and how many steps the shortest time constant takes at least."""
 _LINK_RADIUS, _PALM_RADIUS = 0.0042, 0.0125
 """Of the fingers' links, and of the gripper's palm, where they touch, m."""
 _RADII = np.append(np.full(CAPSULES - 1, _LINK_RADIUS), _PALM_RADIUS)
@@ -43,6 +43,7 @@ class HeldBall:
 
     def __init__(self, params: Params) -> None:
         self._numbers = tuple(numbers_of(params))
+        self._step = internal_step(params)
         weight = params.ball_mass * params.gravity
         self._rest = np.array([0.0, 0.0, -weight / params.hold_stiffness])
         depth = (weight + params.hold_force) / params.palm_stiffness - self._rest[2]
@@ -91,7 +92,7 @@ class HeldBall:
         """
         ends = _bodies(p_WG, R_WG, grip)
         before = ends if self._ends is None else self._ends
-        steps = max(1, math.ceil(dt / _STEP - 1e-9))
+        steps = max(1, math.ceil(dt / self._step - 1e-9))
         low, forces, pressures = p_WO_held + self._p_OL, np.zeros((2, 3)), np.zeros(2)
         rates, low_rate = (ends - before) / dt, (low - self._low) / dt
         self._ends = np.array(before)
@@ -120,6 +121,17 @@ def _bodies(p_WG: Floats, R_WG: Floats, grip: float) -> Floats:
     return np.concatenate([links, np.broadcast_to(palm, (1, 2, 3))])
 
 
+def internal_step(p: Params) -> float:
+    """Return the longest internal step, s: an eighth of the shortest time constant, 0.5 ms at most.
+
+    Time constants are sqrt(m_O / k) of the ball on its stiffest contact, and m_H / c_H of the hand. With steps longer
+    than twice either, a ball or a hand that is hardly moved flies off.
+    """
+    ball = math.sqrt(p.ball_mass / max(p.finger_stiffness, p.palm_stiffness))
+    hand = p.hand_mass / p.hold_damping if p.hold_damping > 0.0 else math.inf
+    return min(_LONGEST_STEP, ball / _STEPS, hand / _STEPS)
+
+
 def numbers_of(p: Params) -> ContactNumbers:
     """Return parameters as the kernel takes them."""
     return ContactNumbers(
@@ -142,4 +154,4 @@ def numbers_of(p: Params) -> ContactNumbers:
 
 
 # Loads the machine code, or makes it: hosts grant loading more time than a step.
-HeldBall(Params()).move(np.zeros(3), np.eye(3), 0.0, np.zeros(3), 0.0, _STEP)
+HeldBall(Params()).move(np.zeros(3), np.eye(3), 0.0, np.zeros(3), 0.0, _LONGEST_STEP)

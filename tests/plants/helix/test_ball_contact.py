@@ -16,7 +16,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.gripper_fingers import finger_joints
 from handover.plants.helix.hand.ball_contact import CAPSULES, advance
 from handover.plants.helix.hand.handover_partner import HandoverPartner
-from handover.plants.helix.hand.held_ball import HeldBall, numbers_of
+from handover.plants.helix.hand.held_ball import HeldBall, internal_step, numbers_of
 from handover.plants.helix.hand.partner_parameters import Holder, Params
 
 G, M, R = 9.81, STILL.ball_mass, STILL.ball_radius
@@ -126,6 +126,28 @@ def test_fingers_centre_a_ball_beside_their_axis():
 def test_the_result_does_not_depend_on_how_the_time_is_cut():
     ends = [take(HandoverPartner(STILL), beside(0.004, 0.0, 0.0), dt=dt)[-1].p_WO for dt in (0.02, 0.01)]
     np.testing.assert_allclose(ends[0], ends[1], atol=3e-4)
+
+
+def test_the_usual_ball_is_advanced_in_steps_of_half_a_millisecond():
+    assert internal_step(Params()) == 5e-4
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"ball_mass": 0.001, "palm_stiffness": 1e4},
+        {"ball_mass": 0.001, "finger_stiffness": 1e4},
+        {"hand_mass": 0.05, "hold_damping": 200.0},
+    ],
+)
+def test_a_light_ball_on_stiff_skin_and_a_light_hand_do_not_fly_off(changes: dict[str, float]):
+    ball = HeldBall(replace(STILL, **changes))
+    ball.lie(P_WO, np.zeros(3))
+    for i in range(200):
+        place = P_WO + 1e-3 * np.array([math.sin(0.5 * i), 0.0, math.sin(0.3 * i)])  # the hand trembles
+        contact = ball.move(beside(0.004, 0.0, 0.0), DOWN.as_matrix(), min(1.0, i * 0.01), place, 1.0, 0.01)
+        assert np.linalg.norm(ball.p_WO - place) < 0.02
+        assert np.linalg.norm(contact.f_H) < 5.0
 
 
 def test_fingers_are_where_they_are_painted_and_mirror_nothing():
