@@ -65,6 +65,7 @@ class HandoverVision:
 
     Raises:
         InvalidCalibration: a quaternion is not of unit length or a focal length not positive.
+        InvalidVisionParameters: a parameter is out of range.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
@@ -74,6 +75,7 @@ class HandoverVision:
     period: ClassVar[Fraction | None] = Fraction(1, 30)
 
     def __init__(self, params: Params) -> None:
+        params.check()
         self.params = params
         self._cameras = _cameras(params)
         self._detector = _detector(params, self._cameras)

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.geometry import looking_at, quaternion_of
 from handover.cosim.blocks.ports import Vector3, Vector4, Vector5, parameter
+from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Pixel, RadianPerSecond
 
 _P_WC_LEFT = np.array([-0.95, 0.25, -0.60])
@@ -14,6 +16,12 @@ _P_WC_RIGHT = np.array([-0.95, -0.25, -0.60])
 _P_WC_THIRD = np.array([-0.55, 0.0, 0.1])
 _LOOKED_AT = np.array([0.0, 0.0, -0.62])
 _CORNER_SHIFT, _EDGE_SHIFT = 0.24, -0.005  # px; as scenarios/helix/calibrate_detector.py estimates them from pictures
+
+
+class InvalidVisionParameters(InvalidParameters):
+    """Parameters out of range; `faults` lists all of them."""
+
+    block = "HandoverVision"
 
 
 class Detector(enum.IntEnum):
@@ -88,3 +96,9 @@ class Params:
     decimation: int = parameter(
         1, "of 30 pairs of pictures a second, every so many-th is looked at", minimum=1, maximum=300
     )
+
+    def check(self) -> None:
+        """Raise InvalidVisionParameters, with all faults, if values are out of range."""
+        faults = parameter_faults(self)
+        if faults:
+            raise InvalidVisionParameters(faults)

@@ -21,7 +21,7 @@ class FastChain:
     """
 
     def __init__(self, params: Params) -> None:
-        design = TendonDesign(params)
+        design = TendonDesign(params, "TendonArmFast")
         n = design.count
         self._internal_step = params.internal_step
         self._motor_stiffness = design.motor_stiffness

@@ -47,7 +47,7 @@ class TendonArm:
         from handover.plants.helix.arm.tendon_design import TendonDesign
 
         self._params = params
-        self._chain = TendonChain(TendonDesign(params))
+        self._chain = TendonChain(TendonDesign(params, "TendonArm"))
         length = np.repeat(params.tendon_length, 3)
         self._end_stops = (length * (params.shortest - 1.0), length * (params.longest - 1.0))
         self._grip = 0.0

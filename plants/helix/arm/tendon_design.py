@@ -21,12 +21,16 @@ class TendonDesign:
     i + k, at the angle s_k = 0, 120, 240 degrees from x of B towards y; it runs through the discs of its own segment
     only, since farther tendons are sheathed.
 
+    Args:
+        params: of the arm.
+        block: whose arm it is, for errors.
+
     Raises:
         InvalidArmParameters: a parameter is out of range, or the tendons of a segment would hang slack.
     """
 
-    def __init__(self, params: Params) -> None:
-        params.check()
+    def __init__(self, params: Params, block: str) -> None:
+        params.check(block)
         self.params = params
         counts = np.array([params.discs_1, params.discs_2, params.discs_3])
         self.count = int(counts.sum())
@@ -34,7 +38,7 @@ class TendonDesign:
         self.segment = np.repeat(np.arange(3), counts)
         self.natural = (params.natural_length / counts)[self.segment]
         self.mass, self.transverse_inertia, self.axial_inertia, self.centre = self._masses(counts)
-        self.rest_tension, self.rest_z = self._hang(counts)
+        self.rest_tension, self.rest_z = self._hang(counts, block)
         angles = np.deg2rad([0.0, 120.0, 240.0])
         self.holes = params.d * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(3)])
 
@@ -102,7 +106,7 @@ class TendonDesign:
         transverse += mass * self.params.d**2 / 4.0
         return mass, transverse, mass * self.params.d**2 / 2.0, centre
 
-    def _hang(self, counts: Floats) -> tuple[Floats, Floats]:
+    def _hang(self, counts: Floats, block: str) -> tuple[Floats, Floats]:
         """Return a tendon's tension in each segment, (3,), and the nodes' z in B, (n + 1,), at rest.
 
         Straight, an element carries the weight w below it and is pressed by its segment's three tendons:
@@ -119,9 +123,12 @@ class TendonDesign:
                     f"the tendons of segment {i + 1} would hang slack ({tension[i]:.3g} N): natural_length "
                     f"{self.params.natural_length[i]:g} m must exceed tendon_length {self.params.tendon_length[i]:g} m"
                     for i in np.flatnonzero(tension <= 0.0)
-                ]
+                ],
+                block,
             )
         lengths = self.natural * (1.0 + (weight - 3.0 * tension[self.segment]) / EA)
         if np.any(lengths <= 0.0):
-            raise InvalidArmParameters(["the arm would be pressed to nothing: natural_length is too long for EA"])
+            raise InvalidArmParameters(
+                ["the arm would be pressed to nothing: natural_length is too long for EA"], block
+            )
         return tension, np.append(0.0, np.cumsum(lengths))

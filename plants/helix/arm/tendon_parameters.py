@@ -1,5 +1,6 @@
 """Parameters of the tendon-driven arm; apart from its design, which takes SciPy, so that they are listed at once."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,9 +23,11 @@ from handover.cosim.blocks.units import (
 
 
 class InvalidArmParameters(InvalidParameters):
-    """Values of which no arm can be built; `faults` lists all of them."""
+    """Values of which no arm can be built; `faults` lists all of them, `block` is which of the two arms."""
 
-    block = "TendonArm"
+    def __init__(self, faults: Sequence[str], block: str) -> None:
+        self.block = block
+        super().__init__(faults)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,8 +87,8 @@ class Params:
     closing_time: Second = parameter(10.0, "time of the gripper's full travel", minimum=0.01, maximum=100.0)
     internal_step: Second = parameter(0.005, "time step of the integrator", minimum=1e-4, maximum=0.01)
 
-    def check(self) -> None:
-        """Raise InvalidArmParameters, with all faults, if a value lies outside its range."""
+    def check(self, block: str) -> None:
+        """Raise InvalidArmParameters of a block, with all faults, if a value lies outside its range."""
         faults = parameter_faults(self)
         if faults:
-            raise InvalidArmParameters(faults)
+            raise InvalidArmParameters(faults, block)

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.random import Generator
 
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.geometry import Pinhole, looking_at, quaternion_of
 from handover.cosim.blocks.ports import (
     Picture1280x720,
@@ -21,6 +22,7 @@ from handover.cosim.blocks.ports import (
     parameter,
     port,
 )
+from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Levels, Metre, Number, Pixel, Second
 from handover.plants.helix.cameras.painting import Backdrop, Canvas, Part
@@ -80,14 +82,10 @@ _FACING = (4, 3, 5, 2, 6, 1, 7, 0)  # markers, from that which faces the cameras
 _HANGING = np.array([0.0, 1.0, 0.0, 0.0])  # q_WR of the arm at rest: R_WR = diag(1, -1, -1)
 
 
-class InvalidCover(ValueError):
-    """What covers a lens, or hides the ball, is taken away before it is there."""
+class InvalidCameraParameters(InvalidParameters):
+    """Parameters out of range, or of what is taken away before it is there; `faults` lists all of them."""
 
-    is_refusal = True
-
-    def __init__(self, what: str, start: float, end: float) -> None:
-        super().__init__(f"{what}: covered from {start} s until {end} s; the end must not come first")
-        self.what, self.start, self.end = what, start, end
+    block = "StereoCamera"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,6 +159,25 @@ class Params:
     bowl_depth: Metre = parameter(0.06, "depth of the bowl", minimum=0.001, maximum=1.0)
     seed: int = parameter(0, "seed of the noise", minimum=0)
 
+    def check(self) -> None:
+        """Raise InvalidCameraParameters, with all faults, if values are out of range or contradict each other."""
+        faults = parameter_faults(self) or [
+            f"{what}_until = {end:g} s must not be before {what}_from = {start:g} s"
+            for what, (start, end) in self.covers.items()
+            if end < start
+        ]
+        if faults:
+            raise InvalidCameraParameters(faults)
+
+    @property
+    def covers(self) -> dict[str, tuple[float, float]]:
+        """From when until when the left and the right lens are covered and the ball is hidden, s, by parameter."""
+        return {
+            "cover_left": (self.cover_left_from, self.cover_left_until),
+            "cover_right": (self.cover_right_from, self.cover_right_until),
+            "hide_ball": (self.hide_ball_from, self.hide_ball_until),
+        }
+
 
 @dataclass(kw_only=True)
 class Inputs:
@@ -202,7 +219,7 @@ class StereoCamera:
 
     Raises:
         InvalidCalibration: a quaternion is not of unit length or a focal length not positive.
-        InvalidCover: a cover ends before it begins.
+        InvalidCameraParameters: a parameter is out of range, or a cover ends before it begins.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
@@ -211,6 +228,7 @@ class StereoCamera:
     period: ClassVar[Fraction | None] = Fraction(1, 30)
 
     def __init__(self, params: Params) -> None:
+        params.check()
         p = self.params = params
         cameras = [
             Pinhole("left", p.p_WC_left, p.q_WC_left, p.intrinsics_left, p.distortion_left),
@@ -225,9 +243,6 @@ class StereoCamera:
         self._black, self._dark = (np.full((_HEIGHT, _WIDTH, 3), level, dtype=np.uint8) for level in (0, _DARK))
         self._black.flags.writeable = False
         self._between = 0.5 * (p.p_WC_left + p.p_WC_right)
-        for what, start, end in self._covers():
-            if end < start:
-                raise InvalidCover(what, start, end)
         self._rng = np.random.default_rng(p.seed)
         self._noise = SensorNoise(p.noise, (_HEIGHT, _WIDTH, 3), self._rng)
         self._offsets = self._draw()
@@ -239,7 +254,7 @@ class StereoCamera:
 
     def outputs(self, t: float, u: Inputs) -> Outputs:
         """Return the pictures at the start."""
-        left_is_covered, right_is_covered, hidden = (start <= t < end for _, start, end in self._covers())
+        left_is_covered, right_is_covered, hidden = (start <= t < end for start, end in self.params.covers.values())
         views = self._scene.project(u, self._between if hidden else None)
         covered = (left_is_covered, right_is_covered, False)
         taken = [self._take(i, *view, covered[i]) for i, view in enumerate(views)]
@@ -276,14 +291,6 @@ class StereoCamera:
         """Return on what the last pictures depend: noise, which of them are lost, their time and what they show."""
         taken = None if self._taken is None else (self._taken[0], tuple(vars(self._taken[1]).values()))
         return self._offsets, self._lost, taken
-
-    def _covers(self) -> list[tuple[str, float, float]]:
-        p = self.params
-        return [
-            ("left lens", p.cover_left_from, p.cover_left_until),
-            ("right lens", p.cover_right_from, p.cover_right_until),
-            ("ball", p.hide_ball_from, p.hide_ball_until),
-        ]
 
     def _draw(self) -> tuple[int, ...]:
         return tuple(self._noise.draw(self._rng) for _ in self._canvases)

@@ -53,7 +53,7 @@ class HandoverPartner:
     the same, and throw the ball about at 20 ms; guidance is calm with k from 10 to 50 N/m and c = 2 N s/m.
 
     Raises:
-        InvalidPartnerParameters: by the constructor, for parameters that contradict each other.
+        InvalidPartnerParameters: by the constructor, for parameters out of range or that contradict each other.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}

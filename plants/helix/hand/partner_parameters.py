@@ -7,6 +7,7 @@ import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector3, Vector4, output, parameter, port
+from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import (
     Hertz,
     Kilogram,
@@ -24,7 +25,7 @@ from handover.cosim.blocks.units import (
 
 
 class InvalidPartnerParameters(InvalidParameters):
-    """Parameters that contradict each other; `faults` lists all of them."""
+    """Parameters out of range, or that contradict each other; `faults` lists all of them."""
 
     block = "HandoverPartner"
 
@@ -140,7 +141,12 @@ class Params:
     seed: int = parameter(0, "seed of the random numbers", minimum=0)
 
     def check(self) -> None:
-        """Raise InvalidPartnerParameters, with all faults, if values contradict each other."""
+        """Raise InvalidPartnerParameters, with all faults, if values are out of range or contradict each other."""
+        faults = parameter_faults(self) or self._contradictions()
+        if faults:
+            raise InvalidPartnerParameters(faults)
+
+    def _contradictions(self) -> list[str]:
         faults: list[str] = []
         if not self.tremor_bandwidth < 2.0 * self.tremor_frequency:
             faults.append(
@@ -162,8 +168,7 @@ class Params:
             faults.append(f"floor {self.floor:g} m must lie below the offered ball, {lowest:g} m")
         if self.bowl_radius > 0.0:
             faults += self._bowl_faults()
-        if faults:
-            raise InvalidPartnerParameters(faults)
+        return faults
 
     def _bowl_faults(self) -> list[str]:
         faults: list[str] = []

@@ -5,6 +5,7 @@ import pytest
 from vision_scenes import AWAY, PLACES, anywhere, distances, hanging, look, over_ball, reaching
 
 from handover.controllers.helix.vision.handover_vision import Detector, HandoverVision, Inputs, Outputs, Params
+from handover.controllers.helix.vision.vision_parameters import InvalidVisionParameters
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import InvalidCalibration
 from handover.cosim.blocks.ports import BLACK_1280X720, Floats
@@ -238,6 +239,13 @@ def test_bad_calibration_is_refused():
         HandoverVision(Params(q_WC_right=np.array([0.5, 0.0, 0.0, 0.0])))
     with pytest.raises(InvalidCalibration, match="'left': intrinsics"):
         HandoverVision(Params(intrinsics_left=np.array([-907.0, 907.0, 640.0, 360.0])))
+
+
+def test_parameters_out_of_range_are_refused_all_at_once():
+    with pytest.raises(InvalidVisionParameters) as caught:
+        HandoverVision(Params(rings=3, corner_noise=0.0))
+    assert len(caught.value.faults) == 2
+    assert "rings: 3 is out of range: from 1 to 2" in str(caught.value)
 
 
 def test_of_three_pairs_one_is_looked_at_and_its_measurement_repeated(camera: StereoCamera):

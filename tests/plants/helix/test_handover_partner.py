@@ -301,6 +301,13 @@ def test_contradicting_parameters_are_refused_all_at_once():
     assert "force_max 0.1 N must exceed the ball's weight, 0.1962 N" in str(caught.value)
 
 
+def test_parameters_out_of_range_are_refused_all_at_once():
+    with pytest.raises(InvalidPartnerParameters) as caught:
+        HandoverPartner(Params(ball_mass=0.0, palm_friction=-0.5))
+    assert len(caught.value.faults) == 2
+    assert "ball_mass: 0.0 is out of range: from 0.001 to 1 kg" in str(caught.value)
+
+
 def test_the_hand_moves_on_with_the_ball_smoothly():
     there = np.array([0.0, 0.18, -0.5])
     partner = HandoverPartner(Params(p_WO_1=there, move_from=1.0, move_for=2.0, tremor_rms=0.0, drift_rms=0.0))

@@ -14,7 +14,7 @@ import pytest
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import InvalidCalibration, Pinhole
 from handover.plants.helix.cameras.shapes import Pixels
-from handover.plants.helix.cameras.stereo_camera import Inputs, InvalidCover, Params, StereoCamera
+from handover.plants.helix.cameras.stereo_camera import Inputs, InvalidCameraParameters, Params, StereoCamera
 
 HOUSE = Path(__file__).parents[3]
 FAR = np.array([0.3, 1.5, -1.2])  # out of both pictures
@@ -167,9 +167,20 @@ def test_a_focal_length_that_is_not_positive_is_refused():
         StereoCamera(Params(intrinsics_right=np.array([907.0, 0.0, 640.0, 360.0])))
 
 
-def test_a_cover_that_ends_before_it_begins_is_refused():
-    with pytest.raises(InvalidCover, match=r"right lens: covered from 3\.0 s until 2\.0 s"):
-        StereoCamera(Params(cover_right_from=3.0, cover_right_until=2.0))
+def test_what_is_taken_away_before_it_is_there_is_refused_all_at_once():
+    with pytest.raises(InvalidCameraParameters) as caught:
+        StereoCamera(Params(cover_right_from=3.0, cover_right_until=2.0, hide_ball_from=1.0, hide_ball_until=0.5))
+    assert caught.value.faults == [
+        "cover_right_until = 2 s must not be before cover_right_from = 3 s",
+        "hide_ball_until = 0.5 s must not be before hide_ball_from = 1 s",
+    ]
+
+
+def test_parameters_out_of_range_are_refused_all_at_once():
+    with pytest.raises(InvalidCameraParameters) as caught:
+        StereoCamera(Params(noise=-1.0, rings=3))
+    assert len(caught.value.faults) == 2
+    assert "rings: 3 is out of range: from 1 to 2" in str(caught.value)
 
 
 def test_light_scales_what_is_seen_until_the_sensor_is_full(clean: StereoCamera):
@@ -272,8 +283,3 @@ def test_a_step_that_is_repeated_from_its_state_is_painted_once_unless_something
     fresh.set_state(state)
     assert np.any(other.left != once.left)
     np.testing.assert_array_equal(other.left, fresh.step(1 / 30, 1 / 30, Inputs(grip=1.0)).left)
-
-
-def test_a_card_that_is_taken_away_before_it_comes_is_refused():
-    with pytest.raises(InvalidCover, match=r"ball: covered from 3.0 s until 2.0 s"):
-        StereoCamera(Params(hide_ball_from=3.0, hide_ball_until=2.0))

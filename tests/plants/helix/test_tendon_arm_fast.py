@@ -252,7 +252,7 @@ def test_failure_names_the_time_and_leaves_the_arm_where_it_was(force: float):
 
 
 def test_bad_parameters_are_refused_all_at_once():
-    with pytest.raises(InvalidArmParameters) as caught:
+    with pytest.raises(InvalidArmParameters, match=r"^TendonArmFast: ") as caught:
         TendonArmFast(Params(discs_1=0, EA=-1.0))
     assert len(caught.value.faults) == 2
 

@@ -20,7 +20,7 @@ def energy(design: TendonDesign, p: Floats, R: Floats, L0: Floats) -> float:
 
 
 def test_tangent_is_the_second_derivative_of_the_tendons_energy():
-    design = TendonDesign(Params(discs_1=2, discs_2=3, discs_3=2, tendon_damping=0.0))
+    design = TendonDesign(Params(discs_1=2, discs_2=3, discs_3=2, tendon_damping=0.0), "TendonArm")
     rng = np.random.default_rng(3)
     q = np.concatenate([rng.normal(scale=[1e-4] * 3 + [0.05] * 3, size=(7, 6)).ravel(), rng.uniform(-0.02, -0.015, 9)])
     L0 = design.reference_length + q[42:]
@@ -41,7 +41,7 @@ def test_tangent_is_the_second_derivative_of_the_tendons_energy():
 
 
 def test_a_slack_tendon_has_next_to_no_tangent():
-    design = TendonDesign(Params(discs_1=1, discs_2=1, discs_3=1))
+    design = TendonDesign(Params(discs_1=1, discs_2=1, discs_3=1), "TendonArm")
     q = np.zeros(27)
     q[18:] = 0.01
     K = np.zeros((27, 27))
