@@ -13,6 +13,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.arm.empty_library import bound_at_first_call, can_be_empty, can_be_loaded, load_empty
+from handover.plants.helix.arm.tendon_ports import SolverFailure
 
 _NO_SETTINGS = "EXUDYN_NO_USER_SETTINGS"
 
@@ -63,14 +64,6 @@ _exu, _items = _load()
 
 TangentTerm = Callable[[Floats, Floats, Floats, float, float], None]
 """Adds scale (dF/dq + rate dF/dq_t) of the tendons' forces to a matrix: called with matrix, q, q_t, scale, rate."""
-
-
-class SolverFailure(RuntimeError):
-    """Newton's method found no solution; `time` is when, in s."""
-
-    def __init__(self, time: float, reason: str) -> None:
-        super().__init__(f"Exudyn: no solution at t = {time:.6g} s ({reason})")
-        self.time = time
 
 
 class ExudynEdge:
@@ -251,7 +244,7 @@ class ExudynEdge:
         after = self.get_state()
         if not solved or not all(np.all(np.isfinite(part)) for part in after):
             self.set_state(before)
-            raise SolverFailure(t + self._solver.it.currentTime, reason)
+            raise SolverFailure("TendonArm", t + self._solver.it.currentTime, f"Exudyn: {reason}")
         self.set_state(after)
 
     def _compute_jacobian(self, add_tangent: TangentTerm) -> None:

@@ -68,13 +68,10 @@ class FastChain:
 def chain_of(design: TendonDesign) -> Chain:
     """Return a design as the kernels take it."""
     p = design.params
-    GA, GJ = p.shear_ratio * p.EA, p.twist_ratio * p.EI
-    stiffness = np.array([GA, GA, p.EA, p.EI, p.EI, GJ]) / design.natural[:, None]
-    # not in shear: translational damping across would also damp the arm's turning as a whole
-    damping = p.damping * np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0]) * stiffness
+    stiffness = design.section_stiffness / design.natural[:, None]
     return Chain(
         nodes=np.column_stack([design.mass, design.transverse_inertia, design.axial_inertia, design.centre]),
-        beams=np.column_stack([design.natural, stiffness, damping]),
+        beams=np.column_stack([design.natural, stiffness, design.damping_times * stiffness]),
         ends=np.array(design.ends, dtype=np.int64),
         holes=np.array(design.holes),
         tendons=np.column_stack([design.tendon_EA, design.tendon_DA, design.reference_length]),

@@ -9,7 +9,7 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.helix.arm.tendon_parameters import Params
-from handover.plants.helix.arm.tendon_ports import R_WB, Inputs, Outputs, StepSizeError, centre_line
+from handover.plants.helix.arm.tendon_ports import R_WB, Inputs, Outputs, closed_towards, internal_steps, outputs_of
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -48,34 +48,22 @@ class TendonArm:
 
         self._params = params
         self._chain = TendonChain(TendonDesign(params, "TendonArm"))
-        length = np.repeat(params.tendon_length, 3)
-        self._end_stops = (length * (params.shortest - 1.0), length * (params.longest - 1.0))
         self._grip = 0.0
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return where the arm is; no time passes."""
         p_B, rotations = self._chain.poses()
         z_B = rotations.as_matrix()[:, :, 2]
-        q_WR = _world_quaternion(rotations)
-        return Outputs(
-            p_WR=R_WB @ p_B[-1],
-            q_WR=q_WR,
-            p_WG=R_WB @ (p_B[-1] + self._params.d_gripper * z_B[-1]),
-            q_WG=np.array(q_WR),
-            backbone=centre_line(p_B, z_B) @ R_WB,
-            tension=np.maximum(self._chain.edge.tensions, 0.0),
-            grip=self._grip,
+        return outputs_of(
+            p_B, z_B, _world_quaternion(rotations), self._params.d_gripper, self._chain.edge.tensions, self._grip
         )
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Advance from t by dt with u held."""
-        steps = round(dt / self._params.internal_step)
-        if steps < 1 or abs(steps * self._params.internal_step - dt) > 1e-6 * self._params.internal_step:
-            raise StepSizeError(dt, self._params.internal_step)
-        self._chain.pull(np.clip(u.dl_t, *self._end_stops), R_WB @ u.f_G)
+        steps = internal_steps(dt, self._params.internal_step, "TendonArm")
+        self._chain.pull(np.clip(u.dl_t, *self._params.end_stops), R_WB @ u.f_G)
         self._chain.edge.advance(t, steps)
-        travel = dt / self._params.closing_time
-        self._grip = min(max(self._grip + min(max(u.closure - self._grip, -travel), travel), 0.0), 1.0)
+        self._grip = closed_towards(self._grip, u.closure, dt / self._params.closing_time)
         return self.outputs(t + dt, u)
 
     def get_state(self) -> bytes:

@@ -10,15 +10,15 @@ from handover.cosim.blocks.block import InvalidState
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.helix.arm.tendon_parameters import Params
-from handover.plants.helix.arm.tendon_ports import R_WB, Inputs, Outputs, StepSizeError, centre_line
-
-
-class SolverFailure(RuntimeError):
-    """Newton's method found no solution; `time` is when, in s."""
-
-    def __init__(self, time: float) -> None:
-        super().__init__(f"TendonArmFast: no solution at t = {time:.6g} s (Newton's method does not converge)")
-        self.time = time
+from handover.plants.helix.arm.tendon_ports import (
+    R_WB,
+    Inputs,
+    Outputs,
+    SolverFailure,
+    closed_towards,
+    internal_steps,
+    outputs_of,
+)
 
 
 class TendonArmFast:
@@ -52,8 +52,6 @@ class TendonArmFast:
 
         self._params = params
         self._chain = FastChain(params)
-        length = np.repeat(params.tendon_length, 3)
-        self._end_stops = (length * (params.shortest - 1.0), length * (params.longest - 1.0))
         self._grip = 0.0
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
@@ -63,26 +61,15 @@ class TendonArmFast:
         w, x, y, z = q[:, 0], q[:, 1], q[:, 2], q[:, 3]
         z_B: Floats = np.column_stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
         q_WR = np.array([-x[-1], w[-1], -z[-1], y[-1]]) + 0.0  # (0, 1, 0, 0) times q_B, without negative zeros
-        return Outputs(
-            p_WR=R_WB @ p_B[-1],
-            q_WR=q_WR,
-            p_WG=R_WB @ (p_B[-1] + self._params.d_gripper * z_B[-1]),
-            q_WG=np.array(q_WR),
-            backbone=centre_line(p_B, z_B) @ R_WB,
-            tension=np.maximum(self._chain.tensions(), 0.0),
-            grip=self._grip,
-        )
+        return outputs_of(p_B, z_B, q_WR, self._params.d_gripper, self._chain.tensions(), self._grip)
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Advance from t by dt with u held."""
-        steps = round(dt / self._params.internal_step)
-        if steps < 1 or abs(steps * self._params.internal_step - dt) > 1e-6 * self._params.internal_step:
-            raise StepSizeError(dt, self._params.internal_step, "TendonArmFast")
-        failure = self._chain.advance(np.clip(u.dl_t, *self._end_stops), R_WB @ u.f_G, steps)
+        steps = internal_steps(dt, self._params.internal_step, "TendonArmFast")
+        failure = self._chain.advance(np.clip(u.dl_t, *self._params.end_stops), R_WB @ u.f_G, steps)
         if failure is not None:
-            raise SolverFailure(t + failure)
-        travel = dt / self._params.closing_time
-        self._grip = min(max(self._grip + min(max(u.closure - self._grip, -travel), travel), 0.0), 1.0)
+            raise SolverFailure("TendonArmFast", t + failure, "Newton's method does not converge")
+        self._grip = closed_towards(self._grip, u.closure, dt / self._params.closing_time)
         return self.outputs(t + dt, u)
 
     def get_state(self) -> bytes:

@@ -63,13 +63,9 @@ class TendonChain:
         )
 
     def _add_beams(self, markers: list[Any]) -> None:
-        p = self._design.params
-        GA, GJ = p.shear_ratio * p.EA, p.twist_ratio * p.EI
-        stiffness = np.array([GA, GA, p.EA, p.EI, p.EI, GJ])
-        # not in shear: translational damping across would also damp the arm's turning as a whole
-        damped = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
+        stiffness, times = self._design.section_stiffness, self._design.damping_times
         for e, l0 in enumerate(self._design.natural):
-            self._edge.add_beam(markers[e : e + 2], float(l0), stiffness / l0, p.damping * damped * stiffness / l0)
+            self._edge.add_beam(markers[e : e + 2], float(l0), stiffness / l0, times * stiffness / l0)
 
     def _add_tendons(self, bodies: list[Any], motors: list[Any]) -> None:
         design = self._design

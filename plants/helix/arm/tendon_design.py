@@ -43,6 +43,21 @@ class TendonDesign:
         self.holes = params.d * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(3)])
 
     @property
+    def section_stiffness(self) -> Floats:
+        """Stiffness of an element over its length: GA, GA and EA, in N, EI, EI and GJ, in N m2, (6,)."""
+        p = self.params
+        GA, GJ = p.shear_ratio * p.EA, p.twist_ratio * p.EI
+        return np.array([GA, GA, p.EA, p.EI, p.EI, GJ])
+
+    @property
+    def damping_times(self) -> Floats:
+        """Damping over stiffness in each strain, (6,), in s.
+
+        None in shear: translational damping across would also damp the arm's turning as a whole.
+        """
+        return self.params.damping * np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
+
+    @property
     def motor_mass(self) -> float:
         """Inertia of a motor, referred to its tendon's length, in kg."""
         return _MOTOR_MASS

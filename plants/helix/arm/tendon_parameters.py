@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.ports import Vector3, parameter
+from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import (
     Hertz,
@@ -86,6 +86,12 @@ class Params:
     )
     closing_time: Second = parameter(10.0, "time of the gripper's full travel", minimum=0.01, maximum=100.0)
     internal_step: Second = parameter(0.005, "time step of the integrator", minimum=1e-4, maximum=0.01)
+
+    @property
+    def end_stops(self) -> tuple[Floats, Floats]:
+        """Smallest and largest length change of each tendon, (9,), m."""
+        length = np.repeat(self.tendon_length, 3)
+        return length * (self.shortest - 1.0), length * (self.longest - 1.0)
 
     def check(self, block: str) -> None:
         """Raise InvalidArmParameters of a block, with all faults, if a value lies outside its range."""
