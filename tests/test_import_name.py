@@ -12,7 +12,7 @@ FOLDERS = ("cosim", "plants", "controllers", "fmus", "scenarios")
 PROGRAM = """
 import importlib
 from handover.cosim.system.system import System
-from handover.plants.hand_tremor import HandTremor
+from handover.plants.hand_motion import HandTremor
 from handover.scenarios.catalog import SCENARIOS
 from handover.fmus.catalog import UNITS
 assert System.__module__.startswith("handover.")

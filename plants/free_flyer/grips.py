@@ -32,7 +32,7 @@ from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.free_flyer.attachment import Attachment, Frame, Palm, Stiffness
 from handover.plants.free_flyer.parameters import Params
 from handover.plants.free_flyer.rigid_body import RigidBody
-from handover.plants.hand_tremor import HandTremor
+from handover.plants.hand_motion import HandTremor
 
 _SLACK = 0.1
 """Metres beyond its reach at which an arm loses what the hand holds."""

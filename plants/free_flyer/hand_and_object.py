@@ -40,7 +40,8 @@ from handover.plants.free_flyer.attachment import Attachment, Frame
 from handover.plants.free_flyer.floating_object import FloatingObject
 from handover.plants.free_flyer.grips import FlyerGripper, FlyerHand
 from handover.plants.free_flyer.parameters import InvalidHandParameters, Motion, Params, StartHolder
-from handover.plants.free_flyer.person import Activity, FlyerPerson, Perception, minimum_jerk
+from handover.plants.free_flyer.person import Activity, FlyerPerson, Perception
+from handover.plants.hand_motion import minimum_jerk
 
 __all__ = [
     "Activity",

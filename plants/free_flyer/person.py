@@ -23,6 +23,7 @@ from handover.cosim.blocks.plain_rotation import (
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.free_flyer.attachment import Frame
 from handover.plants.free_flyer.parameters import Motion, Params, StartHolder
+from handover.plants.hand_motion import minimum_jerk
 
 _PEAK = 1.875
 """Highest speed of a minimum-jerk course over its mean speed."""
@@ -272,10 +273,3 @@ class FlyerPerson:
 
     def _at_rest(self, seen: Perception) -> tuple[Vector, Quaternion]:  # noqa: ARG002
         return self.rest, self._rest_q
-
-
-def minimum_jerk(s: float) -> float:
-    """Return how much of a minimum-jerk course is done after a share s of its time."""
-    if s >= 1.0:
-        return 1.0
-    return s * s * s * (10.0 + s * (6.0 * s - 15.0))

@@ -9,7 +9,7 @@ import numpy as np
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.plants.hand_tremor import HandTremor
+from handover.plants.hand_motion import HandTremor, minimum_jerk
 from handover.plants.helix.hand.bowl import Bowl
 from handover.plants.helix.hand.guidance import Guidance, GuidanceGains
 from handover.plants.helix.hand.partner_parameters import Holder, Inputs, Outputs, Params
@@ -191,7 +191,7 @@ class HandoverPartner:
         p = self._params
         if p.move_for == 0.0:
             return p.p_WO_0
-        return p.p_WO_0 + _minimum_jerk((t - p.move_from) / p.move_for) * (p.p_WO_1 - p.p_WO_0)
+        return p.p_WO_0 + minimum_jerk((t - p.move_from) / p.move_for) * (p.p_WO_1 - p.p_WO_0)
 
     def _brought(self, place: Floats, dt: float, u: Inputs) -> Floats:
         """Return how far from its place the ball is held since the arm is there, or was."""
@@ -221,7 +221,7 @@ class HandoverPartner:
         p = self._params
         outwards = np.array([self._place[0], self._place[1], 0.0])
         away = outwards / max(float(np.linalg.norm(outwards)), 1e-9) - np.array([0.0, 0.0, 1.0])
-        course = p.withdrawal * _minimum_jerk((self._withdrawing - p.release_time) / p.withdrawal_time)
+        course = p.withdrawal * minimum_jerk((self._withdrawing - p.release_time) / p.withdrawal_time)
         return self._place + self._tremor.displacement + course * away / np.linalg.norm(away)
 
 
@@ -230,9 +230,3 @@ def _aside(p_WO: Floats, room: float) -> Floats:
     beside = float(np.hypot(p_WO[0], p_WO[1]))
     outwards = np.array([p_WO[0], p_WO[1], 0.0]) / beside if beside > 0.0 else np.array([1.0, 0.0, 0.0])
     return max(0.0, room - beside) * outwards
-
-
-def _minimum_jerk(s: float) -> float:
-    """Return the part of the way at a part of the time; 0 before and 1 after it."""
-    s = min(max(s, 0.0), 1.0)
-    return 10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5

@@ -1,4 +1,4 @@
-"""Tremor and drift of a hand that holds something out, as random processes."""
+"""How a person's hand moves: a minimum-jerk course, and as random processes tremor and drift of one held out."""
 
 import math
 from typing import NamedTuple
@@ -7,6 +7,12 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.state import pack_state, unpack_state
+
+
+def minimum_jerk(s: float) -> float:
+    """Return 10 s^3 - 15 s^4 + 6 s^5, the part of the way at a part s of the time; 0 before and 1 after it."""
+    s = min(max(s, 0.0), 1.0)
+    return 10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5
 
 
 class _Step(NamedTuple):
