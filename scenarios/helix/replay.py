@@ -9,7 +9,7 @@ from handover.cosim.blocks.geometry import Pinhole, rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
-from handover.plants.helix.cameras.shapes import Limbs, gripper, hand
+from handover.plants.helix.cameras.shapes import BOWL_WALL, Limbs, gripper, hand
 from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
 from handover.plants.helix.hand.bowl import Bowl
 from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, ball, circle, merged, prism, rod, turned
@@ -27,10 +27,6 @@ _PICTURE_CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 """Corners of a picture, in halves of its width and height from its middle."""
 
 _OCTAGON = np.radians(np.arange(22.5, 360.0, 45.0))
-
-
-_BOWL_WALL = 0.004
-"""Thickness of the bowl, m."""
 
 
 def replay_handover(record: Record, watching: Iterable[Pinhole] = (), bowl: Bowl | None = None) -> Replay:
@@ -159,11 +155,11 @@ def _solid(points: Floats, radii: Floats) -> Mesh:
 def _bowl(bowl: Bowl) -> list[Body]:
     """Return the bowl, inside and outside, and the disc on which it stands; they stay where they are."""
     inner = bowl.profile(9) - np.array([0.0, bowl.p_WB[2]])
-    outer = inner[::-1] + np.array([[_BOWL_WALL, 0.0]])
-    outer[:-1, 1] -= _BOWL_WALL * np.linspace(0.0, 1.0, len(outer))[:-1]
-    outer[-1] = [0.0, inner[0, 1] - _BOWL_WALL]
+    outer = inner[::-1] + np.array([[BOWL_WALL, 0.0]])
+    outer[:-1, 1] -= BOWL_WALL * np.linspace(0.0, 1.0, len(outer))[:-1]
+    outer[-1] = [0.0, inner[0, 1] - BOWL_WALL]
     shell = turned(np.vstack([inner, outer]))
-    low = -bowl.depth - _BOWL_WALL
+    low = -bowl.depth - BOWL_WALL
     disc = prism(circle(1.2 * bowl.radius, 32), low - 0.012, low)
     at = bowl.p_WB[None]
     return [

@@ -33,6 +33,8 @@ class UseCaseEvaluator(HandoverEvaluator):
         pictures: those that were kept, where a record is evaluated; None: they are taken.
     """
 
+    records = (*HandoverEvaluator.records, Bowl)
+
     def __init__(
         self,
         parameters: Parameters,
@@ -41,7 +43,7 @@ class UseCaseEvaluator(HandoverEvaluator):
         pictures: Sequence[CameraPicture] | None = None,
     ) -> None:
         super().__init__(parameters, pictures)
-        self._p_WB, self._rim = bowl.p_WB, bowl.radius
+        self._bowl = bowl
         self._carry_patience = carry_patience
         self._fell_at: float | None = None
         self._p_WO_fell: Floats = np.zeros(3)
@@ -63,9 +65,9 @@ class UseCaseEvaluator(HandoverEvaluator):
             self._fell_at, self._moved_at, self._p_WO_fell = t, t, self._p_WO
             self._is_lost = "servo.phase" in signals and self._phase != "DROP"
             self._keep("the ball falls", signals)
-        if self._p_WO[2] < self._p_WB[2] <= p_before[2]:
-            share = (p_before[2] - self._p_WB[2]) / (p_before[2] - self._p_WO[2])
-            self._crossed = (p_before + share * (self._p_WO - p_before) - self._p_WB)[:2]
+        crossing = self._bowl.crossing(p_before, self._p_WO)
+        if crossing is not None:
+            self._crossed = (crossing - self._bowl.p_WB)[:2]
         if np.linalg.norm(self._p_WO - p_before) > _REST_SPEED * (t - t_before):
             self._moved_at = t
 
@@ -81,9 +83,10 @@ class UseCaseEvaluator(HandoverEvaluator):
     @property
     def is_in_bowl(self) -> bool:
         """Whether the ball came in through the rim's plane, and is below it within the rim."""
-        if self._crossed is None or _length(self._crossed) > self._rim:
+        if self._crossed is None or _length(self._crossed) > self._bowl.radius:
             return False
-        return bool(self._p_WO[2] < self._p_WB[2]) and _length((self._p_WO - self._p_WB)[:2]) <= self._rim
+        over = self._p_WO - self._bowl.p_WB
+        return bool(over[2] < 0.0) and _length(over[:2]) <= self._bowl.radius
 
     @property
     def _rests(self) -> bool:
@@ -119,23 +122,23 @@ class UseCaseEvaluator(HandoverEvaluator):
             return handover.reason
         if self._fell_at is None:
             return self._why_not_dropped()
-        beside = _length((self._p_WO_fell - self._p_WB)[:2])
+        beside = _length((self._p_WO_fell - self._bowl.p_WB)[:2])
         if self._is_lost:
             return f"the gripper lost the ball on the way at {self._fell_at:.1f} s, {beside:.3f} m from above the bowl"
         if self._crossed is None:
             return f"stopped at {self._t:.1f} s, before the ball had fallen to the bowl's rim"
-        offset = _length(self._crossed)
-        if offset > self._rim:
+        offset, rim = _length(self._crossed), self._bowl.radius
+        if offset > rim:
             return (
-                f"the ball missed the bowl by {offset - self._rim:.3f} m: it fell past the rim's height {offset:.3f} m "
-                f"beside the bowl's middle, whose rim has a radius of {self._rim:.3f} m"
+                f"the ball missed the bowl by {offset - rim:.3f} m: it fell past the rim's height {offset:.3f} m "
+                f"beside the bowl's middle, whose rim has a radius of {rim:.3f} m"
             )
         if not self.is_in_bowl:
             return f"the ball fell into the bowl, {offset:.3f} m beside its middle, and left it again"
         return f"the ball fell into the bowl and did not come to rest until {self._t:.1f} s"
 
     def _why_not_dropped(self) -> str:
-        beside = _length((self._p_WG - self._p_WB)[:2])
+        beside = _length((self._p_WG - self._bowl.p_WB)[:2])
         where = f"the gripper holds the ball {beside:.3f} m from above the bowl"
         if self._phase == "GIVEN_UP":
             return (

@@ -20,11 +20,12 @@ from handover.plants.helix.cameras.shapes import (
     Pixels,
     PolygonLayer,
     ShadedLimbs,
+    bowl_layers,
     gripper,
     hand,
     together,
 )
-from handover.plants.helix.hand.bowl import Bowl, paint
+from handover.plants.helix.hand.bowl import Bowl
 
 _RIB_LENGTH = 0.008  # m; ribs and gaps alternate
 _STRIPS = 7  # across the visible half, each of one shade
@@ -309,7 +310,7 @@ class HandoverScene:
         self._arm = Tube(arm_radius, cameras, light)
         self._limbs = ShadedLimbs(cameras, light)
         self._balls = [ShadedBall(ball_radius, camera, light) for camera in cameras]
-        self._bowls = [[] if bowl is None else paint(bowl, camera, light) for camera in cameras]
+        self._bowls = [[] if bowl is None else bowl_layers(bowl, camera, light) for camera in cameras]
 
     def project(self, x: Postures, card_before: Floats | None = None) -> list[tuple[list[PolygonLayer], list[Decal]]]:
         """Return what there is to paint, in no order, for each camera.

@@ -1,7 +1,7 @@
 """What is painted: polygons and decals in a picture's pixels, with their depths and shades.
 
 `Limbs` are chains of round rods with rounded ends. `hand` and `gripper` are made of them: a person's hand that offers a
-ball on its fingers, and a stem with three jointed fingers that close on what is at G.
+ball on its fingers, and a stem with three jointed fingers that close on what is at G. `bowl_layers` makes a bowl.
 """
 
 import math
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.gripper_fingers import FINGERS, KNUCKLE, finger_joints
+from handover.plants.helix.hand.bowl import Bowl
 
 Pixels = NDArray[np.uint8]
 """Picture or part of one, shape (h, w, 3), blue, green, red; a decal's texture has a fourth channel, its opacity."""
@@ -217,3 +218,36 @@ def gripper(p_WR: Floats, p_WG: Floats, R_WG: Floats, grip: float) -> Limbs:
     pad = 0.5 * (points[:, 1] + points[:, 2])
     fingers = np.stack([points[:, 0], points[:, 1], points[:, 1], pad, pad, points[:, 2]], axis=1)
     return rods(np.concatenate([stem, fingers.reshape(-1, 2, 3)]), _GRIPPER_RADII, _GRIPPER_COLOURS)
+
+
+BOWL_WALL = 0.004
+"""Thickness of the bowl as it is drawn, m; touching, it has none."""
+_PORCELAIN = np.array([150.0, 176.0, 196.0])
+_RINGS, _SEGMENTS = 5, 24
+_POST_LENGTH, _POST_RADIUS = 0.6, 0.012  # m; of the post on which the bowl stands
+
+
+def bowl_layers(bowl: Bowl, camera: Pinhole, light: Light) -> list[PolygonLayer]:
+    """Return a bowl's inside and its outside as far as they face a camera: what lies in it is painted between."""
+    profile = bowl.profile(_RINGS + 1)
+    angle = np.linspace(0.0, 2.0 * np.pi, _SEGMENTS + 1)
+    round_z = np.stack([np.cos(angle), np.sin(angle), np.zeros(_SEGMENTS + 1)], axis=1)
+    depth = float(camera.depth(bowl.p_WB))
+    foot = np.array([*bowl.p_WB[:2], float(profile[0, 1])])
+    post = rods(np.array([[foot, foot - _POST_LENGTH * _UP]]), np.array([[_POST_RADIUS] * 2]), np.array([_METAL]))
+    pixels, depths = camera.project(post.points), camera.depth(post.points)
+    layers = ShadedLimbs([camera], light).polygons(post, pixels[None], depths[None])
+    for facing, wall in ((-1.0, 0.0), (1.0, BOWL_WALL)):
+        radii = profile[:, 0] * (1.0 + wall / bowl.radius)
+        heights = profile[:, 1] - wall * (1.0 - profile[:, 0] / bowl.radius)
+        points = radii[:, None, None] * round_z + heights[:, None, None] * _UP
+        points = points + np.array([bowl.p_WB[0], bowl.p_WB[1], 0.0])
+        quads = np.stack([points[:-1, :-1], points[:-1, 1:], points[1:, 1:], points[1:, :-1]], axis=2).reshape(-1, 4, 3)
+        middles = quads.mean(axis=1)
+        normals = facing * (middles - bowl.p_WS)
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        seen = np.einsum("ij,ij->i", camera.p_WC - middles, normals) > 0.0
+        depths = np.full(np.count_nonzero(seen), depth - facing * bowl.radius)
+        colours = light.shade(normals[seen])[:, None] * _PORCELAIN
+        layers.append(PolygonLayer(depths, camera.project(quads[seen]), colours, np.full(len(depths), True)))
+    return layers

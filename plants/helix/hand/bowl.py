@@ -5,19 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.cameras.shapes import Light, PolygonLayer, ShadedLimbs, rods
 
 _ROLLING_TIME = 0.25
 """Time in which a ball that rolls in the bowl loses most of its speed, s (assumed)."""
-_WALL = 0.004
-"""Thickness of the bowl as it is painted, m."""
-_COLOUR = np.array([150.0, 176.0, 196.0])
-"""Of the painted bowl: blue, green, red."""
-_RINGS, _SEGMENTS = 5, 24
-_POST, _METAL = (0.6, 0.012), (86.0, 82.0, 78.0)
-"""Length and radius of the post on which the painted bowl stands, m, and its colour."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +41,23 @@ class Bowl:
         """Middle of the inner surface's sphere, in W, shape (3,), m."""
         return self.p_WB + np.array([0.0, 0.0, self.sphere_radius - self.depth])
 
-    def catches(self, p_before: Floats, p_after: Floats) -> bool:
-        """Return whether a ball whose centre went from one point to another came in through the rim's plane."""
+    def crossing(self, p_before: Floats, p_after: Floats) -> Floats | None:
+        """Return where a ball whose centre went straight from one point to another fell through the rim's plane.
+
+        The point is in W, shape (3,), m, within the rim or beside it; None if the ball did not fall through the plane.
+        """
         height = self.p_WB[2]
         if not p_after[2] < height <= p_before[2]:
-            return False
+            return None
         share = (p_before[2] - height) / (p_before[2] - p_after[2])
-        beside = (p_before + share * (p_after - p_before) - self.p_WB)[:2]
+        return p_before + share * (p_after - p_before)
+
+    def catches(self, p_before: Floats, p_after: Floats) -> bool:
+        """Return whether a ball whose centre went from one point to another came in through the rim's plane."""
+        p_WO = self.crossing(p_before, p_after)
+        if p_WO is None:
+            return False
+        beside = (p_WO - self.p_WB)[:2]
         return math.sqrt(beside @ beside) <= self.radius
 
     def roll(self, p_WO: Floats, v_WO: Floats, dt: float) -> tuple[Floats, Floats]:
@@ -78,33 +79,3 @@ class Bowl:
         half_angle = math.atan2(self.radius, self.sphere_radius - self.depth)
         angle = np.linspace(0.0, half_angle, points)
         return np.column_stack([self.sphere_radius * np.sin(angle), self.p_WS[2] - self.sphere_radius * np.cos(angle)])
-
-
-def paint(bowl: Bowl, camera: Pinhole, light: Light) -> list[PolygonLayer]:
-    """Return the bowl's inside and its outside as far as they face a camera: what lies in it is painted between."""
-    profile = bowl.profile(_RINGS + 1)
-    angle = np.linspace(0.0, 2.0 * np.pi, _SEGMENTS + 1)
-    round_z = np.stack([np.cos(angle), np.sin(angle), np.zeros(_SEGMENTS + 1)], axis=1)
-    depth = float(camera.depth(bowl.p_WB))
-    foot = np.array([*bowl.p_WB[:2], float(profile[0, 1])])
-    post = rods(
-        np.array([[foot, foot - np.array([0.0, 0.0, _POST[0]])]]), np.array([[_POST[1]] * 2]), np.array([_METAL])
-    )
-    pixels, depths = camera.project(post.points), camera.depth(post.points)
-    layers = ShadedLimbs([camera], light).polygons(post, pixels[None], depths[None])
-    for facing, wall in ((-1.0, 0.0), (1.0, _WALL)):
-        radii, heights = (
-            profile[:, 0] * (1.0 + wall / bowl.radius),
-            profile[:, 1] - wall * (1.0 - profile[:, 0] / bowl.radius),
-        )
-        points = radii[:, None, None] * round_z + heights[:, None, None] * np.array([0.0, 0.0, 1.0])
-        points = points + np.array([bowl.p_WB[0], bowl.p_WB[1], 0.0])
-        quads = np.stack([points[:-1, :-1], points[:-1, 1:], points[1:, 1:], points[1:, :-1]], axis=2).reshape(-1, 4, 3)
-        middles = quads.mean(axis=1)
-        normals = facing * (middles - bowl.p_WS)
-        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-        seen = np.einsum("ij,ij->i", camera.p_WC - middles, normals) > 0.0
-        depths = np.full(np.count_nonzero(seen), depth - facing * bowl.radius)
-        colours = light.shade(normals[seen])[:, None] * _COLOUR
-        layers.append(PolygonLayer(depths, camera.project(quads[seen]), colours, np.full(len(depths), True)))
-    return layers

@@ -184,7 +184,7 @@ class BallWay(NamedTuple):
 
 def _ways(arm: UseCaseRuns, runs: Path) -> list[BallWay]:
     """Return the balls' ways of the runs that have a record."""
-    p_WB = UseCaseParameters().p_WB
+    bowl = UseCaseParameters().bowl
     found: list[BallWay] = []
     for row in arm.rows:
         path = runs / row["run"] / "signals.parquet"
@@ -192,9 +192,10 @@ def _ways(arm: UseCaseRuns, runs: Path) -> list[BallWay]:
             continue
         record = Record(path)
         p_WO, holder = record["hand.p_WO"], record["hand.holder"]
-        below = np.flatnonzero((p_WO[:, 2] < p_WB[2]) & (holder == int(Holder.FREE)))
+        falling = np.flatnonzero(holder[1:] == int(Holder.FREE))
+        crossings = [p for i in falling if (p := bowl.crossing(p_WO[i], p_WO[i + 1])) is not None]
         colour = COLOURS[HandPlace[row["place"].upper()]]
-        found.append(BallWay(p_WO[holder == int(Holder.GRIPPER)], p_WO[below[0]] if len(below) else None, colour))
+        found.append(BallWay(p_WO[holder == int(Holder.GRIPPER)], crossings[-1] if crossings else None, colour))
     return found
 
 

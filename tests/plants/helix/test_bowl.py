@@ -64,6 +64,15 @@ def test_nothing_comes_in_from_below_or_past_the_rim():
     assert not BOWL.catches(over + aside, under + aside)
 
 
+def test_a_fall_crosses_the_rim_s_plane_on_the_line_between_two_places():
+    before, after = P_WB + np.array([0.1, 0.0, 0.01]), P_WB + np.array([0.14, 0.0, -0.03])
+    crossing = BOWL.crossing(before, after)
+    assert crossing is not None
+    np.testing.assert_allclose(crossing, P_WB + np.array([0.11, 0.0, 0.0]), atol=1e-15)
+    assert BOWL.crossing(after, before) is None
+    assert BOWL.crossing(after, after - 0.1) is None
+
+
 def test_the_rim_lies_on_the_inner_surface():
     profile = BOWL.profile(9)
     np.testing.assert_allclose(profile[[0, -1]], [[0.0, P_WB[2] - BOWL.depth], [BOWL.radius, P_WB[2]]], atol=1e-12)

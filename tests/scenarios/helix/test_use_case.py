@@ -73,6 +73,14 @@ def test_a_ball_that_rests_in_the_bowl_is_a_success():
     assert "final_distance" not in figures
 
 
+def test_an_evaluator_that_is_restored_judges_as_before():
+    seen, other = follow(TAKEN, CARRIED, *falling(0.02, LYING)), UseCaseEvaluator(P, P.bowl, P.carry_patience)
+    for evaluator in (seen, other):
+        evaluator.bind(P)
+    other.set_state(seen.get_state())
+    assert other.outcome() == seen.outcome()
+
+
 def test_it_is_not_over_before_the_ball_rests():
     assert not follow(TAKEN, CARRIED, *falling(0.02, LYING)[:4]).over
     assert not follow(TAKEN, CARRIED).over
