@@ -1,7 +1,8 @@
 """Frames, rotations, quaternions and the pinhole camera, in monogram notation.
 
 `p_WG` is the position of G seen from W, `R_WC` turns coordinates in C into coordinates in W, `q_WB` is the quaternion
-of `R_WB` with its scalar part first. A frame is a single capital letter; FRAMES lists them all.
+of `R_WB` with its scalar part first. A frame is a single capital letter; FRAMES lists them all, but for those of a few
+lines, as P of any point.
 
 Rotations are computed here and not by SciPy's `Rotation`: that is made for many rotations at once and takes ten times
 as long for one, and importing it takes longer than all other imports of a camera or a hand together. `Pinhole` is a
@@ -31,6 +32,10 @@ FRAMES: Final = {
     "H": "hand: middle of the palm; for the soft hand of the grasp scene its wrist, x towards the object",
     "C": "camera: z along the optical axis, x to the right and y down in the picture",
     "M": "one fiducial marker: z out of its face",
+    "K": "lowest point of the cup that the hand before the Helix makes",
+    "E": "elbow of that hand's person",
+    "D": "middle of the rim of the Helix's bowl; on the free-flyer the goal's frame",
+    "S": "middle of the sphere of which that bowl's inside is a part",
 }
 
 

@@ -51,7 +51,7 @@ class BowlPlace:
     )
 
     @property
-    def p_WB(self) -> Floats:
+    def p_WD(self) -> Floats:
         """Middle of the bowl's rim in W, shape (3,), m."""
         a, r = self.bowl_azimuth, self.bowl_distance
         return np.array([r * np.cos(a), r * np.sin(a), self.bowl_height])
@@ -59,13 +59,13 @@ class BowlPlace:
     @property
     def p_WG_drop(self) -> Floats:
         """Where the gripper lets the ball fall, in W, shape (3,), m."""
-        return self.p_WB + np.array([0.0, 0.0, self.drop_height])
+        return self.p_WD + np.array([0.0, 0.0, self.drop_height])
 
     @property
     def bowl(self) -> Bowl:
         """The bowl, with the hand's depth and ball."""
         hand = HandParams()
-        return Bowl(self.p_WB, self.bowl_radius, min(hand.bowl_depth, self.bowl_radius), hand.ball_radius)
+        return Bowl(self.p_WD, self.bowl_radius, min(hand.bowl_depth, self.bowl_radius), hand.ball_radius)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,11 +87,11 @@ class UseCaseParameters(BowlPlace, Parameters):
         return super().camera_values() | self._bowl_values()
 
     def _bowl_values(self) -> dict[str, Any]:
-        return {"p_WB": self.p_WB, "bowl_radius": self.bowl_radius, "bowl_depth": self.bowl.depth}
+        return {"p_WD": self.p_WD, "bowl_radius": self.bowl_radius, "bowl_depth": self.bowl.depth}
 
 
 _BOWL = {
-    "p_WB": "in W; the scenario's bowl",
+    "p_WD": "in W; the scenario's bowl",
     "bowl_radius": "the scenario's",
     "bowl_depth": "the scenario's",
 }

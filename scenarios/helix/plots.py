@@ -67,8 +67,8 @@ def figures_of_handover(parameters: Parameters, record: Record) -> list[TimeFigu
 def figure_of_delivery(bowl: Bowl, record: Record) -> TimeFigure:
     """Return the figure of where the ball is over the bowl: how far beside its middle, and how high over its rim."""
     phases = phases_of(record, "servo.phase") if "servo.phase" in record else ()
-    over = 1000 * (record["hand.p_WO"] - bowl.p_WB)
-    gripper = 1000 * (record["arm.p_WG"] - bowl.p_WB)
+    over = 1000 * (record["hand.p_WO"] - bowl.p_WD)
+    gripper = 1000 * (record["arm.p_WG"] - bowl.p_WD)
     ways = (
         ("beside", "Ball beside the bowl's middle", np.linalg.norm(over[:, :2], axis=1), "rim", 1000 * bowl.radius),
         ("over", "Ball over the bowl's rim", over[:, 2], "rim", 0.0),

@@ -154,14 +154,14 @@ def _solid(points: Floats, radii: Floats) -> Mesh:
 
 def _bowl(bowl: Bowl) -> list[Body]:
     """Return the bowl, inside and outside, and the disc on which it stands; they stay where they are."""
-    inner = bowl.profile(9) - np.array([0.0, bowl.p_WB[2]])
+    inner = bowl.profile(9) - np.array([0.0, bowl.p_WD[2]])
     outer = inner[::-1] + np.array([[BOWL_WALL, 0.0]])
     outer[:-1, 1] -= BOWL_WALL * np.linspace(0.0, 1.0, len(outer))[:-1]
     outer[-1] = [0.0, inner[0, 1] - BOWL_WALL]
     shell = turned(np.vstack([inner, outer]))
     low = -bowl.depth - BOWL_WALL
     disc = prism(circle(1.2 * bowl.radius, 32), low - 0.012, low)
-    at = bowl.p_WB[None]
+    at = bowl.p_WD[None]
     return [
         Body(label="bowl", colour=_BOWL, mesh=shell, p_WB=at),
         Body(label="bowl", colour=_TABLE, mesh=disc, p_WB=at),

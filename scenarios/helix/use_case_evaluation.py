@@ -67,7 +67,7 @@ class UseCaseEvaluator(HandoverEvaluator):
             self._keep("the ball falls", signals)
         crossing = self._bowl.crossing(p_before, self._p_WO)
         if crossing is not None:
-            self._crossed = (crossing - self._bowl.p_WB)[:2]
+            self._crossed = (crossing - self._bowl.p_WD)[:2]
         if np.linalg.norm(self._p_WO - p_before) > _REST_SPEED * (t - t_before):
             self._moved_at = t
 
@@ -85,7 +85,7 @@ class UseCaseEvaluator(HandoverEvaluator):
         """Whether the ball came in through the rim's plane, and is below it within the rim."""
         if self._crossed is None or _length(self._crossed) > self._bowl.radius:
             return False
-        over = self._p_WO - self._bowl.p_WB
+        over = self._p_WO - self._bowl.p_WD
         return bool(over[2] < 0.0) and _length(over[:2]) <= self._bowl.radius
 
     @property
@@ -122,7 +122,7 @@ class UseCaseEvaluator(HandoverEvaluator):
             return handover.reason
         if self._fell_at is None:
             return self._why_not_dropped()
-        beside = _length((self._p_WO_fell - self._bowl.p_WB)[:2])
+        beside = _length((self._p_WO_fell - self._bowl.p_WD)[:2])
         if self._is_lost:
             return f"the gripper lost the ball on the way at {self._fell_at:.1f} s, {beside:.3f} m from above the bowl"
         if self._crossed is None:
@@ -138,7 +138,7 @@ class UseCaseEvaluator(HandoverEvaluator):
         return f"the ball fell into the bowl and did not come to rest until {self._t:.1f} s"
 
     def _why_not_dropped(self) -> str:
-        beside = _length((self._p_WG - self._bowl.p_WB)[:2])
+        beside = _length((self._p_WG - self._bowl.p_WD)[:2])
         where = f"the gripper holds the ball {beside:.3f} m from above the bowl"
         if self._phase == "GIVEN_UP":
             return (

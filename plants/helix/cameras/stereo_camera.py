@@ -152,7 +152,7 @@ class Params:
         0.0, "time at which a card is held between the ball and the cameras", minimum=0.0
     )
     hide_ball_until: Second = parameter(0.0, "time at which the card is taken away", minimum=0.0)
-    p_WB: Vector3[Metre] = parameter(
+    p_WD: Vector3[Metre] = parameter(
         np.array([0.0, -0.16, -0.78]), "middle of the bowl's rim in the world, where there is a bowl"
     )
     bowl_radius: Metre = parameter(0.0, "radius of the bowl's rim; 0: there is no bowl", minimum=0.0, maximum=1.0)
@@ -237,7 +237,7 @@ class StereoCamera:
         if p.has_third:
             cameras.append(Pinhole("third", p.p_WC_third, p.q_WC_third, p.intrinsics_third, p.distortion_third))
         collar = MarkerCollar(p.apothem, p.marker, _FACING[: p.covered_markers], p.rings)
-        bowl = Bowl(p.p_WB, p.bowl_radius, p.bowl_depth, p.ball_radius) if p.bowl_radius > 0.0 else None
+        bowl = Bowl(p.p_WD, p.bowl_radius, p.bowl_depth, p.ball_radius) if p.bowl_radius > 0.0 else None
         self._scene = HandoverScene(cameras, p.arm_radius, p.ball_radius, collar, bowl)
         self._canvases = [Canvas(Backdrop(camera, _WIDTH, _HEIGHT, p.blur, p.gradient, p.light)) for camera in cameras]
         self._black, self._dark = (np.full((_HEIGHT, _WIDTH, 3), level, dtype=np.uint8) for level in (0, _DARK))

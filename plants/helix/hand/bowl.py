@@ -20,13 +20,13 @@ class Bowl:
     ball's.
 
     Attributes:
-        p_WB: middle of the rim, in W, shape (3,), m.
+        p_WD: middle of the rim, in W, shape (3,), m.
         radius: of the rim, m.
         depth: of the bowl's lowest point below the rim, m; as much as the radius at most.
         ball_radius: of the ball, m; less than the rim's.
     """
 
-    p_WB: Floats
+    p_WD: Floats
     radius: float
     depth: float
     ball_radius: float
@@ -39,14 +39,14 @@ class Bowl:
     @property
     def p_WS(self) -> Floats:
         """Middle of the inner surface's sphere, in W, shape (3,), m."""
-        return self.p_WB + np.array([0.0, 0.0, self.sphere_radius - self.depth])
+        return self.p_WD + np.array([0.0, 0.0, self.sphere_radius - self.depth])
 
     def crossing(self, p_before: Floats, p_after: Floats) -> Floats | None:
         """Return where a ball whose centre went straight from one point to another fell through the rim's plane.
 
         The point is in W, shape (3,), m, within the rim or beside it; None if the ball did not fall through the plane.
         """
-        height = self.p_WB[2]
+        height = self.p_WD[2]
         if not p_after[2] < height <= p_before[2]:
             return None
         share = (p_before[2] - height) / (p_before[2] - p_after[2])
@@ -57,7 +57,7 @@ class Bowl:
         p_WO = self.crossing(p_before, p_after)
         if p_WO is None:
             return False
-        beside = (p_WO - self.p_WB)[:2]
+        beside = (p_WO - self.p_WD)[:2]
         return math.sqrt(beside @ beside) <= self.radius
 
     def roll(self, p_WO: Floats, v_WO: Floats, dt: float) -> tuple[Floats, Floats]:

@@ -50,7 +50,7 @@ class Guidance:
 
     def __init__(self, gains: GuidanceGains) -> None:
         self._gains = gains
-        self._p_WL: Floats | None = None  # where the person leads the gripper to at the moment
+        self._p_WG_led: Floats | None = None  # where the person leads the gripper to at the moment
 
     def force(self, p_WO: Floats, p_WG: Floats, v_WG: Floats, dt: float) -> Floats:
         """Return f_G, shape (3,), N, in W, that acts for the next dt.
@@ -65,11 +65,11 @@ class Guidance:
         if g.stiffness == 0.0:
             return np.zeros(3)
         goal = self._goal(p_WO, p_WG)
-        led = p_WG if self._p_WL is None else self._p_WL
+        led = p_WG if self._p_WG_led is None else self._p_WG_led
         way = goal - led
         distance = float(np.linalg.norm(way))
-        self._p_WL = goal if distance <= g.speed * dt else led + g.speed * dt / distance * way
-        e = self._p_WL - p_WG
+        self._p_WG_led = goal if distance <= g.speed * dt else led + g.speed * dt / distance * way
+        e = self._p_WG_led - p_WG
         f = g.stiffness * e - g.damping * v_WG
         size = float(np.linalg.norm(f))
         if size > g.force_max:
@@ -86,8 +86,8 @@ class Guidance:
 
     def get_state(self) -> Floats | None:
         """Return the complete state."""
-        return self._p_WL
+        return self._p_WG_led
 
     def set_state(self, state: Floats | None) -> None:
         """Restore what `get_state` gave."""
-        self._p_WL = state
+        self._p_WG_led = state

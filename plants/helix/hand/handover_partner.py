@@ -98,7 +98,7 @@ class HandoverPartner:
                 speed=params.guide_speed,
             )
         )
-        self._bowl = Bowl(params.p_WB, params.bowl_radius, params.bowl_depth, params.ball_radius)
+        self._bowl = Bowl(params.p_WD, params.bowl_radius, params.bowl_depth, params.ball_radius)
         self._in_bowl = False
         self._p_WG: Floats | None = None  # at the previous step
         self._elapsed = 0.0  # length of that step, s
@@ -177,7 +177,7 @@ class HandoverPartner:
         self._p_WO = before + dt * self._v_WO + dt**2 / 2.0 * g
         self._v_WO = self._v_WO + dt * g
         if self._params.bowl_radius > 0.0:
-            is_below = self._p_WO[2] < self._params.p_WB[2]
+            is_below = self._p_WO[2] < self._params.p_WD[2]
             self._in_bowl = is_below and (self._in_bowl or self._bowl.catches(before, self._p_WO))
         if self._in_bowl:
             self._p_WO, self._v_WO = self._bowl.roll(self._p_WO, self._v_WO, dt)

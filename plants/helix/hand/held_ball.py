@@ -47,7 +47,7 @@ class HeldBall:
         weight = params.ball_mass * params.gravity
         self._rest = np.array([0.0, 0.0, -weight / params.hold_stiffness])
         depth = (weight + params.hold_force) / params.palm_stiffness - self._rest[2]
-        self._p_OL = np.array(  # the cup's lowest point, were the hand not displaced, seen from the ball at rest
+        self._p_OK = np.array(  # the cup's lowest point, were the hand not displaced, seen from the ball at rest
             [0.0, 0.0, depth - params.ball_radius]
         )
         self._ball = np.zeros((3, 3))  # position, velocity, angular velocity
@@ -77,7 +77,7 @@ class HeldBall:
         self._hand[:] = self._rest, np.zeros(3)
         self._xi[:] = 0.0
         self._ends = None
-        self._low[:] = p_WO + self._p_OL
+        self._low[:] = p_WO + self._p_OK
 
     def move(self, p_WG: Floats, R_WG: Floats, grip: float, p_WO_held: Floats, f_hold: float, dt: float) -> Contact:
         """Advance by dt, in which the gripper and the place where the hand holds the ball out come to where they are.
@@ -93,7 +93,7 @@ class HeldBall:
         ends = _bodies(p_WG, R_WG, grip)
         before = ends if self._ends is None else self._ends
         steps = max(1, math.ceil(dt / self._step - 1e-9))
-        low, forces, pressures = p_WO_held + self._p_OL, np.zeros((2, 3)), np.zeros(2)
+        low, forces, pressures = p_WO_held + self._p_OK, np.zeros((2, 3)), np.zeros(2)
         rates, low_rate = (ends - before) / dt, (low - self._low) / dt
         self._ends = np.array(before)
         moved = (self._ball, self._hand, self._xi, self._ends, rates, _RADII, self._low, low_rate)

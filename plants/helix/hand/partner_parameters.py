@@ -119,7 +119,7 @@ class Params:
     withdrawal: Metre = parameter(0.15, "how far the hand withdraws", minimum=0.0, maximum=1.0)
     withdrawal_time: Second = parameter(1.0, "how long that takes", minimum=0.01, maximum=60.0)
     floor: Metre = parameter(-1.2, "height at which a fallen ball rests", minimum=-100.0, maximum=2.0)
-    p_WB: Vector3[Metre] = parameter(
+    p_WD: Vector3[Metre] = parameter(
         np.array([0.0, -0.16, -0.78]), "middle of the bowl's rim in the world, where there is a bowl", minimum=-2.0
     )
     bowl_radius: Metre = parameter(0.0, "radius of the bowl's rim; 0: there is no bowl", minimum=0.0, maximum=1.0)
@@ -182,9 +182,9 @@ class Params:
                 f"bowl_depth {self.bowl_depth:g} m must not exceed bowl_radius {self.bowl_radius:g} m: the bowl is a "
                 "half of a hollow sphere at most"
             )
-        if not self.p_WB[2] - self.bowl_depth + self.ball_radius >= self.floor:
+        if not self.p_WD[2] - self.bowl_depth + self.ball_radius >= self.floor:
             faults.append(
-                f"p_WB: the bowl reaches {self.bowl_depth:g} m below {self.p_WB[2]:g} m, into the floor; a ball on the "
+                f"p_WD: the bowl reaches {self.bowl_depth:g} m below {self.p_WD[2]:g} m, into the floor; a ball on the "
                 f"floor has its middle at {self.floor:g} m"
             )
         return faults

@@ -205,14 +205,14 @@ def _draw_ways(axis: Axes, found: Sequence[BallWay]) -> None:
         axis.plot(1000 * way.carried[:, 0], 1000 * way.carried[:, 1], color=way.colour, lw=1.0)
         if len(way.carried):
             axis.plot(*1000 * way.carried[0, :2], "o", color=way.colour, ms=5, mew=0)
-    axis.add_patch(Circle((1000 * p.p_WB[0], 1000 * p.p_WB[1]), 1000 * p.bowl_radius, fill=False, color="#4d5866"))
+    axis.add_patch(Circle((1000 * p.p_WD[0], 1000 * p.p_WD[1]), 1000 * p.bowl_radius, fill=False, color="#4d5866"))
     axis.plot(0, 0, "+", color="#4d5866", ms=9)
     axis.set(aspect="equal", xlim=(-210, 240), ylim=(-270, 230))
 
 
 def _draw_drops(axis: Axes, found: Sequence[BallWay]) -> None:
     p = UseCaseParameters()
-    x, y, _ = 1000 * p.p_WB
+    x, y, _ = 1000 * p.p_WD
     for radius, stroke in ((p.bowl_radius, "-"), (p.bowl_radius - p.bowl.ball_radius, "--")):
         axis.add_patch(Circle((x, y), 1000 * radius, fill=False, color="#4d5866", ls=stroke))
     for way in found:

@@ -15,15 +15,15 @@ from handover.plants.helix.hand.bowl import Bowl
 from handover.plants.helix.hand.handover_partner import HandoverPartner
 from handover.plants.helix.hand.partner_parameters import Holder, Inputs, InvalidPartnerParameters, Outputs, Params
 
-P_WB = np.array([0.0, -0.16, -0.74])
-BOWL = Bowl(P_WB, radius=0.08, depth=0.06, ball_radius=0.025)
+P_WD = np.array([0.0, -0.16, -0.74])
+BOWL = Bowl(P_WD, radius=0.08, depth=0.06, ball_radius=0.025)
 DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 
 
 def dropped(beside: float, v: float = 0.0, dt: float = 0.02, **changes: Any) -> list[Outputs]:
     """Return what a ball does that a gripper, moving at v, takes 0.1 m over the rim and lets go."""
-    p_WG = P_WB + np.array([beside, 0.0, 0.1])
-    given = {"p_WO_0": p_WG, "p_WB": P_WB, "bowl_radius": 0.08, "tremor_rms": 0.0, "drift_rms": 0.0} | changes
+    p_WG = P_WD + np.array([beside, 0.0, 0.1])
+    given = {"p_WO_0": p_WG, "p_WD": P_WD, "bowl_radius": 0.08, "tremor_rms": 0.0, "drift_rms": 0.0} | changes
     partner = HandoverPartner(replace(Params(), **given))
     step = v * dt * np.array([1.0, 0.0, 0.0])
     take(partner, p_WG, dt=dt)
@@ -37,12 +37,12 @@ def dropped(beside: float, v: float = 0.0, dt: float = 0.02, **changes: Any) -> 
 def test_a_ball_over_the_bowl_comes_to_rest_on_its_lowest_point(beside: float):
     last = dropped(beside)[-1]
     assert last.holder is Holder.FREE
-    lowest = P_WB - np.array([0.0, 0.0, BOWL.depth - BOWL.ball_radius])
+    lowest = P_WD - np.array([0.0, 0.0, BOWL.depth - BOWL.ball_radius])
     np.testing.assert_allclose(last.p_WO, lowest, atol=0.003)
 
 
 def test_a_ball_in_the_bowl_stays_within_its_surface_by_its_radius():
-    inside = [y.p_WO for y in dropped(0.07) if y.p_WO[2] < P_WB[2]]
+    inside = [y.p_WO for y in dropped(0.07) if y.p_WO[2] < P_WD[2]]
     assert len(inside) > 20
     assert np.linalg.norm(inside - BOWL.p_WS, axis=1).max() <= BOWL.sphere_radius - BOWL.ball_radius + 1e-12
 
@@ -57,7 +57,7 @@ def test_without_a_bowl_it_falls_to_the_floor():
 
 
 def test_nothing_comes_in_from_below_or_past_the_rim():
-    over, under = P_WB + np.array([0.0, 0.0, 0.01]), P_WB - np.array([0.0, 0.0, 0.01])
+    over, under = P_WD + np.array([0.0, 0.0, 0.01]), P_WD - np.array([0.0, 0.0, 0.01])
     assert BOWL.catches(over, under)
     assert not BOWL.catches(under, over)
     aside: Floats = np.array([0.081, 0.0, 0.0])
@@ -65,22 +65,22 @@ def test_nothing_comes_in_from_below_or_past_the_rim():
 
 
 def test_a_fall_crosses_the_rim_s_plane_on_the_line_between_two_places():
-    before, after = P_WB + np.array([0.1, 0.0, 0.01]), P_WB + np.array([0.14, 0.0, -0.03])
+    before, after = P_WD + np.array([0.1, 0.0, 0.01]), P_WD + np.array([0.14, 0.0, -0.03])
     crossing = BOWL.crossing(before, after)
     assert crossing is not None
-    np.testing.assert_allclose(crossing, P_WB + np.array([0.11, 0.0, 0.0]), atol=1e-15)
+    np.testing.assert_allclose(crossing, P_WD + np.array([0.11, 0.0, 0.0]), atol=1e-15)
     assert BOWL.crossing(after, before) is None
     assert BOWL.crossing(after, after - 0.1) is None
 
 
 def test_the_rim_lies_on_the_inner_surface():
     profile = BOWL.profile(9)
-    np.testing.assert_allclose(profile[[0, -1]], [[0.0, P_WB[2] - BOWL.depth], [BOWL.radius, P_WB[2]]], atol=1e-12)
+    np.testing.assert_allclose(profile[[0, -1]], [[0.0, P_WD[2] - BOWL.depth], [BOWL.radius, P_WD[2]]], atol=1e-12)
 
 
 def test_a_bowl_that_cannot_be_is_refused_with_all_that_is_wrong():
     with pytest.raises(InvalidPartnerParameters) as told:
-        HandoverPartner(Params(bowl_radius=0.02, bowl_depth=0.5, p_WB=np.array([0.0, 0.0, -1.1])))
+        HandoverPartner(Params(bowl_radius=0.02, bowl_depth=0.5, p_WD=np.array([0.0, 0.0, -1.1])))
     faults = "\n".join(told.value.faults)
     assert "bowl_radius 0.02 m must exceed ball_radius 0.025 m" in faults
     assert "bowl_depth 0.5 m must not exceed bowl_radius 0.02 m" in faults
@@ -89,13 +89,13 @@ def test_a_bowl_that_cannot_be_is_refused_with_all_that_is_wrong():
 
 def test_the_cameras_see_the_bowl_and_what_lies_in_it_behind_its_wall():
     def picture(bowl_radius: float, p_WO: Floats) -> Any:
-        camera = StereoCamera(CameraParams(p_WB=P_WB, bowl_radius=bowl_radius, noise=0.0))
+        camera = StereoCamera(CameraParams(p_WD=P_WD, bowl_radius=bowl_radius, noise=0.0))
         return np.asarray(camera.outputs(0.0, Seen(p_WO=p_WO)).left).reshape(720, 1280, 3).astype(np.int64)
 
     def green(pixels: Any) -> int:
         blue, middle, red = (pixels[..., k] for k in range(3))
         return int(np.sum((middle > blue + 40) & (middle > red + 40)))
 
-    inside, aside = P_WB - np.array([0.0, 0.0, 0.035]), np.array([0.18, 0.0, -0.62])
+    inside, aside = P_WD - np.array([0.0, 0.0, 0.035]), np.array([0.18, 0.0, -0.62])
     assert np.any(picture(0.0, aside) != picture(0.08, aside))
     assert green(picture(0.08, inside)) < 0.4 * green(picture(0.0, inside))

@@ -26,7 +26,7 @@ from handover.scenarios.helix.use_case_evaluation import UseCaseEvaluator
 P = UseCaseParameters()
 OVER = P.p_WG_drop
 ASIDE = np.array([0.3, 0.0, 0.0])
-LYING = P.p_WB - np.array([0.0, 0.0, 0.035])
+LYING = P.p_WD - np.array([0.0, 0.0, 0.035])
 
 
 def signals(phase: Phase, holder: Holder, p_WO: Any, verdict: Verdict = Verdict.NONE) -> Signals:
@@ -56,7 +56,7 @@ def falling(beside: float, end: Any, phase: Phase = Phase.DROP) -> list[tuple[fl
     """Return a ball that falls past the rim beside the bowl's middle, and lies at a place a second later."""
     aside = np.array([beside, 0.0, 0.0])
     rest = [(31.0 + 0.1 * k, end) for k in range(8)]
-    ways = [(30.0, OVER + aside), (30.2, P.p_WB + aside - np.array([0.0, 0.0, 0.01])), *rest]
+    ways = [(30.0, OVER + aside), (30.2, P.p_WD + aside - np.array([0.0, 0.0, 0.01])), *rest]
     return [(t, signals(phase, Holder.FREE, p)) for t, p in ways]
 
 
