@@ -29,6 +29,9 @@ from handover.scenarios.helix.parameters import Parameters
 from handover.scenarios.helix.places import PLACES
 from handover.scenarios.helix.use_case_evaluation import UseCaseEvaluator
 
+_REACHED = 0.02
+"""How far the place above the bowl may lie beyond the sure reach, m: in the thesis's direction the arm gets there."""
+
 _END = Fraction(10)
 """Time for the last ball to fall and rest, s."""
 
@@ -130,12 +133,18 @@ class HelixUseCase(HelixHandover):
     def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:
         """Wire the handover's units, with a bowl; a place to drop the ball that the arm does not reach is a fault."""
         p: UseCaseParameters = parameters
+        from handover.scenarios.helix.workspace import short_of_reach  # OpenCV is slow to import, and lists import this
+
         s = super().build(p, seed, fmu)
-        if (short := nearest_approach(p.p_WG_drop, p.settings)) > REACH_TOLERANCE:
+        if short := short_of_reach(p.p_WG_drop, _REACHED):
+            r, z = float(np.hypot(*p.p_WG_drop[:2])), p.p_WG_drop[2]
+            at = f"{r:.2f} m from the arm's axis at a height of {z:.2f} m"
+            s.notes.append(f"the gripper is to open {at}, but the arm {short}")
+        if (away := nearest_approach(p.p_WG_drop, p.settings)) > REACH_TOLERANCE:
             x, y, z = p.p_WG_drop
             s.add_fault(
                 f"bowl_azimuth, bowl_distance, bowl_height, drop_height: the place above the bowl, ({x:.2f}, {y:.2f}, "
-                f"{z:.2f}) m, is out of the arm's reach: by its model the gripper comes no nearer than {short:.3f} m. "
+                f"{z:.2f}) m, is out of the arm's reach: by its model the gripper comes no nearer than {away:.3f} m. "
                 f"As far as the ball is offered, {p.radius:g} m from the axis and {p.height:g} m high, would do"
             )
         return s

@@ -87,14 +87,15 @@ def notes_on_place(
     return notes
 
 
-def short_of_reach(p_WG: Floats) -> str:
+def short_of_reach(p_WG: Floats, margin: float = 0.0) -> str:
     """Return how far the arm is sure to reach at a place's height, if the place is farther; "" if it is not.
 
     Args:
         p_WG: where the gripper is to be in W, pointing down, shape (3,), m.
+        margin: how much farther the place may be, m: in most directions the arm reaches farther than it is sure to.
     """
     far, r = reach(float(p_WG[2])), float(np.hypot(p_WG[0], p_WG[1]))
-    if far > 0.0 and r <= far:
+    if far > 0.0 and r <= far + margin:
         return ""
     where = f"is sure to reach {far:.2f} m far there" if far > 0.0 else "is not known to reach that height"
     return f"{where}, whatever the direction"

@@ -74,7 +74,7 @@ SHARED: dict[str, dict[str, tuple[Any, ...]]] = {
     "arm": {},
     "hand": {"bowl_depth": ("bowl", "bowl_depth")},
     "camera": _OPTICS
-    | {"p_WB": ("hand", "p_WB"), "bowl_radius": ("hand", "bowl_radius"), "bowl_depth": ("bowl", "bowl_depth")},
+    | {"p_WD": ("hand", "p_WD"), "bowl_radius": ("hand", "bowl_radius"), "bowl_depth": ("bowl", "bowl_depth")},
     "vision": _OPTICS
     | {
         "has_third": ("pictures", "has_third"),

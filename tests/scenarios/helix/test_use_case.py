@@ -132,6 +132,16 @@ def built(**values: Any) -> Any:
     return HelixUseCase().build(UseCaseParameters(**values), 0, lambda name: cached(HelixUseCase.units[name], 3))
 
 
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [({"bowl_distance": 0.3}, "but the arm is sure to reach 0.15 m"), ({"bowl_height": -0.3}, "is not known to reach")],
+)
+def test_a_bowl_that_the_arm_may_not_reach_is_warned_of(values: dict[str, float], words: str):
+    notes = built(**values).notes
+    assert [words in note for note in notes if note.startswith("the gripper is to open")] == [True]
+    assert not built().notes
+
+
 @pytest.mark.parametrize("values", [{"bowl_distance": 0.6}, {"bowl_height": -1.0}, {"drop_height": 0.7}])
 def test_a_bowl_out_of_reach_is_told_before_anything_starts(values: dict[str, float]):
     with pytest.raises(WiringError, match=r"the place above the bowl, .* is out of the arm's reach: .* no nearer than"):
