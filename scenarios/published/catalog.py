@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from handover.scenarios.published.free_flyer.flyer_impedance import FlyerImpedanceTable
 from handover.scenarios.published.helix.helix_1 import Helix1
 from handover.scenarios.published.helix.helix_2 import Helix2
 from handover.scenarios.published.helix.helix_3 import Helix3
@@ -13,6 +14,7 @@ from handover.scenarios.published.ir_grasp.ir_table import IrTable
 from handover.scenarios.published.published_experiment import PublishedExperiment
 
 _ALL: tuple[type[PublishedExperiment], ...] = (
+    FlyerImpedanceTable,
     Helix1,
     Helix2,
     Helix3,

@@ -1,0 +1,1 @@
+"""The published experiments of the free-flyer's thesis."""

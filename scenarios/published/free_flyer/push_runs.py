@@ -1,0 +1,172 @@
+"""Pushes against the free-flyer's gripper that a campaign runs, their rows, and what the linear model predicts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from handover.controllers.free_flyer.body import FlyerBody
+from handover.controllers.free_flyer.gains import published_gains
+from handover.controllers.free_flyer.ports import PERIOD
+from handover.controllers.free_flyer.ports import Behaviour as Gains
+from handover.controllers.free_flyer.sampled_loop import SampledLoop
+from handover.cosim.blocks.ports import Floats
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Wrench
+
+EXACT = {f"robot.{what}_noise": "0" for what in ("position", "attitude", "velocity", "rate")}
+"""Parameters of a navigation without noise."""
+
+_DEFAULT = ImpedanceParameters()
+_AFTER = 30.0
+"""Time after a push for which the linear response is looked at, s: the greatest error comes long before."""
+
+DURATIONS = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0)
+"""How long forces last whose ratio of compliant to rigid errors is looked at, s."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """What the robot is otherwise than its controller assumes, as a factor."""
+
+    what: str
+    name: str
+    factor: float
+
+    @property
+    def label(self) -> str:
+        """What and by how much."""
+        return f"{self.what} {100 * (self.factor - 1):+.0f} %"
+
+    @property
+    def parameters(self) -> dict[str, str]:
+        """The scenario's parameter of it, as texts."""
+        return {self.name: f"{self.factor:g}"}
+
+
+CHANGES = tuple(
+    Change(what, name, factor)
+    for what, name in (("mass", "mass_factor"), ("inertia", "inertia_factor"), ("arm's length", "arm_factor"))
+    for factor in (0.7, 1.3)
+)
+"""Robots that are not what their controller assumes."""
+
+
+@dataclass(frozen=True)
+class Push:
+    """A pulse of force or torque: its wrench and axis."""
+
+    kind: Wrench
+    axis: Axis
+
+    @property
+    def label(self) -> str:
+        """Wrench and axis in words."""
+        p = _DEFAULT
+        size = f"{p.force:g} N along" if self.kind is Wrench.FORCE else f"{p.torque:g} N·m about"
+        return f"{size} {self.axis.name.lower()}"
+
+    @property
+    def metric(self) -> str:
+        """Name of the metric that is its greatest error: of position for a force, of orientation for a torque."""
+        return f"greatest_{'position' if self.kind is Wrench.FORCE else 'orientation'}_error"
+
+    @property
+    def parameters(self) -> dict[str, str]:
+        """The scenario's parameters of it, as texts."""
+        return {"kind": self.kind.name.lower(), "axis": self.axis.name.lower()}
+
+    def figure_number(self, behaviour: Behaviour) -> str:
+        """Return the thesis's figure of it."""
+        return f"fig. 4.{5 + 6 * int(behaviour) + 3 * int(self.kind) + int(self.axis)}"
+
+
+PUSHES = tuple(Push(kind, axis) for kind in Wrench for axis in Axis)
+"""The six of [Fernandes2020] sec. 4.1.3, in the order of its figures."""
+
+
+class PushRuns:
+    """Rows of the campaign's table of runs that came to their end, by what they are for."""
+
+    def __init__(self, table: CampaignTable) -> None:
+        self._rows = [row for row in table.rows if row["status"] == "done"]
+
+    def of(
+        self,
+        push: Push,
+        behaviour: Behaviour,
+        *,
+        ideal: bool = True,
+        exact: bool = False,
+        duration: float = _DEFAULT.duration,
+        change: Change | None = None,
+    ) -> Mapping[str, Any] | None:
+        """Return the run of a push, None where there is none.
+
+        Args:
+            push: what acts on the gripper.
+            behaviour: the controller's setting.
+            ideal: whether thrust has neither limits nor lag.
+            exact: whether the navigation has no noise.
+            duration: of the push, s.
+            change: what of the robot is otherwise than its controller assumes.
+        """
+        wanted: dict[str, Any] = {**push.parameters, "behaviour": behaviour.item, "ideal": ideal, "duration": duration}
+        wanted |= {c.name: 1.0 for c in CHANGES}
+        if change is not None:
+            wanted[change.name] = change.factor
+        for row in self._rows:
+            if (_value(row, "robot.position_noise") == 0.0) is exact and all(
+                _value(row, name) == x for name, x in wanted.items()
+            ):
+                return row
+        return None
+
+    def all_of(self, **which: Any) -> list[Mapping[str, Any]]:
+        """Return the runs that there are of the six pushes under both behaviours; the arguments are those of `of`."""
+        found = [self.of(push, behaviour, **which) for behaviour in Behaviour for push in PUSHES]
+        return [row for row in found if row is not None]
+
+    def ratio(self, axis: Axis, duration: float) -> float | None:
+        """Return compliant over rigid greatest position error under a force along an axis; None without both runs."""
+        push = Push(Wrench.FORCE, axis)
+        rigid, compliant = (self.of(push, b, duration=duration) for b in (Behaviour.RIGID, Behaviour.COMPLIANT))
+        return None if rigid is None or compliant is None else float(compliant[push.metric] / rigid[push.metric])
+
+
+def _value(row: Mapping[str, Any], name: str) -> Any:
+    """Return what a row has of a parameter, the scenario's default where it was not set, None of a unit's."""
+    value = row.get(name)
+    return getattr(_DEFAULT, name, None) if value is None or value != value else value
+
+
+def predicted_errors(push: Push, behaviour: Behaviour, duration: float, t: Floats) -> tuple[Floats, Floats]:
+    """Return position and orientation error, rest minus actual, each (n, 3), m and rad, by python-control.
+
+    It is the response of the body near rest under eq. (3.25) at the controller's period, with ideal thrust and exact
+    navigation: `SampledLoop`, which the controller's own check of its stability uses, too.
+
+    Args:
+        push: what acts on the gripper.
+        behaviour: the controller's setting.
+        duration: of the pulse, s.
+        t: multiples of the controller's period, (n,), s.
+    """
+    p, period = _DEFAULT, float(PERIOD)
+    body = FlyerBody(mass=p.model.mass, I_B=p.model.I_B, p_BG=p.model.p_BG)
+    loop = SampledLoop(body.linear_plant(0.0), published_gains(Gains(behaviour), body).law(body), period)
+    wrench = np.zeros((len(t), 6))
+    held = np.clip((p.begin + duration - t) / period, 0.0, 1.0) - np.clip((p.begin - t) / period, 0.0, 1.0)
+    wrench[:, 3 * int(push.kind) + int(push.axis)] = held * (p.force if push.kind is Wrench.FORCE else p.torque)
+    moved: Floats = np.asarray(loop.response(wrench))
+    return -moved[:, :3], -moved[:, 3:6]
+
+
+@cache
+def predicted_greatest(push: Push, behaviour: Behaviour, duration: float) -> float:
+    """Return the greatest error of the push's own kind by the linear model, m or rad."""
+    t: Floats = np.arange(0.0, _DEFAULT.begin + duration + _AFTER, float(PERIOD))
+    errors = predicted_errors(push, behaviour, duration, t)[int(push.kind)]
+    return float(np.max(np.linalg.norm(errors, axis=1)))
