@@ -32,7 +32,7 @@ class DrivenUnit:
         self.fmu.exitInitializationMode()
 
     def references(self, *names: str) -> list[int]:
-        return [self._declaration.reference(name) for name in names]
+        return [self._declaration.reference(name, self._fmi) for name in names]
 
     def __getitem__(self, name: str) -> float:
         return self.get(self.references(name))[0]

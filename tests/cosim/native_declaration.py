@@ -45,9 +45,9 @@ class _Model(ctypes.Structure):
 
 @dataclass(frozen=True)
 class Variable:
-    """A row of a unit's table."""
+    """A row of a unit's table; `place` counts them from 1."""
 
-    reference: int
+    place: int
     name: str
     causality: int
     type: int
@@ -81,9 +81,16 @@ class Declaration:
         """Whether it has variables that FMI 2 does not know."""
         return any(v.type >= BINARY or v.length for v in self.variables)
 
-    def reference(self, name: str) -> int:
-        """Return a variable's value reference."""
-        return next(v.reference for v in self.variables if v.name == name)
+    def place(self, name: str) -> int:
+        """Return a variable's place among all, counted from 1."""
+        return next(v.place for v in self.variables if v.name == name)
+
+    def reference(self, name: str, fmi: int = 3) -> int:
+        """Return a variable's value reference: its place, in FMI 2 among the variables of its type."""
+        place = self.place(name)
+        if fmi == 3:
+            return place
+        return sum(v.type == self.variables[place - 1].type for v in self.variables[:place])
 
 
 def read_declarations(library: Path) -> list[Declaration]:

@@ -60,7 +60,7 @@ def description2(d: Declaration, step: float, dependencies: bool, flags: Mapping
     ElementTree.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize=repr(step))
     rows = ElementTree.SubElement(root, "ModelVariables")
     for v in d.variables:
-        ends = {"name": v.name, "valueReference": str(v.reference), **_kind(d, v)}
+        ends = {"name": v.name, "valueReference": str(d.reference(v.name, fmi=2)), **_kind(d, v)}
         row = ElementTree.SubElement(rows, "ScalarVariable", ends)
         ElementTree.SubElement(row, FMI2_TYPES[v.type], {**_start(v), **({"unit": v.unit} if v.unit else {})})
     structure = ElementTree.SubElement(root, "ModelStructure")
@@ -70,7 +70,7 @@ def description2(d: Declaration, step: float, dependencies: bool, flags: Mapping
         for v in d.variables:
             if v.causality == OUTPUT:
                 known = _dependencies(d, v, with_parameters=group == "InitialUnknowns") if dependencies else {}
-                ElementTree.SubElement(unknowns, "Unknown", {"index": str(v.reference), **known})
+                ElementTree.SubElement(unknowns, "Unknown", {"index": str(v.place), **known})
     return _text(root)
 
 
@@ -104,18 +104,18 @@ def description3(d: Declaration, step: float, dependencies: bool, flags: Mapping
         for v in d.variables:
             if v.causality == OUTPUT and (group == "Output" or not v.clock):
                 known = _dependencies(d, v, with_parameters=group == "InitialUnknown") if dependencies else {}
-                ElementTree.SubElement(structure, group, {"valueReference": str(v.reference), **known})
+                ElementTree.SubElement(structure, group, {"valueReference": str(v.place), **known})
     return _text(root)
 
 
 def _add_variable3(rows: ElementTree.Element, d: Declaration, v: Variable) -> None:
     row = ElementTree.SubElement(
-        rows, FMI3_TYPES[v.type], {"name": v.name, "valueReference": str(v.reference), **_kind(d, v)}
+        rows, FMI3_TYPES[v.type], {"name": v.name, "valueReference": str(v.place), **_kind(d, v)}
     )
     if v.unit:
         row.set("unit", v.unit)
     if v.clock:
-        row.set("clocks", str(d.reference(v.clock)))
+        row.set("clocks", str(d.place(v.clock)))
     if v.type == BINARY:
         row.set("mimeType", "application/x-native")
         if v.causality == INPUT:
@@ -151,7 +151,7 @@ def _start(v: Variable) -> dict[str, str]:
 
 def _dependencies(d: Declaration, v: Variable, with_parameters: bool) -> dict[str, str]:
     parameters = [p.name for p in d.variables if with_parameters and p.causality == PARAMETER]
-    return {"dependencies": " ".join(str(d.reference(name)) for name in (*v.depends, *parameters))}
+    return {"dependencies": " ".join(str(d.place(name)) for name in (*v.depends, *parameters))}
 
 
 def _add_units(root: ElementTree.Element, d: Declaration) -> None:

@@ -24,6 +24,8 @@ from handover.fmus.compile import TARGETS, cache_folder, host_platform, zig_cc
 SOURCES = Path(__file__).with_name("native")
 FAULTS = Path(__file__).parents[1] / "faults" / "units"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
+Edited = Callable[..., Path]
+"""Takes a unit's name, the version of FMI, and pairs of texts of its description and what is to be there instead."""
 
 
 def native_fmu(name: str, fmi: int = 3, *, step: float | None = None, dependencies: bool = True, **flags: bool) -> Path:

@@ -1,4 +1,6 @@
-/* y = a u + b, y = a1 u1 + a2 u2 + b, and y1 = a1 u1, y2 = a2 u2: direct feedthrough, for algebraic loops and chains. */
+/* y = a u + b, y = a1 u1 + a2 u2 + b, and y1 = a1 u1, y2 = a2 u2: direct feedthrough, for algebraic loops and chains.
+ *
+ * mixed_gain: y = a u + b, n = m and is = was, which FMI 2 tells apart by their types alone. */
 #include "frame/unit.h"
 
 typedef struct {
@@ -33,6 +35,29 @@ static const Variable apart[] = {
     {"a2", PARAMETER, REAL, offsetof(TwoGains, a2), .start = 1},
 };
 
+typedef struct {
+    double u, y, a, b;
+    int32_t m, n, was, is;
+} MixedGain;
+
+static const Variable mixed[] = {
+    {"u", INPUT, REAL, offsetof(MixedGain, u)},
+    {"y", OUTPUT, REAL, offsetof(MixedGain, y), .depends = "u"},
+    {"a", PARAMETER, REAL, offsetof(MixedGain, a), .start = 1},
+    {"b", PARAMETER, REAL, offsetof(MixedGain, b)},
+    {"m", INPUT, INTEGER, offsetof(MixedGain, m)},
+    {"n", OUTPUT, INTEGER, offsetof(MixedGain, n), .depends = "m"},
+    {"was", INPUT, BOOLEAN, offsetof(MixedGain, was)},
+    {"is", OUTPUT, BOOLEAN, offsetof(MixedGain, is), .depends = "was"},
+};
+
+static void outputs_mixed(Unit *unit) {
+    SELF(MixedGain);
+    self->y = self->a * self->u + self->b;
+    self->n = self->m;
+    self->is = self->was;
+}
+
 static void outputs_apart(Unit *unit) {
     SELF(TwoGains);
     self->y1 = self->a1 * self->u1;
@@ -57,3 +82,7 @@ static const Model two_gains = {
     "two_gains", apart, COUNT(apart), 0.1, DERIVATIVES, sizeof(TwoGains), .outputs = outputs_apart,
 };
 UNIT(two_gains)
+static const Model mixed_gain = {
+    "mixed_gain", mixed, COUNT(mixed), 0.1, 0, sizeof(MixedGain), .outputs = outputs_mixed,
+};
+UNIT(mixed_gain)

@@ -116,7 +116,7 @@ fmi2Status fmi2SetRealInputDerivatives(REFERENCES, const fmi2Integer order[], co
         const Variable *v = variable(unit, vr[i], REAL, true, "fmi2SetRealInputDerivatives");
         if (!v || !(unit->model->abilities & INTERPOLATES) || order[i] < 1 || order[i] > MAX_ORDER)
             return fmi2Error;
-        unit->kept->rates[vr[i] - 1][order[i] - 1] = values[i];
+        unit->kept->rates[v - unit->model->variables][order[i] - 1] = values[i];
     }
     return fmi2OK;
 }

@@ -88,10 +88,20 @@ static bool reachable(Unit *unit, const Variable *v, bool to_set, const char *ca
     return true;
 }
 
+static const Variable *referenced(const Unit *unit, uint32_t reference, enum type type) {
+    const Model *model = unit->model;
+    if (unit->fmi == 3)
+        return reference - 1u < model->n_variables ? &model->variables[reference - 1] : NULL;
+    for (size_t i = 0; i < model->n_variables; i++)
+        if (model->variables[i].type == (int)type && !--reference)
+            return &model->variables[i];
+    return NULL;
+}
+
 const Variable *variable(Unit *unit, uint32_t reference, enum type type, bool to_set, const char *call) {
     if (to_set && unit->model->set)
         unit->model->set(unit);
-    const Variable *v = reference - 1u < unit->model->n_variables ? &unit->model->variables[reference - 1] : NULL;
+    const Variable *v = referenced(unit, reference, type);
     if (!v || v->type != (int)type || (to_set && v->causality == OUTPUT)) {
         say(unit, ERROR, "%s: there is no such variable with value reference %u", call, (unsigned)reference);
         return NULL;
@@ -162,7 +172,7 @@ static void reach(Unit *unit, const Unit *from, const uint32_t *known, size_t m,
     if (kept->last_step > 0)
         memcpy(kept->data, kept->data + size, size);
     for (size_t i = 0; i < m; i++)
-        *(double *)place(unit, &unit->model->variables[known[i] - 1]) += seed[i];
+        *(double *)place(unit, referenced(from, known[i], REAL)) += seed[i];
     StepEnd end = {0};
     if (kept->last_step > 0 && unit->model->step)
         unit->model->step(unit, kept->time - kept->last_step, kept->last_step, &end);
@@ -183,7 +193,7 @@ enum status sensitivity(Unit *unit, const uint32_t *unknown, size_t n, const uin
     reach(here, unit, NULL, 0, NULL);
     reach(there, unit, known, m, seed);
     for (size_t i = 0; i < n; i++) {
-        const Variable *v = &unit->model->variables[unknown[i] - 1];
+        const Variable *v = referenced(unit, unknown[i], REAL);
         change[i] = *(double *)place(there, v) - *(double *)place(here, v);
     }
     free_unit(here);

@@ -1,7 +1,7 @@
 /* A unit under test: a table of variables over a struct, and a few functions, make an FMU of both standards.
  *
- * Each `../NAME.c` declares one or a few. A variable's value reference is its place in the table, counted from 1; 0 is
- * the independent variable of FMI 3. `native_units.py` reads the tables out of the compiled library, so that nothing is
+ * Each `../NAME.c` declares one or a few. A variable's value reference is its place in the table, counted from 1, in
+ * FMI 2 among the variables of its type, as the standard tells them apart by it; 0 is the independent variable of FMI 3. `native_units.py` reads the tables out of the compiled library, so that nothing is
  * declared twice. */
 #ifndef UNIT_H
 #define UNIT_H
