@@ -9,7 +9,7 @@ import gc
 import itertools
 import re
 from collections import defaultdict
-from collections.abc import Generator, Iterable, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -21,6 +21,7 @@ from handover.cosim.blocks.variable import Causality, Declared, Kind
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.clocks import FmuClock, clocks_of, without_clocks
 from handover.cosim.fmu.default_experiment import DefaultExperiment, default_experiment
+from handover.cosim.fmu.feedthrough import feedthrough_of
 from handover.cosim.fmu.xml import XmlElement
 
 if TYPE_CHECKING:
@@ -140,8 +141,8 @@ class FmuDescription:
     """An FMU's ports and identity.
 
     `feedthrough` names, by output, the inputs with declared direct feedthrough to it; `presumed_feedthrough` likewise
-    where an FMU declares no dependencies, which the standards take as all inputs. `initial_feedthrough` and
-    `presumed_initial_feedthrough` are the same in initialization mode (`InitialUnknowns`).
+    where an FMU declares no dependencies, which the standards take as all inputs, or does not list the output at all.
+    `initial_feedthrough` and `presumed_initial_feedthrough` are the same in initialization mode (`InitialUnknowns`).
 
     `sampled` says that all outputs are discrete and the step is fixed: such a unit computes at instants, from the
     inputs of the instant. It is stepped without event mode, where it samples by itself, even if it declares a clock for
@@ -216,15 +217,10 @@ def describe_fmu(path: Path) -> FmuDescription:
     starting = [_port(v, units, mimes) for v in md.modelVariables if _is_started(v)]
     ports = [p for p in ports if p is not None]
     grouped = _group_elements(ports)
-    owner = {r: p.name for p in grouped for r in p.references}
     by_causality: dict[Causality, dict[str, FmuPort]] = {c: {} for c in Causality}
     for p in grouped:
         by_causality[p.causality][p.name] = p
-    inputs = by_causality[Causality.INPUT]
-    declared, presumed = _feedthrough(md.outputs, owner, inputs)
-    initial, presumed_initial = _feedthrough(md.initialUnknowns, owner, inputs)
-    declared_initially = {owner.get(u.variable.valueReference) for u in md.initialUnknowns}
-    presumed_initial |= {y: us for y, us in presumed.items() if y not in declared_initially}
+    feedthrough = feedthrough_of(md, grouped)
     outputs = [v for v in md.modelVariables if v.causality == "output"]
     capabilities = capabilities_of(root, 2 if is_fmi2 else 3)
     clocks = _clocks(path, root)
@@ -242,14 +238,10 @@ def describe_fmu(path: Path) -> FmuDescription:
         parameters=by_causality[Causality.PARAMETER],
         inputs=by_causality[Causality.INPUT],
         outputs=by_causality[Causality.OUTPUT],
-        feedthrough=declared,
-        presumed_feedthrough=presumed,
-        initial_feedthrough=_united(
-            declared, {y: us for y, us in initial.items() if y in by_causality[Causality.OUTPUT]}
-        ),
-        presumed_initial_feedthrough={
-            y: us for y, us in presumed_initial.items() if y in by_causality[Causality.OUTPUT]
-        },
+        feedthrough=feedthrough.declared,
+        presumed_feedthrough=feedthrough.presumed,
+        initial_feedthrough=feedthrough.initially_declared,
+        presumed_initial_feedthrough=feedthrough.initially_presumed,
         sampled=is_discrete and not capabilities.varies_step and not is_clocked,
         capabilities=capabilities,
         clocks=clocks,
@@ -348,26 +340,3 @@ def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
         else:
             grouped.extend(p for _, p in members)
     return grouped
-
-
-def _united(a: Mapping[str, tuple[str, ...]], b: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
-    return {y: tuple(sorted({*a.get(y, ()), *b.get(y, ())})) for y in (*a, *(y for y in b if y not in a))}
-
-
-def _feedthrough(
-    unknowns: Iterable[Any], owner: Mapping[int, str], inputs: Mapping[str, FmuPort]
-) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
-    """Return the declared and the presumed dependencies of unknowns on inputs."""
-    declared: dict[str, set[str]] = defaultdict(set)
-    presumed: dict[str, tuple[str, ...]] = {}
-    everything = tuple(sorted(inputs))
-    for unknown in unknowns:
-        name = owner.get(unknown.variable.valueReference)
-        if name is None:
-            continue
-        if unknown.dependencies is None:
-            presumed[name] = everything
-        else:
-            sources = {owner.get(d.valueReference) for d in unknown.dependencies}
-            declared[name].update(s for s in sources if s is not None and s in inputs)
-    return {y: tuple(sorted(us)) for y, us in declared.items() if us}, {y: us for y, us in presumed.items() if us}

@@ -23,6 +23,9 @@ _ROOT = ("fmiVersion", "modelName", "guid", "instantiationToken")
 _UNUSED = ("local", "calculatedParameter", "independent")
 """Causalities of variables that are neither set nor got."""
 
+_PLACEHOLDERS = {"Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
+"""FMI 2's types of variables that hold their places only, by the types of those that they stand for; else reals."""
+
 _REALS = ("Real", "Float32", "Float64")
 _VARIED = ("input", "output")
 """Causalities of variables that may change during a run."""
@@ -91,13 +94,17 @@ def _experiment(element: Any) -> Any:
 
 
 def _variables_of_2(element: Any) -> Any:
-    """Keep what can be set or got; any other variable holds its place only, as variables are referred to by it."""
+    """Keep what can be set or got; any other variable holds its place, as variables are referred to by it.
+
+    It keeps its type, too: a value reference identifies a value within a type.
+    """
     made = _copy(element)
     for i, variable in enumerate(_elements(element)):
         if variable.get("causality", "local") in _UNUSED:
+            kind = next((_PLACEHOLDERS[v.tag] for v in _elements(variable) if v.tag in _PLACEHOLDERS), "Real")
             attributes = {"name": f"{i + 1} unused", "valueReference": variable.get("valueReference", "0")}
-            made.append(_etree.Element("ScalarVariable", attributes))
-            _etree.SubElement(made[-1], "Real")
+            made.append(_etree.Element("ScalarVariable", attributes, variability="discrete"))
+            _etree.SubElement(made[-1], kind)
             continue
         kept = _copy(variable, without=("previous", "canHandleMultipleSetPerTimeInstant"))
         values = [_copy(v, without=("derivative", "displayUnit", "reinit")) for v in _elements(variable)]

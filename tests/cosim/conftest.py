@@ -1,3 +1,4 @@
+import zipfile
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -6,6 +7,7 @@ import decay
 import pytest
 from driven_unit import DrivenUnit, Started
 from fmu_of import FmuOf
+from native_units import Edited, native_fmu
 
 from handover.fmus.build import build_block
 
@@ -44,3 +46,21 @@ def started(tmp_path: Path) -> Iterator[Started]:
     yield start
     for unit in made:
         unit.fmu.freeInstance()
+
+
+@pytest.fixture
+def edited(tmp_path: Path) -> Edited:
+    """Return a native unit's FMU with texts of its description replaced, each of which must be there."""
+
+    def edit(unit: str, fmi: int, *edits: tuple[str, str]) -> Path:
+        file = tmp_path / f"{unit}-{fmi}.fmu"
+        with zipfile.ZipFile(native_fmu(unit, fmi)) as sound, zipfile.ZipFile(file, "w") as faulty:
+            for name in sound.namelist():
+                content = sound.read(name)
+                for old, new in edits if name.endswith(".xml") else ():
+                    assert old.encode() in content, old
+                    content = content.replace(old.encode(), new.encode())
+                faulty.writestr(name, content)
+        return file
+
+    return edit

@@ -2,15 +2,13 @@
 
 import logging
 import re
-import zipfile
-from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import decay
 import pytest
-from native_units import native_fmu
+from native_units import Edited, native_fmu
 
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.exceptions import InvalidFmu, WiringError
@@ -19,28 +17,8 @@ from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.system import System
 
-Edited = Callable[..., Path]
-
 STATE2 = '<ScalarVariable name="s" valueReference="90" causality="local" variability="continuous"><Real {}/>'
 STATE3 = '<Float64 name="s" valueReference="90" causality="local" variability="continuous" {}/>'
-
-
-@pytest.fixture
-def edited(tmp_path: Path) -> Edited:
-    """Return a native unit's FMU with texts of its description replaced, each of which must be there."""
-
-    def edit(unit: str, fmi: int, *edits: tuple[str, str]) -> Path:
-        file = tmp_path / f"{unit}-{fmi}.fmu"
-        with zipfile.ZipFile(native_fmu(unit, fmi)) as sound, zipfile.ZipFile(file, "w") as faulty:
-            for name in sound.namelist():
-                content = sound.read(name)
-                for old, new in edits if name.endswith(".xml") else ():
-                    assert old.encode() in content, old
-                    content = content.replace(old.encode(), new.encode())
-                faulty.writestr(name, content)
-        return file
-
-    return edit
 
 
 def local(fmi: int, attributes: str) -> tuple[str, str]:
