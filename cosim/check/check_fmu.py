@@ -13,12 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path, PurePosixPath
 
 from handover.cosim.check.described_variable import variables_of
-from handover.cosim.check.description_checks import (
-    interface_findings,
-    says,
-    structure_findings,
-    variable_findings,
-)
+from handover.cosim.check.description_checks import description_findings, interface_findings, says
 from handover.cosim.check.finding import CheckReport, Finding, Level, Section, fault, warning
 from handover.cosim.check.isolated_process import run_isolated
 from handover.cosim.exceptions import InvalidFmu
@@ -195,7 +190,7 @@ class _Check:
         self.root = checked_xml(self.archive)
         self.fmi = version_of(self.path, self.root)
         variables = variables_of(self.root, self.fmi)
-        own = [*variable_findings(self.root, self.fmi, variables), *structure_findings(self.root, self.fmi, variables)]
+        own = description_findings(self.root, self.fmi, variables)
         self.can_continue = True
         n = len(variables)
         text = f"{self.root.get('modelName')}, FMI {self.root.get('fmiVersion')}, {n} variable{'s' if n != 1 else ''}"

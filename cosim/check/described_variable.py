@@ -49,8 +49,8 @@ class DescribedVariable:
         elements = [e.get("value") for e in self.values.named("Start")]
         if elements:
             return tuple(elements)
-        given = self.values.attributes.get("start")
-        if given is None:
+        given = self.values.get("start")
+        if not given and "start" not in self.values.attributes:
             return None
         return (given,) if self.type in ("String", "Binary") else tuple(given.split()) or ("",)
 

@@ -100,7 +100,8 @@ def _unlisted_outputs(root: XmlElement, fmi: int, variables: Sequence[DescribedV
         listed = {u.get("valueReference") for u in root.named("ModelStructure", "Output")}
         missing = [v for v in variables if v.causality == "output" and v.reference not in listed]
     for v in missing:
-        yield fault("an output that ModelStructure does not list among the outputs", where=v.where)
+        what = "an output that ModelStructure does not list among the outputs"
+        yield fault(what, where=v.where, cure="a run takes it to depend on all inputs")
 
 
 _CLASSES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
@@ -109,11 +110,11 @@ _CLASSES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boo
 def variable_findings(root: XmlElement, fmi: int, variables: Sequence[DescribedVariable]) -> Iterator[Finding]:
     """Yield what is wrong with variables' start values, ranges, types, dimensions and value references."""
     types = _declared_types(root, fmi)
-    starts_of = {v.reference: v.values.get("start") for v in variables}
+    starts_of = {v.reference: v.values.get("start") for v in variables} if fmi == 3 else {}
     for v in variables:
         declared = types.get(v.values.get("declaredType"))
         yield from _range_findings(v, declared)
-        yield from _start_findings(v, declared, v.shape(starts_of))
+        yield from _start_findings(v, declared, v.shape(starts_of) if fmi == 3 else ())
         if v.type == "Enumeration":
             yield from _enumeration_findings(v, declared)
     yield from _unit_findings(root, variables, types)
@@ -121,6 +122,11 @@ def variable_findings(root: XmlElement, fmi: int, variables: Sequence[DescribedV
         yield from _shared_references(variables)
     else:
         yield from _dimension_findings(variables)
+
+
+def description_findings(root: XmlElement, fmi: int, variables: Sequence[DescribedVariable]) -> list[Finding]:
+    """Return what is wrong with variables and with the references to them."""
+    return [*variable_findings(root, fmi, variables), *structure_findings(root, fmi, variables)]
 
 
 def _declared_types(root: XmlElement, fmi: int) -> dict[str, XmlElement]:
@@ -135,7 +141,7 @@ def _range(v: DescribedVariable, declared: XmlElement | None) -> tuple[float, fl
     """Return the bounds of a variable's values; those that cannot be read are reported by `_range_findings`."""
     bounds: list[float] = []
     for name, none in (("min", -math.inf), ("max", math.inf)):
-        text = v.values.attributes.get(name) or (declared.attributes.get(name) if declared else None)
+        text = v.values.get(name) or (declared.get(name) if declared else "")
         try:
             bounds.append(float(v.parsed(text)) if text else none)
         except ValueError:
@@ -147,7 +153,7 @@ def _range_findings(v: DescribedVariable, declared: XmlElement | None) -> Iterat
     if v.type in ("String", "Boolean", "Binary", "Clock"):
         return
     for name in ("min", "max"):
-        if text := v.values.attributes.get(name):
+        if text := v.values.get(name):
             try:
                 v.parsed(text)
             except ValueError as e:
@@ -224,6 +230,8 @@ def _shared_references(variables: Sequence[DescribedVariable]) -> Iterator[Findi
     for v in variables:
         groups[_CLASSES[v.type], v.reference].append(v)
     for (_, reference), sharing in groups.items():
+        if len(sharing) == 1:
+            continue
         types = {v.type for v in sharing}
         settable = [v for v in sharing if v.causality in ("input", "parameter")]
         if len(types) > 1:

@@ -5,12 +5,10 @@ FMI 2 has no arrays, and some tools do not use those of FMI 3: scalar variables 
 and both forms are interchangeable.
 """
 
-import gc
 import itertools
 import re
 from collections import defaultdict
-from collections.abc import Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +20,7 @@ from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.clocks import FmuClock, clocks_of, without_clocks
 from handover.cosim.fmu.default_experiment import DefaultExperiment, default_experiment
 from handover.cosim.fmu.feedthrough import feedthrough_of
-from handover.cosim.fmu.xml import XmlElement
+from handover.cosim.fmu.xml import XmlElement, collection_paused
 
 if TYPE_CHECKING:
     from handover.cosim.fmu.fmpy_edge import ModelVariable
@@ -56,6 +54,7 @@ class Capabilities:
         directional_derivatives: it provides directional derivatives.
         event_mode, returns_early: it has event mode, and may end a step before its end (FMI 3).
         once_per_process: a process may hold only one instance of it.
+        needs_tool: it runs only where other software is installed.
     """
 
     varies_step: bool = False
@@ -67,6 +66,7 @@ class Capabilities:
     event_mode: bool = False
     returns_early: bool = False
     once_per_process: bool = False
+    needs_tool: bool = False
 
 
 def capabilities_of(root: XmlElement, fmi: int) -> Capabilities:
@@ -89,6 +89,7 @@ def capabilities_of(root: XmlElement, fmi: int) -> Capabilities:
         event_mode=fmi == 3 and flag("hasEventMode"),
         returns_early=fmi == 3 and flag("mightReturnEarlyFromDoStep"),
         once_per_process=flag("canBeInstantiatedOnlyOncePerProcess"),
+        needs_tool=flag("needsExecutionTool"),
     )
 
 
@@ -186,19 +187,7 @@ class FmuDescription:
         return description_html(self)
 
 
-@contextmanager
-def _collection_paused() -> Generator[None, None, None]:
-    """Pause the collection of garbage: a description is all that is made, and searching it for some takes a third."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
-
-
-@_collection_paused()
+@collection_paused()
 def describe_fmu(path: Path) -> FmuDescription:
     """Read an FMU's model description (FMI 2.0 or 3.0, co-simulation).
 

@@ -90,15 +90,15 @@ def read_description(path: Path) -> tuple[ModelDescription, XmlElement, str]:
 def _fault_of(e: Exception, root: XmlElement, fmi: int) -> str:
     """Return why FMPy rejects a description, in one line."""
     if isinstance(e, LookupError) and (lost := [reference.line for reference in lost_references(root, fmi)]):
-        return _in_one_line(lost)
+        return in_one_line(lost)
     if isinstance(e, LookupError):  # its text alone is a name or a number
         return f"{type(e).__name__}: {one_line(e)}"
     if not isinstance(e, ValidationError):
         return one_line(e)
-    return _in_one_line([" ".join(str(p).split()).rstrip(".") for p in cast(list[Any], e.problems)])
+    return in_one_line([" ".join(str(p).split()).rstrip(".") for p in cast(list[Any], e.problems)])
 
 
-def _in_one_line(problems: Sequence[str]) -> str:
+def in_one_line(problems: Sequence[str]) -> str:
     """Return the first problems, and how many more there are."""
     more = f"; and {len(problems) - _MAX_PROBLEMS} more" if len(problems) > _MAX_PROBLEMS else ""
     return "; ".join(problems[:_MAX_PROBLEMS]) + more

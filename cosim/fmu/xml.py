@@ -3,8 +3,10 @@
 defusedxml decides whether a document is safe; lxml, which knows the line of each element, then parses it.
 """
 
+import gc
 import importlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 from xml.etree.ElementTree import ParseError
 
@@ -61,11 +63,16 @@ class XmlElement:
         return self._element.get(name, default)
 
     def named(self, *path: str) -> Iterator["XmlElement"]:
-        """Yield the elements that are reached by a path of tags."""
+        """Yield the elements that are reached by a path of tags; by an empty one this element is."""
         if not path:
             yield self
-        for child in self._element.iterchildren(path[0]) if path else ():
-            yield from XmlElement(child).named(*path[1:])
+            return
+        rest = path[1:]
+        for child in self._element.iterchildren(path[0]):
+            if rest:
+                yield from XmlElement(child).named(*rest)
+            else:
+                yield XmlElement(child)
 
 
 def parse_xml(content: bytes) -> XmlElement:
@@ -111,3 +118,15 @@ def check_xml(content: bytes) -> None:
         raise UnsafeXml(f"it refers to what lies outside of it: {' '.join(str(e).split())}") from e
     except (LookupError, ValueError) as e:  # an encoding that is unknown or of several bytes per character
         raise UnsafeXml(f"its encoding cannot be read: {e}; use UTF-8") from e
+
+
+@contextmanager
+def collection_paused() -> Generator[None, None, None]:
+    """Pause the collection of garbage: a description is all that is made, and searching it for some takes a third."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()

@@ -4,9 +4,11 @@ import array
 import logging
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from pathlib import Path
 from types import TracebackType
 from typing import TypeVar
 
+from handover.cosim.check.run_faults import run_faults
 from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure
 from handover.cosim.fmu.archive import DESCRIPTION
 from handover.cosim.fmu.calls import is_rounding
@@ -39,18 +41,27 @@ def never() -> bool:
     return False
 
 
-def _tell_of_faults(system: System, *, strict: bool) -> None:
+def _tell_of_faults(system: System, *, strict: bool) -> dict[Path, str]:
     """Warn of invalid descriptions, of start values that are NaN, and of what the system notes.
+
+    Returns:
+        How model descriptions break the standard, by FMU.
 
     Raises:
         InvalidFmu: `strict` does not let them pass.
     """
-    for path, fault in system.untouched_faults.items():
-        if strict:
+    untouched, others = system.untouched_faults, run_faults(u.description for u in system.units.values())
+    faults = {p: "; ".join(f[p] for f in (untouched, others) if p in f) for p in (*untouched, *others)}
+    if strict:
+        for path, fault in faults.items():
             raise InvalidFmu(path, f"its {DESCRIPTION} is not valid: {fault}")
+    for path, fault in untouched.items():
         _log.warning("%s: its %s is not valid, which does not matter here: %s", path, DESCRIPTION, fault)
-    for line in (*system.undefined_starts, *system.notes):
+    for path, fault in others.items():
+        _log.warning("%s: its %s is not valid: %s", path, DESCRIPTION, fault)
+    for line in (*system.undefined_starts, *system.execution_tools, *system.notes):
         _log.warning("%s", line)
+    return faults
 
 
 class Master:
@@ -68,7 +79,8 @@ class Master:
 
     def __init__(self, system: System, options: MasterOptions = _PLAIN, heartbeat: Heartbeat | None = None) -> None:
         system.check()
-        _tell_of_faults(system, strict=options.strict)
+        self.description_faults = _tell_of_faults(system, strict=options.strict)
+        """How model descriptions break the standard, by FMU."""
         self.system = system
         self.options = options
         self._factory = StepperFactory(system, options)

@@ -81,7 +81,7 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
 @click.option(
     "--strict",
     is_flag=True,
-    help="Refuse an FMU that breaks the standard even where co-simulation does not touch the fault; see"
+    help="Refuse an FMU whose description breaks the standard, even where it can be run nonetheless; see"
     " `handover check`.  [default: warn]",
 )
 @click.option(AS_JSON, "as_json", is_flag=True, help="Print the summary as JSON, with the run's folder.")

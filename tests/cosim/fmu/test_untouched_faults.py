@@ -49,9 +49,8 @@ def test_a_fault_of_a_local_variable_is_told_and_the_unit_runs(
     with caplog.at_level(logging.WARNING), Master(system) as master:
         master.run(Fraction(1))
         assert master.signals["mass.x"] == pytest.approx(1.0)
-    (line,) = [r.getMessage() for r in caplog.records if "is not valid" in r.getMessage()]
+    (line,) = [r.getMessage() for r in caplog.records if "does not matter here" in r.getMessage()]
     assert fault in line
-    assert "does not matter here" in line
     with pytest.raises(InvalidFmu, match=r"its modelDescription.xml is not valid: "):
         Master(system, MasterOptions(strict=True))
 

@@ -1,0 +1,47 @@
+"""The faults of a system's model descriptions that a run tells: those of `description_checks`, which need no library.
+
+A check also knows FMPy's rules for the names of variables and for the lists of states' derivatives and of initial
+unknowns: names take minutes where there are many, and those lists are wrong in many FMUs and read by few.
+"""
+
+import functools
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from handover.cosim.check.described_variable import variables_of
+from handover.cosim.check.description_checks import description_findings, interface_findings
+from handover.cosim.check.finding import Level
+from handover.cosim.fmu.archive import FmuArchive
+from handover.cosim.fmu.description import FmuDescription
+from handover.cosim.fmu.fmpy_edge import checked_xml, in_one_line
+from handover.cosim.fmu.xml import collection_paused
+
+_LINE = re.compile(r"\(line \d+")
+
+
+def run_faults(descriptions: Iterable[FmuDescription]) -> dict[Path, str]:
+    """Return how model descriptions break the standard, beyond what was found as they were read, in a line an FMU.
+
+    Of a variable that was found to be at fault then, no more is said.
+
+    Raises:
+        InvalidFmu: a file is not what it was when it was described.
+    """
+    found: dict[Path, str] = {}
+    for d in {d.path: d for d in descriptions}.values():
+        told = f"{d.untouched_fault}; {d.experiment.step_fault}"
+        places = set(_LINE.findall(told))
+        state = d.path.stat()
+        faults = _faults(d.path, d.fmi, state.st_mtime_ns, state.st_size)
+        if lines := [line for line in faults if places.isdisjoint(_LINE.findall(line))]:
+            found[d.path] = in_one_line(lines)
+    return found
+
+
+@functools.lru_cache(maxsize=256)
+def _faults(path: Path, fmi: int, _changed: int, _size: int) -> tuple[str, ...]:
+    with collection_paused():
+        root = checked_xml(FmuArchive(path))
+        findings = [*interface_findings(root, fmi), *description_findings(root, fmi, variables_of(root, fmi))]
+    return tuple(f.line for f in findings if f.level is Level.FAULT)
