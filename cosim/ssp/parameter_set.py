@@ -106,7 +106,7 @@ def read_mapping(part: SspPart, root: XmlElement) -> dict[str, list[Mapped]]:
     """Return the targets of a mapping, by the parameters' names in the parameter set.
 
     Raises:
-        InvalidSsp: two parameters are mapped to one name, or a transformation is not linear.
+        InvalidSsp: two parameters are mapped to one name.
     """
     mapping: dict[str, list[Mapped]] = {}
     targets: set[str] = set()
@@ -122,17 +122,13 @@ def read_mapping(part: SspPart, root: XmlElement) -> dict[str, list[Mapped]]:
 
 
 def read_linear(part: SspPart, owner: XmlElement) -> LinearTransformation | None:
-    """Return the transformation of a mapping entry or a connection, None if it has none.
-
-    Raises:
-        InvalidSsp: it is not linear.
-    """
+    """Return the linear transformation of a mapping entry or a connection, None if it has none."""
     for child in owner.children:
         name = local(child.tag)
         if name == "LinearTransformation":
             return LinearTransformation(part.number(child, "factor", 1.0), part.number(child, "offset", 0.0))
         if name.endswith("Transformation"):
-            raise part.fault(child, f"<{short_name(child.tag)}> is not supported; <ssc:LinearTransformation> is")
+            part.leave_out(child, f"<{short_name(child.tag)}> is not supported; <ssc:LinearTransformation> is")
     return None
 
 

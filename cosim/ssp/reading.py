@@ -53,7 +53,7 @@ def read_structure(archive: SspArchive) -> SspStructure:
     """Read the structure of an SSP's system.
 
     Raises:
-        InvalidSsp: it is malformed, or refers to what is missing or not supported.
+        InvalidSsp: it is malformed, or refers to what is missing, or to what is not supported and cannot be left out.
     """
     with archive.opened():
         part = SspPart(archive.path, STRUCTURE, archive.structure(), "ssd:SystemStructureDescription")
@@ -68,6 +68,7 @@ def read_structure(archive: SspArchive) -> SspStructure:
             _stop(part),
             _annotated_period(part, systems[0], "parallel"),
             _step_of_others(part, systems[0]),
+            tuple(part.unsupported),
         )
 
 
@@ -192,7 +193,7 @@ class _Reader:
         part = self._part
         for indices in ("startIndices", "endIndices"):
             if indices in e.attributes:
-                raise part.fault(e, f"{indices} is not supported; whole connectors can be connected")
+                part.leave_out(e, f"{indices} is not supported; whole connectors can be connected")
         return SspConnection(
             SspEnd(e.get("startElement") or None, part.text(e, "startConnector")),
             SspEnd(e.get("endElement") or None, part.text(e, "endConnector")),
@@ -225,7 +226,7 @@ class _Reader:
         inside = [c for c in inside if local(c.tag) not in ("MetaData", "Signature")]
         if "source" in e.attributes:
             member = self._member(e, e.attributes["source"])
-            other = SspPart(self._archive.path, member, self._archive.read(member), wanted)
+            other = SspPart(self._archive.path, member, self._archive.read(member), wanted, part.unsupported)
             return other, other.root
         if len(inside) != 1:
             raise part.fault(e, f"neither a source nor one <{wanted}> inside")

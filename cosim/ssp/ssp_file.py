@@ -145,6 +145,7 @@ class SspFile:
 
     Not supported, and rejected: signal dictionaries, components that are SSPs, mappings of booleans, integers or
     enumerations, connected parameters, single entries of FMI 3 arrays, clocks, files outside of the archive.
+    Connections between types, such as Integer to Real, are too: SSP 2.0 leaves them to implementations.
 
     Args:
         path: the file.
@@ -181,7 +182,7 @@ class SspFile:
                 n: step or c.period or (None if proposed_step(descriptions[n].step) else structure.step)
                 for n, c in flat.components.items()
             }
-            self.system = self._build(flat, descriptions, steps)
+            self.system = self._build(flat, descriptions, steps, structure.unsupported)
             self._flat, self._structure, self._descriptions = flat, structure, descriptions
         except BaseException:
             self.close()
@@ -222,7 +223,11 @@ class SspFile:
         return {name: described[member] for name, member in members.items()}
 
     def _build(
-        self, flat: FlatSystem, descriptions: dict[str, FmuDescription], steps: Mapping[str, Fraction | None]
+        self,
+        flat: FlatSystem,
+        descriptions: dict[str, FmuDescription],
+        steps: Mapping[str, Fraction | None],
+        unsupported: Sequence[str],
     ) -> System:
         faults = list(flat.faults)
         starts, partly = dict[str, dict[str, object]](), dict[str, set[str]]()
@@ -234,7 +239,7 @@ class SspFile:
         grouping = Grouping(flat.connections, descriptions, partly)
         faults += grouping.faults
         if faults:
-            raise InvalidSsp(self.path, faults)
+            raise InvalidSsp(self.path, [*unsupported, *faults])
         system = System()
         for name, component in flat.components.items():
             path = Path(self._folder.name) / component.member
@@ -246,7 +251,9 @@ class SspFile:
         try:
             system.check()
         except WiringError as e:
-            raise InvalidSsp(self.path, e.faults) from e
+            raise InvalidSsp(self.path, [*unsupported, *e.faults]) from e
+        if unsupported:
+            raise InvalidSsp(self.path, unsupported)
         return system
 
     def _named(

@@ -78,6 +78,7 @@ class SspStructure:
 
     `parallel_step` is the communication step of all units where they step in parallel, if `write_ssp` annotated one.
     `step` is the one that OMSimulator or libcosim would take, if it is annotated for them. Both are in seconds.
+    `unsupported` are faults: what was left out of it.
     """
 
     name: str
@@ -85,3 +86,4 @@ class SspStructure:
     stop: float | None
     parallel_step: Fraction | None = None
     step: Fraction | None = None
+    unsupported: tuple[str, ...] = ()

@@ -93,13 +93,18 @@ class SspPart:
         member: the file in it.
         content: the file's content.
         wanted: name of its root, such as `ssv:ParameterSet`.
+        unsupported: the list that `leave_out` writes to; an own one if it is not given.
 
     Raises:
         InvalidSsp: it is malformed, unsafe, of another version, invalid, or has another root.
     """
 
-    def __init__(self, path: Path, member: str, content: bytes, wanted: str) -> None:
+    def __init__(
+        self, path: Path, member: str, content: bytes, wanted: str, unsupported: list[str] | None = None
+    ) -> None:
         self.path, self.member = path, member
+        self.unsupported = [] if unsupported is None else unsupported
+        """What was left out, all of it a fault: reading goes on, so that it is told with all others."""
         try:
             self.root = parse_xml(content)
         except UnsafeXml as e:
@@ -125,6 +130,10 @@ class SspPart:
     def fault(self, element: XmlElement, fault: str) -> InvalidSsp:
         """Return the exception for a fault at an element."""
         return InvalidSsp(self.path, [self.where(element, fault)])
+
+    def leave_out(self, element: XmlElement, fault: str) -> None:
+        """Note a fault without which the rest can be read."""
+        self.unsupported.append(self.where(element, fault))
 
     def where(self, element: XmlElement, fault: str) -> str:
         """Return a fault with the file and line of its element before it."""

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import decay
 import pytest
+from native_units import native_fmu
 from ssp_of import MM, component, connection, connectors, described, pack_ssp, system
 
 from handover.cosim.exceptions import InvalidSsp
+from handover.cosim.ssp.check_ssp import check_ssp
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.conversion import LinearTransformation
 
@@ -207,6 +209,25 @@ def test_a_unit_that_is_not_defined_is_refused_unless_the_fmu_has_it(opened: Ope
 def test_a_value_that_feeds_itself_is_refused(opened: Open):
     inner = system(component("a", PLAIN), connection("u", "y") + connection("u", "a.u"), name="inner", before=PLAIN)
     assert "inner.a.u is fed by itself" in refusal(lambda: opened(inner, connection("inner.y", "inner.u")))
+
+
+def test_what_is_not_supported_is_told_with_what_does_not_fit(tmp_path: Path):
+    table = '<ssc:BooleanMappingTransformation><ssc:MapEntry source="1" target="0"/></ssc:BooleanMappingTransformation>'
+    typed = '<ssd:Connector name="{}" kind="{}"><ssc:{}/></ssd:Connector>'.format
+    truth = typed("truth", "output", "Boolean") + typed("truth_in", "input", "Boolean")
+    ends = f"<ssd:Connectors>{typed('count', 'output', 'Integer')}{truth}</ssd:Connectors>"
+    units = component("a", ends, "resources/passer.fmu") + component("b", connectors(u="input"), "resources/gain.fmu")
+    wired = connection("a.count", "b.u") + connection("a.truth", "a.truth_in", table)
+    files = {
+        "resources/passer.fmu": native_fmu("discrete_passer", 2),
+        "resources/gain.fmu": native_fmu("gain", 2),
+    }
+    path = pack_ssp(tmp_path / "a.ssp", described(system(units, wired)), files)
+    faults = refusal(lambda: SspFile(path))
+    assert "line 3: <ssc:BooleanMappingTransformation> is not supported; <ssc:LinearTransformation> is" in faults
+    assert "a.count (integer) -> b.u (real): integer cannot feed real" in faults
+    checked = list(check_ssp(path, timeout=60.0))
+    assert [len(report.sections[0].findings) for report in checked] == [2, 0, 0]  # and then each FMU by itself
 
 
 def test_indices_of_version_2_are_refused_by_name(opened: Open):
