@@ -144,7 +144,8 @@ def failures_section(results: CampaignResults, folder: Path) -> Section | None:
         for g in groups[:_MAX_REASONS]
     ]
     left = len(groups) - _MAX_REASONS
-    more = Markup("<p class='soft'>{} reasons more, of fewer runs each.</p>").format(left) if left > 0 else Markup()
+    line = Markup("<p class='soft'>{} more reason{}, of fewer runs each.</p>")
+    more = line.format(left, "s" if left > 1 else "") if left > 0 else Markup()
     table = rows_table(("runs", "how", "reason, such as", "examples"), rows, numbers=(0,), cards=True)
     return Section(anchor="failures", title="Failures", html=table + more)
 

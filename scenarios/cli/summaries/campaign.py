@@ -89,5 +89,5 @@ def _print_reasons(console: Console, table: CampaignTable) -> None:
     reasons = Counter((status, reason) for status, reason in ended if status != "done")
     for (status, reason), number in reasons.most_common(_MAX_REASONS):
         console.print(f"{number} {status}: {reason}", markup=False, soft_wrap=True)
-    if len(reasons) > _MAX_REASONS:
-        console.print(f"and {len(reasons) - _MAX_REASONS} reasons more, in the table")
+    if left := max(0, len(reasons) - _MAX_REASONS):
+        console.print(f"and {left} more reason{'s' if left > 1 else ''}, in the table")

@@ -49,7 +49,7 @@ def test_of_many_points_and_reasons_the_first_are_reported(capsys: pytest.Captur
     output = printed(plan, rows, capsys)
     assert "and 88 points more" in output
     assert "10 failed: the hand broke 3 times" in output
-    assert "and 5 reasons more, in the table" in output
+    assert "and 5 more reasons, in the table" in output
     assert len(output.splitlines()) <= 24
 
 
