@@ -258,6 +258,33 @@ class UnitCrashed(UnitFailure):
         return self.headline
 
 
+class LimitsLowered(UnitFailure):
+    """A unit lowered hard limits of the process, which could not go on with what it may have; `status` says which.
+
+    Where it is not known which unit it was, `unit` names all in the process.
+    """
+
+    kind = "limits"
+
+    @property
+    def headline(self) -> str:
+        """One line: unit, call, and which limits."""
+        return (
+            f"unit {self.unit} lowered hard limits in {self.call}: {self.status}; the run could not go on with that at "
+            f"t = {self.t:.6g} s, and such limits cannot be put back"
+        )
+
+    @property
+    def message(self) -> str:
+        """Which limits."""
+        return self.status
+
+    @property
+    def cause(self) -> str:
+        """The headline: the log cannot add to it."""
+        return self.headline
+
+
 class UnsettledEvents(UnitFailure):
     """Units in event mode keep changing each other's inputs, or keep asking for another iteration."""
 

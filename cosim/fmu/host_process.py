@@ -13,17 +13,22 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Mapping
 from typing import Any
 
 if sys.platform != "win32":
     import resource
 
-    _LIMITED = (
-        resource.RLIMIT_FSIZE, resource.RLIMIT_NOFILE, resource.RLIMIT_AS, resource.RLIMIT_DATA, resource.RLIMIT_CPU,
-        resource.RLIMIT_STACK,
-    )  # fmt: skip
+    _LIMITED = {
+        resource.RLIMIT_FSIZE: "RLIMIT_FSIZE",
+        resource.RLIMIT_NOFILE: "RLIMIT_NOFILE",
+        resource.RLIMIT_AS: "RLIMIT_AS",
+        resource.RLIMIT_DATA: "RLIMIT_DATA",
+        resource.RLIMIT_CPU: "RLIMIT_CPU",
+        resource.RLIMIT_STACK: "RLIMIT_STACK",
+    }
 else:
-    _LIMITED = ()
+    _LIMITED = {}
 
 _POSIX = sys.platform != "win32"
 _MADV_WIPEONFORK = 18  # Linux 4.14
@@ -76,6 +81,7 @@ class HostProcess:
         self._libc: Any = ctypes.CDLL(None) if _POSIX else None
         self._libm: Any = _library_with("fegetenv") if _POSIX else None
         self._streams: dict[int, int] = {}
+        self._hard_limits = hard_limits()
         self.note()
 
     def note(self) -> None:
@@ -124,6 +130,10 @@ class HostProcess:
                     resource.setrlimit(limited, limits)
                     break
 
+    def lowered_limits(self) -> str:
+        """Return the hard limits that are below what they were at first; empty if there is none."""
+        return lowered_limits(self._hard_limits)
+
     def restore_arithmetic(self) -> None:
         """Put back the floating-point environment of the calling thread; a process that a unit has forked ends."""
         exit_if_forked()
@@ -159,6 +169,17 @@ class HostProcess:
         buffer = ctypes.create_string_buffer(_SIZE)
         self._libm.fegetenv(buffer)
         return buffer.raw
+
+
+def hard_limits() -> dict[int, int]:
+    """Return the hard limit of each resource that a host needs to write what it records."""
+    return {n: hard for n, (_, hard) in _limits().items()}
+
+
+def lowered_limits(before: Mapping[int, int]) -> str:
+    """Return the hard limits that are below what they were, as in "RLIMIT_AS to 1000000"; empty if there is none."""
+    lowered = [(n, now) for n, now in hard_limits().items() if not _is_within(before[n], now)]
+    return ", ".join(f"{_LIMITED[n]} to {now}" for n, now in lowered)
 
 
 def _limits() -> dict[int, tuple[int, int]]:

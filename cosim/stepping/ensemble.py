@@ -165,6 +165,7 @@ class Ensemble:
         for name, unit in self.system.units.items():
             self.instances[name].set_start(unit.start)
             self.instances[name].enter_initialization(0.0, None)
+            self._note_limits(name, "its initialisation")
             lost[name] = keep_start(self.instances[name], unit.start, self.system.fed_inputs(name))
         if affected := [name for name in lost if lost[name]]:
             raise StartValuesLost(affected, 0.0, [value for name in affected for value in lost[name]])
@@ -353,6 +354,7 @@ class Ensemble:
                 raise InvalidFmu(e.path, f"{name}: {e.fault}", e.log) from e
             finally:
                 self.host.restore()
+                self._note_limits(name, "its loading or instantiation")
             if not instance.isolated:
                 instance.on_fatal = functools.partial(self._corrupt.add, d.path)
                 named[unpacked[d.path]].append(name)
@@ -361,6 +363,11 @@ class Ensemble:
             _log.info("%s: %s (FMI %d) of %s is loaded%s", name, d.name, d.fmi, d.path, process)
             self.instances[name] = instance
         note_libraries(self.heartbeat, named)
+
+    def _note_limits(self, unit: str, call: str) -> None:
+        """Note for the case that the run cannot go on with them that a unit lowered hard limits in a call."""
+        if self.host.lowered_limits() and "limits" not in self.heartbeat.facts:
+            self.heartbeat.record_facts(limits=(unit, call))
 
     def _make(self, name: str, folder: Path) -> Instance:
         d = self.system.units[name].description

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.fmu.failures import UnitCrashed, UnitHung
+from handover.cosim.fmu.failures import LimitsLowered, UnitCrashed, UnitHung
 from handover.cosim.fmu.heartbeat import Call, Heartbeat
 from handover.cosim.fmu.loaded_libraries import is_own_thread, units_at
 from handover.cosim.record.reader import Record
@@ -87,6 +87,9 @@ def _crashed_in_own_thread(heartbeat: Heartbeat) -> bool:
 
 
 def _failure(heartbeat: Heartbeat, call: Call | None, end: ChildEnd) -> UnitFailure | None:
+    if lowered := heartbeat.facts.get("lowered"):
+        unit, place = heartbeat.facts.get("limits") or (_units_in_process(heartbeat), "one of its calls")
+        return LimitsLowered(unit, place, heartbeat.time, lowered, heartbeat.log_of(unit))
     if heartbeat.crash is not None and end.signal is not None and _crashed_in_own_thread(heartbeat):
         units = units_at(heartbeat.crash[1], heartbeat.facts)
         if not units:
@@ -102,6 +105,11 @@ def _failure(heartbeat: Heartbeat, call: Call | None, end: ChildEnd) -> UnitFail
         return None
     how = f"it ended the process with status {end.status}" if end.signal is None else _signal_name(end.signal)
     return UnitCrashed(*call, how, log)
+
+
+def _units_in_process(heartbeat: Heartbeat) -> str:
+    libraries = heartbeat.facts.get("libraries", ())
+    return " or ".join(dict.fromkeys(name for _, _, names in libraries for name in names)) or "of the run"
 
 
 def _signal_name(number: int) -> str:

@@ -119,13 +119,15 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     """Make the run's folder, and leave in the heartbeat what has to be known of the run if this process crashes."""
     if resumption is None:
         task.folder.make()
+        master.heartbeat.record_scratch_folder(str(task.folder.path))  # if it crashes before the folder is begun
     else:
         task.folder.remove_presentation()
     task.folder.write_run(begun_run(task, master))
     if not task.presented:
         task.folder.figures.rmdir()
     places = {"folder": str(task.folder.path), "shown": str(task.folder.shown)}
-    master.heartbeat.record_facts(**places, presented=task.presented, **crash_facts(task, master))
+    scratch = [folder for folder in master.heartbeat.facts.get("scratch", []) if folder != places["folder"]]
+    master.heartbeat.record_facts(**places, scratch=scratch, presented=task.presented, **crash_facts(task, master))
 
 
 def _run(

@@ -10,11 +10,12 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NoReturn
 
 from handover.cosim.exceptions import one_line
 from handover.cosim.fmu.heartbeat import Heartbeat
+from handover.cosim.fmu.host_process import hard_limits, lowered_limits
 from handover.scenarios.execution.child_process import ChildEnd, ForkedChild
 from handover.scenarios.execution.exit_status import ABORTED, UNIT_FAILED
 
@@ -93,8 +94,12 @@ def supervise(command: Callable[[], Any], report_crash: Callable[[Heartbeat, Chi
 
 
 def run_to_end(command: Callable[[], Any]) -> NoReturn:
-    """Run a command and end this process with its status."""
-    status = 1
+    """Run a command and end this process with its status.
+
+    Where a unit has lowered hard limits of this process and the command did not get to its end, an error is a matter of
+    chance and of the place where it struck: a child leaves the report to its parent, as where it crashes.
+    """
+    status, limits = 1, hard_limits()
     try:
         command()
         status = 0
@@ -103,11 +108,32 @@ def run_to_end(command: Callable[[], Any]) -> NoReturn:
     except OSError as e:  # not even an error could be printed, as where a unit took the right to write files
         heartbeat.record_facts(unsaid=one_line(e))
         status = UNIT_FAILED
+    except Exception:  # such as MemoryError, or what libraries make of it
+        if not _limited(limits):
+            raise
+        status = UNIT_FAILED
     finally:
+        if status and (lowered := _limited(limits)):
+            _leave_limited(lowered)
         heartbeat.status = status
     if heartbeat.abandoned:  # a thread is still in a unit's call: the interpreter could not end
         leave(status)
     sys.exit(status)
+
+
+def _limited(limits: Mapping[int, int]) -> str:
+    """Return which hard limits are lower than they were where the run in this child has not ended; else nothing."""
+    return lowered_limits(limits) if _in_child and "concluded" not in heartbeat.facts else ""
+
+
+def _leave_limited(lowered: str) -> NoReturn:
+    """End this process at once, without an exit status in the heartbeat, so that the parent reports it."""
+    with contextlib.suppress(Exception):
+        heartbeat.record_facts(lowered=lowered)
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(Exception):
+            stream.flush()
+    os._exit(UNIT_FAILED)
 
 
 def leave(status: int) -> NoReturn:

@@ -106,6 +106,9 @@ static void limit_files(void) {
     setrlimit(RLIMIT_FSIZE, &(struct rlimit){10, RLIM_INFINITY});
 }
 static void limit_descriptors(void) { setrlimit(RLIMIT_NOFILE, &(struct rlimit){0, 4096}); }
+static void lower_files(void) { setrlimit(RLIMIT_FSIZE, &(struct rlimit){1000, 1000}); }
+static void lower_descriptors(void) { setrlimit(RLIMIT_NOFILE, &(struct rlimit){4, 4}); }
+static void lower_memory(void) { setrlimit(RLIMIT_AS, &(struct rlimit){300000000, 300000000}); }
 
 #define HARMS(DO)                                                                                                      \
     DO(change_directory)                                                                                               \
@@ -125,7 +128,10 @@ static void limit_descriptors(void) { setrlimit(RLIMIT_NOFILE, &(struct rlimit){
     DO(sleep_in_daemon)                                                                                                \
     DO(stop_itself)                                                                                                    \
     DO(limit_files)                                                                                                    \
-    DO(limit_descriptors)
+    DO(limit_descriptors)                                                                                              \
+    DO(lower_files)                                                                                                    \
+    DO(lower_descriptors)                                                                                              \
+    DO(lower_memory)
 
 static enum status integrate(Unit *unit, double t, double h, StepEnd *end) {
     SELF(Harmful);
