@@ -100,6 +100,7 @@ class EventStepper:
         targets = {slot.unit: self._target(slot.unit) for slot in due}
         slots = [Slot(slot.unit, slot.every, float(targets[slot.unit] - self._now)) for slot in due]
         self._coupling.depart(self.time, sampled, slots)
+        self._ensemble.host.restore_arithmetic()  # by another rounding one instant would be several doubles
         for unit, target in targets.items():
             end, course = self._ensemble.ends[unit], self._courses[unit]
             course.begun, course.event = self._now, end.event
@@ -164,6 +165,7 @@ class EventStepper:
                 continue
             if self._ensemble.bring(unit, self.time, float(self._now - course.begun)):
                 course.reached, course.event = self._now, self._ensemble.ends[unit].event
+            self._ensemble.host.restore_arithmetic()
 
     def _target(self, unit: str) -> Fraction:
         """Return when a step from here ends: after the period, or at an event that is known before."""

@@ -102,3 +102,13 @@ def test_a_step_that_goes_on_by_itself_is_not_waited_for():
     s.add("pending", native_fmu("pending", 2))
     with pytest.raises(UnitFailure, match=r"pending: fmi2DoStep at t = 0.2 s answered Pending"):
         observed_rows(s, Fraction(1, 2), "pending.count")
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_an_instant_is_one_row_where_a_unit_changes_the_rounding(algorithm: Algorithm):
+    s = System()
+    for at in (0.55, 0.65):
+        s.add(f"rounds_at_{at}".replace(".", "_"), native_fmu("round_up_in_step", 3), at=at)
+    s.add("other", native_fmu("integrator", 3), u=1.0)
+    options = MasterOptions(repeat_discarded=True, algorithm=algorithm)
+    assert list(observed_rows(s, Fraction(1), "other.x", options=options)) == [k / 10 for k in range(11)]
