@@ -1,4 +1,4 @@
-"""The faults of a system's model descriptions that a run tells: those of `description_checks`, which need no library.
+"""What a run tells of model descriptions: tools that are needed, and faults by `description_checks`, without a library.
 
 A check also knows FMPy's rules for the names of variables and for the lists of states' derivatives and of initial
 unknowns: names take minutes where there are many, and those lists are wrong in many FMUs and read by few.
@@ -6,13 +6,13 @@ unknowns: names take minutes where there are many, and those lists are wrong in 
 
 import functools
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from handover.cosim.check.described_variable import variables_of
 from handover.cosim.check.description_checks import description_findings, interface_findings
 from handover.cosim.check.finding import Level
-from handover.cosim.fmu.archive import FmuArchive
+from handover.cosim.fmu.archive import FmuArchive, is_of_this_project
 from handover.cosim.fmu.description import FmuDescription
 from handover.cosim.fmu.fmpy_edge import checked_xml, in_one_line
 from handover.cosim.fmu.xml import collection_paused
@@ -37,6 +37,17 @@ def run_faults(descriptions: Iterable[FmuDescription]) -> dict[Path, str]:
         if lines := [line for line in faults if places.isdisjoint(_LINE.findall(line))]:
             found[d.path] = in_one_line(lines)
     return found
+
+
+def execution_tools(descriptions: Mapping[str, FmuDescription]) -> list[str]:
+    """Return, a line each, the units that need other software; not those of this project, whose Python is there."""
+    needing = {name: d.path for name, d in descriptions.items() if d.capabilities.needs_tool}
+    foreign = {path for path in set(needing.values()) if not is_of_this_project(path)}
+    return [
+        f"{name} needs other software to run, as its FMU says: the tool that exported it, or an interpreter"
+        for name, path in needing.items()
+        if path in foreign
+    ]
 
 
 @functools.lru_cache(maxsize=256)

@@ -364,3 +364,16 @@ def _packed(files: Mapping[str, bytes]) -> bytes:
         members += b"PK\3\4" + facts + encoded + packed
     counts = struct.pack("<4H2LH", 0, 0, len(files), len(files), len(directory), len(members), 0)
     return bytes(members + directory + b"PK\5\6" + counts)
+
+
+_OF_THIS_PROJECT = "resources/unit.json"
+"""A file that every FMU built by this project has."""
+
+
+def is_of_this_project(path: Path) -> bool:
+    """Return whether this project built an FMU.
+
+    Raises:
+        InvalidFmu: it cannot be read.
+    """
+    return _OF_THIS_PROJECT in FmuArchive(path).names

@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from handover.cosim.exceptions import InvalidOptions
-from handover.cosim.fmu.archive import FmuArchive
+from handover.cosim.fmu.archive import is_of_this_project
 from handover.cosim.isolation.unit_process import unavailable
 from handover.cosim.native_libraries import CompilationError
 from handover.cosim.system.system import System
 
 FOREIGN, ALL = "foreign", "all"
-_OF_THIS_PROJECT = "resources/unit.json"
-"""A file that every FMU built by this project has."""
 
 
 def isolated_units(system: System, wanted: Sequence[str]) -> frozenset[str]:
@@ -34,7 +32,7 @@ def isolated_units(system: System, wanted: Sequence[str]) -> frozenset[str]:
         for name, unit in units.items():
             path = unit.description.path
             if path not in ours:
-                ours[path] = _OF_THIS_PROJECT in FmuArchive(path).names
+                ours[path] = is_of_this_project(path)
             if not ours[path]:
                 named.add(name)
     return frozenset(named)

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TypeVar
 
-from handover.cosim.check.run_faults import run_faults
+from handover.cosim.check.run_faults import execution_tools, run_faults
 from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure
 from handover.cosim.fmu.archive import DESCRIPTION
 from handover.cosim.fmu.calls import is_rounding
@@ -59,7 +59,7 @@ def _tell_of_faults(system: System, *, strict: bool) -> dict[Path, str]:
         _log.warning("%s: its %s is not valid, which does not matter here: %s", path, DESCRIPTION, fault)
     for path, fault in others.items():
         _log.warning("%s: its %s is not valid: %s", path, DESCRIPTION, fault)
-    for line in (*system.undefined_starts, *system.execution_tools, *system.notes):
+    for line in (*system.undefined_starts, *system.notes):
         _log.warning("%s", line)
     return faults
 
@@ -81,6 +81,10 @@ class Master:
         system.check()
         self.description_faults = _tell_of_faults(system, strict=options.strict)
         """How model descriptions break the standard, by FMU."""
+        self.execution_tools = execution_tools({name: u.description for name, u in system.units.items()})
+        """Units that need other software on the machine, a line each."""
+        for line in self.execution_tools:
+            _log.warning("%s", line)
         self.system = system
         self.options = options
         self._factory = StepperFactory(system, options)

@@ -233,15 +233,6 @@ class System:
         ]
 
     @property
-    def execution_tools(self) -> list[str]:
-        """Units that need other software on the machine, a line each."""
-        return [
-            f"{unit.name} needs other software to run, as its FMU says: the tool that exported it, or an interpreter"
-            for unit in self.units.values()
-            if unit.description.capabilities.needs_tool
-        ]
-
-    @property
     def has_events(self) -> bool:
         """Whether a unit runs in event mode: then steps may end at any time, not only on the schedule's grid."""
         return any(u.uses_events for u in self.units.values())

@@ -4,6 +4,7 @@ import logging
 from fractions import Fraction
 
 import pytest
+from fmu_of import FmuOf
 from native_units import Edited, native_fmu
 
 from handover.cosim.check.check_fmu import check_fmu
@@ -65,6 +66,13 @@ def test_a_unit_that_needs_another_tool_is_told(edited: Edited, caplog: pytest.L
     assert warnings_of(caplog) == [
         "gain needs other software to run, as its FMU says: the tool that exported it, or an interpreter"
     ]
+
+
+def test_the_python_of_a_unit_of_this_project_is_no_other_tool(fmu: FmuOf):
+    system = System()
+    system.add("unit", fmu("Mass"))
+    assert system.units["unit"].description.capabilities.needs_tool
+    assert Master(system, MasterOptions(strict=True)).execution_tools == []
 
 
 def test_sound_units_have_no_faults(caplog: pytest.LogCaptureFixture):
