@@ -7,19 +7,17 @@ The gripper's pose error is compared with the one by the impedance model, [Ferna
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Body, ImpedanceParameters
-from handover.scenarios.free_flyer.robot_wiring import stability_metrics
-
-if TYPE_CHECKING:
-    from scipy.spatial.transform import Rotation
+from handover.scenarios.free_flyer.robot_wiring import PERIOD, stability_metrics
 
 MOTION_SIGNALS = ("robot.p_WG", "robot.v_WG", "robot.q_WB", "robot.w_WB", "push.f_G", "push.tau_G")
 """Signals of a push that make up a `Motion`, in the order of its fields after time."""
@@ -30,7 +28,7 @@ class Motion:
     """The motion and the push at communication points, one row each, in W and SI units; quaternions scalar first.
 
     The wrench `f_G`, `tau_G` of a row is the mean since the row before. It acted on the gripper in that step, or where
-    units step in parallel, a step later.
+    units step in parallel, in the next.
     """
 
     t: Floats
@@ -49,7 +47,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of the gripper's pose, rest minus actual, one row for the beginning of each step.
+    """Errors of the gripper's pose, rest minus actual, one row for each sample of the controller.
 
     Attributes:
         t: time, s.
@@ -85,10 +83,10 @@ def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour, model: Bo
     """Return the errors by eq. (4.4), k_D xt' = B_x x'' + (C_x + k_B) x' - f_ext, with rest at no rotation.
 
     Velocities are twists, so B_x x'' + C_x x' - f_ext is the propulsion's wrench, taken at the gripper: what changes
-    the body's momentum, less the push. It is computed as the mean over a step, with the push's impulse. All else
-    is of the instant at which the step begins, as for the controller; since thrust is held in the robot's frame,
-    the mean is turned back by half the step's turn. Whether the push acted at once or a step later is seen in the
-    motion: where it begins, the wrong one is off by the whole push.
+    the body's momentum, less the push. It is computed as the mean over a period of the controller, with the push's
+    impulse. All else is of the instant of its sample; since thrust is held in the robot's frame, the mean is turned
+    back by half the period's turn. Where units step in parallel, push and thrust act some steps later than they were
+    asked for: by how many is seen in the motion, where any other number disagrees more.
 
     Args:
         motion: of a run.
@@ -96,46 +94,69 @@ def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour, model: Bo
         behaviour: whose gains of table 4.1 are taken.
         model: the robot as its controllers assume it to be; where it is another, the errors disagree.
     """
-    at_once = _errors(motion, motion.f_G[1:], motion.tau_G[1:], p_WG_goal, behaviour, model)
-    later = _errors(motion, motion.f_G[:-1], motion.tau_G[:-1], p_WG_goal, behaviour, model)
-    return min(at_once, later, key=lambda errors: sum(errors.disagreement))
+    steps = max(1, round(PERIOD / float(np.median(np.diff(motion.t)))))
+    found = [
+        _errors(motion, _Delays(steps, thrust, push), p_WG_goal, behaviour, model)
+        for thrust in range(steps)
+        for push in (0, 1)
+    ]
+    return min(found, key=lambda errors: sum(errors.disagreement))
 
 
-def _errors(motion: Motion, f_G: Floats, tau_G: Floats, p_WG_goal: Floats, behaviour: Behaviour, model: Body) -> Errors:
-    """Return the errors where this push acted, one row a step."""
+@dataclass(frozen=True)
+class _Delays:
+    """Steps in a period of the controller, and by how many its thrust and the push act later than asked for."""
+
+    steps: int
+    thrust: int
+    push: int
+
+
+def _errors(motion: Motion, delays: _Delays, p_WG_goal: Floats, behaviour: Behaviour, model: Body) -> Errors:
+    """Return the errors with these delays, one row a period of the controller."""
     from scipy.spatial.transform import Rotation
 
     gains = paper_values("free_flyer", f"gains_{behaviour.item}")
     m, I_B = model.mass, model.I_B
-    R_WB = Rotation.from_quat(motion.q_WB, scalar_first=True)
-    r_W: Floats = R_WB.apply(model.p_BG)
-    force, torque = _propulsion(motion, f_G, tau_G, R_WB, r_W, m, I_B)
-    v, w = motion.v_WG[:-1], motion.w_WB[:-1]
-    torque_G: Floats = torque - np.cross(r_W[:-1], force) + gains["k_B_rotational"] * w
+    held = np.arange(delays.thrust, len(motion.t), delays.steps)
+    force, torque = _propulsion(motion, held, delays.push, model)
+    seen = (held - delays.thrust)[:-1]
+    R_WB = Rotation.from_quat(motion.q_WB[seen], scalar_first=True)
+    torque_G: Floats = torque - np.cross(R_WB.apply(model.p_BG), force) + gains["k_B_rotational"] * motion.w_WB[seen]
     softness_R: Floats = np.linalg.inv(I_B) / gains["k_D_rotational"]
     return Errors(
-        t=motion.t[:-1],
-        p=p_WG_goal - motion.p_WG[:-1],
-        p_model=(force + gains["k_B_linear"] * v) / (gains["k_D_linear"] * m),
-        R=-R_WB[:-1].as_rotvec(),
+        t=motion.t[seen],
+        p=p_WG_goal - motion.p_WG[seen],
+        p_model=(force + gains["k_B_linear"] * motion.v_WG[seen]) / (gains["k_D_linear"] * m),
+        R=-R_WB.as_rotvec(),
         R_model=_times(softness_R, torque_G),
     )
 
 
-def _propulsion(
-    motion: Motion, f_G: Floats, tau_G: Floats, R_WB: "Rotation", r_W: Floats, m: float, I_B: Floats
-) -> tuple[Floats, Floats]:
-    """Return force, and torque about B, of the propulsion in W at the beginning of each step."""
+def _propulsion(motion: Motion, rows: NDArray[np.intp], push_delay: int, model: Body) -> tuple[Floats, Floats]:
+    """Return force, and torque about B, of the propulsion in W at the beginning of each interval between two rows."""
     from scipy.spatial.transform import Rotation
 
-    dt = np.diff(motion.t)[:, np.newaxis]
-    v_WB = motion.v_WG - np.cross(motion.w_WB, r_W)
-    w_B: Floats = R_WB.apply(motion.w_WB, inverse=True)
+    m, I_B, w_WB, t = model.mass, model.I_B, motion.w_WB[rows], motion.t[rows]
+    R_WB = Rotation.from_quat(motion.q_WB[rows], scalar_first=True)
+    r_W: Floats = R_WB.apply(model.p_BG)
+    dt = np.diff(t)[:, np.newaxis]
+    f_G, tau_G = (_mean_between(motion.t, a, rows, push_delay) for a in (motion.f_G, motion.tau_G))
+    v_WB = motion.v_WG[rows] - np.cross(w_WB, r_W)
+    w_B: Floats = R_WB.apply(w_WB, inverse=True)
     L_W: Floats = R_WB.apply(_times(I_B, w_B))
     force: Floats = m * np.diff(v_WB, axis=0) / dt - f_G
     torque: Floats = np.diff(L_W, axis=0) / dt - np.cross((r_W[:-1] + r_W[1:]) / 2, f_G) - tau_G
-    half_turn = Rotation.from_rotvec((motion.w_WB[:-1] + motion.w_WB[1:]) * dt / 4)
+    half_turn = Rotation.from_rotvec((w_WB[:-1] + w_WB[1:]) * dt / 4)
     return half_turn.apply(force, inverse=True), half_turn.apply(torque, inverse=True)
+
+
+def _mean_between(t: Floats, means: Floats, rows: NDArray[np.intp], delay: int) -> Floats:
+    """Return the mean between each two rows, of means over the step before each row that acted `delay` steps later."""
+    acting = means[1:] if delay == 0 else means[:-delay]
+    impulse: Floats = np.vstack([np.zeros((1, 3)), np.cumsum(acting * np.diff(t)[:, np.newaxis], axis=0)])
+    mean: Floats = np.diff(impulse[rows], axis=0) / np.diff(t[rows])[:, np.newaxis]
+    return mean
 
 
 def _nearest(turns: Floats, to: Floats) -> Floats:

@@ -61,7 +61,7 @@ def wire_handover(s: System) -> None:
 
 _SLOWEST_MODE = {"pose": "the slowest mode, the integrator's"}
 _POLES = ("pole_radius", "damping_ratio", "pole_frequency")
-_PERIOD = 2 / 125
+PERIOD = 2 / 125
 """Period of the controllers, s."""
 
 
@@ -79,7 +79,7 @@ def stability_metrics(signals: Signals, controllers: Sequence[str]) -> dict[str,
         metrics[f"pole_margin_{name}"] = Metric(
             1.0 - radius, "1", f"outermost pole to unit circle, 1 - |z|, above 0 if stable: {text}"
         )
-        slowest = -_PERIOD / math.log(radius) if 0.0 < radius < 1.0 else math.inf
+        slowest = -PERIOD / math.log(radius) if 0.0 < radius < 1.0 else math.inf
         metrics[f"slowest_decay_{name}"] = Metric(
             slowest, "s", f"time constant of {_SLOWEST_MODE.get(name, 'the slowest mode')}: {text}"
         )

@@ -91,3 +91,28 @@ def test_errors_that_turn_over_leave_a_gap_instead_of_a_jump():
     R, R_model = turned(actual, model).without_jumps
     assert R[:, 0] == pytest.approx([2.9, 3.1, np.nan, -2.8], nan_ok=True)
     assert R_model[:, 0] == pytest.approx([2.9, 2.0 * np.pi - 3.18, np.nan, -2.8], nan_ok=True)
+
+
+@pytest.mark.parametrize("late", [0, 3])
+def test_thrust_held_for_a_period_of_many_steps_is_compared_with_its_sample(late: int):
+    steps, periods = 8, 40
+    h = 0.016 / steps
+    v, p = [0.0], [0.1]
+    command, acting = 0.0, [0.0] * late
+    for k in range(steps * periods):
+        if k % steps == 0:
+            command = -7.0 * MASS * p[-1] - 15.0 * v[-1]
+        acting.append(command)
+        a = acting.pop(0) / MASS
+        p.append(p[-1] + h * v[-1] + h * h * a / 2.0)
+        v.append(v[-1] + h * a)
+    rows = len(p)
+    along_arm = np.zeros((2, rows, 3))
+    along_arm[:, :, 0] = p, v
+    q_WB = np.tile([1.0, 0.0, 0.0, 0.0], (rows, 1))
+    nothing = np.zeros((rows, 3))
+    t: Floats = np.arange(rows, dtype=np.float64) * h
+    motion = Motion(t, GOAL + along_arm[0], along_arm[1], q_WB, nothing, nothing, nothing)
+    errors = errors_of(motion, GOAL, Behaviour.RIGID, BODY)
+    assert errors.p == pytest.approx(-along_arm[0][: rows - steps : steps][: len(errors.t)])
+    assert errors.p_model == pytest.approx(errors.p, abs=1e-12)
