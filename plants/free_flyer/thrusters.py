@@ -1,5 +1,6 @@
 """Propulsion of a free-flyer: limits, delay and lag of commanded wrenches, after [Fernandes2020] sec. 4.1.1."""
 
+import enum
 import math
 from collections import deque
 from collections.abc import Mapping
@@ -17,6 +18,15 @@ _Command = list[float]
 _COMMANDS = ("f_pose", "tau_pose", "f_impedance", "tau_impedance")
 
 
+class Propulsion(enum.IntEnum):
+    """How commands become thrust; the delay is in all."""
+
+    IDEAL = 0
+    """At once and without limits."""
+    LIMITED = 1
+    """With limits of each axis, and a lag."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Params:
     """Limits of NASA's Astrobee as published; lag and delay are assumed."""
@@ -29,7 +39,7 @@ class Params:
     )
     lag: Second = parameter(0.02, "time constant of the first-order lag", minimum=0.0, maximum=10.0)
     delay: Second = parameter(0.0, "how long a command takes to arrive", minimum=0.0, maximum=10.0)
-    ideal: bool = parameter(False, "neither limits nor lag; the delay stays")
+    propulsion: Propulsion = parameter(Propulsion.LIMITED, "without limits or lag, or with both; the delay stays")
 
 
 @dataclass(kw_only=True)
@@ -65,8 +75,8 @@ class Thrusters:
 
     def __init__(self, params: Params) -> None:
         self._limits: list[float] = [*np.asarray(params.f_max).tolist(), *np.asarray(params.tau_max).tolist()]
-        self._ideal = params.ideal
-        self._lag = 0.0 if params.ideal else params.lag
+        self._ideal = params.propulsion is Propulsion.IDEAL
+        self._lag = 0.0 if self._ideal else params.lag
         self._delayed = params.delay > 0.0
         self._delay_line: deque[tuple[float, _Command]] = deque()  # seconds and command, oldest first
         if self._delayed:

@@ -81,7 +81,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         robot_seed, person_seed = (int(n) for n in np.random.SeedSequence(seed).generate_state(2) >> 1)
         at = {name: np.array(value) for name, value in paper_values("free_flyer", "handover_place").items()}
         p_WO_0, behaviour = at["p_WO_0"], p.behaviour.item
-        robot, model, lag = p.robot, vars(p.model), expected_lag(p.ideal)
+        robot, model, lag = p.robot, vars(p.model), expected_lag(p.propulsion)
         s = System()
         s.add(
             "decision",
@@ -96,7 +96,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         )
         s.add("impedance", fmu("impedance"), behaviour=behaviour, **model, delay=p.delay, lag=lag)
         s.add("pose", fmu("pose"), **model, delay=p.delay, lag=lag)
-        s.add("thrusters", fmu("thrusters"), ideal=p.ideal, delay=p.delay)
+        s.add("thrusters", fmu("thrusters"), propulsion=p.propulsion.item, delay=p.delay)
         s.add("robot", fmu("robot"), seed=robot_seed, **vars(robot), p_WB_0=at["p_WG_0"] - robot.p_BG)
         s.add(
             "person",

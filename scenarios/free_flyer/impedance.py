@@ -58,13 +58,13 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
             fmu("impedance"),
             behaviour=p.behaviour.item,
             delay=p.delay if p.delay_known else 0.0,
-            lag=expected_lag(p.ideal),
+            lag=expected_lag(p.propulsion),
             **vars(p.model),
             p_WG_goal=p_WG,
             q_WG_goal=np.array([1.0, 0.0, 0.0, 0.0]),
             active=True,
         )
-        thrusters = s.add("thrusters", fmu("thrusters"), ideal=p.ideal, delay=p.delay)
+        thrusters = s.add("thrusters", fmu("thrusters"), propulsion=p.propulsion.item, delay=p.delay)
         push = s.add(
             "push",
             fmu("push"),

@@ -11,16 +11,27 @@ from handover.cosim.blocks.units import Metre, Newton, NewtonMetre, Number, Seco
 from handover.scenarios.experiment.paper import paper_values
 
 
-class Behaviour(enum.IntEnum):
-    """Settings of the impedance controller: how the robot yields to a push. [Fernandes2020] table 4.1."""
-
-    RIGID = 0
-    COMPLIANT = 1
+class _OfUnit(enum.IntEnum):
+    """An enumeration that a unit has, too."""
 
     @property
     def item(self) -> str:
         """The item's name in the units' enumerations."""
         return self.name.lower()
+
+
+class Behaviour(_OfUnit):
+    """Settings of the impedance controller: how the robot yields to a push. [Fernandes2020] table 4.1."""
+
+    RIGID = 0
+    COMPLIANT = 1
+
+
+class Propulsion(_OfUnit):
+    """How the thrusters follow their commands: ideal ones have neither limits nor lag."""
+
+    IDEAL = 0
+    LIMITED = 1
 
 
 @dataclass(frozen=True)
@@ -77,7 +88,7 @@ class HandoverParameters(RobotAndModel):
         np.array([0.0, -0.07, 0.0]), "where the gripper waits for the person, in W", minimum=-1.0, maximum=1.0
     )
     strength: Newton = parameter(4.0, "force with which the person pulls and pushes at most", minimum=0.1, maximum=20.0)
-    ideal: bool = parameter(False, "whether the thrusters have neither limits nor lag")
+    propulsion: Propulsion = parameter(Propulsion.LIMITED, "what the thrusters are like")
     delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
     patience: Second = parameter(
         60.0, "time in any one phase after which the robot gives up", minimum=1.0, maximum=600.0
@@ -110,7 +121,9 @@ class ImpedanceParameters(RobotAndModel):
     torque: NewtonMetre = parameter(3.0, "torque of a twist", minimum=-10.0, maximum=10.0)
     begin: Second = parameter(1.0, "when the push begins", minimum=0.0, maximum=60.0)
     duration: Second = parameter(0.5, "how long the push lasts", minimum=0.0, maximum=60.0)
-    ideal: bool = parameter(True, "whether the thrusters have neither limits nor lag, as the published plots need")
+    propulsion: Propulsion = parameter(
+        Propulsion.IDEAL, "what the thrusters are like; the published plots need ideal ones"
+    )
     delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
     delay_known: bool = parameter(True, "whether the controller knows the delay, and rejects one it is unstable with")
     patience: Second = parameter(60.0, "time after the push by which the robot must rest", minimum=1.0, maximum=600.0)

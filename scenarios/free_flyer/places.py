@@ -46,7 +46,7 @@ def _thrusters(*controllers: str) -> Place:
     commands = {f"{what}_{name}": "in B" for name in controllers for what in ("f", "tau")}
     return Place(
         required={**commands, **_WRENCH, "saturated": "its share of the run is a metric"},
-        optional={"ideal": "the scenario's parameter", "delay": "the scenario's parameter"},
+        optional={"propulsion": "the scenario's parameter", "delay": "the scenario's parameter"},
         remarks=_FRAMES,
     )
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from handover.scenarios.experiment.paper import PublishedValue
-from handover.scenarios.free_flyer.parameters import HandoverParameters, ImpedanceParameters, Wrench
+from handover.scenarios.free_flyer.parameters import HandoverParameters, ImpedanceParameters, Propulsion, Wrench
 
 _PAPER = "free_flyer"
 
@@ -14,7 +14,7 @@ def published_of_push(p: ImpedanceParameters) -> Sequence[PublishedValue]:
     """Return the bounds of how far robot and impedance model differ; nothing for other pushes than the published."""
     default = ImpedanceParameters()
     same = p.force == default.force if p.kind is Wrench.FORCE else p.torque == default.torque
-    if not same or not p.ideal or p.delay or not p.is_published:
+    if not same or p.propulsion is not Propulsion.IDEAL or p.delay or not p.is_published:
         return ()
     note = "over all pushes and twists; how long they lasted is not stated"
     return [

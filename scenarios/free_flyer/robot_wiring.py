@@ -10,14 +10,15 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.free_flyer.parameters import Propulsion
 
 _MEASURED = ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")
 _SEEN = ("p_WG", "q_WG", "v_WG", "w_WB")
 
 
-def expected_lag(ideal: bool) -> float:
+def expected_lag(propulsion: Propulsion) -> float:
     """Return the lag of the thrusters that the controllers assume, s."""
-    return 0.0 if ideal else float(paper_values("free_flyer", "thrusters")["lag"])
+    return 0.0 if propulsion is Propulsion.IDEAL else float(paper_values("free_flyer", "thrusters")["lag"])
 
 
 def wire_controller(s: System, controller: PlacedUnit, robot: PlacedUnit, thrusters: PlacedUnit) -> None:

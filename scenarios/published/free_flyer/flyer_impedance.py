@@ -8,7 +8,7 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.free_flyer.impedance import FlyerImpedance
-from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Wrench
+from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Propulsion, Wrench
 from handover.scenarios.published.free_flyer.flyer_impedance_claims import claims_of_pushes
 from handover.scenarios.published.free_flyer.flyer_impedance_figures import draw_errors, draw_ratios
 from handover.scenarios.published.free_flyer.push_runs import (
@@ -21,6 +21,8 @@ from handover.scenarios.published.free_flyer.push_runs import (
     predicted_greatest,
 )
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
+
+_IDEAL, _LIMITED = ({"propulsion": p.item} for p in (Propulsion.IDEAL, Propulsion.LIMITED))
 
 
 class FlyerImpedanceTable(PublishedExperiment):
@@ -38,14 +40,14 @@ class FlyerImpedanceTable(PublishedExperiment):
     def plan(self, quick: bool) -> CampaignPlan:
         """Return pushes x behaviours x thrust, and what is beyond the thesis; if quick, with ideal thrust alone."""
         pushed = [{**push.parameters, "behaviour": b.item} for b in Behaviour for push in PUSHES]
-        points = [{**point, "ideal": "true"} for point in pushed]
+        points = [{**point, **_IDEAL} for point in pushed]
         if not quick:
             forces = [point for point in pushed if point["kind"] == Wrench.FORCE.name.lower()]
             others = [d for d in DURATIONS if d != ImpedanceParameters().duration]
-            points += [{**point, "ideal": "false"} for point in pushed]
-            points += [{**point, "ideal": "true", **EXACT} for point in pushed]
-            points += [{**point, "ideal": "true", "duration": f"{d:g}"} for d in others for point in forces]
-            points += [{**point, "ideal": "true", **change.parameters} for change in CHANGES for point in pushed]
+            points += [{**point, **_LIMITED} for point in pushed]
+            points += [{**point, **_IDEAL, **EXACT} for point in pushed]
+            points += [{**point, **_IDEAL, "duration": f"{d:g}"} for d in others for point in forces]
+            points += [{**point, **_IDEAL, **change.parameters} for change in CHANGES for point in pushed]
         return CampaignPlan(scenario=self.scenario, points=points, seed=1, experiment=self.name)
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
@@ -68,7 +70,8 @@ def _pushes(runs: PushRuns) -> ComparisonTable:
     rows: list[list[str]] = []
     for behaviour in Behaviour:
         for push in PUSHES:
-            limited, predicted = runs.of(push, behaviour, ideal=False), predicted_greatest(push, behaviour, duration)
+            limited = runs.of(push, behaviour, propulsion=Propulsion.LIMITED)
+            predicted = predicted_greatest(push, behaviour, duration)
             rows.append(
                 [
                     push.figure_number(behaviour),

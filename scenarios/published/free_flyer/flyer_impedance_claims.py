@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters
+from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Propulsion
 from handover.scenarios.published.free_flyer.push_runs import (
     CHANGES,
     DURATIONS,
@@ -176,7 +176,7 @@ def _bears_limits(runs: PushRuns) -> Claim:
         "published": "",
         "beyond": True,
     }
-    rows = runs.all_of(ideal=False)
+    rows = runs.all_of(propulsion=Propulsion.LIMITED)
     if not rows:
         return nothing_measured(**facts)
     back = [row for row in rows if row.get("settling_time") is not None]

@@ -14,7 +14,7 @@ from handover.controllers.free_flyer.ports import Behaviour as Gains
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Wrench
+from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Propulsion, Wrench
 
 EXACT = {f"robot.{what}_noise": "0" for what in ("position", "attitude", "velocity", "rate")}
 """Parameters of a navigation without noise."""
@@ -98,7 +98,7 @@ class PushRuns:
         push: Push,
         behaviour: Behaviour,
         *,
-        ideal: bool = True,
+        propulsion: Propulsion = Propulsion.IDEAL,
         exact: bool = False,
         duration: float = _DEFAULT.duration,
         change: Change | None = None,
@@ -108,13 +108,13 @@ class PushRuns:
         Args:
             push: what acts on the gripper.
             behaviour: the controller's setting.
-            ideal: whether thrust has neither limits nor lag.
+            propulsion: what the thrusters are like.
             exact: whether the navigation has no noise.
             duration: of the push, s.
             change: what of the robot is otherwise than its controller assumes.
         """
-        wanted: dict[str, Any] = {**push.parameters, "behaviour": behaviour.item, "ideal": ideal, "duration": duration}
-        wanted |= {c.name: 1.0 for c in CHANGES}
+        wanted: dict[str, Any] = {**push.parameters, "behaviour": behaviour.item, "duration": duration}
+        wanted |= {"propulsion": propulsion.item, **{c.name: 1.0 for c in CHANGES}}
         if change is not None:
             wanted[change.name] = change.factor
         for row in self._rows:

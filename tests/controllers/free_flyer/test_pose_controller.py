@@ -19,7 +19,7 @@ from handover.plants.free_flyer.free_flyer import Inputs as FlyerInputs
 from handover.plants.free_flyer.free_flyer import Params as FlyerParams
 from handover.plants.free_flyer.thrusters import Inputs as ThrusterInputs
 from handover.plants.free_flyer.thrusters import Params as ThrusterParams
-from handover.plants.free_flyer.thrusters import Thrusters
+from handover.plants.free_flyer.thrusters import Propulsion, Thrusters
 
 T = 0.016
 MASS, INERTIA = 9.584, np.array([0.1534, 0.1427, 0.1623])
@@ -32,10 +32,12 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 class Robot:
     """The free-flyer behind its thrusters, with a constant force on its centre of mass from outside."""
 
-    def __init__(self, draught: Floats = NOTHING, noise: float = 0.0, ideal: bool = False, **start: Any) -> None:
+    def __init__(
+        self, draught: Floats = NOTHING, noise: float = 0.0, propulsion: Propulsion = Propulsion.LIMITED, **start: Any
+    ) -> None:
         deviations = {"position_noise": noise, "velocity_noise": noise, "attitude_noise": 2 * noise}
         self.body = FreeFlyer(FlyerParams(**deviations, rate_noise=2.0 * noise, **start))
-        self.thrusters = Thrusters(ThrusterParams(ideal=ideal))
+        self.thrusters = Thrusters(ThrusterParams(propulsion=propulsion))
         self.draught = draught
         self.y = self.body.outputs(0.0, FlyerInputs())
 
@@ -220,7 +222,7 @@ def test_linear_prediction_holds_for_a_small_push():
     n = round(8.0 / T)
     wrench = np.zeros((n, 6))
     wrench[:30, 0] = 0.05
-    predicted, robot, path = controller.loop.response(wrench)[:, 0], Robot(ideal=True), list[float]()
+    predicted, robot, path = controller.loop.response(wrench)[:, 0], Robot(propulsion=Propulsion.IDEAL), list[float]()
     for d in wrench:
         path.append(float(robot.y.p_WG[0]))
         robot.draught = d[:3]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.thrusters import Inputs, Outputs, Params, Thrusters
+from handover.plants.free_flyer.thrusters import Inputs, Outputs, Params, Propulsion, Thrusters
 
 DT = 0.016
 
@@ -63,7 +63,7 @@ def test_commands_of_both_controllers_are_added_before_they_are_cut():
 
 
 def test_ideal_thrusters_give_what_is_commanded_at_once():
-    u, thrusters = command(7.0, torque=np.array([3.0, 0.0, 0.0])), Thrusters(Params(ideal=True))
+    u, thrusters = command(7.0, torque=np.array([3.0, 0.0, 0.0])), Thrusters(Params(propulsion=Propulsion.IDEAL))
     for y in (thrusters.outputs(0.0, u), thrusters.step(0.0, DT, u)):
         np.testing.assert_array_equal(y.f_B, [7.0, 0.0, 0.0])
         np.testing.assert_array_equal(y.tau_B, [3.0, 0.0, 0.0])
@@ -83,7 +83,9 @@ def test_a_delay_between_steps_shares_them():
     np.testing.assert_allclose(late, [0.0, 0.3, 0.4, 0.4], rtol=1e-12)
 
 
-@pytest.mark.parametrize("changes", [{}, {"lag": 0.0}, {"delay": 0.025}, {"delay": 0.1, "lag": 0.3}, {"ideal": True}])
+@pytest.mark.parametrize(
+    "changes", [{}, {"lag": 0.0}, {"delay": 0.025}, {"delay": 0.1, "lag": 0.3}, {"propulsion": Propulsion.IDEAL}]
+)
 def test_the_whole_impulse_arrives(changes: dict[str, Any]):
     u = command(0.3, -0.2, 0.1, np.array([0.02, -0.01, 0.03]))
     given = np.array([0.3, -0.2, 0.1, 0.02, -0.01, 0.03]) * 12 * DT
@@ -91,7 +93,7 @@ def test_the_whole_impulse_arrives(changes: dict[str, Any]):
 
 
 def test_does_not_keep_the_inputs_that_it_was_given():
-    u, thrusters = command(0.3), Thrusters(Params(ideal=True, delay=DT))
+    u, thrusters = command(0.3), Thrusters(Params(propulsion=Propulsion.IDEAL, delay=DT))
     thrusters.step(0.0, DT, u)
     u.f_pose[:] = 9.0
     np.testing.assert_array_equal(thrusters.step(DT, DT, u).f_B, [0.3, 0.0, 0.0])

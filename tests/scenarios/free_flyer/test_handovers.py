@@ -58,7 +58,9 @@ def test_the_robot_gives_an_object_to_a_person(tmp_path: Path):
 
 @pytest.mark.slow
 def test_a_compliant_robot_gives_way_further_where_the_thrusters_can_tell_it_from_a_rigid_one(tmp_path: Path):
-    rigid, compliant = (run(RobotToHuman, tmp_path / b, f"behaviour={b}", "ideal=true") for b in ("rigid", "compliant"))
+    rigid, compliant = (
+        run(RobotToHuman, tmp_path / b, f"behaviour={b}", "propulsion=ideal") for b in ("rigid", "compliant")
+    )
     assert rigid.outcome.success, rigid.outcome.reason
     assert compliant.outcome.success, compliant.outcome.reason
     assert metric(compliant, "transfer_displacement_z") > 1.3 * metric(rigid, "transfer_displacement_z")

@@ -39,7 +39,7 @@ def table_of(quick: bool = False, longest: float = 10.0, off: float = 0.004, bac
     for run in FlyerImpedanceTable().plan(quick).runs():
         given = dict(run.parameters)
         row: dict[str, Any] = {name: given[name] for name in ("kind", "axis", "behaviour")} | {"status": "done"}
-        row |= {"ideal": given["ideal"] == "true"} | {n: float(given[n]) if n in given else None for n in NUMBERS}
+        row |= {"propulsion": given["propulsion"]} | {n: float(given[n]) if n in given else None for n in NUMBERS}
         push = Push(Wrench[given["kind"].upper()], Axis[given["axis"].upper()])
         behaviour, duration = Behaviour[given["behaviour"].upper()], float(given.get("duration", "0.5"))
         size = predicted_greatest(push, behaviour, min(duration, 2.0))
@@ -49,7 +49,7 @@ def table_of(quick: bool = False, longest: float = 10.0, off: float = 0.004, bac
         apart = off * (10.0 if other else 0.1 if "robot.position_noise" in given else 1.0)
         row |= {"greatest_position_error": size, "greatest_orientation_error": size, "success": True}
         row |= {"disagreement_position": apart, "disagreement_orientation": apart, "run": run.name}
-        row["settling_time"] = 3.0 if given["ideal"] == "true" or back else None
+        row["settling_time"] = 3.0 if given["propulsion"] == "ideal" or back else None
         rows.append(row)
     return CampaignTable(pa.Table.from_pylist(rows))
 
