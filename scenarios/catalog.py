@@ -120,6 +120,10 @@ SYSTEMS = (
                 "handover.scenarios.free_flyer.handovers:Collaborative",
                 "a free-flyer gives an object to a person, waits, and takes it back",
             ),
+            "flyer_handover": ScenarioEntry(
+                "handover.scenarios.free_flyer.handovers:HandoverOfTask",
+                "a free-flyer and a person hand an object over, in one of the four ways",
+            ),
         },
     ),
     RobotSystem(

@@ -71,6 +71,9 @@ class Params:
         np.array([-0.30, -1.5, -1.5]), "smallest coordinates of gripper and robot: the person is beyond, at -x"
     )
     workspace_high: Vector3[Metre] = parameter(np.array([2.0, 1.5, 1.5]), "largest coordinates of gripper and robot")
+    gated: bool = parameter(
+        True, "it yields, signals and heeds the speed only once at rest; else as soon as it is within gate_error"
+    )
     gate_error: Metre = parameter(
         0.05, "distance from the handover place below which impedance control may begin", minimum=1e-4, maximum=10.0
     )

@@ -1,6 +1,7 @@
 """The sequence of a free-flyer's handovers. [Fernandes2020] chapter 3, figures 3.1 to 3.3."""
 
 import enum
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -102,9 +103,11 @@ class HandoverStateMachine:
     Conditions of this implementation besides: impedance control begins only at rest near the handover place
     (gate_error, gate_speed), and the light only once the gripper is at rest again under it and within `tolerance`,
     after a failure too, since a transient trips the threshold with no person there. The threshold counts from the light
-    on, once the speed was below it. The gripper's velocity is v + w x R p_BG. GIVEN_UP, holding the pose and not moving
-    the gripper, is entered after `patience` in a phase, after `attempts` failures, and when an object that was fetched
-    is not between the fingers.
+    on, once the speed was below it. Unless `gated`, none of this holds, as the thesis names no such condition:
+    impedance control begins within gate_error of the place, at any speed, the light follows at once, and the threshold
+    counts from its end. The gripper's velocity is v + w x R p_BG. GIVEN_UP, holding the pose and not moving the
+    gripper, is entered after `patience` in a phase, after `attempts` failures, and when an object that was fetched is
+    not between the fingers.
 
     Raises:
         InvalidHandoverParameters: by the constructor, for goals out of reach, or thresholds or times that cannot work;
@@ -116,12 +119,12 @@ class HandoverStateMachine:
         ("phase", "p_WG_goal", "q_WG_goal", "impedance", "pose", "closure", "light", "failed_receptions", "speed_G"),
         ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas", "gripper_angle"),
     )
-    period: ClassVar[Fraction | None] = PERIOD
+    period: ClassVar[Fraction] = PERIOD
 
     def __init__(self, params: Params) -> None:
         params.check()
         self._params = params
-        self._T = float(PERIOD)
+        self._T = float(self.period)
         self._release, self._receive = params.velocities()
         self._p_BG = vector(params.p_BG)
         q_handover = unit_quaternion(params.q_WG_handover, NAME, "q_WG_handover")
@@ -140,6 +143,7 @@ class HandoverStateMachine:
         self._failed = 0
         self._steps = 0  # in this phase
         self._settled = 0  # steps in a row at rest and in place
+        self._near = False  # within gate_error of the goal, as of this step
         self._rules = {
             HandoverPhase.OPEN_GRIPPER: self._open_gripper,
             HandoverPhase.MOVE_TO_OBJECT: self._move_to_object,
@@ -208,15 +212,21 @@ class HandoverStateMachine:
     def _count_settled(self, here: tuple[Vector, Quaternion]) -> None:
         """Count the steps for which the gripper has been at rest at its goal."""
         p, (p_WG, q_WG), goal = self._params, here, self._goal
+        away = math.inf if goal is None else distance(goal[0], p_WG)
+        self._near = away < p.gate_error
         if goal is None or self._monitor.speed >= p.gate_speed:
             self._settled = 0
             return
         to_handover = self._phase is HandoverPhase.MOVE_TO_HANDOVER
-        near = distance(goal[0], p_WG) < (p.gate_error if to_handover else p.tolerance)
+        near = self._near if to_handover else away < p.tolerance
         self._settled = self._settled + 1 if near and angle_between(goal[1], q_WG) < p.tolerance_angle else 0
 
     def _arrived(self) -> bool:
         return self._settled * self._T >= self._params.settle_time - self._T / 2.0 and self._settled > 0
+
+    def _may_hand_over(self) -> bool:
+        """Return whether it may yield and signal: at rest in its place, or, if it is not gated, near enough to it."""
+        return self._arrived() if self._params.gated else self._near
 
     def _lasted(self, time: float) -> bool:
         return self._steps * self._T >= time - self._T / 2.0
@@ -254,7 +264,7 @@ class HandoverStateMachine:
         if not self._lasted(self._params.gripper_time):
             return None
         if self._impedance:  # after a failed reception: signal again, once it has come to rest after the push
-            return HandoverPhase.SIGNAL if self._arrived() else None
+            return HandoverPhase.SIGNAL if self._may_hand_over() else None
         return HandoverPhase.MOVE_TO_HANDOVER if self._receiving else HandoverPhase.MOVE_TO_OBJECT
 
     def _move_to_object(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
@@ -273,12 +283,12 @@ class HandoverStateMachine:
     def _move_to_handover(self, angle: float) -> HandoverPhase | None:
         if not self._receiving and not self._holds_something(angle):  # lost during the move
             return HandoverPhase.GIVEN_UP
-        return HandoverPhase.ACTIVATE_IMPEDANCE if self._arrived() else None
+        return HandoverPhase.ACTIVATE_IMPEDANCE if self._may_hand_over() else None
 
     def _activate_impedance(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
         p = self._params
         waits = p.task is HandoverTask.COLLABORATIVE and self._receiving and not self._lasted(p.pause)
-        if p.task is HandoverTask.HOLD or waits or not self._arrived():
+        if p.task is HandoverTask.HOLD or waits or not self._may_hand_over():
             return None
         return HandoverPhase.SIGNAL
 
@@ -318,4 +328,5 @@ class HandoverStateMachine:
         return angle > self._params.angle_threshold
 
     def _moved_by_a_person(self) -> bool:
-        return self._monitor.exceeds(self._receive if self._receiving else self._release)
+        threshold = self._receive if self._receiving else self._release
+        return self._monitor.exceeds(threshold) if self._params.gated else self._monitor.speed > threshold

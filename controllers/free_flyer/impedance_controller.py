@@ -112,11 +112,11 @@ class ImpedanceController:
         "error_p": ("p_WB_meas", "q_WB_meas", "p_WG_goal"),
         "error_R": ("q_WB_meas", "q_WG_goal"),
     }
-    period: ClassVar[Fraction | None] = PERIOD
+    period: ClassVar[Fraction] = PERIOD
     deferred: ClassVar[tuple[str, ...]] = ("control",)
 
     def __init__(self, params: Params) -> None:
-        body, gains, period = params.body(), params.gains(), float(PERIOD)
+        body, gains, period = params.body(), params.gains(), float(self.period)
         faults = body.faults() + (gains.faults() if params.behaviour is Behaviour.CUSTOM else [])
         faults = faults or stability_faults(
             body, lambda factor: gains.scaled(factor).law(body), period, params.delay, params.lag

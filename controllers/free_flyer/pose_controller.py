@@ -149,11 +149,11 @@ class PoseController:
         "error_p": ("p_WB_meas", "q_WB_meas", "p_WG_goal"),
         "error_R": ("q_WB_meas", "q_WG_goal"),
     }
-    period: ClassVar[Fraction | None] = PERIOD
+    period: ClassVar[Fraction] = PERIOD
     deferred: ClassVar[tuple[str, ...]] = ("control",)
 
     def __init__(self, params: Params) -> None:
-        body, self._T = params.body(), float(PERIOD)
+        body, self._T = params.body(), float(self.period)
         position, attitude = params.position_gains(), params.attitude_gains()
         faults = params.faults() or stability_faults(
             body,

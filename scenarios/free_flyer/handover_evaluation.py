@@ -25,6 +25,8 @@ class Transfer:
         in_vain: times at which it had felt one in receptions that failed, s.
         speed: the gripper's speed when it was felt, m/s.
         fastest: maximum speed while the robot has been waiting since it last asked, m/s.
+        at_rest: the same until the person first touches the gripper, or what it holds, since the robot asked, m/s.
+        touched: whether the person has, since then.
         farthest: maximum distance of the gripper from its place, from the signal for as long as it yields, m.
         farthest_along: the same along each axis of W.
         done: when the receiver had the object alone, s; None before.
@@ -37,6 +39,8 @@ class Transfer:
     in_vain: list[float] = field(default_factory=list[float])
     speed: float = 0.0
     fastest: float = 0.0
+    at_rest: float = 0.0
+    touched: bool = False
     farthest: float = 0.0
     farthest_along: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
     done: float | None = None
@@ -48,7 +52,13 @@ class Transfer:
         """Restart the transfer as the robot signals once more: what it had felt was in vain."""
         if self.felt is not None:
             self.in_vain.append(self.felt)
-        self.asked, self.felt, self.fastest = t, None, 0.0
+        self.asked, self.felt, self.fastest, self.touched = t, None, 0.0, False
+
+    def waited(self, speed: float) -> None:
+        """Update the maximum speeds by the gripper's, m/s, while the robot waits to be pulled or pushed."""
+        self.fastest = max(self.fastest, speed)
+        if not self.touched:
+            self.at_rest = max(self.at_rest, speed)
 
     def displaced(self, p_WG: tuple[float, float, float], place: tuple[float, float, float]) -> None:
         """Update the displacement by the gripper's position and its handover place."""
@@ -73,9 +83,16 @@ class Transfer:
                 )
                 for axis, away in zip("xyz", self.farthest_along, strict=True)
             },
+            "rest_speed": Metric(
+                self.at_rest,
+                "m/s",
+                "gripper's speed at most, as the robot sees it, while it waits and nobody touches it",
+            ),
         }
         if self.felt is not None:
             metrics["speed"] = Metric(self.speed, "m/s", f"gripper's speed when the robot felt the {touch} and {act}")
+            since = f"from the last signal until the robot felt the {touch} and {act}"
+            metrics["felt_after"] = Metric(self.felt - self.asked, "s", since)
         if self.done is not None:
             since = f"from the {'first ' if self.in_vain else ''}signal until the {whom} has the object"
             metrics["time"] = Metric(self.done - self.signalled, "s", since)
@@ -84,6 +101,11 @@ class Transfer:
 
 _SETTLING = 1.0
 """How long the receiver must keep the object when the robot is done, s (assumed)."""
+
+_LEAST_FORCE = 0.05
+"""Force on the gripper by which a person is taken to touch it, N (assumed): at rest the object alone gives less."""
+_CLOSING = ("GRASP_OBJECT", "CLOSE_GRIPPER")
+"""Phases at whose end the gripper is closed."""
 
 _TOUCH = {"HAND": "pull", "GRIPPER": "push"}
 _NOT_YIELDING = ("DEACTIVATE_IMPEDANCE", "RETREAT", "DONE", "GIVEN_UP")
@@ -117,6 +139,7 @@ class HandoverEvaluator(Evaluator):
         self._codes = (-1, -1)
         self._arrival: tuple[float, float] | None = None
         self._nearest = math.inf
+        self._angles: dict[str, float] = {}
         self._lost: float | None = None
         self._stability: dict[str, Metric] = {}
 
@@ -134,8 +157,11 @@ class HandoverEvaluator(Evaluator):
         self._nearest = min(self._nearest, math.dist((x, y, z), self._place))
         if self.transfers and self._phase not in _NOT_YIELDING:
             self.transfers[-1].displaced((x, y, z), self._place)
+            if self._phase in ("SIGNAL", "CHECK_VELOCITY"):
+                touches = self._holder == "BOTH" or math.hypot(*signals["person.f_G"].tolist()) > _LEAST_FORCE
+                self.transfers[-1].touched |= touches
             if self._phase == "CHECK_VELOCITY":
-                self.transfers[-1].fastest = max(self.transfers[-1].fastest, speed)
+                self.transfers[-1].waited(speed)
 
     def _change(self, t: float, signals: Signals, p_WG: tuple[float, float, float], speed: float) -> None:
         """Handle a change of phase or holder."""
@@ -146,6 +172,8 @@ class HandoverEvaluator(Evaluator):
         if phase != self._phase:
             left, _ = self.phases[-1] if self.phases else ("", 0.0)
             self.phases.append((phase, t))
+            if left in _CLOSING:
+                self._closed(float(signals["person.gripper_angle"]), holder)
             self._enter(phase, left, t, p_WG, speed)
         if holder != self._holder:
             self.holders.append((holder, t))
@@ -160,6 +188,13 @@ class HandoverEvaluator(Evaluator):
             self.transfers.append(Transfer(self.receivers[len(self.transfers)], t))
         if left == "CHECK_VELOCITY" and phase != "GIVEN_UP" and self._under_way is not None:
             self._under_way.felt, self._under_way.speed = t, speed
+
+    def _closed(self, angle: float, holder: str) -> None:
+        """Keep the angle of a gripper that has closed, rad: the least one on the object, the greatest on nothing."""
+        if holder in ("GRIPPER", "BOTH"):
+            self._angles["full"] = min(self._angles.get("full", math.inf), angle)
+        else:
+            self._angles["empty"] = max(self._angles.get("empty", 0.0), angle)
 
     def _receive(self, holder: str, t: float) -> None:
         if holder == "FREE" and len(self.holders) > 1 and self._lost is None:
@@ -211,6 +246,12 @@ class HandoverEvaluator(Evaluator):
             metrics["arrival_speed"] = Metric(
                 self._arrival[1], "m/s", "gripper's speed when it arrived there and began to yield"
             )
+        for state, words in (
+            ("full", "least angle of the closed gripper with the object in it"),
+            ("empty", "greatest angle of the closed gripper with nothing in it"),
+        ):
+            if state in self._angles:
+                metrics[f"angle_{state}"] = Metric(self._angles[state], "rad", words)
         share = self._saturated / max(self._steps, 1)
         metrics["saturated_share"] = Metric(
             share, "1", "share of the time for which the thrusters were at their limits"

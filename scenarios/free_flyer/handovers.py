@@ -4,6 +4,8 @@
 - `HumanToRobot`: a person puts an object into the gripper, which closes when it is pushed. Sec. 4.3.2.
 - `FailedReception`: a push without the object: the robot finds its gripper empty and asks again. Sec. 3.2.2, 4.3.2.
 - `Collaborative`: the robot gives an object, waits, and takes it back: it holds things for a person. Sec. 5.5, T3.
+
+`HandoverOfTask` is any of them, by a parameter: for campaigns in which they stand beside each other.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,10 +25,10 @@ from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
-from handover.scenarios.free_flyer.parameters import HandoverParameters
+from handover.scenarios.free_flyer.parameters import HandoverParameters, Task, TaskParameters
 from handover.scenarios.free_flyer.places import PLACES_OF_HANDOVER
 from handover.scenarios.free_flyer.published import published_of_giving, published_of_receiving
-from handover.scenarios.free_flyer.robot_wiring import expected_lag, wire_handover
+from handover.scenarios.free_flyer.robot_wiring import common_period, expected_lag, wire_handover
 
 _FLIGHT = 120
 """Time for flying, fetching and retreating, without the waiting for the person, s (assumed)."""
@@ -92,15 +94,18 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
             p_WG_handover=p.p_WG_handover,
             p_WO_0=p_WO_0,
             p_OG=at["p_OG"],
+            gated=p.gated,
             patience=p.patience,
         )
         s.add("impedance", fmu("impedance"), behaviour=behaviour, **model, delay=p.delay, lag=lag)
         s.add("pose", fmu("pose"), **model, delay=p.delay, lag=lag)
-        s.add("thrusters", fmu("thrusters"), propulsion=p.propulsion.item, delay=p.delay)
-        s.add("robot", fmu("robot"), seed=robot_seed, **vars(robot), p_WB_0=at["p_WG_0"] - robot.p_BG)
+        step = common_period([s.units[name] for name in self.cycle()])
+        s.add("thrusters", fmu("thrusters"), period=step, propulsion=p.propulsion.item, delay=p.delay)
+        s.add("robot", fmu("robot"), period=step, seed=robot_seed, **vars(robot), p_WB_0=at["p_WG_0"] - robot.p_BG)
         s.add(
             "person",
             fmu("person"),
+            period=step,
             seed=person_seed,
             p_WO_0=p_WO_0,
             angle_0=float(at["angle_0"]),
@@ -210,3 +215,39 @@ class RobotToHuman(FlyerHandover):
     def published(self, parameters: HandoverParameters) -> Sequence[PublishedValue]:
         """Return the values of sec. 4.1.2 and 4.3."""
         return published_of_giving(parameters)
+
+
+_OF_TASK: Mapping[Task, type[FlyerHandover]] = {
+    Task.ROBOT_TO_HUMAN: RobotToHuman,
+    Task.HUMAN_TO_ROBOT: HumanToRobot,
+    Task.FAILED_RECEPTION: FailedReception,
+    Task.COLLABORATIVE: Collaborative,
+}
+
+
+class HandoverOfTask(FlyerHandover):
+    """One of the four, by the parameter `task`."""
+
+    name: ClassVar[str] = "flyer_handover"
+    title: ClassVar[str] = "a free-flyer and a person hand an object over, in one of the four ways"
+    parameters_type: ClassVar[type[TaskParameters]] = TaskParameters
+
+    def build(self, parameters: TaskParameters, seed: int, fmu: FmuOf) -> System:
+        """Wire the task's scenario.
+
+        Raises:
+            InvalidParameter: the handover place is out of the person's reach.
+        """
+        return _OF_TASK[parameters.task]().build(parameters, seed, fmu)
+
+    def stop_time(self, parameters: TaskParameters) -> Fraction:
+        """Return that of the task's scenario."""
+        return _OF_TASK[parameters.task]().stop_time(parameters)
+
+    def evaluator(self, parameters: TaskParameters) -> HandoverEvaluator:
+        """Return that of the task's scenario."""
+        return _OF_TASK[parameters.task]().evaluator(parameters)
+
+    def published(self, parameters: TaskParameters) -> Sequence[PublishedValue]:
+        """Return the published values of the task."""
+        return _OF_TASK[parameters.task]().published(parameters)

@@ -90,9 +90,31 @@ class HandoverParameters(RobotAndModel):
     strength: Newton = parameter(4.0, "force with which the person pulls and pushes at most", minimum=0.1, maximum=20.0)
     propulsion: Propulsion = parameter(Propulsion.LIMITED, "what the thrusters are like")
     delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
+    gated: bool = parameter(True, "whether the robot yields and signals only once it is at rest in its place")
     patience: Second = parameter(
         60.0, "time in any one phase after which the robot gives up", minimum=1.0, maximum=600.0
     )
+
+
+class Task(enum.IntEnum):
+    """The four handovers."""
+
+    ROBOT_TO_HUMAN = 0
+    HUMAN_TO_ROBOT = 1
+    FAILED_RECEPTION = 2
+    COLLABORATIVE = 3
+
+    @property
+    def item(self) -> str:
+        """The item's name as a parameter's text."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskParameters(HandoverParameters):
+    """One handover of any kind."""
+
+    task: Task = parameter(Task.ROBOT_TO_HUMAN, "which of the four handovers")
 
 
 class Axis(enum.IntEnum):

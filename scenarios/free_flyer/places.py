@@ -86,7 +86,7 @@ PLACES_OF_HANDOVER = {
             **_ESTIMATE,
             "gripper_angle": "",
             **dict.fromkeys(
-                ("task", "behaviour", "p_WG_handover", "patience"), "the scenario's, or its parameter's value"
+                ("task", "behaviour", "p_WG_handover", "gated", "patience"), "the scenario's, or its parameter's value"
             ),
             "p_BG": "in B",
             "p_WO_0": "in W",

@@ -5,7 +5,9 @@ Also the metrics of the controllers' closed loops, which they compute by their o
 
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 
+from handover.controllers.free_flyer.ports import PERIOD
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
 from handover.scenarios.experiment.experiment import Metric
@@ -19,6 +21,16 @@ _SEEN = ("p_WG", "q_WG", "v_WG", "w_WB")
 def expected_lag(propulsion: Propulsion) -> float:
     """Return the lag of the thrusters that the controllers assume, s."""
     return 0.0 if propulsion is Propulsion.IDEAL else float(paper_values("free_flyer", "thrusters")["lag"])
+
+
+def common_period(controllers: Sequence[PlacedUnit]) -> Fraction | None:
+    """Return the period, s, that controllers of another rate than the robot's own share, for its plants to step by.
+
+    A plant that stepped by its own would take their commands late, by a time that drifts from 0 to a step. None where
+    the controllers run at `PERIOD`, which the plants propose, too, or at several rates.
+    """
+    periods = {c.period for c in controllers if c.sampled}
+    return None if len(periods) != 1 or periods == {PERIOD} else periods.pop()
 
 
 def wire_controller(s: System, controller: PlacedUnit, robot: PlacedUnit, thrusters: PlacedUnit) -> None:
@@ -62,8 +74,6 @@ def wire_handover(s: System) -> None:
 
 _SLOWEST_MODE = {"pose": "the slowest mode, the integrator's"}
 _POLES = ("pole_radius", "damping_ratio", "pole_frequency")
-PERIOD = 2 / 125
-"""Period of the controllers, s."""
 
 
 def stability_metrics(signals: Signals, controllers: Sequence[str]) -> dict[str, Metric]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,11 @@ from handover.controllers.free_flyer.handover_state_machine import (
     Params,
 )
 from handover.controllers.free_flyer.ports import Behaviour
+from handover.controllers.free_flyer.published_rate import (
+    HandoverStateMachine67,
+    ImpedanceController67,
+    PoseController67,
+)
 from handover.controllers.free_flyer.velocity_monitor import VelocityMonitor
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
@@ -226,6 +232,38 @@ def test_signal_waits_for_the_transient_of_the_switch():
     w.run(8.0)
     assert next(i for i, y in enumerate(w.ys) if y.impedance) * T < 3.0
     assert next(i for i, y in enumerate(w.ys) if y.light) * T == pytest.approx(6.5, abs=0.1)
+
+
+def test_without_the_gate_a_moving_robot_yields_signals_and_takes_its_own_motion_for_a_pull():
+    def fly_past(w: World) -> None:
+        w.follows = False
+        away = max(0.0, 0.3 - 0.07 * w.t)
+        w.p_WG = np.array([away, -0.07, 0.0])
+        w.v_WB = np.array([-0.07 if away else 0.0, 0.0, 0.0])
+
+    gated = world(HandoverTask.HUMAN_TO_ROBOT, fly_past, gate_error=0.2)
+    gated.run(12.0)
+    assert gated.phases()[-1] is P.CHECK_VELOCITY
+    w = world(HandoverTask.HUMAN_TO_ROBOT, fly_past, gate_error=0.2, gated=False)
+    w.run(6.0)
+    began = next(i for i, y in enumerate(w.ys) if y.impedance) * T
+    assert began == pytest.approx(0.1 / 0.07, abs=0.05)
+    assert w.phases()[2:5] == [P.ACTIVATE_IMPEDANCE, P.SIGNAL, P.CHECK_VELOCITY]
+    assert P.CLOSE_GRIPPER in w.phases()
+
+
+@pytest.mark.parametrize("block", [HandoverStateMachine67, ImpedanceController67, PoseController67])
+def test_the_published_rate_is_67_5_hz(block: type[Any]):
+    assert describe(block).period == Fraction(2, 135)
+    assert 1 / describe(block).period == Fraction("67.5")
+
+
+def test_times_are_kept_at_the_published_rate():
+    machine = HandoverStateMachine67(Params(task=HandoverTask.HUMAN_TO_ROBOT, gripper_time=2.0))
+    steps = 0
+    while machine.step(steps * 2 / 135, 2 / 135, Inputs()).phase is P.OPEN_GRIPPER:
+        steps += 1
+    assert steps * 2 / 135 == pytest.approx(2.0, abs=0.02)
 
 
 def test_threshold_counts_only_after_the_gripper_was_slower():

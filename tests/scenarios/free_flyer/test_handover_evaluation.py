@@ -18,7 +18,15 @@ PLACE = np.array([0.0, -0.07, 0.0])
 
 
 def signals(
-    phase: Phase, holder: Holder, *, speed: float = 0.0, away: float = 0.0, failed: int = 0, saturated: bool = False
+    phase: Phase,
+    holder: Holder,
+    *,
+    speed: float = 0.0,
+    away: float = 0.0,
+    failed: int = 0,
+    saturated: bool = False,
+    force: float = 0.0,
+    angle: float = 0.6,
 ) -> Signals:
     loop = {"pole_radius": [0.99], "damping_ratio": [0.3], "pole_frequency": [2.7]}
     values: dict[str, dict[str, Any]] = {
@@ -27,7 +35,7 @@ def signals(
         "impedance": loop,
         "pose": loop,
         "decision": {"phase": [int(phase)], "speed_G": [speed], "failed_receptions": [failed]},
-        "person": {"holder": [int(holder)]},
+        "person": {"holder": [int(holder)], "f_G": np.array([force, 0.0, 0.0]), "gripper_angle": [angle]},
     }
     items = {"phase": Phase, "holder": Holder}
     units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
@@ -41,7 +49,7 @@ def signals(
                 causality=Causality.OUTPUT,
                 fmi_type="",
                 references=(),
-                shape=(3,) if name == "p_WG" else (),
+                shape=(3,) if name in ("p_WG", "f_G") else (),
                 items=tuple((i.name, int(i)) for i in items[name]) if name in items else (),
             )
             for name in ys
@@ -197,3 +205,31 @@ def test_a_run_that_was_cut_short_says_where():
     outcome = follow(to_person(), *given()[:6]).outcome()
     assert not outcome.success
     assert "stopped at 22.0 s in phase CHECK_VELOCITY" in outcome.reason
+
+
+def test_the_speed_at_rest_is_that_before_anybody_touches_the_gripper():
+    waits = [
+        (10.0, signals(Phase.SIGNAL, Holder.HAND, speed=0.02)),
+        (11.0, signals(Phase.CHECK_VELOCITY, Holder.HAND, speed=0.004)),
+        (12.0, signals(Phase.CHECK_VELOCITY, Holder.HAND, speed=0.003)),
+        (13.0, signals(Phase.CHECK_VELOCITY, Holder.HAND, speed=0.03, force=1.0)),
+        (13.1, signals(Phase.CHECK_VELOCITY, Holder.HAND, speed=0.035)),
+        (13.2, signals(Phase.CLOSE_GRIPPER, Holder.HAND, speed=0.04)),
+    ]
+    metrics = follow(HandoverEvaluator(HandoverParameters(), ("GRIPPER",)), *waits).outcome().metrics
+    assert metrics["transfer_rest_speed"].value == 0.004
+    assert metrics["transfer_speed"].value == 0.04
+    assert metrics["transfer_felt_after"].value == pytest.approx(3.2)
+
+
+def test_the_angles_of_a_closed_gripper_are_told_apart_by_what_is_in_it():
+    moments = [
+        (0.0, signals(Phase.CLOSE_GRIPPER, Holder.HAND, angle=1.1)),
+        (1.0, signals(Phase.CHECK_ANGLE, Holder.HAND, angle=0.61)),
+        (2.0, signals(Phase.CLOSE_GRIPPER, Holder.HAND, angle=1.1)),
+        (3.0, signals(Phase.CHECK_ANGLE, Holder.BOTH, angle=0.8)),
+        (4.0, signals(Phase.GRASP_OBJECT, Holder.GRIPPER, angle=0.9)),
+        (5.0, signals(Phase.MOVE_TO_HANDOVER, Holder.GRIPPER, angle=0.79)),
+    ]
+    metrics = follow(HandoverEvaluator(HandoverParameters(), ("GRIPPER",)), *moments).outcome().metrics
+    assert (metrics["angle_empty"].value, metrics["angle_full"].value) == (0.61, 0.79)

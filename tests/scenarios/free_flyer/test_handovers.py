@@ -1,6 +1,7 @@
 """The free-flyer's four handovers, on the built FMUs."""
 
 import itertools
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,13 @@ from handover.scenarios.free_flyer.handovers import (
     Collaborative,
     FailedReception,
     FlyerHandover,
+    HandoverOfTask,
     HumanToRobot,
     RobotToHuman,
 )
-from handover.scenarios.free_flyer.parameters import HandoverParameters
+from handover.scenarios.free_flyer.parameters import HandoverParameters, Task, TaskParameters
 
+HANDOVERS_OF = dict(zip(Task, (RobotToHuman, HumanToRobot, FailedReception, Collaborative), strict=True))
 HANDOVERS = (RobotToHuman, HumanToRobot, FailedReception, Collaborative)
 FREE, GRIPPER, HAND, BOTH = range(4)
 
@@ -137,3 +140,38 @@ def test_ten_of_ten_handovers_succeed(tmp_path: Path, scenario: type[FlyerHandov
         if not ended.outcome.success:
             failed[seed] = ended.outcome.reason
     assert not failed
+
+
+RATE = "handover.controllers.free_flyer.published_rate"
+
+
+def test_the_plants_step_by_the_rate_of_controllers_that_have_another():
+    at_67_5 = {
+        "decision": f"{RATE}:HandoverStateMachine67",
+        "impedance": f"{RATE}:ImpedanceController67",
+        "pose": f"{RATE}:PoseController67",
+    }
+
+    def system(**others: str) -> dict[str, Fraction]:
+        given = {**RobotToHuman.units, **others}
+        built = RobotToHuman().build(HandoverParameters(), 0, lambda name: cached(given[name], 3))
+        return {name: unit.period for name, unit in built.units.items()}
+
+    assert set(system().values()) == {Fraction(2, 125)}
+    (other,) = set(system(**at_67_5).values())
+    assert float(other) == pytest.approx(1 / 67.5, rel=1e-15)
+    one = system(pose=at_67_5["pose"])
+    assert {one[name] for name in ("thrusters", "robot", "person")} == {Fraction(2, 125)}
+
+
+@pytest.mark.parametrize("task", Task)
+def test_the_scenario_of_any_task_is_that_of_the_task(task: Task):
+    p = TaskParameters(task=task)
+    own = HANDOVERS_OF[task]
+    assert HandoverOfTask().stop_time(p) == own().stop_time(p)
+    assert HandoverOfTask().evaluator(p).receivers == own.receivers
+    units = [s.build(p, 3, lambda name: cached(RobotToHuman.units[name], 3)).units for s in (HandoverOfTask(), own())]
+    starts = [
+        {name: {k: np.array(v).tolist() for k, v in unit.start.items()} for name, unit in u.items()} for u in units
+    ]
+    assert starts[0] == starts[1]

@@ -18,7 +18,7 @@ from handover.plants.free_flyer.parameters import Params as PersonParams
 from handover.plants.free_flyer.push import Params as PushParams
 from handover.plants.free_flyer.thrusters import Params as ThrustersParams
 from handover.scenarios.free_flyer import scene
-from handover.scenarios.free_flyer.parameters import HandoverParameters
+from handover.scenarios.free_flyer.parameters import HandoverParameters, TaskParameters
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters as PushScenarioParameters
 
 Paper = dict[str, dict[str, dict[str, Any]]]
@@ -45,6 +45,10 @@ def paper() -> Paper:
 @pytest.mark.parametrize("group", CODE)
 def test_every_default_has_its_origin(paper: Paper, group: str):
     assert_every_default_has_its_origin(paper[group], CODE[group])
+
+
+def test_the_scenario_of_any_task_has_its_parameters_origins(paper: Paper):
+    assert_every_default_has_its_origin(paper["handover_scenario"] | paper["task_scenario"], TaskParameters)
 
 
 @pytest.mark.parametrize("behaviour", [Behaviour.RIGID, Behaviour.COMPLIANT])
