@@ -1,0 +1,175 @@
+"""A floating base with an arm: conservation, MuJoCo, the rigid body that it is with its joints locked, and stops."""
+
+from dataclasses import astuple
+from typing import Any
+
+import numpy as np
+import pytest
+from arm_scene import MASS, Q_WB, SKEWED, limits, mujoco_model, skewed_arm, tumbling
+from scipy.spatial.transform import Rotation
+
+from handover.cosim.blocks.plain_rotation import ZERO, vector
+from handover.cosim.blocks.ports import Floats
+from handover.plants.free_flyer.rigid_body import RigidBody, Wrenches
+from handover.plants.free_flyer.stopping_joints import JointLimits, Motion, StoppingJoints
+
+NOTHING: Wrenches = (ZERO, ZERO, ZERO, ZERO)
+PUSH: Wrenches = ((0.5, 0.2, -0.3), (0.02, 0.01, -0.02), (3.0, -2.0, 4.0), (0.1, 0.2, -0.1))
+TORQUES = (0.05, -0.04, 0.03)
+IDLE = (0.0, 0.0, 0.0)
+
+
+def flat(motion: Motion) -> Floats:
+    return np.concatenate([np.ravel(x) for x in astuple(motion)])
+
+
+def walk(robot: StoppingJoints, steps: int, wrench: Wrenches, tau_J: tuple[float, ...], h: float = 0.004) -> Floats:
+    for _ in range(steps):
+        robot.advance(h, wrench, tau_J)
+    return flat(robot.motion())
+
+
+def test_momenta_and_energy_stay_while_the_arm_whirls():
+    robot = tumbling(limits(3))
+    walk(robot, 100, NOTHING, (0.04, -0.03, 0.02))
+    before, energy, (_, _, v, L, _, pi) = robot.motion(), robot.energy, robot.state
+    assert min(abs(rate) for rate in before.v_J) > 0.1
+    walk(robot, 2500, NOTHING, IDLE)
+    after = robot.motion()
+    assert np.max(np.abs(np.subtract(after.q_J, before.q_J))) > 2.0
+    assert robot.state[2] == v
+    assert robot.state[3] == L
+    assert robot.state[5] != pi
+    assert robot.energy == pytest.approx(energy, rel=1e-10)
+
+
+def test_torques_between_links_change_no_momentum():
+    robot = tumbling(limits(3, reach=0.9, friction=0.01))
+    _, _, v, L, _, _ = robot.state
+    walk(robot, 200, NOTHING, TORQUES)
+    assert (robot.state[2], robot.state[3]) == (v, L)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_agrees_with_mujoco_on_the_same_wrenches_and_torques(n: int):
+    mujoco = pytest.importorskip("mujoco")
+    robot = tumbling(limits(n), q_J=(0.3, -0.4, 0.8)[:n])
+    model: Any = mujoco.MjModel.from_xml_string(mujoco_model(skewed_arm(n)))
+    data, start, (f_B, tau_B, f_G, tau_G) = mujoco.MjData(model), robot.motion(), PUSH
+    R_WB = Rotation.from_quat(start.q_WB, scalar_first=True).as_matrix()
+    data.qpos[:] = [*start.p_WB, *start.q_WB, *start.q_J]
+    data.qvel[:] = [*start.v_WB, *(np.transpose(R_WB) @ start.w_WB), *start.v_J]
+
+    def push(_: Any, now: Any) -> None:
+        R = now.xmat[1].reshape(3, 3)
+        now.xfrc_applied[1] = [*(R @ f_B), *(R @ tau_B)]
+        now.qfrc_applied[:] = [0.0] * 6 + [*TORQUES[:n]]
+        mujoco.mj_applyFT(model, now, np.array(f_G), np.array(tau_G), now.site_xpos[0], n + 1, now.qfrc_applied)
+
+    worst = 0.0
+    mujoco.set_mjcb_control(push)
+    try:
+        for _ in range(125):
+            mujoco.mj_step(model, data, nstep=4)
+            mujoco.mj_kinematics(model, data)
+            robot.advance(0.004, PUSH, TORQUES[:n])
+            worst = max(worst, float(np.linalg.norm(data.site_xpos[0] - robot.motion().p_WG)))
+    finally:
+        mujoco.set_mjcb_control(None)
+    np.testing.assert_allclose(robot.motion().q_J, data.qpos[7:], atol=1e-6)
+    print(f"\n{n} joints: largest distance to MuJoCo {mujoco.__version__} in 0.5 s: {1e3 * worst:.2g} mm")
+    assert np.linalg.norm(np.subtract(robot.motion().q_J, start.q_J)) > 0.3
+    assert worst < 5e-5
+
+
+def test_error_falls_with_the_fourth_power_of_the_step():
+    exact = walk(tumbling(limits(3)), 800, PUSH, TORQUES, h=0.0005)
+    wide, narrow = (
+        float(np.max(np.abs(walk(tumbling(limits(3)), round(0.4 / h), PUSH, TORQUES, h) - exact)))
+        for h in (0.016, 0.008)
+    )
+    assert 10.0 < wide / narrow < 30.0
+
+
+def whole(q_J: tuple[float, ...]) -> tuple[float, Floats, Floats]:
+    """Return mass, inertia about the centre of mass, and that centre p_BC, of base and arm as one body."""
+    arm = skewed_arm(len(q_J))
+    robot = tumbling(limits(len(q_J)), q_J=q_J)
+    posture, mass = robot.body.posture(q_J), MASS + sum(arm.masses)
+    bodies: list[tuple[float, Floats, Floats]] = [(MASS, np.zeros(3), SKEWED)]
+    for m, p, R, moments in zip(arm.masses, posture.centres, posture.turns, arm.inertias, strict=True):
+        M = np.reshape(R, (3, 3))
+        bodies.append((m, np.array(p), M @ np.diag(moments) @ M.T))
+    c: Floats = np.sum([m * p for m, p, _ in bodies], axis=0) / mass
+    inertia = np.sum([I + m * ((p - c) @ (p - c) * np.eye(3) - np.outer(p - c, p - c)) for m, p, I in bodies], axis=0)
+    return mass, inertia, c
+
+
+def test_with_locked_joints_it_is_the_rigid_body_that_it_makes_up():
+    robot, q_J = tumbling(limits(3)), (0.3, -0.4, 0.8)
+    robot.lock()
+    start, (mass, inertia, c) = robot.motion(), whole(q_J)
+    R_WB = Rotation.from_quat(Q_WB, scalar_first=True).as_matrix()
+    e = np.transpose(R_WB) @ np.subtract(start.p_WG, start.p_WB) - c
+    v = start.v_WB + np.cross(start.w_WB, R_WB @ c)
+    body = RigidBody(mass, inertia, vector(e), vector(start.p_WB + R_WB @ c), Q_WB, vector(v), start.w_WB)
+    for _ in range(250):
+        f_B, tau_B, f_G, tau_G = PUSH
+        robot.advance(0.004, PUSH, TORQUES)
+        body.advance(0.004, f_B, vector(np.array(tau_B) - np.cross(c, f_B)), f_G, tau_G)
+    end, R = robot.motion(), Rotation.from_quat(body.q, scalar_first=True).as_matrix()
+    assert end.q_J == q_J
+    assert end.v_J == IDLE
+    np.testing.assert_allclose(end.p_WG, body.p + R @ e, atol=1e-12)
+    np.testing.assert_allclose(end.q_WB, body.q, atol=1e-12)
+    np.testing.assert_allclose(end.w_WB, body.w, atol=1e-12)
+
+
+def test_a_joint_stops_at_its_limit_loses_energy_there_and_stays_until_it_is_pulled_back():
+    robot = tumbling(limits(3, reach=0.9))
+    walk(robot, 60, NOTHING, (0.1, -0.08, 0.02))
+    energy, hit = robot.energy, False
+    L = robot.state[3]
+    for _ in range(400):
+        robot.advance(0.004, NOTHING, IDLE)
+        assert robot.energy <= energy * (1.0 + 1e-10)
+        assert np.max(np.abs(robot.motion().q_J)) <= 0.9
+        hit = hit or robot.energy < energy - 0.01
+        energy = robot.energy
+    assert hit
+    assert robot.state[3] == L
+    walk(robot, 400, NOTHING, (0.5, 0.5, 0.5))
+    at_stop = robot.motion()
+    assert at_stop.q_J == (0.9, 0.9, 0.9)
+    assert at_stop.v_J == IDLE
+    walk(robot, 20, NOTHING, (-0.1, -0.1, -0.1))
+    assert max(robot.motion().q_J) < 0.9
+
+
+def test_dry_friction_holds_a_joint_up_to_its_torque_and_brings_it_to_a_standstill():
+    held = tumbling(limits(3, friction=0.2))
+    walk(held, 50, NOTHING, (0.1, -0.1, 0.1))
+    assert held.motion().q_J == (0.3, -0.4, 0.8)
+    robot = tumbling(limits(3, friction=0.2))
+    walk(robot, 50, NOTHING, (0.3, 0.0, 0.0))
+    moved = robot.motion()
+    assert moved.v_J[0] > 0.1
+    energy = robot.energy
+    for _ in range(200):
+        robot.advance(0.004, NOTHING, IDLE)
+        assert robot.energy <= energy * (1.0 + 1e-10)
+        energy = robot.energy
+    assert robot.motion().v_J == IDLE
+    rest = robot.motion().q_J
+    walk(robot, 50, NOTHING, IDLE)
+    assert robot.motion().q_J == rest
+    assert rest[0] > moved.q_J[0]
+
+
+def test_a_joint_without_range_does_not_turn_and_the_others_do():
+    fixed = JointLimits((-9.0, -0.4, -9.0), (9.0, -0.4, 9.0), (0.0,) * 3, (0.0,) * 3)
+    robot = tumbling(fixed)
+    walk(robot, 100, PUSH, TORQUES)
+    q_J = robot.motion().q_J
+    assert q_J[1] == -0.4
+    assert min(abs(q_J[0] - 0.3), abs(q_J[2] - 0.8)) > 0.01
