@@ -114,9 +114,9 @@ class HandAndObject:
 
     - `FloatingObject`: a rigid box of 0.1 kg in microgravity. `FlyerGripper` holds it by a stiff spring in all six
       directions that slides at its limits, or has it pressed against its palm. A hand that holds it is joined to its
-      course by the arm's and wrist's springs, which yield at the force that a person cares to exert (`FlyerHand`).
-    - `FlyerPerson` moves the hand's course and decides when the fingers close; `HandTremor` is added to the course. A
-      fist pushes the palm by the arm's spring.
+      course by the arm's and wrist's springs, which yield at the force that a person cares to bear (`FlyerHand`).
+    - `FlyerPerson` moves the hand's course and decides when the fingers close; it pulls and pushes by an effort against
+      the force on the hand (`Effort`). `HandTremor` is added to the course. A fist pushes the palm by the arm's spring.
 
     One unit, because a bare 0.1 kg object that two units exchange by forces is unstable at a few milliseconds. Here the
     gripper's displacement goes in and its wrench, the mean over the step, comes out: stable at 16 and 32 ms. In a
@@ -219,6 +219,7 @@ class HandAndObject:
             q_WH=hand.q,
             p_OH=hand.p_OH,
             q_OH=hand.q_OH,
+            f_H=self._f_H,
         )
 
     def _exchange_forces(self, dt: float, before: Frame, after: Frame, course: Frame) -> None:

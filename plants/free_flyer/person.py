@@ -12,6 +12,7 @@ from handover.cosim.blocks.plain_rotation import (
     add_scaled,
     column,
     distance,
+    dot,
     lerp,
     nlerp,
     quaternion,
@@ -22,6 +23,7 @@ from handover.cosim.blocks.plain_rotation import (
 )
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.free_flyer.attachment import Frame
+from handover.plants.free_flyer.effort import Effort, force_at_rest
 from handover.plants.free_flyer.parameters import Motion, Params, StartHolder
 from handover.plants.hand_motion import minimum_jerk
 
@@ -31,6 +33,8 @@ _MIN_DURATION = 0.3
 """Seconds that a reach takes at least."""
 _CLOSING = 0.1
 """Radians by which the gripper's angle must change for a person to see it."""
+_EASING = 3.0
+"""Seconds in which a person who has pulled in vain eases off before letting go, half of the patience at most."""
 _ROUNDING = 1e-9
 """Seconds by which a sum of steps may miss a time that they fill: step sizes of hosts differ in their last digits."""
 
@@ -63,10 +67,11 @@ class Perception:
     q_WH: Quaternion
     p_OH: Vector
     q_OH: Quaternion
+    f_H: Vector
 
 
 class FlyerPerson:
-    """Moves a hand in minimum-jerk reaches, ramped pulls and pushes, as the robot's actions allow.
+    """Moves a hand in minimum-jerk reaches, and pulls and pushes by an `Effort`, as the robot's actions allow.
 
     TAKE: REACH for the object's end p_OH, GRASP, PULL until the gripper has let go, WITHDRAW with the object, REST.
     GIVE: OFFER, to p_OG in front of the palm, PUSH against it until the gripper moves, LET_GO when it holds, WITHDRAW.
@@ -95,7 +100,7 @@ class FlyerPerson:
         self._from, self._from_q, self._duration = self.p, self.q, 1.0
         self._clock = 0.0  # seconds in this activity
         self._since = 0.0  # seconds for which the condition that ends it has held
-        self._travelled, self._speed, self._axis = 0.0, 0.0, self._pull
+        self._effort, self._axis = Effort(params.arm_mass), self._pull
         self._saw_light, self._called, self._answered = False, False, False
         self._reaction = params.reaction_time
         self._acts = {
@@ -138,7 +143,8 @@ class FlyerPerson:
         """Return the complete state."""
         where = (int(self.activity), int(self._motion), self.p, self.q, self._from, self._from_q, self._axis)
         signal = (self._saw_light, self._called, self._answered, self._reaction)
-        course = (self.holding, self.fingers, self._duration, self._clock, self._since, self._travelled, self._speed)
+        effort = (self._effort.travelled, self._effort.speed)
+        course = (self.holding, self.fingers, self._duration, self._clock, self._since, *effort)
         return pack_state((where, signal, course, self._rng.bit_generator))
 
     def set_state(self, state: bytes) -> None:
@@ -147,14 +153,16 @@ class FlyerPerson:
         activity, motion, self.p, self.q, self._from, self._from_q, self._axis = where
         self.activity, self._motion = Activity(activity), Motion(motion)
         self._saw_light, self._called, self._answered, self._reaction = signal
-        self.holding, self.fingers, self._duration, self._clock, self._since, self._travelled, self._speed = course
+        self.holding, self.fingers, self._duration, self._clock, self._since = course[:5]
+        self._effort.travelled, self._effort.speed = course[5:]
 
     def _begin(self, activity: Activity, seen: Perception) -> None:
         """Start an activity: courses go from where the hand is, or the arm wants it if it holds something."""
         if activity is Activity.LET_GO or not self.holding:
             self.p, self.q = seen.p_WH, seen.q_WH
         self.activity = activity
-        self._clock, self._since, self._travelled, self._speed = 0.0, 0.0, 0.0, 0.0
+        self._clock, self._since = 0.0, 0.0
+        self._effort.begin()
         self._from, self._from_q = self.p, self.q
         goals = {Activity.REACH: self._at_object, Activity.OFFER: self._at_palm, Activity.WITHDRAW: self._at_rest}
         if activity in goals:
@@ -195,7 +203,7 @@ class FlyerPerson:
 
     def _pulls(self, dt: float, seen: Perception) -> None:
         p = self._p
-        self._move_along(dt, self._pull, p.pull_speed, p.pull_ramp, p.pull_distance)
+        self._pull_on(dt, seen)
         if not self.holding or self._has_taken(p.patience):
             self._let_go(seen)
         elif self._has_seen(not seen.gripped, dt):
@@ -211,7 +219,7 @@ class FlyerPerson:
         p = self._p
         moved = seen.angle < p.angle_open - _CLOSING
         if not moved:
-            self._move_along(dt, self._axis, p.push_speed, p.push_ramp, p.push_distance)
+            self._push_on(dt, seen)
         gives = self._motion is Motion.GIVE
         if gives and seen.gripped:
             if self._has_seen(True, dt):
@@ -249,12 +257,29 @@ class FlyerPerson:
         self.p = lerp(self._from, p, s)
         self.q = nlerp(self._from_q, q, s)
 
-    def _move_along(self, dt: float, axis: Vector, speed: float, ramp: float, length: float) -> None:
-        """Move along an axis with a speed that rises smoothly in the time `ramp`, until the length is reached."""
-        self._speed = min(1.0, self._speed + dt / ramp)
-        x = self._speed
-        self._travelled = min(length, self._travelled + dt * speed * x * x * (3.0 - 2.0 * x))
-        self.p = add_scaled(self._from, self._travelled, axis)
+    def _pull_on(self, dt: float, seen: Perception) -> None:
+        p = self._p
+        self._exert(dt, self._pull, p.effort, p.pull_ramp, p.pull_speed, p.pull_distance, seen)
+
+    def _push_on(self, dt: float, seen: Perception) -> None:
+        p = self._p
+        self._exert(dt, self._axis, p.push_share * p.effort, p.push_ramp, p.push_speed, p.push_distance, seen)
+
+    def _exert(
+        self,
+        dt: float,
+        axis: Vector,
+        effort: float,
+        rise: float,
+        free_speed: float,
+        length: float,
+        seen: Perception,
+    ) -> None:
+        """Move along an axis by an effort, against what the hand feels, until the length is reached."""
+        fall = min(_EASING, 0.5 * self._p.patience)
+        force = force_at_rest(effort, self._clock, rise, self._p.patience - fall, fall)
+        self._effort.advance(dt, force, free_speed, length, -dot(seen.f_H, axis))
+        self.p = add_scaled(self._from, self._effort.travelled, axis)
 
     def _at_object(self, seen: Perception) -> tuple[Vector, Quaternion]:
         """Return the hand's pose at the object's end: the object's axes."""

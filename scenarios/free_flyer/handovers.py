@@ -109,7 +109,8 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
             seed=person_seed,
             p_WO_0=p_WO_0,
             angle_0=float(at["angle_0"]),
-            arm_force_max=p.strength,
+            effort=p.strength,
+            arm_force_max=1.5 * p.strength,
             **self.person,
         )
         wire_handover(s)

@@ -87,7 +87,9 @@ class HandoverParameters(RobotAndModel):
     p_WG_handover: Vector3[Metre] = parameter(
         np.array([0.0, -0.07, 0.0]), "where the gripper waits for the person, in W", minimum=-1.0, maximum=1.0
     )
-    strength: Newton = parameter(4.0, "force with which the person pulls and pushes at most", minimum=0.1, maximum=20.0)
+    strength: Newton = parameter(
+        4.0, "force with which the person pulls; with half of it, pushes", minimum=0.1, maximum=20.0
+    )
     propulsion: Propulsion = parameter(Propulsion.LIMITED, "what the thrusters are like")
     delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
     gated: bool = parameter(True, "whether the robot yields and signals only once it is at rest in its place")

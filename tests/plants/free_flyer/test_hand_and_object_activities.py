@@ -60,7 +60,7 @@ def test_a_gripper_that_is_turned_gets_the_object_turned():
     scene.go(0.5)
     scene.until(Activity.LET_GO, closure=1.0)
     assert scene.y.holder is Holder.GRIPPER
-    assert abs(scene.y.q_WO @ q) > math.cos(0.5 * 0.03)
+    assert abs(scene.y.q_WO @ q) > math.cos(0.5 * 0.07)  # the push at one end tilts it in the hand
 
 
 def test_false_reception_pushes_and_leaves_nothing():

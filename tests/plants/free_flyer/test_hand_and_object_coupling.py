@@ -171,9 +171,10 @@ def loop_until_rest(loop: Loop, seconds: float) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_pull_and_push_pass_the_published_thresholds(kind: str):
-    take = gripped(0.016, kind=kind, motion=Motion.TAKE, motion_again=Motion.NONE, seed=1)
+    strong: dict[str, Any] = {"effort": 4.0, "arm_force_max": 6.0, "motion_again": Motion.NONE}
+    take = gripped(0.016, kind=kind, motion=Motion.TAKE, seed=1, **strong)
     assert highest_speed(take, 1.0) > {"rigid": 0.059, "compliant": 0.08}[kind]
-    give = replace(STILL, motion=Motion.GIVE, object_with=StartHolder.HAND, motion_again=Motion.NONE)
+    give = replace(STILL, motion=Motion.GIVE, object_with=StartHolder.HAND, **strong)
     assert highest_speed(Loop(give, 0.016, kind=kind), 0.0) > {"rigid": 0.021, "compliant": 0.037}[kind]
 
 

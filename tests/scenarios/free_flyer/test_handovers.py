@@ -113,6 +113,14 @@ def test_a_pull_that_is_too_weak_is_not_felt_and_the_verdict_says_so(tmp_path: P
     assert "never felt a pull" in ended.outcome.reason
 
 
+@pytest.mark.parametrize("behaviour", ["rigid", "compliant"])
+def test_a_stronger_person_moves_the_robot_farther_within_its_thrusters_limits(tmp_path: Path, behaviour: str):
+    ended = [run(RobotToHuman, tmp_path / f, f"strength={f}", f"behaviour={behaviour}") for f in ("1", "4")]
+    assert all(e.outcome.success for e in ended)
+    weak, strong = (metric(e, "transfer_displacement") for e in ended)
+    assert strong > 1.5 * weak > 0.06
+
+
 @pytest.mark.parametrize(
     ("place", "text"), [("50,-0.07,0", "from -1 to 1 m"), ("0.9,0.9,0.9", "out of the person's reach")]
 )
