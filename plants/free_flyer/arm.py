@@ -72,10 +72,15 @@ class Arm:
         root = vector(p_BG)
         for link in rows:
             root = subtract(root, link)
-        unit = tuple(vector(axis / np.linalg.norm(axis)) for axis in axes[:n])
-        diagonals = tuple(vector(row) for row in inertias[:n])
-        plain = (tuple(a[:n].tolist()) for a in (centres, masses))
-        return cls(root, unit, rows, *plain, diagonals, tuple(rotors[:n].tolist()))
+        return cls(
+            root=root,
+            axes=tuple(vector(axis / np.linalg.norm(axis)) for axis in axes[:n]),
+            links=rows,
+            centres=tuple(centres[:n].tolist()),
+            masses=tuple(masses[:n].tolist()),
+            inertias=tuple(vector(row) for row in inertias[:n]),
+            rotors=tuple(rotors[:n].tolist()),
+        )
 
 
 class Posture:
@@ -97,15 +102,14 @@ class Posture:
     """
 
     def __init__(self, arm: Arm, q_J: Sequence[float], mass: float) -> None:
-        p, q, R = arm.root, IDENTITY, rotation_matrix(IDENTITY)
+        p, q = arm.root, IDENTITY
         axes, origins, centres, turns = list[Vector](), list[Vector](), list[Vector](), list[Matrix]()
         for axis, link, share, angle in zip(arm.axes, arm.links, arm.centres, q_J, strict=True):
-            axes.append(rotate(R, axis))
+            axes.append(rotate(rotation_matrix(q), axis))
             origins.append(p)
             q = quaternion_multiply(q, (math.cos(0.5 * angle), *scale(math.sin(0.5 * angle), axis)))
-            R = rotation_matrix(q)
-            turns.append(R)
-            along = rotate(R, link)
+            turns.append(rotation_matrix(q))
+            along = rotate(turns[-1], link)
             centres.append(add_scaled(p, share, along))
             p = add(p, along)
         self.axes, self.origins, self.centres, self.turns = axes, origins, centres, turns

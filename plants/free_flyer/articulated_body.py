@@ -138,11 +138,9 @@ class ArticulatedBody:
         return self._solve(self.inertia(posture), L_B, momenta, moving)
 
     def _solve(self, H: Floats, L_B: Vector, momenta: Joints, moving: Sequence[int]) -> tuple[Vector, Joints]:
-        h = np.array([*L_B, *(momenta[j] for j in moving)])
-        if len(moving) < len(momenta):
-            free = [0, 1, 2, *(3 + j for j in moving)]
-            H = H[np.ix_(free, free)]
-        nu = np.linalg.solve(H, h).tolist()
+        free = [0, 1, 2, *(3 + j for j in moving)]
+        part = H if len(moving) == len(momenta) else H[np.ix_(free, free)]
+        nu = np.linalg.solve(part, [*L_B, *(momenta[j] for j in moving)]).tolist()
         v_J = [0.0] * len(momenta)
         for j, v in zip(moving, nu[3:], strict=True):
             v_J[j] = v

@@ -98,8 +98,9 @@ def whole(q_J: tuple[float, ...]) -> tuple[float, Floats, Floats]:
     posture, mass = robot.body.posture(q_J), MASS + sum(arm.masses)
     bodies: list[tuple[float, Floats, Floats]] = [(MASS, np.zeros(3), SKEWED)]
     for m, p, R, moments in zip(arm.masses, posture.centres, posture.turns, arm.inertias, strict=True):
-        M = np.reshape(R, (3, 3))
-        bodies.append((m, np.array(p), M @ np.diag(moments) @ M.T))
+        M: Floats = np.reshape(R, (3, 3))
+        turned: Floats = M @ np.diag(moments) @ np.transpose(M)
+        bodies.append((m, np.array(p), turned))
     c: Floats = np.sum([m * p for m, p, _ in bodies], axis=0) / mass
     inertia = np.sum([I + m * ((p - c) @ (p - c) * np.eye(3) - np.outer(p - c, p - c)) for m, p, I in bodies], axis=0)
     return mass, inertia, c
