@@ -140,6 +140,12 @@ _ENTRIES = (
         "makes the gripper yield like a spring and damper",
     ),
     Entry(
+        "AdmittanceController",
+        "handover.controllers.free_flyer.admittance_controller:AdmittanceController",
+        Fraction(2, 125),
+        "makes the gripper follow a virtual mass, spring and damper that an estimated force moves",
+    ),
+    Entry(
         "PoseController",
         "handover.controllers.free_flyer.pose_controller:PoseController",
         Fraction(2, 125),

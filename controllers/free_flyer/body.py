@@ -101,13 +101,13 @@ class InvalidControllerParameters(InvalidParameters):
 
 
 def stability_faults(
-    body: FlyerBody, law: Callable[[float], LinearController], period: float, delay: float, lag: float
+    body: FlyerBody, law: Callable[[float, float], LinearController], period: float, delay: float, lag: float
 ) -> list[str]:
     """Return nothing for a stable loop, else what is wrong and by how much delay or gains must shrink.
 
     Args:
         body: the robot.
-        law: makes the controller with all of its gains times a factor.
+        law: makes the controller with all of its gains times a factor, for a delay, which it may know of.
         period: time between two samples, s.
         delay: time from a measurement to the command's arrival at the propulsion, s.
         lag: time constant of the propulsion, s.
@@ -118,7 +118,7 @@ def stability_faults(
     plant = body.linear_plant(lag)
 
     def pole_radius(factor: float, delay: float) -> float:
-        return SampledLoop(plant, law(factor), period, delay).pole_radius
+        return SampledLoop(plant, law(factor, delay), period, delay).pole_radius
 
     if (radius := pole_radius(1.0, delay)) < 1.0:
         return []

@@ -35,13 +35,23 @@ class ImpedanceGains:
         """Return all gains times a factor."""
         return ImpedanceGains(**{name: factor * M for name, M in vars(self).items()})
 
+    def stiffness(self) -> Floats:
+        """Return k_D of translation and rotation as one matrix (6, 6)."""
+        return _block_diagonal(self.stiffness_translation, self.stiffness_rotation)
+
+    def damping(self) -> Floats:
+        """Return k_B of both, likewise."""
+        return _block_diagonal(self.damping_translation, self.damping_rotation)
+
     def law(self, body: FlyerBody) -> LinearController:
         """Return eq. (3.25) near the goal: commanded wrench on B from displacement and twist of G."""
-        K: Floats = np.zeros((6, 6))
-        D: Floats = np.zeros((6, 6))
-        K[:3, :3], K[3:, 3:] = self.stiffness_translation, self.stiffness_rotation
-        D[:3, :3], D[3:, 3:] = self.damping_translation, self.damping_rotation
-        return without_memory(np.transpose(body.jacobian()) @ np.hstack([K, D]))
+        return without_memory(np.transpose(body.jacobian()) @ np.hstack([self.stiffness(), self.damping()]))
+
+
+def _block_diagonal(upper: Floats, lower: Floats) -> Floats:
+    M: Floats = np.zeros((6, 6))
+    M[:3, :3], M[3:, 3:] = upper, lower
+    return M
 
 
 def published_gains(behaviour: Behaviour, body: FlyerBody) -> ImpedanceGains:

@@ -119,7 +119,7 @@ class ImpedanceController:
         body, gains, period = params.body(), params.gains(), float(self.period)
         faults = body.faults() + (gains.faults() if params.behaviour is Behaviour.CUSTOM else [])
         faults = faults or stability_faults(
-            body, lambda factor: gains.scaled(factor).law(body), period, params.delay, params.lag
+            body, lambda factor, _: gains.scaled(factor).law(body), period, params.delay, params.lag
         )
         if faults:
             raise InvalidControllerParameters(_NAME, faults)

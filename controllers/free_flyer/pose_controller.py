@@ -157,7 +157,7 @@ class PoseController:
         position, attitude = params.position_gains(), params.attitude_gains()
         faults = params.faults() or stability_faults(
             body,
-            lambda factor: pid_law(body, position.scaled(factor), attitude.scaled(factor), self._T),
+            lambda factor, _: pid_law(body, position.scaled(factor), attitude.scaled(factor), self._T),
             self._T,
             params.delay,
             params.lag,

@@ -75,8 +75,8 @@ class SampledLoop:
         straight = _control().ss([], [], [], np.eye(disturbances), self.period)
         forward = _sampled(self._plant, past, self.period) * _control().append(line, straight)
         c = self._controller
-        idle = np.zeros((disturbances, c.D.shape[1]))
-        law = _control().ss(c.A, c.B, np.vstack([c.C, idle[:, : c.A.shape[0]]]), np.vstack([c.D, idle]), self.period)
+        idle_C, idle_D = (np.zeros((disturbances, M.shape[1])) for M in (c.C, c.D))
+        law = _control().ss(c.A, c.B, np.vstack([c.C, idle_C]), np.vstack([c.D, idle_D]), self.period)
         return _control().feedback(forward, law)[:, commands:]
 
     @cached_property
@@ -117,6 +117,12 @@ def largest_stable(radius: Callable[[float], float], upper: float, steps: int = 
         middle = (low + high) / 2.0
         low, high = (middle, high) if radius(middle) < 1.0 else (low, middle)
     return low
+
+
+def discretised(A: Floats, B: Floats, time: float) -> tuple[Floats, Floats]:
+    """Return A and B of x[n+1] = A x[n] + B u[n] for dx/dt = A x + B u with u held for a time."""
+    system = _control().sample_system(_control().ss(A, B, np.eye(len(A)), np.zeros(B.shape)), time, method="zoh")
+    return np.asarray(system.A), np.asarray(system.B)
 
 
 def _delay_line(channels: int, periods: int, period: float) -> Any:

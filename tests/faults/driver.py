@@ -26,6 +26,7 @@ EFFORTS = {
     "HandoverVision": Effort(from_scratch=0.1, steps=1, bytes=0.1),
     "TendonArm": Effort(from_scratch=0.2, steps=3),
     "TendonArmFast": Effort(from_scratch=0.5),
+    "AdmittanceController": Effort(from_scratch=0.12),
     "ImpedanceController": Effort(from_scratch=0.08),
     "PoseController": Effort(from_scratch=0.12),
     "GraspScene": Effort(from_scratch=0.2),

@@ -7,7 +7,7 @@ import pytest
 
 from handover.fmus.catalog import UNITS
 
-DEFERRING = ("TendonArm", "TendonArmFast", "ImpedanceController", "PoseController")
+DEFERRING = ("TendonArm", "TendonArmFast", "AdmittanceController", "ImpedanceController", "PoseController")
 
 _MAKE = """
 import importlib, sys

@@ -1,0 +1,199 @@
+"""The virtual body's motion against its closed form, the observer's convergence, and the loop's stability."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import control as untyped_control
+import numpy as np
+import pytest
+from pushed_body import ARM, GOAL, MASS, Body, T, pushed
+
+from handover.controllers.free_flyer.admittance_controller import AdmittanceController, Inputs, Params
+from handover.controllers.free_flyer.body import InvalidControllerParameters
+from handover.controllers.free_flyer.ports import Behaviour
+from handover.controllers.free_flyer.rotations import InvalidOrientation
+from handover.controllers.free_flyer.wrench_observer import ThrustModel, WrenchObserver
+from handover.cosim.blocks.ports import Floats
+from handover.plants.free_flyer import thrusters
+
+control: Any = untyped_control
+NO_LIMITS = {"f_max": np.full(3, 100.0), "tau_max": np.full(3, 100.0)}
+PROMPT = Params(lag=0.0, **NO_LIMITS)
+SPRING = {Behaviour.RIGID: (7.0 * MASS, 15.0), Behaviour.COMPLIANT: (0.7 * MASS, 5.0)}
+
+
+def steady(axis: int, size: float, seconds: float) -> Floats:
+    d = np.zeros((round(seconds / T), 6))
+    d[:, axis] = size
+    return d
+
+
+@pytest.mark.parametrize("behaviour", SPRING)
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("axis", range(3))
+def test_a_step_of_force_moves_the_gripper_as_the_virtual_mass(behaviour: Behaviour, ratio: float, axis: int):
+    """1 / (m_v s^2 + k_B s + k_D) along every axis, also where the lever would turn the body."""
+    k, b = SPRING[behaviour]
+    p = replace(PROMPT, behaviour=behaviour, inertia_ratio=ratio, observer_rate=100.0)
+    real = pushed(AdmittanceController(p), steady(axis, 0.05, 4.0))
+    t = T * np.arange(len(real))
+    wanted = 0.05 * control.step_response(control.tf([1.0], [ratio * MASS, b, k]), t).outputs
+    assert np.max(np.abs(real[:, axis] - wanted)) < 0.07 * np.max(wanted)
+    assert np.max(np.abs(real[:, 3:])) < 0.02
+
+
+def test_the_slower_the_observer_the_farther_the_gripper_is_from_the_virtual_body():
+    k, b = SPRING[Behaviour.RIGID]
+    t = T * np.arange(round(4.0 / T))
+    wanted = 0.05 * control.step_response(control.tf([1.0], [MASS, b, k]), t).outputs
+    controllers = [AdmittanceController(replace(PROMPT, observer_rate=rate)) for rate in (3.0, 10.0, 30.0)]
+    errors = [np.max(np.abs(pushed(c, steady(0, 0.05, 4.0))[:, 0] - wanted)) for c in controllers]
+    assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2]
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_small_pushes_move_the_gripper_as_linear_theory_says(axis: int):
+    controller = AdmittanceController(PROMPT)
+    wrench = steady(axis, 0.05 if axis < 3 else 0.01, 3.0)
+    wrench[round(0.5 / T) :] = 0.0
+    predicted = controller.loop.response(wrench)[:, :6]
+    real = pushed(controller, wrench)
+    assert np.max(np.abs(real - predicted)) < 0.01 * np.max(np.abs(predicted[:, axis]))
+
+
+def test_prediction_holds_with_a_delay_that_is_known():
+    controller = AdmittanceController(replace(PROMPT, delay=2 * T))
+    wrench = steady(2, 0.05, 3.0)
+    predicted = controller.loop.response(wrench)[:, :6]
+    assert np.max(np.abs(pushed(controller, wrench, delay=2) - predicted)) < 0.01 * np.max(np.abs(predicted[:, 2]))
+
+
+def test_the_estimate_converges_to_a_constant_wrench_at_its_rate():
+    rate, wrench = 10.0, np.array([0.3, -0.2, 0.1, 0.01, 0.02, -0.01])
+    controller, body = AdmittanceController(replace(PROMPT, observer_rate=rate)), Body()
+    for n in range(round(1.0 / T)):
+        y = controller.step(n * T, T, body.measured())
+        felt = np.concatenate([y.f_G_est, y.tau_G_est])
+        np.testing.assert_allclose(felt, (1.0 - math.exp(-rate * n * T)) * wrench, atol=0.01 * np.max(wrench))
+        body.push(y.f_cmd, y.tau_cmd, wrench[:3], wrench[3:], T)
+
+
+def test_the_observer_alone_forgets_exponentially_and_takes_thrust_for_no_wrench():
+    observer, h = WrenchObserver(5.0, T), np.zeros(6)
+    memory = observer.begun(h)
+    thrust, wrench = np.arange(6.0), np.linspace(-1.0, 1.0, 6)
+    for n in range(50):
+        np.testing.assert_allclose(observer.estimate(memory, h), (1.0 - math.exp(-5.0 * n * T)) * wrench, atol=1e-12)
+        memory, h = observer.following(memory, h, thrust), h + T * (thrust + wrench)
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.02, 0.3])
+@pytest.mark.parametrize("delay", [0.0, 0.005, 0.016, 0.04])
+def test_the_model_of_the_propulsion_is_that_of_the_thrusters(lag: float, delay: float):
+    model, rng = ThrustModel(lag, delay, T), np.random.default_rng(3)
+    plant = thrusters.Thrusters(thrusters.Params(lag=lag, delay=delay, f_max=np.full(3, 9.0), tau_max=np.full(3, 9.0)))
+    thrust, past = np.zeros(6), [np.zeros(6)] * model.remembered
+    for n in range(40):
+        command = rng.normal(size=6)
+        y = plant.step(n * T, T, thrusters.Inputs(f_impedance=command[:3], tau_impedance=command[3:]))
+        thrust, mean = model.over_period(thrust, [command, *past])
+        past = [command, *past][: model.remembered]
+        np.testing.assert_allclose(mean, np.concatenate([y.f_B, y.tau_B]), atol=1e-12)
+
+
+def test_commands_stay_within_the_limits_and_the_estimate_knows_it():
+    """A pull that thrust cannot hold is estimated as what it is, and not as what was commanded in vain."""
+    controller, body = AdmittanceController(Params(lag=0.0)), Body()
+    for n in range(round(1.5 / T)):
+        y = controller.step(n * T, T, body.measured())
+        assert np.all(np.abs(y.f_cmd) <= Params().f_max)
+        assert np.all(np.abs(y.tau_cmd) <= Params().tau_max)
+        body.push(y.f_cmd, y.tau_cmd, np.array([4.0, 0.0, 0.0]), np.zeros(3), T)
+    np.testing.assert_allclose(y.f_G_est, [4.0, 0.0, 0.0], atol=0.01)
+
+
+def test_commands_nothing_when_off_and_begins_anew_when_on():
+    body, once = Body(v=np.array([0.02, 0.0, 0.01])), AdmittanceController(PROMPT)
+    u = body.measured()
+    first = once.step(0.0, T, u)
+    once.step(T, T, body.measured())
+    off = once.step(2 * T, T, replace(u, active=False))
+    for vector in (off.f_cmd, off.tau_cmd, off.f_G_est, off.tau_G_est):
+        assert not np.any(vector)
+    np.testing.assert_array_equal(once.step(3 * T, T, u).f_cmd, first.f_cmd)
+    np.testing.assert_allclose(first.f_cmd[2], -15.0 * 0.01, rtol=0.15)  # it begins with the gripper's own velocity
+
+
+def test_where_the_goal_changes_the_gripper_is_drawn_from_where_it_is():
+    controller, body = AdmittanceController(PROMPT), Body()
+    for n in range(10):
+        controller.step(n * T, T, body.measured())
+    y = controller.step(10 * T, T, replace(body.measured(), p_WG_goal=GOAL + np.array([0.001, 0.0, 0.0])))
+    assert 0.0 < y.f_cmd[0] < 7.0 * MASS * 0.001
+    assert y.error_p == pytest.approx(0.001)
+
+
+def test_a_restored_state_continues_bit_for_bit():
+    p = Params(delay=0.02)
+    controller, body, wrench = AdmittanceController(p), Body(), np.array([0.2, 0.1, -0.3])
+    for n in range(60):
+        y = controller.step(n * T, T, body.measured())
+        body.push(y.f_cmd, y.tau_cmd, wrench, np.zeros(3), T)
+    other = AdmittanceController(p)
+    other.set_state(controller.get_state())
+    for n in range(60, 90):
+        a, b = controller.step(n * T, T, body.measured()), other.step(n * T, T, body.measured())
+        for name, value in vars(a).items():
+            np.testing.assert_array_equal(value, getattr(b, name))
+        body.push(a.f_cmd, a.tau_cmd, wrench, np.zeros(3), T)
+
+
+def test_outputs_tell_the_step_and_change_nothing():
+    controller, u = AdmittanceController(PROMPT), Body(v=np.array([0.1, 0.0, 0.0])).measured()
+    y = controller.outputs(0.0, u)
+    np.testing.assert_array_equal(y.f_cmd, controller.step(0.0, T, u).f_cmd)
+
+
+def test_inner_gains_that_are_too_high_are_refused_with_a_remedy():
+    with pytest.raises(InvalidControllerParameters, match=r"the loop is unstable at 62\.5 Hz") as caught:
+        AdmittanceController(Params(k_P=900.0, k_D=200.0))
+    assert "times these gains" in str(caught.value)
+
+
+def test_a_delay_that_is_known_leaves_the_virtual_body_alone_until_the_inner_loop_cannot_bear_it():
+    """The observer's model of the propulsion predicts the commands that are on their way."""
+    prompt, late = (AdmittanceController(Params(delay=d)).outputs(0.0, Inputs()) for d in (0.0, 0.064))
+    assert late.pole_radius == pytest.approx(prompt.pole_radius, abs=1e-9)
+    assert late.damping_ratio == pytest.approx(prompt.damping_ratio, abs=1e-6)
+    with pytest.raises(InvalidControllerParameters, match=r"unstable.*a delay of at most about 0\.0"):
+        AdmittanceController(Params(delay=0.1, k_D=20.0, k_P=100.0))
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"k_D": 0.0}, "inner position gains: k_P = 9 and k_D = 0 must be positive"),
+        ({"k_P_R": 0.0}, "inner attitude gains: k_P = 0"),
+        ({"mass": np.inf}, "mass = inf kg must be positive and finite"),
+        ({"delay": -0.01}, r"delay = -0\.01 s must be finite and not negative"),
+        ({"behaviour": Behaviour.CUSTOM, "damping_rotation": np.zeros((3, 3))}, "damping_rotation = .* definite"),
+    ],
+)
+def test_what_cannot_work_is_refused(changes: dict[str, Any], text: str):
+    with pytest.raises(InvalidControllerParameters, match=text):
+        AdmittanceController(replace(Params(), **changes))
+
+
+def test_orientation_that_is_none_is_refused():
+    with pytest.raises(InvalidOrientation, match="q_WB_meas"):
+        AdmittanceController(Params()).step(0.0, T, Inputs(q_WB_meas=np.zeros(4)))
+
+
+def test_turning_the_goal_turns_the_command():
+    """The law is in the goal's axes: a goal turned about the arm, with the robot at it, changes nothing in B."""
+    half = np.array([math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0])
+    u = Inputs(p_WB_meas=GOAL - ARM, v_WB_meas=np.array([0.03, 0.0, 0.0]), p_WG_goal=GOAL, active=True)
+    a = AdmittanceController(PROMPT).step(0.0, T, u)
+    b = AdmittanceController(PROMPT).step(0.0, T, replace(u, q_WB_meas=half, q_WG_goal=half))
+    np.testing.assert_allclose(a.f_cmd, b.f_cmd, atol=1e-12)
