@@ -1,5 +1,6 @@
 """What holds a floating object: springs with damping in all six directions that slide at a limit, and a flat palm."""
 
+import math
 from dataclasses import dataclass
 
 from handover.cosim.blocks.plain_rotation import (
@@ -45,7 +46,7 @@ class Stiffness:
 
 @dataclass(frozen=True)
 class Palm:
-    """A flat one-sided spring against which an object is pressed at a point r of it, both in the object's frame.
+    """A one-sided spring against which an object is pressed at a point r of it, both in the object's frame.
 
     Attributes:
         r: where the object touches.
@@ -54,6 +55,7 @@ class Palm:
         depth: how deep the object would be in the palm if it stayed where it is, m.
         k: stiffness, N/m.
         c: damping, N s/m.
+        f_max: largest force, N.
     """
 
     r: Vector
@@ -62,6 +64,7 @@ class Palm:
     depth: float
     k: float
     c: float
+    f_max: float = math.inf
 
 
 class Attachment:

@@ -34,6 +34,8 @@ Scales = list[tuple[float, float]]
 _MAX_TIGHTENINGS = 4
 _TOLERANCE = 0.01
 """Relative; an attachment slides when its limit is exceeded by more."""
+_MAX_SWEEPS, _AGREED = 50, 1e-6
+"""How often palms are solved in turn at most, and the change of a force in newtons at which they agree."""
 
 
 class FloatingObject:
@@ -46,8 +48,9 @@ class FloatingObject:
 
     which is stable for any stiffness, and momentum balances to the last bit: an attachment's force in the step is b_i -
     (h K_i + C_i) J_i nu. The matrix is the same as long as the same attachments hold the same places, so its inverse is
-    kept. A palm adds one row, solved by the Sherman-Morrison formula, that only pushes. Where a limit is exceeded,
-    force or torque of the attachment is scaled down to it.
+    kept. A palm adds one row, solved by the Sherman-Morrison formula, that only pushes; of more, each is solved with
+    the others' forces held, in turn, until they agree (projected Gauss-Seidel). Where a limit is exceeded, force or
+    torque of the attachment is scaled down to it.
 
     Args:
         mass: in kg.
@@ -61,36 +64,36 @@ class FloatingObject:
         self.body = body or RigidBody(mass, np.diag(self._moments), ZERO, ZERO, (1.0, 0.0, 0.0, 0.0))
         self._inverses: dict[tuple[object, ...], list[list[float]]] = {}
 
-    def advance(self, h: float, held: Held, palm: Palm | None) -> tuple[list[Wrench], Vector]:
+    def advance(self, h: float, held: Held, palms: Sequence[Palm]) -> tuple[list[Wrench], list[Vector]]:
         """Advance by h seconds.
 
         Returns:
-            Force at its point and torque of each attachment on the object, and the palm's force on it, in the world.
+            Force at its point and torque of each attachment on the object, and each palm's force on it, in the world.
         """
         body = self.body
-        if not held and palm is None:
+        if not held and not palms:
             body.advance(h, ZERO, ZERO, ZERO, ZERO)
-            return [], ZERO
+            return [], []
         R = rotation_matrix(body.q)
         loads = [a.load(F, body.p, body.q, R) for a, F in held]
         momentum = scale(body.mass, inverse_rotate(R, body.v)), inverse_rotate(R, body.spin)
-        nu, push, wrenches = self._balanced(h, held, loads, [(1.0, 1.0)] * len(held), palm, momentum)
+        nu, pushes, wrenches = self._balanced(h, held, loads, [(1.0, 1.0)] * len(held), palms, momentum)
         if _exceeds_limits(held, wrenches):
-            nu, push, wrenches = self._slide(h, held, loads, palm, momentum, wrenches)
+            nu, pushes, wrenches = self._slide(h, held, loads, palms, momentum, wrenches)
         else:
             self._move(h, R, nu)
-        f_palm = ZERO if palm is None else rotate(R, scale(push, palm.n))
-        return [(rotate(R, f), rotate(R, tau)) for f, tau in wrenches], f_palm
+        f_palms = [rotate(R, scale(push, palm.n)) for push, palm in zip(pushes, palms, strict=True)]
+        return [(rotate(R, f), rotate(R, tau)) for f, tau in wrenches], f_palms
 
     def _slide(
         self,
         h: float,
         held: Held,
         loads: Sequence[Wrench],
-        palm: Palm | None,
+        palms: Sequence[Palm],
         momentum: Wrench,
         wrenches: list[Wrench],
-    ) -> tuple[Six, float, list[Wrench]]:
+    ) -> tuple[Six, list[float], list[Wrench]]:
         """Move while attachments keep their limits, and let those give way; return what `_balanced` does."""
         scales = [(1.0, 1.0)] * len(held)
         before = [(1.0, 1.0, 0.0, 0.0)] * len(held)
@@ -99,13 +102,13 @@ class FloatingObject:
             if tighter == scales:
                 break
             scales = tighter
-            _, _, wrenches = self._balanced(h, held, loads, scales, palm, momentum)
-        nu, push, wrenches = self._balanced(h, held, loads, scales, palm, momentum)
+            _, _, wrenches = self._balanced(h, held, loads, scales, palms, momentum)
+        nu, pushes, wrenches = self._balanced(h, held, loads, scales, palms, momentum)
         body = self.body
         self._move(h, rotation_matrix(body.q), nu)
         for (a, F), (s, s_turn) in zip(held, scales, strict=True):
             a.give_way(F, body.p, body.q, s, s_turn)
-        return nu, push, wrenches
+        return nu, pushes, wrenches
 
     def _balanced(
         self,
@@ -113,21 +116,19 @@ class FloatingObject:
         held: Held,
         loads: Sequence[Wrench],
         scales: Scales,
-        palm: Palm | None,
+        palms: Sequence[Palm],
         momentum: Wrench,
-    ) -> tuple[Six, float, list[Wrench]]:
-        """Return nu, the palm's force, and the attachments' wrenches in the object's frame."""
+    ) -> tuple[Six, list[float], list[Wrench]]:
+        """Return nu, the palms' forces, and the attachments' wrenches in the object's frame."""
         linear, angular = momentum
         for (a, _), (f, tau), (s, s_turn) in zip(held, loads, scales, strict=True):
             impulse = scale(h * s, f)
             linear = add(linear, impulse)
             angular = add(angular, add_scaled(cross(a.r, impulse), h * s_turn, tau))
         rows = self._inverse(h, held, scales)
-        nu, push = _applied(rows, (*linear, *angular)), 0.0
-        if palm is not None:
-            nu, push = _pressed(h, rows, nu, palm)
+        nu, pushes = _pressed_by_all(h, rows, _applied(rows, (*linear, *angular)), palms)
         v, w = nu[:3], nu[3:]
-        return nu, push, [_wrench(h, a, b, s, v, w) for (a, _), b, s in zip(held, loads, scales, strict=True)]
+        return nu, pushes, [_wrench(h, a, b, s, v, w) for (a, _), b, s in zip(held, loads, scales, strict=True)]
 
     def _inverse(self, h: float, held: Held, scales: Scales) -> list[list[float]]:
         key = (h, *[(a.r, id(a.stiffness), s) for (a, _), s in zip(held, scales, strict=True)])
@@ -152,16 +153,30 @@ class FloatingObject:
         body.q = normalize(quaternion_multiply(body.q, from_rotation_vector(scale(h, w))))
 
 
-def _pressed(h: float, rows: list[list[float]], nu: Six, palm: Palm) -> tuple[Six, float]:
-    """Return nu as it becomes by a palm, and the palm's force, which only pushes."""
+def _pressed_by_all(h: float, rows: list[list[float]], nu: Six, palms: Sequence[Palm]) -> tuple[Six, list[float]]:
+    """Return nu as it becomes by palms, and each palm's force."""
+    pushes = [0.0] * len(palms)
+    for _ in range(_MAX_SWEEPS if len(palms) > 1 else 1):
+        change = 0.0
+        for i, palm in enumerate(palms):
+            nu, push = _pressed(h, rows, nu, palm, pushes[i])
+            change, pushes[i] = max(change, abs(push - pushes[i])), push
+        if change <= _AGREED:
+            break
+    return nu, pushes
+
+
+def _pressed(h: float, rows: list[list[float]], nu: Six, palm: Palm, before: float) -> tuple[Six, float]:
+    """Return nu as it becomes by a palm whose force `before` is part of it, and the palm's force, which only pushes."""
     J = (*palm.n, *cross(palm.r, palm.n))
     column = _applied(rows, J)
     g = palm.k * h + palm.c
-    push = palm.k * palm.depth + palm.c * palm.speed - g * _dot(J, nu)
-    push /= 1.0 + h * g * _dot(J, column)
-    if push <= 0.0:
-        return nu, 0.0
-    a, b, c, d, e, f = (x + h * push * y for x, y in zip(nu, column, strict=True))
+    yielding = _dot(J, column)
+    push = palm.k * palm.depth + palm.c * palm.speed - g * (_dot(J, nu) - h * before * yielding)
+    push = min(max(push / (1.0 + h * g * yielding), 0.0), palm.f_max)
+    if push == before:
+        return nu, before
+    a, b, c, d, e, f = (x + h * (push - before) * y for x, y in zip(nu, column, strict=True))
     return (a, b, c, d, e, f), push
 
 

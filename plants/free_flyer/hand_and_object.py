@@ -15,17 +15,19 @@ from handover.cosim.blocks.plain_rotation import (
     add,
     cross,
     distance,
+    inverse_rotate,
     lerp,
     nlerp,
     normalize,
     quaternion,
+    relative_quaternion,
     rotate,
     rotation_matrix,
     scale,
     subtract,
     vector,
 )
-from handover.cosim.blocks.ports import Floats, Vector3, Vector4, Vector14, output, port
+from handover.cosim.blocks.ports import Vector3, Vector4, Vector14, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import (
     Metre,
@@ -36,9 +38,12 @@ from handover.cosim.blocks.units import (
     Radian,
     RadianPerSecond,
 )
-from handover.plants.free_flyer.attachment import Attachment, Frame
+from handover.plants.free_flyer.attachment import Attachment, Frame, Palm
+from handover.plants.free_flyer.finger_contact import Angles, HandFingers
 from handover.plants.free_flyer.floating_object import FloatingObject
+from handover.plants.free_flyer.gripper_contact import GripperSolids
 from handover.plants.free_flyer.grips import FlyerGripper, FlyerHand
+from handover.plants.free_flyer.hand_kinematics import CLOSED
 from handover.plants.free_flyer.parameters import InvalidHandParameters, Motion, Params, StartHolder
 from handover.plants.free_flyer.person import Activity, FlyerPerson, Perception
 from handover.plants.hand_motion import minimum_jerk
@@ -54,11 +59,6 @@ __all__ = [
     "Params",
     "StartHolder",
 ]
-
-_THUMB = [1.0, 0.8]
-_FINGER = [1.2, 1.4, 1.0]
-_CLOSED: Floats = np.array(_THUMB + 4 * _FINGER)
-"""Angles of the closed fingers' joints, in rad, assumed: thumb, index, middle, ring, little, each from its base."""
 
 
 class Holder(enum.IntEnum):
@@ -117,6 +117,9 @@ class HandAndObject:
       course by the arm's and wrist's springs, which yield at the force that a person cares to bear (`FlyerHand`).
     - `FlyerPerson` moves the hand's course and decides when the fingers close; it pulls and pushes by an effort against
       the force on the hand (`Effort`). `HandTremor` is added to the course. A fist pushes the palm by the arm's spring.
+    - `HandFingers`: 14 joints whose phalanges, capsules, stop at the object, and push it by springs where they cannot
+      give way; likewise the gripper (`GripperSolids`), if the hand is no fist. They have no friction: what holds an
+      object is the hand's grip as a whole. A person who closes the hand ends at the touch, without pressing.
 
     One unit, because a bare 0.1 kg object that two units exchange by forces is unstable at a few milliseconds. Here the
     gripper's displacement goes in and its wrench, the mean over the step, comes out: stable at 16 and 32 ms. In a
@@ -138,7 +141,9 @@ class HandAndObject:
         self._person = FlyerPerson(params)
         self._hand = FlyerHand(params, self._person.p, self._person.q)
         self._gripper = FlyerGripper(params)
+        self._solids = GripperSolids(params)
         self._object = FloatingObject(params.object_mass, vector(params.object_size))
+        self._fingers = HandFingers(vector(params.object_size), params.finger_rate)
         self._robot: Frame | None = None
         self._f_G, self._tau_G, self._f_H = ZERO, ZERO, ZERO
         body = self._object.body
@@ -146,6 +151,7 @@ class HandAndObject:
             body.q = self._hand.q
             body.p = subtract(self._hand.p, rotate(rotation_matrix(body.q), self._hand.p_OH))
             self._hand.take_or_leave(True, body)
+            self._fingers.settle(CLOSED, self._seen_from_object(self._hand.course))
         else:
             body.p = vector(params.p_WO_0)
             body.q = normalize(quaternion(params.q_WO_0))
@@ -166,8 +172,13 @@ class HandAndObject:
         course, f_fist, p_GF = hand.move(dt, person.p, person.q), ZERO, ZERO
         if person.pushes_with_fist:
             course, f_fist, p_GF = hand.press(dt, course, G)
+        tau_fist = cross(p_GF, f_fist)
+        H = course if hand.hold is None else Frame(hand.p, hand.q, body.v)
+        self._fingers.advance(dt, self._wanted_angles(), self._seen_from_object(course))
+        if not person.pushes_with_fist:
+            f_fist, tau_fist = self._solids.press(self._fingers.bones(), H, G, self._gripper.angle)
         self._exchange_forces(dt, before, G, course)
-        self._f_G, self._tau_G = add(self._f_G, f_fist), add(self._tau_G, cross(p_GF, f_fist))
+        self._f_G, self._tau_G = add(self._f_G, f_fist), add(self._tau_G, tau_fist)
         self._f_H = subtract(self._f_H, f_fist)
         hand.arrive(course, body)
         self._robot = G
@@ -176,7 +187,8 @@ class HandAndObject:
     def get_state(self) -> bytes:
         """Return the complete state."""
         b, grip, G = self._object.body, self._gripper.grip, self._robot
-        parts = (self._person.get_state(), self._hand.get_state(), self._gripper.angle)
+        fingers = (self._fingers.wanted, self._fingers.angles)
+        parts = (self._person.get_state(), self._hand.get_state(), self._gripper.angle, fingers)
         held = None if grip is None else (grip.r, grip.place, grip.turn)
         robot = None if G is None else (G.p, G.q, G.v, G.w)
         return pack_state(((b.p, b.q, b.v, b.spin), parts, held, robot, (self._f_G, self._tau_G, self._f_H)))
@@ -185,7 +197,7 @@ class HandAndObject:
         """Restore a state of this unit or of one with equal parameters."""
         b = self._object.body
         (b.p, b.q, b.v, b.spin), parts, held, robot, (self._f_G, self._tau_G, self._f_H) = unpack_state(state)
-        person, hand, self._gripper.angle = parts
+        person, hand, self._gripper.angle, (self._fingers.wanted, self._fingers.angles) = parts
         self._person.set_state(person)
         self._hand.set_state(hand)
         self._gripper.grip = None if held is None else Attachment(self._gripper.stiffness, *held)
@@ -234,9 +246,12 @@ class HandAndObject:
             held = [(a, F) for a, F in ((grip, gripper), (hold, arm)) if a is not None]
             palm = self._gripper.palm(gripper, body)
             R, p_GO = rotation_matrix(body.q), subtract(body.p, gripper.p)
-            wrenches, push = self._object.advance(dt / count, held, palm)
+            touches = self._touches(arm)
+            wrenches, pushes = self._object.advance(dt / count, held, touches if palm is None else [palm, *touches])
             if palm is not None:
-                f_G, tau_G = _added(f_G, tau_G, push, ZERO, add(p_GO, rotate(R, palm.r)))
+                f_G, tau_G = _added(f_G, tau_G, pushes[0], ZERO, add(p_GO, rotate(R, palm.r)))
+            for push in pushes[len(pushes) - len(touches) :]:
+                f_H = subtract(f_H, push)
             for (a, _), (f, tau) in zip(held, wrenches, strict=True):
                 if a is grip:
                     f_G, tau_G = _added(f_G, tau_G, f, tau, add(p_GO, rotate(R, a.r)))
@@ -244,6 +259,27 @@ class HandAndObject:
                     f_H = subtract(f_H, f)
         s = 1.0 / count
         self._f_G, self._tau_G, self._f_H = scale(s, f_G), scale(s, tau_G), scale(s, f_H)
+
+    def _wanted_angles(self) -> Angles:
+        """Return the angles to which the person wants to close the joints."""
+        closed = minimum_jerk(self._person.fingers)
+        return tuple(closed * angle for angle in CLOSED)
+
+    def _touches(self, H: Frame) -> list[Palm]:
+        """Return what the phalanges of a hand at H, that holds nothing, do to the object."""
+        if self._hand.hold is not None:
+            return []
+        p, seen = self._p, self._seen_from_object(H)
+        return self._fingers.touches(seen, p.finger_stiffness, p.finger_damping, p.arm_force_max, 0.0)
+
+    def _seen_from_object(self, H: Frame) -> Frame:
+        """Return a hand that is at H, or that holds the object, as seen from the object."""
+        hand, body = self._hand, self._object.body
+        if hand.hold is not None:
+            return Frame(hand.p_OH, hand.q_OH)
+        R = rotation_matrix(body.q)
+        p, v, w = (inverse_rotate(R, a) for a in (subtract(H.p, body.p), H.v, H.w))
+        return Frame(p, relative_quaternion(body.q, H.q), v, w)
 
     def _outputs(self) -> Outputs:
         """Return the outputs as pieces of one array, which costs less than an array each."""
@@ -257,7 +293,7 @@ class HandAndObject:
             v_WO=a[13:16],
             p_WH=a[16:19],
             q_WH=a[19:23],
-            finger=minimum_jerk(self._person.fingers) * _CLOSED,
+            finger=np.array(self._fingers.angles),
             gripper_angle=self._gripper.angle,
             holder=_HOLDERS[self._gripper.grip is not None, hand.hold is not None],
             activity=self._person.activity,

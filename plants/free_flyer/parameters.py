@@ -102,6 +102,10 @@ class Params:
     fist_radius: Metre = parameter(0.035, "radius of a fist", minimum=0.005, maximum=0.2)
     fist_offset: Metre = parameter(-0.07, "where along y of G a fist pushes", minimum=-0.3, maximum=0.3)
 
+    finger_rate: RadianPerSecond = parameter(12.0, "speed of the hand's joints", minimum=0.1, maximum=100.0)
+    finger_stiffness: NewtonPerMetre = parameter(300.0, "stiffness of a phalanx", minimum=1.0, maximum=1e5)
+    finger_damping: NewtonSecondPerMetre = parameter(3.0, "damping of a phalanx", minimum=0.0, maximum=1000.0)
+
     grip_stiffness: NewtonPerMetre = parameter(800.0, "stiffness of the grip", minimum=1.0, maximum=1e5)
     grip_damping: NewtonSecondPerMetre = parameter(8.0, "damping of the grip", minimum=0.0, maximum=1000.0)
     grip_force_max: Newton = parameter(5.0, "force at which the object slides", minimum=0.01, maximum=1000.0)

@@ -13,6 +13,7 @@ from matplotlib.colors import to_rgb
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.plants.free_flyer.hand_kinematics import FINGERS, PALM, PALM_SIDES, RADIUS, joint_places
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import figure
@@ -26,18 +27,8 @@ OBJECT = (0.021, 0.195, 0.017)
 PALM_DEPTH = 0.03
 """How far the gripper's palm lies behind G, m."""
 _ARM_WIDTH, _PALM_SIDES, _JAW_SIDES = 0.04, (0.012, 0.05, 0.075), (0.06, 0.04, 0.008)
-_HAND_SIDES, _PALM_OF_HAND = (0.085, 0.08, 0.022), np.array([-0.03, 0.0, 0.02])
-FINGER_WIDTH = 0.016
+FINGER_WIDTH = 2 * RADIUS
 """Thickness of a person's fingers, m."""
-
-_ROOTS = (
-    ((-0.01, 0.045, 0.0), (0.6, 0.8, 0.0), (0.035, 0.028)),
-    ((0.0425, 0.03, 0.0), (1.0, 0.0, 0.0), (0.038, 0.024, 0.018)),
-    ((0.0425, 0.01, 0.0), (1.0, 0.0, 0.0), (0.042, 0.027, 0.018)),
-    ((0.0425, -0.01, 0.0), (1.0, 0.0, 0.0), (0.039, 0.025, 0.018)),
-    ((0.0425, -0.03, 0.0), (1.0, 0.0, 0.0), (0.031, 0.019, 0.016)),
-)
-"""Thumb, index, middle, ring and little finger in H: root from the palm's middle, direction, lengths of segments, m."""
 
 _NEAR = np.array([0.20, 0.20, 0.20])
 """Half the sides of a window for pictures from near, m."""
@@ -104,8 +95,8 @@ def person_at(record: Record, row: int) -> list[Solid]:
     """Return object, palm and fingers at one row of a record."""
     thing = _box(_at(record, "person.p_WO", row), rotation_of(_at(record, "person.q_WO", row)), OBJECT, _THING)
     p_WH, R_WH = _at(record, "person.p_WH", row), rotation_of(_at(record, "person.q_WH", row))
-    palm = p_WH + R_WH @ _PALM_OF_HAND
-    return [thing, _box(palm, R_WH, _HAND_SIDES, _SKIN), *_fingers(p_WH, R_WH, _at(record, "person.finger", row))]
+    palm = p_WH + R_WH @ np.array(PALM)
+    return [thing, _box(palm, R_WH, PALM_SIDES, _SKIN), *_fingers(p_WH, R_WH, _at(record, "person.finger", row))]
 
 
 def draw_scene(moments: Mapping[str, Sequence[Solid]], caption: str, folder: Path) -> Figure:
@@ -153,20 +144,14 @@ def finger_points(finger: Floats) -> list[Floats]:
     Args:
         finger: angles of the joints, shape (14,), rad.
     """
-    chains: list[Floats] = []
-    for (root, along, lengths), angles in zip(_ROOTS, _split(finger), strict=True):
-        bent = np.cumsum(angles)[:, None]
-        ahead = np.cos(bent) * np.array(along) - np.sin(bent) * np.array([0.0, 0.0, 1.0])
-        first = _PALM_OF_HAND + np.array(root)
-        chains.append(np.vstack([first, first + np.cumsum(np.array(lengths)[:, None] * ahead, axis=0)]))
-    return chains
+    return [np.array(joint_places(f, finger[f.joints].tolist())) for f in FINGERS]
 
 
 def _fingers(p_WH: Floats, R_WH: Floats, finger: Floats) -> list[Solid]:
     """Return the segments of thumb and fingers."""
     segments: list[Solid] = []
-    for points, (_, along, _) in zip(finger_points(finger), _ROOTS, strict=True):
-        side = np.cross([0.0, 0.0, 1.0], along)
+    for points, f in zip(finger_points(finger), FINGERS, strict=True):
+        side = np.cross(f.ahead, f.bend)
         for start, end in pairwise(points):
             length = float(np.linalg.norm(end - start))
             ahead = (end - start) / length
@@ -174,10 +159,6 @@ def _fingers(p_WH: Floats, R_WH: Floats, finger: Floats) -> list[Solid]:
             middle = p_WH + R_WH @ ((start + end) / 2)
             segments.append(_box(middle, R_WH @ R_HF, (length, FINGER_WIDTH, FINGER_WIDTH), _SKIN))
     return segments
-
-
-def _split(finger: Floats) -> list[Floats]:
-    return np.split(finger, [2, 5, 8, 11])
 
 
 def _box(p_WX: Floats, R_WX: Floats, sides: tuple[float, float, float], colour: str) -> Solid:

@@ -10,6 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand_and_object import Activity, Holder, Motion, Params
+from handover.plants.free_flyer.hand_kinematics import CLOSED
+from handover.plants.hand_motion import minimum_jerk
 
 TAKEN = [Activity.WAIT, Activity.REACH, Activity.GRASP, Activity.PULL, Activity.WITHDRAW, Activity.REST]
 
@@ -129,18 +131,19 @@ def test_lets_go_when_its_patience_is_at_an_end():
     assert scene.y.holder is Holder.GRIPPER
 
 
-def test_fingers_close_in_a_minimum_jerk_within_their_range():
+def test_fingers_close_in_a_minimum_jerk_until_they_touch():
     scene = Scene(CALM)
     scene.go(2.0, closure=1.0)
     scene.until(Activity.GRASP, light=True)
+    begin = len(scene.seen) - 1
     scene.until(Activity.PULL)
     fingers = np.array([y.finger for y in scene.seen])
     assert np.min(fingers) == 0.0
     assert np.max(fingers) <= 0.5 * math.pi
-    closed = scene.go(0.5).finger
-    assert np.all(closed > 0.5)
-    middle = next(y for y in scene.seen if y.finger[0] >= 0.5 * closed[0])
-    np.testing.assert_allclose(middle.finger / closed, middle.finger[0] / closed[0], atol=1e-12)
+    course = [minimum_jerk((k + 1) * DT / CALM.grasp_time) for k in range(10)]
+    np.testing.assert_allclose(fingers[begin : begin + 10], np.outer(course, CLOSED), atol=1e-9)
+    assert np.all(fingers[-1] <= np.array(CLOSED) + 1e-12)
+    assert np.sum(fingers[-1] < np.array(CLOSED) - 0.1) >= 5  # stopped by the object, each at its own angle
 
 
 def test_tremor_is_in_the_hand_and_comes_by_its_seed():

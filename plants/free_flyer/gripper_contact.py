@@ -1,0 +1,79 @@
+"""Fingers of a person against the free-flyer's gripper: phalanges are kept off its palm and its jaws by springs."""
+
+from collections.abc import Sequence
+
+from handover.cosim.blocks.plain_rotation import (
+    ZERO,
+    Vector,
+    add,
+    add_cross,
+    add_scaled,
+    cross,
+    dot,
+    inverse_rotate,
+    norm,
+    rotate,
+    scale,
+    subtract,
+)
+from handover.plants.free_flyer.attachment import Frame
+from handover.plants.free_flyer.finger_contact import Box
+from handover.plants.free_flyer.hand_kinematics import RADIUS, REACH, Segment
+from handover.plants.free_flyer.parameters import Params
+
+_PALM_THICKNESS, _JAW = 0.012, (0.06, 0.04, 0.008)
+"""Thickness of the palm, and sides of a jaw, m, assumed."""
+
+
+class GripperSolids:
+    """Palm and jaws as boxes along the axes of G; each phalanx presses with stiffness and damping times its depth.
+
+    The hand is not deflected by it: its arm presses with at most arm_force_max in all.
+    """
+
+    def __init__(self, params: Params) -> None:
+        self._p = p = params
+        self._palm = Box((0.5 * _PALM_THICKNESS, p.palm_width, p.palm_width))
+        self._jaw = Box(scale(0.5, _JAW))
+        self._far = p.palm_depth + p.palm_width + p.aperture + REACH
+
+    def press(self, bones: Sequence[Segment], H: Frame, G: Frame, angle: float) -> tuple[Vector, Vector]:
+        """Return force and torque about G of phalanges on the gripper, N, N m, in W.
+
+        Args:
+            bones: the lines in the middle of the phalanges, in H.
+            H: the hand, with its velocity.
+            G: the gripper, with its velocity.
+            angle: between the gripper's fingers, rad.
+        """
+        if norm(subtract(H.p, G.p)) > self._far:
+            return ZERO, ZERO
+        p = self._p
+        gap = max(0.0, p.aperture * (angle - p.angle_empty) / (p.angle_open - p.angle_empty))
+        aside = 0.5 * (gap + _JAW[2])
+        solids = [
+            (self._palm, (p.palm_depth + 0.5 * _PALM_THICKNESS, 0.0, 0.0)),
+            (self._jaw, (0.0, 0.0, aside)),
+            (self._jaw, (0.0, 0.0, -aside)),
+        ]
+        f, tau = ZERO, ZERO
+        for bone in bones:
+            a, b = (inverse_rotate(G.R, subtract(add(H.p, rotate(H.R, end)), G.p)) for end in bone)
+            for solid, place in solids:
+                line = subtract(a, place), subtract(b, place)
+                if solid.least_room(line) >= RADIUS:
+                    continue
+                away, c = solid.nearest(line)
+                if away < RADIUS:
+                    f_W, arm = self._pushed(RADIUS - away, scale(-1.0, solid.normal(c)), add(c, place), H, G)
+                    f, tau = add(f, f_W), add_cross(tau, arm, f_W)
+        most = norm(f) / p.arm_force_max
+        return (f, tau) if most <= 1.0 else (scale(1.0 / most, f), scale(1.0 / most, tau))
+
+    def _pushed(self, depth: float, n: Vector, p_GC: Vector, H: Frame, G: Frame) -> tuple[Vector, Vector]:
+        """Return the force of a phalanx along n of G, and where it acts, seen from G, both in W."""
+        p = self._p
+        n_W, arm = rotate(G.R, n), rotate(G.R, add_scaled(p_GC, RADIUS - depth, n))
+        v_H = add_cross(H.v, H.w, subtract(add(G.p, arm), H.p))
+        v = subtract(v_H, add(G.v, cross(G.w, arm)))
+        return scale(max(0.0, p.finger_stiffness * depth + p.finger_damping * dot(v, n_W)), n_W), arm

@@ -1,0 +1,158 @@
+"""Fingers of the hand: their joints' limits, where they stop at a box, what they do to a free one."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hand_scene import CALM, DT, IDLE, Scene
+
+from handover.cosim.blocks.plain_rotation import IDENTITY, Vector, from_rotation_vector
+from handover.cosim.blocks.ports import Floats
+from handover.plants.free_flyer.attachment import Frame
+from handover.plants.free_flyer.finger_contact import Box, HandFingers
+from handover.plants.free_flyer.hand_and_object import Activity
+from handover.plants.free_flyer.hand_kinematics import (
+    CLOSED,
+    FINGERS,
+    JOINT_MAX,
+    JOINTS,
+    RADIUS,
+    STRAIGHT,
+    joint_places,
+    phalanges,
+)
+
+SIDES = (0.021, 0.195, 0.017)
+RATE = 12.0
+FULL = (JOINT_MAX,) * JOINTS
+FAR = Frame((1.0, 0.0, 0.0), IDENTITY)
+
+
+def closed_on(H: Frame, goal: tuple[float, ...] = FULL) -> HandFingers:
+    fingers = HandFingers(SIDES, RATE)
+    fingers.settle(goal, H)
+    return fingers
+
+
+def room(fingers: HandFingers, H: Frame) -> Floats:
+    """Return the distance of each phalanx from the box, by many points of its middle line."""
+    R, p = np.array(H.R).reshape(3, 3), np.array(H.p)
+    rooms: list[float] = []
+    for finger in FINGERS:
+        for a, b in phalanges(finger, fingers.angles[finger.first : finger.first + len(finger.lengths)]):
+            line = np.array(a) + np.linspace(0.0, 1.0, 4001)[:, None] * (np.array(b) - a)
+            out = np.abs(line @ R.T + p) - np.array(SIDES) / 2.0
+            signed = np.linalg.norm(np.maximum(out, 0.0), axis=1) + np.minimum(out.max(axis=1), 0.0)
+            rooms.append(float(signed.min()) - RADIUS)
+    return np.array(rooms)
+
+
+def test_a_hand_has_fourteen_hinges_of_ninety_degrees():
+    assert sum(len(f.lengths) for f in FINGERS) == len(CLOSED) == JOINTS == 14
+    for angles in (FULL, STRAIGHT):
+        fingers = HandFingers(SIDES, RATE)
+        fingers.settle(tuple(3.0 * a - 1.0 for a in angles), FAR)
+        assert fingers.angles == angles
+
+
+@pytest.mark.parametrize("finger", FINGERS, ids=lambda f: f.name)
+def test_bones_keep_their_lengths_and_bend_by_the_joints_angles(finger):  # type: ignore[no-untyped-def]
+    angles = (0.3, 0.7, 0.2)[: len(finger.lengths)]
+    bones = np.diff(np.array(joint_places(finger, angles)), axis=0)
+    np.testing.assert_allclose(np.linalg.norm(bones, axis=1), finger.lengths, rtol=1e-12)
+    before = np.vstack([finger.ahead, bones])
+    before = before / np.linalg.norm(before, axis=1)[:, None]
+    bent = np.arccos(np.sum(before[1:] * before[:-1], axis=1))  # [Fernandes2020] eq. (4.5)
+    np.testing.assert_allclose(bent, angles, rtol=1e-12)
+    assert np.dot(bones[-1], finger.bend) > 0.0
+
+
+def test_joints_turn_at_a_limited_rate():
+    fingers = HandFingers(SIDES, RATE)
+    fingers.advance(DT, FULL, FAR)
+    np.testing.assert_allclose(fingers.angles, RATE * DT)
+
+
+def test_distance_from_a_box_is_that_of_its_nearest_point():
+    box = Box((0.1, 0.2, 0.3))
+    for p, d in (
+        ((0.15, 0.0, 0.0), 0.05),
+        ((0.13, 0.24, 0.0), 0.05),
+        ((0.05, 0.0, 0.0), -0.05),
+        ((0.0, 0.0, 0.31), 0.01),
+    ):
+        assert box.distance(p) == pytest.approx(d)
+    away, p = box.nearest(((0.2, 0.0, 0.0), (0.12, 0.0, 0.1)))
+    assert away == pytest.approx(0.02)
+    assert p == pytest.approx((0.12, 0.0, 0.1))
+    assert box.normal((0.13, 0.24, 0.0)) == pytest.approx((0.6, 0.8, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("p", "turn"),
+    [
+        ((0.0, 0.07, 0.0), (0.0, 0.0, 0.0)),
+        ((0.004, 0.05, -0.003), (0.1, 0.15, 0.3)),
+        ((0.0, 0.0, 0.0), (0.0, 0.0, -0.3)),
+    ],
+)
+def test_fingers_stop_at_the_objects_surface(p: Vector, turn: Vector):
+    H = Frame(p, from_rotation_vector(turn))
+    fingers = closed_on(H)
+    rooms = room(fingers, H)
+    assert np.min(rooms) > -1e-6
+    touching = [c.joint for c in fingers.contacts(H, 1e-5)]
+    assert len(touching) >= 5
+    np.testing.assert_allclose(rooms[touching], 0.0, atol=2e-5)
+
+
+def test_each_joint_ends_at_its_own_angle_on_an_object_off_the_middle():
+    angles = closed_on(Frame((0.002, 0.05, 0.0), from_rotation_vector((0.12, 0.1, 0.3)))).angles
+    stopped = [a for a in angles if 0.0 < a < JOINT_MAX]
+    assert len(stopped) >= 9
+    assert len(set(np.round(stopped, 4).tolist())) >= 8
+
+
+def test_a_finger_gives_way_to_an_object_that_comes_nearer():
+    fingers = closed_on(Frame((0.0, 0.07, 0.0), IDENTITY))
+    nearer = Frame((0.0, 0.07, -0.003), IDENTITY)
+    before = fingers.angles
+    fingers.advance(DT, FULL, nearer)
+    assert fingers.angles != before
+    assert np.min(room(fingers, nearer)) > -1e-6
+    assert np.max(np.abs(np.subtract(fingers.angles, before))) <= RATE * DT + 1e-12
+
+
+def test_thumb_and_fingers_enclose_what_is_between_them_only():
+    for p, encloses in (((0.0, 0.07, 0.0), True), ((0.0, 0.07, 0.1), False), ((0.0, 0.2, 0.0), False)):
+        H = Frame(p, IDENTITY)
+        assert closed_on(H).encloses(H) is encloses
+        open_hand = HandFingers(SIDES, RATE)
+        assert not open_hand.encloses(H)
+
+
+def test_fingers_of_the_person_differ_by_where_the_object_is():
+    angles: list[Floats] = []
+    for x in (0.0, 0.006):
+        scene = Scene(replace(CALM, p_OH=np.array([x, 0.07, 0.0])))
+        scene.go(2.0, closure=1.0)
+        scene.until(Activity.PULL, light=True)
+        angles.append(scene.y.finger)
+    assert np.sum(np.abs(angles[0] - angles[1]) > 0.01) >= 4
+
+
+def test_a_finger_that_is_moved_against_a_free_object_pushes_it_away_and_feels_it():
+    scene = Scene(replace(IDLE, p_WH_0=np.array([-0.3, 0.0, -0.02])), np.array([1.0, 0.0, 0.0]))
+    hand = scene.unit._hand
+    momentum = np.zeros(3)
+    for k in range(200):
+        hand_at = (-0.3 + 0.2 * (k + 1) * DT, 0.0, -0.036)
+        scene.unit._person.p = hand_at
+        y = scene.go(DT)
+        momentum -= DT * y.f_H
+    assert hand.p[0] > 0.3
+    assert np.linalg.norm(momentum) > 0.005
+    np.testing.assert_allclose(momentum, 0.1 * y.v_WO, atol=1e-9)
+    assert 0.0 < np.linalg.norm(y.v_WO) < 0.5
+    assert math.isfinite(float(np.sum(y.q_WO)))
