@@ -121,6 +121,12 @@ _ENTRIES = (
         "free-flying robot with a fixed arm",
     ),
     Entry(
+        "Navigation",
+        "handover.plants.free_flyer.navigation:Navigation",
+        Fraction(2, 125),
+        "its estimate of pose and velocities, with noise, bias, drift and delay",
+    ),
+    Entry(
         "Thrusters",
         "handover.plants.free_flyer.thrusters:Thrusters",
         Fraction(2, 125),

@@ -12,7 +12,6 @@ from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.plain_rotation import (
     add,
     add_cross,
-    perturb,
     quaternion,
     rotate,
     rotation_matrix,
@@ -45,9 +44,9 @@ class InvalidFlyerParameters(InvalidParameters):
 
 @dataclass(frozen=True, kw_only=True)
 class Params:
-    """The robot, where it starts, and how well it knows where it is.
+    """The robot, and where it starts.
 
-    Mass and inertia are the published ones of NASA's Astrobee; the arm's length and the noise are assumed.
+    Mass and inertia are the published ones of NASA's Astrobee; the arm's length is assumed.
     """
 
     mass: Kilogram = parameter(9.584, "mass of the robot", minimum=0.1, maximum=1000.0)
@@ -65,15 +64,6 @@ class Params:
     )
     substep: Second = parameter(0.016, "longest step of the integration", minimum=1e-5, maximum=0.1)
     turn: Radian = parameter(0.004, "largest turn in a step of the integration", minimum=1e-4, maximum=1.0)
-    position_noise: Metre = parameter(0.001, "deviation of the estimated position, an axis", minimum=0.0, maximum=1.0)
-    attitude_noise: Radian = parameter(0.002, "deviation of the estimated attitude, an axis", minimum=0.0, maximum=0.5)
-    velocity_noise: MetrePerSecond = parameter(
-        0.001, "deviation of the estimated velocity, an axis", minimum=0.0, maximum=1.0
-    )
-    rate_noise: RadianPerSecond = parameter(
-        0.002, "deviation of the estimated angular velocity, an axis", minimum=0.0, maximum=1.0
-    )
-    seed: int = parameter(0, "seed of the random numbers", minimum=0)
 
     def check(self) -> None:
         """Raise InvalidFlyerParameters, with all faults, if no rigid body has these values."""
@@ -94,7 +84,7 @@ class Inputs:
 
 @dataclass(kw_only=True)
 class Outputs:
-    """Where the robot is and how it moves, in the world: the truth, and its navigation's estimate."""
+    """Where the robot is and how it moves, in the world."""
 
     p_WB: Vector3[Metre] = output("position of the centre of mass")
     q_WB: Vector4[Number] = output("orientation")
@@ -103,10 +93,6 @@ class Outputs:
     p_WG: Vector3[Metre] = output("position of the gripper")
     q_WG: Vector4[Number] = output("orientation of the gripper, the robot's own")
     v_WG: Vector3[MetrePerSecond] = output("velocity of the gripper")
-    p_WB_meas: Vector3[Metre] = output("estimated position of the centre of mass")
-    q_WB_meas: Vector4[Number] = output("estimated orientation")
-    v_WB_meas: Vector3[MetrePerSecond] = output("estimated velocity of the centre of mass")
-    w_WB_meas: Vector3[RadianPerSecond] = output("estimated angular velocity")
 
 
 class FreeFlyer:
@@ -116,9 +102,6 @@ class FreeFlyer:
     quaternion whose sign is continuous. During a step the propulsion is held in the robot's frame and the wrench on the
     gripper in the world; steps are cut into equal parts of at most `substep`, in which the robot turns by at most
     `turn`: a robot at rest needs few of them, and one that tumbles is followed as closely.
-
-    The navigation's estimate is the truth plus white Gaussian noise, drawn once a step; the attitude's is a small turn
-    in the robot's frame.
 
     Raises:
         InvalidFlyerParameters: by the constructor, for an inertia that no rigid body has or a quaternion that is not
@@ -135,11 +118,6 @@ class FreeFlyer:
         q = np.asarray(params.q_WB_0) / np.linalg.norm(params.q_WB_0)
         p_BG, p_WB, v_WB, w_WB = (vector(a) for a in (params.p_BG, params.p_WB_0, params.v_WB_0, params.w_WB_0))
         self._body = RigidBody(params.mass, params.I_B, p_BG, p_WB, quaternion(q), v_WB, w_WB)
-        deviations = (params.position_noise, 0.5 * params.attitude_noise, params.velocity_noise, params.rate_noise)
-        self._deviations = np.repeat(np.array(deviations, dtype=np.float64), 3)
-        self._rng = np.random.default_rng(params.seed)
-        self._noise: list[float] = []
-        self._draw()
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return where the robot is; no time passes."""
@@ -152,18 +130,17 @@ class FreeFlyer:
         advance = self._body.advance
         for _ in range(count):
             advance(h, *wrench)
-        self._draw()
         return self._outputs()
 
     def get_state(self) -> bytes:
         """Return the complete state."""
         b = self._body
-        return pack_state((b.p, b.q, b.v, b.spin, self._noise, self._rng.bit_generator))
+        return pack_state((b.p, b.q, b.v, b.spin))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this robot or of one with equal parameters."""
         b = self._body
-        b.p, b.q, b.v, b.spin, self._noise, self._rng.bit_generator.state = unpack_state(state)
+        b.p, b.q, b.v, b.spin = unpack_state(state)
 
     def _substeps(self, dt: float) -> int:
         rate = math.hypot(*self._body.w)
@@ -171,29 +148,12 @@ class FreeFlyer:
             raise TurnsTooFast(rate, dt)
         return max(1, math.ceil(dt / self._substep - 1e-6), math.ceil(rate * dt / self._turn))
 
-    def _draw(self) -> None:
-        self._noise = (self._deviations * self._rng.standard_normal(12)).tolist()
-
     def _outputs(self) -> Outputs:
         """Return the outputs as pieces of one array, which costs less than an array each."""
         b = self._body
         R = rotation_matrix(b.q)
         w, r = b.angular_velocity(R), rotate(R, b.p_BG)
-        p_x, p_y, p_z, h_x, h_y, h_z, v_x, v_y, v_z, w_x, w_y, w_z = self._noise
-        a = np.array(
-            [
-                *b.p,
-                *b.q,
-                *b.v,
-                *w,
-                *add(b.p, r),
-                *add_cross(b.v, w, r),
-                *add(b.p, (p_x, p_y, p_z)),
-                *perturb(b.q, (h_x, h_y, h_z)),
-                *add(b.v, (v_x, v_y, v_z)),
-                *add(w, (w_x, w_y, w_z)),
-            ]
-        )
+        a = np.array([*b.p, *b.q, *b.v, *w, *add(b.p, r), *add_cross(b.v, w, r)])
         return Outputs(
             p_WB=a[0:3],
             q_WB=a[3:7],
@@ -202,8 +162,4 @@ class FreeFlyer:
             p_WG=a[13:16],
             q_WG=a[3:7],
             v_WG=a[16:19],
-            p_WB_meas=a[19:22],
-            q_WB_meas=a[22:26],
-            v_WB_meas=a[26:29],
-            w_WB_meas=a[29:32],
         )

@@ -45,6 +45,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         "thrusters": "Thrusters",
         "person": "HandAndObject",
         "robot": "FreeFlyer",
+        "navigation": "Navigation",
     }
     places: ClassVar[Mapping[str, Place]] = PLACES_OF_HANDOVER
     headline: ClassVar[tuple[str, ...]] = (
@@ -73,14 +74,14 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
     """How many receptions the person is to feign."""
 
     def build(self, parameters: HandoverParameters, seed: int, fmu: FmuOf) -> System:
-        """Wire robot, thrusters, controllers and person.
+        """Wire robot, thrusters, navigation, controllers and person.
 
         Raises:
             InvalidParameter: the handover place is out of the person's reach.
         """
         p = parameters
         _check_reach(p.p_WG_handover)
-        robot_seed, person_seed = (int(n) for n in np.random.SeedSequence(seed).generate_state(2) >> 1)
+        navigation_seed, person_seed = (int(n) for n in np.random.SeedSequence(seed).generate_state(2) >> 1)
         at = {name: np.array(value) for name, value in paper_values("free_flyer", "handover_place").items()}
         p_WO_0, behaviour = at["p_WO_0"], p.behaviour.item
         robot, model, lag = p.robot, vars(p.model), expected_lag(p.propulsion)
@@ -101,7 +102,8 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         s.add("pose", fmu("pose"), **model, delay=p.delay, lag=lag)
         step = common_period([s.units[name] for name in self.cycle()])
         s.add("thrusters", fmu("thrusters"), period=step, propulsion=p.propulsion.item, delay=p.delay)
-        s.add("robot", fmu("robot"), period=step, seed=robot_seed, **vars(robot), p_WB_0=at["p_WG_0"] - robot.p_BG)
+        s.add("robot", fmu("robot"), period=step, **vars(robot), p_WB_0=at["p_WG_0"] - robot.p_BG)
+        s.add("navigation", fmu("navigation"), period=step, seed=navigation_seed)
         s.add(
             "person",
             fmu("person"),

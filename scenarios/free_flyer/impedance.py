@@ -18,7 +18,7 @@ from handover.scenarios.free_flyer.impedance_evaluation import ImpedanceEvaluato
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Wrench
 from handover.scenarios.free_flyer.places import PLACES_OF_PUSH
 from handover.scenarios.free_flyer.published import published_of_push
-from handover.scenarios.free_flyer.robot_wiring import expected_lag, wire_controller, wire_forces
+from handover.scenarios.free_flyer.robot_wiring import expected_lag, wire_controller, wire_forces, wire_navigation
 
 
 class FlyerImpedance(Experiment[ImpedanceEvaluator]):
@@ -32,6 +32,7 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
         "thrusters": "Thrusters",
         "push": "Push",
         "robot": "FreeFlyer",
+        "navigation": "Navigation",
     }
     places: ClassVar[Mapping[str, Place]] = PLACES_OF_PUSH
     parallel_step: ClassVar[Fraction | None] = Fraction(1, 500)
@@ -49,7 +50,7 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
     )
 
     def build(self, parameters: ImpedanceParameters, seed: int, fmu: FmuOf) -> System:
-        """Wire robot, thrusters, impedance controller and push; the gripper starts at its place of rest."""
+        """Wire robot, thrusters, navigation, impedance controller and push; the gripper starts at its place of rest."""
         p = parameters
         p_WG, robot_body = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"]), p.robot
         s = System()
@@ -74,8 +75,10 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
             start=p.begin,
             duration=p.duration,
         )
-        robot = s.add("robot", fmu("robot"), seed=seed, **vars(robot_body), p_WB_0=p_WG - robot_body.p_BG)
-        wire_controller(s, impedance, robot, thrusters)
+        robot = s.add("robot", fmu("robot"), **vars(robot_body), p_WB_0=p_WG - robot_body.p_BG)
+        navigation = s.add("navigation", fmu("navigation"), seed=seed)
+        wire_controller(s, impedance, navigation, thrusters)
+        wire_navigation(s, robot, navigation)
         wire_forces(s, robot, thrusters, push)
         return s
 

@@ -10,11 +10,12 @@ _ESTIMATE = {
     "p_WB_meas": "in W",
     "q_WB_meas": "scalar first",
     "v_WB_meas": "in W",
-    "w_WB_meas": "as the robot's unit gives it",
+    "w_WB_meas": "in W",
 }
+_TRUTH = {"p_WB": "in W", "q_WB": "scalar first", "v_WB": "in W", "w_WB": "in W"}
 _WRENCH = {"f_B": "at the centre of mass, in B", "tau_B": "in B"}
 _ON_GRIPPER = {"f_G": "at G, in W", "tau_G": "in W"}
-_MOTION = {"p_WG": "in W", "q_WG": "scalar first", "v_WG": "in W", "w_WB": ""}
+_MOTION = {"p_WG": "in W", "q_WG": "scalar first", "v_WG": "in W", "w_WB": "in W"}
 _BODY = {"mass": "as the scenario's factors make it", "I_B": "in B, likewise", "p_BG": "in B, likewise"}
 _CONTROLLER = Place(
     required={"f_cmd": "at the centre of mass, in B", "tau_cmd": "in B"},
@@ -52,8 +53,13 @@ def _thrusters(*controllers: str) -> Place:
 
 
 _ROBOT = Place(
-    required={**_WRENCH, **_ON_GRIPPER, **_ESTIMATE, **_MOTION, "p_WB": "in W", "q_WB": "scalar first"},
-    optional={"v_WB": "in W", "seed": "follows from the run's seed", **_BODY, "p_WB_0": "in W"},
+    required={**_WRENCH, **_ON_GRIPPER, **_TRUTH, **_MOTION},
+    optional={**_BODY, "p_WB_0": "in W"},
+    remarks=_FRAMES,
+)
+_NAVIGATION = Place(
+    required=_ESTIMATE,
+    optional={**_TRUTH, "seed": "follows from the run's seed"},
     remarks=_FRAMES,
 )
 
@@ -66,6 +72,7 @@ PLACES_OF_PUSH = {
         remarks=_FRAMES,
     ),
     "robot": _ROBOT,
+    "navigation": _NAVIGATION,
 }
 """Of `FlyerImpedance`, by the units' names in the system."""
 
@@ -127,5 +134,6 @@ PLACES_OF_HANDOVER = {
         remarks=_FRAMES,
     ),
     "robot": _ROBOT,
+    "navigation": _NAVIGATION,
 }
 """Of the handovers, by the units' names in the system."""

@@ -1,4 +1,4 @@
-"""Wiring that the free-flyer's scenarios share: the robot, its thrusters, and one or two controllers that command them.
+"""Wiring that the free-flyer's scenarios share: the robot, its thrusters, its navigation, and controllers.
 
 Also the metrics of the controllers' closed loops, which they compute by their own models at the start.
 """
@@ -14,6 +14,7 @@ from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Propulsion
 
+_TRUE = ("p_WB", "q_WB", "v_WB", "w_WB")
 _MEASURED = ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")
 _SEEN = ("p_WG", "q_WG", "v_WG", "w_WB")
 
@@ -33,17 +34,23 @@ def common_period(controllers: Sequence[PlacedUnit]) -> Fraction | None:
     return None if len(periods) != 1 or periods == {PERIOD} else periods.pop()
 
 
-def wire_controller(s: System, controller: PlacedUnit, robot: PlacedUnit, thrusters: PlacedUnit) -> None:
-    """Connect the robot's estimate of its state to a controller, and the controller to the thrusters."""
-    wire_estimate(s, robot, controller)
+def wire_navigation(s: System, robot: PlacedUnit, navigation: PlacedUnit) -> None:
+    """Connect the robot's pose and velocities to the unit that estimates them."""
+    for name in _TRUE:
+        s.connect(getattr(robot.y, name), getattr(navigation.u, name))
+
+
+def wire_controller(s: System, controller: PlacedUnit, navigation: PlacedUnit, thrusters: PlacedUnit) -> None:
+    """Connect the estimate of the robot's state to a controller, and the controller to the thrusters."""
+    wire_estimate(s, navigation, controller)
     for what in ("f", "tau"):
         s.connect(getattr(controller.y, f"{what}_cmd"), getattr(thrusters.u, f"{what}_{controller.name}"))
 
 
-def wire_estimate(s: System, robot: PlacedUnit, observer: PlacedUnit) -> None:
-    """Connect the robot's estimate of its state to a unit."""
+def wire_estimate(s: System, navigation: PlacedUnit, observer: PlacedUnit) -> None:
+    """Connect the estimate of the robot's state to a unit."""
     for name in _MEASURED:
-        s.connect(getattr(robot.y, name), getattr(observer.u, name))
+        s.connect(getattr(navigation.y, name), getattr(observer.u, name))
 
 
 def wire_forces(s: System, robot: PlacedUnit, thrusters: PlacedUnit, external: PlacedUnit) -> None:
@@ -56,13 +63,15 @@ def wire_forces(s: System, robot: PlacedUnit, thrusters: PlacedUnit, external: P
 
 def wire_handover(s: System) -> None:
     """Wire all units of a handover that were added under the names of `FlyerHandover.units`."""
-    robot, thrusters, person, decision = (s.units[n] for n in ("robot", "thrusters", "person", "decision"))
+    robot, thrusters, person = (s.units[n] for n in ("robot", "thrusters", "person"))
+    navigation, decision = (s.units[n] for n in ("navigation", "decision"))
     wire_forces(s, robot, thrusters, person)
-    wire_estimate(s, robot, decision)
+    wire_navigation(s, robot, navigation)
+    wire_estimate(s, navigation, decision)
     s.connect(person.y.gripper_angle, decision.u.gripper_angle)
     for name in ("impedance", "pose"):
         controller = s.units[name]
-        wire_controller(s, controller, robot, thrusters)
+        wire_controller(s, controller, navigation, thrusters)
         s.connect(getattr(decision.y, name), controller.u.active)
         for goal in ("p_WG_goal", "q_WG_goal"):
             s.connect(getattr(decision.y, goal), getattr(controller.u, goal))

@@ -3,6 +3,7 @@
 Run with `pytest tests/benchmarks/test_free_flyer_speed.py --benchmark-enable -s`.
 """
 
+import itertools
 import time
 from collections.abc import Callable
 
@@ -16,6 +17,9 @@ from handover.plants.free_flyer.free_flyer import Params as FlyerParams
 from handover.plants.free_flyer.hand_and_object import HandAndObject, Holder, Motion, StartHolder
 from handover.plants.free_flyer.hand_and_object import Inputs as HandInputs
 from handover.plants.free_flyer.hand_and_object import Params as HandParams
+from handover.plants.free_flyer.navigation import Inputs as NavigationInputs
+from handover.plants.free_flyer.navigation import Navigation
+from handover.plants.free_flyer.navigation import Params as NavigationParams
 from handover.plants.free_flyer.push import Inputs as PushInputs
 from handover.plants.free_flyer.push import Params as PushParams
 from handover.plants.free_flyer.push import Push
@@ -39,6 +43,12 @@ def thrusters(delay: float) -> Callable[[], object]:
     return lambda: unit.step(0.0, DT, u)
 
 
+def navigation(params: NavigationParams) -> Callable[[], object]:
+    unit, u = Navigation(params), NavigationInputs()
+    steps = itertools.count()
+    return lambda: unit.step(DT * next(steps), DT, u)
+
+
 def push() -> Callable[[], object]:
     unit, u = Push(PushParams()), PushInputs()
     return lambda: unit.step(0.0, DT, u)
@@ -57,6 +67,8 @@ def hand(params: HandParams, holder: Holder) -> Callable[[], object]:
 
 CASES: dict[str, Callable[[], Callable[[], object]]] = {
     "FreeFlyer": flyer,
+    "Navigation": lambda: navigation(NavigationParams()),
+    "Navigation, delayed": lambda: navigation(NavigationParams(delay=0.025)),
     "Thrusters": lambda: thrusters(0.0),
     "Thrusters, delayed": lambda: thrusters(0.025),
     "Push": push,

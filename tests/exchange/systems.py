@@ -20,14 +20,17 @@ def free_flyer(fmi: int, *, scalar: bool = False) -> Wired:
     """Return a robot that drifts and turns, and the controller that makes it yield, in a closed loop."""
     held = dict[str, Any](active=True, p_WG_goal=[0.02, -0.05, 0.01])
     units = {
-        "robot": Placed(cached("FreeFlyer", fmi, scalar=scalar), {"v_WB_0": [0.01, 0.02, 0.0], "seed": 3}),
+        "robot": Placed(cached("FreeFlyer", fmi, scalar=scalar), {"v_WB_0": [0.01, 0.02, 0.0]}),
+        "navigation": Placed(cached("Navigation", fmi, scalar=scalar), {"seed": 3}),
         "controller": Placed(cached("ImpedanceController", fmi, scalar=scalar), held),
         "thrusters": Placed(cached("Thrusters", fmi, scalar=scalar)),
     }
-    measured = [(f"robot.{n}_meas", f"controller.{n}_meas") for n in ("p_WB", "q_WB", "v_WB", "w_WB")]
+    motion = ("p_WB", "q_WB", "v_WB", "w_WB")
+    true = [(f"robot.{n}", f"navigation.{n}") for n in motion]
+    measured = [(f"navigation.{n}_meas", f"controller.{n}_meas") for n in motion]
     commands = [(f"controller.{n}_cmd", f"thrusters.{n}_impedance") for n in ("f", "tau")]
     thrust = [(f"thrusters.{n}_B", f"robot.{n}_B") for n in ("f", "tau")]
-    return Wired(units, [*measured, *commands, *thrust], Fraction(2, 125))
+    return Wired(units, [*true, *measured, *commands, *thrust], Fraction(2, 125))
 
 
 def vsl(fmi: int, *, scalar: bool = False) -> Wired:

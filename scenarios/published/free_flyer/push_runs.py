@@ -16,7 +16,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Propulsion, Wrench
 
-EXACT = {f"robot.{what}_noise": "0" for what in ("position", "attitude", "velocity", "rate")}
+EXACT = {f"navigation.{what}_noise": "0" for what in ("position", "attitude", "velocity", "rate")}
 """Parameters of a navigation without noise."""
 
 _DEFAULT = ImpedanceParameters()
@@ -118,7 +118,7 @@ class PushRuns:
         if change is not None:
             wanted[change.name] = change.factor
         for row in self._rows:
-            if (_value(row, "robot.position_noise") == 0.0) is exact and all(
+            if (_value(row, "navigation.position_noise") == 0.0) is exact and all(
                 _value(row, name) == x for name, x in wanted.items()
             ):
                 return row

@@ -17,6 +17,9 @@ from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.free_flyer import FreeFlyer
 from handover.plants.free_flyer.free_flyer import Inputs as FlyerInputs
 from handover.plants.free_flyer.free_flyer import Params as FlyerParams
+from handover.plants.free_flyer.navigation import Inputs as NavigationInputs
+from handover.plants.free_flyer.navigation import Navigation
+from handover.plants.free_flyer.navigation import Params as NavigationParams
 from handover.plants.free_flyer.thrusters import Inputs as ThrusterInputs
 from handover.plants.free_flyer.thrusters import Params as ThrusterParams
 from handover.plants.free_flyer.thrusters import Propulsion, Thrusters
@@ -35,14 +38,16 @@ class Robot:
     def __init__(
         self, draught: Floats = NOTHING, noise: float = 0.0, propulsion: Propulsion = Propulsion.LIMITED, **start: Any
     ) -> None:
-        deviations = {"position_noise": noise, "velocity_noise": noise, "attitude_noise": 2 * noise}
-        self.body = FreeFlyer(FlyerParams(**deviations, rate_noise=2.0 * noise, **start))
+        deviations: dict[str, Any] = {"position_noise": noise, "velocity_noise": noise, "attitude_noise": 2 * noise}
+        self.body = FreeFlyer(FlyerParams(**start))
+        self.navigation = Navigation(NavigationParams(**deviations, rate_noise=2.0 * noise))
         self.thrusters = Thrusters(ThrusterParams(propulsion=propulsion))
-        self.draught = draught
+        self.draught, self.t = draught, 0.0
         self.y = self.body.outputs(0.0, FlyerInputs())
+        self.estimate = self.navigation.outputs(0.0, self.true())
 
     def measured(self, **changes: Any) -> Inputs:
-        y = self.y
+        y = self.estimate
         u = Inputs(
             p_WB_meas=y.p_WB_meas,
             q_WB_meas=y.q_WB_meas,
@@ -52,11 +57,16 @@ class Robot:
         )
         return replace(u, **changes)
 
+    def true(self) -> NavigationInputs:
+        return NavigationInputs(p_WB=self.y.p_WB, q_WB=self.y.q_WB, v_WB=self.y.v_WB, w_WB=self.y.w_WB)
+
     def fly(self, y: Outputs) -> None:
         thrust = self.thrusters.step(0.0, T, ThrusterInputs(f_pose=y.f_cmd, tau_pose=y.tau_cmd))
         at_centre = -np.cross(self.y.p_WG - self.y.p_WB, self.draught)
         push = FlyerInputs(f_B=thrust.f_B, tau_B=thrust.tau_B, f_G=self.draught, tau_G=at_centre)
         self.y = self.body.step(0.0, T, push)
+        self.estimate = self.navigation.step(self.t, T, self.true())
+        self.t += T
 
 
 def flown(controller: PoseController, robot: Robot, seconds: float, **goal: Any) -> list[Outputs]:
@@ -258,13 +268,14 @@ def test_restored_state_continues_bit_for_bit(seconds: float):
     robot = Robot(draught=np.array([0.02, 0.0, 0.0]), v_WB_0=np.array([0.01, 0.0, 0.0]))
     flown(controller, robot, seconds, **goal)
     state = controller.get_state()
-    first, thrust, y = robot.body.get_state(), robot.thrusters.get_state(), robot.y
+    units = (robot.body, robot.thrusters, robot.navigation)
+    states, seen = [unit.get_state() for unit in units], (robot.y, robot.estimate, robot.t)
     runs: list[Floats] = []
     for c in (controller, other, controller):
         c.set_state(state)
-        robot.body.set_state(first)
-        robot.thrusters.set_state(thrust)
-        robot.y = y
+        for unit, saved in zip(units, states, strict=True):
+            unit.set_state(saved)
+        robot.y, robot.estimate, robot.t = seen
         runs.append(np.array([flat(z) for z in flown(c, robot, 2.0, **goal)]))
     np.testing.assert_array_equal(runs[0], runs[1])
     np.testing.assert_array_equal(runs[0], runs[2])

@@ -11,9 +11,9 @@ from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.free_flyer import FreeFlyer, Inputs, InvalidFlyerParameters, Outputs, Params
 from handover.plants.free_flyer.rigid_body import TurnsTooFast, momentum_rates
 
-KNOWING = Params(position_noise=0.0, attitude_noise=0.0, velocity_noise=0.0, rate_noise=0.0)
+DEFAULT = Params()
 SKEWED = np.array([[0.1534, 0.01, -0.02], [0.01, 0.1427, 0.005], [-0.02, 0.005, 0.1623]])
-TUMBLING = replace(KNOWING, I_B=SKEWED, v_WB_0=np.array([0.1, -0.2, 0.05]), w_WB_0=np.array([0.5, -0.3, 0.8]))
+TUMBLING = replace(DEFAULT, I_B=SKEWED, v_WB_0=np.array([0.1, -0.2, 0.05]), w_WB_0=np.array([0.5, -0.3, 0.8]))
 
 
 def flat(y: Outputs) -> Floats:
@@ -53,7 +53,7 @@ def wrench(seed: int = 0) -> Inputs:
 
 def test_starts_where_it_was_put():
     q = Rotation.from_euler("z", 0.5 * np.pi).as_quat(scalar_first=True)
-    y = FreeFlyer(replace(KNOWING, q_WB_0=q, w_WB_0=np.array([0.0, 0.0, 2.0]))).outputs(0.0, Inputs())
+    y = FreeFlyer(replace(DEFAULT, q_WB_0=q, w_WB_0=np.array([0.0, 0.0, 2.0]))).outputs(0.0, Inputs())
     np.testing.assert_allclose(y.p_WG, [0.30, -0.37, 0.0], atol=1e-15)
     np.testing.assert_allclose(y.v_WG, [0.6, 0.0, 0.0], atol=1e-15)  # w x R p_BG
     np.testing.assert_array_equal(y.q_WG, y.q_WB)
@@ -78,7 +78,7 @@ def test_momenta_and_energy_stay_over_a_hundred_seconds_of_tumbling():
 
 
 def test_a_force_at_the_gripper_gives_momentum_and_its_moment():
-    p, f, seconds = replace(KNOWING, p_WB_0=np.array([0.3, 0.1, -0.2])), np.array([0.2, -0.1, 0.3]), 0.8
+    p, f, seconds = replace(DEFAULT, p_WB_0=np.array([0.3, 0.1, -0.2])), np.array([0.2, -0.1, 0.3]), 0.8
     u, robot, moment = Inputs(f_G=f, tau_G=np.array([0.01, 0.0, -0.02])), FreeFlyer(p), np.zeros(3)
     y = before = robot.outputs(0.0, u)
     for i in range(800):
@@ -105,14 +105,14 @@ def test_rates_are_newtons_and_eulers_laws():
 
 
 def test_propulsion_turns_with_the_robot():
-    turned = replace(KNOWING, q_WB_0=Rotation.from_euler("z", 0.5 * np.pi).as_quat(scalar_first=True))
+    turned = replace(DEFAULT, q_WB_0=Rotation.from_euler("z", 0.5 * np.pi).as_quat(scalar_first=True))
     y = moved(turned, Inputs(f_B=np.array([9.584, 0.0, 0.0])), 0.8)
     np.testing.assert_allclose(y.v_WB, [0.0, 0.8, 0.0], atol=1e-12)
     np.testing.assert_allclose(y.p_WB, [0.30, -0.07 + 0.32, 0.0], atol=1e-12)
 
 
 def test_turns_about_a_principal_axis_as_in_closed_form():
-    y = moved(KNOWING, Inputs(tau_B=np.array([0.0, 0.0, 0.1623])), 1.6)
+    y = moved(DEFAULT, Inputs(tau_B=np.array([0.0, 0.0, 0.1623])), 1.6)
     assert y.w_WB[2] == pytest.approx(1.6, rel=1e-12)
     assert Rotation.from_matrix(matrix(y.q_WB)).magnitude() == pytest.approx(0.5 * 1.6**2, rel=1e-9)
 
@@ -173,34 +173,13 @@ def test_agrees_with_mujoco_on_the_same_wrench():
 
 
 def test_sign_of_the_quaternion_never_jumps():
-    robot, u = FreeFlyer(replace(KNOWING, w_WB_0=np.array([0.0, 3.0, 0.0]))), Inputs()
+    robot, u = FreeFlyer(replace(DEFAULT, w_WB_0=np.array([0.0, 3.0, 0.0]))), Inputs()
     before = robot.outputs(0.0, u).q_WB
     for i in range(400):
         q = robot.step(0.016 * i, 0.016, u).q_WB
         assert q @ before > 0.99
         before = q
     assert before[0] < 0.0 or np.any(before < -0.5)
-
-
-def test_estimate_is_as_far_off_as_declared():
-    robot = FreeFlyer(replace(Params(seed=5), w_WB_0=np.array([0.3, 0.1, 0.0])))
-    offs: list[Floats] = []
-    for i in range(3000):
-        y = robot.step(0.016 * i, 0.016, Inputs())
-        turn = np.asarray((from_quaternion(y.q_WB).inv() * from_quaternion(y.q_WB_meas)).as_rotvec(), dtype=np.float64)
-        offs.append(np.concatenate([y.p_WB_meas - y.p_WB, turn, y.v_WB_meas - y.v_WB, y.w_WB_meas - y.w_WB]))
-        assert y.q_WB_meas @ y.q_WB > 0.99
-        assert np.linalg.norm(y.q_WB_meas) == pytest.approx(1.0, abs=1e-14)
-    deviation = np.std(offs, axis=0)
-    np.testing.assert_allclose(deviation, np.repeat([0.001, 0.002, 0.001, 0.002], 3), rtol=0.06)
-    correlation = np.corrcoef(np.transpose(offs)) - np.eye(12)
-    assert np.max(np.abs(correlation)) < 0.1
-
-
-def test_truth_does_not_depend_on_the_estimate():
-    a, b = moved(Params(seed=1), wrench(), 1.6), moved(Params(seed=2), wrench(), 1.6)
-    np.testing.assert_array_equal(a.p_WG, b.p_WG)
-    assert not np.array_equal(a.p_WB_meas, b.p_WB_meas)
 
 
 def test_asking_for_outputs_changes_nothing():
@@ -210,7 +189,7 @@ def test_asking_for_outputs_changes_nothing():
 
 
 def test_goes_on_bit_for_bit_after_a_state_is_restored():
-    u, a, b = wrench(), FreeFlyer(Params(seed=3)), FreeFlyer(Params(seed=3))
+    u, a, b = wrench(), FreeFlyer(TUMBLING), FreeFlyer(TUMBLING)
     walk(a, u, 20)
     state = a.get_state()
     expected = flat(walk(a, u, 20))
@@ -246,4 +225,4 @@ def test_all_faults_are_reported_together():
 
 def test_a_turn_that_cannot_be_followed_is_an_error():
     with pytest.raises(TurnsTooFast, match="rad/s"):
-        moved(replace(KNOWING, w_WB_0=np.array([0.0, 0.0, 400.0]), substep=0.016), Inputs(), 1.6)
+        moved(replace(DEFAULT, w_WB_0=np.array([0.0, 0.0, 400.0]), substep=0.016), Inputs(), 1.6)

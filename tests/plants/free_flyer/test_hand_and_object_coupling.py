@@ -22,7 +22,7 @@ from handover.plants.free_flyer.hand_and_object import (
     StartHolder,
 )
 
-FLYER = FlyerParams(position_noise=0.0, attitude_noise=0.0, velocity_noise=0.0, rate_noise=0.0)
+FLYER = FlyerParams()
 STILL = Params(motion=Motion.NONE, tremor_rms=0.0, drift_rms=0.0, p_WO_0=np.zeros(3))
 SIDES = np.array([0.021, 0.195, 0.017])
 I_O = 0.1 / 12.0 * np.diag(np.sum(SIDES**2) - SIDES**2)

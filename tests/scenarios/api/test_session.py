@@ -101,21 +101,21 @@ def test_the_whole_state_is_saved_and_restored(other: bool):
         state = s.save()
         s["thrusters.f_pose"] = [0.0, 0.0, 0.0]
         rest = [s.step(0.25) for _ in range(4)]
-        p_free = s["robot.p_WB_meas"]
+        p_free = s["navigation.p_WB_meas"]
         s.restore(state)
         assert s["thrusters.f_pose"].tolist() == [0.5, 0.0, 0.0]
         s.step(1)
-        p_pushed, outcome = s["robot.p_WB_meas"], s.outcome
+        p_pushed, outcome = s["navigation.p_WB_meas"], s.outcome
         assert not np.array_equal(p_free, p_pushed)
         with handover.open("flyer_impedance", seed=5) if other else s as again:
             again.restore(state)
             assert again.time == pytest.approx(0.704)
             again["thrusters.f_pose"] = [0.0, 0.0, 0.0]
             assert [again.step(0.25) for _ in range(4)] == rest
-            assert np.array_equal(again["robot.p_WB_meas"], p_free)
+            assert np.array_equal(again["navigation.p_WB_meas"], p_free)
             again.restore(state)
             again.step(1)
-            assert np.array_equal(again["robot.p_WB_meas"], p_pushed)
+            assert np.array_equal(again["navigation.p_WB_meas"], p_pushed)
             assert again.outcome == outcome
 
 

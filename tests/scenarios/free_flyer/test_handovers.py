@@ -38,7 +38,7 @@ def test_a_command_acts_in_the_step_that_follows_its_measurement():
     system = RobotToHuman().build(HandoverParameters(), 0, lambda name: cached(RobotToHuman.units[name], 3))
     schedule = Schedule(system)
     assert [s.unit for s in schedule.sampled] == ["decision", "impedance", "pose"]
-    assert [s.unit for s in schedule.continuous] == ["thrusters", "robot", "person"]
+    assert [s.unit for s in schedule.continuous] == ["thrusters", "robot", "navigation", "person"]
 
 
 @pytest.mark.slow

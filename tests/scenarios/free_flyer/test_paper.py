@@ -14,6 +14,7 @@ from handover.controllers.free_flyer.impedance_controller import Behaviour
 from handover.controllers.free_flyer.impedance_controller import Params as ImpedanceParams
 from handover.controllers.free_flyer.pose_controller import Params as PoseParams
 from handover.plants.free_flyer.free_flyer import Params as RobotParams
+from handover.plants.free_flyer.navigation import Params as NavigationParams
 from handover.plants.free_flyer.parameters import Params as PersonParams
 from handover.plants.free_flyer.push import Params as PushParams
 from handover.plants.free_flyer.thrusters import Params as ThrustersParams
@@ -25,6 +26,7 @@ Paper = dict[str, dict[str, dict[str, Any]]]
 
 CODE = {
     "robot": RobotParams,
+    "navigation": NavigationParams,
     "thrusters": ThrustersParams,
     "push": PushParams,
     "person": PersonParams,

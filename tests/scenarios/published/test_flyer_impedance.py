@@ -23,7 +23,7 @@ from handover.scenarios.published.free_flyer.push_runs import (
 )
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
-NUMBERS = ("duration", "mass_factor", "inertia_factor", "arm_factor", "robot.position_noise")
+NUMBERS = ("duration", "mass_factor", "inertia_factor", "arm_factor", "navigation.position_noise")
 
 
 def table_of(quick: bool = False, longest: float = 10.0, off: float = 0.004, back: bool = True) -> CampaignTable:
@@ -46,7 +46,7 @@ def table_of(quick: bool = False, longest: float = 10.0, off: float = 0.004, bac
         if duration > 2.0:
             size = 0.01 * (longest if behaviour is Behaviour.COMPLIANT else 1.0)
         other = any("factor" in name for name in given)
-        apart = off * (10.0 if other else 0.1 if "robot.position_noise" in given else 1.0)
+        apart = off * (10.0 if other else 0.1 if "navigation.position_noise" in given else 1.0)
         row |= {"greatest_position_error": size, "greatest_orientation_error": size, "success": True}
         row |= {"disagreement_position": apart, "disagreement_orientation": apart, "run": run.name}
         row["settling_time"] = 3.0 if given["propulsion"] == "ideal" or back else None
@@ -102,8 +102,8 @@ def test_a_run_is_found_by_what_it_is_for():
     usual, exact = runs.of(push, Behaviour.RIGID), runs.of(push, Behaviour.RIGID, exact=True)
     assert usual is not None
     assert exact is not None
-    assert usual["robot.position_noise"] is None
-    assert exact["robot.position_noise"] == 0.0
+    assert usual["navigation.position_noise"] is None
+    assert exact["navigation.position_noise"] == 0.0
     assert runs.of(push, Behaviour.RIGID, duration=7.0) is None
     assert len(runs.all_of()) == 12
 

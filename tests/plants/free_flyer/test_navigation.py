@@ -1,0 +1,225 @@
+"""The errors of the navigation's estimate against their laws, its delay and rate, and its state."""
+
+import itertools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.ports import Floats
+from handover.plants.free_flyer.navigation import (
+    Inputs,
+    InvalidNavigationParameters,
+    Navigation,
+    Outputs,
+    Params,
+)
+
+DT = 0.016
+EXACT = Params(position_noise=0.0, attitude_noise=0.0, velocity_noise=0.0, rate_noise=0.0)
+WHATS = ("position", "attitude", "velocity", "rate")
+P_0, V, W = np.array([0.3, -0.07, 0.1]), np.array([0.2, -0.1, 0.05]), np.array([0.0, 0.6, -0.8])
+UNLIKE_EACH_OTHER = {"position": 0.001, "attitude": 0.002, "velocity": 0.003, "rate": 0.004}
+DRIFTING = replace(EXACT, drift_time=2.0, **{f"{what}_drift": x for what, x in UNLIKE_EACH_OTHER.items()})
+
+
+def quaternion_of(turn: Rotation) -> Floats:
+    return np.asarray(turn.as_quat(scalar_first=True), dtype=np.float64)
+
+
+def turned(q: Floats) -> Rotation:
+    return Rotation.from_quat(q, scalar_first=True)
+
+
+def truth(t: float) -> Inputs:
+    """Return a robot that flies straight and turns evenly; its velocities grow with time, unlike a real one's."""
+    return Inputs(p_WB=P_0 + t * V, q_WB=quaternion_of(Rotation.from_rotvec(t * W)), v_WB=V + t * W, w_WB=W + t * V)
+
+
+def flat(y: Outputs) -> Floats:
+    return np.concatenate([np.ravel(getattr(y, v.name)) for v in describe(Navigation).outputs])
+
+
+def courses(p: Params, steps: int, dt: float = DT) -> list[Outputs]:
+    """Return the estimates at the start and after each step."""
+    unit = Navigation(p)
+    return [unit.outputs(0.0, truth(0.0)), *(unit.step(i * dt, dt, truth((i + 1) * dt)) for i in range(steps))]
+
+
+def off(y: Outputs, u: Inputs) -> Floats:
+    """Return by how much an estimate is off: position, rotation vector in the robot's frame, velocities."""
+    turn: Floats = np.asarray((turned(u.q_WB).inv() * turned(y.q_WB_meas)).as_rotvec(), dtype=np.float64)
+    return np.concatenate([y.p_WB_meas - u.p_WB, turn, y.v_WB_meas - u.v_WB, y.w_WB_meas - u.w_WB])
+
+
+def errors(p: Params, steps: int, dt: float = DT) -> Floats:
+    """Return by how much the estimates are off, a row a communication point."""
+    return np.array([off(y, truth(i * dt)) for i, y in enumerate(courses(p, steps, dt))])
+
+
+def each_axis(what: dict[str, float]) -> Floats:
+    return np.repeat([what[name] for name in WHATS], 3)
+
+
+def test_noise_is_white_and_as_far_off_as_declared():
+    off_by = errors(replace(Params(seed=5), **{f"{what}_noise": x for what, x in UNLIKE_EACH_OTHER.items()}), 4000)
+    np.testing.assert_allclose(np.std(off_by, axis=0), each_axis(UNLIKE_EACH_OTHER), rtol=0.05)
+    assert np.all(np.abs(np.mean(off_by, axis=0)) < 4.0 * each_axis(UNLIKE_EACH_OTHER) / np.sqrt(4000))
+    correlation = np.corrcoef(np.transpose(off_by)) - np.eye(12)
+    assert np.max(np.abs(correlation)) < 0.07
+    steps_apart = np.mean(off_by[1:] * off_by[:-1], axis=0) / np.var(off_by, axis=0)
+    assert np.max(np.abs(steps_apart)) < 0.07
+
+
+def test_noise_is_that_of_numpys_generator_by_the_seed():
+    rng, ys = np.random.default_rng(7), courses(Params(seed=7), 3)
+    for i, y in enumerate(ys):
+        n, u = rng.standard_normal(12), truth(i * DT)
+        np.testing.assert_array_equal(y.p_WB_meas, u.p_WB + 0.001 * n[:3])
+        np.testing.assert_array_equal(y.v_WB_meas, u.v_WB + 0.001 * n[6:9])
+        np.testing.assert_array_equal(y.w_WB_meas, u.w_WB + 0.002 * n[9:])
+        turn = turned(u.q_WB) * Rotation.from_rotvec(0.002 * n[3:6])
+        assert (turn.inv() * turned(y.q_WB_meas)).magnitude() < 1e-8
+
+
+def test_an_exact_estimate_is_the_truth_to_the_last_bit():
+    for i, y in enumerate(courses(EXACT, 20)):
+        u = truth(i * DT)
+        for name in ("p_WB", "v_WB", "w_WB"):
+            np.testing.assert_array_equal(getattr(y, f"{name}_meas"), getattr(u, name))
+        np.testing.assert_allclose(y.q_WB_meas, u.q_WB, atol=1e-15)
+
+
+def test_a_bias_is_constant_in_a_run_and_gaussian_over_the_seeds():
+    biased = replace(EXACT, **{f"{what}_bias": x for what, x in UNLIKE_EACH_OTHER.items()})
+    one_run = errors(replace(biased, seed=3), 50)
+    np.testing.assert_allclose(one_run, np.tile(one_run[0], (51, 1)), atol=1e-15)
+    over_seeds = np.array(
+        [off(Navigation(replace(biased, seed=n)).outputs(0.0, truth(0.0)), truth(0.0)) for n in range(2000)]
+    )
+    np.testing.assert_allclose(np.std(over_seeds, axis=0), each_axis(UNLIKE_EACH_OTHER), rtol=0.07)
+    assert np.all(np.abs(np.mean(over_seeds, axis=0)) < 4.0 * each_axis(UNLIKE_EACH_OTHER) / np.sqrt(2000))
+    normal = over_seeds / each_axis(UNLIKE_EACH_OTHER)
+    assert np.mean(np.abs(normal) < 1.0) == pytest.approx(0.6827, abs=0.015)  # of a normal distribution
+    assert np.max(np.abs(np.corrcoef(np.transpose(normal)) - np.eye(12))) < 0.1
+
+
+def test_drift_is_stationary_from_the_start_and_forgets_in_its_correlation_time():
+    steps, lag = 125, 62  # 2 s, and some half of the correlation time
+    runs = np.array([errors(replace(DRIFTING, seed=n), steps) for n in range(400)]) / each_axis(UNLIKE_EACH_OTHER)
+    for row in (0, lag, steps):
+        assert np.std(runs[:, row]) == pytest.approx(1.0, rel=0.04)
+    at_once, later = runs[:, : steps - lag], runs[:, lag:steps]
+    assert np.mean(at_once * later) == pytest.approx(np.exp(-lag * DT / 2.0), abs=0.05)
+    steps_of_it = np.diff(runs, axis=1)
+    assert np.std(steps_of_it) == pytest.approx(np.sqrt(2.0 * (1.0 - np.exp(-DT / 2.0))), rel=0.02)
+
+
+def test_drifts_statistics_do_not_depend_on_the_steps():
+    long, short = (
+        np.array([errors(replace(DRIFTING, seed=n), round(0.8 / dt), dt)[[0, -1], :3] for n in range(1500)])
+        for dt in (0.4, 0.1)
+    )
+    for runs in (long, short):
+        correlation = float(np.mean(runs[:, 0] * runs[:, 1])) / 0.001**2
+        assert correlation == pytest.approx(np.exp(-0.8 / 2.0), abs=0.05)
+
+
+def test_bias_and_drift_do_not_change_the_noise():
+    noise = errors(Params(seed=2), 30)
+    slow = replace(DRIFTING, rate_bias=0.01, position_bias=0.02, seed=2)
+    together = errors(replace(slow, **{f"{w}_noise": getattr(Params(), f"{w}_noise") for w in WHATS}), 30)
+    np.testing.assert_allclose(together, noise + errors(slow, 30), atol=1e-7)  # small turns do not quite commute
+    assert np.std(together - noise) > 0.001
+
+
+@pytest.mark.parametrize("delay", [0.016, 0.048, 0.05, 0.1, 0.0037])
+@pytest.mark.parametrize("dt", [0.016, 0.002])
+def test_a_delay_is_exact_on_a_ramp(delay: float, dt: float):
+    for i, y in enumerate(courses(replace(EXACT, delay=delay), 150, dt)):
+        np.testing.assert_allclose(off(y, truth(max(i * dt - delay, 0.0))), 0.0, atol=3e-8)
+
+
+def test_a_delayed_estimate_keeps_the_quaternions_sign():
+    ys = courses(replace(EXACT, delay=0.05), 900)
+    assert all(a.q_WB_meas @ b.q_WB_meas > 0.99 for a, b in itertools.pairwise(ys))
+    assert min(y.q_WB_meas[0] for y in ys) < -0.99
+
+
+@pytest.mark.parametrize(("rate", "delay"), [(5.0, 0.0), (5.0, 0.13), (62.5, 0.0), (40.0, 0.05), (1000.0, 0.0)])
+def test_an_estimate_is_held_between_updates(rate: float, delay: float):
+    for i, y in enumerate(courses(replace(EXACT, update_rate=rate, delay=delay), 300)):
+        updated = np.floor(i * DT * rate + 1e-6) / rate
+        np.testing.assert_allclose(off(y, truth(max(updated - delay, 0.0))), 0.0, atol=3e-8)
+
+
+def test_a_held_estimate_has_one_noise():
+    ys = np.array([flat(y) for y in courses(Params(update_rate=5.0), 125)])
+    assert len(np.unique(ys, axis=0)) == 11  # one at the start, and ten in two seconds
+
+
+def test_asking_for_outputs_changes_nothing():
+    p = replace(DRIFTING, position_noise=0.001, delay=0.03, update_rate=20.0)
+    a, b = Navigation(p), Navigation(p)
+    for i in range(20):
+        u = truth(i * DT)
+        np.testing.assert_array_equal(flat(a.outputs(i * DT, u)), flat(a.outputs(i * DT, u)))
+        if i == 0:
+            b.outputs(0.0, u)
+        after = truth((i + 1) * DT)
+        np.testing.assert_array_equal(flat(a.step(i * DT, DT, after)), flat(b.step(i * DT, DT, after)))
+
+
+@pytest.mark.parametrize(
+    "p",
+    [
+        Params(seed=3),
+        replace(DRIFTING, seed=3, position_bias=0.01, position_noise=0.001),
+        replace(DRIFTING, seed=3, attitude_noise=0.002, update_rate=13.0, delay=0.1),
+    ],
+)
+def test_goes_on_bit_for_bit_after_a_state_is_restored(p: Params):
+    def go(unit: Navigation) -> Floats:
+        return np.array([flat(unit.step(i * DT, DT, truth((i + 1) * DT))) for i in range(20, 60)])
+
+    a, b = Navigation(p), Navigation(p)
+    a.outputs(0.0, truth(0.0))
+    for i in range(20):
+        a.step(i * DT, DT, truth((i + 1) * DT))
+    state = a.get_state()
+    expected = go(a)
+    for unit in (a, b):
+        unit.set_state(state)
+        np.testing.assert_array_equal(go(unit), expected)
+
+
+@pytest.mark.parametrize("name", ["noise", "bias", "drift"])
+@pytest.mark.parametrize("what", WHATS)
+def test_a_negative_deviation_is_refused(what: str, name: str):
+    changes: dict[str, Any] = {f"{what}_{name}": -0.001}
+    with pytest.raises(InvalidNavigationParameters, match=f"{what}_{name}: -0.001"):
+        Navigation(replace(EXACT, **changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"delay": -0.1}, "delay: -0.1"),
+        ({"delay": float("nan")}, "delay: nan is not finite"),
+        ({"update_rate": -1.0}, "update_rate: -1"),
+        ({"attitude_bias": 3.0}, "attitude_bias: 3"),
+        ({"position_drift": 0.01}, "position_drift 0.01 needs a correlation time: drift_time must be greater than 0 s"),
+    ],
+)
+def test_what_no_navigation_has_is_refused(changes: dict[str, Any], text: str):
+    with pytest.raises(InvalidNavigationParameters, match=text):
+        Navigation(replace(Params(), **changes))
+
+
+def test_all_faults_are_reported_together():
+    with pytest.raises(InvalidNavigationParameters) as caught:
+        Navigation(Params(delay=-1.0, update_rate=-1.0, rate_noise=-1.0))
+    assert len(caught.value.faults) == 3
