@@ -1,6 +1,6 @@
 """A free-flyer's model of itself with a moving arm: J, B, C of [Fernandes2020] eqs. (3.10)-(3.24), with twists.
 
-xi' = (v_WB, w_WB, q_J'), (6 + n,), in W: in place of rates of Euler angles, angular velocities, so that N of eq. (3.4) is
+xi' = (v_WB, w_WB, q_J'), (6 + n,), in W: angular velocities in place of Euler angles' rates, so that N of eq. (3.4) is
 the identity and Q of eq. (3.5) is R_WB^T. x' = (v_WG, w_WG).
 """
 
@@ -68,7 +68,7 @@ class ArmModel:
 
 
 class Chain:
-    """The robot's links at base attitude R_WB (3, 3), base rate w_WB (3,) in W, and angles and rates of the joints (n,).
+    """The robot's links at base attitude R_WB (3, 3), base rate w_WB (3,) in W, angles and rates of the joints (n,).
 
     Everything is in the axes of W, places seen from B.
 
@@ -140,7 +140,7 @@ class Chain:
 
 
 def mass_matrix(chain: Chain) -> Floats:
-    """Return B (6 + n, 6 + n) of eq. (3.22): the sum of J_i^T diag(m_i, H_i) J_i over base and links, and the rotors."""
+    """Return B (6 + n, 6 + n) of eq. (3.22): the sum of J_i^T diag(m_i, H_i) J_i over base and links, and rotors."""
     n = len(chain.axes)
     B = np.diag([*np.zeros(6), *chain.model.rotors[:n]])
     for i in range(n + 1):
