@@ -61,7 +61,7 @@ def export_command(
         start_from_enumerations(system, {n: unit for n, unit in experiment.units.items() if n not in others})
         warn_of_enumerations(system, others)
         try:
-            write_ssp(system, file, experiment.name, stop, experiment.parallel_step)
+            write_ssp(system, file, experiment.name, stop, instance.step_in_parallel(values))
         except OSError as e:
             raise UsageError(f"--ssp {file}: it cannot be written: {e.strerror}") from e
         for line in system.notes:

@@ -49,8 +49,9 @@ def experiment_system(
         InvalidFmu, InvalidParameter, ScenarioFailed: see `built_system`.
     """
     system = built_system(experiment, parameters, seed, fmus, unit_values)
-    if options.algorithm is Algorithm.JACOBI and experiment.parallel_step is not None:
-        system.set_step(experiment.parallel_step)
+    step = experiment.step_in_parallel(parameters)
+    if options.algorithm is Algorithm.JACOBI and step is not None:
+        system.set_step(step)
     return system
 
 

@@ -157,7 +157,8 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
     """Whether it draws random numbers, which follow from the seed."""
     parallel_step: ClassVar[Fraction | None] = None
     """Communication step, s, of all units where they step in parallel (Jacobi): each then hands on its results a step
-    late, which the loop must bear. None where it bears the steps that the units propose."""
+    late, which the loop must bear. None where it bears the steps that the units propose. One that follows from
+    parameters: `step_in_parallel`."""
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
@@ -200,6 +201,10 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         evaluator = self.evaluator(parameters)
         evaluator.bind(parameters)
         return evaluator
+
+    def step_in_parallel(self, parameters: Any) -> Fraction | None:  # noqa: ARG002
+        """Return the communication step, s, of all units where they step in parallel; by default `parallel_step`."""
+        return self.parallel_step
 
     def evaluator_of_record(self, parameters: Any, pictures: Sequence[CameraPicture]) -> AnyEvaluator:  # noqa: ARG002
         """Return an evaluator to which a finished run is replayed from its record.

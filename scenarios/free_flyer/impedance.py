@@ -35,7 +35,6 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
         "navigation": "Navigation",
     }
     places: ClassVar[Mapping[str, Place]] = PLACES_OF_PUSH
-    parallel_step: ClassVar[Fraction | None] = Fraction(1, 500)
     headline: ClassVar[tuple[str, ...]] = (
         "greatest_position_error",
         "greatest_orientation_error",
@@ -85,6 +84,10 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
     def stop_time(self, parameters: ImpedanceParameters) -> Fraction:
         """Return the end of the push, plus the patience for the return to rest."""
         return parameters.stop
+
+    def step_in_parallel(self, parameters: ImpedanceParameters) -> Fraction:
+        """Return the parameter's."""
+        return parameters.step_in_parallel
 
     def evaluator(self, parameters: ImpedanceParameters) -> ImpedanceEvaluator:
         """Return the evaluator of one push."""

@@ -151,11 +151,19 @@ class ImpedanceParameters(RobotAndModel):
     delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
     delay_known: bool = parameter(True, "whether the controller knows the delay, and rejects one it is unstable with")
     patience: Second = parameter(60.0, "time after the push by which the robot must rest", minimum=1.0, maximum=600.0)
+    parallel_step: Second = parameter(
+        0.002, "communication step in a host that steps all units in parallel (Jacobi)", minimum=0.0005, maximum=0.016
+    )
 
     @property
     def end(self) -> float:
         """Time at which the push ends, s."""
         return self.begin + self.duration
+
+    @property
+    def step_in_parallel(self) -> Fraction:
+        """The communication step where all units step in parallel, exactly as it is printed, s."""
+        return Fraction(repr(self.parallel_step))
 
     @property
     def stop(self) -> Fraction:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from handover.scenarios.published.free_flyer.flyer_impedance import FlyerImpedanceTable
+from handover.scenarios.published.free_flyer.flyer_stability import FlyerStability
 from handover.scenarios.published.helix.helix_1 import Helix1
 from handover.scenarios.published.helix.helix_2 import Helix2
 from handover.scenarios.published.helix.helix_3 import Helix3
@@ -15,6 +16,7 @@ from handover.scenarios.published.published_experiment import PublishedExperimen
 
 _ALL: tuple[type[PublishedExperiment], ...] = (
     FlyerImpedanceTable,
+    FlyerStability,
     Helix1,
     Helix2,
     Helix3,

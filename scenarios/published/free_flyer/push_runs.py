@@ -142,6 +142,14 @@ def _value(row: Mapping[str, Any], name: str) -> Any:
     return getattr(_DEFAULT, name, None) if value is None or value != value else value
 
 
+@cache
+def linear_loop(behaviour: Behaviour, lag: float = 0.0, delay: float = 0.0) -> SampledLoop:
+    """Return the body near rest under eq. (3.25) with table 4.1, with a lag of the propulsion and a delay, both s."""
+    model = _DEFAULT.model
+    body = FlyerBody(mass=model.mass, I_B=model.I_B, p_BG=model.p_BG)
+    return SampledLoop(body.linear_plant(lag), published_gains(Gains(behaviour), body).law(body), float(PERIOD), delay)
+
+
 def predicted_errors(push: Push, behaviour: Behaviour, duration: float, t: Floats) -> tuple[Floats, Floats]:
     """Return position and orientation error, rest minus actual, each (n, 3), m and rad, by python-control.
 
@@ -155,8 +163,7 @@ def predicted_errors(push: Push, behaviour: Behaviour, duration: float, t: Float
         t: multiples of the controller's period, (n,), s.
     """
     p, period = _DEFAULT, float(PERIOD)
-    body = FlyerBody(mass=p.model.mass, I_B=p.model.I_B, p_BG=p.model.p_BG)
-    loop = SampledLoop(body.linear_plant(0.0), published_gains(Gains(behaviour), body).law(body), period)
+    loop = linear_loop(behaviour)
     wrench = np.zeros((len(t), 6))
     held = np.clip((p.begin + duration - t) / period, 0.0, 1.0) - np.clip((p.begin - t) / period, 0.0, 1.0)
     wrench[:, 3 * int(push.kind) + int(push.axis)] = held * (p.force if push.kind is Wrench.FORCE else p.torque)

@@ -1,0 +1,56 @@
+"""The map of the free-flyer's stability: the plan, and how it is judged, on tables that a test makes up."""
+
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pytest
+
+from handover.scenarios.campaign.plan_check import checked_plan
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.free_flyer.parameters import Behaviour
+from handover.scenarios.published.free_flyer.flyer_stability import FlyerStability
+from handover.scenarios.published.free_flyer.push_runs import linear_loop
+from handover.scenarios.published.published_experiment import Verdict
+
+
+def table_of(late: float = 0.0, quick: bool = False) -> CampaignTable:
+    """Return the plan's runs, at rest as the poles say with the coupling's three steps and a delay besides, s."""
+    rows: list[dict[str, Any]] = []
+    for run in FlyerStability().plan(quick).runs():
+        given = run.parameters
+        behaviour, lags = Behaviour[given["behaviour"].upper()], given["propulsion"] == "limited"
+        step, delay = float(given["parallel_step"]), float(given["delay"])
+        radius = linear_loop(behaviour, 0.02 if lags else 0.0, round(3 * step + delay + late, 6)).pole_radius
+        row = {name: given[name] for name in ("behaviour", "propulsion")}
+        row |= {"parallel_step": step, "delay": delay, "status": "done", "run": run.name}
+        rows.append(row | {"settling_time": 2.0 if radius < 1.0 else None})
+    return CampaignTable(pa.Table.from_pylist(rows))
+
+
+def test_the_plans_are_sound_and_have_runs_on_both_sides():
+    for quick in (False, True):
+        assert checked_plan(FlyerStability().plan(quick)).size > 10
+
+
+@pytest.mark.parametrize(("late", "verdict"), [(0.0, Verdict.REPRODUCED), (0.006, Verdict.NOT_REPRODUCED)])
+def test_runs_that_differ_from_the_poles_are_noticed(late: float, verdict: Verdict):
+    (claim,) = FlyerStability().claims(table_of(late))
+    assert claim.verdict is verdict, claim.measured
+
+
+def test_a_table_without_runs_is_no_result():
+    (claim,) = FlyerStability().claims(CampaignTable(pa.Table.from_pylist([{"status": "failed"}])))
+    assert claim.verdict is Verdict.NOT_COMPARABLE
+
+
+def test_the_table_has_a_row_for_each_loop_and_step():
+    (table,) = FlyerStability().tables(table_of())
+    assert len(table.rows) == 20
+    rigid = next(row for row in table.rows if row[:2] == ["rigid, without lag", "4"])
+    assert rigid[2:] == ["14.7", "14", "16"]
+
+
+def test_its_figure_is_drawn(tmp_path: Path):
+    (drawn,) = FlyerStability().draw(table_of(), tmp_path, tmp_path)
+    assert (tmp_path / f"{drawn.name}.png").stat().st_size > 20_000
