@@ -10,9 +10,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.cosim.blocks.ports import Vector3, output, parameter, port
+from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.ports import Floats, Vector2, Vector3, Vector12, output, parameter, port
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.cosim.blocks.units import Newton, NewtonMetre, Second
+from handover.cosim.blocks.units import Newton, NewtonMetre, Number, Radian, RadianPerSecond, Second
+from handover.plants.free_flyer.nozzles import LARGEST_ANGLE, Nozzles, PropulsionModules, lost_directions
 
 _Command = list[float]
 _COMMANDS = ("f_pose", "tau_pose", "f_impedance", "tau_impedance")
@@ -25,11 +27,23 @@ class Propulsion(enum.IntEnum):
     """At once and without limits."""
     LIMITED = 1
     """With limits of each axis, and a lag."""
+    NOZZLES = 2
+    """By twelve nozzles on two plenums, whose flappers and impellers take their time."""
+
+
+class InvalidThrusterParameters(InvalidParameters):
+    """Parameters of thrusters that cannot fly a robot; `faults` lists all of them."""
+
+    block = "Thrusters"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Params:
-    """Limits of NASA's Astrobee as published; lag and delay are assumed."""
+    """Limits of NASA's Astrobee as published; lag and delay are assumed.
+
+    Of nozzles, the impellers' highest speed is published, and the flappers' lag and rate follow from the published
+    model of their servos; `thrust_factor` makes the largest force along each axis `f_max`.
+    """
 
     f_max: Vector3[Newton] = parameter(
         np.array([0.55, 0.39, 0.45]), "largest force, an axis", minimum=0.0, maximum=1000.0
@@ -39,7 +53,46 @@ class Params:
     )
     lag: Second = parameter(0.02, "time constant of the first-order lag", minimum=0.0, maximum=10.0)
     delay: Second = parameter(0.0, "how long a command takes to arrive", minimum=0.0, maximum=10.0)
-    propulsion: Propulsion = parameter(Propulsion.LIMITED, "without limits or lag, or with both; the delay stays")
+    propulsion: Propulsion = parameter(Propulsion.LIMITED, "without limits or lag, with both, or by nozzles; all delay")
+    impeller_speed: RadianPerSecond = parameter(
+        293.2153, "NOZZLES: speed of the impellers, 2800 rpm", minimum=50.0, maximum=1000.0
+    )
+    impeller_speed_0: RadianPerSecond = parameter(
+        293.2153, "NOZZLES: their speed at the start", minimum=0.0, maximum=1000.0
+    )
+    impeller_lag: Second = parameter(0.5, "NOZZLES: time constant of that speed", minimum=0.0, maximum=100.0)
+    flapper_lag: Second = parameter(0.0386, "NOZZLES: time constant of the flappers", minimum=0.0, maximum=10.0)
+    flapper_rate: RadianPerSecond = parameter(
+        62.0, "NOZZLES: speed at which flappers turn at most", minimum=0.001, maximum=1e9
+    )
+    flapper_range: Vector12[Number] = parameter(
+        np.ones(12), "NOZZLES: part of its angle to which each opens, 0: stuck closed", minimum=0.0, maximum=1.0
+    )
+    thrust_factor: Vector3[Number] = parameter(
+        np.array([1.1283, 1.3574, 1.1521]), "NOZZLES: thrust along x, y, z over 2 dp C_d^2 A", minimum=0.1, maximum=10.0
+    )
+
+    def check(self) -> None:
+        """Raise InvalidThrusterParameters if stuck nozzles leave a force or a torque that the others cannot give."""
+        stuck = [i for i, part in enumerate(np.asarray(self.flapper_range).tolist()) if part == 0.0]
+        lost = lost_directions(stuck) if stuck and self.propulsion is Propulsion.NOZZLES else []
+        if lost:
+            numbers = ", ".join(str(i + 1) for i in stuck)
+            raise InvalidThrusterParameters(
+                [f"flapper_range: with nozzles {numbers} stuck closed there is no {', no '.join(lost)}; open one"]
+            )
+
+    def modules(self) -> PropulsionModules:
+        """Return the nozzles with closed flappers."""
+        return PropulsionModules(
+            nozzles=Nozzles(np.asarray(self.thrust_factor), self.impeller_speed),
+            flapper_lag=self.flapper_lag,
+            flapper_rate=self.flapper_rate,
+            impeller_lag=self.impeller_lag,
+            largest=LARGEST_ANGLE * np.asarray(self.flapper_range),
+            angles=np.zeros(12),
+            speeds=np.full(2, self.impeller_speed_0),
+        )
 
 
 @dataclass(kw_only=True)
@@ -58,7 +111,9 @@ class Outputs:
 
     f_B: Vector3[Newton] = output("force at the centre of mass, mean over the step")
     tau_B: Vector3[NewtonMetre] = output("torque, mean over the step")
-    saturated: bool = output("an axis was commanded more than it has")
+    saturated: bool = output("more was commanded than there is")
+    flapper_angles: Vector12[Radian] = output("NOZZLES: how far each nozzle's flappers are open; else 0")
+    impeller_speeds: Vector2[RadianPerSecond] = output("NOZZLES: of the two modules; else 0")
 
 
 class Thrusters:
@@ -68,49 +123,77 @@ class Thrusters:
     y <- c + (y - c) e^(-d/T) and its integral is c d + (y - c) T (1 - e^(-d/T)). The outputs are the mean over the
     step that ends, so that the robot gets the whole impulse; in a system the thrusters come before the robot, which
     then uses the mean in the same step. Where a delay is no multiple of the step, two commands share it.
+
+    With nozzles the clipped command is shared among twelve, and scaled down where they do not have it (`Nozzles`); it
+    is their thrusts that are delayed, and flappers and impellers that lag (`PropulsionModules`). Axes are clipped first
+    as Astrobee's controller does, or a twist of forty times the largest torque would leave a fortieth of the force.
+    That impellers turn the robot as they change their speed, or by its turning, is left out: the two turn opposite
+    ways.
+
+    Raises:
+        InvalidThrusterParameters: by the constructor, stuck nozzles leave a force or a torque that there is not.
     """
 
-    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(("f_B", "tau_B", "saturated"), _COMMANDS)
+    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        **dict.fromkeys(("f_B", "tau_B", "saturated", "flapper_angles"), _COMMANDS),
+        "impeller_speeds": (),
+    }
     period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: Params) -> None:
+        params.check()
         self._limits: list[float] = [*np.asarray(params.f_max).tolist(), *np.asarray(params.tau_max).tolist()]
         self._ideal = params.propulsion is Propulsion.IDEAL
+        self._modules = params.modules() if params.propulsion is Propulsion.NOZZLES else None
         self._lag = 0.0 if self._ideal else params.lag
         self._delayed = params.delay > 0.0
         self._delay_line: deque[tuple[float, _Command]] = deque()  # seconds and command, oldest first
         if self._delayed:
-            self._delay_line.append((params.delay, [0.0] * 6))
+            self._delay_line.append((params.delay, [0.0] * (6 if self._modules is None else 12)))
         self._thrust: _Command = [0.0] * 6
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the thrust at this instant; no time passes."""
-        command = _sum(u)
-        clipped = command if self._ideal else self._clip(command)
-        thrust = clipped if self._lag == 0.0 and not self._delayed else self._thrust
-        return _outputs(thrust, clipped != command)
+        command, saturated = self._command(u)
+        if self._modules is not None:
+            return self._outputs(self._modules.wrench().tolist(), saturated)
+        thrust = command if self._lag == 0.0 and not self._delayed else self._thrust
+        return self._outputs(thrust, saturated)
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Advance from t by dt with u held."""
-        command = _sum(u)
-        clipped = command if self._ideal else self._clip(command)
+        command, saturated = self._command(u)
         if self._delayed:
             total = [0.0] * 6
-            for d, arrived in self._delay(dt, clipped):
+            for d, arrived in self._delay(dt, command):
                 part = self._follow(d, arrived)
                 total = [a + b for a, b in zip(total, part, strict=True)]
         else:
-            total = self._follow(dt, clipped)
-        return _outputs([a / dt for a in total], clipped != command)
+            total = self._follow(dt, command)
+        return self._outputs([a / dt for a in total], saturated)
 
     def get_state(self) -> bytes:
         """Return the complete state."""
-        return pack_state((self._thrust, list(self._delay_line)))
+        modules = None if self._modules is None else (self._modules.angles, self._modules.speeds)
+        return pack_state((self._thrust, list(self._delay_line), modules))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of these thrusters or of ones with equal parameters."""
-        self._thrust, delay_line = unpack_state(state)
+        self._thrust, delay_line, modules = unpack_state(state)
         self._delay_line = deque(delay_line)
+        if self._modules is not None:
+            self._modules.angles, self._modules.speeds = modules
+
+    def _command(self, u: Inputs) -> tuple[_Command, bool]:
+        """Return what is to be given, a wrench or the thrusts of nozzles, and whether it is less than commanded."""
+        command = _sum(u)
+        if self._ideal:
+            return command, False
+        clipped = self._clip(command)
+        if self._modules is None:
+            return clipped, clipped != command
+        thrusts, scaled = self._modules.nozzles.allocate(np.array(clipped))
+        return thrusts.tolist(), scaled or clipped != command
 
     def _clip(self, command: _Command) -> _Command:
         return [c if -m <= c <= m else math.copysign(m, c) for c, m in zip(command, self._limits, strict=True)]
@@ -130,7 +213,9 @@ class Thrusters:
         return arrived
 
     def _follow(self, d: float, command: _Command) -> _Command:
-        """Advance the thrust by d seconds of a command; return its integral."""
+        """Advance the thrust by d seconds of a command; return its integral, a wrench."""
+        if self._modules is not None:
+            return self._modules.advance(d, np.array(command)).tolist()
         T = self._lag
         if T == 0.0:
             self._thrust = command
@@ -141,13 +226,14 @@ class Thrusters:
         self._thrust = [c + (y - c) * decay for c, y in zip(command, before, strict=True)]
         return [c * d + (y - c) * area for c, y in zip(command, before, strict=True)]
 
+    def _outputs(self, thrust: _Command, saturated: bool) -> Outputs:
+        y, modules = np.array(thrust), self._modules
+        angles: Floats = np.zeros(12) if modules is None else np.array(modules.angles)
+        speeds: Floats = np.zeros(2) if modules is None else np.array(modules.speeds)
+        return Outputs(f_B=y[:3], tau_B=y[3:], saturated=saturated, flapper_angles=angles, impeller_speeds=speeds)
+
 
 def _sum(u: Inputs) -> _Command:
     (a, b, c), (d, e, f) = u.f_pose.tolist(), u.f_impedance.tolist()
     (g, h, i), (j, k, l) = u.tau_pose.tolist(), u.tau_impedance.tolist()
     return [a + d, b + e, c + f, g + j, h + k, i + l]
-
-
-def _outputs(thrust: _Command, saturated: bool) -> Outputs:
-    y = np.array(thrust)
-    return Outputs(f_B=y[:3], tau_B=y[3:], saturated=saturated)
