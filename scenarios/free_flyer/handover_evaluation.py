@@ -102,8 +102,6 @@ class Transfer:
 _SETTLING = 1.0
 """How long the receiver must keep the object when the robot is done, s (assumed)."""
 
-_LEAST_FORCE = 0.05
-"""Force on the gripper by which a person is taken to touch it, N (assumed): at rest the object alone gives less."""
 _CLOSING = ("GRASP_OBJECT", "CLOSE_GRIPPER")
 """Phases at whose end the gripper is closed."""
 
@@ -140,6 +138,7 @@ class HandoverEvaluator(Evaluator):
         self._arrival: tuple[float, float] | None = None
         self._nearest = math.inf
         self._angles: dict[str, float] = {}
+        self._unprovoked = 0
         self._lost: float | None = None
         self._stability: dict[str, Metric] = {}
 
@@ -158,7 +157,8 @@ class HandoverEvaluator(Evaluator):
         if self.transfers and self._phase not in _NOT_YIELDING:
             self.transfers[-1].displaced((x, y, z), self._place)
             if self._phase in ("SIGNAL", "CHECK_VELOCITY"):
-                touches = self._holder == "BOTH" or math.hypot(*signals["person.f_G"].tolist()) > _LEAST_FORCE
+                pushed = self._holder != "GRIPPER" and bool(signals["person.f_G"].any())
+                touches = pushed or self._holder == "BOTH"
                 self.transfers[-1].touched |= touches
             if self._phase == "CHECK_VELOCITY":
                 self.transfers[-1].waited(speed)
@@ -188,6 +188,7 @@ class HandoverEvaluator(Evaluator):
             self.transfers.append(Transfer(self.receivers[len(self.transfers)], t))
         if left == "CHECK_VELOCITY" and phase != "GIVEN_UP" and self._under_way is not None:
             self._under_way.felt, self._under_way.speed = t, speed
+            self._unprovoked += not self._under_way.touched
 
     def _closed(self, angle: float, holder: str) -> None:
         """Keep the angle of a gripper that has closed, rad: the least one on the object, the greatest on nothing."""
@@ -239,6 +240,9 @@ class HandoverEvaluator(Evaluator):
         if "GRIPPER" in self.receivers:
             empty = "receptions after which the robot found its gripper empty"
             metrics["failed_receptions"] = Metric(self._failed, "1", empty)
+        if self.transfers:
+            alone = "times that the robot let go, or closed, though nobody had touched it since its signal"
+            metrics["unprovoked"] = Metric(self._unprovoked, "1", alone)
         if self._arrival is not None:
             metrics["arrival_error"] = Metric(
                 self._arrival[0], "m", "gripper to its handover place when it arrived and began to yield"

@@ -12,7 +12,7 @@ from handover.scenarios.experiment.paper import paper_values
 
 
 class _OfUnit(enum.IntEnum):
-    """An enumeration that a unit has, too."""
+    """An enumeration whose items have, in texts and in the units, names in lower case."""
 
     @property
     def item(self) -> str:
@@ -98,18 +98,13 @@ class HandoverParameters(RobotAndModel):
     )
 
 
-class Task(enum.IntEnum):
+class Task(_OfUnit):
     """The four handovers."""
 
     ROBOT_TO_HUMAN = 0
     HUMAN_TO_ROBOT = 1
     FAILED_RECEPTION = 2
     COLLABORATIVE = 3
-
-    @property
-    def item(self) -> str:
-        """The item's name as a parameter's text."""
-        return self.name.lower()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -220,6 +220,17 @@ def test_the_speed_at_rest_is_that_before_anybody_touches_the_gripper():
     assert metrics["transfer_rest_speed"].value == 0.004
     assert metrics["transfer_speed"].value == 0.04
     assert metrics["transfer_felt_after"].value == pytest.approx(3.2)
+    assert metrics["unprovoked"].value == 0
+
+
+def test_a_gripper_that_acts_with_nobody_at_it_is_counted():
+    alone = [
+        (10.0, signals(Phase.SIGNAL, Holder.GRIPPER)),
+        (11.0, signals(Phase.CHECK_VELOCITY, Holder.GRIPPER, speed=0.06, force=0.1)),
+        (11.1, signals(Phase.RELEASE_OBJECT, Holder.GRIPPER, speed=0.07)),
+    ]
+    assert follow(to_person(), *alone).outcome().metrics["unprovoked"].value == 1
+    assert follow(to_person(), *given()).outcome().metrics["unprovoked"].value == 0
 
 
 def test_the_angles_of_a_closed_gripper_are_told_apart_by_what_is_in_it():
