@@ -110,7 +110,8 @@ class CampaignResults:
         """Whether a parameter is a number, neither an array nor a name."""
         variable = self.declared.get(parameter)
         if variable is None:  # of a unit: by what its values look like
-            return all(is_number(values[parameter]) for values in self._values if parameter in values)
+            given = (*self._values, self.metadata["fixed"])
+            return all(is_number(values[parameter]) for values in given if parameter in values)
         return variable.kind in (Kind.REAL, Kind.INTEGER) and not variable.shape
 
     def is_boolean(self, parameter: str) -> bool:

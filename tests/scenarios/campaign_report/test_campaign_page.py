@@ -75,6 +75,12 @@ def test_metrics_that_are_not_numbers_leave_gaps(tmp_path: Path):
     )
 
 
+def test_a_units_parameter_that_is_fixed_to_a_name_is_shown_by_it(tmp_path: Path):
+    plan = campaign_metadata("ir_grasp", POINTS) | {"fixed": {"scene.material": "soft", "scene.mass": "0.1"}}
+    html = page_of(tmp_path, plan, table_of(POINTS))
+    assert "soft" in html[html.index("Fixed parameters") :]
+
+
 def test_a_parameter_that_some_points_leave_alone_is_reported_as_a_gap(tmp_path: Path):
     points = [
         {"strategy": "reflex", "thing": "cylinder"},
