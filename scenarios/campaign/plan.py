@@ -53,7 +53,8 @@ class CampaignPlan:
         scenes: if paired, parameters whose values have seeds of their own: points that differ in them share no seeds,
             so that their runs can be counted together.
         units: what takes the place of units in all runs, by the units' names: files of FMUs, or paths of blocks.
-        varied_units: units that points give other FMUs; a point names the file or the block by the unit's name.
+        varied_units: units that points give other FMUs; a point names the file or the block by the unit's name, or
+            leaves it as it is in the other runs.
         options: how units are run.
         stop: when each run ends, s; None: as the scenario says.
         log_level: from which level on each run's log.txt has logs, see `log_told`.
@@ -86,7 +87,8 @@ class CampaignPlan:
 
     def fmus(self, point: int, fmus: Mapping[str, Path]) -> dict[str, Path]:
         """Return the FMU of each unit at a point, out of a campaign's FMUs, in which varied units have `unit_key`."""
-        own = {unit: fmus[unit_key(unit, self.points[point][unit])] for unit in self.varied_units}
+        given = self.points[point]
+        own = {unit: fmus[unit_key(unit, given[unit])] for unit in self.varied_units if unit in given}
         return {name: path for name, path in fmus.items() if "=" not in name} | own
 
     def runs(self) -> tuple[PlannedRun, ...]:

@@ -64,7 +64,7 @@ def checked_plan(plan: CampaignPlan) -> CampaignPlan:
     points: list[dict[str, str]] = []
     for number, point in enumerate(plan.points):
         try:
-            chosen = {unit: point[unit] for unit in plan.varied_units}
+            chosen = {unit: point[unit] for unit in plan.varied_units if unit in point}
             parameters, of_units = split_parameters(experiment, plan.texts(number))
             _check_together(experiment, parameters, point)
             texts = {v.name: text_of(v, getattr(parameters, v.name)) for v in experiment.parameters()}
@@ -89,11 +89,16 @@ def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
     experiment = find_scenario(plan.scenario)
     others = replacements(experiment, [f"{name}={other}" for name, other in plan.units.items()])
     fmus: dict[str, Path] = {}
-    for chosen in dict.fromkeys(tuple(point[unit] for unit in plan.varied_units) for point in plan.points):
-        varied = dict(zip(plan.varied_units, chosen, strict=True))
+    for chosen in dict.fromkeys(_chosen_units(plan, point) for point in plan.points):
+        varied = {unit: other for unit, other in zip(plan.varied_units, chosen, strict=True) if other}
         found = select_fmus(experiment, {**others, **varied}, lambda unit: cached(unit, 3))
         fmus |= {unit_key(name, varied[name]) if name in varied else name: path for name, path in found.items()}
     return fmus
+
+
+def _chosen_units(plan: CampaignPlan, point: Mapping[str, str]) -> tuple[str, ...]:
+    """Return what a point puts in the place of each unit that is varied, "" where nothing."""
+    return tuple(point.get(unit, "") for unit in plan.varied_units)
 
 
 def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
@@ -114,7 +119,7 @@ def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
         instance.stop_time(parameters)
     first: dict[tuple[str, ...], int] = {}
     for number, point in enumerate(plan.points):
-        first.setdefault(tuple(point[unit] for unit in plan.varied_units), number)
+        first.setdefault(_chosen_units(plan, point), number)
     for number in first.values():
         system = built_system(instance, parameters, plan.seed, plan.fmus(number, fmus), {})
         _check_unit_values(system, plan)
