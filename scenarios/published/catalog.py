@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 
+from handover.scenarios.published.free_flyer.flyer_approaches import FlyerApproaches
+from handover.scenarios.published.free_flyer.flyer_handover import FlyerHandoverTable
 from handover.scenarios.published.free_flyer.flyer_impedance import FlyerImpedanceTable
 from handover.scenarios.published.free_flyer.flyer_stability import FlyerStability
 from handover.scenarios.published.helix.helix_1 import Helix1
@@ -15,6 +17,8 @@ from handover.scenarios.published.ir_grasp.ir_table import IrTable
 from handover.scenarios.published.published_experiment import PublishedExperiment
 
 _ALL: tuple[type[PublishedExperiment], ...] = (
+    FlyerApproaches,
+    FlyerHandoverTable,
     FlyerImpedanceTable,
     FlyerStability,
     Helix1,

@@ -1,0 +1,143 @@
+"""Figures of the free-flyer's handovers: as [Fernandes2020] figs. 4.29 to 4.38, margins, and displacement by force."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.experiment import Figure
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.experiment.plotting import COLOURS, draw_time_figures, figure
+from handover.scenarios.experiment.time_plot import TimeFigure
+from handover.scenarios.free_flyer.parameters import Behaviour, HandoverParameters, Propulsion, Task
+from handover.scenarios.free_flyer.plots import figures_of_handover
+from handover.scenarios.published.free_flyer.handover_runs import (
+    EXCHANGES,
+    GIVING,
+    STRENGTHS,
+    TASKS,
+    USUAL,
+    Exchange,
+    HandoverRuns,
+)
+
+_FIGURES = {
+    (Task.ROBOT_TO_HUMAN, Behaviour.RIGID): (29, 30),
+    (Task.ROBOT_TO_HUMAN, Behaviour.COMPLIANT): (31, 32),
+    (Task.HUMAN_TO_ROBOT, Behaviour.RIGID): (33, 34),
+    (Task.HUMAN_TO_ROBOT, Behaviour.COMPLIANT): (35, 36),
+    (Task.FAILED_RECEPTION, Behaviour.COMPLIANT): (37, 38),
+}
+"""Numbers of the thesis's figures in chapter 4, of motion and of gripper; it has none of the other handovers."""
+
+
+def figure_number(exchange: Exchange, behaviour: Behaviour) -> str:
+    """Return the thesis's figures of a handover, "" where it has none."""
+    numbers = _FIGURES.get((exchange.task, behaviour))
+    return "" if numbers is None else f"figs. 4.{numbers[0]}, 4.{numbers[1]}"
+
+
+def draw_handovers(rows: HandoverRuns, runs: Path, folder: Path) -> list[Figure]:
+    """Draw motion and gripper over time, of the first run of each handover with ideal thrust."""
+    figures: list[Figure] = []
+    for task in Task:
+        for behaviour in Behaviour:
+            for row in rows.of(task, behaviour, Propulsion.IDEAL)[:1]:
+                path = runs / row["run"] / "signals.parquet"
+                if path.exists():
+                    figures += _draw_handover(Record(path), task, behaviour, folder)
+    return figures
+
+
+def _draw_handover(record: Record, task: Task, behaviour: Behaviour, folder: Path) -> list[Figure]:
+    parameters = HandoverParameters(behaviour=behaviour, propulsion=Propulsion.IDEAL)
+    positions, orientations, gripper = figures_of_handover(parameters, record)[:3]
+    numbers = _FIGURES.get((task, behaviour))
+    like = [f", like fig. 4.{n}" for n in numbers] if numbers else ["", ""]
+    what = f"{TASKS[task]}, {behaviour.item}, with ideal thrust"
+    specs = [
+        TimeFigure(
+            name=f"motion_{task.item}_{behaviour.item}",
+            caption=f"Position and orientation in W of gripper, hand and object, {what}{like[0]}; shaded by the "
+            "robot's phases.",
+            plots=[*positions.plots, *orientations.plots],
+        ),
+        replace(
+            gripper,
+            name=f"gripper_{task.item}_{behaviour.item}",
+            caption=f"Angle and speed of the gripper with their thresholds, {what}{like[1]}; shaded by the "
+            "robot's phases.",
+            plots=gripper.plots[:2],
+        ),
+    ]
+    return draw_time_figures(specs, record.time, folder)
+
+
+def draw_margins(rows: HandoverRuns, folder: Path) -> list[Figure]:
+    """Draw the gripper's speeds at rest and when the robot felt the person, beside the thresholds."""
+    cases = [
+        (exchange, behaviour, propulsion, found)
+        for exchange in EXCHANGES
+        for behaviour in Behaviour
+        for propulsion in (Propulsion.LIMITED, Propulsion.IDEAL)
+        if (found := rows.of(exchange.task, behaviour, propulsion))
+    ]
+    if not cases:
+        return []
+    with figure(folder / "margins", 1, size=(8.0, 1.3 + 0.24 * len(cases))) as (axes,):
+        for k, (exchange, behaviour, _, found) in enumerate(cases):
+            rest, felt = exchange.of(found, "rest_speed"), exchange.of(found, "speed")
+            alpha = exchange.threshold(behaviour)
+            labels = ("at rest", "when felt", "threshold") if k == 0 else (None, None, None)
+            axes.plot(1e3 * rest, np.full(len(rest), k), "o", ms=4, color=COLOURS[0], label=labels[0])
+            axes.plot(1e3 * felt, np.full(len(felt), k), "D", ms=4, color=COLOURS[1], label=labels[1])
+            axes.plot([1e3 * alpha] * 2, [k - 0.42, k + 0.42], color=COLOURS[5], lw=1.6, label=labels[2])
+        axes.set_yticks(range(len(cases)), [f"{e.label}, {b.item}, {p.item}" for e, b, p, _ in cases], fontsize=8)
+        axes.invert_yaxis()
+        axes.set(xlabel="speed of the gripper (mm/s)", xlim=(0.0, None))
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
+    caption = (
+        "Speed of the gripper as the robot sees it: the greatest while it waits and nobody touches it, and when it "
+        "felt the person, in each run; between them its threshold, that of sec. 4.1.2."
+    )
+    return [Figure("margins", caption)]
+
+
+def draw_strengths(rows: HandoverRuns, folder: Path) -> list[Figure]:
+    """Draw how far the gripper goes along z, as it gives, by how strongly the person pulls."""
+    usual = HandoverParameters().strength
+    variations = sorted(
+        [(usual, USUAL), *((float(v.parameters["strength"]), v) for v in STRENGTHS)], key=lambda pair: pair[0]
+    )
+    found = {
+        (p, b): [(s, 1e3 * GIVING.of(rows.of(GIVING.task, b, p, v), "displacement_z")) for s, v in variations]
+        for p in Propulsion
+        for b in Behaviour
+    }
+    found = {key: [(s, z) for s, z in points if len(z)] for key, points in found.items()}
+    if any(len(points) < 3 for points in found.values()):
+        return []
+    published = [1e3 * float(x) for x in paper_values("free_flyer", "published")["transfer_displacement_z"]]
+    with figure(folder / "strength", 1, 2, size=(8.0, 3.4)) as panels:
+        for axes, propulsion in zip(panels, (Propulsion.IDEAL, Propulsion.LIMITED), strict=True):
+            for behaviour in Behaviour:
+                points, colour = found[propulsion, behaviour], COLOURS[int(behaviour)]
+                axes.plot([s for s, _ in points], [np.median(z) for _, z in points], "-", lw=1.2, color=colour)
+                for strength, z in points:
+                    axes.plot(np.full(len(z), strength), z, "o", ms=4, color=colour)
+                axes.plot([], [], "o-", ms=4, color=colour, label=behaviour.item)
+                axes.axhline(published[behaviour], color=colour, ls=(0, (7, 3)), lw=1.0)
+            axes.plot([], [], color=COLOURS[5], ls=(0, (7, 3)), lw=1.0, label="published")
+            thrust = "ideal thrust" if propulsion is Propulsion.IDEAL else "Astrobee's limits"
+            axes.set(title=thrust, xlabel="force of the pull at most (N)", xlim=(0.0, None), ylim=(0.0, None))
+        top = max(axes.get_ylim()[1] for axes in panels)
+        for axes in panels:
+            axes.set_ylim(0.0, top)
+        panels[0].set_ylabel("gripper along z (mm)")
+        panels[0].legend(loc="upper left")
+    caption = (
+        "How far the gripper goes from its place along z of W as the robot gives, by the force with which the person "
+        "pulls at most, which the thesis does not say: each run, and medians. Dashed: sec. 4.3.1."
+    )
+    return [Figure("strength", caption)]

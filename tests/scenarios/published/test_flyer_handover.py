@@ -1,0 +1,202 @@
+"""Handovers of the free-flyer: the plan, and how claims and tables are judged, on tables that a test makes up."""
+
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pytest
+
+from handover.scenarios.campaign.plan_check import checked_plan
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.free_flyer.handovers import HandoverOfTask
+from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task
+from handover.scenarios.published.free_flyer.flyer_approaches import CASES, FlyerApproaches, places
+from handover.scenarios.published.free_flyer.flyer_handover import FlyerHandoverTable
+from handover.scenarios.published.free_flyer.flyer_handover_figures import figure_number
+from handover.scenarios.published.free_flyer.handover_runs import (
+    AT_PUBLISHED_RATE,
+    EXCHANGES,
+    GIVING,
+    RATES,
+    STRENGTHS,
+    UNGATED,
+    HandoverRuns,
+)
+from handover.scenarios.published.published_experiment import Claim, Verdict
+
+NUMBERS = ("strength", "arm_factor", "model_arm_factor", "mass_factor", "inertia_factor", "decision.gate_error")
+UNITS = ("robot.position_noise", "person.tremor_rms", *AT_PUBLISHED_RATE)
+HAND_OVER = FlyerHandoverTable()
+
+
+def row_of(run: Any, **measured: Any) -> dict[str, Any]:
+    """Return a run's parameters as the campaign's table has them, with the defaults where it sets none."""
+    given = dict(run.parameters)
+    row: dict[str, Any] = {"status": "done", "run": run.name, "success": True, "saturated_share": 0.1}
+    row |= {name: given[name] for name in ("task", "behaviour")} | {"propulsion": given.get("propulsion", "limited")}
+    row |= {"strength": 4.0, "gated": given.get("gated") != "false"}
+    row |= {n: 1.0 for n in NUMBERS if "factor" in n} | {"decision.gate_error": float("nan")}
+    row |= {n: float(given[n]) for n in NUMBERS if n in given}
+    for name, text in given.items():
+        if "." in name:
+            row[name] = float(text) if name != "person.motion" else text
+    row |= {name: given.get(name, "") for name in AT_PUBLISHED_RATE}
+    row["p_WG_handover"] = [float(x) for x in given.get("p_WG_handover", "0,-0.07,0").split(",")]
+    return row | measured
+
+
+def table_of(
+    quick: bool = False, *, ratio: float = 3.5, twice: float = 2.0, alone: int = 0, gate: int = 1, rate: float = 1e-4
+) -> CampaignTable:
+    """Return the plan's runs: displacements as published with ideal thrust, and the same with limits.
+
+    Args:
+        quick: whether the plan is the quick one.
+        ratio: compliant over rigid displacement along z as the robot gives, with ideal thrust.
+        twice: that along x as it receives.
+        alone: how often a robot acts with nobody there, and
+        gate: how often without the gate.
+        rate: by how much the rate of control changes displacements, m.
+    """
+    rows: list[dict[str, Any]] = []
+    for run in HAND_OVER.plan(quick).runs():
+        compliant = run.parameters["behaviour"] == "compliant"
+        ideal = run.parameters["propulsion"] == "ideal"
+        z = 0.04 * (ratio if compliant and ideal else 1.0)
+        x = 0.02 * (twice if compliant else 1.0)
+        ungated = run.parameters.get("gated") == "false"
+        moved = {"displacement": z + (rate if "impedance" in run.parameters else 0.0)}
+        moved |= {"displacement_x": x, "displacement_y": 0.001, "displacement_z": z, "rest_speed": 0.003, "speed": 0.1}
+        moved |= {"felt_after": 3.0, "time": 4.0}
+        measured = {f"{prefix}_{n}": v for prefix in ("transfer", "return") for n, v in moved.items()}
+        times = {"phase_move_to_handover": 13.0, "phase_close_gripper": 17.0}
+        angles = {"angle_full": 0.78, "angle_empty": 0.6}
+        rows.append(row_of(run, **measured, **times, **angles, unprovoked=gate if ungated else alone))
+    names = dict.fromkeys(name for row in rows for name in row)
+    return CampaignTable(pa.Table.from_pylist([{name: row.get(name) for name in names} for row in rows]))
+
+
+def verdicts(table: CampaignTable) -> dict[str, Claim]:
+    return {claim.claim: claim for claim in HAND_OVER.claims(table)}
+
+
+def test_the_plan_has_the_four_handovers_and_what_is_beyond_them():
+    plan = checked_plan(HAND_OVER.plan(quick=False))
+    assert plan.size == 3 * (16 + 4 * len(STRENGTHS) + 2 * 5 + 4 * (len(UNGATED) + len(RATES)))
+    assert checked_plan(HAND_OVER.plan(quick=True)).size == 16
+
+
+@pytest.mark.parametrize("experiment", [HAND_OVER, FlyerApproaches()])
+@pytest.mark.parametrize("quick", [False, True])
+def test_the_scenario_takes_every_point(experiment: Any, quick: bool):
+    plan = experiment.plan(quick)
+    for point in plan.points[:: 1 if quick else 7]:
+        own = {k: v for k, v in point.items() if "." not in k and k not in plan.varied_units}
+        assert parse_parameters(HandoverOfTask, [f"{k}={v}" for k, v in own.items()])
+
+
+def test_every_claim_is_judged_both_ways():
+    good = verdicts(table_of())
+    bad = verdicts(table_of(ratio=1.2, twice=3.0, alone=1, gate=0, rate=0.002))
+    wrong = "As it gives, the compliant robot's error along z is ten times the rigid one's"
+    judged = {text: c.verdict for text, c in good.items() if c.verdict is not Verdict.NOT_COMPARABLE}
+    assert {text for text, v in judged.items() if v is Verdict.NOT_REPRODUCED} == {wrong}
+    assert verdicts(table_of(ratio=10.0))[wrong].verdict is Verdict.REPRODUCED
+    changed = {text for text in judged if bad[text].verdict is Verdict.NOT_REPRODUCED} - {wrong}
+    succeed = {text for text in judged if "with either behaviour" in text or "asks again" in text}
+    assert changed == set(judged) - succeed - {wrong}
+    assert len(succeed) == 2
+
+
+def test_what_is_chosen_here_is_not_said_to_be_reproduced():
+    not_judged = [c.claim for c in verdicts(table_of()).values() if c.verdict is Verdict.NOT_COMPARABLE]
+    assert len(not_judged) == 3
+    assert {next(w for w in ("angle", "13 s", "32 s") if w in text) for text in not_judged} == {"angle", "13 s", "32 s"}
+
+
+def test_a_quick_plan_decides_nothing_on_forces_gate_and_rate():
+    claims, tables = verdicts(table_of(quick=True)), HAND_OVER.tables(table_of(quick=True))
+    forces = next(c for text, c in claims.items() if "0.14 m" in text)
+    assert forces.verdict is Verdict.NOT_COMPARABLE
+    assert [table.title for table in tables] == ["Transfers", "Margins of the thresholds"]
+
+
+def test_a_full_plan_has_all_tables_with_all_rows():
+    tables = {t.title: t for t in HAND_OVER.tables(table_of())}
+    assert len(tables) == 5
+    assert len(tables["Transfers"].rows) == 4 * len(EXCHANGES)
+    assert len(tables["Where the behaviours differ, as the robot gives"].rows) == 2 * (1 + len(STRENGTHS)) + 5
+    (row, *_) = tables["Control at the rate that the thesis prints"].rows
+    assert row[4] == "+0.10"
+    assert tables["Without a gate to the impedance control"].rows[0][2:] == ["0 of 3", "3 of 3", "3 of 3", "3 of 3"]
+
+
+def test_a_run_is_found_by_what_it_is_for():
+    runs = HandoverRuns(table_of())
+    for variation in (*STRENGTHS, *UNGATED, *RATES):
+        (first, *others) = runs.of(GIVING.task, Behaviour.RIGID, Propulsion.LIMITED, variation)
+        assert len(others) == 2
+        assert (first["gated"], first["decision"] != "") == (variation not in UNGATED, variation is RATES[1])
+    assert len(runs.of(GIVING.task, Behaviour.RIGID)) == 3
+    assert len(runs.usual()) == 48
+    assert not runs.of(Task.COLLABORATIVE, Behaviour.RIGID, variation=STRENGTHS[0])
+
+
+def test_the_figures_are_numbered_as_in_the_thesis():
+    numbers = [n for e in EXCHANGES for b in Behaviour if (n := figure_number(e, b))]
+    assert numbers[0] == "figs. 4.29, 4.30"
+    assert numbers[-1] == "figs. 4.37, 4.38"
+    assert len(numbers) == 5
+
+
+def test_without_records_there_are_no_curves(tmp_path: Path):
+    figures = HAND_OVER.draw(table_of(), tmp_path, tmp_path)
+    assert [figure.name for figure in figures] == ["margins", "strength"]
+
+
+def approaches(alone: int = 0, alone_if_other: int = 0, silent: bool = False, quick: bool = False) -> CampaignTable:
+    """Return the approaches' runs, of which the first and, of robots that are otherwise, as many act alone."""
+    rows: list[dict[str, Any]] = []
+    for run in FlyerApproaches().plan(quick).runs():
+        other = any("factor" in n or "noise" in n for n in run.parameters)
+        acts = (run.point == 0 and run.repetition < alone) or (other and run.repetition < alone_if_other)
+        signalled = None if silent and other else 20.0
+        measured = {"transfer_rest_speed": 0.003, "unprovoked": int(acts), "arrival_error": 0.001}
+        rows.append(row_of(run, **measured, simulated_seconds=36.0, phase_check_velocity=signalled))
+    names = dict.fromkeys(name for row in rows for name in row)
+    return CampaignTable(pa.Table.from_pylist([{name: row.get(name) for name in names} for row in rows]))
+
+
+def test_a_thousand_approaches_are_counted_with_their_interval():
+    plan = FlyerApproaches().plan(quick=False)
+    assert checked_plan(plan).size == 1000 + 2 * 4 * 5 * len(CASES)
+    never, bears = FlyerApproaches().claims(approaches())
+    assert (never.verdict, bears.verdict) == (Verdict.REPRODUCED, Verdict.REPRODUCED)
+    assert never.measured.startswith("0 of 1,000 approaches")
+    assert never.interval is not None
+    assert never.interval[1] == pytest.approx(0.00368, abs=1e-5)
+
+
+def test_one_that_acts_alone_is_found_and_so_is_a_robot_that_never_signals():
+    never, bears = FlyerApproaches().claims(approaches(alone=1))
+    assert (never.verdict, bears.verdict) == (Verdict.NOT_REPRODUCED, Verdict.REPRODUCED)
+    assert FlyerApproaches().claims(approaches(alone_if_other=1))[1].verdict is Verdict.NOT_REPRODUCED
+    assert "never signalled" in FlyerApproaches().claims(approaches(silent=True))[1].reason
+
+
+def test_a_few_approaches_decide_nothing():
+    assert FlyerApproaches().claims(approaches(quick=True))[0].verdict is Verdict.NOT_COMPARABLE
+
+
+def test_the_robot_reaches_all_random_places():
+    plan = FlyerApproaches().plan(quick=False)
+    assert len(set(places(125))) == 125
+    assert {point["p_WG_handover"] for point in plan.points} == set(places(125))
+
+
+def test_approaches_are_drawn_with_each_kind_of_robot(tmp_path: Path):
+    (figure,) = FlyerApproaches().draw(approaches(), tmp_path, tmp_path)
+    assert (tmp_path / f"{figure.name}.png").exists()
+    (table,) = FlyerApproaches().tables(approaches())
+    assert len(table.rows) == 4 * (1 + len(CASES))
