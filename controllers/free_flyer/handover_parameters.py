@@ -10,7 +10,7 @@ from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quat
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.plain_rotation import rotate, vector
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, parameter
-from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian, Second
+from handover.cosim.blocks.units import Metre, MetrePerSecond, MetrePerSecond2, Number, Radian, Second
 
 NAME = "HandoverStateMachine"
 
@@ -89,6 +89,21 @@ class Params:
         4.0, "COLLABORATIVE: time from the release to the next signal, at least", minimum=0.0, maximum=600.0
     )
     filter_time: Second = parameter(0.08, "time constant of the velocity's low-pass", minimum=0.0, maximum=10.0)
+    gradual: bool = parameter(
+        False, "the fingers follow pull and push on the way to the threshold, and back, instead of waiting for it"
+    )
+    gradual_share: Number = parameter(
+        0.5, "gradual: part of the threshold above which they follow the speed", minimum=0.0, maximum=0.95
+    )
+    pull_acceleration: MetrePerSecond2 = parameter(
+        0.15, "gradual: acceleration above which the gripper is pulled: thrust gives less", minimum=0.0, maximum=100.0
+    )
+    braking: MetrePerSecond2 = parameter(
+        0.03, "gradual: deceleration at which a pull has ended: thrust gives more", minimum=0.0, maximum=100.0
+    )
+    free_angle: Radian = parameter(
+        0.25, "gradual: how far they open from what they hold until it is free for certain", minimum=0.0, maximum=3.0
+    )
     attempts: int = parameter(5, "failed receptions before it gives up", minimum=1, maximum=1000)
     patience: Second = parameter(60.0, "time in a phase before it gives up", minimum=0.1, maximum=1e5)
 

@@ -17,7 +17,7 @@ from handover.controllers.free_flyer.handover_parameters import (
 )
 from handover.controllers.free_flyer.ports import PERIOD
 from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
-from handover.controllers.free_flyer.velocity_monitor import VelocityMonitor
+from handover.controllers.free_flyer.velocity_monitor import PullMonitor, VelocityMonitor
 from handover.cosim.blocks.plain_rotation import (
     Quaternion,
     Vector,
@@ -109,6 +109,12 @@ class HandoverStateMachine:
     gripper, is entered after `patience` in a phase, after `attempts` failures, and when an object that was fetched is
     not between the fingers.
 
+    Where it is `gradual`, CHECK_VELOCITY moves the fingers, by how the gripper's speed v lies between a part of the
+    threshold and the threshold a itself: s = (v / a - gradual_share) / (1 - gradual_share), from 0 to 1. While it gives
+    and is pulled (`PullMonitor`), the closure is 1 - s, and the object is released once the fingers have opened by
+    free_angle from what they held, or hold nothing: where the pull ends before that, they close again. While it
+    receives, the closure is the largest s since v was last below that part, and the threshold decides as ever.
+
     Raises:
         InvalidHandoverParameters: by the constructor, for goals out of reach, or thresholds or times that cannot work;
             all are named.
@@ -141,6 +147,9 @@ class HandoverStateMachine:
         self._closure = 0.0
         self._receiving = params.task is HandoverTask.HUMAN_TO_ROBOT
         self._failed = 0
+        self._pull = PullMonitor(params.pull_acceleration, params.braking, params.filter_time, self._T)
+        self._pulled = False  # as of this step
+        self._held_angle = 0.0  # of the closed gripper under the light
         self._steps = 0  # in this phase
         self._settled = 0  # steps in a row at rest and in place
         self._near = False  # within gate_error of the goal, as of this step
@@ -171,6 +180,7 @@ class HandoverStateMachine:
         q_WB = unit_quaternion(u.q_WB_meas, NAME, "q_WB_meas")
         r = rotate(rotation_matrix(q_WB), self._p_BG)
         self._monitor.measure(add(vector(u.v_WB_meas), cross(vector(u.w_WB_meas), r)))
+        self._pulled = self._pull.measure(self._monitor.speed, self._params.gradual_share * self._threshold)
         here = add(vector(u.p_WB_meas), r), q_WB
         if self._goal is None:
             self._goal = here
@@ -198,16 +208,19 @@ class HandoverStateMachine:
     def get_state(self) -> bytes:
         """Return phase, goal, counters and the monitor's filter."""
         counters = (self._failed, self._steps, self._settled)
-        switches = (self._impedance, self._closure, self._receiving)
-        return pack_state((int(self._phase), self._goal, counters, switches, self._monitor.get_state()))
+        switches = (self._impedance, self._closure, self._receiving, self._held_angle)
+        return pack_state(
+            (int(self._phase), self._goal, counters, switches, self._monitor.get_state(), self._pull.get_state())
+        )
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this machine or of one with equal parameters."""
-        phase, self._goal, counters, switches, monitor = unpack_state(state)
+        phase, self._goal, counters, switches, monitor, pull = unpack_state(state)
         self._phase = HandoverPhase(phase)
         self._failed, self._steps, self._settled = counters
-        self._impedance, self._closure, self._receiving = switches
+        self._impedance, self._closure, self._receiving, self._held_angle = switches
         self._monitor.set_state(monitor)
+        self._pull.set_state(pull)
 
     def _count_settled(self, here: tuple[Vector, Quaternion]) -> None:
         """Count the steps for which the gripper has been at rest at its goal."""
@@ -292,14 +305,30 @@ class HandoverStateMachine:
             return None
         return HandoverPhase.SIGNAL
 
-    def _signal(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
+    def _signal(self, angle: float) -> HandoverPhase | None:
+        self._held_angle = angle
         self._moved_by_a_person()
         return HandoverPhase.CHECK_VELOCITY if self._lasted(self._params.signal_time) else None
 
-    def _check_velocity(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
+    def _check_velocity(self, angle: float) -> HandoverPhase | None:
+        if self._params.gradual:
+            return self._follow_the_hand(angle)
         if not self._moved_by_a_person():
             return None
         return HandoverPhase.CLOSE_GRIPPER if self._receiving else HandoverPhase.RELEASE_OBJECT
+
+    def _follow_the_hand(self, angle: float) -> HandoverPhase | None:
+        """Move the fingers with the pull or push; what follows once the object is released, or pushed in."""
+        p, threshold = self._params, self._threshold
+        share = min(max((self._monitor.speed / threshold - p.gradual_share) / (1.0 - p.gradual_share), 0.0), 1.0)
+        moved = self._moved_by_a_person(p.gradual_share)
+        if self._receiving:
+            felt = share if moved else 0.0
+            self._closure = max(felt, self._closure) if felt > 0.0 else 0.0
+            return HandoverPhase.CLOSE_GRIPPER if felt == 1.0 else None
+        self._closure = 1.0 - share if moved and self._pulled else 1.0
+        is_free = angle > self._held_angle + p.free_angle or not self._holds_something(angle)
+        return HandoverPhase.RELEASE_OBJECT if is_free else None
 
     def _release_object(self, angle: float) -> HandoverPhase | None:  # noqa: ARG002
         if not self._lasted(self._params.gripper_time):
@@ -327,6 +356,11 @@ class HandoverStateMachine:
     def _holds_something(self, angle: float) -> bool:
         return angle > self._params.angle_threshold
 
-    def _moved_by_a_person(self) -> bool:
-        threshold = self._receive if self._receiving else self._release
+    @property
+    def _threshold(self) -> float:
+        return self._receive if self._receiving else self._release
+
+    def _moved_by_a_person(self, share: float = 1.0) -> bool:
+        """Return whether the gripper is faster than a part of its threshold."""
+        threshold = share * self._threshold
         return self._monitor.exceeds(threshold) if self._params.gated else self._monitor.speed > threshold

@@ -46,3 +46,41 @@ class VelocityMonitor:
     def set_state(self, state: tuple[Vector | None, bool, float]) -> None:
         """Restore a state that `get_state` gave."""
         self._v, self._armed, self.speed = state
+
+
+class PullMonitor:
+    """Whether a gripper is being pulled: its speed has risen faster than thrust can make it, and is not braked since.
+
+    A free-flyer that was knocked coasts at a speed that says nothing of when the knock ended: its rate of change does.
+    A pull begins while the speed rises by more than `least`, and ends when it falls by more than `braking`, or is no
+    more than a threshold.
+
+    Args:
+        least: acceleration, m/s2; above what the propulsion can give the gripper.
+        braking: deceleration, m/s2; below what it can.
+        time: time constant of the low-pass of the speed's rate, s; 0 for none.
+        period: time between two measurements, s.
+    """
+
+    def __init__(self, least: float, braking: float, time: float, period: float) -> None:
+        self._least, self._braking, self._period = least, braking, period
+        self._gain = 1.0 - math.exp(-period / time) if time > 0.0 else 1.0
+        self._speed, self._rate, self._pulled = 0.0, 0.0, False
+
+    def measure(self, speed: float, threshold: float) -> bool:
+        """Take in a speed, m/s; return whether the gripper is pulled."""
+        self._rate += self._gain * ((speed - self._speed) / self._period - self._rate)
+        self._speed = speed
+        if speed <= threshold or self._rate < -self._braking:
+            self._pulled = False
+        elif self._rate > self._least:
+            self._pulled = True
+        return self._pulled
+
+    def get_state(self) -> tuple[float, float, bool]:
+        """Return speed, its rate, and whether it is pulled."""
+        return self._speed, self._rate, self._pulled
+
+    def set_state(self, state: tuple[float, float, bool]) -> None:
+        """Restore a state that `get_state` gave."""
+        self._speed, self._rate, self._pulled = state

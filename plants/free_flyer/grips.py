@@ -4,6 +4,8 @@ The hand follows its course, the object that it holds, or keeps off a palm that 
 that close along z of G around an object, and a palm behind them.
 """
 
+from dataclasses import replace
+
 from handover.cosim.blocks.plain_rotation import (
     IDENTITY,
     ZERO,
@@ -36,6 +38,8 @@ from handover.plants.hand_motion import HandTremor
 
 _SLACK = 0.1
 """Metres beyond its reach at which an arm loses what the hand holds."""
+_LEAST_GRIP = 1e-3
+"""Part of its force that a grip has until it lets go, lest what slides in it be divided by nothing."""
 _NEAR = 0.02
 """Metres in front of the palm within which an object may come to touch it in a step."""
 
@@ -163,14 +167,15 @@ class FlyerGripper:
     its point nearest to G is at most capture_axial and capture_lateral away along x and z of G, and G at most
     capture_end beyond its end. An object that is held keeps the pose that it had when the fingers closed, drawn to the
     fingers' middle in x and z with the time constant centring_time, until the fingers have opened by release_angle or
-    it slides out of their reach.
+    it slides out of their reach. Where `grip_fades`, the force and torque at which it slides fall linearly to nothing
+    on the way there, as of fingers that are springs.
     """
 
     def __init__(self, params: Params) -> None:
         self._p = p = params
         self._half = 0.5 * float(p.object_size[1])
         self._thick = 0.5 * float(p.object_size[0])
-        self.stiffness = Stiffness(
+        self._firm = Stiffness(
             p.grip_stiffness,
             p.grip_damping,
             p.grip_force_max,
@@ -181,6 +186,16 @@ class FlyerGripper:
         self._angle_object = p.angle_object
         self.angle = p.angle_0
         self.grip: Attachment | None = None
+
+    @property
+    def stiffness(self) -> Stiffness:
+        """The grip's, as far as the fingers are closed."""
+        p, firm = self._p, self._firm
+        opened = self.angle - self._angle_object
+        if not p.grip_fades or opened <= 0.0:
+            return firm
+        share = _LEAST_GRIP if opened >= p.release_angle else max(1.0 - opened / p.release_angle, _LEAST_GRIP)
+        return replace(firm, f_max=share * firm.f_max, tau_max=share * firm.tau_max)
 
     def act(self, dt: float, closure: float, G: Frame, body: RigidBody) -> None:
         """Move the fingers for dt towards a closure from 0, open, to 1; take hold or let go."""
@@ -199,6 +214,8 @@ class FlyerGripper:
             left = max(0.0, 1.0 - dt / p.centring_time)
             self.grip.place = (left * x, y, left * z)
         self.angle = after
+        if self.grip is not None and p.grip_fades:
+            self.grip.stiffness = self.stiffness
 
     def palm(self, G: Frame, body: RigidBody) -> Palm | None:
         """Return the palm for an object that is near it, none for one that is elsewhere or in the grip."""

@@ -127,6 +127,7 @@ class Params:
     release_angle: Radian = parameter(
         0.20, "how far the fingers open before the object comes free", minimum=0.0, maximum=3.0
     )
+    grip_fades: bool = parameter(False, "until then the force and torque that it holds fall, with how far they open")
     gripper_rate: RadianPerSecond = parameter(0.6, "speed of the gripper's angle", minimum=0.01, maximum=100.0)
 
     tremor_rms: Metre = parameter(0.0005, "root mean square length of the tremor", minimum=0.0, maximum=0.05)

@@ -96,6 +96,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
             p_WO_0=p_WO_0,
             p_OG=at["p_OG"],
             gated=p.gated,
+            gradual=p.gradual,
             patience=p.patience,
         )
         s.add("impedance", fmu("impedance"), behaviour=behaviour, **model, delay=p.delay, lag=lag)
@@ -113,6 +114,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
             angle_0=float(at["angle_0"]),
             effort=p.strength,
             arm_force_max=1.5 * p.strength,
+            grip_fades=p.gradual,
             **self.person,
         )
         wire_handover(s)

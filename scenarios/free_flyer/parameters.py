@@ -92,6 +92,7 @@ class HandoverParameters(RobotAndModel):
     )
     propulsion: Propulsion = parameter(Propulsion.LIMITED, "what the thrusters are like")
     delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
+    gradual: bool = parameter(False, "whether the fingers follow pull and push, and their grip fades as they open")
     gated: bool = parameter(True, "whether the robot yields and signals only once it is at rest in its place")
     patience: Second = parameter(
         60.0, "time in any one phase after which the robot gives up", minimum=1.0, maximum=600.0

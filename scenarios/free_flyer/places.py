@@ -93,7 +93,8 @@ PLACES_OF_HANDOVER = {
             **_ESTIMATE,
             "gripper_angle": "",
             **dict.fromkeys(
-                ("task", "behaviour", "p_WG_handover", "gated", "patience"), "the scenario's, or its parameter's value"
+                ("task", "behaviour", "p_WG_handover", "gated", "gradual", "patience"),
+                "the scenario's, or its parameter's value",
             ),
             "p_BG": "in B",
             "p_WO_0": "in W",
@@ -130,6 +131,7 @@ PLACES_OF_HANDOVER = {
             "angle_0": "",
             "effort": "the scenario's parameter strength",
             "arm_force_max": "follows from the scenario's parameter strength",
+            "grip_fades": "the scenario's parameter gradual",
         },
         remarks=_FRAMES,
     ),

@@ -142,3 +142,37 @@ def test_palm_pushes_an_object_away_but_never_holds_it():
     assert min(y.f_G[0] for y in scene.seen) == 0.0
     impulse = -DT * sum(y.f_G[0] for y in scene.seen)
     assert impulse == pytest.approx(0.1 * scene.y.v_WO[0], rel=1e-9)
+
+
+def test_a_grip_that_fades_slides_at_less_the_farther_it_has_opened():
+    """Half open it holds half of its 5 N: a pull of the robot that takes more slides, and less does not."""
+    steady, fading = (replace(IDLE, grip_fades=fades) for fades in (False, True))
+    force: dict[bool, float] = {}
+    for params in (steady, fading):
+        scene = Scene(params)
+        scene.go(2.0, closure=1.0)
+        closed = scene.y.gripper_angle
+        opened = (params.angle_open - closed - 0.1) / (params.angle_open - params.angle_empty)
+        scene.go(1.0, closure=opened)
+        assert scene.y.gripper_angle == pytest.approx(closed + 0.1)
+        scene.u.v_WG = np.array([0.0, 1.0, 0.0])  # 0.1 kg to 1 m/s in a step takes more than 5 N
+        y = scene.go(DT)
+        assert y.holder is Holder.GRIPPER
+        force[params.grip_fades] = float(np.linalg.norm(y.f_G))
+    assert force[False] == pytest.approx(5.0, rel=0.05)
+    assert force[True] == pytest.approx(2.5, rel=0.05)
+
+
+def test_a_fading_grip_is_restored_with_what_it_holds():
+    scene = Scene(replace(IDLE, grip_fades=True))
+    scene.go(2.0, closure=1.0)
+    scene.go(0.16, closure=0.0)
+    other = Scene(replace(IDLE, grip_fades=True))
+    other.unit.set_state(scene.unit.get_state())
+    other.u, other.i = scene.u, scene.i
+    for s in (scene, other):
+        s.u.v_WG = np.array([0.0, 0.0, 0.5])
+    for _ in range(10):
+        a, b = scene.go(DT), other.go(DT)
+        np.testing.assert_array_equal(a.f_G, b.f_G)
+        np.testing.assert_array_equal(a.p_WO, b.p_WO)
