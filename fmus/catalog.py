@@ -152,6 +152,12 @@ _ENTRIES = (
         "makes the gripper follow a virtual mass, spring and damper that an estimated force moves",
     ),
     Entry(
+        "ArmImpedanceController",
+        "handover.controllers.free_flyer.arm_impedance_controller:ArmImpedanceController",
+        Fraction(2, 125),
+        "makes the gripper yield like a spring and damper, by base and arm joints",
+    ),
+    Entry(
         "PoseController",
         "handover.controllers.free_flyer.pose_controller:PoseController",
         Fraction(2, 125),

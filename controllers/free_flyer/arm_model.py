@@ -1,7 +1,7 @@
 """A free-flyer's model of itself with a moving arm: J, B, C of [Fernandes2020] eqs. (3.10)-(3.24), with twists.
 
-xi' = (v_WB, w_WB, q_J'), (6 + n,), in W: angular velocities in place of Euler angles' rates, so that N of eq. (3.4) is
-the identity and Q of eq. (3.5) is R_WB^T. x' = (v_WG, w_WG).
+xi' = (v_WB, w_WB, q_J'), (6 + n,), in W: with angular velocities for rates of Euler angles, N of eq. (3.4) is the
+identity and Q of eq. (3.5) is R_WB^T. x' = (v_WG, w_WG).
 """
 
 from dataclasses import dataclass
@@ -44,11 +44,8 @@ class ArmModel:
         """Return what is impossible for such a robot."""
         faults = FlyerBody(mass=self.mass, I_B=self.I_B, p_BG=self.p_BG).faults()
         for j in range(self.joints):
-            length = float(np.linalg.norm(self.axes[j]))
-            if not abs(length - 1.0) <= 1e-6:
-                faults.append(
-                    f"axis_J[{j + 1}] {self.axes[j].tolist()} must be a unit vector; its length is {length:g}"
-                )
+            if not abs(float(np.linalg.norm(self.axes[j])) - 1.0) <= 1e-6:
+                faults.append(f"axis_J[{j + 1}] = {self.axes[j].tolist()} must be finite and not zero")
             if not 0.0 < self.masses[j] < np.inf:
                 faults.append(f"mass_L[{j + 1}] = {self.masses[j]:g} kg must be positive and finite")
             if not (np.all(np.isfinite(self.inertias[j])) and np.all(self.inertias[j] > 0.0)):
@@ -68,7 +65,7 @@ class ArmModel:
 
 
 class Chain:
-    """The robot's links at base attitude R_WB (3, 3), base rate w_WB (3,) in W, angles and rates of the joints (n,).
+    """The robot's links at an attitude R_WB (3, 3) and rate w_WB (3,) in W, and angles and rates of the joints (n,).
 
     Everything is in the axes of W, places seen from B.
 
@@ -140,7 +137,7 @@ class Chain:
 
 
 def mass_matrix(chain: Chain) -> Floats:
-    """Return B (6 + n, 6 + n) of eq. (3.22): the sum of J_i^T diag(m_i, H_i) J_i over base and links, and rotors."""
+    """Return B (6 + n, 6 + n), eq. (3.22): the sum of J_i^T diag(m_i, H_i) J_i over base and links, and the rotors."""
     n = len(chain.axes)
     B = np.diag([*np.zeros(6), *chain.model.rotors[:n]])
     for i in range(n + 1):

@@ -7,6 +7,7 @@ at its rate, delay and lag by linear theory (`SampledLoop`), and names the delay
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -100,8 +101,16 @@ class InvalidControllerParameters(InvalidParameters):
         super().__init__(faults)
 
 
+class Linearised(Protocol):
+    """A robot that has a linear model near rest."""
+
+    def linear_plant(self, lag: float) -> LinearPlant:
+        """Return the robot near rest, behind a propulsion of first order with a time constant in s."""
+        ...
+
+
 def stability_faults(
-    body: FlyerBody, law: Callable[[float, float], LinearController], period: float, delay: float, lag: float
+    body: Linearised, law: Callable[[float, float], LinearController], period: float, delay: float, lag: float
 ) -> list[str]:
     """Return nothing for a stable loop, else what is wrong and by how much delay or gains must shrink.
 

@@ -25,7 +25,6 @@ from handover.cosim.blocks.plain_rotation import (
 from handover.cosim.blocks.ports import Floats
 
 JOINTS_MAX = 3
-_UNIT = 1e-6  # how far an axis's length may be from 1
 
 Joints = tuple[float, ...]
 """A number a joint, from the base outwards."""
@@ -134,9 +133,8 @@ def arm_faults(n: int, axes: Floats, links: Floats, masses: Floats, inertias: Fl
     """Return what no arm of n joints has, by the rows and entries of its first n links."""
     faults: list[str] = []
     for j in range(n):
-        if not abs(float(np.linalg.norm(axes[j])) - 1.0) <= _UNIT:
-            length = float(np.linalg.norm(axes[j]))
-            faults.append(f"axis_J[{j + 1}] {axes[j].tolist()} must be a unit vector; its length is {length:g}")
+        if not 0.0 < float(np.linalg.norm(axes[j])) < math.inf:
+            faults.append(f"axis_J[{j + 1}] {axes[j].tolist()} must be finite and not zero")
         if not np.all(np.isfinite(links[j])):
             faults.append(f"link[{j + 1}] {links[j].tolist()} m must be finite")
         if not 0.0 < masses[j] < math.inf:

@@ -27,6 +27,7 @@ EFFORTS = {
     "TendonArm": Effort(from_scratch=0.2, steps=3),
     "TendonArmFast": Effort(from_scratch=0.5),
     "AdmittanceController": Effort(from_scratch=0.12),
+    "ArmImpedanceController": Effort(from_scratch=0.2),
     "ImpedanceController": Effort(from_scratch=0.08),
     "PoseController": Effort(from_scratch=0.12),
     "GraspScene": Effort(from_scratch=0.2),

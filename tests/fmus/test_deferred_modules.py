@@ -7,7 +7,14 @@ import pytest
 
 from handover.fmus.catalog import UNITS
 
-DEFERRING = ("TendonArm", "TendonArmFast", "AdmittanceController", "ImpedanceController", "PoseController")
+DEFERRING = (
+    "TendonArm",
+    "TendonArmFast",
+    "AdmittanceController",
+    "ArmImpedanceController",
+    "ImpedanceController",
+    "PoseController",
+)
 
 _MAKE = """
 import importlib, sys

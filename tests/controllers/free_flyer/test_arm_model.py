@@ -139,7 +139,7 @@ def xi_dot(m: Motion) -> Floats:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_it_predicts_how_the_plant_accelerates_and_its_energy(seed: int):
-    at, rng, h = At(seed, 3), np.random.default_rng(seed), 1e-4
+    at, rng, h = At(seed, 3), np.random.default_rng(seed), 2e-5
     robot = robot_at(at)
     f_B, tau_B, f_G, tau_G, tau_J = rng.normal(size=(5, 3)) * [[2.0], [0.1], [2.0], [0.1], [0.1]]
     loads = (vector(f_B), vector(tau_B), vector(f_G), vector(tau_G)), vector(tau_J)
