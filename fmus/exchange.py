@@ -48,24 +48,17 @@ def input_reader(buffers: Buffers) -> Callable[[], Any]:
     layout = buffers.layout
     inputs = layout.description.inputs_type()
     reals = layout.of(Causality.INPUT, Buffer.FLOAT64)
-    names = [s.variable.name for s in reals if not s.variable.shape]
-    read_scalars = _scalar_reader(buffers, reals, names)
-    for slot in reals[len(names) :]:
+    scalars = [s.variable.name for s in reals if not s.variable.shape]
+    for slot in reals[len(scalars) :]:
         setattr(inputs, slot.variable.name, buffers.array(slot, writeable=False))
-    others: list[tuple[str, Callable[[], Any]]] = []
-    for slot in (s for buffer in NOT_REAL for s in layout.of(Causality.INPUT, buffer)):
+    names: dict[str, Any] = {"bit": buffers.booleans.item, "number": buffers.integers.item}
+    lines = [_scalar_reading(buffers, reals, scalars, names)]
+    for i, slot in enumerate(s for buffer in NOT_REAL for s in layout.of(Causality.INPUT, buffer)):
         if slot.variable.raster:
             setattr(inputs, slot.variable.name, buffers.picture(slot, slot.variable.raster, writeable=False))
         else:
-            others.append((slot.variable.name, functools.partial(read_value, buffers, slot)))
-
-    def read() -> Any:
-        read_scalars(inputs)
-        for name, value in others:
-            setattr(inputs, name, value())
-        return inputs
-
-    return read
+            lines.append(f"x.{slot.variable.name} = {_reading(buffers, slot, i, names)}")
+    return functools.partial(_compiled([*lines, "return x"], names), inputs)
 
 
 def output_writer(buffers: Buffers) -> Callable[[Any], None]:
@@ -78,15 +71,14 @@ def output_writer(buffers: Buffers) -> Callable[[Any], None]:
     layout = buffers.layout
     reals = layout.of(Causality.OUTPUT, Buffer.FLOAT64)
     scalars = [s.variable for s in reals if not s.variable.shape]
-    write_scalars = _scalar_writer(buffers, reals, [v.name for v in scalars])
+    write_scalars = _compiled([_scalar_writing(buffers, reals, scalars, names := dict[str, Any]())], names)
     arrays = [(s.variable, s.variable.shape, buffers.array(s, writeable=True)) for s in reals[len(scalars) :]]
     slots = [s for buffer in NOT_REAL for s in layout.of(Causality.OUTPUT, buffer)]
     others = [(s.variable, _writer(buffers, s)) for s in slots]
-    write_exact = _exact_writer(buffers, [*reals[len(scalars) :], *slots])
+    write_exact = _exact_writer(buffers, reals, scalars, slots)
 
     def write(y: Any) -> None:
         try:
-            write_scalars(y)
             write_exact(y)
         except (struct.error, TypeError, ValueError, OverflowError):
             write_checked(y)
@@ -112,18 +104,21 @@ def output_writer(buffers: Buffers) -> Callable[[Any], None]:
     return write
 
 
-def _exact_writer(buffers: Buffers, slots: Sequence[Slot]) -> Callable[[Any], None]:
+def _exact_writer(
+    buffers: Buffers, reals: Sequence[Slot], scalars: Sequence[Variable], others: Sequence[Slot]
+) -> Callable[[Any], None]:
     """Return a function that writes outputs that have exactly the declared types.
 
-    It raises TypeError for all others, although some of them can be converted, such as an array of integers. As
-    generated code the checks take half the time of a loop over variables.
+    It raises TypeError for all others, although some of them can be converted, such as an array of integers, and
+    struct.error for a scalar that is no number. As generated code the checks take half the time of a loop over
+    variables.
     """
     names: dict[str, Any] = {"array": np.ndarray, "real": np.dtype(np.float64)}
-    lines: list[str] = []
-    for i, slot in enumerate(slots):
+    lines = [_scalar_writing(buffers, reals, scalars, names)]
+    for i, slot in enumerate([*reals[len(scalars) :], *others]):
         inexact, write = _exact_statement(buffers, slot, i, names)
         lines += [f"y{i} = x.{slot.variable.name}", f"if {inexact}: raise TypeError", write]
-    return _compiled("\n    ".join(lines) or "pass", names)
+    return _compiled(lines, names)
 
 
 def _exact_statement(buffers: Buffers, slot: Slot, i: int, names: dict[str, Any]) -> tuple[str, str]:
@@ -142,29 +137,40 @@ def _exact_statement(buffers: Buffers, slot: Slot, i: int, names: dict[str, Any]
     return "False", f"put{i}(y{i})"
 
 
-def _scalar_reader(buffers: Buffers, reals: Sequence[Slot], names: Sequence[str]) -> Callable[[Any], None]:
-    targets = "".join(f"x.{name}, " for name in names)
-    return _compiled(
-        f"{targets}= take(memory, {8 * reals[0].offset})" if names else "pass",
-        {"memory": buffers.floats.data.cast("B"), "take": struct.Struct(f"={len(names)}d").unpack_from},
-    )
+def _reading(buffers: Buffers, slot: Slot, i: int, names: dict[str, Any]) -> str:
+    """Return the expression for the value of input i, which is not real."""
+    v = slot.variable
+    if slot.buffer is Buffer.BOOLEAN:
+        return f"bit({slot.offset})"
+    if slot.buffer is Buffer.INT64 and v.enumeration is None and v.width is not Width.UINT64:
+        return f"number({slot.offset})"
+    names[f"value{i}"] = functools.partial(read_value, buffers, slot)
+    return f"value{i}()"
 
 
-def _scalar_writer(buffers: Buffers, reals: Sequence[Slot], names: Sequence[str]) -> Callable[[Any], None]:
-    values = "".join(f", x.{name}" for name in names)
-    return _compiled(
-        f"put(memory, {8 * reals[0].offset}{values})" if names else "pass",
-        {"memory": buffers.floats.data.cast("B"), "put": struct.Struct(f"={len(names)}d").pack_into},
-    )
+def _scalar_reading(buffers: Buffers, reals: Sequence[Slot], scalars: Sequence[str], names: dict[str, Any]) -> str:
+    """Return the statement that sets all real scalars."""
+    if not scalars:
+        return "pass"
+    names.update(memory=buffers.floats.data.cast("B"), take=struct.Struct(f"={len(scalars)}d").unpack_from)
+    return "".join(f"x.{name}, " for name in scalars) + f"= take(memory, {8 * reals[0].offset})"
 
 
-def _compiled(statement: str, names: dict[str, Any]) -> Callable[[Any], None]:
+def _scalar_writing(buffers: Buffers, reals: Sequence[Slot], scalars: Sequence[Variable], names: dict[str, Any]) -> str:
+    """Return the statement that writes all real scalars; it raises struct.error for one that is no number."""
+    if not scalars:
+        return "pass"
+    names.update(memory=buffers.floats.data.cast("B"), put=struct.Struct(f"={len(scalars)}d").pack_into)
+    return f"put(memory, {8 * reals[0].offset}" + "".join(f", x.{v.name}" for v in scalars) + ")"
+
+
+def _compiled(lines: Sequence[str], names: dict[str, Any]) -> Callable[[Any], Any]:
     """Return a function of x that runs generated code.
 
     It gets or sets a dozen attributes in a third of the time that a loop over their names takes.
     """
-    exec(f"def run(x):\n    {statement}\n", names)
-    run: Callable[[Any], None] = names.pop("run")  # else the function and its names would hold each other
+    exec("def run(x):\n    " + "\n    ".join(lines), names)
+    run: Callable[[Any], Any] = names.pop("run")  # else the function and its names would hold each other
     return run
 
 

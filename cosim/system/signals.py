@@ -37,6 +37,11 @@ class Signals:
         self._owner = owner  # keeps the memory alive to which the addresses of pictures and strings point
         self._views = {f"{unit}.{port}": views for unit, ys in outputs.items() for port, views in ys.items()}
         self._ports = {f"{unit}.{name}": p for unit, ps in ports.items() for name, p in ps.items()}
+        self._numbers = {
+            name: self._views[name][0].reshape(port.shape)  # a view, too
+            for name, port in self._ports.items()
+            if port.kind not in (Kind.BINARY, Kind.STRING)
+        }
 
     def __contains__(self, name: object) -> bool:
         """Return whether there is an output of this name."""
@@ -51,19 +56,20 @@ class Signals:
         Raises:
             KeyError: there is no such output.
         """
+        number = self._numbers.get(name)
+        if number is not None:
+            return number.copy()
         views, port = self._of(name)
         if port.kind is Kind.STRING:
             texts: Any = np.array([_text(int(a)) for a in views[0]]).reshape(port.shape)
             return texts[()]  # of an array without dimensions, its text
-        if port.kind is Kind.BINARY:
-            found = [_bytes(int(a), int(size)) for a, size in zip(*views, strict=True)]
-            if not port.shape:
-                return found[0]
-            binaries = np.empty(len(found), dtype=object)
-            for i, binary in enumerate(found):
-                binaries[i] = binary
-            return binaries.reshape(port.shape)
-        return np.array(views[0]).reshape(port.shape)
+        found = [_bytes(int(a), int(size)) for a, size in zip(*views, strict=True)]
+        if not port.shape:
+            return found[0]
+        binaries = np.empty(len(found), dtype=object)
+        for i, binary in enumerate(found):
+            binaries[i] = binary
+        return binaries.reshape(port.shape)
 
     def text(self, name: str) -> str:
         """Return a string signal's text, or the name of an enumeration signal's item; of an array, the first.
