@@ -62,9 +62,10 @@ class Transfer:
 
     def displaced(self, p_WG: tuple[float, float, float], place: tuple[float, float, float]) -> None:
         """Update the displacement by the gripper's position and its handover place."""
-        away = [abs(a - b) for a, b in zip(p_WG, place, strict=True)]
-        self.farthest = max(self.farthest, math.hypot(*away))
-        self.farthest_along = [max(pair) for pair in zip(self.farthest_along, away, strict=True)]
+        (x, y, z), (p_x, p_y, p_z), (far_x, far_y, far_z) = p_WG, place, self.farthest_along
+        x, y, z = abs(x - p_x), abs(y - p_y), abs(z - p_z)
+        self.farthest = max(self.farthest, math.hypot(x, y, z))
+        self.farthest_along = [max(far_x, x), max(far_y, y), max(far_z, z)]
 
     def metrics(self, prefix: str) -> dict[str, Metric]:
         """Return the transfer's metrics, their names with a prefix."""
