@@ -22,6 +22,8 @@ from handover.plants.free_flyer.attachment import Frame, Palm
 from handover.plants.free_flyer.hand_kinematics import (
     FINGERS,
     JOINT_MAX,
+    PALM_BONES,
+    PALM_RADIUS,
     RADIUS,
     REACH,
     STRAIGHT,
@@ -41,7 +43,7 @@ _SWEEPS, _BISECTIONS = 4, 16
 _TOUCH = 0.003
 """Metres between capsule and box, soft skin's give, within which a phalanx counts as touching."""
 _OPPOSED = -0.5
-"""Cosine of the angle between the normals of thumb and finger above which they do not oppose each other."""
+"""Cosine of the angle between the normals of thumb or palm and a finger above which they do not oppose each other."""
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.0)
 """Shares of its rate at which a finger tries to close."""
 _FINE = 0.05
@@ -106,9 +108,13 @@ class Box:
 
 @dataclass(frozen=True)
 class Contact:
-    """A phalanx at a box, in the box's frame; `gap` m between them, `n` the direction in which it pushes the box."""
+    """A phalanx at a box, in the box's frame; `gap` m between them, `n` the direction in which it pushes the box.
 
-    joint: int
+    `joint` is the one at its root, of the palm None; `radius` is its own, m.
+    """
+
+    joint: int | None
+    radius: float
     gap: float
     p: Vector
     n: Vector
@@ -149,18 +155,18 @@ class HandFingers:
             self.advance(_FINE / self._rate, goal, H)
 
     def contacts(self, H: Frame, within: float = _TOUCH) -> list[Contact]:
-        """Return the phalanges of a hand at H that are at most that far from the object, m."""
+        """Return phalanges, and parts of the palm, of a hand at H that are at most that far from the object, m."""
         if norm(H.p) > self._far:
             return []
+        capsules = [(i, RADIUS, bone) for i, bone in enumerate(self.bones())]
         found: list[Contact] = []
-        for finger in FINGERS:
-            for i, bone in zip(finger.joints, phalanges(finger, self._of(finger)), strict=True):
-                line = _moved(H, bone)
-                if self._box.least_room(line) > RADIUS + within:
-                    continue
-                away, p = self._box.nearest(line)
-                if away - RADIUS <= within:
-                    found.append(Contact(i, away - RADIUS, p, scale(-1.0, self._box.normal(p))))
+        for joint, radius, bone in [*capsules, *((None, PALM_RADIUS, bone) for bone in PALM_BONES)]:
+            line = _moved(H, bone)
+            if self._box.least_room(line) > radius + within:
+                continue
+            away, p = self._box.nearest(line)
+            if away - radius <= within:
+                found.append(Contact(joint, radius, away - radius, p, scale(-1.0, self._box.normal(p))))
         return found
 
     def touches(self, H: Frame, stiffness: float, damping: float, most: float, force: float) -> list[Palm]:
@@ -175,27 +181,29 @@ class HandFingers:
         """
         found: list[Palm] = []
         for c in self.contacts(H):
-            lacking = max(0.0, self.wanted[c.joint] - self.angles[c.joint]) if c.gap <= _STOPPED else 0.0
-            pressed = min(lacking * _LENGTHS[c.joint], force / stiffness)
-            depth = max(0.0, -c.gap - _ROUNDING) + pressed
+            depth = max(0.0, -c.gap - _ROUNDING)
+            if c.joint is not None and c.gap <= _STOPPED:
+                lacking = max(0.0, self.wanted[c.joint] - self.angles[c.joint])
+                depth += min(lacking * _LENGTHS[c.joint], force / stiffness)
             if depth <= 0.0:
                 continue
             v = add_cross(H.v, H.w, subtract(c.p, H.p))
-            r = add_scaled(c.p, RADIUS + c.gap, c.n)
+            r = add_scaled(c.p, c.radius + c.gap, c.n)
             found.append(Palm(r, c.n, dot(v, c.n), depth, stiffness, damping, most))
         return found
 
     def encloses(self, H: Frame) -> bool:
-        """Return whether thumb and two fingers at least, of a hand at H, touch the object from opposite sides."""
+        """Return whether the thumb of a hand at H touches the object, and two fingers opposite to it or to the palm."""
         contacts = self.contacts(H)
         thumb = [c for c in contacts if c.joint in FINGERS[0].joints]
+        opposed = [*thumb, *(c for c in contacts if c.joint is None)]
         fingers = {
             finger.name
             for finger in FINGERS[1:]
             for c in contacts
-            if c.joint in finger.joints and any(dot(c.n, t.n) < _OPPOSED for t in thumb)
+            if c.joint in finger.joints and any(dot(c.n, o.n) < _OPPOSED for o in opposed)
         }
-        return len(fingers) >= 2
+        return bool(thumb) and len(fingers) >= 2
 
     def bones(self) -> list[Segment]:
         """Return the lines in the middle of all phalanges, in H."""

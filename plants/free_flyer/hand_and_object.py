@@ -3,8 +3,9 @@
 import enum
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -37,19 +38,23 @@ from handover.cosim.blocks.units import (
     Number,
     Radian,
     RadianPerSecond,
+    Second,
 )
 from handover.plants.free_flyer.attachment import Attachment, Frame, Palm
 from handover.plants.free_flyer.finger_contact import Angles, HandFingers
 from handover.plants.free_flyer.floating_object import FloatingObject
 from handover.plants.free_flyer.gripper_contact import GripperSolids
 from handover.plants.free_flyer.grips import FlyerGripper, FlyerHand
+from handover.plants.free_flyer.hand_guide import HandGuide, pose_of_tracker
 from handover.plants.free_flyer.hand_kinematics import CLOSED
-from handover.plants.free_flyer.parameters import InvalidHandParameters, Motion, Params, StartHolder
+from handover.plants.free_flyer.hand_track import HandPose, read_track
+from handover.plants.free_flyer.parameters import Driver, InvalidHandParameters, Motion, Params, StartHolder
 from handover.plants.free_flyer.person import Activity, FlyerPerson, Perception
 from handover.plants.hand_motion import minimum_jerk
 
 __all__ = [
     "Activity",
+    "Driver",
     "HandAndObject",
     "Holder",
     "Inputs",
@@ -89,6 +94,11 @@ class Inputs:
     w_WB: Vector3[RadianPerSecond] = port(np.zeros(3), "angular velocity of the robot in the world")
     closure: Number = port(0.0, "closure commanded to the gripper: 0 open, 1 closed", minimum=0.0, maximum=1.0)
     light: bool = port(False, "the robot's signal light is on")
+    p_WH_track: Vector3[Metre] = port(np.array([-0.40, 0.10, -0.05]), "wanted position of the hand, by a hand tracker")
+    q_WH_track: Vector4[Number] = port(np.array([1.0, 0.0, 0.0, 0.0]), "wanted orientation of the hand, by it")
+    finger_track: Vector14[Radian] = port(np.zeros(14), "wanted angles of the joints, by it, as the output finger")
+    closed_track: bool = port(False, "by the tracker the hand grasps")
+    age: Second = port(0.0, "age of what the tracker says", minimum=0.0)
 
 
 @dataclass(kw_only=True)
@@ -107,6 +117,10 @@ class Outputs:
     holder: Holder = output("who holds the object")
     activity: Activity = output("what the person does")
     f_H: Vector3[Newton] = output("force on the hand, mean over the step")
+    p_WH_goal: Vector3[Metre] = output("position at which person or tracker want the hand")
+    q_WH_goal: Vector4[Number] = output("orientation in which they want it")
+    finger_goal: Vector14[Radian] = output("angles to which they want the joints")
+    closed_goal: bool = output("they want the hand to grasp")
 
 
 class HandAndObject:
@@ -120,6 +134,11 @@ class HandAndObject:
     - `HandFingers`: 14 joints whose phalanges, capsules, stop at the object, and push it by springs where they cannot
       give way; likewise the gripper (`GripperSolids`), if the hand is no fist. They have no friction: what holds an
       object is the hand's grip as a whole. A person who closes the hand ends at the touch, without pressing.
+    - In place of that person, `driven_by` a track (`HandTrack`, a file) or the inputs of a hand tracker lead the hand
+      (`HandGuide`), and its joints, which then press what they close on. It takes hold when it is to grasp and thumb
+      and fingers enclose the object, and lets go when it is not to; as a fist it pushes the palm. Tracking that is
+      older than age_max, or not finite, is lost: the hand stays where it is, as it is, and keeps what it holds. A track
+      reacts to nothing: neither light nor robot. There is no tremor but its own, and activity stays WAIT.
 
     One unit, because a bare 0.1 kg object that two units exchange by forces is unstable at a few milliseconds. Here the
     gripper's displacement goes in and its wrench, the mean over the step, comes out: stable at 16 and 32 ms. In a
@@ -129,6 +148,7 @@ class HandAndObject:
     Raises:
         InvalidHandParameters: by the constructor, for parameters that contradict each other; by the first step, if the
             gripper starts in the hand or has the free object in its palm or its closed fingers.
+        InvalidTrack: by the constructor, for a track that cannot be followed.
         TurnsTooFast: see `RigidBody`.
     """
 
@@ -139,13 +159,20 @@ class HandAndObject:
         params.check()
         self._p = params
         self._person = FlyerPerson(params)
-        self._hand = FlyerHand(params, self._person.p, self._person.q)
+        self._track = read_track(Path(params.track), params.age_max) if params.driven_by is Driver.TRACK else None
+        self._guide: HandGuide | None = None
+        steady = params
+        if params.driven_by is not Driver.PERSON:
+            self._guide = HandGuide(params, self._person.p, self._person.q, self._person.holding)
+            steady = replace(params, tremor_rms=0.0, drift_rms=0.0)
+        self._hand = FlyerHand(steady, self._person.p, self._person.q)
         self._gripper = FlyerGripper(params)
         self._solids = GripperSolids(params)
         self._object = FloatingObject(params.object_mass, vector(params.object_size))
         self._fingers = HandFingers(vector(params.object_size), params.finger_rate)
         self._robot: Frame | None = None
         self._f_G, self._tau_G, self._f_H = ZERO, ZERO, ZERO
+        self._goal = HandPose(self._hand.p, self._hand.q, self._wanted_angles(), self._person.holding)
         body = self._object.body
         if params.object_with is StartHolder.HAND:
             body.q = self._hand.q
@@ -160,26 +187,24 @@ class HandAndObject:
         """Return where everything is; no time passes."""
         return self._outputs()
 
-    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Advance from t by dt with u held."""
         G = Frame(vector(u.p_WG), quaternion(u.q_WG), vector(u.v_WG), vector(u.w_WB))
         if self._robot is None:
             self._check_overlap(G)
-        before, body, person, hand = self._robot or G, self._object.body, self._person, self._hand
-        person.act(dt, self._perception(u.light, before))
-        self._gripper.act(dt, u.closure, before, body)
-        hand.take_or_leave(person.holding, body)
-        course, f_fist, p_GF = hand.move(dt, person.p, person.q), ZERO, ZERO
-        if person.pushes_with_fist:
-            course, f_fist, p_GF = hand.press(dt, course, G)
-        tau_fist = cross(p_GF, f_fist)
-        H = course if hand.hold is None else Frame(hand.p, hand.q, body.v)
-        self._fingers.advance(dt, self._wanted_angles(), self._seen_from_object(course))
-        if not person.pushes_with_fist:
-            f_fist, tau_fist = self._solids.press(self._fingers.bones(), H, G, self._gripper.angle)
+        before, body, hand = self._robot or G, self._object.body, self._hand
+        course, fist = self._moved_hand(t, dt, u, before)
+        f_hand, tau_hand = ZERO, ZERO
+        if fist:
+            course, f_hand, p_GF = hand.press(dt, course, G)
+            tau_hand = cross(p_GF, f_hand)
+        self._fingers.advance(dt, self._goal.angles, self._seen_from_object(course))
+        if not fist:
+            H = course if hand.hold is None else Frame(hand.p, hand.q, body.v)
+            f_hand, tau_hand = self._solids.press(self._fingers.bones(), H, G, self._gripper.angle)
         self._exchange_forces(dt, before, G, course)
-        self._f_G, self._tau_G = add(self._f_G, f_fist), add(self._tau_G, tau_fist)
-        self._f_H = subtract(self._f_H, f_fist)
+        self._f_G, self._tau_G = add(self._f_G, f_hand), add(self._tau_G, tau_hand)
+        self._f_H = subtract(self._f_H, f_hand)
         hand.arrive(course, body)
         self._robot = G
         return self._outputs()
@@ -188,7 +213,9 @@ class HandAndObject:
         """Return the complete state."""
         b, grip, G = self._object.body, self._gripper.grip, self._robot
         fingers = (self._fingers.wanted, self._fingers.angles)
-        parts = (self._person.get_state(), self._hand.get_state(), self._gripper.angle, fingers)
+        g, guide = self._goal, self._guide
+        led = (g.p, g.q, g.angles, g.closed), None if guide is None else guide.get_state()
+        parts = (self._person.get_state(), self._hand.get_state(), self._gripper.angle, fingers, led)
         held = None if grip is None else (grip.r, grip.place, grip.turn)
         robot = None if G is None else (G.p, G.q, G.v, G.w)
         return pack_state(((b.p, b.q, b.v, b.spin), parts, held, robot, (self._f_G, self._tau_G, self._f_H)))
@@ -197,11 +224,39 @@ class HandAndObject:
         """Restore a state of this unit or of one with equal parameters."""
         b = self._object.body
         (b.p, b.q, b.v, b.spin), parts, held, robot, (self._f_G, self._tau_G, self._f_H) = unpack_state(state)
-        person, hand, self._gripper.angle, (self._fingers.wanted, self._fingers.angles) = parts
+        person, hand, self._gripper.angle, (self._fingers.wanted, self._fingers.angles), (goal, guide) = parts
+        self._goal = HandPose(*goal)
+        if self._guide is not None:
+            self._guide.set_state(guide)
         self._person.set_state(person)
         self._hand.set_state(hand)
         self._gripper.grip = None if held is None else Attachment(self._gripper.stiffness, *held)
         self._robot = None if robot is None else Frame(*robot)
+
+    def _moved_hand(self, t: float, dt: float, u: Inputs, before: Frame) -> tuple[Frame, bool]:
+        """Let who moves the hand do so for dt; return its course if nothing obstructs it, and whether it is a fist."""
+        body, person, hand, guide = self._object.body, self._person, self._hand, self._guide
+        if guide is None:
+            person.act(dt, self._perception(u.light, before))
+            self._gripper.act(dt, u.closure, before, body)
+            hand.take_or_leave(person.holding, body)
+            course = hand.move(dt, person.p, person.q)
+            self._goal = HandPose(course.p, course.q, self._wanted_angles(), person.holding)
+            return course, person.pushes_with_fist
+        guide.follow(dt, self._tracked(t + dt, u))
+        self._goal = guide.goal
+        self._gripper.act(dt, u.closure, before, body)
+        encloses = hand.hold is not None or self._fingers.encloses(self._seen_from_object(hand.course))
+        hand.take_or_leave(guide.goal.closed and encloses, body)
+        return hand.move(dt, guide.p, guide.q), guide.goal.closed
+
+    def _tracked(self, t: float, u: Inputs) -> HandPose | None:
+        """Return the pose that the track has at t, or that the tracker says; none if it has lost the hand."""
+        if self._track is not None:
+            return self._track.at(t)
+        if not u.age <= self._p.age_max:
+            return None
+        return pose_of_tracker(u.p_WH_track, u.q_WH_track, u.finger_track, u.closed_track)
 
     def _check_overlap(self, G: Frame) -> None:
         p, faults = self._p, list[str]()
@@ -270,7 +325,8 @@ class HandAndObject:
         if self._hand.hold is not None:
             return []
         p, seen = self._p, self._seen_from_object(H)
-        return self._fingers.touches(seen, p.finger_stiffness, p.finger_damping, p.arm_force_max, 0.0)
+        force = 0.0 if self._guide is None else p.finger_force
+        return self._fingers.touches(seen, p.finger_stiffness, p.finger_damping, p.arm_force_max, force)
 
     def _seen_from_object(self, H: Frame) -> Frame:
         """Return a hand that is at H, or that holds the object, as seen from the object."""
@@ -284,7 +340,8 @@ class HandAndObject:
     def _outputs(self) -> Outputs:
         """Return the outputs as pieces of one array, which costs less than an array each."""
         b, hand = self._object.body, self._hand
-        a = np.array([*self._f_G, *self._tau_G, *b.p, *b.q, *b.v, *hand.p, *hand.q, *self._f_H])
+        g = self._goal
+        a = np.array([*self._f_G, *self._tau_G, *b.p, *b.q, *b.v, *hand.p, *hand.q, *self._f_H, *g.p, *g.q])
         return Outputs(
             f_G=a[0:3],
             tau_G=a[3:6],
@@ -298,6 +355,10 @@ class HandAndObject:
             holder=_HOLDERS[self._gripper.grip is not None, hand.hold is not None],
             activity=self._person.activity,
             f_H=a[23:26],
+            p_WH_goal=a[26:29],
+            q_WH_goal=a[29:33],
+            finger_goal=np.array(g.angles),
+            closed_goal=g.closed,
         )
 
 

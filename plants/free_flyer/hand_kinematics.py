@@ -84,6 +84,14 @@ CLOSED = tuple(angle for finger in FINGERS for angle in finger.closed)
 STRAIGHT = (0.0,) * JOINTS
 
 
+PALM_RADIUS = 0.5 * PALM_SIDES[2]
+"""Radius of the capsules of which the palm is made where it touches an object, m."""
+PALM_BONES: tuple[Segment, ...] = tuple(
+    (add(PALM, (x, -0.03, 0.0)), add(PALM, (x, 0.03, 0.0))) for x in (-0.03, -0.01, 0.01, 0.03)
+)
+"""Their lines in H, across the palm."""
+
+
 def joint_places(finger: Finger, angles: Sequence[float]) -> list[Vector]:
     """Return where a finger's joints and its tip are in H, m, at the angles of its joints, rad."""
     places, bent = [finger.root], 0.0

@@ -12,6 +12,7 @@ from handover.cosim.blocks.units import (
     Kilogram,
     Metre,
     MetrePerSecond,
+    MetrePerSecond2,
     Newton,
     NewtonMetre,
     NewtonMetrePerRadian,
@@ -19,8 +20,10 @@ from handover.cosim.blocks.units import (
     NewtonPerMetre,
     NewtonSecondPerMetre,
     Number,
+    PerSecond,
     Radian,
     RadianPerSecond,
+    RadianPerSecond2,
     Second,
 )
 from handover.plants.free_flyer.rigid_body import unit_faults
@@ -42,6 +45,14 @@ class Motion(enum.IntEnum):
     TAKE = 1
     GIVE = 2
     PUSH = 3
+
+
+class Driver(enum.IntEnum):
+    """Who moves the hand."""
+
+    PERSON = 0
+    TRACK = 1
+    OUTSIDE = 2
 
 
 class StartHolder(enum.IntEnum):
@@ -102,6 +113,23 @@ class Params:
     fist_radius: Metre = parameter(0.035, "radius of a fist", minimum=0.005, maximum=0.2)
     fist_offset: Metre = parameter(-0.07, "where along y of G a fist pushes", minimum=-0.3, maximum=0.3)
 
+    driven_by: Driver = parameter(Driver.PERSON, "who moves the hand: a simulated person, a file, or the inputs")
+    track: str = parameter("", "CSV file of a recorded track of a hand, of driven_by TRACK")
+    age_max: Second = parameter(
+        0.2, "age from which tracking counts as lost; longest gap of a track", minimum=0.001, maximum=10.0
+    )
+    hand_bandwidth: PerSecond = parameter(
+        20.0, "how fast a hand follows its track: it lags by the inverse", minimum=0.5, maximum=100.0
+    )
+    hand_speed_max: MetrePerSecond = parameter(2.0, "speed at which it follows", minimum=0.01, maximum=10.0)
+    hand_acceleration_max: MetrePerSecond2 = parameter(20.0, "its acceleration", minimum=0.1, maximum=200.0)
+    hand_turning_max: RadianPerSecond = parameter(8.0, "its angular velocity", minimum=0.1, maximum=50.0)
+    hand_turning_acceleration_max: RadianPerSecond2 = parameter(
+        80.0, "its angular acceleration", minimum=1.0, maximum=1000.0
+    )
+    finger_force: Newton = parameter(
+        0.3, "force of a phalanx whose joint wants on, if the hand follows a track", minimum=0.0, maximum=20.0
+    )
     finger_rate: RadianPerSecond = parameter(12.0, "speed of the hand's joints", minimum=0.1, maximum=100.0)
     finger_stiffness: NewtonPerMetre = parameter(300.0, "stiffness of a phalanx", minimum=1.0, maximum=1e5)
     finger_damping: NewtonSecondPerMetre = parameter(3.0, "damping of a phalanx", minimum=0.0, maximum=1000.0)
@@ -193,6 +221,10 @@ class Params:
         faults = unit_faults("q_WO_0", self.q_WO_0) + unit_faults("q_WH_0", self.q_WH_0)
         if not np.linalg.norm(self.pull_direction) > 0.0:
             faults.append("pull_direction must not be zero")
+        if self.driven_by is Driver.TRACK and not self.track:
+            faults.append("driven_by TRACK needs a file of a track: track")
+        if self.track and self.driven_by is not Driver.TRACK:
+            faults.append(f"track {self.track} is given, and driven_by is {self.driven_by.name}, not TRACK")
         if not self.tremor_bandwidth < 2.0 * self.tremor_frequency:
             faults.append(
                 f"tremor_bandwidth {self.tremor_bandwidth:g} Hz must be less than twice tremor_frequency "
