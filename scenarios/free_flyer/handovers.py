@@ -85,6 +85,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         at = {name: np.array(value) for name, value in paper_values("free_flyer", "handover_place").items()}
         p_WO_0, behaviour = at["p_WO_0"], p.behaviour.item
         robot, model, lag = p.robot, vars(p.model), expected_lag(p.propulsion)
+        delay = p.delay + p.navigation_delay
         s = System()
         s.add(
             "decision",
@@ -99,12 +100,12 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
             gradual=p.gradual,
             patience=p.patience,
         )
-        s.add("impedance", fmu("impedance"), behaviour=behaviour, **model, delay=p.delay, lag=lag)
-        s.add("pose", fmu("pose"), **model, delay=p.delay, lag=lag)
+        s.add("impedance", fmu("impedance"), behaviour=behaviour, **model, delay=delay, lag=lag)
+        s.add("pose", fmu("pose"), **model, delay=delay, lag=lag)
         step = common_period([s.units[name] for name in self.cycle()])
         s.add("thrusters", fmu("thrusters"), period=step, propulsion=p.propulsion.item, delay=p.delay)
         s.add("robot", fmu("robot"), period=step, **vars(robot), p_WB_0=at["p_WG_0"] - robot.p_BG)
-        s.add("navigation", fmu("navigation"), period=step, seed=navigation_seed)
+        s.add("navigation", fmu("navigation"), period=step, seed=navigation_seed, delay=p.navigation_delay)
         s.add(
             "person",
             fmu("person"),

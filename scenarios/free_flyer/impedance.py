@@ -57,7 +57,7 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
             "impedance",
             fmu("impedance"),
             behaviour=p.behaviour.item,
-            delay=p.delay if p.delay_known else 0.0,
+            delay=p.delay + p.navigation_delay if p.delay_known else 0.0,
             lag=expected_lag(p.propulsion),
             **vars(p.model),
             p_WG_goal=p_WG,
@@ -75,7 +75,7 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
             duration=p.duration,
         )
         robot = s.add("robot", fmu("robot"), **vars(robot_body), p_WB_0=p_WG - robot_body.p_BG)
-        navigation = s.add("navigation", fmu("navigation"), seed=seed)
+        navigation = s.add("navigation", fmu("navigation"), seed=seed, delay=p.navigation_delay)
         wire_controller(s, impedance, navigation, thrusters)
         wire_navigation(s, robot, navigation)
         wire_forces(s, robot, thrusters, push)

@@ -93,6 +93,9 @@ class HandoverParameters(RobotAndModel):
     propulsion: Propulsion = parameter(Propulsion.LIMITED, "what the thrusters are like")
     delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
     gradual: bool = parameter(False, "whether the fingers follow pull and push, and their grip fades as they open")
+    navigation_delay: Second = parameter(
+        0.0, "age of the estimate of the robot's pose and velocities", minimum=0.0, maximum=0.2
+    )
     gated: bool = parameter(True, "whether the robot yields and signals only once it is at rest in its place")
     patience: Second = parameter(
         60.0, "time in any one phase after which the robot gives up", minimum=1.0, maximum=600.0
@@ -145,7 +148,12 @@ class ImpedanceParameters(RobotAndModel):
         Propulsion.IDEAL, "what the thrusters are like; the published plots need ideal ones"
     )
     delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
-    delay_known: bool = parameter(True, "whether the controller knows the delay, and rejects one it is unstable with")
+    navigation_delay: Second = parameter(
+        0.0, "age of the estimate of the robot's pose and velocities", minimum=0.0, maximum=0.2
+    )
+    delay_known: bool = parameter(
+        True, "whether the controller knows both delays, and rejects ones it is unstable with"
+    )
     patience: Second = parameter(60.0, "time after the push by which the robot must rest", minimum=1.0, maximum=600.0)
     parallel_step: Second = parameter(
         0.002, "communication step in a host that steps all units in parallel (Jacobi)", minimum=0.0005, maximum=0.016

@@ -31,7 +31,7 @@ _CONTROLLER = Place(
         "pole_frequency": "see pole_radius",
         "behaviour": "the scenario's parameter",
         **_BODY,
-        "delay": "the scenario's parameter",
+        "delay": "the sum of the scenario's delay and navigation_delay",
         "lag": "of the thrusters, as a controller may expect it",
     },
     remarks=_FRAMES,
@@ -59,7 +59,7 @@ _ROBOT = Place(
 )
 _NAVIGATION = Place(
     required=_ESTIMATE,
-    optional={**_TRUTH, "seed": "follows from the run's seed"},
+    optional={**_TRUTH, "seed": "follows from the run's seed", "delay": "the scenario's parameter navigation_delay"},
     remarks=_FRAMES,
 )
 

@@ -14,7 +14,7 @@ def published_of_push(p: ImpedanceParameters) -> Sequence[PublishedValue]:
     """Return the bounds of how far robot and impedance model differ; nothing for other pushes than the published."""
     default = ImpedanceParameters()
     same = p.force == default.force if p.kind is Wrench.FORCE else p.torque == default.torque
-    if not same or p.propulsion is not Propulsion.IDEAL or p.delay or not p.is_published:
+    if not same or p.propulsion is not Propulsion.IDEAL or p.delay or p.navigation_delay or not p.is_published:
         return ()
     note = "over all pushes and twists; how long they lasted is not stated"
     return [

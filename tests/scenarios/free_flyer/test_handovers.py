@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from flyer_runs import metric, run
 
+import handover
 from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
@@ -39,6 +40,24 @@ def test_a_command_acts_in_the_step_that_follows_its_measurement():
     schedule = Schedule(system)
     assert [s.unit for s in schedule.sampled] == ["decision", "impedance", "pose"]
     assert [s.unit for s in schedule.continuous] == ["thrusters", "robot", "navigation", "person"]
+
+
+def test_a_biased_estimate_leads_the_gripper_astray_and_the_truth_tells(tmp_path: Path):
+    exact, biased = (
+        handover.run(
+            "flyer_robot_to_human",
+            seed=1,
+            parameters={"navigation.position_bias": bias},
+            out=tmp_path / name,
+            report=False,
+        )
+        for name, bias in (("exact", 0.0), ("biased", 0.02))
+    )
+    record = Record(tmp_path / "biased" / "signals.parquet")
+    bias = np.mean(record["navigation.p_WB_meas"] - record["robot.p_WB"], axis=0)
+    assert np.linalg.norm(bias) > 0.02
+    assert exact.metrics["arrival_error"] < 0.01
+    assert biased.metrics["arrival_error"] == pytest.approx(float(np.linalg.norm(bias)), abs=0.01)
 
 
 @pytest.mark.slow

@@ -60,6 +60,29 @@ def test_a_known_delay_that_makes_the_loop_unstable_is_refused_before_anything_i
     assert not (tmp_path / "r").exists()
 
 
+@pytest.mark.parametrize("delays", [("navigation_delay=0.032",), ("delay=0.016", "navigation_delay=0.016")])
+def test_the_controller_expects_both_delays_together(delays: tuple[str, ...], tmp_path: Path):
+    with pytest.raises(InitializationError, match=r"unstable at 62\.5 Hz with a delay of 0\.032 s"):
+        run(FlyerImpedance, tmp_path / "r", *delays)
+    assert not (tmp_path / "r").exists()
+
+
+def test_a_late_estimate_counts_as_much_as_late_thrust(tmp_path: Path):
+    poles = ("pole_margin_impedance", "damping_ratio_impedance", "frequency_impedance")
+    given = {"on_time": (), "thrust": ("delay=0.016",), "estimate": ("navigation_delay=0.016",)}
+    runs = {name: run(FlyerImpedance, tmp_path / name, *parameters) for name, parameters in given.items()}
+    on_time, late_thrust, late_estimate = ([metric(ended, name) for name in poles] for ended in runs.values())
+    assert late_estimate == late_thrust
+    assert late_estimate[1] < on_time[1]
+
+
+def test_a_late_estimate_that_the_controller_does_not_know_of_makes_it_lose_control(tmp_path: Path):
+    ended = run(FlyerImpedance, tmp_path / "r", "navigation_delay=0.048", "delay_known=false")
+    assert ended.failure is None
+    assert not ended.outcome.success
+    assert "out of control" in ended.outcome.reason
+
+
 def test_an_unknown_delay_makes_the_robot_lose_control_and_the_run_ends_in_time(tmp_path: Path):
     ended = run(FlyerImpedance, tmp_path / "r", "delay=0.032", "delay_known=false")
     assert ended.failure is None
