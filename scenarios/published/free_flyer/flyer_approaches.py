@@ -38,9 +38,9 @@ _QUICK_PLACES = 5
 
 
 def _noise(factor: float) -> Variation:
-    usual = paper_values("free_flyer", "robot")
+    usual = paper_values("free_flyer", "navigation")
     names = [f"{what}_noise" for what in ("position", "attitude", "velocity", "rate")]
-    return Variation(f"noise x {factor:g}", {f"robot.{name}": f"{factor * usual[name]:g}" for name in names})
+    return Variation(f"noise x {factor:g}", {f"navigation.{name}": f"{factor * usual[name]:g}" for name in names})
 
 
 CASES = (

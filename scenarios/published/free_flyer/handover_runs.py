@@ -29,7 +29,7 @@ AT_PUBLISHED_RATE = {
 }
 """The units on the robot's computer that run at the thesis's 67.5 Hz, by the places that they take."""
 WITHOUT_CHANCE = {
-    **{f"robot.{what}_noise": "0" for what in ("position", "attitude", "velocity", "rate")},
+    **{f"navigation.{what}_noise": "0" for what in ("position", "attitude", "velocity", "rate")},
     **{f"person.{what}": "0" for what in ("tremor_rms", "drift_rms", "reaction_spread")},
 }
 """Parameters of a navigation without noise and of a hand that does not shake, and always reacts in the same time."""

@@ -26,7 +26,7 @@ from handover.scenarios.published.free_flyer.handover_runs import (
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 NUMBERS = ("strength", "arm_factor", "model_arm_factor", "mass_factor", "inertia_factor", "decision.gate_error")
-UNITS = ("robot.position_noise", "person.tremor_rms", *AT_PUBLISHED_RATE)
+UNITS = ("navigation.position_noise", "person.tremor_rms", *AT_PUBLISHED_RATE)
 HAND_OVER = FlyerHandoverTable()
 
 
