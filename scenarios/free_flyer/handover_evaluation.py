@@ -232,7 +232,7 @@ class HandoverEvaluator(Evaluator):
             and self._holder == self.receivers[-1]
             and self._failed == self.failures
         )
-        return Outcome(success=success, reason=self._reason(success), metrics=self._metrics())
+        return Outcome(success=success, reason=self._reason(success) + self.parameters.stuck, metrics=self._metrics())
 
     def _metrics(self) -> dict[str, Metric]:
         metrics: dict[str, Metric] = {}

@@ -28,7 +28,7 @@ from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
 from handover.scenarios.free_flyer.parameters import HandoverParameters, Task, TaskParameters
 from handover.scenarios.free_flyer.places import PLACES_OF_HANDOVER
 from handover.scenarios.free_flyer.published import published_of_giving, published_of_receiving
-from handover.scenarios.free_flyer.robot_wiring import common_period, expected_lag, wire_handover
+from handover.scenarios.free_flyer.robot_wiring import common_period, expected_lag, thruster_settings, wire_handover
 
 _FLIGHT = 120
 """Time for flying, fetching and retreating, without the waiting for the person, s (assumed)."""
@@ -103,7 +103,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         s.add("impedance", fmu("impedance"), behaviour=behaviour, **model, delay=delay, lag=lag)
         s.add("pose", fmu("pose"), **model, delay=delay, lag=lag)
         step = common_period([s.units[name] for name in self.cycle()])
-        s.add("thrusters", fmu("thrusters"), period=step, propulsion=p.propulsion.item, delay=p.delay)
+        s.add("thrusters", fmu("thrusters"), period=step, **thruster_settings(p.propulsion, p.delay, p.stuck_nozzle))
         s.add("robot", fmu("robot"), period=step, **vars(robot), p_WB_0=at["p_WG_0"] - robot.p_BG)
         s.add("navigation", fmu("navigation"), period=step, seed=navigation_seed, delay=p.navigation_delay)
         s.add(

@@ -18,7 +18,13 @@ from handover.scenarios.free_flyer.impedance_evaluation import ImpedanceEvaluato
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Wrench
 from handover.scenarios.free_flyer.places import PLACES_OF_PUSH
 from handover.scenarios.free_flyer.published import published_of_push
-from handover.scenarios.free_flyer.robot_wiring import expected_lag, wire_controller, wire_forces, wire_navigation
+from handover.scenarios.free_flyer.robot_wiring import (
+    expected_lag,
+    thruster_settings,
+    wire_controller,
+    wire_forces,
+    wire_navigation,
+)
 
 
 class FlyerImpedance(Experiment[ImpedanceEvaluator]):
@@ -64,7 +70,7 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
             q_WG_goal=np.array([1.0, 0.0, 0.0, 0.0]),
             active=True,
         )
-        thrusters = s.add("thrusters", fmu("thrusters"), propulsion=p.propulsion.item, delay=p.delay)
+        thrusters = s.add("thrusters", fmu("thrusters"), **thruster_settings(p.propulsion, p.delay, p.stuck_nozzle))
         push = s.add(
             "push",
             fmu("push"),

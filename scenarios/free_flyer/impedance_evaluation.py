@@ -274,7 +274,8 @@ class ImpedanceEvaluator(Evaluator):
         )
         joined = "and" if agrees is self._at_rest else "but"
         thrust = f"; thrusters at their limits for {100 * share:.0f} % of the time" if share else ""
-        return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}"
+        stuck = self.parameters.stuck
+        return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}{stuck}"
 
     def _back(self) -> str:
         """Return whether the gripper came back to rest, as a clause of the reason."""

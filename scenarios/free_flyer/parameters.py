@@ -28,10 +28,11 @@ class Behaviour(_OfUnit):
 
 
 class Propulsion(_OfUnit):
-    """How the thrusters follow their commands: ideal ones have neither limits nor lag."""
+    """How the thrusters follow their commands: ideal ones have neither limits nor lag, nozzles share what there is."""
 
     IDEAL = 0
     LIMITED = 1
+    NOZZLES = 2
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,9 @@ class RobotAndModel:
     model_mass_factor: Number = _factor("mass that the robot's controllers assume")
     model_inertia_factor: Number = _factor("inertia that the robot's controllers assume")
     model_arm_factor: Number = _factor("length of the arm that the robot's controllers assume")
+    stuck_nozzle: int = parameter(
+        0, "which of twelve nozzles is stuck closed, unknown to the robot; 0: none", minimum=0, maximum=12
+    )
 
     @property
     def robot(self) -> Body:
@@ -67,6 +71,11 @@ class RobotAndModel:
     def model(self) -> Body:
         """The robot as its controllers assume it to be."""
         return _body(self.model_mass_factor, self.model_inertia_factor, self.model_arm_factor)
+
+    @property
+    def stuck(self) -> str:
+        """Which nozzle is stuck, as the end of a sentence."""
+        return f"; nozzle {self.stuck_nozzle} was stuck closed" if self.stuck_nozzle else ""
 
     @property
     def is_published(self) -> bool:

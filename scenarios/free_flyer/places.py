@@ -47,7 +47,11 @@ def _thrusters(*controllers: str) -> Place:
     commands = {f"{what}_{name}": "in B" for name in controllers for what in ("f", "tau")}
     return Place(
         required={**commands, **_WRENCH, "saturated": "its share of the run is a metric"},
-        optional={"propulsion": "the scenario's parameter", "delay": "the scenario's parameter"},
+        optional={
+            "propulsion": "the scenario's parameter",
+            "delay": "the scenario's parameter",
+            "flapper_range": "0 of a nozzle that is stuck",
+        },
         remarks=_FRAMES,
     )
 

@@ -6,12 +6,16 @@ Also the metrics of the controllers' closed loops, which they compute by their o
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import Any
+
+import numpy as np
 
 from handover.controllers.free_flyer.ports import PERIOD
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.parameters import Propulsion
 
 _TRUE = ("p_WB", "q_WB", "v_WB", "w_WB")
@@ -20,8 +24,32 @@ _SEEN = ("p_WG", "q_WG", "v_WG", "w_WB")
 
 
 def expected_lag(propulsion: Propulsion) -> float:
-    """Return the lag of the thrusters that the controllers assume, s."""
-    return 0.0 if propulsion is Propulsion.IDEAL else float(paper_values("free_flyer", "thrusters")["lag"])
+    """Return the lag of the thrusters that the controllers assume, s.
+
+    Of nozzles it is that of their flappers: thrust follows a flapper's angle at once, and as its sine rather than in
+    proportion, so that a step of the command lags by 0.8 to 1.2 of it. Impellers stay at their speed.
+    """
+    if propulsion is Propulsion.IDEAL:
+        return 0.0
+    values = paper_values("free_flyer", "thrusters")
+    return float(values["flapper_lag" if propulsion is Propulsion.NOZZLES else "lag"])
+
+
+def thruster_settings(propulsion: Propulsion, delay: float, stuck_nozzle: int) -> dict[str, Any]:
+    """Return the parameters of the thrusters' unit.
+
+    Raises:
+        InvalidParameter: a nozzle is stuck of thrusters that have none.
+    """
+    settings: dict[str, Any] = {"propulsion": propulsion.item, "delay": delay}
+    if stuck_nozzle == 0:
+        return settings
+    if propulsion is not Propulsion.NOZZLES:
+        text = f"propulsion {propulsion.item} has no nozzle that could be; set propulsion nozzles, or 0"
+        raise InvalidParameter([f"stuck_nozzle: {stuck_nozzle} is to be stuck, and {text}"])
+    opens = np.ones(12)
+    opens[stuck_nozzle - 1] = 0.0
+    return settings | {"flapper_range": opens}
 
 
 def common_period(controllers: Sequence[PlacedUnit]) -> Fraction | None:

@@ -10,7 +10,8 @@ from handover.cosim.exceptions import InitializationError
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.impedance import FlyerImpedance
-from handover.scenarios.free_flyer.parameters import ImpedanceParameters
+from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Propulsion
+from handover.scenarios.free_flyer.robot_wiring import expected_lag, thruster_settings
 
 
 def test_a_pushed_robot_comes_back_and_moves_as_the_impedance_model_says(tmp_path: Path):
@@ -133,3 +134,23 @@ def test_nothing_published_stands_beside_another_robot():
     published = FlyerImpedance().published
     assert published(ImpedanceParameters())
     assert not published(ImpedanceParameters(arm_factor=1.2))
+
+
+@pytest.mark.slow
+def test_a_push_is_borne_by_nozzles_and_a_stuck_one_is_told(tmp_path: Path):
+    small = ("propulsion=nozzles", "force=0.3", "patience=10")
+    whole = run(FlyerImpedance, tmp_path / "whole", *small)
+    assert metric(whole, "greatest_orientation_error") < 0.03
+    stuck = run(FlyerImpedance, tmp_path / "stuck", *small, "stuck_nozzle=1")
+    assert stuck.outcome.reason.endswith("; nozzle 1 was stuck closed")
+    assert metric(stuck, "greatest_orientation_error") > metric(whole, "greatest_orientation_error")
+
+
+def test_only_nozzles_can_be_stuck():
+    p = ImpedanceParameters(propulsion=Propulsion.LIMITED, stuck_nozzle=3)
+    with pytest.raises(InvalidParameter, match="stuck_nozzle: 3 is to be stuck, and propulsion limited has no nozzle"):
+        thruster_settings(p.propulsion, p.delay, p.stuck_nozzle)
+
+
+def test_controllers_expect_the_flappers_lag_of_nozzles():
+    assert [expected_lag(p) for p in Propulsion] == [0.0, 0.02, 0.0386]
