@@ -11,7 +11,7 @@
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -236,24 +236,28 @@ class HandoverOfTask(FlyerHandover):
 
     name: ClassVar[str] = "flyer_handover"
     title: ClassVar[str] = "a free-flyer and a person hand an object over, in one of the four ways"
-    parameters_type: ClassVar[type[TaskParameters]] = TaskParameters
+    parameters_type: ClassVar[type[HandoverParameters]] = TaskParameters
 
-    def build(self, parameters: TaskParameters, seed: int, fmu: FmuOf) -> System:
+    def build(self, parameters: HandoverParameters, seed: int, fmu: FmuOf) -> System:
         """Wire the task's scenario.
 
         Raises:
             InvalidParameter: the handover place is out of the person's reach.
         """
-        return _OF_TASK[parameters.task]().build(parameters, seed, fmu)
+        return _of_task(parameters).build(parameters, seed, fmu)
 
-    def stop_time(self, parameters: TaskParameters) -> Fraction:
+    def stop_time(self, parameters: HandoverParameters) -> Fraction:
         """Return that of the task's scenario."""
-        return _OF_TASK[parameters.task]().stop_time(parameters)
+        return _of_task(parameters).stop_time(parameters)
 
-    def evaluator(self, parameters: TaskParameters) -> HandoverEvaluator:
+    def evaluator(self, parameters: HandoverParameters) -> HandoverEvaluator:
         """Return that of the task's scenario."""
-        return _OF_TASK[parameters.task]().evaluator(parameters)
+        return _of_task(parameters).evaluator(parameters)
 
-    def published(self, parameters: TaskParameters) -> Sequence[PublishedValue]:
+    def published(self, parameters: HandoverParameters) -> Sequence[PublishedValue]:
         """Return the published values of the task."""
-        return _OF_TASK[parameters.task]().published(parameters)
+        return _of_task(parameters).published(parameters)
+
+
+def _of_task(parameters: HandoverParameters) -> FlyerHandover:
+    return _OF_TASK[cast(TaskParameters, parameters).task]()

@@ -15,6 +15,7 @@ from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure
 from handover.scenarios.free_flyer.handovers import HandoverOfTask
 from handover.scenarios.free_flyer.parameters import Behaviour
+from handover.scenarios.published.free_flyer.flyer_handover_figures import legend_below
 from handover.scenarios.published.free_flyer.handover_runs import (
     GIVING,
     RECEIVING,
@@ -242,7 +243,7 @@ def _draw(runs: _Approaches, folder: Path) -> list[Figure]:
             axes.set_ylim(len(cases) - 0.4, -0.6)
             axes.set(title="gives" if exchange.gives else "receives", xlim=(0.0, None), xlabel="speed at rest (mm/s)")
         panels[1].tick_params(labelleft=False)
-        panels[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.08), ncols=3)
+        legend_below(panels[0])
     caption = (
         "Greatest speed of the gripper, as the robot sees it, while it waits where nobody is, of every approach; "
         "dashed: the thresholds of sec. 4.1.2, from which on it lets go or closes."

@@ -1,15 +1,19 @@
 """Figures of the free-flyer's handovers: as [Fernandes2020] figs. 4.29 to 4.38, margins, and displacement by force."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, draw_time_figures, figure
-from handover.scenarios.experiment.time_plot import TimeFigure
+from handover.scenarios.experiment.time_plot import TimeFigure, TimePlot
 from handover.scenarios.free_flyer.parameters import Behaviour, HandoverParameters, Propulsion, Task
 from handover.scenarios.free_flyer.plots import figures_of_handover
 from handover.scenarios.published.free_flyer.handover_runs import (
@@ -20,6 +24,7 @@ from handover.scenarios.published.free_flyer.handover_runs import (
     USUAL,
     Exchange,
     HandoverRuns,
+    Variation,
 )
 
 _FIGURES = {
@@ -30,6 +35,8 @@ _FIGURES = {
     (Task.FAILED_RECEPTION, Behaviour.COMPLIANT): (37, 38),
 }
 """Numbers of the thesis's figures in chapter 4, of motion and of gripper; it has none of the other handovers."""
+_LEAST = 2.0
+"""What a plot of angles shows at least, up and down, °."""
 
 
 def figure_number(exchange: Exchange, behaviour: Behaviour) -> str:
@@ -61,7 +68,7 @@ def _draw_handover(record: Record, task: Task, behaviour: Behaviour, folder: Pat
             name=f"motion_{task.item}_{behaviour.item}",
             caption=f"Position and orientation in W of gripper, hand and object, {what}{like[0]}; shaded by the "
             "robot's phases.",
-            plots=[*positions.plots, *orientations.plots],
+            plots=[*positions.plots, *(_not_magnified(plot) for plot in orientations.plots)],
         ),
         replace(
             gripper,
@@ -72,6 +79,13 @@ def _draw_handover(record: Record, task: Task, behaviour: Behaviour, folder: Pat
         ),
     ]
     return draw_time_figures(specs, record.time, folder)
+
+
+def _not_magnified(plot: TimePlot) -> TimePlot:
+    """Return a plot of angles, °, which shows two degrees up and down at least: less is noise and tremor."""
+    values = np.concatenate([curve.values for curve in plot.curves])
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    return replace(plot, limits=(min(1.1 * low, -_LEAST), max(1.1 * high, _LEAST)))
 
 
 def draw_margins(rows: HandoverRuns, folder: Path) -> list[Figure]:
@@ -104,30 +118,47 @@ def draw_margins(rows: HandoverRuns, folder: Path) -> list[Figure]:
     return [Figure("margins", caption)]
 
 
+def legend_below(axes: Axes) -> None:
+    """Write a figure's legend, of what one of its axes has, below all of them."""
+    canvas: Any = axes.get_figure(root=True)
+    handles, labels = axes.get_legend_handles_labels()
+    canvas.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+
+
+def _by_force(
+    rows: HandoverRuns, variations: Sequence[tuple[float, Variation]], propulsion: Propulsion, behaviour: Behaviour
+) -> list[tuple[float, Floats, bool]]:
+    """Return force, N, displacements along z, mm, and whether the robot felt the pull in all runs."""
+    points: list[tuple[float, Floats, bool]] = []
+    for strength, variation in variations:
+        found = rows.of(GIVING.task, behaviour, propulsion, variation)
+        z = 1e3 * GIVING.of(found, "displacement_z")
+        if len(z):
+            points.append((strength, z, len(GIVING.of(found, "speed")) == len(found)))
+    return points
+
+
 def draw_strengths(rows: HandoverRuns, folder: Path) -> list[Figure]:
     """Draw how far the gripper goes along z, as it gives, by how strongly the person pulls."""
     usual = HandoverParameters().strength
     variations = sorted(
         [(usual, USUAL), *((float(v.parameters["strength"]), v) for v in STRENGTHS)], key=lambda pair: pair[0]
     )
-    found = {
-        (p, b): [(s, 1e3 * GIVING.of(rows.of(GIVING.task, b, p, v), "displacement_z")) for s, v in variations]
-        for p in Propulsion
-        for b in Behaviour
-    }
-    found = {key: [(s, z) for s, z in points if len(z)] for key, points in found.items()}
+    found = {(p, b): _by_force(rows, variations, p, b) for p in Propulsion for b in Behaviour}
     if any(len(points) < 3 for points in found.values()):
         return []
     published = [1e3 * float(x) for x in paper_values("free_flyer", "published")["transfer_displacement_z"]]
-    with figure(folder / "strength", 1, 2, size=(8.0, 3.4)) as panels:
+    with figure(folder / "strength", 1, 2, size=(8.0, 3.7)) as panels:
         for axes, propulsion in zip(panels, (Propulsion.IDEAL, Propulsion.LIMITED), strict=True):
             for behaviour in Behaviour:
                 points, colour = found[propulsion, behaviour], COLOURS[int(behaviour)]
-                axes.plot([s for s, _ in points], [np.median(z) for _, z in points], "-", lw=1.2, color=colour)
-                for strength, z in points:
-                    axes.plot(np.full(len(z), strength), z, "o", ms=4, color=colour)
-                axes.plot([], [], "o-", ms=4, color=colour, label=behaviour.item)
+                axes.plot([s for s, _, _ in points], [np.median(z) for _, z, _ in points], "-", lw=1.2, color=colour)
+                for strength, z, felt in points:
+                    inside = colour if felt else "white"
+                    axes.plot(np.full(len(z), strength), z, "o", ms=5, color=colour, markerfacecolor=inside)
+                axes.plot([], [], "o-", ms=5, color=colour, label=behaviour.item)
                 axes.axhline(published[behaviour], color=colour, ls=(0, (7, 3)), lw=1.0)
+            axes.plot([], [], "o", ms=5, color=COLOURS[5], markerfacecolor="white", label="not felt")
             axes.plot([], [], color=COLOURS[5], ls=(0, (7, 3)), lw=1.0, label="published")
             thrust = "ideal thrust" if propulsion is Propulsion.IDEAL else "Astrobee's limits"
             axes.set(title=thrust, xlabel="force of the pull at most (N)", xlim=(0.0, None), ylim=(0.0, None))
@@ -135,9 +166,10 @@ def draw_strengths(rows: HandoverRuns, folder: Path) -> list[Figure]:
         for axes in panels:
             axes.set_ylim(0.0, top)
         panels[0].set_ylabel("gripper along z (mm)")
-        panels[0].legend(loc="upper left")
+        legend_below(panels[0])
     caption = (
         "How far the gripper goes from its place along z of W as the robot gives, by the force with which the person "
-        "pulls at most, which the thesis does not say: each run, and medians. Dashed: sec. 4.3.1."
+        "pulls at most, which the thesis does not say: each run, and medians; hollow where the robot did not feel the "
+        "pull in all runs, and the person gave up. Dashed: sec. 4.3.1."
     )
     return [Figure("strength", caption)]

@@ -50,7 +50,7 @@ class Variation:
 
 USUAL = Variation("")
 
-STRENGTHS = tuple(Variation(f"{n:g} N", {"strength": f"{n:g}"}) for n in (1.0, 2.0, 3.0, 6.0, 10.0))
+STRENGTHS = tuple(Variation(f"{n:g} N", {"strength": f"{n:g}"}) for n in (0.3, 0.5, 1.0, 2.0, 8.0))
 """Persons who pull with other forces than the default's at most."""
 ARMS = tuple(
     Variation(f"arm {100 * (k - 1):+.0f} %", {"arm_factor": f"{k:g}", "model_arm_factor": f"{k:g}"}) for k in (0.5, 1.5)
@@ -161,11 +161,12 @@ def is_of(row: Mapping[str, Any], variation: Variation, names: Sequence[str]) ->
 
 def _is(row: Mapping[str, Any], name: str, text: str | None) -> bool:
     """Return whether a row has a parameter's value; None: that it was not set, or to the scenario's default."""
-    value = row.get(name)
+    value: Any = row.get(name)
     default = getattr(_DEFAULT, name, None)
     if text is None:
-        unset = value is None or value == "" or value != value
-        return unset or (default is not None and np.array_equal(value, default))
+        if value is None or value == "" or value != value:
+            return True
+        return default is not None and np.array_equal(np.asarray(value), np.asarray(default))
     if isinstance(value, str):
         return value == text
     return value is not None and np.array_equal(np.atleast_1d(value), _numbers(text))

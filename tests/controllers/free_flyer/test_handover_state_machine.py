@@ -254,8 +254,7 @@ def test_without_the_gate_a_moving_robot_yields_signals_and_takes_its_own_motion
 
 @pytest.mark.parametrize("block", [HandoverStateMachine67, ImpedanceController67, PoseController67])
 def test_the_published_rate_is_67_5_hz(block: type[Any]):
-    assert describe(block).period == Fraction(2, 135)
-    assert 1 / describe(block).period == Fraction("67.5")
+    assert describe(block).period == 1 / Fraction("67.5")
 
 
 def test_times_are_kept_at_the_published_rate():
