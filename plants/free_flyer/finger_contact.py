@@ -193,8 +193,11 @@ class HandFingers:
         return found
 
     def encloses(self, H: Frame) -> bool:
-        """Return whether the thumb of a hand at H touches the object, and two fingers opposite to it or to the palm."""
-        contacts = self.contacts(H)
+        """Return whether the object is between two fingers, at least, and thumb or palm of a hand at H.
+
+        All of them, and the thumb always, are at most half a finger's thickness from it.
+        """
+        contacts = self.contacts(H, RADIUS)
         thumb = [c for c in contacts if c.joint in FINGERS[0].joints]
         opposed = [*thumb, *(c for c in contacts if c.joint is None)]
         fingers = {

@@ -135,10 +135,11 @@ class HandAndObject:
       give way; likewise the gripper (`GripperSolids`), if the hand is no fist. They have no friction: what holds an
       object is the hand's grip as a whole. A person who closes the hand ends at the touch, without pressing.
     - In place of that person, `driven_by` a track (`HandTrack`, a file) or the inputs of a hand tracker lead the hand
-      (`HandGuide`), and its joints, which then press what they close on. It takes hold when it is to grasp and thumb
-      and fingers enclose the object, and lets go when it is not to; as a fist it pushes the palm. Tracking that is
-      older than age_max, or not finite, is lost: the hand stays where it is, as it is, and keeps what it holds. A track
-      reacts to nothing: neither light nor robot. There is no tremor but its own, and activity stays WAIT.
+      (`HandGuide`) and its joints, which then press what they close on. It takes hold when it is to grasp and thumb and
+      fingers enclose the object, and lets go when it is not to; as a fist it pushes the palm. Tracking that is older
+      than age_max, or not finite, is lost: the hand stops, as it is, and keeps what it holds. The hand lags behind its
+      inputs, and not behind a file, where it looks ahead. A track reacts to nothing: neither light nor robot. There is
+      no tremor but its own, and activity stays WAIT.
 
     One unit, because a bare 0.1 kg object that two units exchange by forces is unstable at a few milliseconds. Here the
     gripper's displacement goes in and its wrench, the mean over the step, comes out: stable at 16 and 32 ms. In a
@@ -243,20 +244,15 @@ class HandAndObject:
             course = hand.move(dt, person.p, person.q)
             self._goal = HandPose(course.p, course.q, self._wanted_angles(), person.holding)
             return course, person.pushes_with_fist
-        guide.follow(dt, self._tracked(t + dt, u))
+        if self._track is not None:
+            guide.follow(dt, self._track.at(t + dt), self._track.at(t + dt + guide.lag(dt)))
+        else:
+            guide.follow(dt, _tracked(u, self._p.age_max))
         self._goal = guide.goal
         self._gripper.act(dt, u.closure, before, body)
         encloses = hand.hold is not None or self._fingers.encloses(self._seen_from_object(hand.course))
         hand.take_or_leave(guide.goal.closed and encloses, body)
         return hand.move(dt, guide.p, guide.q), guide.goal.closed
-
-    def _tracked(self, t: float, u: Inputs) -> HandPose | None:
-        """Return the pose that the track has at t, or that the tracker says; none if it has lost the hand."""
-        if self._track is not None:
-            return self._track.at(t)
-        if not u.age <= self._p.age_max:
-            return None
-        return pose_of_tracker(u.p_WH_track, u.q_WH_track, u.finger_track, u.closed_track)
 
     def _check_overlap(self, G: Frame) -> None:
         p, faults = self._p, list[str]()
@@ -360,6 +356,13 @@ class HandAndObject:
             finger_goal=np.array(g.angles),
             closed_goal=g.closed,
         )
+
+
+def _tracked(u: Inputs, age_max: float) -> HandPose | None:
+    """Return the pose that a hand tracker says, none if it has lost the hand."""
+    if not u.age <= age_max:
+        return None
+    return pose_of_tracker(u.p_WH_track, u.q_WH_track, u.finger_track, u.closed_track)
 
 
 def _added(f: Vector, tau: Vector, f_O: Vector, tau_O: Vector, arm: Vector) -> tuple[Vector, Vector]:

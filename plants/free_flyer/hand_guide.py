@@ -60,17 +60,25 @@ class HandGuide:
         self.p, self.q = p, q
         self.goal = HandPose(p, q, STRAIGHT, closed)
 
-    def follow(self, dt: float, goal: HandPose | None) -> None:
-        """Advance by dt towards a pose, or stop where there is none."""
+    def lag(self, dt: float) -> float:
+        """Return the time by which a hand that is led in steps of dt lags, s."""
+        return 1.0 / min(self._p.hand_bandwidth, 1.0 / dt) - dt
+
+    def follow(self, dt: float, goal: HandPose | None, ahead: HandPose | None = None) -> None:
+        """Advance by dt towards a pose, or stop where there is none.
+
+        Where it is known what will be wanted a lag later, as of a recorded track, the hand is led by that, `ahead`.
+        """
         p = self._p
         most = (p.hand_acceleration_max * dt, p.hand_turning_acceleration_max * dt)
         if goal is None:
             self._v, self._w = _changed(self._v, ZERO, most[0]), _changed(self._w, ZERO, most[1])
         else:
-            q = _limited(self._neutral, goal.q)
-            self.goal = HandPose(goal.p, q, goal.angles, goal.closed)
+            self.goal = HandPose(goal.p, _limited(self._neutral, goal.q), goal.angles, goal.closed)
+            there = self.goal if ahead is None else ahead
+            q = _limited(self._neutral, there.q)
             b = min(p.hand_bandwidth, 1.0 / dt)
-            v = _approach(subtract(goal.p, self.p), b, p.hand_speed_max, p.hand_acceleration_max)
+            v = _approach(subtract(there.p, self.p), b, p.hand_speed_max, p.hand_acceleration_max)
             turn = rotation_vector(quaternion_multiply(q, quaternion_inverse(self.q)))
             w = _approach(turn, b, p.hand_turning_max, p.hand_turning_acceleration_max)
             self._v, self._w = _changed(self._v, v, most[0]), _changed(self._w, w, most[1])

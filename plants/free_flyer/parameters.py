@@ -128,7 +128,7 @@ class Params:
         80.0, "its angular acceleration", minimum=1.0, maximum=1000.0
     )
     finger_force: Newton = parameter(
-        0.3, "force of a phalanx whose joint wants on, if the hand follows a track", minimum=0.0, maximum=20.0
+        0.1, "force of a phalanx whose joint wants on, if the hand follows a track", minimum=0.0, maximum=20.0
     )
     finger_rate: RadianPerSecond = parameter(12.0, "speed of the hand's joints", minimum=0.1, maximum=100.0)
     finger_stiffness: NewtonPerMetre = parameter(300.0, "stiffness of a phalanx", minimum=1.0, maximum=1e5)

@@ -27,6 +27,7 @@ Run
   handover paper ir-table                a paper's experiment: ours beside the published
   handover report runs/long              writes its page again, also of a killed run
   handover vsl-train --out model.json    kinematics learned on the VSL arm
+  handover flyer-track runs/x            the hand's track, for -p hand_track=FILE
 
 \b
 Your own
@@ -122,6 +123,11 @@ COMMANDS = (
         "export",
         "handover.scenarios.cli.export:export_command",
         short_help="Write a SCENARIO as an SSP, for other tools.",
+    ),
+    DeferredCommand(
+        "flyer-track",
+        "handover.scenarios.cli.flyer_track:flyer_track",
+        short_help="Write the hand's track of a free-flyer's run, by which other runs are led.",
     ),
     DeferredCommand(
         "info", "handover.scenarios.cli.info:info", short_help="Tell what is in an FMU or an SSP, from any tool."

@@ -18,6 +18,8 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
+from handover.plants.free_flyer.hand_track import InvalidTrack, read_track
+from handover.plants.free_flyer.parameters import Params
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
@@ -77,7 +79,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         """Wire robot, thrusters, navigation, controllers and person.
 
         Raises:
-            InvalidParameter: the handover place is out of the person's reach.
+            InvalidParameter: the handover place is out of the person's reach, or the hand's track cannot be followed.
         """
         p = parameters
         _check_reach(p.p_WG_handover)
@@ -117,6 +119,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
             arm_force_max=1.5 * p.strength,
             grip_fades=p.gradual,
             **self.person,
+            **_leader(p.hand_track),
         )
         wire_handover(s)
         return s
@@ -157,6 +160,24 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         from handover.scenarios.free_flyer.replay import replay_handover
 
         return replay_handover(record)
+
+
+def _leader(track: str) -> dict[str, str]:
+    """Return what leads the hand, as the parameters of the person's unit: none of them if it is a simulated person.
+
+    The file's path is absolute, since a unit may run in another folder.
+
+    Raises:
+        InvalidParameter: the track cannot be followed.
+    """
+    if not track:
+        return {}
+    path = Path(track).absolute()
+    try:
+        read_track(path, Params().age_max)
+    except InvalidTrack as e:
+        raise InvalidParameter([f"hand_track: {fault}" for fault in e.faults]) from e
+    return {"driven_by": "track", "track": str(path)}
 
 
 def _check_reach(p_WG: Floats) -> None:
@@ -242,7 +263,7 @@ class HandoverOfTask(FlyerHandover):
         """Wire the task's scenario.
 
         Raises:
-            InvalidParameter: the handover place is out of the person's reach.
+            InvalidParameter: the handover place is out of the person's reach, or the hand's track cannot be followed.
         """
         return _of_task(parameters).build(parameters, seed, fmu)
 

@@ -99,6 +99,11 @@ class HandoverParameters(RobotAndModel):
     strength: Newton = parameter(
         4.0, "force with which the person pulls; with half of it, pushes", minimum=0.1, maximum=20.0
     )
+    hand_track: str = parameter(
+        "",
+        "file of a recorded track that leads the hand, of `handover flyer-track`; empty: a simulated person. A track "
+        "reacts to nothing, neither to the light nor to the robot",
+    )
     propulsion: Propulsion = parameter(Propulsion.LIMITED, "what the thrusters are like")
     delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
     gradual: bool = parameter(False, "whether the fingers follow pull and push, and their grip fades as they open")

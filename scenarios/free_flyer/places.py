@@ -133,6 +133,9 @@ PLACES_OF_HANDOVER = {
             "seed": "follows from the run's seed",
             "p_WO_0": "in W",
             "angle_0": "",
+            **dict.fromkeys(
+                ("driven_by", "track"), "of the scenario's parameter hand_track; not set for a simulated person"
+            ),
             "effort": "the scenario's parameter strength",
             "arm_force_max": "follows from the scenario's parameter strength",
             "grip_fades": "the scenario's parameter gradual",

@@ -143,7 +143,7 @@ def test_fingers_that_close_on_a_free_object_and_do_not_hold_it_squeeze_it_out_s
     y = scene.go(2.0, finger_track=FIST)
     assert y.holder is Holder.FREE
     assert max(np.linalg.norm(s.v_WO) for s in scene.seen) < 0.2
-    assert max(np.linalg.norm(s.f_H) for s in scene.seen) < 14 * 0.3
+    assert max(np.linalg.norm(s.f_H) for s in scene.seen) < 14 * LED.finger_force + 0.2
 
 
 @pytest.mark.parametrize(
