@@ -87,9 +87,8 @@ def read_track(path: Path, max_gap: float) -> HandTrack:
     header = [name.strip() for name in table[0]] if table else []
     lacking = [name for name in COLUMNS if name not in header]
     if lacking:
-        raise InvalidTrack(
-            str(path), [f"its first row must name all of {', '.join(COLUMNS)}; lacking: {', '.join(lacking)}"]
-        )
+        fault = f"its first row must name all of {', '.join(COLUMNS)}; lacking: {', '.join(lacking)}"
+        raise InvalidTrack(path, [fault])
     at = [header.index(name) for name in COLUMNS]
     rows = [(n, _numbers(row, at)) for n, row in enumerate(table[1:], start=2) if row]
     if not rows:
@@ -142,22 +141,16 @@ def _faults(rows: Sequence[tuple[int, Sequence[float]]], max_gap: float) -> list
             add("every entry must be a finite number", n, ", ".join(broken))
         if math.isfinite(norm) and abs(norm - 1.0) > _UNIT:
             add("a quaternion must have the norm 1", n, f"norm {norm:.4g}")
-        beyond = [
-            i for i, x in enumerate(row[8:-1], start=1) if not (-_ROUNDING <= x <= JOINT_MAX + _ROUNDING) and x == x
-        ]
+        beyond = [f"{name} {x:.4g}" for name, x in zip(COLUMNS[8:-1], row[8:-1], strict=True) if _is_beyond(x)]
         if beyond:
-            add(
-                f"joints must be within 0 and {JOINT_MAX:.4f} rad",
-                n,
-                ", ".join(f"joint_{i} {row[7 + i]:.4g}" for i in beyond),
-            )
+            add(f"joints must be within 0 and {JOINT_MAX:.4f} rad", n, ", ".join(beyond))
         if math.isfinite(row[-1]) and row[-1] not in (0.0, 1.0):
             add("closed must be 0 or 1", n, f"{row[-1]:g}")
         if not math.isfinite(t):
             continue
         if before is not None and t <= before:
             add("time must increase", n, f"{t:g} s after {before:g} s")
-        elif before is not None and t - before > max_gap:
+        elif before is not None and t - before > max_gap * (1.0 + 1e-9):
             add(f"rows must be {max_gap:g} s apart at most", n, f"{t - before:.3g} s after the row before")
         before = t
     return [f"{what}: {_listed(where)}" for what, where in found.items()]

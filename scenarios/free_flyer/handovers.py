@@ -162,7 +162,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         return replay_handover(record)
 
 
-def _leader(track: str) -> dict[str, str]:
+def _leader(track: str) -> dict[str, Any]:
     """Return what leads the hand, as the parameters of the person's unit: none of them if it is a simulated person.
 
     The file's path is absolute, since a unit may run in another folder.
