@@ -161,11 +161,8 @@ def test_fingers_that_close_on_a_free_object_and_do_not_hold_it_squeeze_it_out_s
 def test_hand_stops_and_keeps_what_it_holds_while_tracking_is_lost(lost: Callable[[], dict[str, Any]]):
     scene = grasping()
     before = scene.go(0.5, p_WH_track=from_(END, 0.0, 0.3, 0.0))
-    told: dict[str, Any] = {
-        "closed_track": False,
-        "finger_track": np.zeros(14),
-        "p_WH_track": from_(END, 0.5, 0.3, 0.0),
-    }
+    there = from_(END, 0.5, 0.3, 0.0)
+    told: dict[str, Any] = {"closed_track": False, "finger_track": np.zeros(14), "p_WH_track": there}
     y = scene.go(1.0, **(told | lost()))
     assert y.holder is Holder.HAND
     assert np.linalg.norm(y.p_WH - before.p_WH) < 0.12
