@@ -5,11 +5,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from handover.cosim.blocks.plain_rotation import (
+    ZERO,
     Vector,
     add,
     add_cross,
     add_scaled,
-    distance,
     divide,
     dot,
     lerp,
@@ -66,17 +66,27 @@ class Box:
 
     def distance(self, p: Vector) -> float:
         """Return the signed distance of a point from the surface, below 0 inside, m; a convex function of p."""
-        (x, y, z), (a, b, c) = p, self.half
-        x, y, z = abs(x) - a, abs(y) - b, abs(z) - c
+        return self.distance_along(p, ZERO, 0.0)
+
+    def distance_along(self, p: Vector, d: Vector, s: float) -> float:
+        """Return the distance of p + s d."""
+        (x, y, z), (dx, dy, dz), (a, b, c) = p, d, self.half
+        x, y, z = abs(x + s * dx) - a, abs(y + s * dy) - b, abs(z + s * dz) - c
         if x <= 0.0 and y <= 0.0 and z <= 0.0:
             return max(x, y, z)
         x, y, z = x if x > 0.0 else 0.0, y if y > 0.0 else 0.0, z if z > 0.0 else 0.0
         return math.sqrt(x * x + y * y + z * z)
 
     def least_room(self, bone: Segment) -> float:
-        """Return a distance than which no point of a line is nearer to the box, m; it changes by 1 a metre at most."""
-        a, b = bone
-        return self.distance(lerp(a, b, 0.5)) - 0.5 * distance(a, b)
+        """Return a distance than which no point of a line is nearer to the box, m; it changes by 1 a metre at most.
+
+        It is that of the line's bounding box.
+        """
+        (a_x, a_y, a_z), (b_x, b_y, b_z) = bone
+        x = 0.0 if a_x * b_x <= 0.0 else min(abs(a_x), abs(b_x))
+        y = 0.0 if a_y * b_y <= 0.0 else min(abs(a_y), abs(b_y))
+        z = 0.0 if a_z * b_z <= 0.0 else min(abs(a_z), abs(b_z))
+        return self.distance((x, y, z))
 
     def normal(self, p: Vector) -> Vector:
         """Return the outward normal at the surface's point that is nearest to p."""
@@ -93,11 +103,12 @@ class Box:
         The distance is convex along the line, so a ternary search finds it; of a line along a face, its middle.
         """
         a, b = bone
+        d, distance_along = subtract(b, a), self.distance_along
         low, high = 0.0, 1.0
         for _ in range(_SEARCHES):
             third = (high - low) / 3.0
             s, t = low + third, high - third
-            left, right = self.distance(lerp(a, b, s)), self.distance(lerp(a, b, t))
+            left, right = distance_along(a, d, s), distance_along(a, d, t)
             if left <= right:
                 high = t
             if right <= left:
@@ -135,13 +146,18 @@ class HandFingers:
         self._far = norm(self._box.half) + REACH
         self._still: tuple[object, ...] | None = None
         """Arguments and angles of a step that changed no angle: the same again would change none either."""
+        self._bones: tuple[Angles, list[Segment]] | None = None
+        """The phalanges and the angles that they are of."""
         self.wanted = self.angles = angles
 
     def advance(self, dt: float, goal: Angles, H: Frame) -> None:
         """Turn the joints towards wanted angles, rad, for dt, with the hand at H, seen from the object."""
         most = self._rate * dt
-        goal = tuple(min(max(angle, 0.0), JOINT_MAX) for angle in goal)
-        self.wanted = tuple(_towards(a, b, most) for a, b in zip(self.wanted, goal, strict=True))
+        if goal != self.wanted:
+            goal = tuple(min(max(angle, 0.0), JOINT_MAX) for angle in goal)
+            self.wanted = tuple(_towards(a, b, most) for a, b in zip(self.wanted, goal, strict=True))
+        if self.angles == self.wanted and norm(H.p) > self._far:
+            return
         step = (dt, self.wanted, H.p, H.q, self.angles)
         if step == self._still:
             return
@@ -210,7 +226,10 @@ class HandFingers:
 
     def bones(self) -> list[Segment]:
         """Return the lines in the middle of all phalanges, in H."""
-        return [bone for finger in FINGERS for bone in phalanges(finger, self._of(finger))]
+        if self._bones is None or self._bones[0] != self.angles:
+            bones = [bone for finger in FINGERS for bone in phalanges(finger, self._of(finger))]
+            self._bones = self.angles, bones
+        return self._bones[1]
 
     def _of(self, finger: Finger) -> Angles:
         return tuple(self.angles[i] for i in finger.joints)
@@ -252,10 +271,10 @@ class HandFingers:
         return min(self._room(H, bone) for bone in bones)
 
     def _room(self, H: Frame, bone: Segment) -> float:
-        """Return the distance between a phalanx and the object, or less where it is far."""
+        """Return the distance between a phalanx and the object, or less, above _STOPPED, where it is farther."""
         line = _moved(H, bone)
         least = self._box.least_room(line)
-        return (least if least > 2.0 * RADIUS else self._box.nearest(line)[0]) - RADIUS
+        return (least if least > RADIUS + _STOPPED else self._box.nearest(line)[0]) - RADIUS
 
 
 def _moved(H: Frame, bone: Segment) -> Segment:
