@@ -12,7 +12,9 @@ from handover.cosim.blocks.plain_rotation import (
     dot,
     inverse_rotate,
     norm,
+    relative_quaternion,
     rotate,
+    rotation_matrix,
     scale,
     subtract,
 )
@@ -35,6 +37,9 @@ class GripperSolids:
         self._p = p = params
         self._palm = Box((0.5 * _PALM_THICKNESS, p.palm_width, p.palm_width))
         self._jaw = Box(scale(0.5, _JAW))
+        deep, wide = p.palm_depth + _PALM_THICKNESS, max(p.palm_width, 0.5 * _JAW[1])
+        self._around = Box((max(deep, 0.5 * _JAW[0]), wide, max(p.palm_width, 0.5 * p.aperture + _JAW[2])))
+        """A box about G that has the others in it, whatever the angle."""
         self._far = p.palm_depth + p.palm_width + p.aperture + REACH
 
     def press(self, bones: Sequence[Segment], H: Frame, G: Frame, angle: float) -> tuple[Vector, Vector]:
@@ -57,8 +62,11 @@ class GripperSolids:
             (self._jaw, (0.0, 0.0, -aside)),
         ]
         f, tau = ZERO, ZERO
+        p_GH, R_GH = inverse_rotate(G.R, subtract(H.p, G.p)), rotation_matrix(relative_quaternion(G.q, H.q))
         for bone in bones:
-            a, b = (inverse_rotate(G.R, subtract(add(H.p, rotate(H.R, end)), G.p)) for end in bone)
+            a, b = (add(p_GH, rotate(R_GH, end)) for end in bone)
+            if self._around.least_room((a, b)) >= RADIUS:
+                continue
             for solid, place in solids:
                 line = subtract(a, place), subtract(b, place)
                 if solid.least_room(line) >= RADIUS:
