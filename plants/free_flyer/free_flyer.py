@@ -118,6 +118,7 @@ class FreeFlyer:
         q = np.asarray(params.q_WB_0) / np.linalg.norm(params.q_WB_0)
         p_BG, p_WB, v_WB, w_WB = (vector(a) for a in (params.p_BG, params.p_WB_0, params.v_WB_0, params.w_WB_0))
         self._body = RigidBody(params.mass, params.I_B, p_BG, p_WB, quaternion(q), v_WB, w_WB)
+        self._w = self._body.w
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return where the robot is; no time passes."""
@@ -141,9 +142,10 @@ class FreeFlyer:
         """Restore a state of this robot or of one with equal parameters."""
         b = self._body
         b.p, b.q, b.v, b.spin = unpack_state(state)
+        self._w = b.w
 
     def _substeps(self, dt: float) -> int:
-        rate = math.hypot(*self._body.w)
+        rate = math.hypot(*self._w)
         if not rate * dt < _HALF_A_TURN:
             raise TurnsTooFast(rate, dt)
         return max(1, math.ceil(dt / self._substep - 1e-6), math.ceil(rate * dt / self._turn))
@@ -153,6 +155,7 @@ class FreeFlyer:
         b = self._body
         R = rotation_matrix(b.q)
         w, r = b.angular_velocity(R), rotate(R, b.p_BG)
+        self._w = w
         a = np.array([*b.p, *b.q, *b.v, *w, *add(b.p, r), *add_cross(b.v, w, r)])
         return Outputs(
             p_WB=a[0:3],

@@ -230,7 +230,9 @@ class Navigation:
         Times before the start have the motion at the start.
         """
         past = self._past
-        first = next((i for i in range(len(past) - 1, 0, -1) if past[i].t <= t), 0)
+        first = len(past) - 1
+        while first > 0 and past[first].t > t:
+            first -= 1
         del past[:first]
         a = past[0]
         if t <= a.t or len(past) == 1:
