@@ -9,7 +9,7 @@ from sample_units import every_kind, eye
 
 from handover.cosim.blocks.description import describe
 from handover.fmus.buffers import Buffers
-from handover.fmus.exchange import InvalidOutput, output_writer
+from handover.fmus.exchange import InvalidOutput, input_reader, output_writer
 from handover.fmus.layout import Layout
 
 
@@ -81,3 +81,21 @@ def test_numpys_scalars_and_lists_of_numbers_are_taken():
 def test_what_a_block_gave_is_shown_in_one_line():
     variable = next(v for v in describe(every_kind.EveryKind).outputs if v.shape)
     assert "\n" not in str(InvalidOutput(variable, np.ones((40, 9))))
+
+
+def test_inputs_have_their_declared_types_and_follow_the_buffers():
+    buffers = Buffers(Layout(describe(every_kind.EveryKind)))
+    read = input_reader(buffers)
+    u = read()
+    places = buffers.layout.slots
+    buffers.floats[places["a"].entries] = 0.25
+    buffers.floats[places["v"].entries] = [1.0, 2.0, 3.0]
+    buffers.integers[places["k"].offset] = -7
+    buffers.booleans[places["on"].offset] = False
+    buffers.integers[places["mood_in"].offset] = 5
+    buffers.strings[places["word"].offset] = "ä".encode()
+    assert read() is u
+    assert (u.a, u.k, u.on, u.mood_in, u.word) == (0.25, -7, False, every_kind.Mood.WILD, "ä")
+    assert [type(x) for x in (u.a, u.k, u.on, u.mood_in, u.word)] == [float, int, bool, every_kind.Mood, str]
+    assert u.v.tolist() == [1.0, 2.0, 3.0]
+    assert not u.v.flags.writeable

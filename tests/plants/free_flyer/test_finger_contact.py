@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hand_scene import CALM, DT, Scene
 
-from handover.cosim.blocks.plain_rotation import IDENTITY, Vector, from_rotation_vector
+from handover.cosim.blocks.plain_rotation import IDENTITY, Vector, from_rotation_vector, vector
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.attachment import Frame
 from handover.plants.free_flyer.finger_contact import Box, HandFingers
@@ -88,6 +88,16 @@ def test_distance_from_a_box_is_that_of_its_nearest_point():
     assert away == pytest.approx(0.02)
     assert p == pytest.approx((0.12, 0.0, 0.1))
     assert box.normal((0.13, 0.24, 0.0)) == pytest.approx((0.6, 0.8, 0.0))
+
+
+def test_no_point_of_a_line_is_nearer_to_a_box_than_its_least_room():
+    box, rng = Box((0.1, 0.2, 0.3)), np.random.default_rng(0)
+    least: list[float] = []
+    for a, b in rng.uniform(-0.5, 0.5, (500, 2, 3)):
+        line = vector(a), vector(0.7 * a + 0.3 * b)
+        least.append(box.least_room(line))
+        assert least[-1] <= box.nearest(line)[0] + 1e-12
+    assert sum(room > 0.0 for room in least) > 100
 
 
 @pytest.mark.parametrize(
