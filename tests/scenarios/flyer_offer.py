@@ -10,9 +10,10 @@ from handover.controllers.free_flyer.handover_state_machine import HandoverPhase
 from handover.controllers.free_flyer.impedance_controller import Behaviour, ImpedanceController
 from handover.controllers.free_flyer.pose_controller import PoseController
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer import free_flyer, hand_and_object, thrusters
+from handover.plants.free_flyer import free_flyer, hand_and_object, navigation, thrusters
 from handover.plants.free_flyer.free_flyer import FreeFlyer
 from handover.plants.free_flyer.hand_and_object import HandAndObject, Holder, Motion
+from handover.plants.free_flyer.navigation import Navigation
 from handover.plants.free_flyer.thrusters import Thrusters
 
 T = 0.016
@@ -40,7 +41,8 @@ class Offer:
 
 def offer(force: Floats, duration: float, behaviour: Behaviour, seed: int = 0, **decision: Any) -> Offer:
     """Let the robot fetch the object, offer it, and be knocked by a force on its gripper, in W, for a time."""
-    robot = FreeFlyer(free_flyer.Params(seed=seed, p_WB_0=_START - free_flyer.Params().p_BG))
+    robot = FreeFlyer(free_flyer.Params(p_WB_0=_START - free_flyer.Params().p_BG))
+    estimate = Navigation(navigation.Params(seed=seed))
     task = HandoverTask.ROBOT_TO_HUMAN
     machine = HandoverStateMachine(handover_state_machine.Params(task=task, behaviour=behaviour, **decision))
     impedance = ImpedanceController(impedance_controller.Params(behaviour=behaviour))
@@ -52,7 +54,8 @@ def offer(force: Floats, duration: float, behaviour: Behaviour, seed: int = 0, *
     found, since, held = Offer(), -1.0, 0.0
     for n in range(round(45.0 / T)):
         t = n * T
-        seen: dict[str, Any] = {k: getattr(r, k) for k in ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")}
+        u = navigation.Inputs(**{k: getattr(r, k) for k in ("p_WB", "q_WB", "v_WB", "w_WB")})
+        seen: dict[str, Any] = vars(estimate.step(t, T, u) if n else estimate.outputs(t, u))
         d = machine.step(t, T, handover_state_machine.Inputs(**seen, gripper_angle=o.gripper_angle))
         if since < 0.0 and d.phase is HandoverPhase.CHECK_VELOCITY:
             since, held = t, o.gripper_angle
