@@ -1,6 +1,6 @@
 """Checks all of a campaign's plan before any of its runs begins."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -120,15 +120,15 @@ def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
     first: dict[tuple[str, ...], int] = {}
     for number, point in enumerate(plan.points):
         first.setdefault(_chosen_units(plan, point), number)
-    for number in first.values():
+    for chosen, number in first.items():
         system = built_system(instance, parameters, plan.seed, plan.fmus(number, fmus), {})
-        _check_unit_values(system, plan)
+        _check_unit_values(system, plan, [p for p in plan.points if _chosen_units(plan, p) == chosen])
         Master(system, plan.options)
 
 
-def _check_unit_values(system: System, plan: CampaignPlan) -> None:
-    """Check each value of a unit's parameter that the plan has."""
-    given = [item for values in (plan.fixed, *plan.points) for item in values.items() if is_unit_value(item[0])]
+def _check_unit_values(system: System, plan: CampaignPlan, points: Sequence[Mapping[str, str]]) -> None:
+    """Check each value of a unit's parameter that the plan has for the points with the system's units."""
+    given = [item for values in (plan.fixed, *points) for item in values.items() if is_unit_value(item[0])]
     faults: dict[str, None] = {}
     for name, value in dict.fromkeys(given):
         try:
