@@ -29,6 +29,7 @@ class Transfer:
         touched: whether the person has, since then.
         farthest: maximum distance of the gripper from its place, from the signal for as long as it yields, m.
         farthest_along: the same along each axis of W.
+        hardest: greatest force on the hand, from the signal until the receiver has the object alone, N.
         done: when the receiver had the object alone, s; None before.
     """
 
@@ -43,6 +44,7 @@ class Transfer:
     touched: bool = False
     farthest: float = 0.0
     farthest_along: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    hardest: float = 0.0
     done: float | None = None
 
     def __post_init__(self) -> None:
@@ -84,6 +86,7 @@ class Transfer:
                 )
                 for axis, away in zip("xyz", self.farthest_along, strict=True)
             },
+            "force": Metric(self.hardest, "N", f"force on the hand at most, until the {whom} has the object"),
             "rest_speed": Metric(
                 self.at_rest,
                 "m/s",
@@ -154,6 +157,8 @@ class HandoverEvaluator(Evaluator):
         if codes != self._codes:
             self._change(t, signals, (x, y, z), speed)
             self._codes = codes
+        if self._under_way is not None:
+            self._under_way.hardest = max(self._under_way.hardest, math.hypot(*signals["person.f_H"].tolist()))
         self._nearest = min(self._nearest, math.dist((x, y, z), self._place))
         if self.transfers and self._phase not in _NOT_YIELDING:
             self.transfers[-1].displaced((x, y, z), self._place)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from handover.scenarios.published.free_flyer.flyer_approaches import FlyerApproaches
+from handover.scenarios.published.free_flyer.flyer_controllers import FlyerControllers
 from handover.scenarios.published.free_flyer.flyer_handover import FlyerHandoverTable
 from handover.scenarios.published.free_flyer.flyer_impedance import FlyerImpedanceTable
 from handover.scenarios.published.free_flyer.flyer_stability import FlyerStability
@@ -18,6 +19,7 @@ from handover.scenarios.published.published_experiment import PublishedExperimen
 
 _ALL: tuple[type[PublishedExperiment], ...] = (
     FlyerApproaches,
+    FlyerControllers,
     FlyerHandoverTable,
     FlyerImpedanceTable,
     FlyerStability,

@@ -1,0 +1,96 @@
+"""Controllers in the impedance control's place: the plan, and how claims and tables are judged, on made-up tables."""
+
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pytest
+
+from handover.scenarios.campaign.plan_check import checked_plan
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task
+from handover.scenarios.published.free_flyer.flyer_controllers import (
+    CONTROLLERS,
+    DISTURBANCES,
+    ControllerRows,
+    FlyerControllers,
+)
+from handover.scenarios.published.published_experiment import Claim, Verdict
+
+NUMBERS = ("delay", "mass_factor", *DISTURBANCES[1].parameters)
+
+
+def table_of(quick: bool = False, apart: float = 1.0, late: bool = False, lost: str = "") -> CampaignTable:
+    """Return the plan's runs.
+
+    Args:
+        quick: whether the plan is the quick one.
+        apart: how many times as far the PID lets the gripper go with limits; with ideal thrust it is three times.
+        late: whether the rigid impedance control starts with the delay.
+        lost: a controller that loses all objects.
+    """
+    rows: list[dict[str, Any]] = []
+    for run in FlyerControllers().plan(quick).runs():
+        given = dict(run.parameters)
+        row: dict[str, Any] = {name: given[name] for name in ("impedance", "task", "behaviour", "propulsion")}
+        row |= {name: float(given[name]) if name in given else None for name in NUMBERS}
+        refused = "delay" in given and given["behaviour"] == "rigid" and given["impedance"] == "ImpedanceController"
+        far = 1.0 if given["impedance"] != "PoseController" else 3.0 if given["propulsion"] == "ideal" else apart
+        done = late or not refused
+        row |= {"status": "done" if done else "failed", "success": done and given["impedance"] != lost}
+        row |= {f"transfer_{name}": far if done else None for name in ("displacement", "force", "time")}
+        rows.append(row)
+    return CampaignTable(pa.Table.from_pylist(rows))
+
+
+def verdicts(table: CampaignTable) -> dict[str, Claim]:
+    return {claim.claim: claim for claim in FlyerControllers().claims(table)}
+
+
+def test_the_plan_has_every_controller_in_every_handover_and_under_every_disturbance():
+    plan = FlyerControllers().plan(quick=False)
+    assert checked_plan(plan).size == 2 * 6 * (len(Task) * len(Propulsion) + len(DISTURBANCES))
+    assert FlyerControllers().plan(quick=True).size == 6
+
+
+def test_every_claim_is_judged_both_ways():
+    good, bad = verdicts(table_of()), verdicts(table_of(apart=1.5, late=True, lost="PoseController"))
+    assert [c.verdict for c in good.values()] == [Verdict.REPRODUCED] * 3 + [
+        Verdict.NOT_REPRODUCED,
+        Verdict.REPRODUCED,
+        Verdict.REPRODUCED,
+    ]
+    changed = [text for text in good if good[text].verdict is not bad[text].verdict]
+    assert changed == [
+        "With the PID control every handover succeeds",
+        "With limited thrust the controller hardly matters to how far a pull takes the rigid robot",
+        "A delay that the rigid impedance control cannot bear is borne by the admittance control",
+    ]
+    assert all(claim.beyond for claim in good.values())
+
+
+def test_a_controller_that_does_not_start_is_told_as_refused():
+    *_, disturbed = FlyerControllers().tables(table_of())
+    late = disturbed.rows[0]
+    assert late[:3] == [DISTURBANCES[0].label, "rigid", "refused"]
+    assert late[3].startswith("2/2: 1000 mm")
+
+
+@pytest.mark.parametrize("what", DISTURBANCES)
+def test_a_run_is_found_by_what_disturbs_it(what: Any):
+    rows = ControllerRows(table_of())
+    case = "AdmittanceController", Task.ROBOT_TO_HUMAN, Behaviour.RIGID, Propulsion.LIMITED
+    assert len(rows.of(*case)) == len(rows.of(*case, what)) == 2
+    assert rows.of(*case) != rows.of(*case, what)
+
+
+def test_a_quick_campaign_has_one_table_and_no_figure(tmp_path: Path):
+    table = table_of(quick=True)
+    assert [t.title for t in FlyerControllers().tables(table)] == ["With limited thrust"]
+    assert FlyerControllers().draw(table, tmp_path, tmp_path) == []
+
+
+def test_the_figure_shows_what_was_run(tmp_path: Path):
+    (drawn,) = FlyerControllers().draw(table_of(), tmp_path, tmp_path)
+    assert (tmp_path / f"{drawn.name}.png").exists()
+    assert len(CONTROLLERS) == 3
