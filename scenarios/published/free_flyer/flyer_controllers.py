@@ -135,10 +135,9 @@ def succeeded(rows: Sequence[Mapping[str, Any]]) -> int:
 
 def _is(name: str, value: Any, wanted: str | None) -> bool:
     """Return whether a row has a disturbance's value of a parameter, or, for None, its default."""
-    given = value is not None and value == value
-    if wanted is None:
-        return not given or float(value) == getattr(_DEFAULT, name, None)
-    return given and float(value) == float(wanted)
+    if value is None or value != value:
+        return wanted is None
+    return float(value) == (getattr(_DEFAULT, name, None) if wanted is None else float(wanted))
 
 
 def _hands_over(rows: ControllerRows, controller: str) -> Claim:

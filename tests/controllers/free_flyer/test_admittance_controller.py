@@ -18,7 +18,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer import thrusters
 
 control: Any = untyped_control
-NO_LIMITS = {"f_max": np.full(3, 100.0), "tau_max": np.full(3, 100.0)}
+NO_LIMITS: dict[str, Any] = {"f_max": np.full(3, 100.0), "tau_max": np.full(3, 100.0)}
 PROMPT = Params(lag=0.0, **NO_LIMITS)
 SPRING = {Behaviour.RIGID: (7.0 * MASS, 15.0), Behaviour.COMPLIANT: (0.7 * MASS, 5.0)}
 
@@ -105,6 +105,7 @@ def test_the_model_of_the_propulsion_is_that_of_the_thrusters(lag: float, delay:
 def test_commands_stay_within_the_limits_and_the_estimate_knows_it():
     """A pull that thrust cannot hold is estimated as what it is, and not as what was commanded in vain."""
     controller, body = AdmittanceController(Params(lag=0.0)), Body()
+    y = controller.outputs(0.0, body.measured())
     for n in range(round(1.5 / T)):
         y = controller.step(n * T, T, body.measured())
         assert np.all(np.abs(y.f_cmd) <= Params().f_max)

@@ -461,7 +461,7 @@ def offered(speeds: Floats, **params: Any) -> tuple[list[Outputs], Fingers]:
 
 
 def rising(rate: float, up_to: float, seconds: float) -> Floats:
-    return np.minimum(rate * T * np.arange(round(seconds / T)), up_to)
+    return np.asarray(np.minimum(rate * T * np.arange(round(seconds / T)), up_to), dtype=np.float64)
 
 
 def test_gradual_fingers_open_with_the_pull_and_release_what_they_have_opened_for():
@@ -477,7 +477,7 @@ def test_gradual_fingers_open_with_the_pull_and_release_what_they_have_opened_fo
 
 def test_gradual_fingers_close_again_where_the_pull_ends_although_the_robot_coasts():
     """Above the threshold all the time: 0.2 s of acceleration, then thrust brakes it."""
-    knock = np.concatenate([rising(0.6, 0.12, 0.2), 0.12 - 0.06 * T * np.arange(60)])
+    knock = np.asarray(np.concatenate([rising(0.6, 0.12, 0.2), 0.12 - 0.06 * T * np.arange(60)]), dtype=np.float64)
     assert np.min(knock[-60:]) > 0.059
     ys, fingers = offered(knock)
     assert min(y.closure for y in ys) < 1.0
