@@ -1,4 +1,4 @@
-"""A serial arm of revolute joints on a free-flying base: its dimensions, what is wrong with them, and its postures."""
+"""A serial arm of revolute joints on a free-flying base: its dimensions and its postures."""
 
 import math
 from collections.abc import Sequence
@@ -127,36 +127,3 @@ def _mean(masses: Joints, mass: float, of_links: Sequence[Vector]) -> Vector:
     for m, x in zip(masses, of_links, strict=True):
         total = add_scaled(total, m, x)
     return scale(1.0 / mass, total)
-
-
-def arm_faults(n: int, axes: Floats, links: Floats, masses: Floats, inertias: Floats) -> list[str]:
-    """Return what no arm of n joints has, by the rows and entries of its first n links."""
-    faults: list[str] = []
-    for j in range(n):
-        if not 0.0 < float(np.linalg.norm(axes[j])) < math.inf:
-            faults.append(f"axis_J[{j + 1}] {axes[j].tolist()} must be finite and not zero")
-        if not np.all(np.isfinite(links[j])):
-            faults.append(f"link[{j + 1}] {links[j].tolist()} m must be finite")
-        if not 0.0 < masses[j] < math.inf:
-            faults.append(f"mass_L[{j + 1}] {masses[j]:g} kg must be positive and finite")
-        small, middle, large = sorted(inertias[j].tolist())
-        moments = f"I_L[{j + 1}] {inertias[j].tolist()} kg m2"
-        if not (small > 0.0 and large < math.inf):
-            faults.append(f"{moments} must be positive and finite")
-        elif large > (small + middle) * (1.0 + 1e-9):
-            faults.append(f"no body has {moments}: the largest may not exceed the sum of the others")
-    return faults
-
-
-def limit_faults(n: int, q_0: Floats, lower: Floats, upper: Floats, tolerance: float) -> list[str]:
-    """Return which of n joints has limits the wrong way round, or starts outside of them; angles in rad."""
-    faults: list[str] = []
-    if not tolerance >= 0.0:
-        faults.append(f"tolerance_J {tolerance:g} rad must not be negative")
-    for j in range(n):
-        low, high, start = float(lower[j]), float(upper[j]), float(q_0[j])
-        if not low <= high:
-            faults.append(f"lower_J[{j + 1}] {low:g} rad must not exceed upper_J[{j + 1}] {high:g} rad")
-        elif not low <= start <= high:
-            faults.append(f"q_J_0[{j + 1}] {start:g} rad must lie within the joint's limits, {low:g} to {high:g} rad")
-    return faults

@@ -1,4 +1,4 @@
-"""A free-flying robot in microgravity whose arm is fixed: one rigid body, after [Fernandes2020] sec. 4.1."""
+"""A free-flying robot in microgravity with an arm that is fixed or has joints, after [Fernandes2020] secs. 3.3, 4.1."""
 
 import math
 from collections.abc import Mapping
@@ -10,6 +10,7 @@ import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.plain_rotation import (
+    ZERO,
     add,
     add_cross,
     quaternion,
@@ -31,9 +32,15 @@ from handover.cosim.blocks.units import (
     RadianPerSecond,
     Second,
 )
+from handover.plants.free_flyer.arm import JOINTS_MAX
+from handover.plants.free_flyer.arm_parameters import ArmParameters
+from handover.plants.free_flyer.articulated_body import ArticulatedBody
 from handover.plants.free_flyer.rigid_body import RigidBody, TurnsTooFast, inertia_faults, unit_faults
+from handover.plants.free_flyer.stopping_joints import Motion, StoppingJoints
 
 _HALF_A_TURN = math.pi
+_ROUNDING = 1e-9
+"""Seconds by which a step may begin before the time that it should."""
 
 
 class InvalidFlyerParameters(InvalidParameters):
@@ -43,18 +50,21 @@ class InvalidFlyerParameters(InvalidParameters):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params:
-    """The robot, and where it starts.
+class BodyParameters:
+    """The robot, or with an arm that has joints its base, and where it starts.
 
     Mass and inertia are the published ones of NASA's Astrobee; the arm's length is assumed.
     """
 
-    mass: Kilogram = parameter(9.584, "mass of the robot", minimum=0.1, maximum=1000.0)
+    mass: Kilogram = parameter(9.584, "mass of the robot, with joints of its base", minimum=0.1, maximum=1000.0)
     I_B: Matrix3[KilogramMetre2] = parameter(
         np.diag([0.1534, 0.1427, 0.1623]), "inertia about the centre of mass", minimum=-100.0, maximum=100.0
     )
     p_BG: Vector3[Metre] = parameter(
-        np.array([-0.30, 0.0, 0.0]), "the gripper seen from the centre of mass", minimum=-5.0, maximum=5.0
+        np.array([-0.30, 0.0, 0.0]),
+        "the gripper seen from the centre of mass, with all joints at zero",
+        minimum=-5.0,
+        maximum=5.0,
     )
     p_WB_0: Vector3[Metre] = parameter(np.array([0.30, -0.07, 0.0]), "position of the centre of mass at the start")
     q_WB_0: Vector4[Number] = parameter(np.array([1.0, 0.0, 0.0, 0.0]), "orientation at the start, a unit quaternion")
@@ -65,9 +75,14 @@ class Params:
     substep: Second = parameter(0.016, "longest step of the integration", minimum=1e-5, maximum=0.1)
     turn: Radian = parameter(0.004, "largest turn in a step of the integration", minimum=1e-4, maximum=1.0)
 
+
+@dataclass(frozen=True, kw_only=True)
+class Params(ArmParameters, BodyParameters):
+    """The robot, where it starts, and its arm."""
+
     def check(self) -> None:
-        """Raise InvalidFlyerParameters, with all faults, if no rigid body has these values."""
-        faults = inertia_faults(self.mass, self.I_B) + unit_faults("q_WB_0", self.q_WB_0)
+        """Raise InvalidFlyerParameters, with all faults, if no rigid body or no arm has these values."""
+        faults = inertia_faults(self.mass, self.I_B) + unit_faults("q_WB_0", self.q_WB_0) + self.arm_faults()
         if faults:
             raise InvalidFlyerParameters(faults)
 
@@ -80,33 +95,42 @@ class Inputs:
     tau_B: Vector3[NewtonMetre] = port(np.zeros(3), "torque of the propulsion, in the robot's frame")
     f_G: Vector3[Newton] = port(np.zeros(3), "force on the gripper, acting at G, in the world")
     tau_G: Vector3[NewtonMetre] = port(np.zeros(3), "torque on the gripper, in the world")
+    tau_J: Vector3[NewtonMetre] = port(np.zeros(3), "torques on the joints; beyond the last joint not used")
 
 
 @dataclass(kw_only=True)
 class Outputs:
     """Where the robot is and how it moves, in the world."""
 
-    p_WB: Vector3[Metre] = output("position of the centre of mass")
+    p_WB: Vector3[Metre] = output("position of the centre of mass, with joints of the base's")
     q_WB: Vector4[Number] = output("orientation")
-    v_WB: Vector3[MetrePerSecond] = output("velocity of the centre of mass")
+    v_WB: Vector3[MetrePerSecond] = output("velocity of that centre of mass")
     w_WB: Vector3[RadianPerSecond] = output("angular velocity")
     p_WG: Vector3[Metre] = output("position of the gripper")
-    q_WG: Vector4[Number] = output("orientation of the gripper, the robot's own")
+    q_WG: Vector4[Number] = output("orientation of the gripper, without joints the robot's own")
     v_WG: Vector3[MetrePerSecond] = output("velocity of the gripper")
+    w_WG: Vector3[RadianPerSecond] = output("angular velocity of the gripper")
+    q_J: Vector3[Radian] = output("angles of the joints, zero beyond the last")
+    v_J: Vector3[RadianPerSecond] = output("speeds of the joints")
 
 
 class FreeFlyer:
-    """Moves as one rigid body (`RigidBody`): m v' = R f_B + f_G, L' = R tau_B + (R p_BG) x f_G + tau_G.
+    """Moves as one rigid body (`RigidBody`), or as a base with an arm of 1 to 3 joints (`StoppingJoints`).
 
-    [Fernandes2020] eqs. (3.18)-(3.24) with the arm's joints fixed, eq. (4.1), in place of its Euler angles a unit
-    quaternion whose sign is continuous. During a step the propulsion is held in the robot's frame and the wrench on the
-    gripper in the world; steps are cut into equal parts of at most `substep`, in which the robot turns by at most
-    `turn`: a robot at rest needs few of them, and one that tumbles is followed as closely.
+    Without joints: m v' = R f_B + f_G, L' = R tau_B + (R p_BG) x f_G + tau_G, [Fernandes2020] eqs. (3.18)-(3.24) with
+    eq. (4.1). With joints: eq. (3.23) as it is, C of base and arm in the place of B where their momenta are concerned;
+    B stays at the base's centre of mass. In place of Euler angles both have a unit quaternion whose sign is continuous.
+    During a step the propulsion is held in the robot's frame, the wrench on the gripper in the world, and the
+    joints' torques, of at most `torque_max_J`; steps are cut into equal parts of at most `substep`, in which base
+    and joints turn by at most `turn`: a robot at rest needs few of them, and one that tumbles is followed as closely.
+
+    A joint that reaches an end stop, or the tolerance of its drive, stops there without rebound; no momentum is made.
+    With `tolerance_J` zero the joints are fixed, as in the thesis; at the first step from `lock_time` on they lock.
 
     Raises:
-        InvalidFlyerParameters: by the constructor, for an inertia that no rigid body has or a quaternion that is not
-            unit.
-        TurnsTooFast: by `step`, where the robot turns by more than half a turn in it.
+        InvalidFlyerParameters: by the constructor, for an inertia that no rigid body has, a quaternion that is not
+            unit, or an arm that cannot be.
+        TurnsTooFast: by `step`, where base and joints turn by more than half a turn in it.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
@@ -114,38 +138,56 @@ class FreeFlyer:
 
     def __init__(self, params: Params) -> None:
         params.check()
-        self._substep, self._turn = params.substep, params.turn
-        q = np.asarray(params.q_WB_0) / np.linalg.norm(params.q_WB_0)
+        self._substep, self._turn, self._lock_time = params.substep, params.turn, params.lock_time
+        self._torque_max = params.of_joints(params.torque_max_J)
+        q = quaternion(np.asarray(params.q_WB_0) / np.linalg.norm(params.q_WB_0))
         p_BG, p_WB, v_WB, w_WB = (vector(a) for a in (params.p_BG, params.p_WB_0, params.v_WB_0, params.w_WB_0))
-        self._body = RigidBody(params.mass, params.I_B, p_BG, p_WB, quaternion(q), v_WB, w_WB)
-        self._w = self._body.w
+        if params.joints == 0:
+            self._body: RigidBody | StoppingJoints = RigidBody(params.mass, params.I_B, p_BG, p_WB, q, v_WB, w_WB)
+        else:
+            body = ArticulatedBody(params.mass, params.I_B, params.arm(params.p_BG))
+            angles = params.of_joints(params.q_J_0)
+            self._body = StoppingJoints(body, params.limits(), angles, (p_WB, q), (v_WB, w_WB))
+        self._w = self._body.w if isinstance(self._body, RigidBody) else ZERO  # of the last outputs, without joints
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return where the robot is; no time passes."""
         return self._outputs()
 
-    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Advance from t by dt with u held."""
         wrench = vector(u.f_B), vector(u.tau_B), vector(u.f_G), vector(u.tau_G)
         h = dt / (count := self._substeps(dt))
-        advance = self._body.advance
+        if isinstance(self._body, RigidBody):
+            advance = self._body.advance
+            for _ in range(count):
+                advance(h, *wrench)
+            return self._outputs()
+        if not self._body.locked and t >= self._lock_time - _ROUNDING:
+            self._body.lock()
+        asked = zip(u.tau_J.tolist(), self._torque_max, strict=False)
+        tau_J = tuple(min(max(torque, -most), most) for torque, most in asked)
         for _ in range(count):
-            advance(h, *wrench)
+            self._body.advance(h, wrench, tau_J)
         return self._outputs()
 
     def get_state(self) -> bytes:
         """Return the complete state."""
         b = self._body
-        return pack_state((b.p, b.q, b.v, b.spin))
+        return pack_state((b.p, b.q, b.v, b.spin) if isinstance(b, RigidBody) else (b.state, b.still, b.locked))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this robot or of one with equal parameters."""
         b = self._body
-        b.p, b.q, b.v, b.spin = unpack_state(state)
-        self._w = b.w
+        if isinstance(b, RigidBody):
+            b.p, b.q, b.v, b.spin = unpack_state(state)
+            self._w = b.w
+        else:
+            b.state, b.still, b.locked = unpack_state(state)
 
     def _substeps(self, dt: float) -> int:
-        rate = math.hypot(*self._w)
+        b = self._body
+        rate = math.hypot(*self._w) if isinstance(b, RigidBody) else b.rate
         if not rate * dt < _HALF_A_TURN:
             raise TurnsTooFast(rate, dt)
         return max(1, math.ceil(dt / self._substep - 1e-6), math.ceil(rate * dt / self._turn))
@@ -153,10 +195,12 @@ class FreeFlyer:
     def _outputs(self) -> Outputs:
         """Return the outputs as pieces of one array, which costs less than an array each."""
         b = self._body
+        if isinstance(b, StoppingJoints):
+            return _outputs_with_joints(b.motion())
         R = rotation_matrix(b.q)
         w, r = b.angular_velocity(R), rotate(R, b.p_BG)
         self._w = w
-        a = np.array([*b.p, *b.q, *b.v, *w, *add(b.p, r), *add_cross(b.v, w, r)])
+        a = np.array([*b.p, *b.q, *b.v, *w, *add(b.p, r), *add_cross(b.v, w, r), *ZERO])
         return Outputs(
             p_WB=a[0:3],
             q_WB=a[3:7],
@@ -165,4 +209,24 @@ class FreeFlyer:
             p_WG=a[13:16],
             q_WG=a[3:7],
             v_WG=a[16:19],
+            w_WG=a[10:13],
+            q_J=a[19:22],
+            v_J=a[19:22],
         )
+
+
+def _outputs_with_joints(m: Motion) -> Outputs:
+    idle = (0.0,) * (JOINTS_MAX - len(m.q_J))
+    a = np.array([*m.p_WB, *m.q_WB, *m.v_WB, *m.w_WB, *m.p_WG, *m.q_WG, *m.v_WG, *m.w_WG, *m.q_J, *idle, *m.v_J, *idle])
+    return Outputs(
+        p_WB=a[0:3],
+        q_WB=a[3:7],
+        v_WB=a[7:10],
+        w_WB=a[10:13],
+        p_WG=a[13:16],
+        q_WG=a[16:20],
+        v_WG=a[20:23],
+        w_WG=a[23:26],
+        q_J=a[26:29],
+        v_J=a[29:32],
+    )

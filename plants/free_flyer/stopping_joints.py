@@ -84,12 +84,12 @@ class StoppingJoints:
     ) -> None:
         self.body, self._limits = body, limits
         (p, q), (v, w), R = pose, velocity, rotation_matrix(pose[1])
-        posture, idle = body.posture(q_J), (0.0,) * len(q_J)
+        posture = body.posture(q_J)
         r, w_B = rotate(R, posture.p_BC), inverse_rotate(R, w)
         h = (body.inertia(posture)[:, :3] @ w_B).tolist()
         L = rotate(R, (h[0], h[1], h[2]))
         self.state: State = (add(p, r), q, add_cross(v, w, r), L, q_J, tuple(h[3:]))
-        self.still = tuple(True for _ in idle)
+        self.still = tuple(True for _ in q_J)
         self.locked = False
 
     @property
@@ -100,6 +100,14 @@ class StoppingJoints:
     def energy(self) -> float:
         """Kinetic energy, in J."""
         return self.body.energy(self.state, self._moving)
+
+    @property
+    def rate(self) -> float:
+        """The most by which anything turns: base and joints together, in rad/s."""
+        _, q, _, L, q_J, pi = self.state
+        L_B = inverse_rotate(rotation_matrix(q), L)
+        w, v_J = self.body.velocities(self.body.posture(q_J), L_B, pi, self._moving)
+        return math.hypot(*w) + sum(map(abs, v_J))
 
     def motion(self) -> Motion:
         """Return pose and velocity of base and gripper."""

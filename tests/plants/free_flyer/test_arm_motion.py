@@ -1,6 +1,6 @@
 """A floating base with an arm: conservation, MuJoCo, the rigid body that it is with its joints locked, and stops."""
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.plain_rotation import ZERO, vector
 from handover.cosim.blocks.ports import Floats
+from handover.plants.free_flyer.free_flyer import FreeFlyer, Inputs, InvalidFlyerParameters, Outputs, Params
 from handover.plants.free_flyer.rigid_body import RigidBody, Wrenches
 from handover.plants.free_flyer.stopping_joints import JointLimits, Motion, StoppingJoints
 
@@ -174,3 +175,75 @@ def test_a_joint_without_range_does_not_turn_and_the_others_do():
     q_J = robot.motion().q_J
     assert q_J[1] == -0.4
     assert min(abs(q_J[0] - 0.3), abs(q_J[2] - 0.8)) > 0.01
+
+
+ARMED = Params(joints=3, lower_J=np.full(3, -0.2), upper_J=np.full(3, 0.2), friction_J=np.full(3, 0.02))
+HELD = Inputs(**dict(zip(("f_B", "tau_B", "f_G", "tau_G", "tau_J"), map(np.array, (*PUSH, TORQUES)), strict=True)))
+
+
+def outputs(y: Outputs) -> Floats:
+    return np.concatenate([np.ravel(x) for x in vars(y).values()])
+
+
+def test_a_robot_with_an_arm_goes_on_bit_for_bit_after_a_state_is_restored():
+    a, b = FreeFlyer(ARMED), FreeFlyer(ARMED)
+    seen = [a.step(0.016 * i, 0.016, HELD).q_J for i in range(30)]
+    assert np.max(np.abs(seen)) == 0.2
+    state = a.get_state()
+    expected = [outputs(a.step(0.016 * i, 0.016, HELD)) for i in range(30, 60)]
+    for robot in (a, b):
+        robot.set_state(state)
+        again = [outputs(robot.step(0.016 * i, 0.016, HELD)) for i in range(30, 60)]
+        np.testing.assert_array_equal(again, expected)
+
+
+def test_with_no_tolerance_the_joints_are_fixed_and_with_some_they_go_no_farther():
+    p = Params(joints=2, q_J_0=np.array([0.2, -0.3, 0.0]))
+    for tolerance in (0.0, 0.05):
+        robot = FreeFlyer(replace(p, tolerance_J=tolerance))
+        y = [robot.step(0.016 * i, 0.016, HELD) for i in range(60)]
+        strayed = np.max(np.abs([now.q_J[:2] - p.q_J_0[:2] for now in y]))
+        assert strayed == pytest.approx(tolerance, abs=1e-12)
+
+
+def test_torque_is_limited_and_joints_lock_when_they_are_to():
+    p = Params(joints=2, torque_max_J=np.full(3, 0.05), lock_time=0.32)
+    strong, weak = Inputs(tau_J=np.array([5.0, -5.0, 9.0])), Inputs(tau_J=np.array([0.05, -0.05, 0.0]))
+    a, b = FreeFlyer(p), FreeFlyer(p)
+    for i in range(20):
+        np.testing.assert_array_equal(
+            outputs(a.step(0.016 * i, 0.016, strong)), outputs(b.step(0.016 * i, 0.016, weak))
+        )
+    before = a.outputs(0.32, strong)
+    assert np.min(np.abs(before.v_J[:2])) > 0.1
+    after = a.step(0.32, 0.016, strong)
+    np.testing.assert_array_equal(after.q_J, before.q_J)
+    assert not np.any(after.v_J)
+
+
+def test_without_joints_the_arm_counts_for_nothing():
+    plain, other = FreeFlyer(Params()), FreeFlyer(Params(mass_L=np.full(3, 5.0), q_J_0=np.ones(3)))
+    for i in range(20):
+        a, b = (robot.step(0.016 * i, 0.016, HELD) for robot in (plain, other))
+        np.testing.assert_array_equal(outputs(a), outputs(b))
+        np.testing.assert_array_equal(a.q_WG, a.q_WB)
+    assert not np.any(a.q_J)
+
+
+def test_what_no_arm_is_is_refused_all_at_once():
+    with pytest.raises(InvalidFlyerParameters) as caught:
+        FreeFlyer(
+            Params(
+                joints=3,
+                I_B=-np.eye(3),
+                axis_J=np.diag([1.0, 0.0, 1.0]),
+                mass_L=np.array([0.1, 0.1, -0.1]),
+                I_L=np.array([[0.1, 0.1, -0.1], [0.1, 0.1, 0.5], [0.1, 0.1, 0.1]]),
+                lower_J=np.array([0.5, 1.0, -1.0]),
+                upper_J=np.array([-0.5, 2.0, 1.0]),
+            )
+        )
+    text = caught.value.faults
+    found = ("I_B must be", "axis_J[2]", "mass_L[3]", "I_L[1]", "I_L[2]", "lower_J[1] 0.5 rad", "q_J_0[2] 0 rad")
+    assert len(text) == len(found)
+    assert all(any(name in fault for fault in text) for name in found)
