@@ -104,6 +104,10 @@ SYSTEMS = (
                 "handover.scenarios.free_flyer.impedance:FlyerImpedance",
                 "a free-flyer yields to a push against its gripper and comes back",
             ),
+            "flyer_arm_impedance": ScenarioEntry(
+                "handover.scenarios.free_flyer.arm_impedance:FlyerArmImpedance",
+                "a free-flyer yields to a push against its gripper with base and arm",
+            ),
             "flyer_robot_to_human": ScenarioEntry(
                 "handover.scenarios.free_flyer.handovers:RobotToHuman",
                 "a free-flyer fetches an object and gives it to a person",

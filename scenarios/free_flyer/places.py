@@ -80,6 +80,42 @@ PLACES_OF_PUSH = {
 }
 """Of `FlyerImpedance`, by the units' names in the system."""
 
+_ARM = {
+    "joints": "the scenario's parameter",
+    "link": "in B, as the scenario's factors make it",
+    "mass_L": "likewise",
+    "I_L": "likewise",
+}
+
+PLACES_OF_ARM_PUSH = {
+    **PLACES_OF_PUSH,
+    "impedance": Place(
+        required={**_CONTROLLER.required, "tau_J_cmd": "on the joints"},
+        optional={
+            **_CONTROLLER.optional,
+            **_ARM,
+            "q_J": "",
+            "v_J": "",
+            "q_J_goal": "the scenario's parameter posture",
+            "rotational_damping": "the scenario's parameter",
+        },
+        remarks=_FRAMES,
+    ),
+    "robot": Place(
+        required={**_ROBOT.required, "tau_J": "on the joints", "q_J": "", "v_J": "", "w_WG": "in W"},
+        optional={
+            **_ROBOT.optional,
+            **_ARM,
+            "q_J_0": "the scenario's parameter posture",
+            "tolerance_J": "the scenario's parameter",
+            "friction_J": "the scenario's parameter",
+            "lock_time": "the scenario's parameter",
+        },
+        remarks=_FRAMES,
+    ),
+}
+"""Of `FlyerArmImpedance`, by the units' names in the system."""
+
 PLACES_OF_HANDOVER = {
     "decision": Place(
         required={

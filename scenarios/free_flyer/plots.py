@@ -226,8 +226,8 @@ def figures_of_push(parameters: ImpedanceParameters, record: Record) -> list[Tim
             caption="Error of the gripper's pose, rest minus actual, in the whole run, and by [Fernandes2020] "
             f"eq. (4.4); {_push_in_words(parameters)}.",
             plots=[
-                *_errors("position", "mm", 1000 * errors.p, 1000 * errors.p_model, phases),
-                *_errors("orientation", "°", turned, turned_model, phases),
+                *errors_over_time("position", "mm", 1000 * errors.p, 1000 * errors.p_model, phases),
+                *errors_over_time("orientation", "°", turned, turned_model, phases),
             ],
             columns=2,
         ),
@@ -240,7 +240,7 @@ def figures_of_push(parameters: ImpedanceParameters, record: Record) -> list[Tim
         TimeFigure(
             name="push",
             caption="The push on the gripper in W.",
-            plots=[_push(parameters, record, phases)],
+            plots=[push_over_time(parameters, record, phases)],
         ),
     ]
 
@@ -261,7 +261,9 @@ def _push_in_words(p: ImpedanceParameters) -> str:
     return f"{what} {p.axis.name.lower()} for {p.duration:g} s"
 
 
-def _errors(what: str, unit: str, actual: Floats, calculated: Floats, phases: Sequence[Phase]) -> list[TimePlot]:
+def errors_over_time(
+    what: str, unit: str, actual: Floats, calculated: Floats, phases: Sequence[Phase]
+) -> list[TimePlot]:
     """Return the errors along or about x, y and z, whose axes show the same range."""
     limit = 1.1 * max(float(np.nanmax(np.abs(values), initial=1e-3)) for values in (actual, calculated))
     return [
@@ -286,7 +288,8 @@ def _to_the_end(values: Floats) -> Floats:
     return np.append(values, np.nan)
 
 
-def _push(parameters: ImpedanceParameters, record: Record, phases: Sequence[Phase]) -> TimePlot:
+def push_over_time(parameters: ImpedanceParameters, record: Record, phases: Sequence[Phase]) -> TimePlot:
+    """Return the push, force or torque, on the gripper over time."""
     signal, quantity, unit = (
         ("push.f_G", "force", "N") if parameters.kind is Wrench.FORCE else ("push.tau_G", "torque", "N·m")
     )

@@ -33,19 +33,24 @@ def replay_handover(record: Record) -> Replay:
 
 def replay_push(parameters: ImpedanceParameters, record: Record) -> Replay:
     """Return the robot, its gripper's place of rest, and what pushes it."""
-    pushes = (
-        ("push", _PUSH, _PER_NEWTON * record["push.f_G"]),
-        ("twist", _TWIST, _PER_NEWTON_METRE * record["push.tau_G"]),
-    )
     path = Line(label="path of the gripper", colour=_PATH, points=record["robot.p_WG"][:, None], trail=True)
     return Replay(
         bodies=_robot(record, np.zeros(len(record.time))),
-        lines=[path, *(_arrow(label, colour, record, along) for label, colour, along in pushes if np.any(along))],
-        fixed=_frame("place of rest", np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])),
+        lines=[path, *push_arrows(record)],
+        fixed=frame_at("place of rest", np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])),
         eye=(-1.0, -1.15, 0.6),
         phases=phases_of_push(parameters, record),
         notes=(f"Arrows: {1000 * _PER_NEWTON:.0f} mm a newton, {1000 * _PER_NEWTON_METRE:.0f} mm a newton metre.",),
     )
+
+
+def push_arrows(record: Record) -> list[Line]:
+    """Return arrows of the push and the twist, where there are any."""
+    pushes = (
+        ("push", _PUSH, _PER_NEWTON * record["push.f_G"]),
+        ("twist", _TWIST, _PER_NEWTON_METRE * record["push.tau_G"]),
+    )
+    return [_arrow(label, colour, record, along) for label, colour, along in pushes if np.any(along)]
 
 
 def _robot(record: Record, gap: Floats) -> list[Body]:
@@ -111,7 +116,7 @@ def _arrow(label: str, colour: str, record: Record, along: Floats) -> Line:
     return Line(label=label, colour=colour, points=points, radii=np.array([0.006, 0.006, 0.018, 0.0005]))
 
 
-def _frame(label: str, p_WF: Floats) -> list[Line]:
+def frame_at(label: str, p_WF: Floats) -> list[Line]:
     """Return the axes of a frame with the world's orientation."""
     axes = np.eye(3) * _AXIS_LENGTH
     return [

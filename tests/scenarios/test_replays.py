@@ -18,6 +18,7 @@ MUST_SHOW: dict[str, set[str]] = {
     "vsl_model_based": {"arm", "gripper", "load", "desired path", "path of the tip"},
     "vsl_hybrid": {"arm", "gripper", "load", "desired path", "path of the tip", "tip, by the hybrid model"},
     "flyer_impedance": {"robot", "gripper", "push", "place of rest"},
+    "flyer_arm_impedance": {"robot", "link 1", "link 2", "gripper", "push", "place of rest"},
     **{
         f"flyer_{task}": {"robot", "arm", "gripper", "object", "hand"}
         for task in ("robot_to_human", "human_to_robot", "failed_reception", "collaborative")

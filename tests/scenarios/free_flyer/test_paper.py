@@ -9,6 +9,7 @@ import tomli
 from parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.free_flyer
+from handover.controllers.free_flyer.arm_impedance_controller import Params as ArmControllerParams
 from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
 from handover.controllers.free_flyer.impedance_controller import Behaviour
 from handover.controllers.free_flyer.impedance_controller import Params as ImpedanceParams
@@ -19,6 +20,7 @@ from handover.plants.free_flyer.parameters import Params as PersonParams
 from handover.plants.free_flyer.push import Params as PushParams
 from handover.plants.free_flyer.thrusters import Params as ThrustersParams
 from handover.scenarios.free_flyer import scene
+from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters
 from handover.scenarios.free_flyer.parameters import HandoverParameters, TaskParameters
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters as PushScenarioParameters
 
@@ -51,6 +53,18 @@ def test_every_default_has_its_origin(paper: Paper, group: str):
 
 def test_the_scenario_of_any_task_has_its_parameters_origins(paper: Paper):
     assert_every_default_has_its_origin(paper["handover_scenario"] | paper["task_scenario"], TaskParameters)
+
+
+def test_the_push_on_an_arm_has_its_parameters_origins(paper: Paper):
+    assert_every_default_has_its_origin(paper["push_scenario"] | paper["arm_push_scenario"], ArmPushParameters)
+
+
+def test_robot_and_controller_know_the_same_arm(paper: Paper):
+    robot, controller = RobotParams(), ArmControllerParams()
+    for name in ("axis_J", "link", "centre_L", "mass_L", "I_L", "rotor_J"):
+        np.testing.assert_array_equal(getattr(robot, name), getattr(controller, name))
+    for name, entry in paper["arm_2"].items():
+        np.testing.assert_array_equal(getattr(robot, name), entry["value"])
 
 
 @pytest.mark.parametrize("behaviour", [Behaviour.RIGID, Behaviour.COMPLIANT])

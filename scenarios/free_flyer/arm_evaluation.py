@@ -1,0 +1,170 @@
+"""Evaluates a push on a robot whose arm moves: by the impedance model with joints, and by what base and joints do.
+
+The gripper's errors are compared with those by [Fernandes2020] eqs. (3.26), (4.4), with B_x and C_x x' for a Jacobian
+that is not square, by the controllers' model of the robot.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from handover.controllers.free_flyer.arm_model import (
+    Chain,
+    OperationalSpace,
+    coriolis_matrix,
+    mass_matrix,
+    operational_bias,
+)
+from handover.cosim.blocks.geometry import rotation_of
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
+from handover.cosim.system.signals import Signals
+from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters, ArmTarget
+from handover.scenarios.free_flyer.impedance_evaluation import Errors
+from handover.scenarios.free_flyer.robot_wiring import stability_metrics
+
+SIGNALS = (
+    *(f"robot.{name}" for name in ("p_WG", "q_WG", "v_WG", "w_WG", "p_WB", "q_WB", "v_WB", "w_WB", "q_J", "v_J")),
+    "push.f_G",
+    "push.tau_G",
+    "thrusters.f_B",
+)
+"""Signals of which a motion is made, in the order of its columns after time."""
+
+_REST_POSITION, _REST_ANGLE, _RESTING, _SPINNING = 0.010, 0.030, 5.0, 60.0
+"""As in `impedance_evaluation`: errors at rest, m and rad, for how long, s, and speed out of control, rad/s."""
+
+
+Columns = dict[str, Floats]
+
+
+def columns_of(record: Record) -> Columns:
+    """Return a record's motion by signal, and its time as `t`."""
+    return {"t": record.time, **{name: record[name] for name in SIGNALS}}
+
+
+def errors_with_arm(motion: Columns, target: ArmTarget) -> Errors:
+    """Return the errors, actual and by k_D xt' = B_x x'' + C_x x' + k_B x' - f_ext, one row a step.
+
+    x'' is the mean over a step and B_x, C_x x' those of its middle; damping and actual error are of its beginning,
+    when the controller measured. Units step one after the other, so a step is a period of the controller.
+    """
+    rows, R_WD, g = len(motion["t"]) - 1, target.R_WG, target.gains
+    actual, calculated = np.zeros((rows, 6)), np.zeros((rows, 6))
+    for k in range(rows):
+        wrench = _inertial_wrench(motion, k, target)
+        v_D, w_D = R_WD.T @ motion["robot.v_WG"][k], R_WD.T @ motion["robot.w_WG"][k]
+        pull = R_WD.T @ wrench[:3] + g.damping_translation @ v_D
+        twist = R_WD.T @ wrench[3:] + g.damping_rotation @ w_D
+        calculated[k, :3] = R_WD @ np.linalg.solve(g.stiffness_translation, pull)
+        calculated[k, 3:] = R_WD @ np.linalg.solve(g.stiffness_rotation, twist)
+    from scipy.spatial.transform import Rotation  # slow to import, and needed only after a run
+
+    R_WG = Rotation.from_quat(motion["robot.q_WG"][:-1], scalar_first=True)
+    actual[:, :3] = target.p_WG - motion["robot.p_WG"][:-1]
+    actual[:, 3:] = -(R_WG * Rotation.from_matrix(R_WD).inv()).as_rotvec()
+    return Errors(motion["t"][:-1], actual[:, :3], calculated[:, :3], actual[:, 3:], calculated[:, 3:])
+
+
+def _inertial_wrench(motion: Columns, k: int, target: ArmTarget) -> Floats:
+    """Return B_x x'' + C_x x' - f_ext in the middle of step k, (6,), in W."""
+
+    def middle(name: str) -> Floats:
+        return (motion[name][k] + motion[name][k + 1]) / 2.0
+
+    n, dt = target.model.joints, float(motion["t"][k + 1] - motion["t"][k])
+    q_J, v_J = middle("robot.q_J")[:n], middle("robot.v_J")[:n]
+    chain = Chain(target.model, rotation_of(middle("robot.q_WB")), middle("robot.w_WB"), q_J, v_J)
+    size = 6 if target.fixed else 6 + n
+    J, J_rate = chain.jacobian(-1)[:, :size], chain.jacobian_rate(-1)[:, :size]
+    B, C = mass_matrix(chain)[:size, :size], coriolis_matrix(chain)[:size, :size]
+    xi_dot = np.concatenate([middle("robot.v_WB"), middle("robot.w_WB"), v_J])[:size]
+    x_2 = np.concatenate([np.diff(motion[f"robot.{v}_WG"][k : k + 2], axis=0)[0] for v in ("v", "w")]) / dt
+    push = np.concatenate([motion["push.f_G"][k + 1], motion["push.tau_G"][k + 1]])
+    return OperationalSpace.of(J, B).B_x @ x_2 + operational_bias(J, J_rate, B, C, xi_dot) - push
+
+
+class ArmImpedanceEvaluator(Evaluator):
+    """Follows one push and decides whether the gripper came back to rest and moved as by the impedance model."""
+
+    records = (Metric,)
+
+    def __init__(self, parameters: ArmPushParameters) -> None:
+        self.parameters = parameters
+        target = parameters.target()
+        self._p_WG, self._R_WG = target.p_WG, target.R_WG
+        self._rows: list[list[Any]] = []
+        self._saturated, self._t, self._astray, self._spins = 0, 0.0, 0.0, False
+        self._greatest = [0.0, 0.0]
+        self._stability: dict[str, Metric] = {}
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Keep the motion and follow the errors."""
+        if not self._rows:
+            self._stability = stability_metrics(signals, ("impedance",))
+        self._rows.append([t, *(signals[name] for name in SIGNALS)])
+        self._saturated += bool(signals["thrusters.saturated"])
+        away = float(np.linalg.norm(signals["robot.p_WG"] - self._p_WG))
+        cosine = (np.trace(np.transpose(self._R_WG) @ rotation_of(signals["robot.q_WG"])) - 1.0) / 2.0
+        turned = math.acos(min(1.0, max(-1.0, float(cosine))))
+        self._greatest = [max(self._greatest[0], away), max(self._greatest[1], turned)]
+        self._t, self._spins = t, float(np.linalg.norm(signals["robot.w_WB"])) > _SPINNING
+        if away > _REST_POSITION or turned > _REST_ANGLE:
+            self._astray = t
+
+    @property
+    def over(self) -> bool:
+        """Whether the gripper has come to rest after the push, or the robot spins out of control."""
+        return self._spins or self._at_rest
+
+    @property
+    def _at_rest(self) -> bool:
+        return self._t - max(self._astray, self.parameters.end) >= _RESTING
+
+    def outcome(self) -> Outcome:
+        """Return whether the gripper rests again and agreed with the model, why, and the metrics."""
+        if len(self._rows) < 2:
+            return Outcome(success=False, reason="stopped before the first step")
+        names = ("t", *SIGNALS)
+        motion = {name: np.array(column) for name, column in zip(names, zip(*self._rows, strict=True), strict=True)}
+        by = errors_with_arm(motion, self.parameters.target()).disagreement
+        bounds = paper_values("free_flyer", "published")["model_agreement"]
+        agrees = by[0] <= bounds[0] and by[1] <= bounds[1]
+        metrics = self._metrics(motion, by)
+        back = (
+            f"the gripper was back at rest {max(0.0, self._astray - self.parameters.end):.1f} s after the push"
+            if self._at_rest
+            else f"the gripper was not back at rest at {self._t:.1f} s"
+        )
+        verb = "agreed with" if agrees else "departed from"
+        joined = "and" if agrees is self._at_rest else "but"
+        reason = f"{back}, {joined} {verb} the impedance model by {1000 * by[0]:.1f} mm and {by[1]:.3f} rad"
+        return Outcome(success=self._at_rest and agrees, reason=reason, metrics=metrics)
+
+    def _metrics(self, motion: Columns, by: tuple[float, float]) -> dict[str, Metric]:
+        base = np.linalg.norm(motion["robot.p_WB"] - motion["robot.p_WB"][0], axis=1)
+        turn = 2.0 * np.arccos(np.minimum(1.0, np.abs(motion["robot.q_WB"] @ motion["robot.q_WB"][0])))
+        joints = np.abs(motion["robot.q_J"] - motion["robot.q_J"][0])
+        impulse = np.diff(motion["t"]) @ np.linalg.norm(motion["thrusters.f_B"][1:], axis=1)
+        model = "[Fernandes2020] eq. (4.4) with joints"
+        metrics = {
+            "greatest_position_error": Metric(self._greatest[0], "m", "gripper from its place of rest at most"),
+            "greatest_orientation_error": Metric(self._greatest[1], "rad", "gripper from its rest orientation at most"),
+            "base_displacement": Metric(float(base.max()), "m", "base from where it was at most"),
+            "base_turn": Metric(float(turn.max()), "rad", "base from its first attitude at most"),
+            "joint_motion": Metric(float(joints.max()), "rad", "a joint from its first angle at most"),
+            "thrust_impulse": Metric(float(impulse), "N.s", "of the thrusters, whatever its direction"),
+            "disagreement_position": Metric(by[0], "m", f"actual against calculated position error, {model}"),
+            "disagreement_orientation": Metric(by[1], "rad", f"actual against calculated orientation error, {model}"),
+            "saturated_share": Metric(
+                self._saturated / len(self._rows), "1", "share of the time for which the thrusters were at their limits"
+            ),
+            **self._stability,
+        }
+        if self._at_rest:
+            settled = max(0.0, self._astray - self.parameters.end)
+            metrics["settling_time"] = Metric(settled, "s", "from the end of the push until the gripper stays at rest")
+        return metrics

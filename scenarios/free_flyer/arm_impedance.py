@@ -1,0 +1,119 @@
+"""A push against the gripper of a robot whose arm gives way, too. [Fernandes2020] sec. 3.3."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from handover.cosim.blocks.geometry import quaternion_of
+from handover.cosim.record.reader import Record
+from handover.cosim.system.system import System
+from handover.scenarios.experiment.experiment import Experiment, FmuOf
+from handover.scenarios.experiment.places import Place
+from handover.scenarios.experiment.replay import Replay
+from handover.scenarios.experiment.time_plot import TimeFigure
+from handover.scenarios.free_flyer.arm_evaluation import ArmImpedanceEvaluator
+from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters
+from handover.scenarios.free_flyer.parameters import Wrench
+from handover.scenarios.free_flyer.places import PLACES_OF_ARM_PUSH
+from handover.scenarios.free_flyer.robot_wiring import expected_lag, wire_controller, wire_forces, wire_navigation
+
+
+class FlyerArmImpedance(Experiment[ArmImpedanceEvaluator]):
+    """One pulse of force or torque on the gripper; base and joints yield, and go back."""
+
+    name: ClassVar[str] = "flyer_arm_impedance"
+    title: ClassVar[str] = "a free-flyer yields to a push against its gripper with base and arm"
+    parameters_type: ClassVar[type[ArmPushParameters]] = ArmPushParameters
+    units: ClassVar[Mapping[str, str]] = {
+        "impedance": "ArmImpedanceController",
+        "thrusters": "Thrusters",
+        "push": "Push",
+        "robot": "FreeFlyer",
+        "navigation": "Navigation",
+    }
+    places: ClassVar[Mapping[str, Place]] = PLACES_OF_ARM_PUSH
+    parallel_step: ClassVar[Fraction | None] = Fraction(1, 500)
+    headline: ClassVar[tuple[str, ...]] = (
+        "greatest_position_error",
+        "greatest_orientation_error",
+        "base_displacement",
+        "base_turn",
+        "joint_motion",
+        "thrust_impulse",
+        "settling_time",
+        "disagreement_position",
+        "disagreement_orientation",
+        "pole_margin_impedance",
+        "cpu_per_cycle",
+    )
+
+    def build(self, parameters: ArmPushParameters, seed: int, fmu: FmuOf) -> System:
+        """Wire robot, thrusters, navigation, controller and push; the gripper starts at its place of rest."""
+        p, target = parameters, parameters.target()
+        p_BG, R_BG = p.gripper_at_start()
+        s = System()
+        impedance = s.add(
+            "impedance",
+            fmu("impedance"),
+            **p.controller(),
+            delay=p.delay if p.delay_known else 0.0,
+            lag=expected_lag(p.propulsion),
+            p_WG_goal=target.p_WG,
+            q_WG_goal=np.array([1.0, 0.0, 0.0, 0.0]) if p.fixed else quaternion_of(R_BG),
+            active=True,
+        )
+        thrusters = s.add("thrusters", fmu("thrusters"), propulsion=p.propulsion.item, delay=p.delay)
+        push = s.add(
+            "push",
+            fmu("push"),
+            axis=p.axis.name.lower(),
+            force=p.force if p.kind is Wrench.FORCE else 0.0,
+            torque=p.torque if p.kind is Wrench.TORQUE else 0.0,
+            start=p.begin,
+            duration=p.duration,
+        )
+        robot = s.add(
+            "robot",
+            fmu("robot"),
+            **vars(p.robot),
+            **p.arm(p.arm_factor),
+            q_J_0=p.posture,
+            tolerance_J=p.tolerance,
+            friction_J=np.full(3, p.friction),
+            lock_time=p.lock_time,
+            p_WB_0=target.p_WG - p_BG,
+        )
+        navigation = s.add("navigation", fmu("navigation"), seed=seed)
+        wire_controller(s, impedance, navigation, thrusters)
+        wire_navigation(s, robot, navigation)
+        wire_forces(s, robot, thrusters, push)
+        for name in ("q_J", "v_J"):
+            s.connect(getattr(robot.y, name), getattr(impedance.u, name))
+        s.connect(impedance.y.tau_J_cmd, robot.u.tau_J)
+        return s
+
+    def stop_time(self, parameters: ArmPushParameters) -> Fraction:
+        """Return the end of the push, plus the patience for the return to rest."""
+        return parameters.stop
+
+    def evaluator(self, parameters: ArmPushParameters) -> ArmImpedanceEvaluator:
+        """Return the evaluator of one push."""
+        return ArmImpedanceEvaluator(parameters)
+
+    def cycle(self) -> tuple[str, ...]:
+        """Return the unit that runs on the robot's computer."""
+        return ("impedance",)
+
+    def time_figures(self, parameters: ArmPushParameters, record: Record) -> list[TimeFigure]:
+        """Return errors actual and calculated, base and joints, push and thrust over time."""
+        from handover.scenarios.free_flyer.arm_plots import figures_of_arm_push
+
+        return figures_of_arm_push(parameters, record)
+
+    def replay(self, parameters: ArmPushParameters, record: Record) -> Replay:
+        """Return base and links, the gripper's place of rest and the push in space."""
+        from handover.scenarios.free_flyer.arm_plots import replay_arm_push
+
+        return replay_arm_push(parameters, record)

@@ -1,0 +1,52 @@
+"""A push on a robot whose arm moves, on the built FMUs: what base and joints do, and what may be amiss."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flyer_runs import metric, run
+
+from handover.cosim.exceptions import InitializationError
+from handover.cosim.record.reader import Record
+from handover.scenarios.free_flyer.arm_impedance import FlyerArmImpedance
+from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters
+
+
+def test_a_pushed_robot_yields_with_its_arm_and_moves_as_the_impedance_model_says(tmp_path: Path):
+    ended = run(FlyerArmImpedance, tmp_path / "r", drawn=True)
+    assert ended.outcome.success, ended.outcome.reason
+    assert metric(ended, "disagreement_position") <= 0.007
+    assert metric(ended, "disagreement_orientation") <= 0.02
+    assert metric(ended, "joint_motion") > 0.2
+    record = Record(tmp_path / "r" / "signals.parquet")
+    away = np.linalg.norm(record["robot.p_WG"] - [0.0, -0.07, 0.0], axis=1)
+    assert metric(ended, "greatest_position_error") == pytest.approx(away.max())
+    moved = np.linalg.norm(record["robot.p_WB"] - record["robot.p_WB"][0], axis=1)
+    assert metric(ended, "base_displacement") == pytest.approx(moved.max())
+
+
+def test_with_fixed_joints_the_model_is_that_of_one_body_and_the_base_does_it_all(tmp_path: Path):
+    ended = run(FlyerArmImpedance, tmp_path / "r", "tolerance=0")
+    assert ended.outcome.success, ended.outcome.reason
+    assert metric(ended, "joint_motion") == 0.0
+
+
+def test_joints_that_lock_unknown_to_the_controller_depart_from_the_model(tmp_path: Path):
+    ended = run(FlyerArmImpedance, tmp_path / "r", "lock_time=1.25")
+    assert not ended.outcome.success
+    assert "departed from the impedance model" in ended.outcome.reason
+    q_J, t = Record(tmp_path / "r" / "signals.parquet")["robot.q_J"], Record(tmp_path / "r" / "signals.parquet").time
+    assert len(np.unique(q_J[t > 1.28], axis=0)) == 1
+
+
+def test_the_published_rigid_damping_is_refused_with_joints(tmp_path: Path):
+    with pytest.raises(InitializationError, match="unstable"):
+        run(FlyerArmImpedance, tmp_path / "r", "rotational_damping=5")
+
+
+def test_factors_of_the_arm_scale_its_links():
+    p = ArmPushParameters(arm_factor=2.0, model_arm_factor=0.5, model_link_factor=0.7)
+    robot, model = p.arm(p.arm_factor), p.controller()
+    np.testing.assert_allclose(robot["link"][0], [-0.2, 0.0, 0.0])
+    np.testing.assert_allclose(model["link"][0], [-0.05, 0.0, 0.0])
+    np.testing.assert_allclose(model["mass_L"], 0.7 * robot["mass_L"])
