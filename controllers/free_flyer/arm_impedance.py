@@ -51,15 +51,15 @@ class ArmAtRest:
             lag: time constant of the propulsion, s; 0 if thrust follows its command without delay.
         """
         n = len(self.B)
-        inverse = np.linalg.inv(self.B)
+        inverse: Floats = np.linalg.inv(self.B).astype(np.float64)
         A, E = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 6))
         A[:n, n:], E[n:] = np.eye(n), inverse @ np.transpose(self.J)
-        B, C = np.vstack([np.zeros((n, n)), inverse]), np.eye(2 * n)
+        B: Floats = np.vstack([np.zeros((n, n)), inverse])
+        C = np.eye(2 * n)
         if lag == 0.0:
             return LinearPlant(A=A, B=B, E=E, C=C)
         thrust = np.vstack([np.eye(6) / lag, np.zeros((n - 6, 6))])
-        torques = B.copy()
-        torques[:, :6] = 0.0
+        torques: Floats = np.hstack([np.zeros((2 * n, 6)), B[:, 6:]])
         return LinearPlant(
             A=np.block([[A, B[:, :6]], [np.zeros((6, 2 * n)), -np.eye(6) / lag]]),
             B=np.vstack([torques, np.transpose(thrust)]),

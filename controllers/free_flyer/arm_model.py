@@ -139,11 +139,11 @@ class Chain:
 def mass_matrix(chain: Chain) -> Floats:
     """Return B (6 + n, 6 + n), eq. (3.22): the sum of J_i^T diag(m_i, H_i) J_i over base and links, and the rotors."""
     n = len(chain.axes)
-    B = np.diag([*np.zeros(6), *chain.model.rotors[:n]])
+    total = np.diag([*np.zeros(6), *chain.model.rotors[:n]])
     for i in range(n + 1):
         J = chain.jacobian(i)
-        B += chain.mass(i) * np.transpose(J[:3]) @ J[:3] + np.transpose(J[3:]) @ chain.inertia(i) @ J[3:]
-    return B
+        total += chain.mass(i) * np.transpose(J[:3]) @ J[:3] + np.transpose(J[3:]) @ chain.inertia(i) @ J[3:]
+    return total
 
 
 def coriolis_matrix(chain: Chain) -> Floats:
@@ -152,12 +152,12 @@ def coriolis_matrix(chain: Chain) -> Floats:
     Twists are no derivatives of coordinates, so Christoffel's symbols (3.24) do not hold for them; C xi' is the same.
     """
     n = len(chain.axes)
-    C = np.zeros((6 + n, 6 + n))
+    total = np.zeros((6 + n, 6 + n))
     for i in range(n + 1):
         J, rate, H = chain.jacobian(i), chain.jacobian_rate(i), chain.inertia(i)
-        C += chain.mass(i) * np.transpose(J[:3]) @ rate[:3]
-        C += np.transpose(J[3:]) @ (H @ rate[3:] + _skew(chain.w[i]) @ H @ J[3:])
-    return C
+        total += chain.mass(i) * np.transpose(J[:3]) @ rate[:3]
+        total += np.transpose(J[3:]) @ (H @ rate[3:] + _skew(chain.w[i]) @ H @ J[3:])
+    return total
 
 
 @dataclass(frozen=True)
@@ -180,9 +180,9 @@ class OperationalSpace:
     def of(cls, J: Floats, B: Floats) -> "OperationalSpace":
         """Return it for a Jacobian J (6, 6 + n) and a mass matrix B."""
         compliance = np.linalg.solve(B, np.transpose(J))
-        B_x = np.linalg.inv(J @ compliance)
+        B_x: Floats = np.linalg.inv(J @ compliance).astype(np.float64)
         n = J.shape[1] - 6
-        Z = np.vstack([-np.linalg.solve(J[:, :6], J[:, 6:]), np.eye(n)])
+        Z: Floats = np.vstack([-np.linalg.solve(J[:, :6], J[:, 6:]), np.eye(n)]).astype(np.float64)
         return cls(B_x=B_x, J_bar=compliance @ B_x, Z=Z, inertia=np.transpose(Z) @ B @ Z)
 
 

@@ -56,9 +56,9 @@ def errors_with_arm(motion: Columns, target: ArmTarget) -> Errors:
     actual, calculated = np.zeros((rows, 6)), np.zeros((rows, 6))
     for k in range(rows):
         wrench = _inertial_wrench(motion, k, target)
-        v_D, w_D = R_WD.T @ motion["robot.v_WG"][k], R_WD.T @ motion["robot.w_WG"][k]
-        pull = R_WD.T @ wrench[:3] + g.damping_translation @ v_D
-        twist = R_WD.T @ wrench[3:] + g.damping_rotation @ w_D
+        v_D, w_D = np.transpose(R_WD) @ motion["robot.v_WG"][k], np.transpose(R_WD) @ motion["robot.w_WG"][k]
+        pull = np.transpose(R_WD) @ wrench[:3] + g.damping_translation @ v_D
+        twist = np.transpose(R_WD) @ wrench[3:] + g.damping_rotation @ w_D
         calculated[k, :3] = R_WD @ np.linalg.solve(g.stiffness_translation, pull)
         calculated[k, 3:] = R_WD @ np.linalg.solve(g.stiffness_rotation, twist)
     from scipy.spatial.transform import Rotation  # slow to import, and needed only after a run

@@ -61,7 +61,7 @@ def random_inputs(seed: int) -> dict[str, Any]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_without_joints_it_is_the_impedance_controller(seed: int):
-    law = {"behaviour": Behaviour.CUSTOM, "damping_rotation": np.diag([1.0, 2.0, 3.0])}
+    law: dict[str, Any] = {"behaviour": Behaviour.CUSTOM, "damping_rotation": np.diag([1.0, 2.0, 3.0])}
     with_arm, rigid = ArmImpedanceController(Params(joints=0, **law)), ImpedanceController(RigidParams(**law))
     u = random_inputs(seed)
     a = with_arm.outputs(0.0, Inputs(**u, active=True))

@@ -62,7 +62,7 @@ def test_jacobians_and_their_rates_are_derivatives(seed: int, n: int):
         moved = (at.place(i, h) - at.place(i, -h)) / (2.0 * h)
         link = min(i, n)
         R, after, before = (at.chain(t).R[link] for t in (0.0, h, -h))
-        turned = (after - before) @ R.T / (2.0 * h)
+        turned = (after - before) @ np.transpose(R) / (2.0 * h)
         twist = at.chain().jacobian(i) @ at.xi_dot
         np.testing.assert_allclose(twist[:3], moved, atol=1e-8)
         np.testing.assert_allclose(twist[3:], [turned[2, 1], turned[0, 2], turned[1, 0]], atol=1e-8)
@@ -81,20 +81,20 @@ def published_mass_matrix(m: ArmModel, angles: Floats, q_J: Floats) -> Floats:
         [[np.cos(t) * np.cos(p), -np.sin(p), 0.0], [np.cos(t) * np.sin(p), np.cos(p), 0.0], [-np.sin(t), 0.0, 1.0]]
     )
     R, n = Rotation.from_euler("ZYX", angles[::-1]).as_matrix(), m.joints
-    Q, seen = R.T @ N, Chain(m, np.eye(3), np.zeros(3), q_J)
+    Q, seen = np.transpose(R) @ N, Chain(m, np.eye(3), np.zeros(3), q_J)
     B = np.zeros((6 + n, 6 + n))
     B[:3, :3] = np.eye(3) * (m.mass + np.sum(m.masses[:n]))
-    B[3:6, 3:6] = Q.T @ m.I_B @ Q
+    B[3:6, 3:6] = np.transpose(Q) @ m.I_B @ Q
     B[6:, 6:] = np.diag(m.rotors[:n])
     for i in range(1, n + 1):
         J_t, J_r, H, r = seen.jacobian(i)[:3, 6:], seen.jacobian(i)[3:, 6:], seen.inertia(i), skew(R @ seen.p[i])
         mass = m.masses[i - 1]
         B[:3, 3:6] += -mass * r @ N
         B[:3, 6:] += mass * R @ J_t
-        B[3:6, 3:6] += mass * N.T @ r.T @ r @ N + Q.T @ H @ Q
-        B[3:6, 6:] += Q.T @ H @ J_r - mass * N.T @ r.T @ R @ J_t
-        B[6:, 6:] += mass * J_t.T @ J_t + J_r.T @ H @ J_r
-    B[3:6, :3], B[6:, :3], B[6:, 3:6] = B[:3, 3:6].T, B[:3, 6:].T, B[3:6, 6:].T
+        B[3:6, 3:6] += mass * np.transpose(N) @ np.transpose(r) @ r @ N + np.transpose(Q) @ H @ Q
+        B[3:6, 6:] += np.transpose(Q) @ H @ J_r - mass * np.transpose(N) @ np.transpose(r) @ R @ J_t
+        B[6:, 6:] += mass * np.transpose(J_t) @ J_t + np.transpose(J_r) @ H @ J_r
+    B[3:6, :3], B[6:, :3], B[6:, 3:6] = np.transpose(B[:3, 3:6]), np.transpose(B[:3, 6:]), np.transpose(B[3:6, 6:])
     return B
 
 
@@ -108,10 +108,10 @@ def test_the_mass_matrix_is_the_published_one_and_positive_definite(seed: int, n
     E = np.eye(6 + n)
     for k in range(3):  # the angular velocity that a rate of one angle makes, by differences
         after, before = (Rotation.from_euler("ZYX", (angles + s * np.eye(3)[k])[::-1]).as_matrix() for s in (h, -h))
-        turned = (after - before) @ R.T / (2.0 * h)
+        turned = (after - before) @ np.transpose(R) / (2.0 * h)
         E[3:6, 3 + k] = [turned[2, 1], turned[0, 2], turned[1, 0]]
-    np.testing.assert_allclose(E.T @ B @ E, published_mass_matrix(m, angles, q_J), atol=1e-8)
-    np.testing.assert_allclose(B, B.T, atol=1e-15)
+    np.testing.assert_allclose(np.transpose(E) @ B @ E, published_mass_matrix(m, angles, q_J), atol=1e-8)
+    np.testing.assert_allclose(B, np.transpose(B), atol=1e-15)
     assert np.min(np.linalg.eigvalsh(B)) > 1e-3
 
 
@@ -120,7 +120,7 @@ def test_the_rate_of_B_less_twice_C_is_skew(seed: int):
     at, h = At(seed, 3), 1e-6
     rate = (mass_matrix(at.chain(h)) - mass_matrix(at.chain(-h))) / (2.0 * h)
     S = rate - 2.0 * coriolis_matrix(at.chain())
-    np.testing.assert_allclose(S, -S.T, atol=1e-7)
+    np.testing.assert_allclose(S, -np.transpose(S), atol=1e-7)
     assert np.max(np.abs(S)) > 0.1
 
 
@@ -155,12 +155,12 @@ def test_it_predicts_how_the_plant_accelerates_and_its_energy(seed: int):
     B, C, J, J_rate = mass_matrix(chain), coriolis_matrix(chain), chain.jacobian(-1), chain.jacobian_rate(-1)
     u, f_ext = np.concatenate([R @ f_B, R @ tau_B, tau_J]), np.concatenate([f_G, tau_G])
     acceleration = (xi_dot(after) - xi_dot(before)) / (2.0 * h)
-    np.testing.assert_allclose(B @ acceleration + C @ moving, u + J.T @ f_ext, atol=2e-5)
+    np.testing.assert_allclose(B @ acceleration + C @ moving, u + np.transpose(J) @ f_ext, atol=2e-5)
     assert np.linalg.norm(C @ moving) > 0.01
     space = OperationalSpace.of(J, B)
     x_2 = (np.subtract([*after.v_WG, *after.w_WG], [*before.v_WG, *before.w_WG])) / (2.0 * h)
     impedance = space.B_x @ x_2 + operational_bias(J, J_rate, B, C, moving)
-    np.testing.assert_allclose(impedance, space.J_bar.T @ u + f_ext, atol=2e-5)
+    np.testing.assert_allclose(impedance, np.transpose(space.J_bar) @ u + f_ext, atol=2e-5)
     energy = 0.5 * moving @ B @ moving
     assert np.linalg.norm(now.v_J) > 0.05
     assert stored == pytest.approx(energy, rel=1e-12)
@@ -175,7 +175,7 @@ def test_null_motions_leave_the_gripper_where_it_is_and_need_no_force_there():
     np.testing.assert_allclose(J @ space.Z, 0.0, atol=1e-12)
     np.testing.assert_allclose(J @ np.linalg.solve(B, B @ space.Z), 0.0, atol=1e-12)
     np.testing.assert_allclose(J @ space.J_bar, np.eye(6), atol=1e-10)
-    np.testing.assert_allclose(space.J_bar.T @ B @ space.Z, 0.0, atol=1e-10)
+    np.testing.assert_allclose(np.transpose(space.J_bar) @ B @ space.Z, 0.0, atol=1e-10)
 
 
 def test_the_whole_is_what_its_parts_make_up():
@@ -184,7 +184,7 @@ def test_the_whole_is_what_its_parts_make_up():
     c = np.array(robot.body.posture(robot.state[4]).p_BC)
     robot.lock()
     energy = 0.5 * whole.mass * float(np.dot(robot.state[2], robot.state[2]))
-    w = np.linalg.solve(at.R @ whole.I_B @ at.R.T, robot.state[3])
+    w = np.linalg.solve(at.R @ whole.I_B @ np.transpose(at.R), robot.state[3])
     assert whole.mass == pytest.approx(robot.body.mass)
     assert robot.energy == pytest.approx(energy + 0.5 * float(w @ np.array(robot.state[3])))
     np.testing.assert_allclose(whole.p_BG + c, Chain(at.model, np.eye(3), np.zeros(3), at.q_J).p[-1], atol=1e-12)

@@ -227,7 +227,7 @@ def test_without_joints_the_arm_counts_for_nothing():
         a, b = (robot.step(0.016 * i, 0.016, HELD) for robot in (plain, other))
         np.testing.assert_array_equal(outputs(a), outputs(b))
         np.testing.assert_array_equal(a.q_WG, a.q_WB)
-    assert not np.any(a.q_J)
+        assert not np.any(a.q_J)
 
 
 def test_what_no_arm_is_is_refused_all_at_once():
