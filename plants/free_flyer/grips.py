@@ -4,6 +4,7 @@ The hand follows its course, the object that it holds, or keeps off a palm that 
 that close along z of G around an object, and a palm behind them.
 """
 
+import math
 from dataclasses import replace
 
 from handover.cosim.blocks.plain_rotation import (
@@ -40,6 +41,8 @@ _SLACK = 0.1
 """Metres beyond its reach at which an arm loses what the hand holds."""
 _LEAST_GRIP = 1e-3
 """Part of its force that a grip has until it lets go, lest what slides in it be divided by nothing."""
+_BEYOND_END = 0.01
+"""Metres beyond an object's end at which a hand still gets it."""
 _NEAR = 0.02
 """Metres in front of the palm within which an object may come to touch it in a step."""
 
@@ -48,13 +51,16 @@ class FlyerHand:
     """The hand H. Its course, where the arm wants it, is the person's plus tremor.
 
     What the hand holds, it holds fast: the compliance is the arm's, between course and object (`Attachment`). The arm
-    yields at arm_force_max, and recovers with the time constant recovery_time. A fist on the palm of a gripper is kept
-    off it, by the depth that its course has in the palm, and presses with the arm's stiffness and damping times depth
-    and speed, at most arm_force_max.
+    yields at arm_force_max, and recovers with the time constant recovery_time. Fingers that close get the object if its
+    middle line is at most finger_reach away, and 1 cm beyond its end; else they close on nothing. The palm of an open
+    hand, palm_back behind its middle, pushes an object that is in its way by the arm's stiffness and damping. A fist on
+    the palm of a gripper is kept off it, by the depth that its course has in the palm, and presses with the arm's
+    stiffness and damping times depth and speed, at most arm_force_max.
     """
 
     def __init__(self, params: Params, p: Vector, q: Quaternion) -> None:
         self._p = params
+        self._half, self._thick = 0.5 * float(params.object_size[1]), 0.5 * float(params.object_size[0])
         self._arm = Stiffness(
             params.arm_stiffness,
             params.arm_damping,
@@ -76,6 +82,7 @@ class FlyerHand:
         self.p_OH, self.q_OH = vector(params.p_OH), IDENTITY
         self.course = Frame(p, q)
         self.hold: Attachment | None = None
+        self._closed = False
 
     @property
     def calm(self) -> Vector:
@@ -104,6 +111,46 @@ class FlyerHand:
         push = min(max(push, 0.0), p.arm_force_max)
         kept_off = _moving_frame(dt, self.course.p, add_scaled(course.p, -depth, n), course.q)
         return kept_off, scale(push, n), add_scaled(arm, p.fist_radius - depth, n)
+
+    def palm(self, course: Frame, body: RigidBody) -> Palm | None:
+        """Return the palm for an object that it meets on a course, none for one that is elsewhere.
+
+        Its spring is the arm's, which yields at arm_force_max, so the palm is no deeper than that.
+        """
+        p, R = self._p, rotation_matrix(body.q)
+        s, depth = self._depth(course, body, R)
+        if depth <= 0.0:
+            return None
+        n_W = column(course.R, 0)
+        n = inverse_rotate(R, n_W)
+        r = add_scaled((0.0, s, 0.0), -self._thick, n)
+        yielding = min(depth, p.arm_force_max / p.arm_stiffness)
+        return Palm(r, n, dot(course.v, n_W), yielding, p.arm_stiffness, p.arm_damping)
+
+    def _depth(self, course: Frame, body: RigidBody, R: Matrix) -> tuple[float, float]:
+        """Return where on its centre line an object meets the palm, and how deep it would be in it; 0: not at all."""
+        p = self._p
+        s, (x, y, z) = _nearest(self._half, course.p, course.R, body, R)
+        depth = self._thick - p.palm_back - x
+        meets = 0.0 < depth < p.arm_reach and max(abs(y), abs(z)) <= p.fist_radius
+        return s, depth if meets else 0.0
+
+    def kept_off(self, dt: float, course: Frame, body: RigidBody) -> Frame:
+        """Return the course of an open hand as the object lets it."""
+        _, depth = self._depth(course, body, rotation_matrix(body.q))
+        if depth <= 0.0:
+            return course
+        return _moving_frame(dt, self.course.p, add_scaled(course.p, -depth, column(course.R, 0)), course.q)
+
+    def reaches(self, body: RigidBody) -> bool:
+        """Return whether the fingers get an object if they close."""
+        _, (x, y, z) = _nearest(self._half, self.p, rotation_matrix(self.q), body, rotation_matrix(body.q))
+        return math.hypot(x, z) <= self._p.finger_reach and abs(y) <= _BEYOND_END
+
+    def gets(self, closed: bool, body: RigidBody) -> bool:
+        """Return whether fingers that are closed, or not, have the object: they get it where they close."""
+        closes, self._closed = closed and not self._closed, closed
+        return closed if self.hold is not None else closes and self.reaches(body)
 
     def take_or_leave(self, wants: bool, body: RigidBody) -> None:
         """Take hold of an object where the hand is, or let it go; an arm that is stretched too far loses it."""
@@ -136,11 +183,11 @@ class FlyerHand:
         h, c = self.hold, self.course
         hold = None if h is None else (h.r, h.place, h.turn)
         places = (self._shake, self._target, self.p, self.q, self.p_OH, self.q_OH)
-        return pack_state((self._tremor.get_state(), hold, (c.p, c.q, c.v, c.w), places))
+        return pack_state((self._tremor.get_state(), hold, (c.p, c.q, c.v, c.w), places, self._closed))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this hand or of one with equal parameters."""
-        tremor, hold, course, places = unpack_state(state)
+        tremor, hold, course, places, self._closed = unpack_state(state)
         self._tremor.set_state(tremor)
         self.hold = None if hold is None else Attachment(self._arm, *hold)
         self.course = Frame(*course)
@@ -255,8 +302,12 @@ class FlyerGripper:
         return Attachment(self.stiffness, (0.0, s, 0.0), place, relative_quaternion(G.q, body.q))
 
     def _nearest(self, G: Frame, body: RigidBody, R: Matrix) -> tuple[float, Vector]:
-        """Return where on the centre line the point nearest to G lies, seen from the centre, and the point in G."""
-        axis = column(R, 1)
-        d = subtract(G.p, body.p)
-        s = min(max(dot(d, axis), -self._half), self._half)
-        return s, inverse_rotate(G.R, subtract(scale(s, axis), d))
+        return _nearest(self._half, G.p, G.R, body, R)
+
+
+def _nearest(half: float, p: Vector, R_F: Matrix, body: RigidBody, R: Matrix) -> tuple[float, Vector]:
+    """Return where on an object's centre line the point nearest to p lies, seen from the centre, and the point in F."""
+    axis = column(R, 1)
+    d = subtract(p, body.p)
+    s = min(max(dot(d, axis), -half), half)
+    return s, inverse_rotate(R_F, subtract(scale(s, axis), d))

@@ -49,7 +49,8 @@ from handover.plants.free_flyer.hand_guide import HandGuide, pose_of_tracker
 from handover.plants.free_flyer.hand_kinematics import CLOSED
 from handover.plants.free_flyer.hand_track import HandPose, read_track
 from handover.plants.free_flyer.parameters import Driver, InvalidHandParameters, Motion, Params, StartHolder
-from handover.plants.free_flyer.person import Activity, FlyerPerson, Perception
+from handover.plants.free_flyer.person import Activity, FlyerPerson
+from handover.plants.free_flyer.sight import Perception
 from handover.plants.hand_motion import minimum_jerk
 
 __all__ = [
@@ -178,7 +179,7 @@ class HandAndObject:
         if params.object_with is StartHolder.HAND:
             body.q = self._hand.q
             body.p = subtract(self._hand.p, rotate(rotation_matrix(body.q), self._hand.p_OH))
-            self._hand.take_or_leave(True, body)
+            self._hand.take_or_leave(self._hand.gets(True, body), body)
             self._fingers.settle(CLOSED, self._seen_from_object(self._hand.course))
         else:
             body.p = vector(params.p_WO_0)
@@ -206,6 +207,8 @@ class HandAndObject:
         self._exchange_forces(dt, before, G, course)
         self._f_G, self._tau_G = add(self._f_G, f_hand), add(self._tau_G, tau_hand)
         self._f_H = subtract(self._f_H, f_hand)
+        if self._reaches():
+            course = hand.kept_off(dt, course, body)
         hand.arrive(course, body)
         self._robot = G
         return self._outputs()
@@ -240,7 +243,7 @@ class HandAndObject:
         if guide is None:
             person.act(dt, self._perception(u.light, before))
             self._gripper.act(dt, u.closure, before, body)
-            hand.take_or_leave(person.holding, body)
+            hand.take_or_leave(hand.gets(person.holding and person.fingers == 1.0, body), body)
             course = hand.move(dt, person.p, person.q)
             self._goal = HandPose(course.p, course.q, self._wanted_angles(), person.holding)
             return course, person.pushes_with_fist
@@ -322,7 +325,13 @@ class HandAndObject:
             return []
         p, seen = self._p, self._seen_from_object(H)
         force = 0.0 if self._guide is None else p.finger_force
-        return self._fingers.touches(seen, p.finger_stiffness, p.finger_damping, p.arm_force_max, force)
+        touches = self._fingers.touches(seen, p.finger_stiffness, p.finger_damping, p.arm_force_max, force)
+        bump = self._hand.palm(H, self._object.body) if self._reaches() else None
+        return touches if bump is None else [*touches, bump]
+
+    def _reaches(self) -> bool:
+        """Return whether a person's open hand reaches for the object, so that its palm may meet it."""
+        return self._guide is None and self._person.reaches
 
     def _seen_from_object(self, H: Frame) -> Frame:
         """Return a hand that is at H, or that holds the object, as seen from the object."""

@@ -158,6 +158,27 @@ class Params:
     grip_fades: bool = parameter(False, "until then the force and torque that it holds fall, with how far they open")
     gripper_rate: RadianPerSecond = parameter(0.6, "speed of the gripper's angle", minimum=0.01, maximum=100.0)
 
+    line_of_sight: Vector3[Number] = parameter(np.array([1.0, 0.0, 0.0]), "where the person looks, in the world")
+    sight_error: Metre = parameter(
+        0.002, "deviation of where things are seen, along each axis across the line of sight", minimum=0.0, maximum=1.0
+    )
+    depth_error: Metre = parameter(0.006, "the same along the line of sight", minimum=0.0, maximum=1.0)
+    interface_delay: Second = parameter(0.05, "how old is what the person sees", minimum=0.0, maximum=5.0)
+    timing_error: Second = parameter(
+        0.05, "deviation of how early fingers are taken for closed or opened", minimum=0.0, maximum=5.0
+    )
+    effort_spread: Number = parameter(0.05, "deviation of the effort, relative", minimum=0.0, maximum=0.3)
+    finger_reach: Metre = parameter(
+        0.04,
+        "how far from the object's middle line the hand may be for its fingers to get it",
+        minimum=0.001,
+        maximum=0.2,
+    )
+    palm_back: Metre = parameter(
+        0.03, "how far the palm of the hand lies behind its middle", minimum=0.001, maximum=0.2
+    )
+    attempts: int = parameter(3, "how often the person tries at a signal", minimum=1, maximum=100)
+
     tremor_rms: Metre = parameter(0.0005, "root mean square length of the tremor", minimum=0.0, maximum=0.05)
     tremor_frequency: Hertz = parameter(8.0, "middle of the tremor's band", minimum=0.1, maximum=50.0)
     tremor_bandwidth: Hertz = parameter(2.0, "width of the tremor's band at half power", minimum=0.01, maximum=50.0)
@@ -225,6 +246,8 @@ class Params:
             faults.append("driven_by TRACK needs a file of a track: track")
         if self.track and self.driven_by is not Driver.TRACK:
             faults.append(f"track {self.track} is given, and driven_by is {self.driven_by.name}, not TRACK")
+        if not np.linalg.norm(self.line_of_sight) > 0.0:
+            faults.append("line_of_sight must not be zero")
         if not self.tremor_bandwidth < 2.0 * self.tremor_frequency:
             faults.append(
                 f"tremor_bandwidth {self.tremor_bandwidth:g} Hz must be less than twice tremor_frequency "

@@ -1,7 +1,6 @@
 """A person who takes an object from a free-flying robot, gives it one, or only pushes it."""
 
 import enum
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,9 +21,9 @@ from handover.cosim.blocks.plain_rotation import (
     vector,
 )
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.plants.free_flyer.attachment import Frame
 from handover.plants.free_flyer.effort import Effort, force_at_rest
 from handover.plants.free_flyer.parameters import Motion, Params, StartHolder
+from handover.plants.free_flyer.sight import Perception, Sight
 from handover.plants.hand_motion import minimum_jerk
 
 _PEAK = 1.875
@@ -53,23 +52,6 @@ class Activity(enum.IntEnum):
     REST = 8
 
 
-@dataclass(slots=True)
-class Perception:
-    """What the person sees and feels: the gripper and its light, the object, and the hand with its hold of it."""
-
-    light: bool
-    angle: float
-    G: Frame
-    O: Frame
-    gripped: bool
-    held: bool
-    p_WH: Vector
-    q_WH: Quaternion
-    p_OH: Vector
-    q_OH: Quaternion
-    f_H: Vector
-
-
 class FlyerPerson:
     """Moves a hand in minimum-jerk reaches, and pulls and pushes by an `Effort`, as the robot's actions allow.
 
@@ -80,6 +62,11 @@ class FlyerPerson:
     A signal is the rising edge of the light. What the person sees is acted on after a reaction time, drawn at each
     signal; a signal that comes in the middle of something waits until that is done, and so does one whose motion is not
     possible: TAKE with the object in the hand or out of reach, GIVE with it elsewhere.
+
+    Each attempt has its errors of sight and of timing (`Sight`). Whether the fingers get the object is decided where
+    they close, not here: a person who sees a closed hand empty, or a push that meets nothing, tries again, `attempts`
+    times in all. By an error of timing the pull begins before the fingers are closed, and the hand lets go, or
+    withdraws, before the gripper holds, or has let go.
     """
 
     def __init__(self, params: Params) -> None:
@@ -100,6 +87,9 @@ class FlyerPerson:
         self._from, self._from_q, self._duration = self.p, self.q, 1.0
         self._clock = 0.0  # seconds in this activity
         self._since = 0.0  # seconds for which the condition that ends it has held
+        self._in_vain = 0.0  # seconds for which a closed hand has been empty, or a push at its end
+        self._tries = 0  # since the signal
+        self._sight = Sight(params)
         self._effort, self._axis = Effort(params.arm_mass), self._pull
         self._saw_light, self._called, self._answered = False, False, False
         self._reaction = params.reaction_time
@@ -120,8 +110,14 @@ class FlyerPerson:
         """Whether the hand is to be a fist that may touch the gripper."""
         return self._motion is Motion.PUSH and self.activity in (Activity.OFFER, Activity.PUSH, Activity.WITHDRAW)
 
-    def act(self, dt: float, seen: Perception) -> None:
-        """Advance by dt with what is seen at its beginning."""
+    @property
+    def reaches(self) -> bool:
+        """Whether the hand is open, or closing, and its palm may meet the object."""
+        return self.activity in (Activity.REACH, Activity.GRASP)
+
+    def act(self, dt: float, there: Perception) -> None:
+        """Advance by dt with what is there at its beginning."""
+        seen = self._sight.look(dt, there)
         if seen.light and not self._saw_light:
             self._called = True
             spread = self._p.reaction_spread * float(self._rng.standard_normal())
@@ -130,10 +126,9 @@ class FlyerPerson:
                 self._since = 0.0
         self._saw_light = seen.light
         self._clock += dt
-        if self.holding and not seen.held:
+        if self.holding and not seen.held and self.activity is not Activity.PULL:
             self.holding = False
-            if self.activity not in (Activity.GRASP, Activity.PULL):
-                self._begin(Activity.WITHDRAW, seen)
+            self._begin(Activity.WITHDRAW, seen)
         self._acts[self.activity](dt, seen)
         step = dt / self._p.grasp_time
         closed = self.holding or self.activity is Activity.GRASP or self.pushes_with_fist
@@ -145,11 +140,14 @@ class FlyerPerson:
         signal = (self._saw_light, self._called, self._answered, self._reaction)
         effort = (self._effort.travelled, self._effort.speed)
         course = (self.holding, self.fingers, self._duration, self._clock, self._since, *effort)
-        return pack_state((where, signal, course, self._rng.bit_generator))
+        tries = (self._tries, self._in_vain)
+        return pack_state((where, signal, course, tries, self._sight.get_state(), self._rng.bit_generator))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this person or of one with equal parameters."""
-        where, signal, course, self._rng.bit_generator.state = unpack_state(state)
+        where, signal, course, tries, sight, self._rng.bit_generator.state = unpack_state(state)
+        self._tries, self._in_vain = tries
+        self._sight.set_state(sight)
         activity, motion, self.p, self.q, self._from, self._from_q, self._axis = where
         self.activity, self._motion = Activity(activity), Motion(motion)
         self._saw_light, self._called, self._answered, self._reaction = signal
@@ -161,8 +159,11 @@ class FlyerPerson:
         if activity is Activity.LET_GO or not self.holding:
             self.p, self.q = seen.p_WH, seen.q_WH
         self.activity = activity
-        self._clock, self._since = 0.0, 0.0
+        self._clock, self._since, self._in_vain = 0.0, 0.0, 0.0
         self._effort.begin()
+        if activity in (Activity.REACH, Activity.OFFER):
+            self._tries += 1
+            self._sight.begin_attempt()
         self._from, self._from_q = self.p, self.q
         goals = {Activity.REACH: self._at_object, Activity.OFFER: self._at_palm, Activity.WITHDRAW: self._at_rest}
         if activity in goals:
@@ -176,7 +177,7 @@ class FlyerPerson:
         self._motion = self._p.motion_again if self._answered else self._p.motion
         if self._since < self._reaction - _ROUNDING or not self._can(seen):
             return
-        self._called, self._answered = False, True
+        self._called, self._answered, self._tries = False, True, 0
         starts = {Motion.TAKE: Activity.REACH, Motion.GIVE: Activity.OFFER, Motion.PUSH: Activity.OFFER}
         if self._motion in starts:
             self._begin(starts[self._motion], seen)
@@ -197,16 +198,19 @@ class FlyerPerson:
 
     def _grasps(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
         self.p, self.q = self._at_object(seen)
-        if self._has_taken(self._p.grasp_time):
+        if self._has_taken(self._p.grasp_time - self._sight.lead):
             self._begin(Activity.PULL, seen)
             self.holding = True
 
     def _pulls(self, dt: float, seen: Perception) -> None:
-        p = self._p
         self._pull_on(dt, seen)
-        if not self.holding or self._has_taken(p.patience):
+        empty = self.fingers == 1.0 and not seen.held
+        if self._is_in_vain(empty, dt):
+            self.holding = False
+            self._try_again(Activity.REACH, seen)
+        elif self._has_taken(self._p.patience):
             self._let_go(seen)
-        elif self._has_seen(not seen.gripped, dt):
+        elif seen.held and self._has_seen(self._takes_for_free(seen), dt):
             self._begin(Activity.WITHDRAW, seen)
 
     def _offers(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
@@ -221,12 +225,14 @@ class FlyerPerson:
         if not moved:
             self._push_on(dt, seen)
         gives = self._motion is Motion.GIVE
-        if gives and seen.gripped:
+        if gives and self._takes_for_gripped(seen):
             if self._has_seen(True, dt):
                 self._let_go(seen)
             return
         empty = seen.angle < p.angle_object - 0.5 * _CLOSING
-        if self._has_seen(empty if gives else moved, dt) or self._has_taken(p.patience):
+        if self._is_in_vain(not moved and self._effort.travelled >= p.push_distance, dt):
+            self._try_again(Activity.OFFER, seen)
+        elif self._has_seen(empty if gives else moved, dt) or self._has_taken(p.patience):
             self._begin(Activity.WITHDRAW, seen)
 
     def _lets_go(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
@@ -241,6 +247,29 @@ class FlyerPerson:
     def _let_go(self, seen: Perception) -> None:
         self._begin(Activity.LET_GO, seen)
         self.holding = False
+
+    def _try_again(self, activity: Activity, seen: Perception) -> None:
+        """Begin the motion again after an attempt in vain, as often as the person cares to."""
+        self._begin(activity if self._tries < self._p.attempts else Activity.WITHDRAW, seen)
+
+    def _is_in_vain(self, there: bool, dt: float) -> bool:
+        """Return whether what tells a failed attempt has been seen for the time of a reaction."""
+        self._in_vain = self._in_vain + dt if there else 0.0
+        return there and self._in_vain >= self._reaction - _ROUNDING
+
+    def _takes_for_gripped(self, seen: Perception) -> bool:
+        """Return whether the gripper seems to hold the object: by its angle, as early as the error of timing has it."""
+        p = self._p
+        left = seen.angle - p.angle_object
+        closes = seen.angle < p.angle_open - _CLOSING and left >= -0.5 * _CLOSING
+        return seen.gripped or (closes and left < p.gripper_rate * self._sight.lead)
+
+    def _takes_for_free(self, seen: Perception) -> bool:
+        """Return whether the gripper seems to have let go of the object, likewise."""
+        p = self._p
+        opens = seen.angle > p.angle_object + 0.5 * _CLOSING
+        left = p.angle_object + p.release_angle - seen.angle
+        return not seen.gripped or (opens and left < p.gripper_rate * self._sight.lead)
 
     def _has_taken(self, duration: float) -> bool:
         """Return whether the activity has lasted that long."""
@@ -259,42 +288,43 @@ class FlyerPerson:
 
     def _pull_on(self, dt: float, seen: Perception) -> None:
         p = self._p
-        self._exert(dt, self._pull, p.effort, p.pull_ramp, p.pull_speed, p.pull_distance, seen)
+        self._exert(dt, self._pull, 1.0, p.pull_ramp, p.pull_speed, p.pull_distance, seen)
 
     def _push_on(self, dt: float, seen: Perception) -> None:
         p = self._p
-        self._exert(dt, self._axis, p.push_share * p.effort, p.push_ramp, p.push_speed, p.push_distance, seen)
+        self._exert(dt, self._axis, p.push_share, p.push_ramp, p.push_speed, p.push_distance, seen)
 
     def _exert(
         self,
         dt: float,
         axis: Vector,
-        effort: float,
+        share: float,
         rise: float,
         free_speed: float,
         length: float,
         seen: Perception,
     ) -> None:
-        """Move along an axis by an effort, against what the hand feels, until the length is reached."""
+        """Move along an axis by a share of the effort, against what the hand feels, until the length is reached."""
+        effort = share * self._sight.strength * self._p.effort
         fall = min(_EASING, 0.5 * self._p.patience)
         force = force_at_rest(effort, self._clock, rise, self._p.patience - fall, fall)
         self._effort.advance(dt, force, free_speed, length, -dot(seen.f_H, axis))
         self.p = add_scaled(self._from, self._effort.travelled, axis)
 
     def _at_object(self, seen: Perception) -> tuple[Vector, Quaternion]:
-        """Return the hand's pose at the object's end: the object's axes."""
-        return add(seen.O.p, rotate(seen.O.R, self._end)), seen.O.q
+        """Return the hand's pose at the object's end, as it is believed to be: the object's axes."""
+        return add(add(seen.O.p, self._sight.error), rotate(seen.O.R, self._end)), seen.O.q
 
     def _at_palm(self, seen: Perception) -> tuple[Vector, Quaternion]:
-        """Return the hand's pose where a push begins: with the object, p_OG in front of the palm; a fist, beside it."""
-        p, G = self._p, seen.G
+        """Return the hand's believed pose where a push begins: with the object, p_OG before the palm, or as a fist."""
+        p, G, p_WG = self._p, seen.G, add(seen.G.p, self._sight.error)
         front = p.palm_depth - p.offer_gap
         q = quaternion_multiply(G.q, seen.q_OH)
         if self._motion is Motion.PUSH:
-            return add(G.p, rotate(G.R, (front - p.fist_radius, p.fist_offset, 0.0))), q
+            return add(p_WG, rotate(G.R, (front - p.fist_radius, p.fist_offset, 0.0))), q
         x, y, z = subtract(seen.p_OH, self._offered)
         place = (front - 0.5 * float(p.object_size[0]) + x, y, z)
-        return add(G.p, rotate(G.R, place)), q
+        return add(p_WG, rotate(G.R, place)), q
 
     def _at_rest(self, seen: Perception) -> tuple[Vector, Quaternion]:  # noqa: ARG002
         return self.rest, self._rest_q

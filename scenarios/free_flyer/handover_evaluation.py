@@ -9,7 +9,9 @@ from dataclasses import dataclass, field
 
 from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
+from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import HandoverParameters
+from handover.scenarios.free_flyer.person_evaluation import Cause, Miss, PersonsDeeds
 from handover.scenarios.free_flyer.robot_wiring import stability_metrics
 
 
@@ -119,7 +121,8 @@ class HandoverEvaluator(Evaluator):
 
     It is a success when the object reached each receiver in turn "without being supported anywhere else and always in
     contact with at least one of the participants" once it was held at all, [Fernandes2020] sec. 3.1.2, and the robot
-    took an empty gripper for a failed reception as often as it had one.
+    took an empty gripper for a failed reception as often as it had one. A failure has a `Cause`, the metric
+    `decided_by`, which is told apart by what the person did (`PersonsDeeds`).
 
     Attributes:
         phases: phases of the robot and when they began, s, in chronological order; a phase may recur.
@@ -127,7 +130,7 @@ class HandoverEvaluator(Evaluator):
         transfers: those that the robot signalled for.
     """
 
-    records = (Metric, Transfer)
+    records = (Metric, Transfer, PersonsDeeds, Miss)
 
     def __init__(self, parameters: HandoverParameters, receivers: Sequence[str], failures: int = 0) -> None:
         self.parameters, self.receivers, self.failures = parameters, tuple(receivers), failures
@@ -143,7 +146,9 @@ class HandoverEvaluator(Evaluator):
         self._nearest = math.inf
         self._angles: dict[str, float] = {}
         self._unprovoked = 0
-        self._lost: float | None = None
+        self._lost: tuple[float, str, str] | None = None  # when, who had held it, and the robot's phase
+        self._deeds = PersonsDeeds()
+        self._empty = 0
         self._stability: dict[str, Metric] = {}
 
     def __call__(self, t: float, signals: Signals) -> None:
@@ -154,11 +159,14 @@ class HandoverEvaluator(Evaluator):
         codes = (int(signals["decision.phase"]), int(signals["person.holder"]))
         x, y, z = signals["robot.p_WG"].tolist()
         speed = float(signals["decision.speed_G"])
+        held_before = self._holder
         if codes != self._codes:
             self._change(t, signals, (x, y, z), speed)
             self._codes = codes
         if self._under_way is not None:
             self._under_way.hardest = max(self._under_way.hardest, math.hypot(*signals["person.f_H"].tolist()))
+        if self._lost is None or t < self._lost[0] + _SETTLING:
+            self._deeds.follow(t, signals, self._holder, held_before)
         self._nearest = min(self._nearest, math.dist((x, y, z), self._place))
         if self.transfers and self._phase not in _NOT_YIELDING:
             self.transfers[-1].displaced((x, y, z), self._place)
@@ -188,6 +196,10 @@ class HandoverEvaluator(Evaluator):
     def _enter(self, phase: str, left: str, t: float, p_WG: tuple[float, float, float], speed: float) -> None:
         if phase == "ACTIVATE_IMPEDANCE" and self._arrival is None:
             self._arrival = (math.dist(p_WG, self._place), speed)
+        if phase == "CHECK_ANGLE" and self._holder not in ("GRIPPER", "BOTH"):
+            self._empty += 1
+        if phase == "SIGNAL":
+            self._deeds.signalled()
         if phase == "SIGNAL" and self._under_way is not None:
             self._under_way.asked_again(t)
         elif phase == "SIGNAL" and len(self.transfers) < len(self.receivers):
@@ -205,7 +217,7 @@ class HandoverEvaluator(Evaluator):
 
     def _receive(self, holder: str, t: float) -> None:
         if holder == "FREE" and len(self.holders) > 1 and self._lost is None:
-            self._lost = t
+            self._lost = (t, self.holders[-2][0], self._phase)
         if self._under_way is not None and holder == self._under_way.receiver:
             self._under_way.done = t
 
@@ -224,7 +236,7 @@ class HandoverEvaluator(Evaluator):
     @property
     def over(self) -> bool:
         """Whether the robot is done or has given up, or the object is lost."""
-        if self._lost is not None and self._t >= self._lost + _SETTLING:
+        if self._lost is not None and self._t >= self._lost[0] + _SETTLING:
             return True
         return self._phase in ("DONE", "GIVEN_UP") and self._t >= self.phases[-1][1] + _SETTLING
 
@@ -235,9 +247,10 @@ class HandoverEvaluator(Evaluator):
             and self._phase == "DONE"
             and [t.receiver for t in self.transfers if t.done is not None] == list(self.receivers)
             and self._holder == self.receivers[-1]
-            and self._failed == self.failures
+            and self._failed == self._empty >= self.failures
         )
-        return Outcome(success=success, reason=self._reason(success) + self.parameters.stuck, metrics=self._metrics())
+        cause, reason = (Cause.NONE, self._success()) if success else self._failure()
+        return Outcome(success=success, reason=reason + self.parameters.stuck, metrics=self._metrics() | self._causes(cause))
 
     def _metrics(self) -> dict[str, Metric]:
         metrics: dict[str, Metric] = {}
@@ -274,40 +287,73 @@ class HandoverEvaluator(Evaluator):
             )
         return metrics
 
-    def _reason(self, success: bool) -> str:
-        if success:
-            received = [f"{_PEOPLE[t.receiver]} had the object at {t.done:.1f} s" for t in self.transfers]
-            again = f" after {self._failed} failed reception" if self._failed else ""
-            return " and ".join(received) + again + ", and it was never out of both hands"
-        if self._lost is not None:
-            before = _PEOPLE.get(self.holders[-2][0], "both") if len(self.holders) > 1 else "nobody"
-            return f"the object was lost at {self._lost:.1f} s in phase {self._phase}; {before} had held it"
-        return self._failure()
+    def _causes(self, cause: Cause) -> dict[str, Metric]:
+        """Return the metrics that say why a run failed, and what the person did wrong."""
+        codes = ", ".join(f"{item.value} {item.words}" for item in Cause)
+        metrics = {"decided_by": Metric(int(cause), "1", f"why it failed, by number: {codes}")}
+        if "HAND" in self.receivers:
+            misses = self._deeds.misses
+            metrics["misses"] = Metric(len(misses), "1", "times the person's hand closed beside the object")
+            if misses:
+                depth, aside = max(abs(m.depth) for m in misses), max(m.aside for m in misses)
+                metrics["miss_depth"] = Metric(depth, "m", "object's end from a hand that missed it, along its sight")
+                metrics["miss_aside"] = Metric(aside, "m", "object's end from a hand that missed it, across its sight")
+        return metrics
 
-    def _failure(self) -> str:
-        """Return why the robot did not finish, or finished otherwise than it should."""
-        transfer, before = self._under_way, self.phases[-2][0] if len(self.phases) > 1 else ""
+    def _success(self) -> str:
+        received = [f"{_PEOPLE[t.receiver]} had the object at {t.done:.1f} s" for t in self.transfers]
+        again = f" after {self._failed} failed reception{'s' * (self._failed > 1)}" if self._failed else ""
+        return " and ".join(received) + again + ", and it was never out of both hands"
+
+    def _failure(self) -> tuple[Cause, str]:
+        """Return why the object was lost, or the robot did not finish, or finished otherwise than it should."""
+        if self._lost is not None:
+            return self._loss(*self._lost)
         if self._phase not in ("DONE", "GIVEN_UP"):
-            return f"stopped at {self._t:.1f} s in phase {self._phase}, before the handover was done; {self._where}"
-        if self._phase == "GIVEN_UP" and before == "CHECK_VELOCITY" and transfer is not None:
-            waited = self.phases[-1][1] - transfer.asked
-            return (
-                f"the robot never felt a {_TOUCH[transfer.receiver]} within {waited:.0f} s of its signal: "
-                f"its gripper's speed stayed below {math.ceil(1000 * transfer.fastest) / 1000:.3f} m/s; {self._where}"
-            )
-        if self._phase == "GIVEN_UP" and before == "CHECK_ANGLE":
-            return f"the robot gave up after {self._failed} failed receptions; {self._where}"
-        if self._phase == "GIVEN_UP" and before == "GRASP_OBJECT":
-            return f"the robot closed its gripper and found nothing in it; {self._where}"
-        if self._phase == "GIVEN_UP" and before == "MOVE_TO_HANDOVER":
+            text = f"stopped at {self._t:.1f} s in phase {self._phase}, before the handover was done; {self._where}"
+            return Cause.OUT_OF_TIME, text
+        if self._phase == "GIVEN_UP":
+            cause, text = self._given_up(self.phases[-2][0] if len(self.phases) > 1 else "")
+            return cause, f"{text}; {self._where}"
+        if self._failed != self._empty:
+            text = f"the robot counted {self._failed} failed receptions where its gripper was empty {self._empty} times"
+            return Cause.OTHER, f"{text}; {self._where}"
+        if self._failed < self.failures:
+            text = f"{self._failed} failed receptions where {self.failures} was staged; {self._where}"
+            return Cause.OTHER, text
+        return Cause.OTHER, f"the robot was done, but the object did not go where it should; {self._where}"
+
+    def _loss(self, t: float, holder: str, phase: str) -> tuple[Cause, str]:
+        """Return why the object was lost at t by a holder in a phase of the robot."""
+        opens = phase in ("RELEASE_OBJECT", "DEACTIVATE_IMPEDANCE", "ACTIVATE_IMPEDANCE", "OPEN_GRIPPER")
+        if holder == "GRIPPER" and opens:
+            return self._deeds.released(t)
+        if holder == "HAND":
+            return self._deeds.dropped(t)
+        before = _PEOPLE.get(holder, "both")
+        return Cause.SLIPPED, f"the object was lost at {t:.1f} s in phase {phase}; {before} had held it"
+
+    def _given_up(self, before: str) -> tuple[Cause, str]:
+        """Return why the robot gave up in a phase."""
+        transfer = self._under_way
+        if before == "CHECK_VELOCITY" and transfer is not None:
+            waited, touch = self.phases[-1][1] - transfer.asked, _TOUCH[transfer.receiver]
+            cause, why = self._deeds.unfelt(touch, transfer.fastest, self._threshold(transfer.receiver))
+            return cause, f"the robot never felt a {touch} within {waited:.0f} s of its signal: {why}"
+        if before == "CHECK_ANGLE":
+            text = f"the robot gave up after {self._failed} failed receptions{self._deeds.receptions()}"
+            return Cause.RECEPTIONS_FAILED, text
+        if before == "GRASP_OBJECT":
+            return Cause.NOT_FETCHED, "the robot closed its gripper and found nothing in it"
+        if before == "MOVE_TO_HANDOVER":
             place = "(" + ", ".join(f"{x:.2f}" for x in self._place) + ")"
             nearest = f"the gripper came no nearer than {self._nearest:.2f} m to its place at {place} m"
-            return f"out of reach, or not at rest in time: {nearest}; {self._where}"
-        if self._phase == "GIVEN_UP":
-            return f"the robot gave up in phase {before}; {self._where}"
-        if self._failed != self.failures:
-            return f"{self._failed} failed receptions where {self.failures} was staged; {self._where}"
-        return f"the robot was done, but the object did not go where it should; {self._where}"
+            return Cause.OUT_OF_REACH, f"out of reach, or not at rest in time: {nearest}"
+        return Cause.OTHER, f"the robot gave up in phase {before}"
+
+    def _threshold(self, receiver: str) -> float:
+        """Return the speed above which the robot feels a receiver's pull or push, as published, m/s."""
+        return float(paper_values("free_flyer", "published")[f"velocity_{receiver.lower()}"][self.parameters.behaviour])
 
     @property
     def _where(self) -> str:

@@ -10,6 +10,12 @@ from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.units import Metre, Newton, NewtonMetre, Number, Second
 from handover.scenarios.experiment.paper import paper_values
 
+_UNSKILLED_ERRORS = 8.0
+"""Errors of sight and timing at skill 0, over those at skill 1 (assumed)."""
+_YIELDING = 1.5
+"""Force at which the person's arm yields, over the strength of a pull (assumed)."""
+_SCALED = ("timing_error", "reaction_time")
+
 
 class _OfUnit(enum.IntEnum):
     """An enumeration whose items have, in texts and in the units, names in lower case."""
@@ -104,6 +110,20 @@ class HandoverParameters(RobotAndModel):
         "file of a recorded track that leads the hand, of `handover flyer-track`; empty: a simulated person. A track "
         "reacts to nothing, neither to the light nor to the robot",
     )
+    skill: Number = parameter(
+        1.0,
+        "the person's skill: 0 sees and times with eight times the errors, and reacts in twice the time",
+        minimum=0.0,
+        maximum=1.0,
+    )
+    sight_error: Metre = parameter(
+        0.002,
+        "error of a skilled person's sight, along each axis across it, standard deviation",
+        minimum=0.0,
+        maximum=0.1,
+    )
+    depth_error: Metre = parameter(0.006, "the same along the line of sight", minimum=0.0, maximum=0.1)
+    interface_delay: Second = parameter(0.05, "how old is what the person sees", minimum=0.0, maximum=2.0)
     propulsion: Propulsion = parameter(Propulsion.LIMITED, "what the thrusters are like")
     delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
     gradual: bool = parameter(False, "whether the fingers follow pull and push, and their grip fades as they open")
@@ -114,6 +134,23 @@ class HandoverParameters(RobotAndModel):
     patience: Second = parameter(
         60.0, "time in any one phase after which the robot gives up", minimum=1.0, maximum=600.0
     )
+
+    @property
+    def traits(self) -> dict[str, float]:
+        """Parameters of the person's unit that follow from strength and skill (assumed)."""
+        worse = _UNSKILLED_ERRORS + (1.0 - _UNSKILLED_ERRORS) * self.skill
+        skilled = {
+            name: float(value) for name, value in paper_values("free_flyer", "person").items() if name in _SCALED
+        }
+        return {
+            "effort": self.strength,
+            "arm_force_max": _YIELDING * self.strength,
+            "sight_error": worse * self.sight_error,
+            "depth_error": worse * self.depth_error,
+            "timing_error": worse * skilled["timing_error"],
+            "reaction_time": (2.0 - self.skill) * skilled["reaction_time"],
+            "interface_delay": self.interface_delay,
+        }
 
 
 class Task(_OfUnit):

@@ -18,7 +18,10 @@ from handover.plants.free_flyer.hand_and_object import (
 
 DT = 0.016
 PLACE = np.array([0.0, -0.07, 0.0])
-CALM = Params(tremor_rms=0.0, drift_rms=0.0, reaction_spread=0.0, p_WO_0=np.zeros(3))
+EXACT: dict[str, Any] = dict.fromkeys(
+    ("sight_error", "depth_error", "interface_delay", "timing_error", "effort_spread", "reaction_spread"), 0.0
+)
+CALM = Params(tremor_rms=0.0, drift_rms=0.0, p_WO_0=np.zeros(3), **EXACT)
 IDLE = replace(CALM, motion=Motion.NONE, motion_again=Motion.NONE)
 GIVING = replace(CALM, motion=Motion.GIVE, object_with=StartHolder.HAND)
 

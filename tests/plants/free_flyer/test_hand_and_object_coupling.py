@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hand_scene import EXACT
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
@@ -23,7 +24,7 @@ from handover.plants.free_flyer.hand_and_object import (
 )
 
 FLYER = FlyerParams()
-STILL = Params(motion=Motion.NONE, tremor_rms=0.0, drift_rms=0.0, p_WO_0=np.zeros(3))
+STILL = Params(motion=Motion.NONE, tremor_rms=0.0, drift_rms=0.0, p_WO_0=np.zeros(3), **EXACT)
 SIDES = np.array([0.021, 0.195, 0.017])
 I_O = 0.1 / 12.0 * np.diag(np.sum(SIDES**2) - SIDES**2)
 KINDS = {"rigid": (7.0 * 9.584, 15.0, 70.0, 5.0), "compliant": (0.7 * 9.584, 5.0, 7.0, 1.0)}

@@ -13,6 +13,7 @@ from handover.cosim.system.signals import Signals
 from handover.plants.free_flyer.hand_and_object import Holder
 from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
 from handover.scenarios.free_flyer.parameters import HandoverParameters
+from handover.scenarios.free_flyer.person_evaluation import Cause
 
 PLACE = np.array([0.0, -0.07, 0.0])
 
@@ -123,7 +124,8 @@ def test_a_pull_that_never_came_is_reported_with_the_greatest_speed():
     outcome = evaluator.outcome()
     assert not outcome.success
     assert "never felt a pull within 61 s" in outcome.reason
-    assert "below 0.013 m/s" in outcome.reason
+    assert "below the threshold: 0.013 of 0.059 m/s" in outcome.reason
+    assert Cause(int(outcome.metrics["decided_by"].value)) is Cause.NOT_FELT
     assert "transfer_time" not in outcome.metrics
 
 
@@ -138,7 +140,7 @@ def test_a_gripper_that_closed_beside_the_object_is_reported():
     assert "found nothing" in evaluator.outcome().reason
 
 
-def received(failed: int) -> HandoverEvaluator:
+def received(failed: int, empty: int = 1) -> HandoverEvaluator:
     evaluator = HandoverEvaluator(HandoverParameters(), ("GRIPPER",), failures=1)
     return follow(
         evaluator,
@@ -146,6 +148,7 @@ def received(failed: int) -> HandoverEvaluator:
         (10.0, signals(Phase.ACTIVATE_IMPEDANCE, Holder.HAND)),
         (11.0, signals(Phase.SIGNAL, Holder.HAND)),
         (12.0, signals(Phase.CHECK_VELOCITY, Holder.HAND)),
+        *[(13.0 + i, signals(p, Holder.HAND)) for i in range(empty) for p in (Phase.CHECK_ANGLE, Phase.OPEN_GRIPPER)],
         (20.0, signals(Phase.CLOSE_GRIPPER, Holder.BOTH, failed=failed)),
         (21.0, signals(Phase.CHECK_ANGLE, Holder.GRIPPER, failed=failed)),
         (25.0, signals(Phase.DONE, Holder.GRIPPER, failed=failed)),
@@ -155,9 +158,17 @@ def received(failed: int) -> HandoverEvaluator:
 
 def test_the_staged_failure_must_have_been_noticed():
     assert received(failed=1).outcome().success
-    outcome = received(failed=0).outcome()
+    assert received(failed=2, empty=2).outcome().success  # the person failed once more
+    outcome = received(failed=0, empty=0).outcome()
     assert not outcome.success
     assert "0 failed receptions where 1 was staged" in outcome.reason
+
+
+@pytest.mark.parametrize(("failed", "empty"), [(2, 1), (1, 2)])
+def test_a_robot_that_takes_a_full_gripper_for_an_empty_one_fails(failed: int, empty: int):
+    outcome = received(failed, empty).outcome()
+    assert not outcome.success
+    assert f"counted {failed} failed receptions where its gripper was empty {empty} times" in outcome.reason
 
 
 def asked_again() -> HandoverEvaluator:
@@ -186,7 +197,7 @@ def test_a_push_in_vain_is_kept_apart_from_the_one_that_counts():
 def test_a_wait_after_a_failed_reception_is_distinguished_from_the_last_signal():
     reason = follow(asked_again(), (92.0, signals(Phase.GIVEN_UP, Holder.HAND, failed=1))).outcome().reason
     assert "never felt a push within 62 s" in reason
-    assert "below 0.004 m/s" in reason
+    assert "below the threshold: 0.004 of 0.021 m/s" in reason
 
 
 def test_a_robot_that_gave_up_on_the_way_to_the_object_is_not_reported_of_the_handover_place():

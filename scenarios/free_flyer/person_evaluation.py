@@ -1,0 +1,220 @@
+"""What the person did wrong in a handover in microgravity, by ground truth, and the causes of failures."""
+
+import enum
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from handover.cosim.blocks.plain_rotation import (
+    add,
+    add_scaled,
+    column,
+    dot,
+    inverse_rotate,
+    norm,
+    quaternion,
+    rotate,
+    rotation_matrix,
+    scale,
+    subtract,
+    vector,
+)
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.system.signals import Signals
+from handover.scenarios.experiment.paper import paper_values
+
+_TOUCH = 0.3
+"""Force on an open hand from which it has bumped the object, N (assumed; its tremor gives less)."""
+_AT_ONCE = 0.1
+"""Time within which an object is free that the hand lets go of, s (assumed; it is one step)."""
+_SHORTLY = 3.0
+"""Time for which a bump may be what the robot felt, s (assumed)."""
+_NEEDED = ("activity", "f_H", "p_WH", "p_WO", "q_WO", "gripper_angle")
+
+
+class Cause(enum.IntEnum):
+    """Why a handover failed, for counting; the reason says it in words."""
+
+    NONE = 0
+    NOT_FETCHED = 1
+    OUT_OF_REACH = 2
+    MISSED_BY_HAND = 3
+    PUSHED_BESIDE = 4
+    NOT_FELT = 5
+    NOT_TRIED = 6
+    BUMPED = 7
+    RELEASED_UNHELD = 8
+    LET_GO_EARLY = 9
+    RECEPTIONS_FAILED = 10
+    SLIPPED = 11
+    DELIVERIES_FAILED = 12
+    OUT_OF_TIME = 13
+    OTHER = 14
+
+    @property
+    def words(self) -> str:
+        """The cause in plain words."""
+        return self.name.lower().replace("_", " ")
+
+
+@dataclass
+class Miss:
+    """A hand that closed beside the object: when, s, and the object's end from it along and across the sight, m."""
+
+    t: float
+    depth: float
+    aside: float
+
+    @property
+    def words(self) -> str:
+        """By how much and in which direction."""
+        along, across = abs(self.depth) >= self.aside, "to the side"
+        short = "short of it" if self.depth > 0.0 else "beyond it"
+        return (
+            f"{1000.0 * abs(self.depth):.0f} mm in depth, {short}"
+            if along
+            else f"{1000.0 * self.aside:.0f} mm {across}"
+        )
+
+
+def _angle_object() -> float:
+    """Return the angle of the gripper closed on the object, rad."""
+    opened, empty = float(_of_person("angle_open")), float(_of_person("angle_empty"))
+    return empty + (opened - empty) * float(_of_person("object_size")[2] / _of_person("aperture"))
+
+
+def _of_person(name: str) -> Floats:
+    return np.array(paper_values("free_flyer", "person")[name], dtype=np.float64)
+
+
+@dataclass
+class PersonsDeeds:
+    """Follows the person through a run; without the outputs that it needs, nothing is known.
+
+    Attributes:
+        misses: times that the hand closed and did not get the object.
+        pulled: whether the person has pulled or pushed since the last signal.
+        resisted: greatest force on the hand in that, N.
+        beside: how far from G, across the fingers, the object was at the last push, m; None before.
+        activity: what the person does.
+        closing: the last hand that closed, and whether it got the object, in `got`.
+        bump: when an open hand last bumped the object, s, and the greatest force of all, N.
+        let_go: when the person last let go, s, and who held the object just before.
+        closed: when the gripper's fingers last closed as far as the object is thick, s.
+        angle: of the gripper, rad.
+    """
+
+    misses: list[Miss] = field(default_factory=list[Miss])
+    pulled: bool = False
+    resisted: float = 0.0
+    beside: float | None = None
+    activity: str = ""
+    closing: Miss | None = None
+    got: bool = False
+    bump: tuple[float, float] | None = None
+    let_go: tuple[float, str] | None = None
+    closed: float | None = None
+    angle: float = math.inf
+
+    def signalled(self) -> None:
+        """Begin to count what the person does anew."""
+        self.pulled, self.resisted = False, 0.0
+
+    def follow(self, t: float, signals: Signals, holder: str, held_before: str) -> None:
+        """Follow the person by the outputs of an instant; `held_before` is who held the object at the last one."""
+        if not all(f"person.{name}" in signals for name in _NEEDED):
+            return
+        activity, before = signals.text("person.activity"), self.activity
+        force = float(np.linalg.norm(signals["person.f_H"]))
+        angle = float(signals["person.gripper_angle"])
+        if angle <= _angle_object() + 1e-6 < self.angle:
+            self.closed = t
+        self.angle = angle
+        if activity in ("PULL", "PUSH"):
+            self.pulled, self.resisted = True, max(self.resisted, force)
+        if activity in ("REACH", "GRASP") and holder == "GRIPPER" and force > _TOUCH:
+            greatest = force if self.bump is None else max(force, self.bump[1])
+            self.bump = (t, greatest)
+        if activity == "PUSH":
+            self.beside = self._aside_of_fingers(signals)
+        self._follow_grasp(t, signals, activity, before, holder)
+        if activity == "LET_GO" != before:
+            self.let_go = (t, held_before)
+        self.activity = activity
+
+    def released(self, t: float) -> tuple[Cause, str]:
+        """Return why a robot let go that nobody had taken the object from, which was lost at t."""
+        opened = f"the robot opened its gripper though the person did not hold the object, which was lost at {t:.1f} s"
+        if self.let_go is not None and self.let_go[1] == "BOTH":
+            return Cause.RELEASED_UNHELD, f"{opened}: the person had let go of it at {self.let_go[0]:.1f} s, unfelt"
+        if self.bump is not None and t - self.bump[0] < _SHORTLY:
+            bumped = f"what it felt was the open hand, which bumped the object with {self.bump[1]:.1f} N"
+            return Cause.BUMPED, f"{opened}: {bumped} at {self.bump[0]:.1f} s"
+        return Cause.RELEASED_UNHELD, f"{opened}: {self._missed() or 'what it felt was no pull'}"
+
+    def dropped(self, t: float) -> tuple[Cause, str]:
+        """Return why the hand lost the object at t, of which the gripper had no hold."""
+        if self.let_go is None or abs(self.let_go[0] - t) > _AT_ONCE:
+            return Cause.SLIPPED, f"the object slipped out of the hand at {t:.1f} s"
+        let_go = f"the person let go of the object at {t:.1f} s"
+        if self.closed is not None and self.closed > t:
+            return Cause.LET_GO_EARLY, f"{let_go}, {self.closed - t:.2f} s before the fingers closed"
+        if self.closed is not None and self.beside is not None:
+            return Cause.PUSHED_BESIDE, f"{let_go}, {1000.0 * self.beside:.0f} mm beside the fingers, which had closed"
+        return Cause.LET_GO_EARLY, f"{let_go}, when the fingers had not closed"
+
+    def unfelt(self, touch: str, fastest: float, threshold: float) -> tuple[Cause, str]:
+        """Return why the robot felt no pull or push: its gripper's highest speed and threshold, m/s."""
+        missed = self._missed()
+        if missed:
+            return Cause.MISSED_BY_HAND, missed
+        if self.activity and not self.pulled:
+            return Cause.NOT_TRIED, f"the person did not {touch}"
+        if self.beside is not None and self.resisted < _TOUCH and touch == "push":
+            return (
+                Cause.PUSHED_BESIDE,
+                f"the push went past the gripper, {1000.0 * self.beside:.0f} mm beside its fingers",
+            )
+        speed = math.ceil(1000.0 * fastest) / 1000.0
+        return Cause.NOT_FELT, f"the {touch} stayed below the threshold: {speed:.3f} of {threshold:.3f} m/s"
+
+    def receptions(self) -> str:
+        """Return what made receptions fail, if it is known."""
+        return "" if self.beside is None else f": the object was {1000.0 * self.beside:.0f} mm beside the fingers"
+
+    def _missed(self) -> str:
+        if not self.misses:
+            return ""
+        last, n = self.misses[-1], len(self.misses)
+        often = f", the last of {n} times" if n > 1 else ""
+        return f"the hand missed the object by {last.words}{often}"
+
+    def _follow_grasp(self, t: float, signals: Signals, activity: str, before: str, holder: str) -> None:
+        """Note a hand that closes, and, when its pull is over, whether it had got the object."""
+        if activity == "PULL" != before:
+            depth, aside = self._from_end(signals)
+            self.closing, self.got = Miss(t, depth, aside), False
+        if activity == "PULL":
+            self.got = self.got or holder in ("HAND", "BOTH")
+        elif before == "PULL" and self.closing is not None and not self.got:
+            self.misses.append(self.closing)
+
+    def _from_end(self, signals: Signals) -> tuple[float, float]:
+        """Return how far the object's end is from the hand along and across the line of sight, m."""
+        R_WO = rotation_matrix(quaternion(signals["person.q_WO"]))
+        end = rotate(R_WO, vector(_of_person("p_OH")))
+        apart = subtract(add(vector(signals["person.p_WO"]), end), vector(signals["person.p_WH"]))
+        sight = vector(_of_person("line_of_sight"))
+        depth = dot(apart, sight)
+        return depth, norm(add_scaled(apart, -depth, sight))
+
+    def _aside_of_fingers(self, signals: Signals) -> float:
+        """Return how far G is from the object's centre line, across the axis x of the gripper, m."""
+        axis = column(rotation_matrix(quaternion(signals["person.q_WO"])), 1)
+        half = 0.5 * float(_of_person("object_size")[1])
+        apart = subtract(vector(signals["robot.p_WG"]), vector(signals["person.p_WO"]))
+        along = min(max(dot(apart, axis), -half), half)
+        R_WG = rotation_matrix(quaternion(signals["robot.q_WG"]))
+        _, y, z = inverse_rotate(R_WG, subtract(scale(along, axis), apart))
+        return math.hypot(y, z)

@@ -1,0 +1,142 @@
+"""What goes wrong by a person's errors of sight and timing, and that it does by where things are."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hand_scene import CALM, DT, GIVING, Scene
+
+from handover.plants.free_flyer.hand_and_object import Activity, HandAndObject, Holder, Motion, Params
+from handover.plants.free_flyer.sight import Sight
+
+END = np.array([0.0, 0.07, 0.0])
+STRONG: dict[str, Any] = {"effort": 4.0, "arm_force_max": 6.0}
+
+
+def reaching(**changes: Any) -> Scene:
+    """Return a scene in which the gripper holds the object and the person has been called."""
+    scene = Scene(replace(CALM, motion_again=Motion.NONE, **(STRONG | changes)))
+    scene.go(2.0, closure=1.0)
+    scene.until(Activity.REACH, light=True)
+    return scene
+
+
+def test_errors_of_sight_have_their_deviations_along_and_across_the_line_of_sight():
+    line = np.array([0.6, 0.0, 0.8])
+    sight = Sight(Params(line_of_sight=2.0 * line, sight_error=0.002, depth_error=0.02, timing_error=0.1))
+    errors: list[tuple[float, ...]] = []
+    leads: list[float] = []
+    for _ in range(4000):
+        sight.begin_attempt()
+        errors.append(sight.error)
+        leads.append(sight.lead)
+    depth = np.array(errors) @ line
+    aside = np.array(errors) - np.outer(depth, line)
+    assert np.std(depth) == pytest.approx(0.02, rel=0.05)
+    assert np.sqrt(np.mean(np.sum(aside**2, axis=1, dtype=np.float64)) / 2.0) == pytest.approx(0.002, rel=0.05)
+    assert np.sqrt(np.mean(np.square(leads))) == pytest.approx(0.1, rel=0.05)
+    assert min(leads) >= 0.0
+
+
+def test_fingers_get_the_object_where_they_close_near_enough_and_nowhere_else():
+    got: dict[bool, int] = {True: 0, False: 0}
+    for seed in range(16):
+        scene = reaching(depth_error=0.05, sight_error=0.01, seed=seed, attempts=1)
+        closing = scene.until(Activity.PULL)
+        x, _, z = closing.p_WH - closing.p_WO - END
+        held = scene.go(0.1).holder is Holder.BOTH
+        assert held is (math.hypot(x, z) <= 0.04)
+        got[held] += 1
+    assert min(got.values()) >= 3
+
+
+def test_a_hand_that_reaches_too_far_bumps_the_object_and_one_that_stops_short_does_not():
+    bumps = 0
+    for seed in range(12):
+        scene = reaching(depth_error=0.03, seed=seed, attempts=1)
+        begin = len(scene.seen)
+        scene.until(Activity.PULL)
+        x = [float((y.p_WH - y.p_WO)[0]) for y in scene.seen[begin:]]
+        pushed = max(float(y.f_G[0]) for y in scene.seen[begin:])
+        felt = -min(float(y.f_H[0]) for y in scene.seen[begin:])
+        assert (pushed > 0.3) is (felt > 0.3)
+        if pushed > 0.3:
+            bumps += 1
+        assert max(x) < 0.03  # the palm does not go through the object
+    assert 2 <= bumps <= 10
+
+
+def test_a_hand_that_got_nothing_is_noticed_by_sight_and_tries_again_with_other_errors():
+    scene = reaching(depth_error=0.4, arm_reach=3.0, seed=2, interface_delay=0.1)
+    scene.until(Activity.REST)
+    activities = scene.activities()
+    assert activities.count(Activity.REACH) == 3
+    assert scene.y.holder is Holder.GRIPPER
+    pulls = [i for i, y in enumerate(scene.seen) if y.activity is Activity.PULL]
+    first = [i for i in pulls if i < pulls[0] + 200][: pulls.index(pulls[0]) + 1]
+    end = next(i for i in range(first[0], len(scene.seen)) if scene.seen[i].activity is not Activity.PULL)
+    assert (end - first[0]) * DT >= 0.35 - DT  # no sooner than a reaction
+    places = {round(float(scene.seen[i].p_WH[0]), 3) for i in pulls if scene.seen[i - 1].activity is Activity.GRASP}
+    assert len(places) == 3
+
+
+def test_what_is_seen_is_as_old_as_the_interface_makes_it():
+    def begun(delay: float) -> float:
+        scene = Scene(replace(CALM, interface_delay=delay))
+        scene.go(1.6)
+        begin = scene.i
+        scene.until(Activity.REACH, light=True)
+        return (scene.i - begin) * DT
+
+    assert begun(0.16) - begun(0.0) == pytest.approx(0.16, abs=1e-9)
+
+
+def test_who_lets_go_before_the_fingers_have_closed_lets_the_object_float():
+    early = late = 0
+    for seed in range(12):
+        scene = Scene(replace(GIVING, timing_error=0.5, reaction_time=0.1, seed=seed, **STRONG))
+        scene.until(Activity.PUSH, light=True)
+        scene.go(0.5)
+        scene.until(Activity.LET_GO, closure=1.0)
+        if scene.y.gripper_angle > 0.79:
+            early += 1
+            assert scene.y.holder is Holder.FREE
+        else:
+            late += 1
+            assert scene.y.holder is Holder.GRIPPER
+    assert min(early, late) >= 2
+
+
+def test_who_pulls_before_the_fingers_hold_leaves_the_object_behind():
+    scene = reaching(timing_error=0.0)
+    assert scene.until(Activity.WITHDRAW, closure=0.0).holder is Holder.HAND
+    hasty = reaching(timing_error=5.0, seed=1, attempts=1, pull_ramp=0.01)
+    assert hasty.until(Activity.PULL).finger.max() < 1.4 * 0.1
+    assert hasty.go(2.0).holder is Holder.GRIPPER
+
+
+def test_a_push_that_meets_nothing_is_tried_again_and_the_object_kept():
+    scene = Scene(replace(GIVING, motion_again=Motion.NONE, sight_error=0.5, seed=3, arm_reach=5.0, **STRONG))
+    scene.until(Activity.REST, light=True)
+    assert scene.activities().count(Activity.OFFER) == 3
+    assert {y.holder for y in scene.seen} == {Holder.HAND}
+
+
+@pytest.mark.parametrize("moment", [2.5, 3.6, 4.4, 5.2])
+def test_a_person_with_errors_continues_from_a_restored_state_bit_for_bit(moment: float):
+    params = replace(
+        CALM, depth_error=0.2, sight_error=0.02, interface_delay=0.1, timing_error=0.1, effort_spread=0.1, arm_reach=3.0
+    )
+    scene = Scene(replace(params, seed=4, tremor_rms=0.001, drift_rms=0.002))
+    scene.go(2.0, closure=1.0)
+    scene.go(moment - 2.0, light=True)
+    other = HandAndObject(replace(params, seed=4, tremor_rms=0.001, drift_rms=0.002))
+    other.set_state(scene.unit.get_state())
+    assert other.get_state() == scene.unit.get_state()
+    for i in range(200):
+        a, b = (unit.step(i * DT, DT, scene.u) for unit in (scene.unit, other))
+        np.testing.assert_array_equal(np.concatenate([a.p_WH, a.p_WO, a.f_G]), np.concatenate([b.p_WH, b.p_WO, b.f_G]))
+        assert a.activity is b.activity
+    assert scene.unit.get_state() == other.get_state()
