@@ -30,6 +30,7 @@ from handover.scenarios.published.free_flyer.handover_runs import (
     RECEIVING,
     STRENGTHS,
     TASKS,
+    THRUSTS,
     UNGATED,
     USUAL,
     Exchange,
@@ -60,9 +61,9 @@ class FlyerHandoverTable(PublishedExperiment):
     def plan(self, quick: bool) -> CampaignPlan:
         """Return tasks x behaviours x propulsion, and what is beyond the thesis; if quick, the first alone."""
         limited, gives, receives = Propulsion.LIMITED, GIVING.task, RECEIVING.task
-        points = [point_of(t, b, p) for t in Task for b in Behaviour for p in Propulsion]
+        points = [point_of(t, b, p) for t in Task for b in Behaviour for p in THRUSTS]
         if not quick:
-            points += [point_of(gives, b, p, v) for v in STRENGTHS for p in Propulsion for b in Behaviour]
+            points += [point_of(gives, b, p, v) for v in STRENGTHS for p in THRUSTS for b in Behaviour]
             points += [point_of(gives, b, limited, v) for v in (*ARMS, *PLACES) for b in Behaviour]
             others = (*UNGATED, *RATES)
             points += [point_of(t, b, limited, v) for t in (gives, receives) for v in others for b in Behaviour]
@@ -97,7 +98,7 @@ def _transfers(runs: HandoverRuns) -> ComparisonTable:
     rows: list[list[str]] = []
     for exchange in EXCHANGES:
         for behaviour in Behaviour:
-            for propulsion in Propulsion:
+            for propulsion in THRUSTS:
                 found = runs.of(exchange.task, behaviour, propulsion)
                 if found:
                     like = figure_number(exchange, behaviour)
@@ -139,7 +140,7 @@ def _margins(runs: HandoverRuns) -> ComparisonTable:
     rows: list[list[str]] = []
     for exchange in EXCHANGES:
         for behaviour in Behaviour:
-            for propulsion in Propulsion:
+            for propulsion in THRUSTS:
                 found = runs.of(exchange.task, behaviour, propulsion)
                 if not found:
                     continue
@@ -184,7 +185,7 @@ def _varied(runs: HandoverRuns) -> ComparisonTable:
     rows: list[list[str]] = []
     usual = Variation("as usual, 4 N")
     for variation in (usual, *STRENGTHS, *ARMS, *PLACES):
-        for propulsion in Propulsion:
+        for propulsion in THRUSTS:
             found = [runs.of(GIVING.task, b, propulsion, variation) for b in Behaviour]
             if not all(found):
                 continue

@@ -14,6 +14,7 @@ from handover.scenarios.published.free_flyer.handover_runs import (
     RATES,
     RECEIVING,
     STRENGTHS,
+    THRUSTS,
     UNGATED,
     USUAL,
     Exchange,
@@ -84,7 +85,7 @@ def _threshold(runs: HandoverRuns, exchange: Exchange, behaviour: Behaviour) -> 
         "where": "sec. 4.1.2",
     }
     same = [e for e in EXCHANGES if e.gives is exchange.gives]
-    found = [(e, runs.of(e.task, behaviour, p)) for e in same for p in Propulsion]
+    found = [(e, runs.of(e.task, behaviour, p)) for e in same for p in THRUSTS]
     rows = [row for _, rows_of in found for row in rows_of]
     if not rows:
         return nothing_measured(**facts)
@@ -156,7 +157,7 @@ def _by_force(runs: HandoverRuns, felt: bool = True) -> list[tuple[str, list[flo
     """
     found: list[tuple[str, list[float]]] = []
     for variation in (USUAL, *STRENGTHS):
-        for propulsion in Propulsion:
+        for propulsion in THRUSTS:
             away = _medians(runs, GIVING, "displacement_z", propulsion, variation=variation)
             rows = [row for b in Behaviour for row in runs.of(GIVING.task, b, propulsion, variation)]
             if away and (len(GIVING.of(rows, "speed")) == len(rows)) is felt:
@@ -178,7 +179,7 @@ def _ten_times(runs: HandoverRuns) -> Claim:
         "published": "10 times, and 3.5 times by its own figures",
         "where": "sec. 4.3.1, discussion",
     }
-    found = {p: _medians(runs, GIVING, "displacement_z", p) for p in Propulsion}
+    found = {p: _medians(runs, GIVING, "displacement_z", p) for p in THRUSTS}
     ratios = {p: away[1] / away[0] for p, away in found.items() if away}
     if not ratios:
         return nothing_measured(**facts)
@@ -204,7 +205,7 @@ def _twice(runs: HandoverRuns) -> Claim:
         "published": f"{published:g} times",
         "where": "sec. 4.3.2, figs. 4.33, 4.35",
     }
-    found = {p: _medians(runs, RECEIVING, "displacement_x", p) for p in Propulsion}
+    found = {p: _medians(runs, RECEIVING, "displacement_x", p) for p in THRUSTS}
     ratios = {p: away[1] / away[0] for p, away in found.items() if away}
     if Propulsion.IDEAL not in ratios:
         return nothing_measured(**facts)
@@ -259,7 +260,7 @@ def _limits_hide(runs: HandoverRuns) -> Claim:
         "published": "",
         "beyond": True,
     }
-    found = {p: _medians(runs, GIVING, "displacement_z", p) for p in Propulsion}
+    found = {p: _medians(runs, GIVING, "displacement_z", p) for p in THRUSTS}
     if not all(found.values()):
         return nothing_measured(**facts)
     ratios = {p: away[1] / away[0] for p, away in found.items()}

@@ -21,6 +21,7 @@ from handover.scenarios.published.free_flyer.handover_runs import (
     GIVING,
     STRENGTHS,
     TASKS,
+    THRUSTS,
     USUAL,
     Exchange,
     HandoverRuns,
@@ -144,7 +145,7 @@ def draw_strengths(rows: HandoverRuns, folder: Path) -> list[Figure]:
     variations = sorted(
         [(usual, USUAL), *((float(v.parameters["strength"]), v) for v in STRENGTHS)], key=lambda pair: pair[0]
     )
-    found = {(p, b): _by_force(rows, variations, p, b) for p in Propulsion for b in Behaviour}
+    found = {(p, b): _by_force(rows, variations, p, b) for p in THRUSTS for b in Behaviour}
     if any(len(points) < 3 for points in found.values()):
         return []
     published = [1e3 * float(x) for x in paper_values("free_flyer", "published")["transfer_displacement_z"]]

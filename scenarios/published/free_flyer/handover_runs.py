@@ -21,6 +21,9 @@ TASKS = {
 }
 """The four handovers in words."""
 
+THRUSTS = (Propulsion.IDEAL, Propulsion.LIMITED)
+"""The thesis's pushes need the first; Astrobee's limits of each axis are the second."""
+
 _RATE = "handover.controllers.free_flyer.published_rate"
 AT_PUBLISHED_RATE = {
     "decision": f"{_RATE}:HandoverStateMachine67",
@@ -151,7 +154,7 @@ class HandoverRuns:
     def usual(self, task: Task | None = None) -> list[Mapping[str, Any]]:
         """Return the runs of a task, or of all, with the scenario's own values, whatever behaviour and propulsion."""
         tasks = Task if task is None else (task,)
-        return [row for t in tasks for b in Behaviour for p in Propulsion for row in self.of(t, b, p)]
+        return [row for t in tasks for b in Behaviour for p in THRUSTS for row in self.of(t, b, p)]
 
 
 def is_of(row: Mapping[str, Any], variation: Variation, names: Sequence[str]) -> bool:
