@@ -30,6 +30,8 @@ DISTURBANCES = (
 )
 """One at a time; the controllers know the delay, and not the mass."""
 _VARIED = tuple(dict.fromkeys(name for v in DISTURBANCES for name in v.parameters))
+PROPULSIONS = (Propulsion.IDEAL, Propulsion.LIMITED)
+"""Without and with limits of each axis."""
 _DEFAULT = TaskParameters()
 _SIMILAR = 0.2
 """Part of a displacement by which two controllers' may differ and count as like, where thrust has limits."""
@@ -64,7 +66,7 @@ class FlyerControllers(PublishedExperiment):
         """Return controllers x behaviours x tasks x propulsions, and the disturbances."""
         ways = [(c, b) for c in CONTROLLERS for b in Behaviour]
         given = Task.ROBOT_TO_HUMAN
-        cases = [(t, p, USUAL) for t in Task for p in Propulsion] + [
+        cases = [(t, p, USUAL) for t in Task for p in PROPULSIONS] + [
             (given, Propulsion.LIMITED, disturbance) for disturbance in DISTURBANCES
         ]
         if quick:
@@ -83,12 +85,12 @@ class FlyerControllers(PublishedExperiment):
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
         """Judge, all beyond the thesis: that each controller hands over, and whether the person can tell them apart."""
         rows = ControllerRows(table)
-        return [*[_hands_over(rows, c) for c in CONTROLLERS], *[_alike(rows, p) for p in Propulsion], _late(rows)]
+        return [*[_hands_over(rows, c) for c in CONTROLLERS], *[_alike(rows, p) for p in PROPULSIONS], _late(rows)]
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return all cases, and the disturbances."""
         rows = ControllerRows(table)
-        tables = [_table(f"With {p.item} thrust", rows, [(t, p, USUAL) for t in Task]) for p in Propulsion]
+        tables = [_table(f"With {p.item} thrust", rows, [(t, p, USUAL) for t in Task]) for p in PROPULSIONS]
         disturbed = [(Task.ROBOT_TO_HUMAN, Propulsion.LIMITED, what) for what in DISTURBANCES]
         return [t for t in (*tables, _table("Robot to human, disturbed", rows, disturbed)) if t.rows]
 
@@ -141,7 +143,7 @@ def _is(name: str, value: Any, wanted: str | None) -> bool:
 
 
 def _hands_over(rows: ControllerRows, controller: str) -> Claim:
-    found = [row for t in Task for b in Behaviour for p in Propulsion for row in rows.of(controller, t, b, p)]
+    found = [row for t in Task for b in Behaviour for p in PROPULSIONS for row in rows.of(controller, t, b, p)]
     claim = f"With the {CONTROLLERS[controller]} control every handover succeeds"
     return every_claim(claim, "", (0, 0), (succeeded(found), len(found)))
 

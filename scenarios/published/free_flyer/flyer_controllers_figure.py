@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure
 from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task
-from handover.scenarios.published.free_flyer.flyer_controllers import CONTROLLERS, ControllerRows
+from handover.scenarios.published.free_flyer.flyer_controllers import CONTROLLERS, PROPULSIONS, ControllerRows
 
 _TASKS = {Task.ROBOT_TO_HUMAN: "robot to human", Task.HUMAN_TO_ROBOT: "human to robot"}
 _SHOWN = (("displacement", "displacement (mm)", 1e3), ("force", "force on the hand (N)", 1.0))
@@ -19,7 +19,7 @@ def draw_controllers(rows: ControllerRows, folder: Path) -> list[Figure]:
         return []
     with figure(folder / "controllers", 2, 2, size=(9.0, 5.6)) as panels:
         for k, (metric, label, scale) in enumerate(_SHOWN):
-            for axis, propulsion in zip(panels[2 * k : 2 * k + 2], Propulsion, strict=True):
+            for axis, propulsion in zip(panels[2 * k : 2 * k + 2], PROPULSIONS, strict=True):
                 _draw_panel(axis, rows, propulsion, f"transfer_{metric}", scale)
                 axis.set(ylabel=label, ylim=(0.0, None), title=f"{propulsion.item} thrust" if k == 0 else "")
         panels[0].legend(loc="upper left", fontsize=8)

@@ -12,6 +12,7 @@ from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task
 from handover.scenarios.published.free_flyer.flyer_controllers import (
     CONTROLLERS,
     DISTURBANCES,
+    PROPULSIONS,
     ControllerRows,
     FlyerControllers,
 )
@@ -49,7 +50,7 @@ def verdicts(table: CampaignTable) -> dict[str, Claim]:
 
 def test_the_plan_has_every_controller_in_every_handover_and_under_every_disturbance():
     plan = FlyerControllers().plan(quick=False)
-    assert checked_plan(plan).size == 2 * 6 * (len(Task) * len(Propulsion) + len(DISTURBANCES))
+    assert checked_plan(plan).size == 2 * 6 * (len(Task) * len(PROPULSIONS) + len(DISTURBANCES))
     assert FlyerControllers().plan(quick=True).size == 6
 
 
