@@ -37,7 +37,7 @@ class Signals:
         self._owner = owner  # keeps the memory alive to which the addresses of pictures and strings point
         self._views = {f"{unit}.{port}": views for unit, ys in outputs.items() for port, views in ys.items()}
         self._ports = {f"{unit}.{name}": p for unit, ps in ports.items() for name, p in ps.items()}
-        self._numbers = {
+        self._numbers: dict[str, NDArray[Any]] = {
             name: self._views[name][0].reshape(port.shape)  # a view, too
             for name, port in self._ports.items()
             if port.kind not in (Kind.BINARY, Kind.STRING)
@@ -58,7 +58,7 @@ class Signals:
         """
         number = self._numbers.get(name)
         if number is not None:
-            return number.copy()
+            return np.array(number)
         views, port = self._of(name)
         if port.kind is Kind.STRING:
             texts: Any = np.array([_text(int(a)) for a in views[0]]).reshape(port.shape)

@@ -72,15 +72,15 @@ class Sight:
         """Return what is seen at the beginning of a step dt of what is there then."""
         if self._p.interface_delay == 0.0:
             return there
-        G, O = there.G, there.O
-        self._past.append((self._clock, there.light, there.angle, G.p, G.q, O.p, O.q, there.gripped, there.held))
+        poses = (there.G.p, there.G.q, there.O.p, there.O.q)
+        self._past.append((self._clock, there.light, there.angle, *poses, there.gripped, there.held))
         due = self._clock - self._p.interface_delay + _ROUNDING
         self._clock += dt
         while len(self._past) > 1 and self._past[1][0] <= due:
             del self._past[0]
         _, light, angle, p_WG, q_WG, p_WO, q_WO, gripped, held = self._past[0]
-        G, O = Frame(p_WG, q_WG), Frame(p_WO, q_WO)
-        return replace(there, light=light, angle=angle, G=G, O=O, gripped=gripped, held=held)
+        poses = {"G": Frame(p_WG, q_WG), "O": Frame(p_WO, q_WO)}
+        return replace(there, **poses, light=light, angle=angle, gripped=gripped, held=held)
 
     def get_state(self) -> tuple[object, ...]:
         """Return what was there and is not yet seen, and the attempt's errors."""

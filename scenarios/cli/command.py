@@ -127,7 +127,7 @@ COMMANDS = (
     DeferredCommand(
         "flyer-track",
         "handover.scenarios.cli.flyer_track:flyer_track",
-        short_help="Write the hand's track of a free-flyer's run, by which other runs are led.",
+        help="Write the track of the hand in a handover of the free-flyer, of the run in DIR.",
     ),
     DeferredCommand(
         "info", "handover.scenarios.cli.info:info", short_help="Tell what is in an FMU or an SSP, from any tool."

@@ -250,7 +250,9 @@ class HandoverEvaluator(Evaluator):
             and self._failed == self._empty >= self.failures
         )
         cause, reason = (Cause.NONE, self._success()) if success else self._failure()
-        return Outcome(success=success, reason=reason + self.parameters.stuck, metrics=self._metrics() | self._causes(cause))
+        return Outcome(
+            success=success, reason=reason + self.parameters.stuck, metrics=self._metrics() | self._causes(cause)
+        )
 
     def _metrics(self) -> dict[str, Metric]:
         metrics: dict[str, Metric] = {}

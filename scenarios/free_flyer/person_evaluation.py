@@ -3,6 +3,7 @@
 import enum
 import math
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
@@ -78,10 +79,16 @@ class Miss:
         )
 
 
+@cache
 def _angle_object() -> float:
     """Return the angle of the gripper closed on the object, rad."""
     opened, empty = float(_of_person("angle_open")), float(_of_person("angle_empty"))
     return empty + (opened - empty) * float(_of_person("object_size")[2] / _of_person("aperture"))
+
+
+def _force(signals: Signals) -> float:
+    """Return the force on the hand, N."""
+    return math.hypot(*signals["person.f_H"].tolist())
 
 
 def _of_person(name: str) -> Floats:
@@ -97,7 +104,9 @@ class PersonsDeeds:
         pulled: whether the person has pulled or pushed since the last signal.
         resisted: greatest force on the hand in that, N.
         beside: how far from G, across the fingers, the object was at the last push, m; None before.
+        known: whether the outputs that it needs are there; None before the first instant.
         activity: what the person does.
+        code: the same as a number.
         closing: the last hand that closed, and whether it got the object, in `got`.
         bump: when an open hand last bumped the object, s, and the greatest force of all, N.
         let_go: when the person last let go, s, and who held the object just before.
@@ -109,7 +118,9 @@ class PersonsDeeds:
     pulled: bool = False
     resisted: float = 0.0
     beside: float | None = None
+    known: bool | None = None
     activity: str = ""
+    code: int = -1
     closing: Miss | None = None
     got: bool = False
     bump: tuple[float, float] | None = None
@@ -123,17 +134,19 @@ class PersonsDeeds:
 
     def follow(self, t: float, signals: Signals, holder: str, held_before: str) -> None:
         """Follow the person by the outputs of an instant; `held_before` is who held the object at the last one."""
-        if not all(f"person.{name}" in signals for name in _NEEDED):
+        if self.known is None:
+            self.known = all(f"person.{name}" in signals for name in _NEEDED)
+        if not self.known:
             return
-        activity, before = signals.text("person.activity"), self.activity
-        force = float(np.linalg.norm(signals["person.f_H"]))
-        angle = float(signals["person.gripper_angle"])
+        code, before = int(signals["person.activity"]), self.activity
+        activity = before if code == self.code else signals.text("person.activity")
+        self.code, angle = code, float(signals["person.gripper_angle"])
         if angle <= _angle_object() + 1e-6 < self.angle:
             self.closed = t
         self.angle = angle
         if activity in ("PULL", "PUSH"):
-            self.pulled, self.resisted = True, max(self.resisted, force)
-        if activity in ("REACH", "GRASP") and holder == "GRIPPER" and force > _TOUCH:
+            self.pulled, self.resisted = True, max(self.resisted, _force(signals))
+        elif activity in ("REACH", "GRASP") and holder == "GRIPPER" and (force := _force(signals)) > _TOUCH:
             greatest = force if self.bump is None else max(force, self.bump[1])
             self.bump = (t, greatest)
         if activity == "PUSH":

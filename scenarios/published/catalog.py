@@ -7,6 +7,7 @@ from handover.scenarios.published.free_flyer.flyer_controllers import FlyerContr
 from handover.scenarios.published.free_flyer.flyer_handover import FlyerHandoverTable
 from handover.scenarios.published.free_flyer.flyer_impedance import FlyerImpedanceTable
 from handover.scenarios.published.free_flyer.flyer_stability import FlyerStability
+from handover.scenarios.published.free_flyer.flyer_study import FlyerStudy
 from handover.scenarios.published.helix.helix_1 import Helix1
 from handover.scenarios.published.helix.helix_2 import Helix2
 from handover.scenarios.published.helix.helix_3 import Helix3
@@ -23,6 +24,7 @@ _ALL: tuple[type[PublishedExperiment], ...] = (
     FlyerHandoverTable,
     FlyerImpedanceTable,
     FlyerStability,
+    FlyerStudy,
     Helix1,
     Helix2,
     Helix3,

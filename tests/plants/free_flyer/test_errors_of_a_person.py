@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hand_scene import CALM, DT, GIVING, Scene
 
+from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand_and_object import Activity, HandAndObject, Holder, Motion, Params
 from handover.plants.free_flyer.sight import Sight
 
@@ -32,10 +33,10 @@ def test_errors_of_sight_have_their_deviations_along_and_across_the_line_of_sigh
         sight.begin_attempt()
         errors.append(sight.error)
         leads.append(sight.lead)
-    depth = np.array(errors) @ line
-    aside = np.array(errors) - np.outer(depth, line)
-    assert np.std(depth) == pytest.approx(0.02, rel=0.05)
-    assert np.sqrt(np.mean(np.sum(aside**2, axis=1, dtype=np.float64)) / 2.0) == pytest.approx(0.002, rel=0.05)
+    depth: Floats = np.array(errors) @ line
+    aside: Floats = np.array(errors) - depth[:, np.newaxis] * line
+    assert math.sqrt(float(np.var(depth))) == pytest.approx(0.02, rel=0.05)
+    assert math.hypot(*aside.ravel().tolist()) / math.sqrt(2.0 * len(aside)) == pytest.approx(0.002, rel=0.05)
     assert np.sqrt(np.mean(np.square(leads))) == pytest.approx(0.1, rel=0.05)
     assert min(leads) >= 0.0
 

@@ -82,7 +82,7 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
     ("arguments", "sentence"),
     [
         (("run", "helix_hand"), "did you mean helix_handover or helix_reach"),
-        (("list", "nothing_like_it"), "valid: FreeFlyer, "),
+        (("list", "nothing_like_it"), "valid: AdmittanceController, "),
         (("run", "helix_handover", "-p", "alfa=0.2"), "did you mean alpha"),
         (("run", "helix_handover", "-p", "alpha=7"), "from 0.01 to 1"),
         (("run", "helix_handover", "-p", "alpha=quick"), "not a number"),

@@ -89,7 +89,7 @@ def test_list_as_data():
     assert (strategy["start"], strategy["items"]) == ("REFLEX", ["REFLEX", "BLIND", "FORWARD"])
     unit = data_of("list", "Thrusters")
     assert unit["step"] == 0.016
-    assert [p["name"] for p in unit["outputs"]] == ["f_B", "tau_B", "saturated"]
+    assert [p["name"] for p in unit["outputs"]] == ["f_B", "tau_B", "saturated", "flapper_angles", "impeller_speeds"]
 
 
 @pytest.mark.parametrize("as_json", [(), ("--json",)])

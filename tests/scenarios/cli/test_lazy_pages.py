@@ -75,7 +75,7 @@ def test_scenarios_have_the_names_and_titles_by_which_they_are_listed():
     assert "nothing" not in SCENARIOS
 
 
-ALTERNATIVES = {"TendonArmFast"}  # for --unit
+ALTERNATIVES = {"AdmittanceController", "TendonArmFast"}  # for --unit
 
 
 def test_the_units_of_a_robot_are_those_of_its_scenarios():

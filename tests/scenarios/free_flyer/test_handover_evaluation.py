@@ -36,7 +36,12 @@ def signals(
         "impedance": loop,
         "pose": loop,
         "decision": {"phase": [int(phase)], "speed_G": [speed], "failed_receptions": [failed]},
-        "person": {"holder": [int(holder)], "f_G": np.array([force, 0.0, 0.0]), "gripper_angle": [angle]},
+        "person": {
+            "holder": [int(holder)],
+            "f_G": np.array([force, 0.0, 0.0]),
+            "f_H": np.array([-force, 0.0, 0.0]),
+            "gripper_angle": [angle],
+        },
     }
     items = {"phase": Phase, "holder": Holder}
     units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
@@ -50,7 +55,7 @@ def signals(
                 causality=Causality.OUTPUT,
                 fmi_type="",
                 references=(),
-                shape=(3,) if name in ("p_WG", "f_G") else (),
+                shape=(3,) if name in ("p_WG", "f_G", "f_H") else (),
                 items=tuple((i.name, int(i)) for i in items[name]) if name in items else (),
             )
             for name in ys
