@@ -54,7 +54,7 @@ def test_both_behaviours_share_the_seeds_of_a_participants_trials_and_nobody_els
         who = tuple(run.parameters.get(name, "") for name in ("task", *NAMES))
         seeds.setdefault((run.parameters["behaviour"], *who), []).append(run.seed)
     rigid = {who[1:]: found for who, found in seeds.items() if who[0] == "rigid"}
-    assert all(seeds["compliant", *who] == found for who, found in rigid.items())
+    assert all(seeds[("compliant", *who)] == found for who, found in rigid.items())
     assert len({seed for found in rigid.values() for seed in found}) == 3 * 15 * 20
 
 
@@ -73,7 +73,7 @@ def test_failures_that_grow_with_less_skill_are_noticed():
 
 
 def test_failures_that_do_not_are_noticed_too():
-    claims = verdicts(table_of(lambda given, k: k == 7))
+    claims = verdicts(table_of(lambda _, k: k == 7))
     grow = [c for name, c in claims.items() if name.startswith("Failures grow")]
     assert [c.verdict for c in grow] == [Verdict.NOT_REPRODUCED] * 3
     assert claims["The rigid robot succeeds more often (H2): collaborative"].verdict is Verdict.NOT_REPRODUCED
@@ -82,7 +82,7 @@ def test_failures_that_do_not_are_noticed_too():
 
 
 def test_rates_far_from_the_published_are_not_reproduced():
-    claims = verdicts(table_of(lambda given, k: True))
+    claims = verdicts(table_of(lambda *_: True))
     rates = [c for name, c in claims.items() if name.startswith("Handovers that succeed")]
     assert [c.verdict for c in rates] == [Verdict.NOT_REPRODUCED] * 6
 
