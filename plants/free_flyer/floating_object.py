@@ -1,5 +1,6 @@
 """A light object that floats freely or is held by stiff springs, stable at steps as long as a control period."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -31,6 +32,8 @@ Wrench = tuple[Vector, Vector]
 Held = Sequence[tuple[Attachment, Frame]]
 Scales = list[tuple[float, float]]
 
+_TURN = 0.5
+"""Radians by which a free object turns at most in a part of a step: a rod that is hit at its edge may spin fast."""
 _MAX_TIGHTENINGS = 4
 _TOLERANCE = 0.01
 """Relative; an attachment slides when its limit is exceeded by more."""
@@ -72,7 +75,9 @@ class FloatingObject:
         """
         body = self.body
         if not held and not palms:
-            body.advance(h, ZERO, ZERO, ZERO, ZERO)
+            parts = max(1, math.ceil(norm(body.spin) * h / (min(self._moments) * _TURN)))
+            for _ in range(parts):
+                body.advance(h / parts, ZERO, ZERO, ZERO, ZERO)
             return [], []
         R = rotation_matrix(body.q)
         loads = [a.load(F, body.p, body.q, R) for a, F in held]

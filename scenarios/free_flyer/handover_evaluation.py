@@ -317,9 +317,11 @@ class HandoverEvaluator(Evaluator):
         if self._phase == "GIVEN_UP":
             cause, text = self._given_up(self.phases[-2][0] if len(self.phases) > 1 else "")
             return cause, f"{text}; {self._where}"
-        if self._failed != self._empty:
-            text = f"the robot counted {self._failed} failed receptions where its gripper was empty {self._empty} times"
-            return Cause.OTHER, f"{text}; {self._where}"
+        if self._failed < self._empty:
+            text = "the robot took its gripper for full, by its angle, from which the object had slipped"
+            return Cause.SLIPPED, f"{text}; {self._where}"
+        if self._failed > self._empty:
+            return Cause.OTHER, f"the robot took its gripper for empty, which held the object; {self._where}"
         if self._failed < self.failures:
             text = f"{self._failed} failed receptions where {self.failures} was staged; {self._where}"
             return Cause.OTHER, text

@@ -9,6 +9,7 @@ from hand_scene import EXACT
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
+from handover.plants.free_flyer.floating_object import FloatingObject
 from handover.plants.free_flyer.free_flyer import FreeFlyer
 from handover.plants.free_flyer.free_flyer import Inputs as FlyerInputs
 from handover.plants.free_flyer.free_flyer import Outputs as FlyerOutputs
@@ -197,3 +198,13 @@ def test_results_do_not_hang_on_the_step():
     assert np.linalg.norm(fine[:3] - [0.0, -0.07, 0.0]) > 0.01
     np.testing.assert_allclose(path(0.016), fine, atol=2e-3)
     np.testing.assert_allclose(path(0.032), fine, atol=4e-3)
+
+
+def test_a_rod_that_was_hit_at_its_edge_spins_on_without_loss():
+    spun = FloatingObject(0.1, (0.021, 0.195, 0.017))
+    spun.body.spin = (0.0, 256.0 * 0.1 * (0.021**2 + 0.017**2) / 12.0, 1e-5)
+    energy, spin = spun.body.energy, spun.body.spin
+    for _ in range(60):
+        spun.advance(0.016, [], [])
+    assert spun.body.spin == spin
+    assert spun.body.energy == pytest.approx(energy, rel=1e-6)
