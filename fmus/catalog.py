@@ -116,26 +116,28 @@ _ENTRIES = (
     ),
     Entry(
         "FreeFlyer",
-        "handover.plants.free_flyer.free_flyer:FreeFlyer",
+        "handover.plants.free_flyer.robot.free_flyer:FreeFlyer",
         Fraction(2, 125),
         "free-flying robot with a fixed arm",
     ),
     Entry(
         "Navigation",
-        "handover.plants.free_flyer.navigation:Navigation",
+        "handover.plants.free_flyer.robot.navigation:Navigation",
         Fraction(2, 125),
         "its estimate of pose and velocities, with noise, bias, drift and delay",
     ),
     Entry(
         "Thrusters",
-        "handover.plants.free_flyer.thrusters:Thrusters",
+        "handover.plants.free_flyer.robot.thrusters:Thrusters",
         Fraction(2, 125),
         "its propulsion, with limits and lag",
     ),
-    Entry("Push", "handover.plants.free_flyer.push:Push", Fraction(2, 125), "pulse of force and torque on a gripper"),
+    Entry(
+        "Push", "handover.plants.free_flyer.robot.push:Push", Fraction(2, 125), "pulse of force and torque on a gripper"
+    ),
     Entry(
         "HandAndObject",
-        "handover.plants.free_flyer.hand_and_object:HandAndObject",
+        "handover.plants.free_flyer.hand.hand_and_object:HandAndObject",
         Fraction(2, 125),
         "hand that takes and gives an object in microgravity",
     ),

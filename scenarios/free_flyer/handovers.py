@@ -18,8 +18,8 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
-from handover.plants.free_flyer.hand_track import InvalidTrack, read_track
-from handover.plants.free_flyer.parameters import Params
+from handover.plants.free_flyer.hand.hand_track import InvalidTrack, read_track
+from handover.plants.free_flyer.hand.parameters import Params
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from handover.cosim.record.reader import Record
-from handover.plants.free_flyer.hand_track import HandPose, write_track
+from handover.plants.free_flyer.hand.hand_track import HandPose, write_track
 
 _SIGNALS = ("p_WH_goal", "q_WH_goal", "finger_goal", "closed_goal")
 

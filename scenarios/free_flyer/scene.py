@@ -13,7 +13,7 @@ from matplotlib.colors import to_rgb
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.plants.free_flyer.hand_kinematics import FINGERS, PALM, PALM_SIDES, RADIUS, joint_places
+from handover.plants.free_flyer.hand.hand_kinematics import FINGERS, PALM, PALM_SIDES, RADIUS, joint_places
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import figure

@@ -11,21 +11,21 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from handover.plants.free_flyer.free_flyer import FreeFlyer
-from handover.plants.free_flyer.free_flyer import Inputs as FlyerInputs
-from handover.plants.free_flyer.free_flyer import Params as FlyerParams
-from handover.plants.free_flyer.hand_and_object import HandAndObject, Holder, Motion, StartHolder
-from handover.plants.free_flyer.hand_and_object import Inputs as HandInputs
-from handover.plants.free_flyer.hand_and_object import Params as HandParams
-from handover.plants.free_flyer.navigation import Inputs as NavigationInputs
-from handover.plants.free_flyer.navigation import Navigation
-from handover.plants.free_flyer.navigation import Params as NavigationParams
-from handover.plants.free_flyer.push import Inputs as PushInputs
-from handover.plants.free_flyer.push import Params as PushParams
-from handover.plants.free_flyer.push import Push
-from handover.plants.free_flyer.thrusters import Inputs as ThrusterInputs
-from handover.plants.free_flyer.thrusters import Params as ThrusterParams
-from handover.plants.free_flyer.thrusters import Thrusters
+from handover.plants.free_flyer.hand.hand_and_object import HandAndObject, Holder, Motion, StartHolder
+from handover.plants.free_flyer.hand.hand_and_object import Inputs as HandInputs
+from handover.plants.free_flyer.hand.hand_and_object import Params as HandParams
+from handover.plants.free_flyer.robot.free_flyer import FreeFlyer
+from handover.plants.free_flyer.robot.free_flyer import Inputs as FlyerInputs
+from handover.plants.free_flyer.robot.free_flyer import Params as FlyerParams
+from handover.plants.free_flyer.robot.navigation import Inputs as NavigationInputs
+from handover.plants.free_flyer.robot.navigation import Navigation
+from handover.plants.free_flyer.robot.navigation import Params as NavigationParams
+from handover.plants.free_flyer.robot.push import Inputs as PushInputs
+from handover.plants.free_flyer.robot.push import Params as PushParams
+from handover.plants.free_flyer.robot.push import Push
+from handover.plants.free_flyer.robot.thrusters import Inputs as ThrusterInputs
+from handover.plants.free_flyer.robot.thrusters import Params as ThrusterParams
+from handover.plants.free_flyer.robot.thrusters import Thrusters
 
 DT = 0.016
 GRIPPED = HandParams(motion=Motion.NONE, p_WO_0=np.zeros(3))

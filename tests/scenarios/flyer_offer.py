@@ -11,10 +11,10 @@ from handover.controllers.free_flyer.impedance_controller import Behaviour, Impe
 from handover.controllers.free_flyer.pose_controller import PoseController
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer import free_flyer, hand_and_object, navigation, thrusters
-from handover.plants.free_flyer.free_flyer import FreeFlyer
-from handover.plants.free_flyer.hand_and_object import HandAndObject, Holder, Motion
-from handover.plants.free_flyer.navigation import Navigation
-from handover.plants.free_flyer.thrusters import Thrusters
+from handover.plants.free_flyer.hand.hand_and_object import HandAndObject, Holder, Motion
+from handover.plants.free_flyer.robot.free_flyer import FreeFlyer
+from handover.plants.free_flyer.robot.navigation import Navigation
+from handover.plants.free_flyer.robot.thrusters import Thrusters
 
 T = 0.016
 WAITING = 1.0

@@ -21,9 +21,9 @@ from handover.controllers.free_flyer.impedance_controller import Params as Rigid
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.plain_rotation import IDENTITY, ZERO, vector
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.arm import Arm
-from handover.plants.free_flyer.articulated_body import ArticulatedBody
-from handover.plants.free_flyer.stopping_joints import JointLimits, StoppingJoints
+from handover.plants.free_flyer.robot.arm import Arm
+from handover.plants.free_flyer.robot.articulated_body import ArticulatedBody
+from handover.plants.free_flyer.robot.stopping_joints import JointLimits, StoppingJoints
 
 PERIOD = 0.016
 IDEAL = Params(lag=0.0)

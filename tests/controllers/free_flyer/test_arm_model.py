@@ -15,9 +15,9 @@ from handover.controllers.free_flyer.arm_model import (
 from handover.cosim.blocks.geometry import rotation_by
 from handover.cosim.blocks.plain_rotation import ZERO, quaternion, vector
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.arm import Arm
-from handover.plants.free_flyer.articulated_body import ArticulatedBody
-from handover.plants.free_flyer.stopping_joints import JointLimits, Motion, StoppingJoints
+from handover.plants.free_flyer.robot.arm import Arm
+from handover.plants.free_flyer.robot.articulated_body import ArticulatedBody
+from handover.plants.free_flyer.robot.stopping_joints import JointLimits, Motion, StoppingJoints
 
 I_B = np.array([[0.1534, 0.01, -0.02], [0.01, 0.1427, 0.005], [-0.02, 0.005, 0.1623]])
 P_BG = np.array([-0.3, 0.02, 0.05])

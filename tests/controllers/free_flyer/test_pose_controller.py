@@ -14,15 +14,15 @@ from handover.controllers.free_flyer.profile import Bounds, profile_between
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.free_flyer import FreeFlyer
-from handover.plants.free_flyer.free_flyer import Inputs as FlyerInputs
-from handover.plants.free_flyer.free_flyer import Params as FlyerParams
-from handover.plants.free_flyer.navigation import Inputs as NavigationInputs
-from handover.plants.free_flyer.navigation import Navigation
-from handover.plants.free_flyer.navigation import Params as NavigationParams
-from handover.plants.free_flyer.thrusters import Inputs as ThrusterInputs
-from handover.plants.free_flyer.thrusters import Params as ThrusterParams
-from handover.plants.free_flyer.thrusters import Propulsion, Thrusters
+from handover.plants.free_flyer.robot.free_flyer import FreeFlyer
+from handover.plants.free_flyer.robot.free_flyer import Inputs as FlyerInputs
+from handover.plants.free_flyer.robot.free_flyer import Params as FlyerParams
+from handover.plants.free_flyer.robot.navigation import Inputs as NavigationInputs
+from handover.plants.free_flyer.robot.navigation import Navigation
+from handover.plants.free_flyer.robot.navigation import Params as NavigationParams
+from handover.plants.free_flyer.robot.thrusters import Inputs as ThrusterInputs
+from handover.plants.free_flyer.robot.thrusters import Params as ThrusterParams
+from handover.plants.free_flyer.robot.thrusters import Propulsion, Thrusters
 
 T = 0.016
 MASS, INERTIA = 9.584, np.array([0.1534, 0.1427, 0.1623])

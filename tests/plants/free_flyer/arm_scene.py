@@ -6,9 +6,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.plain_rotation import quaternion
-from handover.plants.free_flyer.arm import Arm, Joints
-from handover.plants.free_flyer.articulated_body import ArticulatedBody
-from handover.plants.free_flyer.stopping_joints import JointLimits, StoppingJoints
+from handover.plants.free_flyer.robot.arm import Arm, Joints
+from handover.plants.free_flyer.robot.articulated_body import ArticulatedBody
+from handover.plants.free_flyer.robot.stopping_joints import JointLimits, StoppingJoints
 
 MASS = 9.584
 SKEWED = np.array([[0.1534, 0.01, -0.02], [0.01, 0.1427, 0.005], [-0.02, 0.005, 0.1623]])

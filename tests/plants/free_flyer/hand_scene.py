@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.hand_and_object import (
+from handover.plants.free_flyer.hand.hand_and_object import (
     Activity,
     HandAndObject,
     Inputs,

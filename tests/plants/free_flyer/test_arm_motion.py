@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.plain_rotation import ZERO, vector
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.free_flyer import FreeFlyer, Inputs, InvalidFlyerParameters, Outputs, Params
 from handover.plants.free_flyer.rigid_body import RigidBody, Wrenches
-from handover.plants.free_flyer.stopping_joints import JointLimits, Motion, StoppingJoints
+from handover.plants.free_flyer.robot.free_flyer import FreeFlyer, Inputs, InvalidFlyerParameters, Outputs, Params
+from handover.plants.free_flyer.robot.stopping_joints import JointLimits, Motion, StoppingJoints
 
 NOTHING: Wrenches = (ZERO, ZERO, ZERO, ZERO)
 PUSH: Wrenches = ((0.5, 0.2, -0.3), (0.02, 0.01, -0.02), (3.0, -2.0, 4.0), (0.1, 0.2, -0.1))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hand_scene import CALM, DT, Scene
 
-from handover.plants.free_flyer.effort import Effort, force_at_rest
-from handover.plants.free_flyer.hand_and_object import Activity, Params
+from handover.plants.free_flyer.hand.effort import Effort, force_at_rest
+from handover.plants.free_flyer.hand.hand_and_object import Activity, Params
 
 FAR = 1e9
 

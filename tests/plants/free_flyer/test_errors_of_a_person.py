@@ -9,8 +9,8 @@ import pytest
 from hand_scene import CALM, DT, GIVING, Scene
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.hand_and_object import Activity, HandAndObject, Holder, Motion, Params
-from handover.plants.free_flyer.sight import Sight
+from handover.plants.free_flyer.hand.hand_and_object import Activity, HandAndObject, Holder, Motion, Params
+from handover.plants.free_flyer.hand.sight import Sight
 
 END = np.array([0.0, 0.07, 0.0])
 STRONG: dict[str, Any] = {"effort": 4.0, "arm_force_max": 6.0}

@@ -8,10 +8,10 @@ from hand_scene import CALM, DT, Scene
 
 from handover.cosim.blocks.plain_rotation import IDENTITY, Vector, from_rotation_vector, vector
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.attachment import Frame
-from handover.plants.free_flyer.finger_contact import Box, HandFingers
-from handover.plants.free_flyer.hand_and_object import Activity
-from handover.plants.free_flyer.hand_kinematics import (
+from handover.plants.free_flyer.hand.attachment import Frame
+from handover.plants.free_flyer.hand.finger_contact import Box, HandFingers
+from handover.plants.free_flyer.hand.hand_and_object import Activity
+from handover.plants.free_flyer.hand.hand_kinematics import (
     CLOSED,
     FINGERS,
     JOINT_MAX,

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.plain_rotation import quaternion, quaternion_multiply, row_major, vector
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.free_flyer import FreeFlyer, Inputs, InvalidFlyerParameters, Outputs, Params
 from handover.plants.free_flyer.rigid_body import TurnsTooFast, momentum_rates
+from handover.plants.free_flyer.robot.free_flyer import FreeFlyer, Inputs, InvalidFlyerParameters, Outputs, Params
 
 DEFAULT = Params()
 SKEWED = np.array([[0.1534, 0.01, -0.02], [0.01, 0.1427, 0.005], [-0.02, 0.005, 0.1623]])

@@ -8,7 +8,7 @@ import pytest
 from hand_scene import CALM, DT, IDLE, Scene, off
 from scipy.spatial.transform import Rotation
 
-from handover.plants.free_flyer.hand_and_object import Activity, Holder
+from handover.plants.free_flyer.hand.hand_and_object import Activity, Holder
 
 
 def test_gripper_follows_its_command_at_its_rate_and_distinguishes_empty_from_full():

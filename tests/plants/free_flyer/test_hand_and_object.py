@@ -8,7 +8,15 @@ from hand_scene import CALM, DT, GIVING, IDLE, Scene
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.hand_and_object import Activity, HandAndObject, Holder, Inputs, Motion, Outputs, Params
+from handover.plants.free_flyer.hand.hand_and_object import (
+    Activity,
+    HandAndObject,
+    Holder,
+    Inputs,
+    Motion,
+    Outputs,
+    Params,
+)
 
 
 def flat(y: Outputs) -> Floats:

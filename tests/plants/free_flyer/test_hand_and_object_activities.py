@@ -9,8 +9,8 @@ from hand_scene import CALM, DT, GIVING, IDLE, Scene
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.hand_and_object import Activity, Holder, Motion, Params
-from handover.plants.free_flyer.hand_kinematics import CLOSED
+from handover.plants.free_flyer.hand.hand_and_object import Activity, Holder, Motion, Params
+from handover.plants.free_flyer.hand.hand_kinematics import CLOSED
 from handover.plants.hand_motion import minimum_jerk
 
 TAKEN = [Activity.WAIT, Activity.REACH, Activity.GRASP, Activity.PULL, Activity.WITHDRAW, Activity.REST]

@@ -9,12 +9,8 @@ from hand_scene import EXACT
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.floating_object import FloatingObject
-from handover.plants.free_flyer.free_flyer import FreeFlyer
-from handover.plants.free_flyer.free_flyer import Inputs as FlyerInputs
-from handover.plants.free_flyer.free_flyer import Outputs as FlyerOutputs
-from handover.plants.free_flyer.free_flyer import Params as FlyerParams
-from handover.plants.free_flyer.hand_and_object import (
+from handover.plants.free_flyer.hand.floating_object import FloatingObject
+from handover.plants.free_flyer.hand.hand_and_object import (
     HandAndObject,
     Holder,
     Inputs,
@@ -23,6 +19,10 @@ from handover.plants.free_flyer.hand_and_object import (
     Params,
     StartHolder,
 )
+from handover.plants.free_flyer.robot.free_flyer import FreeFlyer
+from handover.plants.free_flyer.robot.free_flyer import Inputs as FlyerInputs
+from handover.plants.free_flyer.robot.free_flyer import Outputs as FlyerOutputs
+from handover.plants.free_flyer.robot.free_flyer import Params as FlyerParams
 
 FLYER = FlyerParams()
 STILL = Params(motion=Motion.NONE, tremor_rms=0.0, drift_rms=0.0, p_WO_0=np.zeros(3), **EXACT)

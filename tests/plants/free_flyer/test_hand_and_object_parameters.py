@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.hand_and_object import (
+from handover.plants.free_flyer.hand.hand_and_object import (
     HandAndObject,
     Inputs,
     InvalidHandParameters,

@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.plain_rotation import angle_between, quaternion
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.hand_and_object import Driver, HandAndObject, Holder, Inputs, StartHolder
-from handover.plants.free_flyer.hand_kinematics import CLOSED
+from handover.plants.free_flyer.hand.hand_and_object import Driver, HandAndObject, Holder, Inputs, StartHolder
+from handover.plants.free_flyer.hand.hand_kinematics import CLOSED
 
 LED = replace(IDLE, driven_by=Driver.OUTSIDE)
 AWAY = np.array([1.0, 0.0, 0.0])

@@ -9,9 +9,9 @@ import pytest
 from hand_scene import DT, IDLE, Scene
 
 from handover.cosim.blocks.plain_rotation import IDENTITY, from_rotation_vector
-from handover.plants.free_flyer.hand_and_object import Driver, HandAndObject, InvalidHandParameters, Params
-from handover.plants.free_flyer.hand_kinematics import JOINT_MAX, JOINTS
-from handover.plants.free_flyer.hand_track import COLUMNS, HandPose, InvalidTrack, read_track, write_track
+from handover.plants.free_flyer.hand.hand_and_object import Driver, HandAndObject, InvalidHandParameters, Params
+from handover.plants.free_flyer.hand.hand_kinematics import JOINT_MAX, JOINTS
+from handover.plants.free_flyer.hand.hand_track import COLUMNS, HandPose, InvalidTrack, read_track, write_track
 
 AWAY = np.array([1.0, 0.0, 0.0])
 

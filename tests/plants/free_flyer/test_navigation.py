@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.navigation import (
+from handover.plants.free_flyer.robot.navigation import (
     Inputs,
     InvalidNavigationParameters,
     Navigation,

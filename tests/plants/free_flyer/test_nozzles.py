@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.nozzles import (
+from handover.plants.free_flyer.robot.nozzles import (
     AXIS_OF_NOZZLE,
     DIRECTIONS,
     LARGEST_ANGLE,
@@ -16,7 +16,7 @@ from handover.plants.free_flyer.nozzles import (
     Nozzles,
     lost_directions,
 )
-from handover.plants.free_flyer.thrusters import (
+from handover.plants.free_flyer.robot.thrusters import (
     Inputs,
     InvalidThrusterParameters,
     Outputs,

@@ -12,7 +12,7 @@ from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.fmus.build import build_block
-from handover.plants.free_flyer.push import Axis, Inputs, Params, Push
+from handover.plants.free_flyer.robot.push import Axis, Inputs, Params, Push
 
 PULSE = Params(axis=Axis.Z, force=5.0, torque=-3.0, start=0.105, duration=0.05)
 
@@ -56,8 +56,8 @@ def speeds_under(folder: Path, algorithm: Algorithm, push_first: bool) -> list[f
     """Return the robot's speed at each communication point."""
     system = System()
     files = {
-        "push": built(folder, "handover.plants.free_flyer.push:Push", 3),
-        "robot": built(folder, "handover.plants.free_flyer.free_flyer:FreeFlyer", 3),
+        "push": built(folder, "handover.plants.free_flyer.robot.push:Push", 3),
+        "robot": built(folder, "handover.plants.free_flyer.robot.free_flyer:FreeFlyer", 3),
     }
     starts: dict[str, dict[str, Any]] = {"push": {"start": 0.0, "duration": 0.05}, "robot": {}}
     names = ["push", "robot"] if push_first else ["robot", "push"]
@@ -98,7 +98,7 @@ def test_the_first_step_has_the_push_if_the_algorithm_says_so(
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_unit_without_inputs_is_valid_and_runs_elsewhere(folder: Path, fmi: int):
-    file = built(folder, "handover.plants.free_flyer.push:Push", fmi)
+    file = built(folder, "handover.plants.free_flyer.robot.push:Push", fmi)
     assert validate_fmu(str(file)) == []
     result = fmpy.simulate_fmu(str(file), stop_time=1.6, output_interval=0.016, start_values={"start": 0.805})
     f = result["f_G[1]"] if fmi == 2 else result["f_G"][:, 0]

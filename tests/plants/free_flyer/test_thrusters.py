@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.thrusters import Inputs, Outputs, Params, Propulsion, Thrusters
+from handover.plants.free_flyer.robot.thrusters import Inputs, Outputs, Params, Propulsion, Thrusters
 
 DT = 0.016
 

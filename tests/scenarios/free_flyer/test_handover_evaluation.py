@@ -10,7 +10,7 @@ from handover.controllers.free_flyer.handover_state_machine import HandoverPhase
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
-from handover.plants.free_flyer.hand_and_object import Holder
+from handover.plants.free_flyer.hand.hand_and_object import Holder
 from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
 from handover.scenarios.free_flyer.parameters import HandoverParameters
 from handover.scenarios.free_flyer.person_evaluation import Cause

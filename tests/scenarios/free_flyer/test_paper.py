@@ -14,11 +14,11 @@ from handover.controllers.free_flyer.handover_parameters import Params as Decisi
 from handover.controllers.free_flyer.impedance_controller import Behaviour
 from handover.controllers.free_flyer.impedance_controller import Params as ImpedanceParams
 from handover.controllers.free_flyer.pose_controller import Params as PoseParams
-from handover.plants.free_flyer.free_flyer import Params as RobotParams
-from handover.plants.free_flyer.navigation import Params as NavigationParams
-from handover.plants.free_flyer.parameters import Params as PersonParams
-from handover.plants.free_flyer.push import Params as PushParams
-from handover.plants.free_flyer.thrusters import Params as ThrustersParams
+from handover.plants.free_flyer.hand.parameters import Params as PersonParams
+from handover.plants.free_flyer.robot.free_flyer import Params as RobotParams
+from handover.plants.free_flyer.robot.navigation import Params as NavigationParams
+from handover.plants.free_flyer.robot.push import Params as PushParams
+from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
 from handover.scenarios.free_flyer import scene
 from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters
 from handover.scenarios.free_flyer.parameters import HandoverParameters, TaskParameters

@@ -111,7 +111,7 @@ def test_a_signal_that_no_unit_of_the_scenario_has_is_an_error(tmp_path: Path):
 
 
 def test_a_block_of_ones_own_tells_what_its_outputs_would_have_been(tmp_path: Path):
-    units = {"robot": "handover.plants.free_flyer.free_flyer:FreeFlyer", "none": "nowhere:Block"}
+    units = {"robot": "handover.plants.free_flyer.robot.free_flyer:FreeFlyer", "none": "nowhere:Block"}
     record = LackingRecord(Record(_one_row(tmp_path)), units)
     assert record["robot.q_WB"].shape == (1, 4)
     with pytest.raises(KeyError, match=r"none\.q_WB"):

@@ -16,8 +16,8 @@ from handover.cosim.blocks.units import (
     Radian,
     Second,
 )
-from handover.plants.free_flyer.arm import Arm, Joints
-from handover.plants.free_flyer.stopping_joints import JointLimits
+from handover.plants.free_flyer.robot.arm import Arm, Joints
+from handover.plants.free_flyer.robot.stopping_joints import JointLimits
 
 NEVER = 1e6
 """Seconds after the start at which what never happens does."""

@@ -25,9 +25,9 @@ from handover.cosim.blocks.plain_rotation import (
 )
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.plants.free_flyer.hand_kinematics import STRAIGHT
-from handover.plants.free_flyer.hand_track import HandPose
-from handover.plants.free_flyer.parameters import Params
+from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
+from handover.plants.free_flyer.hand.hand_track import HandPose
+from handover.plants.free_flyer.hand.parameters import Params
 
 _BRAKING = 0.8
 """Share of the acceleration by which a hand counts on braking, so that it does not overshoot in steps."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.plain_rotation import Quaternion, Vector, lerp, nlerp, normalize
-from handover.plants.free_flyer.hand_kinematics import JOINT_MAX, JOINTS
+from handover.plants.free_flyer.hand.hand_kinematics import JOINT_MAX, JOINTS
 
 COLUMNS = (
     "t",

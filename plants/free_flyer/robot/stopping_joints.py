@@ -18,9 +18,9 @@ from handover.cosim.blocks.plain_rotation import (
     rotation_matrix,
     subtract,
 )
-from handover.plants.free_flyer.arm import Joints
-from handover.plants.free_flyer.articulated_body import ArticulatedBody, State
 from handover.plants.free_flyer.rigid_body import Wrenches
+from handover.plants.free_flyer.robot.arm import Joints
+from handover.plants.free_flyer.robot.articulated_body import ArticulatedBody, State
 
 _ROUNDS = 60
 _NEAR = 1e-13

@@ -18,10 +18,10 @@ from handover.cosim.blocks.plain_rotation import (
     scale,
     subtract,
 )
-from handover.plants.free_flyer.attachment import Frame
-from handover.plants.free_flyer.finger_contact import Box
-from handover.plants.free_flyer.hand_kinematics import RADIUS, REACH, Segment
-from handover.plants.free_flyer.parameters import Params
+from handover.plants.free_flyer.hand.attachment import Frame
+from handover.plants.free_flyer.hand.finger_contact import Box
+from handover.plants.free_flyer.hand.hand_kinematics import RADIUS, REACH, Segment
+from handover.plants.free_flyer.hand.parameters import Params
 
 _PALM_THICKNESS, _JAW = 0.012, (0.06, 0.04, 0.008)
 """Thickness of the palm, and sides of a jaw, m, assumed."""

@@ -24,7 +24,7 @@ from handover.cosim.blocks.plain_rotation import (
     scale,
 )
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.attachment import Attachment, Frame, Palm
+from handover.plants.free_flyer.hand.attachment import Attachment, Frame, Palm
 from handover.plants.free_flyer.rigid_body import RigidBody
 
 Six = tuple[float, float, float, float, float, float]

@@ -40,17 +40,17 @@ from handover.cosim.blocks.units import (
     RadianPerSecond,
     Second,
 )
-from handover.plants.free_flyer.attachment import Attachment, Frame, Palm
-from handover.plants.free_flyer.finger_contact import Angles, HandFingers
-from handover.plants.free_flyer.floating_object import FloatingObject
-from handover.plants.free_flyer.gripper_contact import GripperSolids
-from handover.plants.free_flyer.grips import FlyerGripper, FlyerHand
-from handover.plants.free_flyer.hand_guide import HandGuide, pose_of_tracker
-from handover.plants.free_flyer.hand_kinematics import CLOSED
-from handover.plants.free_flyer.hand_track import HandPose, read_track
-from handover.plants.free_flyer.parameters import Driver, InvalidHandParameters, Motion, Params, StartHolder
-from handover.plants.free_flyer.person import Activity, FlyerPerson
-from handover.plants.free_flyer.sight import Perception
+from handover.plants.free_flyer.hand.attachment import Attachment, Frame, Palm
+from handover.plants.free_flyer.hand.finger_contact import Angles, HandFingers
+from handover.plants.free_flyer.hand.floating_object import FloatingObject
+from handover.plants.free_flyer.hand.gripper_contact import GripperSolids
+from handover.plants.free_flyer.hand.grips import FlyerGripper, FlyerHand
+from handover.plants.free_flyer.hand.hand_guide import HandGuide, pose_of_tracker
+from handover.plants.free_flyer.hand.hand_kinematics import CLOSED
+from handover.plants.free_flyer.hand.hand_track import HandPose, read_track
+from handover.plants.free_flyer.hand.parameters import Driver, InvalidHandParameters, Motion, Params, StartHolder
+from handover.plants.free_flyer.hand.person import Activity, FlyerPerson
+from handover.plants.free_flyer.hand.sight import Perception
 from handover.plants.hand_motion import minimum_jerk
 
 __all__ = [

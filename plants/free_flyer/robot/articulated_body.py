@@ -31,8 +31,8 @@ from handover.cosim.blocks.plain_rotation import (
     weighted_sum,
 )
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.arm import Arm, Joints, Posture
 from handover.plants.free_flyer.rigid_body import TurnsTooFast, Wrenches
+from handover.plants.free_flyer.robot.arm import Arm, Joints, Posture
 
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 

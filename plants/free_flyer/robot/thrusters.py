@@ -14,7 +14,7 @@ from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, Vector12, output, parameter, port
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Newton, NewtonMetre, Number, Radian, RadianPerSecond, Second
-from handover.plants.free_flyer.nozzles import LARGEST_ANGLE, Nozzles, PropulsionModules, lost_directions
+from handover.plants.free_flyer.robot.nozzles import LARGEST_ANGLE, Nozzles, PropulsionModules, lost_directions
 
 _Command = list[float]
 _COMMANDS = ("f_pose", "tau_pose", "f_impedance", "tau_impedance")

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.plain_rotation import ZERO, Quaternion, Vector, add_scaled, dot, scale, subtract, vector
-from handover.plants.free_flyer.attachment import Frame
-from handover.plants.free_flyer.parameters import Params
+from handover.plants.free_flyer.hand.attachment import Frame
+from handover.plants.free_flyer.hand.parameters import Params
 
 _ROUNDING = 1e-9
 """Seconds by which a sum of steps may miss a time that they fill: step sizes of hosts differ in their last digits."""

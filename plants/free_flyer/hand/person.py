@@ -21,9 +21,9 @@ from handover.cosim.blocks.plain_rotation import (
     vector,
 )
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.plants.free_flyer.effort import Effort, force_at_rest
-from handover.plants.free_flyer.parameters import Motion, Params, StartHolder
-from handover.plants.free_flyer.sight import Perception, Sight
+from handover.plants.free_flyer.hand.effort import Effort, force_at_rest
+from handover.plants.free_flyer.hand.parameters import Motion, Params, StartHolder
+from handover.plants.free_flyer.hand.sight import Perception, Sight
 from handover.plants.hand_motion import minimum_jerk
 
 _PEAK = 1.875

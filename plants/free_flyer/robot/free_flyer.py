@@ -32,11 +32,11 @@ from handover.cosim.blocks.units import (
     RadianPerSecond,
     Second,
 )
-from handover.plants.free_flyer.arm import JOINTS_MAX
-from handover.plants.free_flyer.arm_parameters import ArmParameters
-from handover.plants.free_flyer.articulated_body import ArticulatedBody
 from handover.plants.free_flyer.rigid_body import RigidBody, TurnsTooFast, inertia_faults, unit_faults
-from handover.plants.free_flyer.stopping_joints import Motion, StoppingJoints
+from handover.plants.free_flyer.robot.arm import JOINTS_MAX
+from handover.plants.free_flyer.robot.arm_parameters import ArmParameters
+from handover.plants.free_flyer.robot.articulated_body import ArticulatedBody
+from handover.plants.free_flyer.robot.stopping_joints import Motion, StoppingJoints
 
 _HALF_A_TURN = math.pi
 _ROUNDING = 1e-9

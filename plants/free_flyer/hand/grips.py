@@ -32,8 +32,8 @@ from handover.cosim.blocks.plain_rotation import (
     vector,
 )
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.plants.free_flyer.attachment import Attachment, Frame, Palm, Stiffness
-from handover.plants.free_flyer.parameters import Params
+from handover.plants.free_flyer.hand.attachment import Attachment, Frame, Palm, Stiffness
+from handover.plants.free_flyer.hand.parameters import Params
 from handover.plants.free_flyer.rigid_body import RigidBody
 from handover.plants.hand_motion import HandTremor
 

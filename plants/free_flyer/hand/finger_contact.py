@@ -18,8 +18,8 @@ from handover.cosim.blocks.plain_rotation import (
     scale,
     subtract,
 )
-from handover.plants.free_flyer.attachment import Frame, Palm
-from handover.plants.free_flyer.hand_kinematics import (
+from handover.plants.free_flyer.hand.attachment import Frame, Palm
+from handover.plants.free_flyer.hand.hand_kinematics import (
     FINGERS,
     JOINT_MAX,
     PALM_BONES,

@@ -1,0 +1,1 @@
+"""The free-flying robot: body, arm, propulsion and navigation."""
