@@ -10,8 +10,9 @@ from handover.controllers.free_flyer.handover_state_machine import HandoverPhase
 from handover.controllers.free_flyer.impedance_controller import Behaviour, ImpedanceController
 from handover.controllers.free_flyer.pose_controller import PoseController
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer import free_flyer, hand_and_object, navigation, thrusters
+from handover.plants.free_flyer.hand import hand_and_object
 from handover.plants.free_flyer.hand.hand_and_object import HandAndObject, Holder, Motion
+from handover.plants.free_flyer.robot import free_flyer, navigation, thrusters
 from handover.plants.free_flyer.robot.free_flyer import FreeFlyer
 from handover.plants.free_flyer.robot.navigation import Navigation
 from handover.plants.free_flyer.robot.thrusters import Thrusters

@@ -15,7 +15,7 @@ from handover.controllers.free_flyer.ports import Behaviour
 from handover.controllers.free_flyer.rotations import InvalidOrientation
 from handover.controllers.free_flyer.wrench_observer import ThrustModel, WrenchObserver
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer import thrusters
+from handover.plants.free_flyer.robot import thrusters
 
 control: Any = untyped_control
 NO_LIMITS: dict[str, Any] = {"f_max": np.full(3, 100.0), "tau_max": np.full(3, 100.0)}
