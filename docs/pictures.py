@@ -29,6 +29,7 @@ FIGURES: Mapping[str, tuple[str, str]] = {
 """Scenario and figure that a picture shows; the first seed's run, with the scenario's defaults."""
 EXPERIMENTS: Mapping[str, tuple[str, str]] = {
     "flyer_ratio.png": ("flyer-impedance", "ratio"),
+    "flyer_strength.png": ("flyer-handover", "strength"),
     "helix_errors.png": ("helix-1", "errors"),
     "helix_workspace.png": ("helix-workspace", "workspace"),
 }

@@ -34,6 +34,8 @@ _COUPLING_DELAYS = 3
 controller and thrusters."""
 _MARGIN = 0.005
 """How far the largest pole must be from the unit circle for a run of half a minute to tell its side."""
+_TWISTS = {Behaviour.RIGID: "1", Behaviour.COMPLIANT: "0.3"}
+"""Torques, N m, that take the robot well out of what counts as rest: from there a growing oscillation is seen."""
 _WITHOUT_LIMITS = {"thrusters.f_max": "1000,1000,1000", "thrusters.tau_max": "1000,1000,1000"}
 
 
@@ -51,14 +53,14 @@ class _Loop:
     @property
     def parameters(self) -> dict[str, str]:
         propulsion = {"propulsion": "limited", **_WITHOUT_LIMITS} if self.lags else {"propulsion": "ideal"}
-        return {"behaviour": self.behaviour.item, **propulsion}
+        return {"behaviour": self.behaviour.item, "torque": _TWISTS[self.behaviour], **propulsion}
 
 
 _LOOPS = tuple(_Loop(behaviour, lags) for behaviour in Behaviour for lags in (False, True))
 
 
 class FlyerStability(PublishedExperiment):
-    """A small twist on the robot, in a host that steps all units in parallel, with a delay that nobody has told it.
+    """A twist on the robot, in a host that steps all units in parallel, with a delay that nobody has told it.
 
     Each unit hands on its results a communication step late, so three steps come on top of the thrust's own delay. The
     controller's linearised loop, with the sum of both as its delay, says by its poles where the robot comes to rest
@@ -81,7 +83,7 @@ class FlyerStability(PublishedExperiment):
                 for step in ((_QUICK_STEP,) if quick else _STEPS)
                 for delay in _DELAYS[loop.behaviour]
             ],
-            fixed={"kind": "torque", "axis": "y", "torque": "0.02", "delay_known": "false", "patience": "30"},
+            fixed={"kind": "torque", "axis": "y", "delay_known": "false", "patience": "30"},
             seed=5,
             options=MasterOptions(algorithm=Algorithm.JACOBI),
             experiment=self.name,
@@ -132,7 +134,9 @@ class FlyerStability(PublishedExperiment):
                 most = 1e3 * max(_DELAYS[loop.behaviour])
                 axis.set(title=loop.label, xlim=(0.0, 17.0), ylim=(-0.04 * most, 1.04 * most))
                 axis.set(xlabel="communication step (ms)", ylabel="delay of the thrust (ms)")
-            panels[0].legend(loc="upper right")
+            handles, labels = panels[0].get_legend_handles_labels()
+            canvas: Any = panels[0].get_figure(root=True)
+            canvas.legend(handles, labels, loc="outside lower center", ncols=3)
         caption = (
             "Whether the robot comes to rest after a twist where all units step in parallel, by communication step and "
             "delay of the thrust, and where the largest pole of the controller's own loop is on the unit circle."
