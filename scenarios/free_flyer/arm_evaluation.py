@@ -4,6 +4,7 @@ The gripper's errors are compared with those by [Fernandes2020] eqs. (3.26), (4.
 that is not square, by the controllers' model of the robot.
 """
 
+import itertools
 import math
 from typing import Any
 
@@ -23,7 +24,7 @@ from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters, ArmTarget
-from handover.scenarios.free_flyer.impedance_evaluation import Errors
+from handover.scenarios.free_flyer.impedance_evaluation import Errors, mean_between, steps_of_period
 from handover.scenarios.free_flyer.robot_wiring import stability_metrics
 
 SIGNALS = (
@@ -47,44 +48,53 @@ def columns_of(record: Record) -> Columns:
 
 
 def errors_with_arm(motion: Columns, target: ArmTarget) -> Errors:
-    """Return the errors, actual and by k_D xt' = B_x x'' + C_x x' + k_B x' - f_ext, one row a step.
+    """Return the errors, actual and by k_D xt' = B_x x'' + C_x x' + k_B x' - f_ext, one row a period of the controller.
 
-    x'' is the mean over a step and B_x, C_x x' those of its middle; damping and actual error are of its beginning,
-    when the controller measured. Units step one after the other, so a step is a period of the controller.
+    x'' is the mean over a period and B_x, C_x x' those of its middle; damping and actual error are of its beginning,
+    when the controller measured. Where units step in parallel, thrust and push act some steps later: by how many is
+    seen in the motion, as in `impedance_evaluation.errors_of`.
     """
-    rows, R_WD, g = len(motion["t"]) - 1, target.R_WG, target.gains
-    actual, calculated = np.zeros((rows, 6)), np.zeros((rows, 6))
-    for k in range(rows):
-        wrench = _inertial_wrench(motion, k, target)
-        v_D, w_D = np.transpose(R_WD) @ motion["robot.v_WG"][k], np.transpose(R_WD) @ motion["robot.w_WG"][k]
+    steps = steps_of_period(motion["t"])
+    found = [_errors(motion, steps, *late, target) for late in itertools.product(range(steps), (0, 1))]
+    return min(found, key=lambda errors: sum(errors.disagreement))
+
+
+def _errors(motion: Columns, steps: int, late: int, push_delay: int, target: ArmTarget) -> Errors:
+    """Return the errors with thrust and push that act so many steps later than they were asked for."""
+    held = np.arange(late, len(motion["t"]), steps)
+    seen, R_WD, g = (held - late)[:-1], target.R_WG, target.gains
+    f_G, tau_G = (mean_between(motion["t"], motion[f"push.{w}_G"], held, push_delay) for w in ("f", "tau"))
+    actual, calculated = np.zeros((len(seen), 6)), np.zeros((len(seen), 6))
+    for k, row in enumerate(seen):
+        wrench = _inertial_wrench(motion, held[k], held[k + 1], target) - np.concatenate([f_G[k], tau_G[k]])
+        v_D, w_D = np.transpose(R_WD) @ motion["robot.v_WG"][row], np.transpose(R_WD) @ motion["robot.w_WG"][row]
         pull = np.transpose(R_WD) @ wrench[:3] + g.damping_translation @ v_D
         twist = np.transpose(R_WD) @ wrench[3:] + g.damping_rotation @ w_D
         calculated[k, :3] = R_WD @ np.linalg.solve(g.stiffness_translation, pull)
         calculated[k, 3:] = R_WD @ np.linalg.solve(g.stiffness_rotation, twist)
     from scipy.spatial.transform import Rotation  # slow to import, and needed only after a run
 
-    R_WG = Rotation.from_quat(motion["robot.q_WG"][:-1], scalar_first=True)
-    actual[:, :3] = target.p_WG - motion["robot.p_WG"][:-1]
+    R_WG = Rotation.from_quat(motion["robot.q_WG"][seen], scalar_first=True)
+    actual[:, :3] = target.p_WG - motion["robot.p_WG"][seen]
     actual[:, 3:] = -(R_WG * Rotation.from_matrix(R_WD).inv()).as_rotvec()
-    return Errors(motion["t"][:-1], actual[:, :3], calculated[:, :3], actual[:, 3:], calculated[:, 3:])
+    return Errors(motion["t"][seen], actual[:, :3], calculated[:, :3], actual[:, 3:], calculated[:, 3:])
 
 
-def _inertial_wrench(motion: Columns, k: int, target: ArmTarget) -> Floats:
-    """Return B_x x'' + C_x x' - f_ext in the middle of step k, (6,), in W."""
+def _inertial_wrench(motion: Columns, first: int, last: int, target: ArmTarget) -> Floats:
+    """Return B_x x'' + C_x x' in the middle between two rows, (6,), in W."""
 
     def middle(name: str) -> Floats:
-        return (motion[name][k] + motion[name][k + 1]) / 2.0
+        return (motion[name][first] + motion[name][last]) / 2.0
 
-    n, dt = target.model.joints, float(motion["t"][k + 1] - motion["t"][k])
+    n, dt = target.model.joints, float(motion["t"][last] - motion["t"][first])
     q_J, v_J = middle("robot.q_J")[:n], middle("robot.v_J")[:n]
     chain = Chain(target.model, rotation_of(middle("robot.q_WB")), middle("robot.w_WB"), q_J, v_J)
     size = 6 if target.fixed else 6 + n
     J, J_rate = chain.jacobian(-1)[:, :size], chain.jacobian_rate(-1)[:, :size]
     B, C = mass_matrix(chain)[:size, :size], coriolis_matrix(chain)[:size, :size]
     xi_dot = np.concatenate([middle("robot.v_WB"), middle("robot.w_WB"), v_J])[:size]
-    x_2 = np.concatenate([np.diff(motion[f"robot.{v}_WG"][k : k + 2], axis=0)[0] for v in ("v", "w")]) / dt
-    push = np.concatenate([motion["push.f_G"][k + 1], motion["push.tau_G"][k + 1]])
-    return OperationalSpace.of(J, B).B_x @ x_2 + operational_bias(J, J_rate, B, C, xi_dot) - push
+    x_2 = np.concatenate([motion[f"robot.{v}_WG"][last] - motion[f"robot.{v}_WG"][first] for v in ("v", "w")]) / dt
+    return OperationalSpace.of(J, B).B_x @ x_2 + operational_bias(J, J_rate, B, C, xi_dot)
 
 
 class ArmImpedanceEvaluator(Evaluator):

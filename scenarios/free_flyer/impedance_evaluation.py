@@ -95,13 +95,18 @@ def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour, model: Bo
         behaviour: whose gains of table 4.1 are taken.
         model: the robot as its controllers assume it to be; where it is another, the errors disagree.
     """
-    steps = max(1, round(PERIOD / float(np.median(np.diff(motion.t)))))
+    steps = steps_of_period(motion.t)
     found = [
         _errors(motion, _Delays(steps, thrust, push), p_WG_goal, behaviour, model)
         for thrust in range(steps)
         for push in (0, 1)
     ]
     return min(found, key=lambda errors: sum(errors.disagreement))
+
+
+def steps_of_period(t: Floats) -> int:
+    """Return how many of a motion's steps make up a period of the controller; t are its times, s."""
+    return max(1, round(PERIOD / float(np.median(np.diff(t)))))
 
 
 @dataclass(frozen=True)
@@ -142,7 +147,7 @@ def _propulsion(motion: Motion, rows: NDArray[np.intp], push_delay: int, model: 
     R_WB = Rotation.from_quat(motion.q_WB[rows], scalar_first=True)
     r_W: Floats = R_WB.apply(model.p_BG)
     dt = np.diff(t)[:, np.newaxis]
-    f_G, tau_G = (_mean_between(motion.t, a, rows, push_delay) for a in (motion.f_G, motion.tau_G))
+    f_G, tau_G = (mean_between(motion.t, a, rows, push_delay) for a in (motion.f_G, motion.tau_G))
     v_WB = motion.v_WG[rows] - np.cross(w_WB, r_W)
     w_B: Floats = R_WB.apply(w_WB, inverse=True)
     L_W: Floats = R_WB.apply(_times(I_B, w_B))
@@ -152,7 +157,7 @@ def _propulsion(motion: Motion, rows: NDArray[np.intp], push_delay: int, model: 
     return half_turn.apply(force, inverse=True), half_turn.apply(torque, inverse=True)
 
 
-def _mean_between(t: Floats, means: Floats, rows: NDArray[np.intp], delay: int) -> Floats:
+def mean_between(t: Floats, means: Floats, rows: NDArray[np.intp], delay: int) -> Floats:
     """Return the mean between each two rows, of means over the step before each row that acted `delay` steps later."""
     acting = means[1:] if delay == 0 else means[:-delay]
     impulse: Floats = np.vstack([np.zeros((1, 3)), np.cumsum(acting * np.diff(t)[:, np.newaxis], axis=0)])

@@ -132,7 +132,8 @@ class FlyerPerson:
         self._acts[self.activity](dt, seen)
         step = dt / self._p.grasp_time
         closed = self.holding or self.activity is Activity.GRASP or self.pushes_with_fist
-        self.fingers = min(1.0, self.fingers + step) if closed else max(0.0, self.fingers - step)
+        fingers = self.fingers + step if closed else self.fingers - step
+        self.fingers = 1.0 if fingers > 1.0 - _ROUNDING else 0.0 if fingers < _ROUNDING else fingers
 
     def get_state(self) -> bytes:
         """Return the complete state."""
