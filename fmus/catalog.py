@@ -118,7 +118,7 @@ _ENTRIES = (
         "FreeFlyer",
         "handover.plants.free_flyer.robot.free_flyer:FreeFlyer",
         Fraction(2, 125),
-        "free-flying robot with a fixed arm",
+        "free-flying robot with an arm that is fixed or has up to three joints",
     ),
     Entry(
         "Navigation",
@@ -130,7 +130,7 @@ _ENTRIES = (
         "Thrusters",
         "handover.plants.free_flyer.robot.thrusters:Thrusters",
         Fraction(2, 125),
-        "its propulsion, with limits and lag",
+        "its propulsion: ideal, with limits and lag, or by nozzles",
     ),
     Entry(
         "Push", "handover.plants.free_flyer.robot.push:Push", Fraction(2, 125), "pulse of force and torque on a gripper"

@@ -108,7 +108,7 @@ class PersonsDeeds:
         activity: what the person does.
         code: the same as a number.
         closing: the last hand that closed, and whether it got the object, in `got`.
-        bump: when an open hand last bumped the object, s, and the greatest force of all, N.
+        bump: when an open hand bumped the object hardest of late, s, and how hard, N.
         let_go: when the person last let go, s, and who held the object just before.
         closed: when the gripper's fingers last closed as far as the object is thick, s.
         angle: of the gripper, rad.
@@ -146,9 +146,8 @@ class PersonsDeeds:
         self.angle = angle
         if activity in ("PULL", "PUSH"):
             self.pulled, self.resisted = True, max(self.resisted, _force(signals))
-        elif activity in ("REACH", "GRASP") and holder == "GRIPPER" and (force := _force(signals)) > _TOUCH:
-            greatest = force if self.bump is None else max(force, self.bump[1])
-            self.bump = (t, greatest)
+        elif activity in ("REACH", "GRASP") and holder == "GRIPPER":
+            self._follow_bump(t, _force(signals))
         if activity == "PUSH":
             self.beside = self._aside_of_fingers(signals)
         self._follow_grasp(t, signals, activity, before, holder)
@@ -212,6 +211,12 @@ class PersonsDeeds:
             self.got = self.got or holder in ("HAND", "BOTH")
         elif before == "PULL" and self.closing is not None and not self.got:
             self.misses.append(self.closing)
+
+    def _follow_bump(self, t: float, force: float) -> None:
+        """Keep the hardest bump of the open hand of late."""
+        last = self.bump
+        if force > _TOUCH and (last is None or t - last[0] > _SHORTLY or force > last[1]):
+            self.bump = (t, force)
 
     def _from_end(self, signals: Signals) -> tuple[float, float]:
         """Return how far the object's end is from the hand along and across the line of sight, m."""

@@ -43,6 +43,11 @@ class Stiffness:
     c_turn: float
     tau_max: float
 
+    @property
+    def rates(self) -> tuple[float, float, float, float]:
+        """Stiffnesses and dampings, without the limits."""
+        return self.k, self.c, self.k_turn, self.c_turn
+
 
 @dataclass(frozen=True)
 class Palm:
@@ -70,8 +75,9 @@ class Palm:
 class Attachment:
     """Holds the point r of an object O at the point `place` of a frame F, and O's orientation at `turn` seen from F.
 
-    f = -k e + c (v_F - v), tau = -k_turn theta + c_turn (w_F - w), e the displacement of the point, theta the rotation
-    vector (its sine, twice the half's). Beyond f_max or tau_max, the place or the turn gives way, as dry friction does.
+    f = -k e + c (v_F - v), tau = -k_turn theta + c_turn (w_F - w), e the displacement of the point, theta =
+    2 sin(a/2) n for a rotation by the angle a about n. Beyond f_max or tau_max, the place or
+    the turn gives way, as dry friction does.
     """
 
     def __init__(

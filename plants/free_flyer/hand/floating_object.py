@@ -136,7 +136,7 @@ class FloatingObject:
         return nu, pushes, [_wrench(h, a, b, s, v, w) for (a, _), b, s in zip(held, loads, scales, strict=True)]
 
     def _inverse(self, h: float, held: Held, scales: Scales) -> list[list[float]]:
-        key = (h, *[(a.r, id(a.stiffness), s) for (a, _), s in zip(held, scales, strict=True)])
+        key = (h, *[(a.r, a.stiffness.rates, s) for (a, _), s in zip(held, scales, strict=True)])
         if key not in self._inverses:
             if len(self._inverses) >= 8:
                 self._inverses.clear()

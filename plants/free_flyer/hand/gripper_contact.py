@@ -28,9 +28,10 @@ _PALM_THICKNESS, _JAW = 0.012, (0.06, 0.04, 0.008)
 
 
 class GripperSolids:
-    """Palm and jaws as boxes along the axes of G; each phalanx presses with stiffness and damping times its depth.
+    """Palm and jaws as boxes along the axes of G, and what each phalanx that touches them presses with.
 
-    The hand is not deflected by it: its arm presses with at most arm_force_max in all.
+    That is stiffness times depth plus damping times speed, and it only pushes. The hand is not deflected by it: its arm
+    presses with at most arm_force_max in all.
     """
 
     def __init__(self, params: Params) -> None:

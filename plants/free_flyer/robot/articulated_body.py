@@ -17,7 +17,6 @@ from handover.cosim.blocks.plain_rotation import (
     cross,
     dot,
     inverse_rotate,
-    norm,
     normalize,
     quaternion_add_scaled,
     quaternion_dot,
@@ -169,7 +168,7 @@ class ArticulatedBody:
         d = at(h, c)
         turned = quaternion_runge_kutta_step(q, h, a.q, b.q, c.q, d.q)
         if not 0.99 < quaternion_dot(turned, turned) < 1.01:
-            raise TurnsTooFast(2.0 * norm(a.q[1:]), h)
+            raise TurnsTooFast(2.0 * math.sqrt(quaternion_dot(a.q, a.q)), h)
         mean = _mean_rates(a.momenta, b.momenta, c.momenta, d.momenta)
         after = (
             weighted_sum(1.0, p, h, v, h * (h / 6.0), add(add(a.v, b.v), c.v)),

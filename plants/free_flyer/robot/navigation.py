@@ -1,4 +1,4 @@
-"""What a free-flyer takes for its pose and velocities: the estimate of its filter, as far off as such a filter's is."""
+"""A free-flyer's navigation: its pose and velocities with noise, bias, drift and delay."""
 
 import math
 from collections.abc import Mapping

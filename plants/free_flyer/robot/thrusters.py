@@ -126,12 +126,12 @@ class Thrusters:
 
     With nozzles the clipped command is shared among twelve, and scaled down where they do not have it (`Nozzles`); it
     is their thrusts that are delayed, and flappers and impellers that lag (`PropulsionModules`). Axes are clipped first
-    as Astrobee's controller does, or a twist of forty times the largest torque would leave a fortieth of the force.
+    as Astrobee's controller does, or a torque of forty times the largest would leave a fortieth of the force.
     That impellers turn the robot as they change their speed, or by its turning, is left out: the two turn opposite
     ways.
 
     Raises:
-        InvalidThrusterParameters: by the constructor, stuck nozzles leave a force or a torque that there is not.
+        InvalidThrusterParameters: by the constructor, if without the stuck nozzles a force or torque cannot be given.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {

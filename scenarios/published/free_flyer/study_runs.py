@@ -61,7 +61,7 @@ TRAITS = (
 
 @cache
 def participants(count: int = 10, seed: int = 2020) -> tuple[Mapping[str, str], ...]:
-    """Return participants, as parameters in texts: each trait is drawn by itself; nothing was fit to the seed."""
+    """Return participants, as parameters in texts: each trait is drawn by itself."""
     rng = np.random.default_rng(seed)
     drawn = {t.name: rng.uniform(t.low, t.high, count) for t in TRAITS}
     return tuple({name: f"{values[k]:.4g}" for name, values in drawn.items()} for k in range(count))
