@@ -152,7 +152,7 @@ class ArmImpedanceEvaluator(Evaluator):
         verb = "agreed with" if agrees else "departed from"
         joined = "and" if agrees is self._at_rest else "but"
         reason = f"{back}, {joined} {verb} the impedance model by {1000 * by[0]:.1f} mm and {by[1]:.3f} rad"
-        return Outcome(success=self._at_rest and agrees, reason=reason, metrics=metrics)
+        return Outcome(success=self._at_rest and agrees, reason=reason + self.parameters.stuck, metrics=metrics)
 
     def _metrics(self, motion: Columns, by: tuple[float, float]) -> dict[str, Metric]:
         base = np.linalg.norm(motion["robot.p_WB"] - motion["robot.p_WB"][0], axis=1)

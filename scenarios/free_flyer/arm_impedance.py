@@ -17,7 +17,13 @@ from handover.scenarios.free_flyer.arm_evaluation import ArmImpedanceEvaluator
 from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters
 from handover.scenarios.free_flyer.parameters import Wrench
 from handover.scenarios.free_flyer.places import PLACES_OF_ARM_PUSH
-from handover.scenarios.free_flyer.robot_wiring import expected_lag, wire_controller, wire_forces, wire_navigation
+from handover.scenarios.free_flyer.robot_wiring import (
+    expected_lag,
+    thruster_settings,
+    wire_controller,
+    wire_forces,
+    wire_navigation,
+)
 
 
 class FlyerArmImpedance(Experiment[ArmImpedanceEvaluator]):
@@ -34,7 +40,6 @@ class FlyerArmImpedance(Experiment[ArmImpedanceEvaluator]):
         "navigation": "Navigation",
     }
     places: ClassVar[Mapping[str, Place]] = PLACES_OF_ARM_PUSH
-    parallel_step: ClassVar[Fraction | None] = Fraction(1, 500)
     headline: ClassVar[tuple[str, ...]] = (
         "greatest_position_error",
         "greatest_orientation_error",
@@ -58,13 +63,13 @@ class FlyerArmImpedance(Experiment[ArmImpedanceEvaluator]):
             "impedance",
             fmu("impedance"),
             **p.controller(),
-            delay=p.delay if p.delay_known else 0.0,
+            delay=p.delay + p.navigation_delay if p.delay_known else 0.0,
             lag=expected_lag(p.propulsion),
             p_WG_goal=target.p_WG,
             q_WG_goal=np.array([1.0, 0.0, 0.0, 0.0]) if p.fixed else quaternion_of(R_BG),
             active=True,
         )
-        thrusters = s.add("thrusters", fmu("thrusters"), propulsion=p.propulsion.item, delay=p.delay)
+        thrusters = s.add("thrusters", fmu("thrusters"), **thruster_settings(p.propulsion, p.delay, p.stuck_nozzle))
         push = s.add(
             "push",
             fmu("push"),
@@ -85,7 +90,7 @@ class FlyerArmImpedance(Experiment[ArmImpedanceEvaluator]):
             lock_time=p.lock_time,
             p_WB_0=target.p_WG - p_BG,
         )
-        navigation = s.add("navigation", fmu("navigation"), seed=seed)
+        navigation = s.add("navigation", fmu("navigation"), seed=seed, delay=p.navigation_delay)
         wire_controller(s, impedance, navigation, thrusters)
         wire_navigation(s, robot, navigation)
         wire_forces(s, robot, thrusters, push)
@@ -97,6 +102,10 @@ class FlyerArmImpedance(Experiment[ArmImpedanceEvaluator]):
     def stop_time(self, parameters: ArmPushParameters) -> Fraction:
         """Return the end of the push, plus the patience for the return to rest."""
         return parameters.stop
+
+    def step_in_parallel(self, parameters: ArmPushParameters) -> Fraction:
+        """Return the parameter's."""
+        return parameters.step_in_parallel
 
     def evaluator(self, parameters: ArmPushParameters) -> ArmImpedanceEvaluator:
         """Return the evaluator of one push."""

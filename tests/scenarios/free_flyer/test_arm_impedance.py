@@ -50,3 +50,16 @@ def test_factors_of_the_arm_scale_its_links():
     np.testing.assert_allclose(robot["link"][0], [-0.2, 0.0, 0.0])
     np.testing.assert_allclose(model["link"][0], [-0.05, 0.0, 0.0])
     np.testing.assert_allclose(model["mass_L"], 0.7 * robot["mass_L"])
+
+
+def test_the_age_of_the_estimate_reaches_navigation_and_controller(tmp_path: Path):
+    with pytest.raises(InitializationError, match=r"with a delay of 0\.15 s"):
+        run(FlyerArmImpedance, tmp_path / "r", "delay=0.05", "navigation_delay=0.1")
+    late = run(FlyerArmImpedance, tmp_path / "late", "navigation_delay=0.004")
+    prompt = run(FlyerArmImpedance, tmp_path / "prompt")
+    assert metric(late, "pole_margin_impedance") < metric(prompt, "pole_margin_impedance")
+
+
+def test_a_nozzle_that_is_stuck_is_told(tmp_path: Path):
+    ended = run(FlyerArmImpedance, tmp_path / "r", "propulsion=nozzles", "stuck_nozzle=3", "force=0.2", "patience=10")
+    assert ended.outcome.reason.endswith("; nozzle 3 was stuck closed")
