@@ -65,11 +65,13 @@ class PullMonitor:
     def __init__(self, least: float, braking: float, time: float, period: float) -> None:
         self._least, self._braking, self._period = least, braking, period
         self._gain = 1.0 - math.exp(-period / time) if time > 0.0 else 1.0
-        self._speed, self._rate, self._pulled = 0.0, 0.0, False
+        self._speed: float | None = None
+        self._rate, self._pulled = 0.0, False
 
     def measure(self, speed: float, threshold: float) -> bool:
-        """Take in a speed, m/s; return whether the gripper is pulled."""
-        self._rate += self._gain * ((speed - self._speed) / self._period - self._rate)
+        """Take in a speed, m/s; return whether the gripper is pulled. The first speed is where the rate begins."""
+        before = speed if self._speed is None else self._speed
+        self._rate += self._gain * ((speed - before) / self._period - self._rate)
         self._speed = speed
         if speed <= threshold or self._rate < -self._braking:
             self._pulled = False
@@ -77,10 +79,10 @@ class PullMonitor:
             self._pulled = True
         return self._pulled
 
-    def get_state(self) -> tuple[float, float, bool]:
+    def get_state(self) -> tuple[float | None, float, bool]:
         """Return speed, its rate, and whether it is pulled."""
         return self._speed, self._rate, self._pulled
 
-    def set_state(self, state: tuple[float, float, bool]) -> None:
+    def set_state(self, state: tuple[float | None, float, bool]) -> None:
         """Restore a state that `get_state` gave."""
         self._speed, self._rate, self._pulled = state
