@@ -142,6 +142,12 @@ _ENTRIES = (
         "hand that takes and gives an object in microgravity",
     ),
     Entry(
+        "LargeObjectAndHands",
+        "handover.plants.free_flyer.large_object.large_object_and_hands:LargeObjectAndHands",
+        Fraction(2, 125),
+        "two hands that take and give a large object, which two robots grip",
+    ),
+    Entry(
         "ImpedanceController",
         "handover.controllers.free_flyer.impedance_controller:ImpedanceController",
         Fraction(2, 125),
@@ -170,6 +176,12 @@ _ENTRIES = (
         "handover.controllers.free_flyer.handover_state_machine:HandoverStateMachine",
         Fraction(2, 125),
         "decides when to fly, yield, signal, hold and let go",
+    ),
+    Entry(
+        "HandoverTeam",
+        "handover.controllers.free_flyer.handover_team:HandoverTeam",
+        Fraction(2, 125),
+        "decides the same for two robots that hold one object, together",
     ),
     Entry(
         "GraspScene",
@@ -248,7 +260,9 @@ def import_class(path: str) -> type[Any]:
     except (Exception, SystemExit) as e:  # a module may raise anything while it is loaded
         fault = f"its module cannot be loaded{_line_of(e, module_name)}: {type(e).__name__}: {one_line(e)}"
         if isinstance(e, ModuleNotFoundError) and e.name == module_name:
-            fault = f"there is no module {module_name!r}, neither installed nor in {Path.cwd()}"
+            near = nearest(module_name, [file.stem for file in Path.cwd().glob("*.py")])
+            hint = f"; {near}" if near.startswith("did you mean") else ""
+            fault = f"there is no module {module_name!r}, neither installed nor in {Path.cwd()}{hint}"
         elif isinstance(e, SystemExit):
             fault = f"its module calls sys.exit({e.code!r}) as it is loaded{_line_of(e, module_name)}"
         elif is_of_a_package(e):

@@ -10,7 +10,7 @@ import re
 import sys
 
 _OWN = "handover-cosim"
-_DISTRIBUTIONS = {"cv2": "opencv-python-headless"}
+_DISTRIBUTIONS = {"cv2": "opencv-python-headless", "imageio_ffmpeg": "imageio-ffmpeg"}
 """The distributions of modules that are not named like them."""
 
 _MISSING_LIBRARY = re.compile(r"(?:^|[\s'\"])([\w.+-]+\.so[.\d]*): cannot open shared object file")
@@ -59,7 +59,7 @@ def debian_package(library: str) -> str:
 def missing_modules(extra: str) -> list[str]:
     """Return the modules that an extra of this project brings and that are not installed."""
     modules = {distribution: module for module, distribution in _DISTRIBUTIONS.items()}
-    wanted = [modules.get(name, name) for name, of in _requirements() if of == extra]
+    wanted = [modules.get(name, name) for name, of in _requirements() if of == extra and name != _OWN]
     return [module for module in wanted if importlib.util.find_spec(module) is None]
 
 

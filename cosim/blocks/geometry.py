@@ -80,6 +80,12 @@ def quaternion_of(R_AB: Floats) -> Floats:
     return np.array([w, x, y, z] if (w, x, y, z) >= (0.0, 0.0, 0.0, 0.0) else [-w, -x, -y, -z])
 
 
+def skew(v: Floats) -> Floats:
+    """Return [v]x, shape (3, 3), of v, shape (3,): [v]x a is the cross product v x a."""
+    x, y, z = np.asarray(v, dtype=np.float64).tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
 def looking_at(p_WC: Floats, p_WT: Floats) -> Floats:
     """Return R_WC of a camera at p_WC that looks at p_WT and keeps the horizon level (x horizontal, y down)."""
     z = np.asarray(p_WT, dtype=np.float64) - p_WC

@@ -1,4 +1,4 @@
-"""Start values that a unit has lost when it enters initialization mode: set there again, and told where that fails.
+"""Start values as numbers; those lost as a unit enters initialization mode are set there again, or told of.
 
 Both standards let parameters and start values be set before initialization mode and in it (FMI 2.0.4, sec. 4.2.4; FMI
 3.0, sec. 2.3.2 and 2.3.3). Some units set all of them back as the experiment is set up.
@@ -15,6 +15,8 @@ from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.buffers import SignalBuffer, Views, content_of
 from handover.cosim.fmu.description import FmuDescription, FmuPort, indices_of
+
+_BOOLEANS = {"true": 1, "1": 1, "false": 0, "0": 0}
 
 _ROUNDING = {4: 1e-6, 8: 1e-12}
 """Relative difference of reals by their width in bytes that is rounding, as by a unit that keeps degrees in radians."""
@@ -98,3 +100,33 @@ def _differences(unit: str, port: FmuPort, value: Any, views: Views) -> list[Los
     indices = indices_of(port.shape)
     elements = [(i, f"[{','.join(map(str, indices[i]))}]" if port.shape else "") for i in np.flatnonzero(differs)]
     return [LostValue(name + index, f"{wanted[i].item()!r}", f"{numbers[i].item()!r}") for i, index in elements]
+
+
+def entries_of(port: FmuPort, start: Mapping[str, Any]) -> list[Any]:
+    """Return the entries of a port's start value, the given one or its FMU's; 0 where there is none."""
+    if port.name in start:
+        return numbers_of(port, start[port.name]).tolist()
+    texts = (port.start or "0").split() or ["0"]
+    entries = [parsed_number(port, text) for text in texts]
+    return entries * port.size if len(entries) == 1 else entries
+
+
+def parsed_number(port: FmuPort, text: str) -> int | float:
+    """Return a number, boolean or item of a port that a text says.
+
+    Raises:
+        ValueError: it says none, with what would be right.
+    """
+    if port.kind is Kind.BOOLEAN:
+        if text.lower() not in _BOOLEANS:
+            raise ValueError("true, false, 1 or 0 is right")
+        return _BOOLEANS[text.lower()]
+    if port.kind is Kind.ENUMERATION:
+        items = {name.upper(): value for name, value in port.items} | {str(value): value for _, value in port.items}
+        if text.upper() not in items:
+            raise ValueError(f"one of {', '.join(name.lower() for name, _ in port.items)} is right")
+        return items[text.upper()]
+    try:
+        return int(text) if port.kind is Kind.INTEGER else float(text)
+    except ValueError:
+        raise ValueError(f"a {'whole ' if port.kind is Kind.INTEGER else ''}number is right") from None

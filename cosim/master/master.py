@@ -20,13 +20,14 @@ from handover.cosim.master.pacing import Pacer
 from handover.cosim.master.stepper_factory import StepperFactory
 from handover.cosim.master.watchdog import Watchdog
 from handover.cosim.plan.plan_stepper import PlanStepper
+from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper
 from handover.cosim.stepping.ensemble import CleanupStack, Ensemble
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.stepping.step_control import StepStatistics
 from handover.cosim.stepping.stepper import Coupling, Stepper
-from handover.cosim.system.signals import Observer, Signals
+from handover.cosim.system.signals import ObserveAfter, Observer, Signals
 from handover.cosim.system.system import System
 
 T = TypeVar("T")
@@ -39,6 +40,13 @@ _PLAIN = MasterOptions()
 def never() -> bool:
     """Let a run continue to its stop time."""
     return False
+
+
+def _recorders(observers: Sequence[Observer]) -> Sequence[Observer]:
+    """Return the first of the observers if it records, also from a time on; else none."""
+    first = observers[0] if observers else None
+    records = isinstance(first.observe if isinstance(first, ObserveAfter) else first, Recorder)
+    return observers[: int(records)]
 
 
 def _tell_of_faults(system: System, *, strict: bool) -> dict[Path, str]:
@@ -278,6 +286,9 @@ class Master:
         if self.pacer is not None:
             self.pacer.start(self.time)
         last, arriving = self.schedule.ticks(stop), True
+        wait = None if self.pacer is None else self._waiting(until)
+        if self.ensemble.external_inputs:  # these wait before they ask
+            self.ensemble.external_inputs.wait, wait = wait, None
         if len(observers) > 1:  # a recorder alone does not bring the plan back to Python at each point
             observers = [*observers, lambda _t, _signals: self.ensemble.host.restore_if_due()]
         try:
@@ -290,10 +301,13 @@ class Master:
                 ended = self.stepper.arrive(last)
                 if self.heartbeat.stopped:
                     raise Abandoned
-                if self.pacer is not None:
-                    self._pause(until)()
                 self.ensemble.host.restore_arithmetic()
-                for observe in observers:
+                recorders = _recorders(observers)
+                for observe in recorders:  # before the wait, as of a plan: who watches a record sees it at once
+                    observe(self.stepper.time, signals)
+                if wait is not None:
+                    wait(self.stepper.time)
+                for observe in observers[len(recorders) :]:
                     observe(self.stepper.time, signals)
                 if ended or until():
                     break
@@ -327,11 +341,20 @@ class Master:
         exact = self.schedule.time(round(Fraction(t) / self.schedule.tick))
         return exact if is_rounding(t - exact, exact) else t
 
+    def _waiting(self, until: Callable[[], bool]) -> Callable[[float], None]:
+        """Return a function that waits until the wall clock has reached a simulated time, s."""
+
+        def wait(t: float) -> None:
+            if self.pacer is not None:
+                self.pacer.wait(t, lambda: self.heartbeat.stopped or until())
+
+        return wait
+
     def _pause(self, until: Callable[[], bool]) -> Callable[[], None]:
-        """Return a function that waits until the wall clock has reached the simulated time."""
+        """Return a function that waits until the wall clock has reached the simulated time that the run has reached."""
+        wait = self._waiting(until)
 
         def pause() -> None:
-            if self.pacer is not None:
-                self.pacer.wait(self.time, lambda: self.heartbeat.stopped or until())
+            wait(self.time)
 
         return pause

@@ -73,6 +73,11 @@ class Pacer:
         """Count the wall clock from now, at simulated time t in seconds."""
         self._t_0, self._w_0 = t, self._clock()
 
+    def restart(self, pace: float, t: float) -> None:
+        """Begin anew at another pace, at simulated time t in seconds; the report, too."""
+        self._pace, self._report = pace, PaceReport(pace, 0, 0, 0.0, None)
+        self.start(t)
+
     def wait(self, t: float, ended: Callable[[], bool]) -> None:
         """Wait until simulated time t in seconds is due, or until `ended()` says that the run is to end."""
         if t <= self._t_0:

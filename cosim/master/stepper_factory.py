@@ -15,7 +15,7 @@ from handover.cosim.stepping.interface import Interface
 from handover.cosim.stepping.jacobi import Jacobi
 from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
 from handover.cosim.stepping.solvers import FixedPoint, InterfaceNewton, InterfaceSolver
-from handover.cosim.stepping.stepper import Coupling, GridStepper, Stepper
+from handover.cosim.stepping.stepper import AskingCoupling, Coupling, GridStepper, Stepper
 from handover.cosim.system.loops import Group, check_cycles, check_loops, groups_of_data_flow
 from handover.cosim.system.schedule import Schedule
 from handover.cosim.system.system import System
@@ -60,11 +60,18 @@ class StepperFactory:
     def initialize(self, ensemble: Ensemble) -> None:
         """Take the units through initialisation mode; algebraic loops are solved."""
         schedule = self.schedule
+        ensemble.external_inputs.ask(0.0)
         values = InitialValues(ensemble, schedule.initial_groups, schedule.initial_passes, self._solver)
         ensemble.initialize(schedule.slots, values)
 
     def couple(self, ensemble: Ensemble) -> Coupling:
-        """Return the coupling of the algorithm."""
+        """Return the coupling of the algorithm; where there are inputs from outside, it asks for them."""
+        coupling = self._coupling(ensemble)
+        if not ensemble.external_inputs or self._options.adaptive is not None:  # an adaptive stepper asks by itself
+            return coupling
+        return AskingCoupling(coupling, ensemble.external_inputs)
+
+    def _coupling(self, ensemble: Ensemble) -> Coupling:
         match self._options.algorithm:
             case Algorithm.JACOBI:
                 return Jacobi(ensemble, self.schedule.groups, self._solver)

@@ -51,6 +51,8 @@ def _obstacle(schedule: Schedule, ensemble: Ensemble, options: MasterOptions, it
         return "inputs are extrapolated"
     if ensemble.system.followed:
         return "inputs follow values over time"
+    if ensemble.external_inputs:
+        return "inputs come from outside"
     if max(schedule.tick.numerator, schedule.tick.denominator) >= _MAX_TICKS:
         return f"a tick of {schedule.tick} s is too long a fraction"
     return None

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.exceptions import nearest
 from handover.cosim.system.signals import Signals
+from handover.cosim.system.time_series import TimeSeries
 
 SUBSCRIPT = re.compile(r"\[(\d+(?:,\d+)*)\]$")
 """The end of a column's name that is an entry of an array, counted from 1."""
@@ -47,6 +48,23 @@ class Record:
             return self._values(names[0])
         shape = tuple(int(i) for i in last_subscript[1].split(","))
         return np.column_stack([self._values(n) for n in names]).reshape(-1, *shape)
+
+    def series(self, signal: str) -> TimeSeries:
+        """Return a signal's values as they were held, for an input that is to take them once more.
+
+        The inputs of a run from outside, given to those of another by `System.external`, let that one do the same.
+
+        Raises:
+            KeyError: no such signal was recorded.
+        """
+        return TimeSeries(self.time, self[signal].reshape(len(self.time), -1), linear=False)
+
+    def row(self, k: int) -> "Record":
+        """Return the record of one row alone, counted from 0, or from the last by -1."""
+        one = Record.__new__(Record)
+        one._table = self._table.slice(range(len(self.time))[k], 1)
+        one._columns, one.time = self._columns, self.time[[k]]
+        return one
 
     @property
     def signals(self) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 import contextlib
 import json
 import mmap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from handover.cosim.record.file_lock import FileLocked, lock_file, unlock_file
 
-_MAGIC = b"HANDOVER"
-_HEADER = np.dtype([("magic", "S8"), ("layout", "<i8"), ("filled", "<i8"), ("first", "<i8")])
+MAGIC = b"HANDOVER"
+HEADER = np.dtype([("magic", "S8"), ("layout", "<i8"), ("filled", "<i8"), ("first", "<i8")])
 _ALIGNMENT = 64
 _BYTES = 2**22
 _MIN_ROWS, _MAX_ROWS = 16, 4096
@@ -52,22 +52,17 @@ class RecordBlock:
     """
 
     def __init__(self, file: mmap.mmap, handle: Any, sources: Sequence[NDArray[Any]] | None = None) -> None:
-        header = np.frombuffer(file, dtype=_HEADER, count=1)
-        if header["magic"][0] != _MAGIC:
+        header = np.frombuffer(file, dtype=HEADER, count=1)
+        if header["magic"][0] != MAGIC:
             raise DamagedTail("it does not begin as the last rows of a record do")
         size = int(header["layout"][0])
-        self.layout: dict[str, Any] = json.loads(file[_HEADER.itemsize : _HEADER.itemsize + size])
+        self.layout: dict[str, Any] = json.loads(file[HEADER.itemsize : HEADER.itemsize + size])
         self._file, self._handle = file, handle
-        self.counters: NDArray[np.int64] = np.frombuffer(file, dtype=np.int64, count=2, offset=16)
         self.capacity = int(self.layout["capacity"])
-        offset = _aligned(_HEADER.itemsize + size)
-        self.time: NDArray[np.float64] = np.frombuffer(file, dtype=np.float64, count=self.capacity, offset=offset)
-        offset = _aligned(offset + self.time.nbytes)
+        self.counters, self.time, rows = block_arrays(file, self.layout, HEADER.itemsize + size)
         self.parts: list[Part] = []
         for i, (dtype, n) in enumerate(self.layout["parts"]):
-            flat: NDArray[Any] = np.frombuffer(file, dtype=dtype, count=self.capacity * n, offset=offset)
-            self.parts.append(Part(sources[i] if sources is not None else np.zeros(n, dtype), flat.reshape(-1, n)))
-            offset = _aligned(offset + flat.nbytes)
+            self.parts.append(Part(sources[i] if sources is not None else np.zeros(n, dtype), rows[i]))
 
     @classmethod
     def create(cls, path: Path, sources: Sequence[NDArray[Any]], about: dict[str, Any]) -> "RecordBlock":
@@ -82,14 +77,14 @@ class RecordBlock:
         row = 8 + sum(a.itemsize * len(a) for a in sources)
         capacity = min(max(_BYTES // row, _MIN_ROWS), _MAX_ROWS)
         layout = json.dumps({**about, "capacity": capacity, "parts": parts}).encode()
-        size = _aligned(_aligned(_HEADER.itemsize + len(layout)) + 8 * capacity)
+        size = _aligned(_aligned(HEADER.itemsize + len(layout)) + 8 * capacity)
         for a in sources:
             size = _aligned(size + a.itemsize * len(a) * capacity)
         handle = open(path, "a+b")  # noqa: SIM115 (kept open: it carries the lock)
         try:
             lock_file(handle)
             handle.truncate(0)
-            header = np.array([(_MAGIC, len(layout), 0, 0)], dtype=_HEADER)
+            header = np.array([(MAGIC, len(layout), 0, 0)], dtype=HEADER)
             handle.write((header.tobytes() + layout).ljust(size, b"\0"))
             handle.flush()
             return cls(mmap.mmap(handle.fileno(), size), handle, sources)
@@ -151,6 +146,22 @@ class RecordBlock:
         self.counters, self.time, self.parts = np.zeros(2, dtype=np.int64), np.zeros(0), []
         with contextlib.suppress(BufferError):  # an array of it is held elsewhere
             self._file.close()
+
+
+def block_arrays(
+    file: mmap.mmap, layout: Mapping[str, Any], end: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64], list[NDArray[Any]]]:
+    """Return counters, times and the rows of each part of a block's file, whose layout ends at a byte."""
+    counters: NDArray[np.int64] = np.frombuffer(file, dtype=np.int64, count=2, offset=16)
+    capacity, offset = int(layout["capacity"]), _aligned(end)
+    time: NDArray[np.float64] = np.frombuffer(file, dtype=np.float64, count=capacity, offset=offset)
+    offset = _aligned(offset + time.nbytes)
+    parts: list[NDArray[Any]] = []
+    for dtype, n in layout["parts"]:
+        flat: NDArray[Any] = np.frombuffer(file, dtype=dtype, count=capacity * n, offset=offset)
+        parts.append(flat.reshape(-1, n))
+        offset = _aligned(offset + flat.nbytes)
+    return counters, time, parts
 
 
 def _aligned(n: int) -> int:

@@ -27,7 +27,7 @@ from handover.cosim.ssp.xml import (
 )
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.schedule import common_divisor
-from handover.cosim.system.system import Connection, PlacedUnit, System
+from handover.cosim.system.system import Connection, PlacedUnit, PortName, System
 
 Items = tuple[tuple[str, int], ...]
 
@@ -152,7 +152,7 @@ def write_ssp(
     It is of version 1.0 if all units are of FMI 2, else of 2.0. A communication step other than the one that an FMU
     proposes is written to an annotation, which other tools may ignore; the steps for tools that step all units in
     parallel are annotated as OMSimulator, libcosim and Ecos read them. A conversion of units is written as a linear
-    transformation, as not every tool converts.
+    transformation, as not every tool converts. An input that comes from outside is a connector of the system.
 
     Args:
         system: the system.
@@ -203,7 +203,8 @@ class _Structure:
         self._system, self._version, self._files, self._sets = system, version, files, sets
         self._parallel_step = parallel_step
         self._base = parallel_step or common_divisor([u.period for u in system.units.values()])
-        self._connected = {end for c in system.connections for end in (c.source, c.target)}
+        self._external = [PortName(unit, port) for unit, ports in system.externals.items() for port in ports]
+        self._connected = {*self._external, *(end for c in system.connections for end in (c.source, c.target))}
         self._types = DescribedTypes(p for u in system.units.values() for p in self._shown(u))
 
     def content(self, name: str, stop: Fraction | None) -> bytes:
@@ -211,6 +212,7 @@ class _Structure:
         root = root_element("ssd:SystemStructureDescription", self._version, name)
         root.attrib.update({"xmlns:oms": OMS_NAMESPACE, "xmlns:osp": OSP_NAMESPACE})
         system = ET.SubElement(root, "ssd:System", name=name)
+        self._add_external_connectors(system)
         elements = ET.SubElement(system, "ssd:Elements")
         for unit in self._system.units.values():
             self._add_component(elements, unit)
@@ -234,6 +236,16 @@ class _Structure:
         ET.SubElement(ET.SubElement(oms, "oms:SimulationInformation"), "oms:FixedStepMaster", {**step, **tolerances})
         if self._parallel_step is not None:
             _add_step(annotations, parallel=str(self._parallel_step))
+
+    def _add_external_connectors(self, system: ET.Element) -> None:
+        """Add a connector of the system for each input that comes from outside."""
+        connectors = ET.SubElement(system, "ssd:Connectors") if self._external else system
+        for end in self._external:
+            port = self._system.units[end.unit].description.inputs[end.port]
+            for name in entry_names(port):
+                connector = ET.SubElement(connectors, "ssd:Connector", name=f"{end.unit}.{name}", kind="input")
+                self._types.add_type(connector, "ssc", port)
+                add_dimensions(connector, port.shape if len(port.references) == 1 else ())
 
     def _shown(self, unit: PlacedUnit) -> list[FmuPort]:
         """Return a unit's inputs and outputs, of the enumerations only what is connected: see `bound_values`."""
@@ -268,7 +280,11 @@ class _Structure:
 
     def _add_connections(self, system: ET.Element) -> None:
         connections, clocks = self._system.connections, self._system.clock_connections()
-        parent = ET.SubElement(system, "ssd:Connections") if connections else system
+        parent = ET.SubElement(system, "ssd:Connections") if connections or self._external else system
+        for end in self._external:
+            for name in entry_names(self._system.units[end.unit].description.inputs[end.port]):
+                ends = {"startConnector": f"{end.unit}.{name}", "endElement": end.unit, "endConnector": name}
+                _add_connection(parent, ends, None)
         faults: list[str] = []
         for c in connections:
             if c in clocks:

@@ -93,6 +93,7 @@ class AdaptiveStepper:
     def arrive(self, last: int) -> bool:
         """Let the sampled units that are due act; see `Stepper`."""
         self._last = last * self._per_tick
+        self._ensemble.external_inputs.ask(self.time)  # not the coupling, which also arrives where steps are tried
         due = [s for s in self._schedule.sampled if self._due[s.unit] == self._tick > self._acted[s.unit]]
         self._coupling.arrive(self.time, due, ())
         for slot in due:
@@ -126,6 +127,7 @@ class AdaptiveStepper:
             "acted": dict(self._acted),
             "wanted": self._wanted,
             "coupling": self._coupling.get_state(),
+            "external": self._ensemble.external_inputs.get_state(),
             "controller": self._controller.get_state(),
             "largest": self._error.get_state(),
             "statistics": dataclasses.asdict(self.statistics),
@@ -138,6 +140,7 @@ class AdaptiveStepper:
         self._due, self._acted = dict(state["due"]), dict(state["acted"])
         self.time = self._seconds(self._tick)
         self._coupling.set_state(state["coupling"])
+        self._ensemble.external_inputs.set_state(state["external"])
         self._controller.set_state(state["controller"])
         self._error.set_state(state["largest"])
         self.statistics = StepStatistics(**state["statistics"])

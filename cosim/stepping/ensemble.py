@@ -23,6 +23,7 @@ from handover.cosim.fmu.host_process import HostProcess
 from handover.cosim.fmu.instance import Instance
 from handover.cosim.fmu.loaded_libraries import note_libraries
 from handover.cosim.fmu.start_values import LostValue, keep_start
+from handover.cosim.stepping.external_inputs import ExternalInputs
 from handover.cosim.stepping.extrapolation import LinearExtrapolation, Memory
 from handover.cosim.stepping.transfers import Feeding, FiniteCheck, feedings, finite_checks
 from handover.cosim.system.schedule import Slot
@@ -131,6 +132,7 @@ class Ensemble:
         try:
             self._load()
             self._feedings = feedings(system, self.instances)
+            self.external_inputs = ExternalInputs(system, self.instances)
             self._finite = finite_checks(system, self.instances)
         except BaseException:
             if cleanups is None:
@@ -146,9 +148,14 @@ class Ensemble:
         self._cleanups.close()
 
     def signals(self) -> Signals:
-        """Return the units' outputs as they are."""
+        """Return the units' outputs and the inputs that come from outside, as they are."""
         ports = {n: u.description.outputs for n, u in self.system.units.items()}
-        return Signals({n: i.y for n, i in self.instances.items()}, ports, self)
+        views = {n: i.y for n, i in self.instances.items()}
+        for name, inputs in self.system.externals.items():
+            instance = self.instances[name]
+            ports[name] = {**ports[name], **{port: instance.description.inputs[port] for port in inputs}}
+            views[name] = {**views[name], **{port: instance.u[port] for port in inputs}}
+        return Signals(views, ports, self)
 
     def initialize(self, slots: Sequence[Slot], compute_values: Callable[[], None]) -> None:
         """Take all units through initialisation mode.
@@ -212,7 +219,8 @@ class Ensemble:
         """
         sources = self.system.sources_of(unit)
         ports = [port for port, s in sources.items() if s.unit in known]
-        self.instances[unit].set_some_inputs([*ports, *self.system.followed.get(unit, ())])
+        free = [port for port in self.system.fed_inputs(unit) if port not in sources]
+        self.instances[unit].set_some_inputs([*ports, *free])
 
     def gather(self, unit: str, t: float) -> None:
         """Copy to a unit's buffers what its sources give, and what inputs follow over time at t.

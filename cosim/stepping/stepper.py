@@ -7,6 +7,7 @@ these get inputs, step and give outputs.
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
+from handover.cosim.stepping.external_inputs import ExternalInputs
 from handover.cosim.stepping.extrapolation import LinearExtrapolation
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.system.schedule import Schedule, Slot
@@ -66,6 +67,41 @@ class Coupling(Protocol):
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Restore what `get_state` returned."""
         ...
+
+
+class AskingCoupling:
+    """A coupling that asks for the inputs from outside before it arrives at a communication point.
+
+    Args:
+        coupling: passes them on, and does all else.
+        inputs: what is asked for.
+    """
+
+    def __init__(self, coupling: Coupling, inputs: ExternalInputs) -> None:
+        self._coupling, self._inputs = coupling, inputs
+        self.count: IterationCount = coupling.count
+
+    def arrive(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:
+        """Ask, then bring the signals to what observers see at t.
+
+        Raises:
+            InvalidExternalValue: an input cannot take what its source gave.
+        """
+        self._inputs.ask(t)
+        self._coupling.arrive(t, sampled, continuous)
+
+    def depart(self, t: float, sampled: Sequence[Slot], continuous: Sequence[Slot]) -> None:
+        """Step the units that are due, from t."""
+        self._coupling.depart(t, sampled, continuous)
+
+    def get_state(self) -> Mapping[str, Any]:
+        """Return the coupling's state, and the values that hold."""
+        return {"coupling": self._coupling.get_state(), "external": self._inputs.get_state()}
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Restore what `get_state` returned."""
+        self._coupling.set_state(state["coupling"])
+        self._inputs.set_state(state["external"])
 
 
 class GridStepper:

@@ -71,6 +71,15 @@ class Signals:
             binaries[i] = binary
         return binaries.reshape(port.shape)
 
+    def plain(self, name: str) -> Any:
+        """Return what `signals[name].tolist()` does, a number of Python or a list of such, in less time.
+
+        Raises:
+            KeyError: there is no such output.
+        """
+        number = self._numbers.get(name)
+        return self[name].tolist() if number is None else number.tolist()
+
     def text(self, name: str) -> str:
         """Return a string signal's text, or the name of an enumeration signal's item; of an array, the first.
 

@@ -1,26 +1,25 @@
 """Units, their parameters and the connections between them, checked before anything is loaded.
 
 `System` collects what is wired, and `System.check` reports everything that is wrong with it: names, values, clocks,
-FMUs that a process may instantiate only once, and connections whose ports do not fit each other (see `mismatch`).
+FMUs that a process may instantiate only once, and connections whose ports do not fit each other.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from numbers import Rational
 from pathlib import Path
 from typing import Any
 
-from handover.cosim.blocks.start_values import fault_of
-from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import WiringError, nearest
 from handover.cosim.fmu.clocks import FmuClock
 from handover.cosim.fmu.default_experiment import NO_STEP, DefaultExperiment, NoStep, proposed_step
 from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
-from handover.cosim.system.conversion import LinearTransformation, conversion, needs_no_conversion
-from handover.cosim.system.time_series import TimeSeries
+from handover.cosim.system.conversion import LinearTransformation, conversion
+from handover.cosim.system.time_series import ExternalSource, NoSource, TimeSeries, external_fault
+from handover.cosim.system.wiring_faults import clock_mismatch, event_faults, mismatch, once_faults, value_faults
 
 
 @dataclass(frozen=True)
@@ -104,6 +103,8 @@ class System:
         self._sources: defaultdict[str, dict[str, PortName]] = defaultdict(dict)  # by unit, by input
         self.followed: defaultdict[str, dict[str, TimeSeries]] = defaultdict(dict)
         """By unit and input, the values over time that inputs follow."""
+        self.externals: defaultdict[str, dict[str, ExternalSource]] = defaultdict(dict)
+        """By unit and input, the sources of inputs that come from outside."""
         self.notes: list[str] = []
         """What who runs it should know before it starts, in lines: such as connections and values that its units do not
         have and need not have."""
@@ -167,6 +168,7 @@ class System:
                 del sources[port]
         self._sources[end.unit].pop(end.port, None)
         self.followed[end.unit].pop(end.port, None)
+        self.externals[end.unit].pop(end.port, None)
         unit = self.units[end.unit]
         self.units[end.unit] = replace(unit, start={n: x for n, x in unit.start.items() if n != end.port})
 
@@ -184,6 +186,24 @@ class System:
             raise TypeError(f"{target!r} is not a port: give unit.u.NAME of what add returned")
         self.followed[target.unit][target.port] = series
 
+    def external(self, target: PortName, source: ExternalSource | None = None) -> None:
+        """Let an input that no output feeds come from outside: its source is asked at each communication point.
+
+        Observers see the value as the signal `unit.port`, so a record holds it; a run whose sources are
+        `Record.series` of these does what the recorded one did, byte for byte. A second call puts another source in
+        the place of the first.
+
+        Args:
+            target: the input.
+            source: gives its values, in its unit; None gives none, and the input keeps its start value.
+
+        Raises:
+            TypeError: the target is not a port.
+        """
+        if not isinstance(target, PortName):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise TypeError(f"{target!r} is not a port: give unit.u.NAME of what add returned")
+        self.externals[target.unit][target.port] = NoSource() if source is None else source
+
     def check(self) -> None:
         """Check all names, values and connections.
 
@@ -192,7 +212,7 @@ class System:
         """
         faults = list(self._faults)
         for unit in self.units.values():
-            faults += _value_faults(unit)
+            faults += value_faults(unit.name, unit.description, unit.start)
             faults += event_faults(unit.name, unit.description, unit.sampled)
         faults += once_faults((u.name, u.description) for u in self.units.values())
         fed: dict[PortName, PortName] = {}
@@ -203,6 +223,8 @@ class System:
             fed[c.target] = c.source
         for unit, inputs in self.followed.items():
             faults += [f for port, series in inputs.items() if (f := self._series_fault(PortName(unit, port), series))]
+        for unit, inputs in self.externals.items():
+            faults += [f for port in inputs if (f := self._external_fault(PortName(unit, port)))]
         if faults:
             raise WiringError(faults)
 
@@ -245,7 +267,7 @@ class System:
 
     def fed_inputs(self, unit: str) -> list[str]:
         """Return the names of the inputs of a unit that are set during a run."""
-        return [*self.sources_of(unit), *self.followed.get(unit, ())]
+        return [*self.sources_of(unit), *self.followed.get(unit, ()), *self.externals.get(unit, ())]
 
     def clock_connections(self) -> list[Connection]:
         """Return the connections between clocks."""
@@ -302,6 +324,15 @@ class System:
         fault = fault or (series.fault(port) if port is not None else None)
         return f"{target}: {fault}" if fault else None
 
+    def _external_fault(self, target: PortName) -> str | None:
+        port, fault = self._find(target, "input")
+        if port is not None and target.port in self._sources.get(target.unit, {}):
+            fault = f"fed by {self._sources[target.unit][target.port]}, so it cannot come from outside"
+        elif port is not None and target.port in self.followed.get(target.unit, {}):
+            fault = "follows values over time, so it cannot come from outside"
+        fault = fault or (external_fault(port) if port is not None else None)
+        return f"{target}: {fault}" if fault else None
+
     def _find(self, end: PortName, role: str) -> tuple[FmuPort | None, str | None]:
         unit = self.units.get(end.unit)
         if unit is None:
@@ -315,85 +346,3 @@ class System:
         if end.port in others:
             return None, f"{end} is an {'input' if role == 'output' else 'output'}, not an {role}"
         return None, f"{end.unit} has no {role} {end.port!r}; {nearest(end.port, ports)}"
-
-
-def _value_faults(unit: PlacedUnit) -> list[str]:
-    ports = unit.description.settable
-    faults: list[str] = []
-    for name, value in unit.start.items():
-        if name not in ports:
-            faults.append(f"{unit.name} has no parameter or input {name!r}; {nearest(name, ports)}")
-            continue
-        fault = fault_of(ports[name], value)
-        if fault:
-            faults.append(f"{unit.name}.{name}: {fault}")
-    return faults
-
-
-def clock_mismatch(a: FmuClock | None, b: FmuClock | None) -> str | None:
-    """Return why two clocks cannot be connected, or None if they can; an end that is no clock is None."""
-    if a is None or b is None:
-        return "a clock can be connected with a clock only"
-    if a.is_input or not b.is_input:
-        return "an output clock triggers an input clock, not the other way round"
-    if not b.is_triggered:
-        return "it is time-based; only a triggered input clock can be connected"
-    return None
-
-
-def event_faults(name: str, description: FmuDescription, sampled: bool) -> list[str]:
-    """Return why a unit's clocked ports cannot be accessed as it is placed: that takes event mode."""
-    d = description
-    clocked = sorted(p.name for p in (*d.inputs.values(), *d.outputs.values()) if p.clocks)
-    if not clocked:
-        return []
-    fault = f"{name}: {', '.join(clocked)} can be reached only while a clock ticks, in event mode"
-    if not d.capabilities.event_mode:
-        return [f"{fault}, which its FMU does not have (hasEventMode)"]
-    return [f"{fault}; it cannot be placed as a sampled unit, which runs without"] if sampled else []
-
-
-def once_faults(units: Iterable[tuple[str, FmuDescription]]) -> list[str]:
-    """Return which FMUs are placed more than once though a process may hold only one instance of them."""
-    placed: Mapping[Path, list[str]] = defaultdict(list)
-    for name, d in units:
-        if d.capabilities.once_per_process:
-            placed[d.path.resolve()].append(name)
-    return [
-        f"{' and '.join(names)} are one FMU, {path.name}, of which a process may hold one instance only "
-        "(canBeInstantiatedOnlyOncePerProcess)"
-        for path, names in placed.items()
-        if len(names) > 1
-    ]
-
-
-def mismatch(a: FmuPort, b: FmuPort, transformation: LinearTransformation | None = None) -> str | None:
-    """Return why an output cannot feed an input, or None."""
-    if a.kind is not b.kind:
-        return f"{a.kind.value} cannot feed {b.kind.value}"
-    if a.shape != b.shape:
-        return "their shapes differ"
-    if transformation is not None:
-        return transformation.fault if a.kind is Kind.REAL else f"{a.kind.value} takes no linear transformation"
-    if a.kind is Kind.REAL and (fault := _unit_mismatch(a.unit, b.unit)):
-        return fault
-    if a.kind is Kind.ENUMERATION and a.items != b.items:
-        return "their enumerations have other items"
-    if a.kind is Kind.BINARY and a.mime != b.mime:
-        return "their MIME types differ"
-    return None
-
-
-def _unit_mismatch(a: Unit, b: Unit) -> str | None:
-    """Compare units by their definitions, not by their names; a variable without a unit fits any."""
-    if needs_no_conversion(a, b):
-        return None
-    if not (a.defined and b.defined):
-        undefined = b.symbol if a.defined else a.symbol
-        return f"the unit {undefined!r} is not defined in its FMU, so it cannot be compared"
-    if a.base != b.base:
-        return "their units differ in dimension"
-    unusable = next((u for u in (a, b) if not u.is_usable), None)
-    if unusable is not None and a != b:
-        return f"the unit {unusable.symbol!r} has the factor {unusable.factor!r} and the offset {unusable.offset!r}"
-    return None

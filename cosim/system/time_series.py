@@ -1,7 +1,7 @@
-"""Values that an input follows over time, given beforehand: between two instants on a line, or held."""
+"""Values that an input takes over time: given beforehand, on lines between instants or held, or from outside."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,8 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.description import FmuPort
 
-_FOLLOWING = (Kind.REAL, Kind.INTEGER, Kind.BOOLEAN, Kind.ENUMERATION)
+SETTABLE_KINDS = (Kind.REAL, Kind.INTEGER, Kind.BOOLEAN, Kind.ENUMERATION)
+"""Kinds of inputs that can follow values over time, or come from outside."""
 
 
 class TimeSeries:
@@ -54,7 +55,7 @@ class TimeSeries:
 
     def fault(self, port: FmuPort) -> str | None:
         """Return why an input cannot follow this, or None."""
-        if port.kind not in _FOLLOWING:
+        if port.kind not in SETTABLE_KINDS:
             return f"a {port.kind.value} cannot follow values over time"
         if port.clocks:
             return f"it can be set only while its clock {port.clocks[0]} ticks, so it cannot follow values over time"
@@ -84,3 +85,33 @@ class HeldValue(TimeSeries):
     def set(self, entries: Sequence[Any] | NDArray[Any]) -> None:
         """Hold another value of as many entries from now on."""
         self.values[0] = entries
+
+
+class ExternalSource(Protocol):
+    """Where the values of an input come from while a run goes on, see `System.external`. A `TimeSeries` is one."""
+
+    def at(self, t: float) -> "Sequence[Any] | NDArray[Any] | None":
+        """Return the entries for the communication point at t, s, in row-major order; None lets the value hold.
+
+        It is asked once at each communication point, at t = 0 before the units are initialised, and for all inputs
+        before any unit gets them, in the order in which they were declared: a source of several inputs, such as the
+        parts of a sample of a hand, takes the sample at the first of these questions.
+        """
+        ...
+
+
+class NoSource:
+    """A source that says nothing: the input keeps its start value."""
+
+    def at(self, t: float) -> None:  # noqa: ARG002
+        """Let the value hold."""
+        return
+
+
+def external_fault(port: FmuPort) -> str | None:
+    """Return why an input cannot come from outside, or None."""
+    if port.kind not in SETTABLE_KINDS:
+        return f"a {port.kind.value} cannot come from outside"
+    if port.clocks:
+        return f"it can be set only while its clock {port.clocks[0]} ticks, so it cannot come from outside"
+    return None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handover.cosim.blocks.geometry import quaternion_of, rotation_by, rotation_of
+from handover.cosim.blocks.geometry import quaternion_of, rotation_by, rotation_of, skew
 from handover.cosim.blocks.ports import Floats
 
 RANDOM = np.random.default_rng(0)
@@ -32,3 +32,8 @@ def test_matrix_of_a_rotation_vector(r: Floats):
 def test_a_quaternion_of_length_0_is_refused():
     with pytest.raises(ValueError, match="length 0"):
         rotation_of(np.zeros(4))
+
+
+def test_skew_is_the_matrix_of_a_cross_product():
+    v, a = np.array([0.3, -0.5, 0.7]), np.array([-1.1, 0.2, 0.4])
+    np.testing.assert_allclose(skew(v) @ a, np.cross(v, a), rtol=0.0, atol=1e-16)

@@ -1,6 +1,8 @@
 """A run keeps to the wall clock by absolute deadlines, and reports those that it missed; the clock here is a list."""
 
+from collections.abc import Callable
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 from native_units import native_fmu
@@ -8,7 +10,8 @@ from native_units import native_fmu
 from handover.cosim.exceptions import InvalidOptions
 from handover.cosim.master.master import Master
 from handover.cosim.master.pacing import Pacer, PaceReport
-from handover.cosim.stepping.options import MasterOptions
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.system import System
 
 
@@ -99,6 +102,47 @@ def test_the_master_lets_each_communication_point_wait():
         master.pacer = Pacer(0.5, clock, clock.sleep)
         master.run(Fraction(1, 10), [lambda t, _: seen.append((t, clock.now - 100.0))])
     assert [wall for _, wall in seen] == pytest.approx([2 * t for t, _ in seen], abs=0.001)
+    assert master.pacer.report.deadlines == 10
+
+
+class Paused(Pacer):
+    """Notes at each wait, in place of it, how many rows were recorded until then."""
+
+    def __init__(self, recorder: Recorder) -> None:
+        super().__init__(1.0)
+        self._recorder = recorder
+        self.waited: list[tuple[float, int]] = []
+
+    def wait(self, t: float, ended: Callable[[], bool]) -> None:  # noqa: ARG002
+        self.waited.append((t, self._recorder.rows))
+
+
+@pytest.mark.parametrize("algorithm", list(Algorithm))
+def test_a_row_is_recorded_before_the_wait_so_that_who_watches_sees_the_first_one(algorithm: Algorithm, tmp_path: Path):
+    s = System()
+    s.add("unit", native_fmu("trivial"), period=Fraction(1, 100))
+    options = MasterOptions(algorithm=algorithm, pace=1.0)
+    with Master(s, options) as master, Recorder(tmp_path / "a.parquet") as recorder:
+        master.pacer = pacer = Paused(recorder)
+        master.run(Fraction(3, 100), [recorder, lambda _t, _s: None])
+    assert pacer.waited == [(pytest.approx(0.01 * k), k + 1) for k in range(4)]
+
+
+def test_inputs_from_outside_are_asked_for_when_their_point_is_due():
+    s = System()
+    mass = s.add("mass", native_fmu("mass", 3))
+    clock = Clock()
+    asked: list[float] = []
+
+    class Source:
+        def at(self, t: float) -> None:
+            asked.append(clock.now - 100.0 - 2.0 * t)
+
+    s.external(mass.u.f, Source())
+    with Master(s, MasterOptions(pace=0.5)) as master:
+        master.pacer = Pacer(0.5, clock, clock.sleep)
+        master.run(Fraction(1, 10), [])
+    assert asked == pytest.approx([0.0] * 11, abs=0.001)
     assert master.pacer.report.deadlines == 10
 
 

@@ -50,6 +50,22 @@ def test_arrays_of_texts_and_of_binaries_have_their_shape():
     assert signals.text("text.y") == "\N{REPLACEMENT CHARACTER}"  # not UTF-8: shown, not refused
 
 
+def test_plain_values_are_those_of_the_arrays():
+    contents = [ctypes.create_string_buffer(b"one")]
+    texts = np.array([ctypes.addressof(contents[0])], dtype=np.uint64)
+    views = {"text": {"y": (texts,)}, "one": {"y": (np.array([0.1]),)}, "two": {"y": (np.array([True, False]),)}}
+    ports = {
+        "text": {"y": output(Kind.STRING, (), "String")},
+        "one": {"y": output(Kind.REAL, (), "Float64")},
+        "two": {"y": output(Kind.BOOLEAN, (2,), "Boolean")},
+    }
+    signals = Signals(views, ports, contents)
+    assert [signals.plain(f"{unit}.y") for unit in views] == ["one", 0.1, [True, False]]
+    assert [type(signals.plain(f"{unit}.y")) for unit in views] == [str, float, list]
+    with pytest.raises(KeyError, match=r"did you mean two\.y"):
+        signals.plain("two.z")
+
+
 def test_a_binary_is_an_array_of_bytes_and_an_unknown_name_is_refused():
     s = System()
     s.add("passer", native_fmu("binary_passer", 3), u=b"some bytes")

@@ -12,7 +12,8 @@ from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import InvalidFmu, WiringError
 from handover.cosim.fmu.default_experiment import proposed_step
 from handover.cosim.fmu.description import FmuPort
-from handover.cosim.system.system import System, mismatch
+from handover.cosim.system.system import System
+from handover.cosim.system.wiring_faults import mismatch
 
 M, NM = BaseExponents(m=1), BaseExponents(kg=1, m=2, s=-2)
 

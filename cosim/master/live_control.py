@@ -1,0 +1,146 @@
+"""Controls of a run that another process may use while it goes on: pace, pause, single steps and stop.
+
+They lie in a memory-mapped file of five numbers, which the run reads at each communication point. They say when a step
+is taken, never what is in it: the record is the same, byte for byte, at any pace.
+"""
+
+import contextlib
+import math
+import mmap
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handover.cosim.master.pacing import Pacer
+
+_FIELDS = np.dtype(
+    [("pace", "<f8"), ("paused", "<i8"), ("steps_asked", "<i8"), ("steps_taken", "<i8"), ("stop", "<i8")]
+)
+_SLICE = 0.02
+"""How often a run that waits looks whether it may go on, s."""
+
+
+class LiveControl:
+    """The controls of a run, in a file of both processes. Each number has one process that writes it.
+
+    Attributes, written by who controls the run:
+        pace: simulated seconds per second of wall time; infinite: as fast as it goes.
+        paused: whether the run waits at the communication point that it has reached.
+        steps_asked: how many points it was told to go on to nonetheless, in all.
+        stop: whether it is to end after its step.
+
+    Attributes, written by the run:
+        steps_taken: how many of these points it has gone on to, or will not as it is no longer paused.
+    """
+
+    def __init__(self, path: Path) -> None:
+        with open(path, "r+b") as file:
+            self._map = mmap.mmap(file.fileno(), _FIELDS.itemsize)
+        self._fields: Any = np.frombuffer(self._map, dtype=_FIELDS, count=1)[0]
+
+    @classmethod
+    def create(cls, path: Path, pace: float, *, paused: bool) -> "LiveControl":
+        """Make the file.
+
+        Raises:
+            OSError: it cannot be made.
+        """
+        path.write_bytes(np.array([(pace, int(paused), 0, 0, 0)], dtype=_FIELDS).tobytes())
+        return cls(path)
+
+    @property
+    def pace(self) -> float:  # noqa: D102 (see the class, also below)
+        return float(self._fields["pace"])
+
+    @pace.setter
+    def pace(self, value: float) -> None:
+        self._fields["pace"] = value
+
+    @property
+    def paused(self) -> bool:  # noqa: D102
+        return bool(self._fields["paused"])
+
+    @paused.setter
+    def paused(self, value: bool) -> None:
+        self._fields["paused"] = value
+
+    @property
+    def stop(self) -> bool:  # noqa: D102
+        return bool(self._fields["stop"])
+
+    @stop.setter
+    def stop(self, value: bool) -> None:
+        self._fields["stop"] = value
+
+    def ask_for_step(self) -> None:
+        """Pause the run, and let it go on to one more communication point."""
+        self._fields["steps_asked"] += 1
+        self.paused = True
+
+    def take_step(self) -> bool:
+        """Take a step that was asked for; return whether there was one."""
+        left = bool(self._fields["steps_taken"] < self._fields["steps_asked"])
+        self._fields["steps_taken"] += int(left)
+        return left
+
+    def forget_steps(self) -> None:
+        """Count all steps that were asked for as taken: the run is not paused."""
+        self._fields["steps_taken"] = self._fields["steps_asked"]
+
+    def close(self) -> None:
+        """Release the file."""
+        self._fields = np.zeros(1, dtype=_FIELDS)[0]
+        with contextlib.suppress(BufferError):
+            self._map.close()
+
+
+class ControlledPacer(Pacer):
+    """Lets a run wait for the wall clock as its controls say, which may change at any time.
+
+    Deadlines count from the last change of pace, and from the end of the last pause; so does the report.
+    """
+
+    def __init__(self, control: LiveControl) -> None:
+        super().__init__(_finite(control.pace))
+        self._control = control
+        self._current: float = control.pace
+        self._last = 0.0
+
+    def wait(self, t: float, ended: Callable[[], bool]) -> None:
+        """Wait until simulated time t in seconds is due by the controls, or until `ended()` says that the run ends."""
+        control, waited = self._control, False
+        while not ended():
+            if control.paused:
+                waited = True
+                if control.take_step():
+                    break
+                time.sleep(_SLICE)
+                continue
+            control.forget_steps()
+            if waited:
+                break
+            if control.pace != self._current:
+                self._current = control.pace
+                self.restart(_finite(self._current), self._last)
+            if math.isinf(self._current) or self._is_due(t, ended):
+                break
+        if waited:
+            self.restart(_finite(self._current), t)
+        self._last = t
+
+    def _is_due(self, t: float, ended: Callable[[], bool]) -> bool:
+        """Wait until t is due; return whether it is, and not paused or at another pace before."""
+        control = self._control
+
+        def changed() -> bool:
+            return ended() or control.paused or control.pace != self._current
+
+        super().wait(t, changed)
+        return not changed()
+
+
+def _finite(pace: float) -> float:
+    return pace if math.isfinite(pace) else 1.0

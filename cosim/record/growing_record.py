@@ -1,0 +1,96 @@
+"""The newest row of a record that a running process writes, read by another one without a word to it.
+
+The rows of a run under way lie in a memory-mapped file (`signals.tail`, see `RecordBlock`), whose counters are raised
+only after a row is whole. Who maps that file, too, sees each row as it comes; the run knows nothing of it.
+"""
+
+import json
+import mmap
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handover.cosim.record.columns import column_metadata
+from handover.cosim.record.reader import SUBSCRIPT, Record
+from handover.cosim.record.stream import stream_of, stream_schema, tail_of
+from handover.cosim.record.tail import HEADER, MAGIC, DamagedTail, block_arrays
+
+_TRIES = 20
+"""How often a row is read anew that the run overwrites meanwhile."""
+
+
+class NoRows(Exception):
+    """The run has not written its first row yet, or has completed its record already."""
+
+
+class GrowingRecord(Record):
+    """A record of one row, the newest at the last `refresh`; signals, units and items are as in any record.
+
+    Args:
+        path: where the record will be (`signals.parquet`).
+
+    Raises:
+        NoRows: it is not under way: not begun, or complete.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            self._schema = stream_schema(stream_of(path))
+            with open(tail_of(path), "rb") as file:
+                self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+            header = np.frombuffer(self._map, dtype=HEADER, count=1)
+            if header["magic"][0] != MAGIC:
+                raise NoRows
+            size = int(header["layout"][0])
+            layout = json.loads(self._map[HEADER.itemsize : HEADER.itemsize + size])
+            self._counters, self._times, self._rows = block_arrays(self._map, layout, HEADER.itemsize + size)
+        except (OSError, ValueError, DamagedTail) as e:
+            raise NoRows from e
+        self.places: dict[str, tuple[int, int]] = dict(zip(self._schema.names[1:], layout["places"], strict=True))
+        """By column, the part of a row and the index in it."""
+        self._columns: dict[str, list[str]] = {}
+        for name in self._schema.names:
+            self._columns.setdefault(SUBSCRIPT.sub("", name), []).append(name)
+        self._about = dict(column_metadata(self._schema))
+        self.newest: list[NDArray[Any]] = []
+        """The values of the newest row, in the block's parts."""
+        self.count = 0
+        """Rows of the record until the one that is shown."""
+        self.time = np.zeros(0)
+        if not self.refresh():
+            raise NoRows
+
+    def refresh(self) -> bool:
+        """Read the newest row; return whether there is one that was not seen before."""
+        for _ in range(_TRIES):
+            filled, first = (int(n) for n in self._counters)
+            if not filled or filled + first == self.count:
+                return False
+            i = filled - 1
+            row = [rows[i].copy() for rows in self._rows]
+            time = float(self._times[i])
+            if int(self._counters[1]) == first and int(self._counters[0]) >= filled:
+                self.newest, self.time, self.count = row, np.array([time]), filled + first
+                return True
+        return False
+
+    def close(self) -> None:
+        """Release the file; the row that was read stays."""
+        self._rows, self._times, self._counters = [], np.zeros(0), np.zeros(2, dtype=np.int64)
+        self._map.close()
+
+    def metadata(self, signal: str) -> dict[bytes, bytes]:
+        """Return unit, description and items of a signal, as in the record's schema."""
+        about = self._about[self._columns[signal][0]]
+        return {key.encode(): value.encode() for key, value in about.items()}
+
+    def _metadata(self, signal: str) -> dict[bytes, bytes]:
+        return self.metadata(signal)
+
+    def _values(self, name: str) -> NDArray[Any]:
+        if name == "time":
+            return self.time
+        part, index = self.places[name]
+        return self.newest[part][index : index + 1]

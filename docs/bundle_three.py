@@ -1,0 +1,44 @@
+"""Make `scenarios/reporting/page/three.min.js` anew: the parts of three.js that `scene.js` uses, in one file.
+
+Needs npm. The version is pinned below; the licence is copied beside the file.
+
+    python docs/bundle_three.py
+"""
+
+import re
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+THREE, ESBUILD = "0.187.0", "0.28.1"
+PAGE = Path(__file__).parents[1] / "scenarios" / "reporting" / "page"
+ADDONS = {
+    "OrbitControls": "controls/OrbitControls.js",
+    "LineSegments2": "lines/LineSegments2.js",
+    "LineSegmentsGeometry": "lines/LineSegmentsGeometry.js",
+    "LineMaterial": "lines/LineMaterial.js",
+}
+
+
+def main() -> None:
+    """Bundle what `scene.js` names after `THREE.`."""
+    names = set(re.findall(r"\bTHREE\.(\w+)", (PAGE / "scene.js").read_text(encoding="utf-8")))
+    core = ", ".join(sorted(names - set(ADDONS)))
+    lines = [f'export {{ {core} }} from "three";']
+    lines += [f'export {{ {name} }} from "three/addons/{path}";' for name, path in ADDONS.items() if name in names]
+    with tempfile.TemporaryDirectory() as folder:
+        there = Path(folder)
+        (there / "entry.js").write_text("\n".join(lines), encoding="utf-8")
+        (there / "package.json").write_text("{}", encoding="utf-8")
+        run = ["npm", "install", "--silent", f"three@{THREE}", f"esbuild@{ESBUILD}"]
+        subprocess.run(run, cwd=there, check=True)
+        bundle = ["npx", "esbuild", "entry.js", "--bundle", "--minify", "--format=iife", "--global-name=THREE"]
+        subprocess.run([*bundle, "--legal-comments=none", "--outfile=three.min.js"], cwd=there, check=True)
+        told = f"/* three.js {THREE}, MIT licence: see three.LICENSE.txt. The parts that scene.js uses. */\n"
+        (PAGE / "three.min.js").write_text(told + (there / "three.min.js").read_text(encoding="utf-8"), "utf-8")
+        shutil.copyfile(there / "node_modules" / "three" / "LICENSE", PAGE / "three.LICENSE.txt")
+
+
+if __name__ == "__main__":
+    main()
