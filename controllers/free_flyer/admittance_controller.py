@@ -57,12 +57,12 @@ class Params(impedance_controller.Params):
     observer_rate: PerSecond = parameter(
         10.0, "at which the estimated wrench converges (assumed)", minimum=0.1, maximum=1000.0
     )
-    k_P: PerSecond2 = parameter(9.0, "inner loop: acceleration per position error (assumed)", minimum=0.0, maximum=1e4)
-    k_D: PerSecond = parameter(6.0, "inner loop: acceleration per velocity error (assumed)", minimum=0.0, maximum=1e4)
-    k_P_R: PerSecond2 = parameter(
+    k_x: PerSecond2 = parameter(9.0, "inner loop: acceleration per position error (assumed)", minimum=0.0, maximum=1e4)
+    k_v: PerSecond = parameter(6.0, "inner loop: acceleration per velocity error (assumed)", minimum=0.0, maximum=1e4)
+    k_R: PerSecond2 = parameter(
         16.0, "inner loop: angular acceleration per attitude error (assumed)", minimum=0.0, maximum=1e4
     )
-    k_D_R: PerSecond = parameter(
+    k_w: PerSecond = parameter(
         8.0, "inner loop: angular acceleration per rate error (assumed)", minimum=0.0, maximum=1e4
     )
     f_max: Vector3[Newton] = parameter(
@@ -74,26 +74,27 @@ class Params(impedance_controller.Params):
 
     def inner_gains(self, factor: float = 1.0) -> tuple[PidGains, PidGains]:
         """Return the inner loop's gains of position and attitude, times a factor."""
-        return PidGains(k_P=factor * self.k_P, k_I=0.0, k_D=factor * self.k_D), PidGains(
-            k_P=factor * self.k_P_R, k_I=0.0, k_D=factor * self.k_D_R
+        return PidGains(k_P=factor * self.k_x, k_I=0.0, k_D=factor * self.k_v), PidGains(
+            k_P=factor * self.k_R, k_I=0.0, k_D=factor * self.k_w
         )
 
-    def virtual_body(self) -> VirtualBody:
-        """Return what the wrench on the gripper moves."""
-        return VirtualBody(self.body(), self.gains(), self.inertia_ratio, float(PERIOD))
+    def virtual_body(self, period: float) -> VirtualBody:
+        """Return what the wrench on the gripper moves, for a period between two samples, s."""
+        return VirtualBody(self.body(), self.gains(), self.inertia_ratio, period)
 
-    def law(self, factor: float, delay: float) -> LinearController:
-        """Return the law near the goal, with inner gains and observer rate times a factor, that expects a delay."""
-        T = float(PERIOD)
+    def law(self, factor: float, delay: float, T: float) -> LinearController:
+        """Return the law near the goal at a period T, with inner gains and observer rate times a factor."""
         observer, thrust = WrenchObserver(factor * self.observer_rate, T), ThrustModel(self.lag, delay, T)
-        return admittance_law(self.body(), self.virtual_body(), observer, thrust, *self.inner_gains(factor), T)
+        return admittance_law(self.body(), self.virtual_body(T), observer, thrust, *self.inner_gains(factor), T)
 
-    def faults(self) -> list[str]:
-        """Return what is wrong with body, gains and the closed loop."""
+    def faults(self, period: float) -> list[str]:
+        """Return what is wrong with body, gains and the loop that is closed at a period, s."""
         position, attitude = self.inner_gains()
         faults = self.body().faults() + (self.gains().faults() if self.behaviour is Behaviour.CUSTOM else [])
         faults += position.faults("inner position gains") + attitude.faults("inner attitude gains")
-        return faults or stability_faults(self.body(), self.law, float(PERIOD), self.delay, self.lag)
+        return faults or stability_faults(
+            self.body(), lambda factor, delay: self.law(factor, delay, period), period, self.delay, self.lag
+        )
 
 
 @dataclass(kw_only=True)
@@ -117,7 +118,7 @@ class AdmittanceController:
       behind the arm is felt, a force at G does not turn the gripper.
     - The base follows the pose that puts the gripper there: with e, phi its errors in W and B and f, tau the estimate,
 
-        F = R_WB^T (m (k_P e + k_D e' + a_v) - f),  M = I_B (k_P_R phi + k_D_R phi' + dw_v) + w x I_B w - R_WB^T tau.
+        F = R_WB^T (m (k_x e + k_v e' + a_v) - f),  M = I_B (k_R phi + k_w phi' + dw_v) + w x I_B w - R_WB^T tau.
 
     On activation, and where the goal changes, the virtual body is at the gripper and moves with it.
 
@@ -132,25 +133,26 @@ class AdmittanceController:
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "f_cmd": ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas", "p_WG_goal", "q_WG_goal", "active"),
-        "tau_cmd": ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas", "p_WG_goal", "q_WG_goal", "active"),
-        "error_p": ("p_WB_meas", "q_WB_meas", "p_WG_goal"),
+        "tau_cmd": ("q_WB_meas", "v_WB_meas", "w_WB_meas", "p_WG_goal", "q_WG_goal", "active"),
+        "error_p": ("p_WB_meas", "q_WB_meas", "p_WG_goal", "q_WG_goal"),
         "error_R": ("q_WB_meas", "q_WG_goal"),
-        "f_G_est": ("q_WB_meas", "v_WB_meas", "w_WB_meas", "p_WG_goal", "q_WG_goal", "active"),
-        "tau_G_est": ("q_WB_meas", "v_WB_meas", "w_WB_meas", "p_WG_goal", "q_WG_goal", "active"),
+        "f_G_est": ("v_WB_meas", "active"),
+        "tau_G_est": ("q_WB_meas", "v_WB_meas", "w_WB_meas", "active"),
     }
-    period: ClassVar[Fraction | None] = PERIOD
-    deferred: ClassVar[tuple[str, ...]] = ("control",)
+    period: ClassVar[Fraction] = PERIOD
+    deferred: ClassVar[tuple[str, ...]] = ("control", "threadpoolctl")
 
     def __init__(self, params: Params) -> None:
-        if faults := params.faults():
+        self._T = float(self.period)
+        if faults := params.faults(self._T):
             raise InvalidControllerParameters(_NAME, faults)
-        self._T = float(PERIOD)
         self.loop = SampledLoop(
-            params.body().linear_plant(params.lag), params.law(1.0, params.delay), self._T, params.delay
+            params.body().linear_plant(params.lag), params.law(1.0, params.delay, self._T), self._T, params.delay
         )
         self._pole_radius = self.loop.pole_radius
         self._damping_ratio, self._pole_frequency = self.loop.least_damped
-        self._virtual, self._thrust_model = params.virtual_body(), ThrustModel(params.lag, params.delay, self._T)
+        self._slowest_decay = self.loop.slowest_decay
+        self._virtual, self._thrust_model = params.virtual_body(self._T), ThrustModel(params.lag, params.delay, self._T)
         self._observer = WrenchObserver(params.observer_rate, self._T)
         self._position, self._attitude = params.inner_gains()
         self._mass, self._I_B, self._p_BG = params.mass, row_major(params.I_B), vector(params.p_BG)
@@ -180,6 +182,7 @@ class AdmittanceController:
             pole_radius=self._pole_radius,
             damping_ratio=self._damping_ratio,
             pole_frequency=self._pole_frequency,
+            slowest_decay=self._slowest_decay,
             f_G_est=w_G[:3],
             tau_G_est=w_G[3:],
         )

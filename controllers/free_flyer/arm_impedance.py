@@ -70,13 +70,7 @@ class ArmAtRest:
     def law(self, gains: ImpedanceGains, null: NullMotion) -> LinearController:
         """Return the law of `ArmImpedanceController` near rest: commanded forces from displacement and its rate."""
         J, B, Z, n = self.J, self.B, self.space.Z, len(self.B)
-        K, D = (
-            _in_axes(self.R_BG, linear, turning)
-            for linear, turning in (
-                (gains.stiffness_translation, gains.stiffness_rotation),
-                (gains.damping_translation, gains.damping_rotation),
-            )
-        )
+        K, D = (_in_axes(self.R_BG, gain) for gain in (gains.stiffness(), gains.damping()))
         angles = np.hstack([np.zeros((n - 6, 6)), np.eye(n - 6)])
         rates = np.linalg.solve(self.space.inertia, np.transpose(Z) @ B)
         return without_memory(
@@ -89,8 +83,7 @@ class ArmAtRest:
         )
 
 
-def _in_axes(R: Floats, linear: Floats, turning: Floats) -> Floats:
-    """Return a gain (6, 6) of two (3, 3) whose axes R (3, 3) turns."""
-    both = np.zeros((6, 6))
-    both[:3, :3], both[3:, 3:] = R @ linear @ np.transpose(R), R @ turning @ np.transpose(R)
-    return both
+def _in_axes(R: Floats, gain: Floats) -> Floats:
+    """Return a gain (6, 6) of translation and rotation whose axes R (3, 3) turns."""
+    turned = np.kron(np.eye(2), R)
+    return turned @ gain @ np.transpose(turned)

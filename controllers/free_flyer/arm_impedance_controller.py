@@ -177,7 +177,7 @@ class ArmImpedanceController:
         "error_R": ("q_WB_meas", "q_J", "q_WG_goal"),
     }
     period: ClassVar[Fraction] = PERIOD
-    deferred: ClassVar[tuple[str, ...]] = ("control",)
+    deferred: ClassVar[tuple[str, ...]] = ("control", "threadpoolctl")
 
     def __init__(self, params: Params) -> None:
         model, period = params.model(), float(self.period)
@@ -196,6 +196,7 @@ class ArmImpedanceController:
         loop = SampledLoop(rest.linear_plant(params.lag), rest.law(gains, null), period, params.delay)
         self._pole_radius = loop.pole_radius
         self._damping_ratio, self._pole_frequency = loop.least_damped
+        self._slowest_decay = loop.slowest_decay
         self._model, self._gains, self._null, self._posture = model, gains, null, params.posture
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
@@ -234,6 +235,7 @@ class ArmImpedanceController:
             pole_radius=self._pole_radius,
             damping_ratio=self._damping_ratio,
             pole_frequency=self._pole_frequency,
+            slowest_decay=self._slowest_decay,
         )
 
     def _forces(self, chain: Chain, R_WD: Floats, e: Floats, phi: Floats, xi_dot: Floats, q_J: Floats) -> Floats:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.controllers.free_flyer.body import FlyerBody
-from handover.cosim.blocks.geometry import rotation_by
+from handover.cosim.blocks.geometry import rotation_by, skew
 from handover.cosim.blocks.ports import Floats
 
 
@@ -48,8 +48,11 @@ class ArmModel:
                 faults.append(f"axis_J[{j + 1}] = {self.axes[j].tolist()} must be finite and not zero")
             if not 0.0 < self.masses[j] < np.inf:
                 faults.append(f"mass_L[{j + 1}] = {self.masses[j]:g} kg must be positive and finite")
-            if not (np.all(np.isfinite(self.inertias[j])) and np.all(self.inertias[j] > 0.0)):
-                faults.append(f"I_L[{j + 1}] = {self.inertias[j].tolist()} kg m2 must be positive and finite")
+            small, middle, large = moments = sorted(float(moment) for moment in self.inertias[j])
+            if not all(0.0 < moment < np.inf for moment in moments):
+                faults.append(f"I_L[{j + 1}] = {moments} kg m2 must be positive and finite")
+            elif large > (small + middle) * (1.0 + 1e-9):
+                faults.append(f"I_L[{j + 1}] = {moments} kg m2: the largest may not exceed the sum of the others")
             if not np.all(np.isfinite(self.links[j])):
                 faults.append(f"link[{j + 1}] = {self.links[j].tolist()} m must be finite")
         return faults
@@ -108,7 +111,7 @@ class Chain:
         place = i % (n + 2)
         J = np.zeros((6, 6 + n))
         J[:3, :3] = J[3:, 3:6] = np.eye(3)
-        J[:3, 3:6] = -_skew(self.p[place])
+        J[:3, 3:6] = -skew(self.p[place])
         for j in range(min(place, n)):
             J[:3, 6 + j] = _cross(self.axes[j], self.p[place] - self.origins[j])
             J[3:, 6 + j] = self.axes[j]
@@ -119,7 +122,7 @@ class Chain:
         n = len(self.axes)
         place = i % (n + 2)
         J = np.zeros((6, 6 + n))
-        J[:3, 3:6] = -_skew(self.p_dot[place])
+        J[:3, 3:6] = -skew(self.p_dot[place])
         for j in range(min(place, n)):
             r, r_dot = self.p[place] - self.origins[j], self.p_dot[place] - self.origins_dot[j]
             J[:3, 6 + j] = _cross(self.axes_dot[j], r) + _cross(self.axes[j], r_dot)
@@ -156,7 +159,7 @@ def coriolis_matrix(chain: Chain) -> Floats:
     for i in range(n + 1):
         J, rate, H = chain.jacobian(i), chain.jacobian_rate(i), chain.inertia(i)
         total += chain.mass(i) * np.transpose(J[:3]) @ rate[:3]
-        total += np.transpose(J[3:]) @ (H @ rate[3:] + _skew(chain.w[i]) @ H @ J[3:])
+        total += np.transpose(J[3:]) @ (H @ rate[3:] + skew(chain.w[i]) @ H @ J[3:])
     return total
 
 
@@ -190,11 +193,6 @@ def operational_bias(J: Floats, J_rate: Floats, B: Floats, C: Floats, xi_dot: Fl
     """Return C_x x' of eq. (3.26), (6,): B_x (J B^-1 C xi' - J' xi'), errata of eq. (3.27b)."""
     B_x = OperationalSpace.of(J, B).B_x
     return B_x @ (J @ np.linalg.solve(B, C @ xi_dot) - J_rate @ xi_dot)
-
-
-def _skew(v: Floats) -> Floats:
-    x, y, z = v.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

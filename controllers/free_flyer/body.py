@@ -13,6 +13,7 @@ import numpy as np
 
 from handover.controllers.free_flyer.sampled_loop import LinearController, LinearPlant, SampledLoop, largest_stable
 from handover.cosim.blocks.block import InvalidParameters
+from handover.cosim.blocks.geometry import skew
 from handover.cosim.blocks.ports import Floats
 
 _MAX_DELAY = 0.5  # s; the longest delay that is proposed as a remedy
@@ -51,9 +52,8 @@ class FlyerBody:
 
         Errata: block 12 is -[R p]x N; with angular velocities in place of rates of Euler angles N drops out.
         """
-        x, y, z = self.p_BG
         J = np.eye(6)
-        J[:3, 3:] = -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        J[:3, 3:] = -skew(self.p_BG)
         return J
 
     def mass_matrix(self) -> Floats:

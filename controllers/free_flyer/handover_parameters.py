@@ -15,6 +15,7 @@ from handover.cosim.blocks.units import Metre, MetrePerSecond, MetrePerSecond2, 
 NAME = "HandoverStateMachine"
 
 _VELOCITIES = {Behaviour.RIGID: (0.059, 0.021), Behaviour.COMPLIANT: (0.08, 0.037)}  # release, receive: sec. 4.1.2
+_REMEDY = "move it there, or move workspace_low or workspace_high"
 
 
 class InvalidHandoverParameters(InvalidParameters):
@@ -102,9 +103,18 @@ class Params:
         0.03, "gradual: deceleration at which a pull has ended: thrust gives more", minimum=0.0, maximum=100.0
     )
     free_angle: Radian = parameter(
-        0.25, "gradual: how far they open from what they hold until it is free for certain", minimum=0.0, maximum=3.0
+        0.25,
+        "gradual, verify: how far they open from what they hold until it is free for certain",
+        minimum=0.0,
+        maximum=3.0,
     )
-    attempts: int = parameter(5, "failed receptions before it gives up", minimum=1, maximum=1000)
+    verify: bool = parameter(
+        False, "after a release the fingers close once more: where they hold something, it was not taken"
+    )
+    verify_wait: Second = parameter(
+        0.1, "verify: time from the object's being free to their closing", minimum=0.0, maximum=60.0
+    )
+    attempts: int = parameter(5, "failed receptions, or deliveries, before it gives up", minimum=1, maximum=1000)
     patience: Second = parameter(60.0, "time in a phase before it gives up", minimum=0.1, maximum=1e5)
 
     def velocities(self) -> tuple[float, float]:
@@ -128,9 +138,13 @@ class Params:
 
     def check(self) -> None:
         """Raise InvalidHandoverParameters, with all faults, if the handover is not possible."""
-        faults = self._place_faults() + self._velocity_faults() + self._time_faults()
+        faults = self.faults()
         if faults:
             raise InvalidHandoverParameters(faults)
+
+    def faults(self) -> list[str]:
+        """Return what makes the handover impossible."""
+        return self._place_faults() + self._velocity_faults() + self._time_faults()
 
     def _place_faults(self) -> list[str]:
         faults = [
@@ -158,7 +172,7 @@ class Params:
         low, high = self.workspace_low, self.workspace_high
         return [
             f"{name} takes the {what} to {np.round(p, 3).tolist()} m, out of the workspace from {low.tolist()} to "
-            f"{high.tolist()} m"
+            f"{high.tolist()} m: {_REMEDY}"
             for what, p in (("gripper", p_WG), ("robot's centre of mass", p_WG - np.array(arm)))
             if not np.all((low <= p) & (p <= high))
         ]
@@ -172,12 +186,21 @@ class Params:
                 faults.append(
                     f"{name} = {v:g} m/s must exceed gate_speed = {self.gate_speed:g} m/s, or rest exceeds it too"
                 )
+            elif self.gradual and not self.gradual_share * v > self.gate_speed:
+                faults.append(
+                    f"gradual_share = {self.gradual_share:g} of {name} = {v:g} m/s must exceed gate_speed = "
+                    f"{self.gate_speed:g} m/s, or the fingers move at rest"
+                )
         return faults
 
     def _time_faults(self) -> list[str]:
-        times = ("settle_time", "gripper_time", "signal_time") + ("pause",) * (self.task is HandoverTask.COLLABORATIVE)
+        times = {name: getattr(self, name) for name in ("settle_time", "gripper_time", "signal_time")}
+        if self.task is HandoverTask.COLLABORATIVE:
+            times["pause"] = self.pause
+        if self.verify and self.fetches:
+            times["verify_wait + gripper_time"] = self.verify_wait + self.gripper_time
         return [
-            f"{name} = {getattr(self, name):g} s must not exceed patience = {self.patience:g} s, or it gives up first"
-            for name in times
-            if self.task is not HandoverTask.HOLD and not getattr(self, name) <= self.patience
+            f"{name} = {time:g} s must not exceed patience = {self.patience:g} s, or it gives up first"
+            for name, time in times.items()
+            if self.task is not HandoverTask.HOLD and not time <= self.patience
         ]

@@ -113,7 +113,7 @@ class ImpedanceController:
         "error_R": ("q_WB_meas", "q_WG_goal"),
     }
     period: ClassVar[Fraction] = PERIOD
-    deferred: ClassVar[tuple[str, ...]] = ("control",)
+    deferred: ClassVar[tuple[str, ...]] = ("control", "threadpoolctl")
 
     def __init__(self, params: Params) -> None:
         body, gains, period = params.body(), params.gains(), float(self.period)
@@ -126,6 +126,7 @@ class ImpedanceController:
         self.loop = SampledLoop(body.linear_plant(params.lag), gains.law(body), period, params.delay)
         self._pole_radius = self.loop.pole_radius
         self._damping_ratio, self._pole_frequency = self.loop.least_damped
+        self._slowest_decay = self.loop.slowest_decay
         self._p_BG = vector(params.p_BG)
         self._k, self._d = row_major(gains.stiffness_translation), row_major(gains.damping_translation)
         self._k_R, self._d_R = row_major(gains.stiffness_rotation), row_major(gains.damping_rotation)
@@ -169,4 +170,5 @@ class ImpedanceController:
             pole_radius=self._pole_radius,
             damping_ratio=self._damping_ratio,
             pole_frequency=self._pole_frequency,
+            slowest_decay=self._slowest_decay,
         )

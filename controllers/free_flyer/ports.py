@@ -20,6 +20,7 @@ from handover.cosim.blocks.units import (
     Number,
     Radian,
     RadianPerSecond,
+    Second,
 )
 
 PERIOD: Final = Fraction(2, 125)
@@ -45,7 +46,11 @@ class Behaviour(enum.IntEnum):
 
 @dataclass(kw_only=True)
 class Inputs:
-    """The navigation's estimate of the base, the gripper's goal, and whether to act."""
+    """The navigation's estimate of the base, the gripper's goal, and whether to act.
+
+    An estimate that is updated at a rate, as by the parameter `update_rate` of the unit Navigation, is older by up to
+    1 / rate. No controller expects that unless its parameter `delay` includes it: half of it, on average.
+    """
 
     p_WB_meas: Vector3[Metre] = port(np.zeros(3), "estimated position of the centre of mass")
     q_WB_meas: Vector4[Number] = port(np.array([1.0, 0.0, 0.0, 0.0]), "estimated attitude")
@@ -67,3 +72,4 @@ class Outputs:
     pole_radius: Number = output("largest |z| of the linearised loop", minimum=0.0)
     damping_ratio: Number = output("least damping ratio of the linearised loop")
     pole_frequency: RadianPerSecond = output("frequency of the pole with that ratio", minimum=0.0)
+    slowest_decay: Second = output("time constant of the pole with the largest |z|", minimum=0.0)

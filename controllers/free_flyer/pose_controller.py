@@ -107,16 +107,20 @@ class Params:
         """Return what is wrong with gains, body and bounds."""
         faults = self.body().faults()
         faults += self.position_gains().faults("position gains") + self.attitude_gains().faults("attitude gains")
-        force, torque = self.mass * self.acceleration, self.turning * float(np.max(np.abs(self.I_B)))
-        if force > np.min(self.f_max):
+        inertia = float(np.max(np.abs(self.I_B)))
+        force, torque = self.mass * self.acceleration, self.turning * inertia
+        least_f, least_tau = float(np.min(self.f_max)), float(np.min(self.tau_max))
+        if force > least_f:
             faults.append(
-                f"acceleration = {self.acceleration:g} m/s2 takes {force:.3g} N, more than the least of f_max = "
-                f"{self.f_max.tolist()} N; at most {np.min(self.f_max) / self.mass:.3g} m/s2"
+                f"mass = {self.mass:.4g} kg at acceleration = {self.acceleration:g} m/s2 takes {force:.3g} N, more "
+                f"than the least of f_max = {self.f_max.tolist()} N; at most {least_f / self.acceleration:.3g} kg, or "
+                f"{least_f / self.mass:.3g} m/s2"
             )
-        if torque > np.min(self.tau_max):
+        if torque > least_tau:
             faults.append(
-                f"turning = {self.turning:g} rad/s2 takes {torque:.3g} N m, more than the least of tau_max = "
-                f"{self.tau_max.tolist()} N m; at most {self.turning * np.min(self.tau_max) / torque:.3g} rad/s2"
+                f"I_B, up to {inertia:.4g} kg m2, at turning = {self.turning:g} rad/s2 takes {torque:.3g} N m, more "
+                f"than the least of tau_max = {self.tau_max.tolist()} N m; at most {least_tau / self.turning:.3g} "
+                f"kg m2, or {least_tau / inertia:.3g} rad/s2"
             )
         return faults
 
@@ -150,7 +154,7 @@ class PoseController:
         "error_R": ("q_WB_meas", "q_WG_goal"),
     }
     period: ClassVar[Fraction] = PERIOD
-    deferred: ClassVar[tuple[str, ...]] = ("control",)
+    deferred: ClassVar[tuple[str, ...]] = ("control", "threadpoolctl")
 
     def __init__(self, params: Params) -> None:
         body, self._T = params.body(), float(self.period)
@@ -169,6 +173,7 @@ class PoseController:
         )
         self._pole_radius = self.loop.pole_radius
         self._damping_ratio, self._pole_frequency = self.loop.least_damped
+        self._slowest_decay = self.loop.slowest_decay
         self._position, self._attitude, self._mass = position, attitude, params.mass
         self._I_B, self._p_BG = row_major(params.I_B), vector(params.p_BG)
         self._f_max, self._tau_max = vector(params.f_max), vector(params.tau_max)
@@ -207,6 +212,7 @@ class PoseController:
             pole_radius=self._pole_radius,
             damping_ratio=self._damping_ratio,
             pole_frequency=self._pole_frequency,
+            slowest_decay=self._slowest_decay,
         )
 
     def get_state(self) -> bytes:

@@ -22,6 +22,15 @@ def _control() -> Any:
     return control
 
 
+@cache
+def _arithmetic_libraries() -> Any:
+    """Find the libraries (BLAS) that python-control calculates with."""
+    _control()
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinearPlant:
     """dx/dt = A x + B u + E d, y = C x: u is commanded, d comes from outside."""
@@ -90,6 +99,14 @@ class SampledLoop:
         return float(np.max(np.abs(self.poles)))
 
     @property
+    def slowest_decay(self) -> float:
+        """Time constant of the pole with the largest |z|, s; infinite if that is not less than 1."""
+        radius = self.pole_radius
+        if radius == 0.0:
+            return 0.0
+        return -self.period / math.log(radius) if radius < 1.0 else math.inf
+
+    @property
     def least_damped(self) -> tuple[float, float]:
         """Damping ratio and frequency (rad/s) of the pole s = log(z) / period with the least ratio.
 
@@ -121,7 +138,7 @@ def largest_stable(radius: Callable[[float], float], upper: float, steps: int = 
 
 def discretised(A: Floats, B: Floats, time: float) -> tuple[Floats, Floats]:
     """Return A and B of x[n+1] = A x[n] + B u[n] for dx/dt = A x + B u with u held for a time."""
-    system = _control().sample_system(_control().ss(A, B, np.eye(len(A)), np.zeros(B.shape)), time, method="zoh")
+    system = _zero_order_hold(_control().ss(A, B, np.eye(len(A)), np.zeros(B.shape)), time)
     return np.asarray(system.A), np.asarray(system.B)
 
 
@@ -149,4 +166,15 @@ def _sampled(plant: LinearPlant, past: float, period: float) -> Any:
 def _discrete(plant: LinearPlant, time: float) -> Any:
     B = np.hstack([plant.B, plant.E])
     continuous = _control().ss(plant.A, B, plant.C, np.zeros((len(plant.C), B.shape[1])))
-    return _control().sample_system(continuous, time, method="zoh")
+    return _zero_order_hold(continuous, time)
+
+
+def _zero_order_hold(continuous: Any, time: float) -> Any:
+    """Return a continuous `control.StateSpace` sampled with its inputs held.
+
+    Its matrix exponential would wake the threads of BLAS, which then wait busily for about 0.1 s of CPU time, beside
+    the run's first steps, and have nothing to do for matrices of some twenty rows. Only meanwhile is there one thread:
+    other units in this process keep theirs.
+    """
+    with _arithmetic_libraries().limit(limits=1, user_api="blas"):
+        return _control().sample_system(continuous, time, method="zoh")

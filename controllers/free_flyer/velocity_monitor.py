@@ -2,7 +2,7 @@
 
 import math
 
-from handover.cosim.blocks.plain_rotation import Vector, lerp, norm
+from handover.cosim.blocks.plain_rotation import ZERO, Vector, lerp, norm
 
 
 class VelocityMonitor:
@@ -28,16 +28,23 @@ class VelocityMonitor:
         self._v = v
         self.speed = norm(v)
 
+    @property
+    def velocity(self) -> Vector:
+        """The low-passed velocity, m/s; zero before the first measurement."""
+        return ZERO if self._v is None else self._v
+
     def disarm(self) -> None:
         """Ignore thresholds until the gripper is slower than one again."""
         self._armed = False
 
+    def arm_below(self, threshold: float) -> None:
+        """Let thresholds count from here on if the gripper is no faster than this one."""
+        self._armed |= self.speed <= threshold
+
     def exceeds(self, threshold: float) -> bool:
         """Return whether the speed has risen above the threshold; to be called at each measurement after `disarm`."""
-        if self.speed <= threshold:
-            self._armed = True
-            return False
-        return self._armed
+        self.arm_below(threshold)
+        return self._armed and self.speed > threshold
 
     def get_state(self) -> tuple[Vector | None, bool, float]:
         """Return the filter, whether the threshold counts, and the speed."""

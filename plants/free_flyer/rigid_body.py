@@ -38,7 +38,8 @@ class TurnsTooFast(ArithmeticError):
     """The body turns too far in a step to be followed."""
 
     def __init__(self, rate: float, h: float) -> None:
-        super().__init__(f"a body turns by {rate * h:.3g} rad, {rate:.3g} rad/s, in a step of {h:g} s: too far for it")
+        text = f"a body turns by {rate * h:.3g} rad, {rate:.3g} rad/s, in a step of {h:g} s: too far to be followed"
+        super().__init__(f"{text}; step it shorter, or let less torque act on it")
         self.rate, self.h = rate, h
 
 

@@ -27,9 +27,19 @@ from handover.cosim.blocks.plain_rotation import (
 class Frame:
     """Pose and velocity of a thing that holds, all in world coordinates; R is the matrix of q."""
 
+    __slots__ = ("R", "p", "q", "v", "w")
+    R: Matrix
+
     def __init__(self, p: Vector, q: Quaternion, v: Vector = ZERO, w: Vector = ZERO) -> None:
         self.p, self.q, self.v, self.w = p, q, v, w
-        self.R: Matrix = rotation_matrix(q)
+
+    def __getattr__(self, name: str) -> Matrix:
+        """Compute R when it is first asked for: many a frame goes by without."""
+        if name != "R":
+            raise AttributeError(name)
+        R = rotation_matrix(self.q)
+        object.__setattr__(self, "R", R)
+        return R
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from handover.cosim.blocks.plain_rotation import (
-    ZERO,
     Vector,
     add,
     add_cross,
     add_scaled,
-    divide,
+    distance,
     dot,
     lerp,
     norm,
@@ -19,6 +18,7 @@ from handover.cosim.blocks.plain_rotation import (
     subtract,
 )
 from handover.plants.free_flyer.hand.attachment import Frame, Palm
+from handover.plants.free_flyer.hand.box import Box
 from handover.plants.free_flyer.hand.hand_kinematics import (
     FINGERS,
     JOINT_MAX,
@@ -27,6 +27,7 @@ from handover.plants.free_flyer.hand.hand_kinematics import (
     RADIUS,
     REACH,
     STRAIGHT,
+    Ball,
     Finger,
     Segment,
     phalanges,
@@ -36,8 +37,6 @@ Angles = tuple[float, ...]
 Gap = Callable[[float], float]
 """The room between phalanges and object, m, by a joint's angle."""
 
-_SEARCHES = 20
-"""How often the range in which a bone's point nearest to a box lies is cut to two thirds: to 3e-4 of its length."""
 _SWEEPS, _BISECTIONS = 4, 16
 """How finely a joint's motion in a step is looked through for contact, and how often what is found is halved."""
 _TOUCH = 0.003
@@ -50,71 +49,16 @@ _FINE = 0.05
 """Radians in which fingers close that begin around an object."""
 _ROUNDING = 1e-7
 """Metres by which a capsule that has stopped may be in the box, by the bisection's last digit."""
+_CLEARLY = 1e-12
+"""Metres beyond rounding by which a ball is away."""
 _STOPPED = 1e-5
 """Metres from the box within which a capsule counts as stopped: it is not looked for nearer to the surface."""
 
 
 _LENGTHS = tuple(length for finger in FINGERS for length in finger.lengths)
 """Of phalanges, by the joint at their root, m."""
-
-
-@dataclass(frozen=True)
-class Box:
-    """A box about the origin of its own frame; `half` are half its sides, m."""
-
-    half: Vector
-
-    def distance(self, p: Vector) -> float:
-        """Return the signed distance of a point from the surface, below 0 inside, m; a convex function of p."""
-        return self.distance_along(p, ZERO, 0.0)
-
-    def distance_along(self, p: Vector, d: Vector, s: float) -> float:
-        """Return the distance of p + s d."""
-        (x, y, z), (dx, dy, dz), (a, b, c) = p, d, self.half
-        x, y, z = abs(x + s * dx) - a, abs(y + s * dy) - b, abs(z + s * dz) - c
-        if x <= 0.0 and y <= 0.0 and z <= 0.0:
-            return max(x, y, z)
-        x, y, z = x if x > 0.0 else 0.0, y if y > 0.0 else 0.0, z if z > 0.0 else 0.0
-        return math.sqrt(x * x + y * y + z * z)
-
-    def least_room(self, bone: Segment) -> float:
-        """Return a distance than which no point of a line is nearer to the box, m; it changes by 1 a metre at most.
-
-        It is that of the line's bounding box.
-        """
-        (a_x, a_y, a_z), (b_x, b_y, b_z) = bone
-        x = 0.0 if a_x * b_x <= 0.0 else min(abs(a_x), abs(b_x))
-        y = 0.0 if a_y * b_y <= 0.0 else min(abs(a_y), abs(b_y))
-        z = 0.0 if a_z * b_z <= 0.0 else min(abs(a_z), abs(b_z))
-        return self.distance((x, y, z))
-
-    def normal(self, p: Vector) -> Vector:
-        """Return the outward normal at the surface's point that is nearest to p."""
-        room = subtract((abs(p[0]), abs(p[1]), abs(p[2])), self.half)
-        out = [max(x, 0.0) for x in room]
-        if not any(out):
-            out[room.index(max(room))] = 1.0
-        n = (math.copysign(out[0], p[0]), math.copysign(out[1], p[1]), math.copysign(out[2], p[2]))
-        return divide(n, norm(n))
-
-    def nearest(self, bone: Segment) -> tuple[float, Vector]:
-        """Return distance and place of the point of a line that is nearest to the box, or deepest in it.
-
-        The distance is convex along the line, so a ternary search finds it; of a line along a face, its middle.
-        """
-        a, b = bone
-        d, distance_along = subtract(b, a), self.distance_along
-        low, high = 0.0, 1.0
-        for _ in range(_SEARCHES):
-            third = (high - low) / 3.0
-            s, t = low + third, high - third
-            left, right = distance_along(a, d, s), distance_along(a, d, t)
-            if left <= right:
-                high = t
-            if right <= left:
-                low = s
-        ends = ((self.distance(p), p) for p in (lerp(a, b, 0.5 * (low + high)), a, b))
-        return min(ends, key=lambda end: end[0])
+_REACHES = {finger.name: sum(finger.lengths) + RADIUS for finger in FINGERS}
+"""Of fingers from their roots, m."""
 
 
 @dataclass(frozen=True)
@@ -138,31 +82,45 @@ class HandFingers:
     Where object or hand have moved so that a phalanx is in the object, its joint gives way and opens, at that rate too.
     What it cannot give way to is left as a depth, by which `touches` presses. So does a joint that stopped and wants to
     turn on, by what its tip lacks. Phalanges pass through each other.
+
+    Attributes:
+        wanted: angles to which the joints turn, rad.
+        angles: of the joints, rad.
+        reach: distance of the hand from the object beyond which nothing of it touches, m.
     """
 
     def __init__(self, sides: Vector, rate: float, angles: Angles = STRAIGHT) -> None:
         self._box = Box(scale(0.5, sides))
         self._rate = rate
-        self._far = norm(self._box.half) + REACH
+        self.reach = norm(self._box.half) + REACH
         self._still: tuple[object, ...] | None = None
         """Arguments and angles of a step that changed no angle: the same again would change none either."""
-        self._bones: tuple[Angles, list[Segment]] | None = None
-        """The phalanges and the angles that they are of."""
+        self._bones: tuple[Angles, list[tuple[list[Segment], Ball]]] | None = None
+        """What `bones` gives, and the angles that it is of."""
         self.wanted = self.angles = angles
 
-    def advance(self, dt: float, goal: Angles, H: Frame) -> None:
-        """Turn the joints towards wanted angles, rad, for dt, with the hand at H, seen from the object."""
+    def advance(self, dt: float, goal: Angles, H: Frame | None) -> None:
+        """Turn the joints towards wanted angles, rad, for dt, with the hand at H, seen from the object.
+
+        H may be None where the hand is farther from it than its reach.
+        """
         most = self._rate * dt
         if goal != self.wanted:
             goal = tuple(min(max(angle, 0.0), JOINT_MAX) for angle in goal)
             self.wanted = tuple(_towards(a, b, most) for a, b in zip(self.wanted, goal, strict=True))
-        if self.angles == self.wanted and norm(H.p) > self._far:
+        if H is None:
+            if self.angles != self.wanted:
+                self.angles = tuple(_towards(a, b, most) for a, b in zip(self.angles, self.wanted, strict=True))
             return
         step = (dt, self.wanted, H.p, H.q, self.angles)
         if step == self._still:
             return
         before = self.angles
-        self.angles = tuple(angle for finger in FINGERS for angle in self._turned(finger, most, H))
+        self.angles = tuple(
+            angle
+            for finger, (_, ball) in zip(FINGERS, self.bones(), strict=True)
+            for angle in self._turned(finger, ball, most, H)
+        )
         self._still = step if self.angles == before else None
 
     def settle(self, goal: Angles, H: Frame) -> None:
@@ -172,17 +130,16 @@ class HandFingers:
 
     def contacts(self, H: Frame, within: float = _TOUCH) -> list[Contact]:
         """Return phalanges, and parts of the palm, of a hand at H that are at most that far from the object, m."""
-        if norm(H.p) > self._far:
+        if norm(H.p) > self.reach:
             return []
-        capsules = [(i, RADIUS, bone) for i, bone in enumerate(self.bones())]
         found: list[Contact] = []
-        for joint, radius, bone in [*capsules, *((None, PALM_RADIUS, bone) for bone in PALM_BONES)]:
-            line = _moved(H, bone)
-            if self._box.least_room(line) > radius + within:
-                continue
-            away, p = self._box.nearest(line)
-            if away - radius <= within:
-                found.append(Contact(joint, radius, away - radius, p, scale(-1.0, self._box.normal(p))))
+        for finger, (bones, ball) in zip(FINGERS, self.bones(), strict=True):
+            if self._is_near(H, ball, RADIUS + within):
+                for joint, bone in zip(finger.joints, bones, strict=True):
+                    self._add_contact(found, joint, RADIUS, _moved(H, bone), within)
+        if self._is_near(H, _PALM_BALL, PALM_RADIUS + within):
+            for bone in PALM_BONES:
+                self._add_contact(found, None, PALM_RADIUS, _moved(H, bone), within)
         return found
 
     def touches(self, H: Frame, stiffness: float, damping: float, most: float, force: float) -> list[Palm]:
@@ -224,63 +181,108 @@ class HandFingers:
         }
         return bool(thumb) and len(fingers) >= 2
 
-    def bones(self) -> list[Segment]:
-        """Return the lines in the middle of all phalanges, in H."""
+    def bones(self) -> list[tuple[list[Segment], Ball]]:
+        """Return the lines in the middle of each finger's phalanges, and a ball that these are in, in H."""
         if self._bones is None or self._bones[0] != self.angles:
-            bones = [bone for finger in FINGERS for bone in phalanges(finger, self._of(finger))]
-            self._bones = self.angles, bones
+            fingers = [phalanges(finger, self._of(finger)) for finger in FINGERS]
+            self._bones = self.angles, [(bones, _ball_around(bones)) for bones in fingers]
         return self._bones[1]
 
     def _of(self, finger: Finger) -> Angles:
         return tuple(self.angles[i] for i in finger.joints)
 
-    def _turned(self, finger: Finger, most: float, H: Frame) -> list[float]:
-        """Return a finger's angles after joints have turned by at most that much, rad.
+    def _is_near(self, H: Frame, ball: Ball, within: float) -> bool:
+        """Return whether something in a ball of H may be that near to the object, m."""
+        centre, radius = ball
+        return self._box.distance(_seen(H, centre)) <= radius + within + _CLEARLY
+
+    def _add_contact(
+        self, found: list[Contact], joint: int | None, radius: float, line: Segment, within: float
+    ) -> None:
+        """Add what a capsule about a line is to the object, if it is that near."""
+        if self._box.least_room(line) > radius + within:
+            return
+        away, p = self._box.nearest(line)
+        if away - radius <= within:
+            found.append(Contact(joint, radius, away - radius, p, scale(-1.0, self._box.normal(p))))
+
+    def _turned(self, finger: Finger, ball: Ball, most: float, H: Frame) -> Angles:
+        """Return a finger's angles after joints have turned by at most that much, rad; `ball` is around it.
 
         Where the ones beyond a joint cannot give way as fast as it brings them into the object, the finger closes more
         slowly.
         """
-        angles = [_towards(self.angles[i], self.wanted[i], most) for i in finger.joints]
-        if self._box.distance(add(H.p, rotate(H.R, finger.root))) > sum(finger.lengths) + RADIUS:
-            return angles
+        before, first = self._of(finger), finger.first
+        wanted = self.wanted[first : first + len(before)]
+        if before == wanted and not self._is_near(H, ball, RADIUS):
+            return before
+        if self._box.distance(_seen(H, finger.root)) > _REACHES[finger.name]:
+            return tuple(_towards(a, b, most) for a, b in zip(before, wanted, strict=True))
+        rooms: dict[tuple[Vector, float], float] = {}
+        angles = before
         for share in _SHARES:
-            angles = [self.angles[i] for i in finger.joints]
-            self._turn(finger, angles, share * most, most, H)
-            if self._deepest(finger, angles, 0, H) >= -_ROUNDING:
+            angles, least = self._turn(finger, (share * most, most), H, rooms)
+            if least >= -_ROUNDING:
                 break
         return angles
 
-    def _turn(self, finger: Finger, angles: list[float], closing: float, opening: float, H: Frame) -> None:
-        """Turn joints from the palm on, by at most these angles, rad."""
-        for k, (i, before) in enumerate(zip(finger.joints, angles, strict=True)):
+    def _turn(
+        self, finger: Finger, most: tuple[float, float], H: Frame, rooms: dict[tuple[Vector, float], float]
+    ) -> tuple[Angles, float]:
+        """Return angles of joints that turn from the palm on, by at most these as they close and open, rad.
 
-            def gap(angle: float, k: int = k) -> float:
-                angles[k] = angle
-                return self._deepest(finger, angles, k, H, k + 1)
+        And the least room that its phalanges have then, m; `rooms` keeps it by a phalanx's root and its direction.
+        """
+        closing, opening = most
+        root, bent, least = finger.root, 0.0, math.inf
+        turned: list[float] = []
+        for i, length in zip(finger.joints, finger.lengths, strict=True):
+            before, wanted, start = self.angles[i], self.wanted[i], _seen(H, root)
 
-            room, wanted = gap(before), self.wanted[i]
+            def gap(
+                angle: float, root: Vector = root, bent: float = bent, length: float = length, start: Vector = start
+            ) -> float:
+                way = bent + angle
+                if (root, way) not in rooms:
+                    tip = add_scaled(root, length, finger.direction(way))
+                    rooms[root, way] = self._room((start, _seen(H, tip)))
+                return rooms[root, way]
+
+            room = gap(before)
             if room < -_ROUNDING:
-                angles[k] = _least_deep(gap, room, before, max(0.0, before - opening))
+                angle = _least_deep(gap, room, before, max(0.0, before - opening))
             else:
-                most = closing if wanted > before else opening
-                angles[k] = _last_free(gap, room, before, _towards(before, wanted, most))
+                angle = _last_free(gap, room, before, _towards(before, wanted, closing if wanted > before else opening))
+            least = min(least, gap(angle))
+            turned.append(angle)
+            bent += angle
+            root = add_scaled(root, length, finger.direction(bent))
+        return tuple(turned), least
 
-    def _deepest(self, finger: Finger, angles: Sequence[float], first: int, H: Frame, end: int | None = None) -> float:
-        """Return the least room between the object and phalanges from `first` to before `end`, m."""
-        bones = phalanges(finger, angles)[first:end]
-        return min(self._room(H, bone) for bone in bones)
-
-    def _room(self, H: Frame, bone: Segment) -> float:
+    def _room(self, line: Segment) -> float:
         """Return the distance between a phalanx and the object, or less, above _STOPPED, where it is farther."""
-        line = _moved(H, bone)
         least = self._box.least_room(line)
         return (least if least > RADIUS + _STOPPED else self._box.nearest(line)[0]) - RADIUS
 
 
+def _ball_around(bones: Sequence[Segment]) -> Ball:
+    """Return a ball that lines which follow each other are in."""
+    centre = lerp(bones[0][0], bones[-1][1], 0.5)
+    return centre, max(distance(centre, end) for bone in bones for end in bone)
+
+
+_PALM_BALL = _ball_around(PALM_BONES)
+
+
+def _seen(H: Frame, p: Vector) -> Vector:
+    """Return a point of a frame as seen from where that frame stands at H."""
+    return add(H.p, rotate(H.R, p))
+
+
 def _moved(H: Frame, bone: Segment) -> Segment:
-    """Return a line of a frame as seen from where that frame stands at H."""
-    a, b = (add(H.p, rotate(H.R, p)) for p in bone)
-    return a, b
+    """Return a line of a frame likewise."""
+    a, b = bone
+    return _seen(H, a), _seen(H, b)
 
 
 def _towards(a: float, b: float, most: float) -> float:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from handover.cosim.blocks.geometry import skew
 from handover.cosim.blocks.plain_rotation import (
     ZERO,
     Matrix,
@@ -12,6 +13,7 @@ from handover.cosim.blocks.plain_rotation import (
     add,
     add_cross,
     add_scaled,
+    column,
     cross,
     dot,
     from_rotation_vector,
@@ -22,8 +24,8 @@ from handover.cosim.blocks.plain_rotation import (
     rotate,
     rotation_matrix,
     scale,
+    subtract,
 )
-from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand.attachment import Attachment, Frame, Palm
 from handover.plants.free_flyer.rigid_body import RigidBody
 
@@ -75,6 +77,8 @@ class FloatingObject:
         """
         body = self.body
         if not held and not palms:
+            if body.v == ZERO and body.spin == ZERO and normalize(body.q) == body.q:
+                return [], []  # at rest it stays, to the last bit
             parts = max(1, math.ceil(norm(body.spin) * h / (min(self._moments) * _TURN)))
             for _ in range(parts):
                 body.advance(h / parts, ZERO, ZERO, ZERO, ZERO)
@@ -142,7 +146,7 @@ class FloatingObject:
                 self._inverses.clear()
             masses = np.diag([*[self.body.mass] * 3, *self._moments])
             for (a, _), (s, s_turn) in zip(held, scales, strict=True):
-                J = np.hstack([np.eye(3), -_crossing(a.r)])
+                J = np.hstack([np.eye(3), -skew(np.array(a.r))])
                 masses += h * s * (a.stiffness.k * h + a.stiffness.c) * np.transpose(J) @ J
                 masses[3:, 3:] += h * s_turn * (a.stiffness.k_turn * h + a.stiffness.c_turn) * np.eye(3)
             self._inverses[key] = np.linalg.inv(masses).tolist()
@@ -248,6 +252,14 @@ def _applied(rows: list[list[float]], y: Sequence[float]) -> Six:
     return a, b, c, d, e, f
 
 
-def _crossing(a: Vector) -> Floats:
-    x, y, z = a
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+def nearest_on_centre_line(
+    middle: Vector, half: float, p: Vector, R_F: Matrix, body: RigidBody, R: Matrix
+) -> tuple[Vector, Vector]:
+    """Return the point of a bar's centre line that is nearest to p, seen from the object's centre in O, and in F.
+
+    The bar is along y of O, and reaches `half` to both sides of its middle.
+    """
+    axis = column(R, 1)
+    d = subtract(p, add(body.p, rotate(R, middle)))
+    s = min(max(dot(d, axis), -half), half)
+    return add_scaled(middle, s, (0.0, 1.0, 0.0)), inverse_rotate(R_F, subtract(scale(s, axis), d))

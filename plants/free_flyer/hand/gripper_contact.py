@@ -19,12 +19,14 @@ from handover.cosim.blocks.plain_rotation import (
     subtract,
 )
 from handover.plants.free_flyer.hand.attachment import Frame
-from handover.plants.free_flyer.hand.finger_contact import Box
-from handover.plants.free_flyer.hand.hand_kinematics import RADIUS, REACH, Segment
-from handover.plants.free_flyer.hand.parameters import Params
+from handover.plants.free_flyer.hand.box import Box
+from handover.plants.free_flyer.hand.hand_kinematics import RADIUS, REACH, Ball, Segment
+from handover.plants.free_flyer.hand.parameters import ContactParams
 
 _PALM_THICKNESS, _JAW = 0.012, (0.06, 0.04, 0.008)
 """Thickness of the palm, and sides of a jaw, m, assumed."""
+_NEAR = RADIUS + 1e-9
+"""Metres from the gripper within which a ball around bones may have one whose phalanx touches it."""
 
 
 class GripperSolids:
@@ -34,20 +36,22 @@ class GripperSolids:
     presses with at most arm_force_max in all.
     """
 
-    def __init__(self, params: Params) -> None:
+    def __init__(self, params: ContactParams) -> None:
         self._p = p = params
         self._palm = Box((0.5 * _PALM_THICKNESS, p.palm_width, p.palm_width))
         self._jaw = Box(scale(0.5, _JAW))
         deep, wide = p.palm_depth + _PALM_THICKNESS, max(p.palm_width, 0.5 * _JAW[1])
         self._around = Box((max(deep, 0.5 * _JAW[0]), wide, max(p.palm_width, 0.5 * p.aperture + _JAW[2])))
         """A box about G that has the others in it, whatever the angle."""
-        self._far = p.palm_depth + p.palm_width + p.aperture + REACH
+        self._far = norm(self._around.half) + REACH
 
-    def press(self, bones: Sequence[Segment], H: Frame, G: Frame, angle: float) -> tuple[Vector, Vector]:
+    def press(
+        self, fingers: Sequence[tuple[Sequence[Segment], Ball]], H: Frame, G: Frame, angle: float
+    ) -> tuple[Vector, Vector]:
         """Return force and torque about G of phalanges on the gripper, N, N m, in W.
 
         Args:
-            bones: the lines in the middle of the phalanges, in H.
+            fingers: the lines in the middle of each finger's phalanges, and a ball that these are in, in H.
             H: the hand, with its velocity.
             G: the gripper, with its velocity.
             angle: between the gripper's fingers, rad.
@@ -64,8 +68,9 @@ class GripperSolids:
         ]
         f, tau = ZERO, ZERO
         p_GH, R_GH = inverse_rotate(G.R, subtract(H.p, G.p)), rotation_matrix(relative_quaternion(G.q, H.q))
-        for bone in bones:
-            a, b = (add(p_GH, rotate(R_GH, end)) for end in bone)
+        near = [bones for bones, (c, r) in fingers if self._around.distance(add(p_GH, rotate(R_GH, c))) < r + _NEAR]
+        for bone in (bone for bones in near for bone in bones):
+            a, b = add(p_GH, rotate(R_GH, bone[0])), add(p_GH, rotate(R_GH, bone[1]))
             if self._around.least_room((a, b)) >= RADIUS:
                 continue
             for solid, place in solids:

@@ -1,9 +1,7 @@
 """Hand, object and grip between a person and a free-flyer in microgravity, after [Fernandes2020] secs. 3.1-3.2, 4.3."""
 
-import enum
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
@@ -12,44 +10,36 @@ import numpy as np
 
 from handover.cosim.blocks.plain_rotation import (
     ZERO,
-    Vector,
     add,
     cross,
     distance,
-    inverse_rotate,
-    lerp,
-    nlerp,
     normalize,
     quaternion,
-    relative_quaternion,
     rotate,
     rotation_matrix,
-    scale,
     subtract,
     vector,
 )
-from handover.cosim.blocks.ports import Vector3, Vector4, Vector14, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.cosim.blocks.units import (
-    Metre,
-    MetrePerSecond,
-    Newton,
-    NewtonMetre,
-    Number,
-    Radian,
-    RadianPerSecond,
-    Second,
-)
 from handover.plants.free_flyer.hand.attachment import Attachment, Frame, Palm
+from handover.plants.free_flyer.hand.contacts import (
+    MovedGripper,
+    MovedHand,
+    exchange_forces,
+    seen_from_bar,
+    touches_of,
+)
 from handover.plants.free_flyer.hand.finger_contact import Angles, HandFingers
 from handover.plants.free_flyer.hand.floating_object import FloatingObject
+from handover.plants.free_flyer.hand.flyer_gripper import FlyerGripper
+from handover.plants.free_flyer.hand.flyer_hand import FlyerHand
 from handover.plants.free_flyer.hand.gripper_contact import GripperSolids
-from handover.plants.free_flyer.hand.grips import FlyerGripper, FlyerHand
 from handover.plants.free_flyer.hand.hand_guide import HandGuide, pose_of_tracker
-from handover.plants.free_flyer.hand.hand_kinematics import CLOSED
+from handover.plants.free_flyer.hand.hand_kinematics import CLOSED, STRAIGHT
 from handover.plants.free_flyer.hand.hand_track import HandPose, read_track
 from handover.plants.free_flyer.hand.parameters import Driver, InvalidHandParameters, Motion, Params, StartHolder
 from handover.plants.free_flyer.hand.person import Activity, FlyerPerson
+from handover.plants.free_flyer.hand.ports import Holder, Inputs, Outputs
 from handover.plants.free_flyer.hand.sight import Perception
 from handover.plants.hand_motion import minimum_jerk
 
@@ -67,15 +57,6 @@ __all__ = [
 ]
 
 
-class Holder(enum.IntEnum):
-    """Who holds the object."""
-
-    FREE = 0
-    GRIPPER = 1
-    HAND = 2
-    BOTH = 3
-
-
 _HOLDERS = {
     (False, False): Holder.FREE,
     (True, False): Holder.GRIPPER,
@@ -83,45 +64,8 @@ _HOLDERS = {
     (True, True): Holder.BOTH,
 }
 """By whether the gripper and whether the hand holds it."""
-
-
-@dataclass(kw_only=True)
-class Inputs:
-    """What the robot does; its gripper's place in the default wiring's start."""
-
-    p_WG: Vector3[Metre] = port(np.array([0.0, -0.07, 0.0]), "position of the gripper in the world")
-    q_WG: Vector4[Number] = port(np.array([1.0, 0.0, 0.0, 0.0]), "orientation of the gripper in the world")
-    v_WG: Vector3[MetrePerSecond] = port(np.zeros(3), "velocity of the gripper in the world")
-    w_WB: Vector3[RadianPerSecond] = port(np.zeros(3), "angular velocity of the robot in the world")
-    closure: Number = port(0.0, "closure commanded to the gripper: 0 open, 1 closed", minimum=0.0, maximum=1.0)
-    light: bool = port(False, "the robot's signal light is on")
-    p_WH_track: Vector3[Metre] = port(np.array([-0.40, 0.10, -0.05]), "wanted position of the hand, by a hand tracker")
-    q_WH_track: Vector4[Number] = port(np.array([1.0, 0.0, 0.0, 0.0]), "wanted orientation of the hand, by it")
-    finger_track: Vector14[Radian] = port(np.zeros(14), "wanted angles of the joints, by it, as the output finger")
-    closed_track: bool = port(False, "by the tracker the hand grasps")
-    age: Second = port(0.0, "age of what the tracker says", minimum=0.0)
-
-
-@dataclass(kw_only=True)
-class Outputs:
-    """What the gripper feels, where object and hand are, in the world, and who holds the object."""
-
-    f_G: Vector3[Newton] = output("force on the gripper at G, mean over the step")
-    tau_G: Vector3[NewtonMetre] = output("torque on the gripper about G, mean over the step")
-    p_WO: Vector3[Metre] = output("position of the object's centre")
-    q_WO: Vector4[Number] = output("orientation of the object")
-    v_WO: Vector3[MetrePerSecond] = output("velocity of the object's centre")
-    p_WH: Vector3[Metre] = output("position of the middle of the palm of the hand")
-    q_WH: Vector4[Number] = output("orientation of the hand, along the object's axes when it holds it as offered")
-    finger: Vector14[Radian] = output("angles of the joints: thumb 2, then 3 of each finger, each from its base")
-    gripper_angle: Radian = output("angle between the gripper's fingers")
-    holder: Holder = output("who holds the object")
-    activity: Activity = output("what the person does")
-    f_H: Vector3[Newton] = output("force on the hand, mean over the step")
-    p_WH_goal: Vector3[Metre] = output("position at which person or tracker want the hand")
-    q_WH_goal: Vector4[Number] = output("orientation in which they want it")
-    finger_goal: Vector14[Radian] = output("angles to which they want the joints")
-    closed_goal: bool = output("they want the hand to grasp")
+_ENDS = {0.0: STRAIGHT, 1.0: CLOSED}
+"""Angles of a hand that is open or closed."""
 
 
 class HandAndObject:
@@ -137,10 +81,11 @@ class HandAndObject:
       object is the hand's grip as a whole. A person who closes the hand ends at the touch, without pressing.
     - In place of that person, `driven_by` a track (`HandTrack`, a file) or the inputs of a hand tracker lead the hand
       (`HandGuide`) and its joints, which then press what they close on. It takes hold when it is to grasp and thumb and
-      fingers enclose the object, and lets go when it is not to; as a fist it pushes the palm. Tracking that is older
-      than age_max, or not finite, is lost: the hand stops, as it is, and keeps what it holds. The hand lags behind its
-      inputs, and not behind a file, where it looks ahead. A track reacts to nothing: neither light nor robot. There is
-      no tremor but its own, and activity stays WAIT.
+      fingers enclose the object, and lets go when it is not to; as a fist it pushes the palm. An object that it loses
+      beyond the reach of its arm it takes again only after it has opened. Tracking that is older than age_max, or not
+      finite, is lost: the hand stops, as it is, and keeps what it holds. The hand lags behind its inputs, and not
+      behind a file, where it looks ahead. A track reacts to nothing: neither light nor robot. There is no tremor but
+      its own, and activity stays WAIT.
 
     One unit, because a bare 0.1 kg object that two units exchange by forces is unstable at a few milliseconds. Here the
     gripper's displacement goes in and its wrench, the mean over the step, comes out: stable at 16 and 32 ms. In a
@@ -191,7 +136,7 @@ class HandAndObject:
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Advance from t by dt with u held."""
-        G = Frame(vector(u.p_WG), quaternion(u.q_WG), vector(u.v_WG), vector(u.w_WB))
+        G = Frame(vector(u.p_WG), quaternion(u.q_WG), vector(u.v_WG), vector(u.w_WG))
         if self._robot is None:
             self._check_overlap(G)
         before, body, hand = self._robot or G, self._object.body, self._hand
@@ -200,14 +145,16 @@ class HandAndObject:
         if fist:
             course, f_hand, p_GF = hand.press(dt, course, G)
             tau_hand = cross(p_GF, f_hand)
-        self._fingers.advance(dt, self._goal.angles, self._seen_from_object(course))
+        is_far = hand.hold is None and distance(course.p, body.p) > self._fingers.reach
+        self._fingers.advance(dt, self._goal.angles, None if is_far else self._seen_from_object(course))
         if not fist:
-            H = course if hand.hold is None else Frame(hand.p, hand.q, body.v)
+            H = course if hand.hold is None else hand.carried_by(body)
             f_hand, tau_hand = self._solids.press(self._fingers.bones(), H, G, self._gripper.angle)
         self._exchange_forces(dt, before, G, course)
-        self._f_G, self._tau_G = add(self._f_G, f_hand), add(self._tau_G, tau_hand)
-        self._f_H = subtract(self._f_H, f_hand)
-        if self._reaches():
+        if f_hand != ZERO or tau_hand != ZERO:
+            self._f_G, self._tau_G = add(self._f_G, f_hand), add(self._tau_G, tau_hand)
+            self._f_H = subtract(self._f_H, f_hand)
+        if self._may_bump():
             course = hand.kept_off(dt, course, body)
         hand.arrive(course, body)
         self._robot = G
@@ -253,8 +200,8 @@ class HandAndObject:
             guide.follow(dt, _tracked(u, self._p.age_max))
         self._goal = guide.goal
         self._gripper.act(dt, u.closure, before, body)
-        encloses = hand.hold is not None or self._fingers.encloses(self._seen_from_object(hand.course))
-        hand.take_or_leave(guide.goal.closed and encloses, body)
+        encloses = hand.hold is None and self._fingers.encloses(self._seen_from_object(hand.course))
+        hand.take_or_leave(hand.grasps(guide.goal.closed, encloses), body)
         return hand.move(dt, guide.p, guide.q), guide.goal.closed
 
     def _check_overlap(self, G: Frame) -> None:
@@ -290,57 +237,30 @@ class HandAndObject:
 
     def _exchange_forces(self, dt: float, before: Frame, after: Frame, course: Frame) -> None:
         """Let object, gripper and hand act on each other for dt; find their mean wrenches."""
-        count = max(1, math.ceil(dt / self._p.substep - 1e-6))
-        f_G, tau_G, f_H, body = ZERO, ZERO, ZERO, self._object.body
-        grip, hold = self._gripper.grip, self._hand.hold
-        for i in range(1, count + 1):
-            last, s = i == count, i / count
-            gripper = after if last else _between(before, after, s)
-            arm = course if last else _between(self._hand.course, course, s)
-            held = [(a, F) for a, F in ((grip, gripper), (hold, arm)) if a is not None]
-            palm = self._gripper.palm(gripper, body)
-            R, p_GO = rotation_matrix(body.q), subtract(body.p, gripper.p)
-            touches = self._touches(arm)
-            wrenches, pushes = self._object.advance(dt / count, held, touches if palm is None else [palm, *touches])
-            if palm is not None:
-                f_G, tau_G = _added(f_G, tau_G, pushes[0], ZERO, add(p_GO, rotate(R, palm.r)))
-            for push in pushes[len(pushes) - len(touches) :]:
-                f_H = subtract(f_H, push)
-            for (a, _), (f, tau) in zip(held, wrenches, strict=True):
-                if a is grip:
-                    f_G, tau_G = _added(f_G, tau_G, f, tau, add(p_GO, rotate(R, a.r)))
-                else:
-                    f_H = subtract(f_H, f)
-        s = 1.0 / count
-        self._f_G, self._tau_G, self._f_H = scale(s, f_G), scale(s, tau_G), scale(s, f_H)
+        gripper = MovedGripper(self._gripper, before, after)
+        hand = MovedHand(self._hand, course, self._touches)
+        wrenches, forces = exchange_forces(dt, self._p.substep, self._object, [gripper], [hand])
+        ((self._f_G, self._tau_G),), (self._f_H,) = wrenches, forces
 
     def _wanted_angles(self) -> Angles:
         """Return the angles to which the person wants to close the joints."""
+        if self._person.fingers in _ENDS:
+            return _ENDS[self._person.fingers]
         closed = minimum_jerk(self._person.fingers)
-        return tuple(closed * angle for angle in CLOSED)
+        return tuple([closed * angle for angle in CLOSED])
 
     def _touches(self, H: Frame) -> list[Palm]:
-        """Return what the phalanges of a hand at H, that holds nothing, do to the object."""
-        if self._hand.hold is not None:
-            return []
-        p, seen = self._p, self._seen_from_object(H)
-        force = 0.0 if self._guide is None else p.finger_force
-        touches = self._fingers.touches(seen, p.finger_stiffness, p.finger_damping, p.arm_force_max, force)
-        bump = self._hand.palm(H, self._object.body) if self._reaches() else None
-        return touches if bump is None else [*touches, bump]
+        """Return what a hand at H, that holds nothing, does to the object."""
+        force = 0.0 if self._guide is None else self._p.finger_force
+        return touches_of(self._p, self._hand, self._fingers, self._object.body, H, force, self._may_bump())
 
-    def _reaches(self) -> bool:
+    def _may_bump(self) -> bool:
         """Return whether a person's open hand reaches for the object, so that its palm may meet it."""
         return self._guide is None and self._person.reaches
 
     def _seen_from_object(self, H: Frame) -> Frame:
         """Return a hand that is at H, or that holds the object, as seen from the object."""
-        hand, body = self._hand, self._object.body
-        if hand.hold is not None:
-            return Frame(hand.p_OH, hand.q_OH)
-        R = rotation_matrix(body.q)
-        p, v, w = (inverse_rotate(R, a) for a in (subtract(H.p, body.p), H.v, H.w))
-        return Frame(p, relative_quaternion(body.q, H.q), v, w)
+        return seen_from_bar(self._hand, self._object.body, H)
 
     def _outputs(self) -> Outputs:
         """Return the outputs as pieces of one array, which costs less than an array each."""
@@ -372,12 +292,3 @@ def _tracked(u: Inputs, age_max: float) -> HandPose | None:
     if not u.age <= age_max:
         return None
     return pose_of_tracker(u.p_WH_track, u.q_WH_track, u.finger_track, u.closed_track)
-
-
-def _added(f: Vector, tau: Vector, f_O: Vector, tau_O: Vector, arm: Vector) -> tuple[Vector, Vector]:
-    """Return a wrench on the gripper with the reaction to one on the object added, which acts at `arm` from G."""
-    return subtract(f, f_O), subtract(subtract(tau, tau_O), cross(arm, f_O))
-
-
-def _between(a: Frame, b: Frame, s: float) -> Frame:
-    return Frame(lerp(a.p, b.p, s), nlerp(a.q, b.q, s), lerp(a.v, b.v, s), lerp(a.w, b.w, s))

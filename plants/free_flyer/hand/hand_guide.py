@@ -25,12 +25,12 @@ from handover.cosim.blocks.plain_rotation import (
 )
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
+from handover.plants.free_flyer.hand.hand_kinematics import CLOSED, STRAIGHT
 from handover.plants.free_flyer.hand.hand_track import HandPose
 from handover.plants.free_flyer.hand.parameters import Params
 
 _BRAKING = 0.8
-"""Share of the acceleration by which a hand counts on braking, so that it does not overshoot in steps."""
+"""Share of the acceleration by which a hand counts on braking, so that it does not overshoot in steps (assumed)."""
 _RIGHT_ANGLE = math.pi / 2.0
 
 
@@ -48,7 +48,7 @@ class HandGuide:
 
     with v' as near to v_goal as its limit lets it: a low-pass of 1 / b, which lags by that time, and a wanted pose that
     jumps moves the hand no faster than an arm moves. Attitude likewise, by the rotation vector. Without a wanted pose,
-    the hand brakes, and stays with its fingers as they are.
+    the hand brakes, and stays with its fingers as they are; before the first one they are closed if it is, or straight.
 
     Roll, pitch and yaw seen from q_WH_0 are limited to +-90 degrees each. [Fernandes2020] sec. 4.2.1
     """
@@ -58,7 +58,7 @@ class HandGuide:
         self._neutral = q
         self._v, self._w = ZERO, ZERO
         self.p, self.q = p, q
-        self.goal = HandPose(p, q, STRAIGHT, closed)
+        self.goal = HandPose(p, q, CLOSED if closed else STRAIGHT, closed)
 
     def lag(self, dt: float) -> float:
         """Return the time by which a hand that is led in steps of dt lags, s."""

@@ -28,6 +28,8 @@ REACH = 0.16
 
 Segment = tuple[Vector, Vector]
 """The line between the ends of a bone."""
+Ball = tuple[Vector, float]
+"""Centre and radius, m."""
 
 
 @dataclass(frozen=True)

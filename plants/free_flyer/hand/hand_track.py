@@ -4,8 +4,8 @@ import csv
 import math
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.plain_rotation import Quaternion, Vector, lerp, nlerp, normalize
@@ -28,8 +28,7 @@ _ROUNDING = 1e-6
 """Radians by which a joint may be beyond its range, by rounding."""
 
 
-@dataclass(frozen=True)
-class HandPose:
+class HandPose(NamedTuple):
     """Where a hand is to be: H in W, m and scalar first; angles of its joints, rad; whether it grasps."""
 
     p: Vector
@@ -57,6 +56,16 @@ class HandTrack:
     def __init__(self, times: Sequence[float], poses: Sequence[HandPose]) -> None:
         self._times, self._poses = tuple(times), tuple(poses)
 
+    @property
+    def times(self) -> tuple[float, ...]:
+        """Times of its rows, s, which increase."""
+        return self._times
+
+    @property
+    def poses(self) -> tuple[HandPose, ...]:
+        """Where the hand is to be at these times."""
+        return self._poses
+
     def at(self, t: float) -> HandPose:
         """Return where the hand is to be at a time, s."""
         i = bisect_right(self._times, t)
@@ -76,8 +85,8 @@ def read_track(path: Path, max_gap: float) -> HandTrack:
         max_gap: longest time between two rows, s.
 
     Raises:
-        InvalidTrack: it cannot be read, lacks columns, or rows are not numbers, not in the order of time, too far
-            apart, or hold a quaternion that is no rotation or a joint beyond 0 to 90 degrees.
+        InvalidTrack: it cannot be read, lacks columns, or rows are not numbers, before 0 s, not in the order of time,
+            too far apart, or hold a quaternion that is no rotation or a joint beyond 0 to 90 degrees.
     """
     try:
         with path.open(newline="", encoding="utf-8") as file:
@@ -148,6 +157,8 @@ def _faults(rows: Sequence[tuple[int, Sequence[float]]], max_gap: float) -> list
             add("closed must be 0 or 1", n, f"{row[-1]:g}")
         if not math.isfinite(t):
             continue
+        if t < 0.0:
+            add("time must not be negative, a run begins at 0 s", n, f"{t:g} s")
         if before is not None and t <= before:
             add("time must increase", n, f"{t:g} s after {before:g} s")
         elif before is not None and t - before > max_gap * (1.0 + 1e-9):

@@ -29,7 +29,16 @@ from handover.cosim.blocks.units import (
 from handover.plants.free_flyer.rigid_body import unit_faults
 
 MIN_ROOM = 0.05
-"""Metres that must lie between the gripper's and the hand's place on an object for both to hold it."""
+"""Metres that must lie between the gripper's and the hand's place on an object for both to hold it (assumed)."""
+
+OF_PERSON = (
+    *("reaction_time", "reaction_spread", "reach_speed", "grasp_time", "attempts", "patience"),
+    *("pull_direction", "pull_speed", "pull_ramp", "pull_distance", "push_speed", "push_ramp", "push_distance"),
+    *("effort", "effort_spread", "push_share", "arm_mass", "offer_gap", "fist_offset"),
+    *("line_of_sight", "sight_error", "depth_error", "interface_delay", "timing_error", "haste"),
+    *("tremor_rms", "tremor_frequency", "tremor_bandwidth", "drift_rms", "drift_time"),
+)
+"""Parameters that only a simulated person has: a hand that is driven by anything else ignores them."""
 
 
 class InvalidHandParameters(InvalidParameters):
@@ -63,12 +72,8 @@ class StartHolder(enum.IntEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Params:
-    """Object: [Fernandes2020] sec. 4.1.2, its sides in metres. All other values are assumed.
-
-    The object lies across the gripper, its long side along y: that makes the handover place (0, -0.07, 0) of
-    [Fernandes2020] the position of an end of an object whose centre is in the world's origin.
-    """
+class PersonParams:
+    """What the person does, with what arm, and the object: [Fernandes2020] sec. 4.1.2, its sides in metres."""
 
     motion: Motion = parameter(Motion.TAKE, "what the person does at the robot's first signal")
     motion_again: Motion = parameter(Motion.GIVE, "what the person does at each later signal")
@@ -113,6 +118,11 @@ class Params:
     fist_radius: Metre = parameter(0.035, "radius of a fist", minimum=0.005, maximum=0.2)
     fist_offset: Metre = parameter(-0.07, "where along y of G a fist pushes", minimum=-0.3, maximum=0.3)
 
+
+@dataclass(frozen=True, kw_only=True)
+class TrackParams(PersonParams):
+    """What may lead a hand in place of that person, and how it follows."""
+
     driven_by: Driver = parameter(Driver.PERSON, "who moves the hand: a simulated person, a file, or the inputs")
     track: str = parameter("", "CSV file of a recorded track of a hand, of driven_by TRACK")
     age_max: Second = parameter(
@@ -130,6 +140,12 @@ class Params:
     finger_force: Newton = parameter(
         0.1, "force of a phalanx whose joint wants on, if the hand follows a track", minimum=0.0, maximum=20.0
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactParams(PersonParams):
+    """Fingers, the gripper's hold, and a person's errors and tremor: all that does not depend on who leads a hand."""
+
     finger_rate: RadianPerSecond = parameter(12.0, "speed of the hand's joints", minimum=0.1, maximum=100.0)
     finger_stiffness: NewtonPerMetre = parameter(300.0, "stiffness of a phalanx", minimum=1.0, maximum=1e5)
     finger_damping: NewtonSecondPerMetre = parameter(3.0, "damping of a phalanx", minimum=0.0, maximum=1000.0)
@@ -167,7 +183,10 @@ class Params:
     timing_error: Second = parameter(
         0.05, "deviation of how early fingers are taken for closed or opened", minimum=0.0, maximum=5.0
     )
-    effort_spread: Number = parameter(0.05, "deviation of the effort, relative", minimum=0.0, maximum=0.3)
+    effort_spread: Number = parameter(0.05, "deviation of the effort, relative", minimum=0.0, maximum=0.5)
+    haste: Number = parameter(
+        0.0, "share of attempts in which the person does not wait for the gripper", minimum=0.0, maximum=1.0
+    )
     finger_reach: Metre = parameter(
         0.04,
         "how far from the object's middle line the hand may be for its fingers to get it",
@@ -192,9 +211,65 @@ class Params:
         """Angle of the gripper closed on the object, in rad; its fingers close along z."""
         return self.angle_empty + (self.angle_open - self.angle_empty) * float(self.object_size[2]) / self.aperture
 
+    def gripper_faults(self) -> list[str]:
+        """Return what is wrong with a gripper that is to hold and release an object of these sides."""
+        faults: list[str] = []
+        if not self.angle_empty < self.angle_open:
+            faults.append(f"angle_empty {self.angle_empty:g} rad must be less than angle_open {self.angle_open:g} rad")
+        if not self.angle_empty <= self.angle_0 <= self.angle_open:
+            faults.append(
+                f"angle_0 {self.angle_0:g} rad must lie between angle_empty {self.angle_empty:g} rad and angle_open "
+                f"{self.angle_open:g} rad"
+            )
+        if self.angle_object + self.release_angle > self.angle_open:
+            faults.append(
+                f"the object never comes free: the fingers hold it at {self.angle_object:g} rad and must open by "
+                f"release_angle {self.release_angle:g} rad, which is beyond angle_open {self.angle_open:g} rad; "
+                "make release_angle less or angle_open more"
+            )
+        if not self.object_size[2] < self.aperture:
+            faults.append(
+                f"aperture {self.aperture:g} m must exceed the object's thickness, object_size[3] "
+                f"{self.object_size[2]:g} m, or it does not fit into the gripper"
+            )
+        if not self.object_size[0] / 2.0 < self.palm_depth + self.capture_axial:
+            faults.append(
+                f"an object {self.object_size[0]:g} m wide against a palm at {self.palm_depth:g} m is out of the "
+                f"fingers' reach, capture_axial {self.capture_axial:g} m: make that, or palm_depth, more"
+            )
+        return faults
+
+    def person_faults(self) -> list[str]:
+        """Return what is wrong with the person's motions and errors."""
+        faults = unit_faults("q_WO_0", self.q_WO_0) + unit_faults("q_WH_0", self.q_WH_0)
+        if not np.linalg.norm(self.pull_direction) > 0.0:
+            faults.append("pull_direction must not be zero: give a vector of any other length")
+        if not np.linalg.norm(self.line_of_sight) > 0.0:
+            faults.append("line_of_sight must not be zero: give a vector of any other length")
+        if not self.tremor_bandwidth < 2.0 * self.tremor_frequency:
+            faults.append(
+                f"tremor_bandwidth {self.tremor_bandwidth:g} Hz must be less than twice tremor_frequency "
+                f"{self.tremor_frequency:g} Hz"
+            )
+        if self.motion is Motion.GIVE and self.object_with is StartHolder.FREE:
+            faults.append("motion GIVE at the first signal needs the object in the hand: object_with HAND")
+        if self.motion is Motion.TAKE and self.object_with is StartHolder.HAND:
+            faults.append("motion TAKE at the first signal needs the object elsewhere: object_with FREE")
+        return faults
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params(ContactParams, TrackParams):
+    """Object: [Fernandes2020] sec. 4.1.2, its sides in metres. All other values are assumed.
+
+    The object lies across the gripper, its long side along y: that makes the handover place (0, -0.07, 0) of
+    [Fernandes2020] the position of an end of an object whose centre is in the world's origin.
+    """
+
     def check(self) -> None:
         """Raise InvalidHandParameters, with all faults, if values contradict each other."""
-        faults = self._object_faults() + self._gripper_faults() + self._person_faults()
+        faults = self._object_faults() + self.gripper_faults() + self.person_faults()
+        faults += self._track_faults() + self._start_faults()
         if faults:
             raise InvalidHandParameters(faults)
 
@@ -209,59 +284,21 @@ class Params:
                 faults.append(f"{name} {entries} m must lie inside the object, within {half} m of its centre")
         room = float(np.linalg.norm(np.asarray(self.p_OG) - self.p_OH))
         if room < MIN_ROOM:
-            faults.append(f"p_OG and p_OH are {room:g} m apart; gripper and hand need {MIN_ROOM:g} m")
+            faults.append(f"p_OG and p_OH are {room:g} m apart; gripper and hand need {MIN_ROOM:g} m; move one")
         return faults
 
-    def _gripper_faults(self) -> list[str]:
+    def _track_faults(self) -> list[str]:
         faults: list[str] = []
-        if not self.angle_empty < self.angle_open:
-            faults.append(f"angle_empty {self.angle_empty:g} rad must be less than angle_open {self.angle_open:g} rad")
-        if not self.angle_empty <= self.angle_0 <= self.angle_open:
-            faults.append(
-                f"angle_0 {self.angle_0:g} rad must lie between angle_empty {self.angle_empty:g} rad and angle_open "
-                f"{self.angle_open:g} rad"
-            )
-        if self.angle_object + self.release_angle > self.angle_open:
-            faults.append(
-                f"the object never comes free: the fingers hold it at {self.angle_object:g} rad and must open by "
-                f"release_angle {self.release_angle:g} rad, which is beyond angle_open {self.angle_open:g} rad"
-            )
-        if not self.object_size[2] < self.aperture:
-            faults.append(
-                f"aperture {self.aperture:g} m must exceed the object's thickness, object_size[3] "
-                f"{self.object_size[2]:g} m, or it does not fit into the gripper"
-            )
-        if not self.object_size[0] / 2.0 < self.palm_depth + self.capture_axial:
-            faults.append(
-                f"an object {self.object_size[0]:g} m wide against a palm at {self.palm_depth:g} m is out of the "
-                f"fingers' reach, capture_axial {self.capture_axial:g} m"
-            )
-        return faults
-
-    def _person_faults(self) -> list[str]:
-        faults = unit_faults("q_WO_0", self.q_WO_0) + unit_faults("q_WH_0", self.q_WH_0)
-        if not np.linalg.norm(self.pull_direction) > 0.0:
-            faults.append("pull_direction must not be zero")
         if self.driven_by is Driver.TRACK and not self.track:
             faults.append("driven_by TRACK needs a file of a track: track")
         if self.track and self.driven_by is not Driver.TRACK:
             faults.append(f"track {self.track} is given, and driven_by is {self.driven_by.name}, not TRACK")
-        if not np.linalg.norm(self.line_of_sight) > 0.0:
-            faults.append("line_of_sight must not be zero")
-        if not self.tremor_bandwidth < 2.0 * self.tremor_frequency:
-            faults.append(
-                f"tremor_bandwidth {self.tremor_bandwidth:g} Hz must be less than twice tremor_frequency "
-                f"{self.tremor_frequency:g} Hz"
-            )
-        if self.motion is Motion.GIVE and self.object_with is StartHolder.FREE:
-            faults.append("motion GIVE at the first signal needs the object in the hand: object_with HAND")
-        if self.motion is Motion.TAKE and self.object_with is StartHolder.HAND:
-            faults.append("motion TAKE at the first signal needs the object elsewhere: object_with FREE")
-        if self.object_with is StartHolder.FREE:
-            gap = self._start_gap()
-            if gap < 0.0:
-                faults.append(f"p_WH_0 and p_WO_0: the hand starts {-gap:.3g} m inside the object; move one away")
         return faults
+
+    def _start_faults(self) -> list[str]:
+        gap = self._start_gap() if self.object_with is StartHolder.FREE else 0.0
+        fault = f"p_WH_0 and p_WO_0: the hand starts {-gap:.3g} m inside the object; move one away"
+        return [fault] if gap < 0.0 else []
 
     def _start_gap(self) -> float:
         """Return the room between fist and object at the start, the object taken as a rod along its long side."""

@@ -17,25 +17,30 @@ from handover.cosim.blocks.plain_rotation import (
     quaternion,
     quaternion_multiply,
     rotate,
+    rotation_matrix,
     subtract,
     vector,
 )
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.free_flyer.hand.effort import Effort, force_at_rest
-from handover.plants.free_flyer.hand.parameters import Motion, Params, StartHolder
-from handover.plants.free_flyer.hand.sight import Perception, Sight
+from handover.plants.free_flyer.hand.parameters import ContactParams, Motion, StartHolder
+from handover.plants.free_flyer.hand.sight import CLOSING, ROUNDING, Perception, Sight
 from handover.plants.hand_motion import minimum_jerk
 
 _PEAK = 1.875
-"""Highest speed of a minimum-jerk course over its mean speed."""
+"""Highest speed of a minimum-jerk course over its mean speed: 15/8, of 30 s^2 - 60 s^3 + 30 s^4 at s = 1/2 (Flash and
+Hogan, 1985)."""
 _MIN_DURATION = 0.3
-"""Seconds that a reach takes at least."""
-_CLOSING = 0.1
-"""Radians by which the gripper's angle must change for a person to see it."""
+"""Seconds that each movement of a reach takes at least (assumed)."""
+_READY = 0.15
+"""Metres before what it grasps from which a hand comes on along its fingers, which reach 0.11 m
+(assumed)."""
+_OVERLAP = 0.4
+"""Part of the shorter of a reach's two movements for which they overlap; their sum is no faster than either
+(assumed)."""
 _EASING = 3.0
-"""Seconds in which a person who has pulled in vain eases off before letting go, half of the patience at most."""
-_ROUNDING = 1e-9
-"""Seconds by which a sum of steps may miss a time that they fill: step sizes of hosts differ in their last digits."""
+"""Seconds in which a person who has pulled in vain eases off before letting go, half of the patience at most
+(assumed)."""
 
 
 class Activity(enum.IntEnum):
@@ -55,21 +60,27 @@ class Activity(enum.IntEnum):
 class FlyerPerson:
     """Moves a hand in minimum-jerk reaches, and pulls and pushes by an `Effort`, as the robot's actions allow.
 
+    A reach is two minimum-jerk movements that overlap: to a place before its goal, and on along the straight fingers,
+    as people come at what they grasp. A straight one would sweep object and gripper with the fingers, wherever they are
+    higher than the hand rests. A hand leaves likewise, back along its fingers first.
+
     TAKE: REACH for the object's end p_OH, GRASP, PULL until the gripper has let go, WITHDRAW with the object, REST.
     GIVE: OFFER, to p_OG in front of the palm, PUSH against it until the gripper moves, LET_GO when it holds, WITHDRAW.
     PUSH: OFFER and PUSH with the fist beside the fingers, until the gripper moves; WITHDRAW with what the hand holds.
 
-    A signal is the rising edge of the light. What the person sees is acted on after a reaction time, drawn at each
+    A signal is the rising edge of the light. At later ones the person does motion_again; who was to TAKE and then GIVE,
+    and has not yet got the object, takes first. What the person sees is acted on after a reaction time, drawn at each
     signal; a signal that comes in the middle of something waits until that is done, and so does one whose motion is not
     possible: TAKE with the object in the hand or out of reach, GIVE with it elsewhere.
 
     Each attempt has its errors of sight and of timing (`Sight`). Whether the fingers get the object is decided where
     they close, not here: a person who sees a closed hand empty, or a push that meets nothing, tries again, `attempts`
     times in all. By an error of timing the pull begins before the fingers are closed, and the hand lets go, or
-    withdraws, before the gripper holds, or has let go.
+    withdraws, before the gripper holds, or has let go. A hasty person withdraws with the object a reaction after having
+    got it, whatever the gripper does, and lets go of it a reaction after the gripper began to close.
     """
 
-    def __init__(self, params: Params) -> None:
+    def __init__(self, params: ContactParams) -> None:
         self._p = params
         self._rng = np.random.default_rng([params.seed, 1])
         pull = np.asarray(params.pull_direction) / np.linalg.norm(params.pull_direction)
@@ -84,7 +95,9 @@ class FlyerPerson:
         self.holding = params.object_with is StartHolder.HAND
         self.fingers = 1.0 if self.holding else 0.0  # 0 straight, 1 closed
         self._motion = Motion.NONE
-        self._from, self._from_q, self._duration = self.p, self.q, 1.0
+        self._from, self._from_q = self.p, self.q
+        self._near = max(_MIN_DURATION, _PEAK * _READY / params.reach_speed)  # duration of a reach's part at its goal
+        self._far = 1.0  # and of the other one
         self._clock = 0.0  # seconds in this activity
         self._since = 0.0  # seconds for which the condition that ends it has held
         self._in_vain = 0.0  # seconds for which a closed hand has been empty, or a push at its end
@@ -92,6 +105,7 @@ class FlyerPerson:
         self._sight = Sight(params)
         self._effort, self._axis = Effort(params.arm_mass), self._pull
         self._saw_light, self._called, self._answered = False, False, False
+        self._got = self.holding  # whether the person has ever had the object
         self._reaction = params.reaction_time
         self._acts = {
             Activity.WAIT: self._waits,
@@ -133,14 +147,14 @@ class FlyerPerson:
         step = dt / self._p.grasp_time
         closed = self.holding or self.activity is Activity.GRASP or self.pushes_with_fist
         fingers = self.fingers + step if closed else self.fingers - step
-        self.fingers = 1.0 if fingers > 1.0 - _ROUNDING else 0.0 if fingers < _ROUNDING else fingers
+        self.fingers = 1.0 if fingers > 1.0 - ROUNDING else 0.0 if fingers < ROUNDING else fingers
 
     def get_state(self) -> bytes:
         """Return the complete state."""
         where = (int(self.activity), int(self._motion), self.p, self.q, self._from, self._from_q, self._axis)
-        signal = (self._saw_light, self._called, self._answered, self._reaction)
+        signal = (self._saw_light, self._called, self._answered, self._got, self._reaction)
         effort = (self._effort.travelled, self._effort.speed)
-        course = (self.holding, self.fingers, self._duration, self._clock, self._since, *effort)
+        course = (self.holding, self.fingers, self._far, self._clock, self._since, *effort)
         tries = (self._tries, self._in_vain)
         return pack_state((where, signal, course, tries, self._sight.get_state(), self._rng.bit_generator))
 
@@ -151,8 +165,8 @@ class FlyerPerson:
         self._sight.set_state(sight)
         activity, motion, self.p, self.q, self._from, self._from_q, self._axis = where
         self.activity, self._motion = Activity(activity), Motion(motion)
-        self._saw_light, self._called, self._answered, self._reaction = signal
-        self.holding, self.fingers, self._duration, self._clock, self._since = course[:5]
+        self._saw_light, self._called, self._answered, self._got, self._reaction = signal
+        self.holding, self.fingers, self._far, self._clock, self._since = course[:5]
         self._effort.travelled, self._effort.speed = course[5:]
 
     def _begin(self, activity: Activity, seen: Perception) -> None:
@@ -160,6 +174,7 @@ class FlyerPerson:
         if activity is Activity.LET_GO or not self.holding:
             self.p, self.q = seen.p_WH, seen.q_WH
         self.activity = activity
+        self._got |= activity is Activity.WITHDRAW and self.holding
         self._clock, self._since, self._in_vain = 0.0, 0.0, 0.0
         self._effort.begin()
         if activity in (Activity.REACH, Activity.OFFER):
@@ -168,20 +183,27 @@ class FlyerPerson:
         self._from, self._from_q = self.p, self.q
         goals = {Activity.REACH: self._at_object, Activity.OFFER: self._at_palm, Activity.WITHDRAW: self._at_rest}
         if activity in goals:
-            p, _ = goals[activity](seen)
-            self._duration = max(_MIN_DURATION, _PEAK * distance(p, self.p) / self._p.reach_speed)
+            goal, q = goals[activity](seen)
+            leaves = activity is Activity.WITHDRAW
+            a, b = (goal, _ready(self.p, self.q)) if leaves else (self.p, _ready(goal, q))
+            self._far = max(_MIN_DURATION, _PEAK * distance(a, b) / self._p.reach_speed)
 
     def _waits(self, dt: float, seen: Perception) -> None:
         if not self._called:
             return
         self._since += dt
-        self._motion = self._p.motion_again if self._answered else self._p.motion
-        if self._since < self._reaction - _ROUNDING or not self._can(seen):
+        self._motion = self._p.motion_again if self._answered and not self._still_takes else self._p.motion
+        if self._since < self._reaction - ROUNDING or not self._can(seen):
             return
         self._called, self._answered, self._tries = False, True, 0
         starts = {Motion.TAKE: Activity.REACH, Motion.GIVE: Activity.OFFER, Motion.PUSH: Activity.OFFER}
         if self._motion in starts:
             self._begin(starts[self._motion], seen)
+
+    @property
+    def _still_takes(self) -> bool:
+        """Whether the person was to take the object and then give it, and has not yet got it."""
+        return self._p.motion is Motion.TAKE and self._p.motion_again is Motion.GIVE and not self._got
 
     def _can(self, seen: Perception) -> bool:
         if self._motion is Motion.NONE:
@@ -193,7 +215,7 @@ class FlyerPerson:
         return distance(goal, self.rest) <= self._p.arm_reach
 
     def _reaches(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
-        self._follow(*self._at_object(seen))
+        self._approach(*self._at_object(seen))
         if self._has_taken(self._duration):
             self._begin(Activity.GRASP, seen)
 
@@ -211,26 +233,26 @@ class FlyerPerson:
             self._try_again(Activity.REACH, seen)
         elif self._has_taken(self._p.patience):
             self._let_go(seen)
-        elif seen.held and self._has_seen(self._takes_for_free(seen), dt):
+        elif seen.held and self._has_seen(self._sight.takes_for_free(seen), dt):
             self._begin(Activity.WITHDRAW, seen)
 
     def _offers(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
-        self._follow(*self._at_palm(seen))
+        self._approach(*self._at_palm(seen))
         if self._has_taken(self._duration):
             self._begin(Activity.PUSH, seen)
             self._axis = column(seen.G.R, 0)
 
     def _pushes(self, dt: float, seen: Perception) -> None:
         p = self._p
-        moved = seen.angle < p.angle_open - _CLOSING
+        moved = seen.angle < p.angle_open - CLOSING
         if not moved:
             self._push_on(dt, seen)
         gives = self._motion is Motion.GIVE
-        if gives and self._takes_for_gripped(seen):
+        if gives and self._sight.takes_for_gripped(seen):
             if self._has_seen(True, dt):
                 self._let_go(seen)
             return
-        empty = seen.angle < p.angle_object - 0.5 * _CLOSING
+        empty = seen.angle < p.angle_object - 0.5 * CLOSING
         if self._is_in_vain(not moved and self._effort.travelled >= p.push_distance, dt):
             self._try_again(Activity.OFFER, seen)
         elif self._has_seen(empty if gives else moved, dt) or self._has_taken(p.patience):
@@ -241,7 +263,7 @@ class FlyerPerson:
             self._begin(Activity.WITHDRAW, seen)
 
     def _withdraws(self, dt: float, seen: Perception) -> None:  # noqa: ARG002
-        self._follow(*self._at_rest(seen))
+        self._leave(*self._at_rest(seen))
         if self._has_taken(self._duration):
             self._begin(Activity.REST, seen)
 
@@ -256,36 +278,37 @@ class FlyerPerson:
     def _is_in_vain(self, there: bool, dt: float) -> bool:
         """Return whether what tells a failed attempt has been seen for the time of a reaction."""
         self._in_vain = self._in_vain + dt if there else 0.0
-        return there and self._in_vain >= self._reaction - _ROUNDING
-
-    def _takes_for_gripped(self, seen: Perception) -> bool:
-        """Return whether the gripper seems to hold the object: by its angle, as early as the error of timing has it."""
-        p = self._p
-        left = seen.angle - p.angle_object
-        closes = seen.angle < p.angle_open - _CLOSING and left >= -0.5 * _CLOSING
-        return seen.gripped or (closes and left < p.gripper_rate * self._sight.lead)
-
-    def _takes_for_free(self, seen: Perception) -> bool:
-        """Return whether the gripper seems to have let go of the object, likewise."""
-        p = self._p
-        opens = seen.angle > p.angle_object + 0.5 * _CLOSING
-        left = p.angle_object + p.release_angle - seen.angle
-        return not seen.gripped or (opens and left < p.gripper_rate * self._sight.lead)
+        return there and self._in_vain >= self._reaction - ROUNDING
 
     def _has_taken(self, duration: float) -> bool:
         """Return whether the activity has lasted that long."""
-        return self._clock >= duration - _ROUNDING
+        return self._clock >= duration - ROUNDING
 
     def _has_seen(self, there: bool, dt: float) -> bool:
         """Return whether something has been there for the time of a reaction."""
         self._since = self._since + dt if there else 0.0
-        return there and self._since >= self._reaction - _ROUNDING
+        return there and self._since >= self._reaction - ROUNDING
 
-    def _follow(self, p: Vector, q: Quaternion) -> None:
-        """Follow a minimum-jerk course to a goal that may move."""
-        s = minimum_jerk(self._clock / self._duration)
-        self.p = lerp(self._from, p, s)
-        self.q = nlerp(self._from_q, q, s)
+    @property
+    def _duration(self) -> float:
+        """Duration of a reach, s."""
+        return self._far + self._near - _OVERLAP * min(self._far, self._near)
+
+    def _approach(self, p: Vector, q: Quaternion) -> None:
+        """Follow a course to a goal that may move, by way of the place before it."""
+        far = minimum_jerk(self._clock / self._far)
+        near = minimum_jerk(1.0 + (self._clock - self._duration) / self._near)
+        ready = _ready(p, q)
+        self.p = add_scaled(lerp(self._from, ready, far), near, subtract(p, ready))
+        self.q = nlerp(self._from_q, q, far)
+
+    def _leave(self, p: Vector, q: Quaternion) -> None:
+        """Follow a course to a goal, by way of the place before where it begins."""
+        near = minimum_jerk(self._clock / self._near)
+        far = minimum_jerk(1.0 + (self._clock - self._duration) / self._far)
+        ready = _ready(self._from, self._from_q)
+        self.p = add_scaled(lerp(self._from, ready, near), far, subtract(p, ready))
+        self.q = nlerp(self._from_q, q, far)
 
     def _pull_on(self, dt: float, seen: Perception) -> None:
         p = self._p
@@ -329,3 +352,8 @@ class FlyerPerson:
 
     def _at_rest(self, seen: Perception) -> tuple[Vector, Quaternion]:  # noqa: ARG002
         return self.rest, self._rest_q
+
+
+def _ready(p: Vector, q: Quaternion) -> Vector:
+    """Return the place before a pose of the hand, back along x, from which it comes at what it grasps there."""
+    return add_scaled(p, -_READY, column(rotation_matrix(q), 0))

@@ -98,7 +98,7 @@ class ArmParameters:
             faults.append(f"mass_L[{j + 1}] {mass:g} kg must be positive and finite")
         moments: list[float] = sorted(self.I_L[j].tolist())
         small, middle, large = moments
-        if not (small > 0.0 and large < math.inf):
+        if not all(0.0 < moment < math.inf for moment in moments):
             faults.append(f"I_L[{j + 1}] {moments} kg m2 must be positive and finite, or it is not positive definite")
         elif large > (small + middle) * (1.0 + 1e-9):
             faults.append(f"no body has I_L[{j + 1}] {moments} kg m2: the largest may not exceed the sum of the others")

@@ -11,8 +11,10 @@ import numpy as np
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.plain_rotation import (
     ZERO,
+    Vector,
     add,
     add_cross,
+    inverse_rotate,
     quaternion,
     rotate,
     rotation_matrix,
@@ -95,6 +97,10 @@ class Inputs:
     tau_B: Vector3[NewtonMetre] = port(np.zeros(3), "torque of the propulsion, in the robot's frame")
     f_G: Vector3[Newton] = port(np.zeros(3), "force on the gripper, acting at G, in the world")
     tau_G: Vector3[NewtonMetre] = port(np.zeros(3), "torque on the gripper, in the world")
+    f_P: Vector3[Newton] = port(np.zeros(3), "force of a person's push on the robot, or its base, in the world")
+    p_BP: Vector3[Metre] = port(
+        np.zeros(3), "where it acts, seen from B in the robot's frame", minimum=-5.0, maximum=5.0
+    )
     tau_J: Vector3[NewtonMetre] = port(np.zeros(3), "torques on the joints; beyond the last joint not used")
 
 
@@ -120,7 +126,7 @@ class FreeFlyer:
     Without joints: m v' = R f_B + f_G, L' = R tau_B + (R p_BG) x f_G + tau_G, [Fernandes2020] eqs. (3.18)-(3.24) with
     eq. (4.1). With joints: eq. (3.23) as it is, C of base and arm in the place of B where their momenta are concerned;
     B stays at the base's centre of mass. In place of Euler angles both have a unit quaternion whose sign is continuous.
-    During a step the propulsion is held in the robot's frame, the wrench on the gripper in the world, and the
+    During a step propulsion and push are held in the robot's frame, the wrench on the gripper in the world, and the
     joints' torques, of at most `torque_max_J`; steps are cut into equal parts of at most `substep`, in which base
     and joints turn by at most `turn`: a robot at rest needs few of them, and one that tumbles is followed as closely.
 
@@ -156,7 +162,10 @@ class FreeFlyer:
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Advance from t by dt with u held."""
-        wrench = vector(u.f_B), vector(u.tau_B), vector(u.f_G), vector(u.tau_G)
+        f_B, tau_B = vector(u.f_B), vector(u.tau_B)
+        if u.f_P.any():
+            f_B, tau_B = self._pushed(f_B, tau_B, u)
+        wrench = f_B, tau_B, vector(u.f_G), vector(u.tau_G)
         h = dt / (count := self._substeps(dt))
         if isinstance(self._body, RigidBody):
             advance = self._body.advance
@@ -170,6 +179,13 @@ class FreeFlyer:
         for _ in range(count):
             self._body.advance(h, wrench, tau_J)
         return self._outputs()
+
+    def _pushed(self, f_B: Vector, tau_B: Vector, u: Inputs) -> tuple[Vector, Vector]:
+        """Return force and torque in B with those of a push: f_B + R^T f_P, tau_B + p_BP x R^T f_P."""
+        b = self._body
+        R_WB = rotation_matrix(b.q if isinstance(b, RigidBody) else b.motion().q_WB)
+        f_P = inverse_rotate(R_WB, vector(u.f_P))
+        return add(f_B, f_P), add_cross(tau_B, vector(u.p_BP), f_P)
 
     def get_state(self) -> bytes:
         """Return the complete state."""

@@ -28,12 +28,22 @@ from handover.cosim.blocks.units import Hertz, Metre, MetrePerSecond, Number, Ra
 
 _ROUNDING = 1e-6
 """Part of an update's interval by which a host's time may be off."""
+_DRAWN_AT_ONCE = 16
+"""Updates whose noise is drawn together: the same numbers in a third of the time."""
 
 
 class InvalidNavigationParameters(InvalidParameters):
     """Parameters out of range, or that contradict each other; `faults` lists all of them."""
 
     block = "Navigation"
+
+
+class NoOrientation(ValueError):
+    """The truth has an orientation that is none: its quaternion is zero."""
+
+    def __init__(self, t: float) -> None:
+        super().__init__(f"input q_WB is [0, 0, 0, 0] at {t:g} s, which is no orientation: give a unit quaternion")
+        self.t = t
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,6 +162,7 @@ class Navigation:
 
     Raises:
         InvalidNavigationParameters: by the constructor, for values out of range, or a drift without correlation time.
+        NoOrientation: the input q_WB is zero.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -174,6 +185,7 @@ class Navigation:
         self._slow = self._drifts or bool(np.any(self._bias))
         self._past: list[_Motion] = []  # as far back as an update may reach, oldest first
         self._updated: float | None = None  # time of the latest update
+        self._noise: list[list[float]] = []  # of the next updates, the last one first
         self._errors: list[float] = []
         self._estimate = _Motion(0.0, ZERO, IDENTITY, ZERO, ZERO)
         self._draw()
@@ -207,6 +219,7 @@ class Navigation:
                 tuple(self._estimate),
                 self._errors,
                 self._drift,
+                self._noise,
                 self._rng.bit_generator,
                 self._slow_rng.bit_generator,
             )
@@ -214,9 +227,10 @@ class Navigation:
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this navigation or of one with equal parameters."""
-        past, self._updated, estimate, self._errors, self._drift, noise, slow = unpack_state(state)
+        past, self._updated, estimate, self._errors, self._drift, noise, rng, slow = unpack_state(state)
         self._past, self._estimate = [_Motion(*m) for m in past], _Motion(*estimate)
-        self._rng.bit_generator.state, self._slow_rng.bit_generator.state = noise, slow
+        self._noise = list(noise)
+        self._rng.bit_generator.state, self._slow_rng.bit_generator.state = rng, slow
 
     def _latest_update(self, t: float) -> float:
         """Return the time of the latest update at t or before."""
@@ -249,8 +263,11 @@ class Navigation:
         self._drift = decay * self._drift + added * self._slow_rng.standard_normal(12)
 
     def _draw(self) -> None:
-        noise = self._noise_deviations * self._rng.standard_normal(12)
-        self._errors = (noise + self._bias + self._drift if self._slow else noise).tolist()
+        if not self._noise:
+            drawn = self._noise_deviations * self._rng.standard_normal((_DRAWN_AT_ONCE, 12))
+            self._noise = drawn[::-1].tolist()
+        noise = self._noise.pop()
+        self._errors = (np.array(noise) + self._bias + self._drift).tolist() if self._slow else noise
 
     def _outputs(self, m: _Motion) -> Outputs:
         """Return the outputs as pieces of one array, which costs less than an array each."""
@@ -267,4 +284,6 @@ class Navigation:
 
 
 def _motion(t: float, u: Inputs) -> _Motion:
+    if not np.any(u.q_WB):
+        raise NoOrientation(t)
     return _Motion(t, vector(u.p_WB), quaternion(u.q_WB), vector(u.v_WB), vector(u.w_WB))

@@ -12,7 +12,7 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from handover.cosim.blocks.geometry import Pinhole, rotation_of
+from handover.cosim.blocks.geometry import Pinhole, rotation_of, skew
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.cameras.shapes import (
     Decal,
@@ -109,8 +109,7 @@ class ShadedBall:
         self._radius = radius
         self._camera = camera
         self._down = camera.R_WC[:, 1]
-        x, y, z = self._down.tolist()
-        self._across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # across @ v is down x v
+        self._across = skew(self._down)  # across @ v is down x v
         self._texture = _texture(light.in_camera_frame(camera.R_WC))
 
     def decal(self, p_WO: Floats) -> Decal | None:

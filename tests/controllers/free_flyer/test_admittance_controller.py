@@ -12,8 +12,10 @@ from pushed_body import ARM, GOAL, MASS, Body, T, pushed
 from handover.controllers.free_flyer.admittance_controller import AdmittanceController, Inputs, Params
 from handover.controllers.free_flyer.body import InvalidControllerParameters
 from handover.controllers.free_flyer.ports import Behaviour
+from handover.controllers.free_flyer.published_rate import PUBLISHED_PERIOD, AdmittanceController67
 from handover.controllers.free_flyer.rotations import InvalidOrientation
 from handover.controllers.free_flyer.wrench_observer import ThrustModel, WrenchObserver
+from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.robot import thrusters
 
@@ -158,7 +160,7 @@ def test_outputs_tell_the_step_and_change_nothing():
 
 def test_inner_gains_that_are_too_high_are_refused_with_a_remedy():
     with pytest.raises(InvalidControllerParameters, match=r"the loop is unstable at 62\.5 Hz") as caught:
-        AdmittanceController(Params(k_P=900.0, k_D=200.0))
+        AdmittanceController(Params(k_x=900.0, k_v=200.0))
     assert "times these gains" in str(caught.value)
 
 
@@ -168,14 +170,14 @@ def test_a_delay_that_is_known_leaves_the_virtual_body_alone_until_the_inner_loo
     assert late.pole_radius == pytest.approx(prompt.pole_radius, abs=1e-9)
     assert late.damping_ratio == pytest.approx(prompt.damping_ratio, abs=1e-6)
     with pytest.raises(InvalidControllerParameters, match=r"unstable.*a delay of at most about 0\.0"):
-        AdmittanceController(Params(delay=0.1, k_D=20.0, k_P=100.0))
+        AdmittanceController(Params(delay=0.1, k_v=20.0, k_x=100.0))
 
 
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"k_D": 0.0}, "inner position gains: k_P = 9 and k_D = 0 must be positive"),
-        ({"k_P_R": 0.0}, "inner attitude gains: k_P = 0"),
+        ({"k_v": 0.0}, "inner position gains: k_P = 9 and k_D = 0 must be positive"),
+        ({"k_R": 0.0}, "inner attitude gains: k_P = 0"),
         ({"mass": np.inf}, "mass = inf kg must be positive and finite"),
         ({"delay": -0.01}, r"delay = -0\.01 s must be finite and not negative"),
         ({"behaviour": Behaviour.CUSTOM, "damping_rotation": np.zeros((3, 3))}, "damping_rotation = .* definite"),
@@ -198,3 +200,45 @@ def test_turning_the_goal_turns_the_command():
     a = AdmittanceController(PROMPT).step(0.0, T, u)
     b = AdmittanceController(PROMPT).step(0.0, T, replace(u, q_WB_meas=half, q_WG_goal=half))
     np.testing.assert_allclose(a.f_cmd, b.f_cmd, atol=1e-12)
+
+
+def test_an_output_depends_directly_on_the_inputs_that_are_declared_and_on_no_others():
+    controller, rng = AdmittanceController(Params(delay=T)), np.random.default_rng(5)
+
+    def drawn(active: bool = True) -> Inputs:
+        q = np.array([1.0, *0.1 * rng.standard_normal(3)])
+        p, v, w = 0.02 * rng.standard_normal((3, 3))
+        goal = {"p_WG_goal": 0.02 * rng.standard_normal(3), "q_WG_goal": np.array([1.0, 0.1, 0.0, 0.0])}
+        return Inputs(p_WB_meas=p, q_WB_meas=q, v_WB_meas=v, w_WB_meas=w, active=active, **goal)
+
+    names = [v.name for v in describe(AdmittanceController).inputs]
+    changed: dict[str, set[str]] = {v.name: set() for v in describe(AdmittanceController).outputs}
+    for n in range(12):
+        u = drawn()
+        for _ in range(5):
+            controller.step(0.0, T, u)
+        for given in (u, drawn(active=n % 3 > 0)):
+            before = vars(controller.outputs(0.0, given))
+            for name in names:
+                other = not given.active if name == "active" else getattr(drawn(), name)
+                if name == "q_WG_goal":
+                    other = np.array([1.0, 0.0, 0.2, 0.0])
+                after = vars(controller.outputs(0.0, replace(given, **{name: other})))
+                for output, seen in changed.items():
+                    if not np.array_equal(before[output], after[output]):
+                        seen.add(name)
+    declared = AdmittanceController.feedthrough
+    assert changed == {output: set(declared.get(output, ())) for output in changed}
+
+
+def test_at_another_rate_loop_observer_and_virtual_body_have_that_rate():
+    """The virtual body's step of force is the same, by a loop that is closed at 67.5 Hz."""
+    period = float(PUBLISHED_PERIOD)
+    slow, fast = AdmittanceController(PROMPT), AdmittanceController67(PROMPT)
+    assert (slow.loop.period, fast.loop.period) == (T, period)
+    assert slow.loop.slowest_decay == pytest.approx(fast.loop.slowest_decay, rel=0.01)
+    wrenches = [np.tile([0.05, 0.0, 0.0, 0.0, 0.0, 0.0], (round(2.0 / dt), 1)) for dt in (T, period)]
+    ends = [c.loop.response(d)[-1, 0] for c, d in zip((slow, fast), wrenches, strict=True)]
+    assert ends[0] == pytest.approx(ends[1], rel=0.01)
+    states = [c.step(0.0, 1.0, Inputs(active=True)).slowest_decay for c in (slow, fast)]
+    assert states == [slow.loop.slowest_decay, fast.loop.slowest_decay]

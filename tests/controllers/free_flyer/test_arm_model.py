@@ -1,5 +1,7 @@
 """The controller's model of a robot with an arm: by differences, by the thesis's formulas, and beside the plant."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -17,6 +19,7 @@ from handover.cosim.blocks.plain_rotation import ZERO, quaternion, vector
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.robot.arm import Arm
 from handover.plants.free_flyer.robot.articulated_body import ArticulatedBody
+from handover.plants.free_flyer.robot.free_flyer import Params as FlyerParams
 from handover.plants.free_flyer.robot.stopping_joints import JointLimits, Motion, StoppingJoints
 
 I_B = np.array([[0.1534, 0.01, -0.02], [0.01, 0.1427, 0.005], [-0.02, 0.005, 0.1623]])
@@ -189,3 +192,21 @@ def test_the_whole_is_what_its_parts_make_up():
     assert robot.energy == pytest.approx(energy + 0.5 * float(w @ np.array(robot.state[3])))
     np.testing.assert_allclose(whole.p_BG + c, Chain(at.model, np.eye(3), np.zeros(3), at.q_J).p[-1], atol=1e-12)
     assert robot.state[3] != ZERO
+
+
+@pytest.mark.parametrize(
+    ("moments", "possible"),
+    [
+        ((0.02, 0.025, 0.02), True),
+        ((0.02, 0.04, 0.02), True),
+        ((0.02, 0.0401, 0.02), False),
+        ((0.0, 0.01, 0.01), False),
+        ((0.02, np.nan, 0.02), False),
+        ((0.02, 0.02, np.inf), False),
+    ],
+)
+def test_plant_and_controller_refuse_the_same_inertias_of_a_link(moments: tuple[float, ...], possible: bool):
+    inertias = np.array([[0.01] * 3, moments, [0.01] * 3])
+    faults = replace(model(2), inertias=inertias).faults()
+    assert [fault.startswith("I_L[2]") for fault in faults] == [True] * (not possible)
+    assert bool(FlyerParams(joints=2, I_L=inertias).arm_faults()) is not possible

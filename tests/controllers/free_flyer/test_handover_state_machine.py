@@ -1,16 +1,14 @@
 """The sequences of figures 3.2 and 3.3, with a robot that reaches its goal immediately unless a person moves it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
+from decision_world import ARM, EMPTY, END, HOLDING, OPEN, RECEIVE, TO_HUMAN, P, T, World, first, tug, world
 from scipy.spatial.transform import Rotation
 
 from handover.controllers.free_flyer.handover_state_machine import (
-    HandoverPhase,
     HandoverStateMachine,
     HandoverTask,
     Inputs,
@@ -20,80 +18,14 @@ from handover.controllers.free_flyer.handover_state_machine import (
 )
 from handover.controllers.free_flyer.ports import Behaviour
 from handover.controllers.free_flyer.published_rate import (
+    AdmittanceController67,
     HandoverStateMachine67,
     ImpedanceController67,
     PoseController67,
 )
-from handover.controllers.free_flyer.velocity_monitor import PullMonitor, VelocityMonitor
+from handover.controllers.free_flyer.velocity_monitor import VelocityMonitor
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
-
-P = HandoverPhase
-T = 0.016
-ARM = np.array([-0.30, 0.0, 0.0])
-OPEN, HOLDING, EMPTY = 1.2, 0.79, 0.60
-
-
-@dataclass
-class World:
-    """Where the robot is and what its gripper does; a hook may change it before each step."""
-
-    machine: HandoverStateMachine
-    before: Callable[["World"], None] = lambda _: None
-    p_WG: Floats = field(default_factory=lambda: np.array([0.0, -0.07, 0.0]))
-    v_WB: Floats = field(default_factory=lambda: np.zeros(3))
-    angle_closed: float = HOLDING
-    follows: bool = True
-    rng: np.random.Generator | None = None
-    y: Outputs | None = None
-    t: float = 0.0
-    ys: list[Outputs] = field(default_factory=list[Outputs])
-
-    def step(self) -> Outputs:
-        self.before(self)
-        y = self.y
-        if y and self.follows:
-            self.p_WG = np.array(y.p_WG_goal)
-        angle = self.angle_closed if y and y.closure > 0.5 else OPEN
-        noise = 0.001 * self.rng.standard_normal((2, 3)) if self.rng else np.zeros((2, 3))
-        u = Inputs(p_WB_meas=self.p_WG - ARM + noise[0], v_WB_meas=self.v_WB + noise[1], gripper_angle=angle)
-        self.y = self.machine.step(self.t, T, u)
-        self.t += T
-        self.ys.append(self.y)
-        return self.y
-
-    def run(self, seconds: float) -> list[Outputs]:
-        return [self.step() for _ in range(round(seconds / T))]
-
-    def phases(self) -> list[HandoverPhase]:
-        found = [y.phase for y in self.ys]
-        return [p for i, p in enumerate(found) if i == 0 or p is not found[i - 1]]
-
-
-def world(task: HandoverTask, before: Callable[[World], None] = lambda _: None, **params: Any) -> World:
-    return World(HandoverStateMachine(Params(task=task, **params)), before)
-
-
-def tug(speed: float, after: float = 0.5) -> Callable[[World], None]:
-    """A person who moves the gripper for 0.3 s, a while after each time that the robot began to check."""
-    waited = [0.0]
-
-    def act(w: World) -> None:
-        checking = w.y is not None and w.y.phase is P.CHECK_VELOCITY
-        waited[0] = waited[0] + T if checking else 0.0
-        w.v_WB = np.array([0.0, 0.0, speed if checking and waited[0] > after else 0.0])
-
-    return act
-
-
-def first(ys: list[Outputs], phase: HandoverPhase) -> Outputs:
-    return next(y for y in ys if y.phase is phase)
-
-
-FETCH = [P.OPEN_GRIPPER, P.MOVE_TO_OBJECT, P.GRASP_OBJECT, P.MOVE_TO_HANDOVER]
-TO_HUMAN = [*FETCH, P.ACTIVATE_IMPEDANCE, P.SIGNAL, P.CHECK_VELOCITY, P.RELEASE_OBJECT]
-END = [P.DEACTIVATE_IMPEDANCE, P.RETREAT, P.DONE]
-RECEIVE = [P.CHECK_VELOCITY, P.CLOSE_GRIPPER, P.CHECK_ANGLE]
 
 
 def test_robot_to_human_goes_through_figure_3_2():
@@ -252,7 +184,9 @@ def test_without_the_gate_a_moving_robot_yields_signals_and_takes_its_own_motion
     assert P.CLOSE_GRIPPER in w.phases()
 
 
-@pytest.mark.parametrize("block", [HandoverStateMachine67, ImpedanceController67, PoseController67])
+@pytest.mark.parametrize(
+    "block", [HandoverStateMachine67, ImpedanceController67, AdmittanceController67, PoseController67]
+)
 def test_the_published_rate_is_67_5_hz(block: type[Any]):
     assert describe(block).period == 1 / Fraction("67.5")
 
@@ -430,103 +364,3 @@ def test_inputs_are_not_kept():
     u.p_WB_meas[:] = 9.0
     y.p_WG_goal[:] = 9.0
     np.testing.assert_allclose(machine.step(T, T, u).p_WG_goal, [-0.1, 0.1, 0.0])
-
-
-class Fingers:
-    """A gripper that follows the closure at 0.6 rad/s and holds something 0.79 rad thick, until it is 0.2 rad wider."""
-
-    def __init__(self) -> None:
-        self.angle, self.held = HOLDING, True
-
-    def move(self, closure: float) -> float:
-        target = OPEN + closure * (EMPTY - OPEN)
-        self.angle += min(max(target - self.angle, -0.6 * T), 0.6 * T)
-        self.held &= self.angle <= HOLDING + 0.2
-        if self.held:
-            self.angle = max(self.angle, HOLDING)
-        return self.angle
-
-
-def offered(speeds: Floats, **params: Any) -> tuple[list[Outputs], Fingers]:
-    """What a robot does that gives, while its gripper's speed, from the check on, is this at each step."""
-    w = world(HandoverTask.ROBOT_TO_HUMAN, gradual=True, filter_time=0.0, **params)
-    while w.y is None or w.y.phase is not P.CHECK_VELOCITY:
-        w.step()
-    fingers, ys, y = Fingers(), list[Outputs](), w.y
-    for v in speeds:
-        u = Inputs(p_WB_meas=w.p_WG - ARM, v_WB_meas=np.array([v, 0.0, 0.0]), gripper_angle=fingers.move(y.closure))
-        y = w.machine.step(w.t, T, u)
-        ys.append(y)
-    return ys, fingers
-
-
-def rising(rate: float, up_to: float, seconds: float) -> Floats:
-    return np.asarray(np.minimum(rate * T * np.arange(round(seconds / T)), up_to), dtype=np.float64)
-
-
-def test_gradual_fingers_open_with_the_pull_and_release_what_they_have_opened_for():
-    ys, fingers = offered(rising(0.3, 0.12, 1.5))
-    share = np.clip((np.array([y.speed_G for y in ys]) / 0.059 - 0.5) / 0.5, 0.0, 1.0)
-    waiting = [k for k, y in enumerate(ys) if y.phase is P.CHECK_VELOCITY]
-    np.testing.assert_allclose([ys[k].closure for k in waiting], 1.0 - share[waiting], atol=1e-12)
-    assert any(0.0 < ys[k].closure < 1.0 for k in waiting)
-    assert ys[-1].phase is P.RELEASE_OBJECT
-    assert not fingers.held
-    assert len(waiting) * T > 0.25 / 0.6  # a pull shorter than the fingers take is none
-
-
-def test_gradual_fingers_close_again_where_the_pull_ends_although_the_robot_coasts():
-    """Above the threshold all the time: 0.2 s of acceleration, then thrust brakes it."""
-    knock = np.asarray(np.concatenate([rising(0.6, 0.12, 0.2), 0.12 - 0.06 * T * np.arange(60)]), dtype=np.float64)
-    assert np.min(knock[-60:]) > 0.059
-    ys, fingers = offered(knock)
-    assert min(y.closure for y in ys) < 1.0
-    assert ys[-1].closure == 1.0
-    assert ys[-1].phase is P.CHECK_VELOCITY
-    assert fingers.held
-
-
-def test_gradual_takes_an_empty_gripper_for_a_release():
-    w = world(HandoverTask.ROBOT_TO_HUMAN, gradual=True)
-    while w.y is None or w.y.phase is not P.CHECK_VELOCITY:
-        w.step()
-    w.angle_closed = EMPTY
-    w.run(2 * T)
-    assert w.phases()[-1] is P.RELEASE_OBJECT
-
-
-def test_gradual_fingers_close_with_the_push_and_the_threshold_decides():
-    w = world(HandoverTask.HUMAN_TO_ROBOT, gradual=True, filter_time=0.0)
-    while w.y is None or w.y.phase is not P.CHECK_VELOCITY:
-        w.step()
-    closures: list[float] = []
-    for v in (0.0, 0.0126, 0.0168, 0.0147, 0.0):
-        w.v_WB = np.array([v, 0.0, 0.0])
-        closures.append(w.step().closure)
-    np.testing.assert_allclose(closures, [0.0, 0.2, 0.6, 0.6, 0.0], atol=1e-9)
-    w.v_WB = np.array([0.022, 0.0, 0.0])
-    assert w.step().phase is P.CLOSE_GRIPPER
-
-
-def test_gradual_restored_state_continues_as_it_was():
-    w = world(HandoverTask.ROBOT_TO_HUMAN, gradual=True)
-    while w.y is None or w.y.phase is not P.CHECK_VELOCITY:
-        w.step()
-    other = HandoverStateMachine(Params(task=HandoverTask.ROBOT_TO_HUMAN, gradual=True))
-    for v in rising(0.3, 0.12, 1.0):
-        other.set_state(w.machine.get_state())
-        u = Inputs(p_WB_meas=w.p_WG - ARM, v_WB_meas=np.array([v, 0.0, 0.0]), gripper_angle=HOLDING)
-        a, b = w.machine.step(w.t, T, u), other.step(w.t, T, u)
-        for name, value in vars(a).items():
-            np.testing.assert_array_equal(value, getattr(b, name))
-
-
-def test_a_pull_begins_with_more_than_thrust_gives_and_ends_with_the_braking():
-    monitor = PullMonitor(0.15, 0.03, 0.0, T)
-    assert not monitor.measure(0.10, 0.03)
-    steps = [(0.2, True), (0.0, True), (-0.02, True), (-0.04, False), (0.1, False), (0.2, True)]
-    speed = 0.10
-    for rate, pulled in steps:
-        speed += rate * T
-        assert monitor.measure(speed, 0.03) is pulled, rate
-    assert not monitor.measure(0.02, 0.03)

@@ -250,7 +250,7 @@ def test_what_thrust_cannot_give_is_refused_all_at_once():
     with pytest.raises(InvalidControllerParameters) as caught:
         PoseController(Params(acceleration=0.1, turning=1.0, k_D=0.0))
     assert len(caught.value.faults) == 3
-    assert "at most 0.0407 m/s2" in str(caught.value)
+    assert "at most 3.9 kg, or 0.0407 m/s2" in str(caught.value)
 
 
 @pytest.mark.parametrize("k_I", [-0.1, 0.72, np.nan])
@@ -287,3 +287,21 @@ def test_outputs_at_the_start_are_those_of_the_step_and_begin_nothing():
     y = controller.outputs(0.0, u)
     assert controller.get_state() == before
     np.testing.assert_array_equal(flat(y), flat(controller.step(0.0, T, u)))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (
+            {"mass": 48.0},
+            r"mass = 48 kg at acceleration = 0\.02 m/s2 .*; at most 19\.5 kg, or 0\.00813 m/s2$",
+        ),
+        (
+            {"I_B": 0.8 * np.eye(3)},
+            r"I_B, up to 0\.8 kg m2, at turning = 0\.1 .* at most 0\.4 kg m2, or 0\.05 rad/s2$",
+        ),
+    ],
+)
+def test_a_body_too_heavy_for_the_trajectory_is_named_with_what_would_do(given: dict[str, Any], words: str):
+    with pytest.raises(InvalidControllerParameters, match=words):
+        PoseController(Params(**given))

@@ -1,6 +1,10 @@
 """Against closed forms of a mass under sampled control."""
 
 import math
+import os
+import subprocess
+import sys
+import textwrap
 
 import numpy as np
 import pytest
@@ -97,3 +101,35 @@ def test_memory_of_the_controller_takes_the_offset_away():
 def test_bisection_finds_the_limit():
     assert largest_stable(lambda x: x / 0.7, 1.0) == pytest.approx(0.7, abs=1e-3)
     assert largest_stable(lambda _: 2.0, 1.0) == 0.0
+
+
+def test_closing_a_loop_wakes_no_thread_of_blas_and_leaves_their_number():
+    """CPU time of other threads in the 0.3 s after a loop of 24 rows was sampled, in a process where BLAS has two."""
+    code = """
+        import time
+        import numpy as np
+        from threadpoolctl import threadpool_info
+        from handover.controllers.free_flyer.sampled_loop import LinearPlant, SampledLoop, without_memory
+
+        def loop(mass):
+            A = np.kron([[0.0, 1.0], [0.0, 0.0]], np.eye(6))
+            B = np.vstack([np.zeros((6, 6)), np.eye(6) / mass])
+            return SampledLoop(LinearPlant(A=A, B=B, E=B, C=np.eye(12)), without_memory(np.eye(6, 12)), 0.016, 0.02)
+
+        def threads():
+            return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
+
+        loop(1.0).poles
+        time.sleep(0.5)  # threads wait busily when a library has been loaded, too
+        before = threads()
+        begin = time.process_time() - time.thread_time()
+        loop(2.0).poles
+        time.sleep(0.3)
+        print(time.process_time() - time.thread_time() - begin, threads() == before and max(before))
+    """
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "2"}
+    command = [sys.executable, "-c", textwrap.dedent(code)]
+    answer = subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout
+    others, threads = answer.split()
+    assert float(others) < 0.01
+    assert threads == "2"

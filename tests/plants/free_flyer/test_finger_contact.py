@@ -9,7 +9,8 @@ from hand_scene import CALM, DT, Scene
 from handover.cosim.blocks.plain_rotation import IDENTITY, Vector, from_rotation_vector, vector
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand.attachment import Frame
-from handover.plants.free_flyer.hand.finger_contact import Box, HandFingers
+from handover.plants.free_flyer.hand.box import Box
+from handover.plants.free_flyer.hand.finger_contact import HandFingers
 from handover.plants.free_flyer.hand.hand_and_object import Activity
 from handover.plants.free_flyer.hand.hand_kinematics import (
     CLOSED,
@@ -98,6 +99,20 @@ def test_no_point_of_a_line_is_nearer_to_a_box_than_its_least_room():
         least.append(box.least_room(line))
         assert least[-1] <= box.nearest(line)[0] + 1e-12
     assert sum(room > 0.0 for room in least) > 100
+
+
+def test_the_nearest_point_of_a_line_is_that_of_many_of_its_points():
+    box, rng = Box((0.01, 0.1, 0.008)), np.random.default_rng(1)
+    at_ends = 0
+    for a, b in rng.uniform(-1.0, 1.0, (400, 2, 3)) * (0.03, 0.12, 0.03):
+        many = [box.distance(vector(a + s * (b - a))) for s in np.linspace(0.0, 1.0, 501)]
+        away, p = box.nearest((vector(a), vector(b)))
+        assert (
+            min(many) - 0.002 * float(np.linalg.norm(b - a)) <= away <= min(many) + 1e-3 * float(np.linalg.norm(b - a))
+        )
+        assert away == box.distance(p)
+        at_ends += p in (vector(a), vector(b))
+    assert 50 < at_ends < 350
 
 
 @pytest.mark.parametrize(

@@ -111,6 +111,20 @@ def test_propulsion_turns_with_the_robot():
     np.testing.assert_allclose(y.p_WB, [0.30, -0.07 + 0.32, 0.0], atol=1e-12)
 
 
+def test_a_push_at_the_gripper_is_the_force_there_and_none_changes_nothing():
+    q = Rotation.from_euler("xyz", [0.3, -0.5, 0.9]).as_quat(scalar_first=True)
+    p, force = replace(DEFAULT, q_WB_0=q), np.array([0.3, -0.2, 0.5])
+    by_hand = Inputs(f_P=force, p_BP=p.p_BG)
+    for joints in (0, 1):
+        robot = replace(p, joints=joints, tolerance_J=0.0)
+        pushed, at_base = moved(robot, by_hand, 0.016), moved(robot, Inputs(f_G=force), 0.016)
+        np.testing.assert_allclose(flat(pushed), flat(at_base), rtol=0.0, atol=1e-6)  # held in B, not in W, for a step
+    speed = float(np.linalg.norm(moved(p, by_hand, 0.16).v_WB))
+    assert speed == pytest.approx(float(np.linalg.norm(force)) * 0.16 / p.mass, rel=1e-6)
+    idle = replace(wrench(), p_BP=np.ones(3))
+    np.testing.assert_array_equal(flat(moved(TUMBLING, idle, 1.6)), flat(moved(TUMBLING, wrench(), 1.6)))
+
+
 def test_turns_about_a_principal_axis_as_in_closed_form():
     y = moved(DEFAULT, Inputs(tau_B=np.array([0.0, 0.0, 0.1623])), 1.6)
     assert y.w_WB[2] == pytest.approx(1.6, rel=1e-12)

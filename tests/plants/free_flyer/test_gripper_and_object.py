@@ -8,6 +8,10 @@ import pytest
 from hand_scene import CALM, DT, IDLE, Scene, off
 from scipy.spatial.transform import Rotation
 
+from handover.cosim.blocks.plain_rotation import IDENTITY, ZERO, quaternion, vector
+from handover.plants.free_flyer.hand.attachment import Frame
+from handover.plants.free_flyer.hand.finger_contact import HandFingers
+from handover.plants.free_flyer.hand.gripper_contact import GripperSolids
 from handover.plants.free_flyer.hand.hand_and_object import Activity, Holder
 
 
@@ -77,7 +81,7 @@ def test_a_gripped_object_is_carried_in_position_and_attitude():
     turn = np.array([0.0, 0.0, 0.3])
     for i in range(1, 251):  # a turn about G, and a way along y
         q = Rotation.from_rotvec(turn * i * DT).as_quat(scalar_first=True)
-        scene.go(DT, q_WG=q, w_WB=turn, v_WG=np.array([0.0, 0.05, 0.0]))
+        scene.go(DT, q_WG=q, w_WG=turn, v_WG=np.array([0.0, 0.05, 0.0]))
     R = Rotation.from_quat(scene.u.q_WG, scalar_first=True)
     np.testing.assert_allclose(scene.y.p_WO, scene.u.p_WG + R.apply([0.0, 0.07, 0.0]), atol=5e-4)
     assert abs(scene.y.q_WO @ scene.u.q_WG) > math.cos(0.5 * 2e-3)
@@ -176,3 +180,22 @@ def test_a_fading_grip_is_restored_with_what_it_holds():
         a, b = scene.go(DT), other.go(DT)
         np.testing.assert_array_equal(a.f_G, b.f_G)
         np.testing.assert_array_equal(a.p_WO, b.p_WO)
+
+
+def test_a_wide_palm_pushes_what_it_meets_far_from_its_middle():
+    scene = Scene(replace(IDLE, palm_width=0.4), off(0.05, z=0.3))
+    scene.go(0.8, v_WG=np.array([-0.1, 0.0, 0.0]))
+    assert scene.y.v_WO[0] < -0.02
+    beside = Scene(replace(IDLE, palm_width=0.25), off(0.05, z=0.3))
+    assert beside.go(0.8, v_WG=np.array([-0.1, 0.0, 0.0])).v_WO[0] == 0.0
+
+
+def test_fingers_press_on_the_corner_of_a_wide_palm():
+    wide = replace(IDLE, palm_width=0.5)
+    inwards = np.column_stack([[0.0, -1.0, -1.0], [0.0, -1.0, 1.0], [-math.sqrt(2.0), 0.0, 0.0]]) / math.sqrt(2.0)
+    q = quaternion(Rotation.from_matrix(inwards).as_quat(scalar_first=True))
+    for beyond, meets in ((0.06, True), (0.12, False)):  # along the diagonal, of fingers that point to its middle
+        p = (wide.palm_depth + 0.036 - 0.005, 0.5 + beyond / math.sqrt(2.0), 0.5 + beyond / math.sqrt(2.0))
+        bones = HandFingers(vector(wide.object_size), wide.finger_rate).bones()
+        f, _ = GripperSolids(wide).press(bones, Frame(p, q), Frame(ZERO, IDENTITY), wide.angle_open)
+        assert (f[0] > 0.5) is meets

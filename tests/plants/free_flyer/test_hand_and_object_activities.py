@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_scene import CALM, DT, GIVING, IDLE, Scene
+from hand_scene import CALM, DT, GIVING, IDLE, PLACE, Scene
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
@@ -53,6 +53,45 @@ def test_gives_what_it_holds():
     assert Holder.FREE not in [y.holder for y in scene.seen]
     np.testing.assert_allclose(scene.y.p_WO - scene.u.p_WG, [0.0, 0.07, 0.0], atol=0.012)
     np.testing.assert_allclose(scene.go(0.5).p_WH, [-0.40, 0.10, -0.05], atol=1e-5)
+
+
+HIGHER = [(0.0, 0.0, 0.3), (-0.2, 0.0, 0.4), (0.2, -0.25, 0.4), (-0.25, 0.1, 0.3)]
+"""Places of an object above the hand's rest; a hand on straight courses sweeps it with its fingers from below."""
+
+
+@pytest.mark.parametrize("place", [*HIGHER, (0.0, 0.0, 0.0), (-0.1, 0.2, -0.45)])
+def test_an_open_hand_touches_nothing_until_it_closes(place: tuple[float, float, float]):
+    p_WO = np.array(place)
+    scene = Scene(replace(CALM, p_WO_0=p_WO), p_WO + PLACE)
+    scene.go(2.0, closure=1.0)
+    scene.until(Activity.GRASP, light=True)
+    assert max(float(np.abs(y.f_H).max()) for y in scene.seen) == 0.0
+    np.testing.assert_allclose(scene.y.p_WH - scene.y.p_WO, [0.0, 0.07, 0.0], atol=1e-3)
+    scene.until(Activity.PULL)
+    assert scene.go(0.5).holder is Holder.BOTH
+
+
+@pytest.mark.parametrize("place", HIGHER)
+def test_a_hand_that_has_given_leaves_without_a_touch(place: tuple[float, float, float]):
+    scene = Scene(replace(GIVING, motion_again=Motion.NONE), np.array(place) + PLACE)
+    scene.until(Activity.PUSH, light=True)
+    scene.until(Activity.LET_GO, closure=1.0)
+    scene.until(Activity.WITHDRAW)
+    begin = len(scene.seen)
+    scene.until(Activity.REST)
+    assert max(float(np.abs(y.f_H).max()) for y in scene.seen[begin:]) < 1e-3
+    assert scene.y.holder is Holder.GRIPPER
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0, 0.0), (-0.3, 0.1, -0.05), (-0.4, 0.15, 0.4), (-0.22, 0.1, -0.05)])
+def test_no_reach_is_faster_than_its_highest_speed(place: tuple[float, float, float]):
+    p_WO = np.array(place) - [0.0, 0.07, 0.0]
+    scene = Scene(replace(CALM, p_WO_0=p_WO), p_WO + PLACE)
+    scene.go(2.0, closure=1.0)
+    scene.until(Activity.GRASP, light=True)
+    places = np.array([y.p_WH for y in scene.seen if y.activity is Activity.REACH])
+    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / DT
+    assert 0.1 < speeds.max() <= 1.01 * Params().reach_speed
 
 
 def test_a_gripper_that_is_turned_gets_the_object_turned():

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
@@ -233,3 +233,39 @@ def test_goes_on_bit_for_bit_after_a_state_is_restored():
             unit.set_state(state)
             again = [flat(unit.step(DT * i, DT, inputs(i))) for i in range(begin, 260)]
             np.testing.assert_array_equal(again, path[begin:])
+
+
+def test_an_object_in_a_hand_that_turns_at_a_constant_rate_does_not_lag():
+    """The wrist damps turning against the hand's course; damping of absolute turning made it lag by c / k, 80 ms."""
+    carrying, empty = grasping(), Scene(LED, AWAY)
+    empty.go(carrying.i * DT, p_WH_track=END)
+    rate = np.array([0.0, 0.0, 0.5])
+    for k in range(1, 126):
+        q = Rotation.from_rotvec(rate * k * DT).as_quat(scalar_first=True)
+        for scene in (carrying, empty):
+            scene.go(DT, p_WH_track=END, q_WH_track=q)
+    assert carrying.y.holder is Holder.HAND
+    assert angle_between(quaternion(empty.y.q_WH), (1.0, 0.0, 0.0, 0.0)) > 0.9
+    lagging = angle_between(quaternion(carrying.y.q_WH), quaternion(empty.y.q_WH))
+    assert lagging < 1e-3 * float(np.linalg.norm(rate))
+    circling = rate[2] ** 2 * END[1]  # m/s^2, of the object's centre; a step begins with damping along its chord
+    apart = (LED.object_mass + LED.arm_damping * DT) * circling / LED.arm_stiffness
+    np.testing.assert_allclose(carrying.y.p_WH, empty.y.p_WH, atol=apart)
+
+
+def test_a_hand_that_holds_the_object_and_was_never_tracked_stays_closed():
+    scene = Scene(replace(LED, object_with=StartHolder.HAND), AWAY)
+    closed = scene.y.finger
+    y = scene.go(1.0, age=1.0)
+    assert y.closed_goal
+    np.testing.assert_array_equal(y.finger_goal, FIST)
+    assert np.sum(y.finger) > 0.9 * np.sum(closed)
+    assert y.holder is Holder.HAND
+    assert scene.go(1.0, age=0.0).holder is Holder.FREE  # the tracker says that it is open
+
+
+def test_a_closed_hand_that_lost_the_object_beyond_its_reach_does_not_take_it_again():
+    scene = grasping()
+    begin = len(scene.seen)
+    scene.go(3.0, p_WH_track=from_(END, 0.8, 0.0, 0.0))
+    assert [k for k, _ in groupby(y.holder for y in scene.seen[begin:])] == [Holder.HAND, Holder.FREE]

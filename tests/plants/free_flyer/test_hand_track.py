@@ -64,6 +64,7 @@ def test_columns_may_stand_in_any_order(tmp_path: Path):
         ({"joint_3": (9, "x")}, "every entry must be a finite number: line 9 (joint_3)"),
         ({"t": (5, 0.05)}, "time must increase: line 5 (0.05 s after 0.1 s)"),
         ({"t": (61, 3.5)}, "rows must be 0.2 s apart at most: line 61 (0.6 s after the row before)"),
+        ({"t": (2, -0.1)}, "time must not be negative, a run begins at 0 s: line 2 (-0.1 s)"),
         ({"joint_14": (4, 1.7)}, f"joints must be within 0 and {JOINT_MAX:.4f} rad: line 4 (joint_14 1.7)"),
         ({"joint_1": (4, -0.1)}, f"joints must be within 0 and {JOINT_MAX:.4f} rad: line 4 (joint_1 -0.1)"),
         ({"q_w": (3, 1.2)}, "a quaternion must have the norm 1: line 3 (norm 1.2"),
@@ -80,7 +81,7 @@ def test_what_cannot_be_followed_is_refused_with_file_line_and_reason(
 
 
 def test_all_faults_are_told_at_once_and_the_first_lines_of_each(tmp_path: Path):
-    rows = [(t, replace(pose, angles=(2.0,) * JOINTS, q=(2.0, 0.0, 0.0, 0.0))) for t, pose in poses(10)]
+    rows = [(t, pose._replace(angles=(2.0,) * JOINTS, q=(2.0, 0.0, 0.0, 0.0))) for t, pose in poses(10)]
     write_track(tmp_path / "t.csv", rows)
     with pytest.raises(InvalidTrack) as e:
         read_track(tmp_path / "t.csv", 0.01)

@@ -14,6 +14,7 @@ from handover.plants.free_flyer.robot.navigation import (
     Inputs,
     InvalidNavigationParameters,
     Navigation,
+    NoOrientation,
     Outputs,
     Params,
 )
@@ -223,3 +224,13 @@ def test_all_faults_are_reported_together():
     with pytest.raises(InvalidNavigationParameters) as caught:
         Navigation(Params(delay=-1.0, update_rate=-1.0, rate_noise=-1.0))
     assert len(caught.value.faults) == 3
+
+
+@pytest.mark.parametrize("changes", [{}, {"delay": 0.1}, {"update_rate": 13.0}])
+def test_an_orientation_that_is_none_is_refused_by_name(changes: dict[str, Any]):
+    unit, none = Navigation(replace(EXACT, **changes)), replace(truth(0.0), q_WB=np.zeros(4))
+    with pytest.raises(NoOrientation, match=r"q_WB is \[0, 0, 0, 0\] at 0 s.*unit quaternion"):
+        unit.outputs(0.0, none)
+    unit.outputs(0.0, truth(0.0))
+    with pytest.raises(NoOrientation, match=r"at 0\.016 s"):
+        unit.step(0.0, DT, none)

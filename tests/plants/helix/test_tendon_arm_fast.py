@@ -139,6 +139,7 @@ def exudyn_beam(force: float, EI: float, l: float, elements: int = 20) -> tuple[
     system.AddLoad(items.Force(markerNumber=marker, loadVector=[0, force, 0]))
     system.Assemble()
     settings = exudyn.SimulationSettings()
+    settings.solution.file.write = False
     settings.staticSolver.numberOfLoadSteps, settings.staticSolver.verboseMode = 10, 0
     system.SolveStatic(settings)
     along, across, _ = system.GetNodeOutput(tip, exudyn.OutputVariableType.Position)

@@ -1,0 +1,144 @@
+"""Fingers that follow pull and push: when they open, close again, and release what they hold."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from decision_world import ARM, EMPTY, HOLDING, OPEN, P, T, world
+
+from handover.controllers.free_flyer.handover_state_machine import (
+    HandoverStateMachine,
+    HandoverTask,
+    Inputs,
+    InvalidHandoverParameters,
+    Outputs,
+    Params,
+)
+from handover.controllers.free_flyer.velocity_monitor import PullMonitor
+from handover.cosim.blocks.ports import Floats
+
+
+class Fingers:
+    """A gripper that follows the closure at 0.6 rad/s and holds something 0.79 rad thick, until it is 0.2 rad wider."""
+
+    def __init__(self) -> None:
+        self.angle, self.held = HOLDING, True
+
+    def move(self, closure: float) -> float:
+        target = OPEN + closure * (EMPTY - OPEN)
+        self.angle += min(max(target - self.angle, -0.6 * T), 0.6 * T)
+        self.held &= self.angle <= HOLDING + 0.2
+        if self.held:
+            self.angle = max(self.angle, HOLDING)
+        return self.angle
+
+
+def offered(speeds: Floats, **params: Any) -> tuple[list[Outputs], Fingers]:
+    """What a robot does that gives, while its gripper's speed, from the check on, is this at each step."""
+    w = world(HandoverTask.ROBOT_TO_HUMAN, gradual=True, filter_time=0.0, **params)
+    while w.y is None or w.y.phase is not P.CHECK_VELOCITY:
+        w.step()
+    fingers, ys, y = Fingers(), list[Outputs](), w.y
+    for v in speeds:
+        u = Inputs(p_WB_meas=w.p_WG - ARM, v_WB_meas=np.array([v, 0.0, 0.0]), gripper_angle=fingers.move(y.closure))
+        y = w.machine.step(w.t, T, u)
+        ys.append(y)
+    return ys, fingers
+
+
+def rising(rate: float, up_to: float, seconds: float) -> Floats:
+    return np.asarray(np.minimum(rate * T * np.arange(round(seconds / T)), up_to), dtype=np.float64)
+
+
+def test_gradual_fingers_open_with_the_pull_and_release_what_they_have_opened_for():
+    ys, fingers = offered(rising(0.3, 0.12, 1.5))
+    share = np.clip((np.array([y.speed_G for y in ys]) / 0.059 - 0.5) / 0.5, 0.0, 1.0)
+    waiting = [k for k, y in enumerate(ys) if y.phase is P.CHECK_VELOCITY]
+    np.testing.assert_allclose([ys[k].closure for k in waiting], 1.0 - share[waiting], atol=1e-12)
+    assert any(0.0 < ys[k].closure < 1.0 for k in waiting)
+    assert ys[-1].phase is P.RELEASE_OBJECT
+    assert not fingers.held
+    assert len(waiting) * T > 0.25 / 0.6  # a pull shorter than the fingers take is none
+
+
+def test_gradual_fingers_close_again_where_the_pull_ends_although_the_robot_coasts():
+    """Above the threshold all the time: 0.2 s of acceleration, then thrust brakes it."""
+    knock = np.asarray(np.concatenate([rising(0.6, 0.12, 0.2), 0.12 - 0.06 * T * np.arange(60)]), dtype=np.float64)
+    assert np.min(knock[-60:]) > 0.059
+    ys, fingers = offered(knock)
+    assert min(y.closure for y in ys) < 1.0
+    assert ys[-1].closure == 1.0
+    assert ys[-1].phase is P.CHECK_VELOCITY
+    assert fingers.held
+
+
+def test_gradual_takes_an_empty_gripper_for_a_release():
+    w = world(HandoverTask.ROBOT_TO_HUMAN, gradual=True)
+    while w.y is None or w.y.phase is not P.CHECK_VELOCITY:
+        w.step()
+    w.angle_closed = EMPTY
+    w.run(2 * T)
+    assert w.phases()[-1] is P.RELEASE_OBJECT
+
+
+def test_gradual_fingers_close_with_the_push_and_the_threshold_decides():
+    w = world(HandoverTask.HUMAN_TO_ROBOT, gradual=True, filter_time=0.0)
+    while w.y is None or w.y.phase is not P.CHECK_VELOCITY:
+        w.step()
+    closures: list[float] = []
+    for v in (0.0, 0.0126, 0.0168, 0.0147, 0.0):
+        w.v_WB = np.array([v, 0.0, 0.0])
+        closures.append(w.step().closure)
+    np.testing.assert_allclose(closures, [0.0, 0.2, 0.6, 0.6, 0.0], atol=1e-9)
+    w.v_WB = np.array([0.022, 0.0, 0.0])
+    assert w.step().phase is P.CLOSE_GRIPPER
+
+
+def test_gradual_restored_state_continues_as_it_was():
+    w = world(HandoverTask.ROBOT_TO_HUMAN, gradual=True)
+    while w.y is None or w.y.phase is not P.CHECK_VELOCITY:
+        w.step()
+    other = HandoverStateMachine(Params(task=HandoverTask.ROBOT_TO_HUMAN, gradual=True))
+    for v in rising(0.3, 0.12, 1.0):
+        other.set_state(w.machine.get_state())
+        u = Inputs(p_WB_meas=w.p_WG - ARM, v_WB_meas=np.array([v, 0.0, 0.0]), gripper_angle=HOLDING)
+        a, b = w.machine.step(w.t, T, u), other.step(w.t, T, u)
+        for name, value in vars(a).items():
+            np.testing.assert_array_equal(value, getattr(b, name))
+
+
+def test_a_pull_begins_with_more_than_thrust_gives_and_ends_with_the_braking():
+    monitor = PullMonitor(0.15, 0.03, 0.0, T)
+    assert not monitor.measure(0.10, 0.03)
+    steps = [(0.2, True), (0.0, True), (-0.02, True), (-0.04, False), (0.1, False), (0.2, True)]
+    speed = 0.10
+    for rate, pulled in steps:
+        speed += rate * T
+        assert monitor.measure(speed, 0.03) is pulled, rate
+    assert not monitor.measure(0.02, 0.03)
+
+
+def test_a_speed_from_before_the_lights_end_does_not_move_the_fingers():
+    """Between the part of the threshold and the threshold, until the gripper has once been slower than that part."""
+    w = world(HandoverTask.HUMAN_TO_ROBOT, gradual=True, filter_time=0.0)
+    while w.y is None or w.y.phase is not P.SIGNAL:
+        w.step()
+    w.v_WB = np.array([0.0168, 0.0, 0.0])
+    while w.y.phase is P.SIGNAL:
+        w.step()
+    assert {w.step().closure for _ in range(3)} == {0.0}
+    closures: list[float] = []
+    for v in (0.0, 0.0168):
+        w.v_WB = np.array([v, 0.0, 0.0])
+        closures.append(w.step().closure)
+    np.testing.assert_allclose(closures, [0.0, 0.6], atol=1e-9)
+
+
+def test_a_share_that_rest_exceeds_is_refused_for_gradual_fingers_alone():
+    Params(gradual_share=0.4).check()
+    with pytest.raises(InvalidHandoverParameters) as error:
+        Params(gradual=True, gradual_share=0.1).check()
+    for name in ("release_velocity = 0.059", "receive_velocity = 0.021"):
+        assert f"gradual_share = 0.1 of {name} m/s must exceed gate_speed = 0.01 m/s" in str(error.value)
+    with pytest.raises(InvalidHandoverParameters, match=r"gradual_share = 0\.4 of receive_velocity"):
+        Params(gradual=True, gradual_share=0.4).check()
