@@ -1,5 +1,6 @@
 """HTML that pages are made of: Plotly figures, which the page's script draws in its colours and width, and tables."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
@@ -8,7 +9,8 @@ import plotly.graph_objects as go
 import plotly.io.json
 from markupsafe import Markup, escape
 
-_packed = cast(Callable[[Any], str], plotly.io.json.to_json_plotly)
+packed_json = cast(Callable[[Any], str], plotly.io.json.to_json_plotly)
+"""Returns content as JSON, whose arrays Plotly packs."""
 
 
 def plot_html(figure: go.Figure, height: int = 320, label: str = "") -> Markup:
@@ -28,12 +30,18 @@ def plot_html(figure: go.Figure, height: int = 320, label: str = "") -> Markup:
     return Markup(f'<div class="plot" role="img" aria-label="{escape(label)}" style="height: {height}px">{data}</div>')
 
 
+_ESCAPED_SLASH = re.compile(r"(\\\\)|\\u002f")
+"""A backslash that is meant as one, or an escaped slash."""
+
+
 def json_html(content: Any, name: str = "") -> Markup:
     """Return data for a page's scripts, escaped so as not to end the element; Plotly packs arrays.
 
+    Plotly escapes the slashes of packed arrays, too, at six bytes each: without "<" none of them ends an element.
+
     `name` is the element's class, if it has one.
     """
-    data = _packed(content).replace("<", "\\u003c")
+    data = _ESCAPED_SLASH.sub(lambda found: found[1] or "/", packed_json(content)).replace("<", "\\u003c")
     of = f' class="{escape(name)}"' if name else ""
     return Markup(f'<script type="application/json"{of}>{data}</script>')
 

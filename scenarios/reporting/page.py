@@ -76,13 +76,14 @@ def write_page(path: Path, title: str, header: Markup, sections: Sequence[Sectio
     write_whole(path, page_html(title, header, sections))
 
 
-def page_html(title: str, header: Markup, sections: Sequence[Section]) -> str:
+def page_html(title: str, header: Markup, sections: Sequence[Section], *, connects: bool = False) -> str:
     """Return a page.
 
     Args:
         title: the heading.
         header: what stands under the heading.
         sections: in order of appearance; Plotly is included if one of them has plots or scripts.
+        connects: whether its scripts may connect to where the page comes from.
     """
     names = [_SCRIPT, *dict.fromkeys(name for s in sections for name in s.scripts)]
     has_plots = any(s.scripts or 'class="plot"' in s.html for s in sections)
@@ -93,7 +94,26 @@ def page_html(title: str, header: Markup, sections: Sequence[Section]) -> str:
         sections=[replace(s, html=Markup(non_breaking(s.html))) for s in sections],
         style=Markup(asset("page.css")),
         scripts=[Markup(s) for s in scripts],
-        policy=_policy(scripts),
+        policy=_policy(scripts, connects=connects),
+    )
+
+
+def plain_page_html(title: str, html: str, styles: Sequence[str], scripts: Sequence[str]) -> str:
+    """Return a page without headings and sections that connects to where it comes from, see `page_html`.
+
+    Args:
+        title: of the browser's window.
+        html: the body.
+        styles: style sheets.
+        scripts: names of files in `scenarios/reporting/page/`, in the order in which they run.
+    """
+    texts = [asset(name) for name in scripts]
+    return template("plain_page.html").render(
+        title=title,
+        html=Markup(html),
+        styles=[Markup(s) for s in styles],
+        scripts=[Markup(s) for s in texts],
+        policy=_policy(texts, connects=True),
     )
 
 
@@ -115,10 +135,11 @@ def _plotly() -> str:
     return get_plotlyjs()
 
 
-def _policy(scripts: Sequence[str]) -> str:
+def _policy(scripts: Sequence[str], *, connects: bool) -> str:
     """Return the page's Content-Security-Policy: its scripts by their hashes, inline styles, embedded pictures.
 
     Plotly sets inline styles, and hands over pictures to be saved as data and blobs.
     """
     hashes = " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in scripts)
-    return f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:"
+    own = "; connect-src 'self'" if connects else ""
+    return f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:{own}"

@@ -4,7 +4,7 @@ The page holds a limited number of frames, picked from the record's rows; its sc
 """
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -24,10 +24,10 @@ MAX_FRAMES = 240
 """Frames of a replay; the page interpolates poses between them."""
 
 
-def frame_rows(time: NDArray[np.float64]) -> NDArray[np.int64]:
+def frame_rows(time: NDArray[np.float64], frames: int = MAX_FRAMES) -> NDArray[np.int64]:
     """Return ascending rows of a record that are about evenly spaced in time, with the first and the last."""
     last = len(time) - 1
-    wanted: Floats = np.linspace(float(time[0]), float(time[-1]), min(MAX_FRAMES, len(time)))
+    wanted: Floats = np.linspace(float(time[0]), float(time[-1]), min(frames, len(time)))
     after = np.clip(np.searchsorted(time, wanted), min(1, last), last)
     nearest = after - (wanted - time[after - 1] < time[after] - wanted)
     return np.unique([0, *nearest.tolist(), last]).astype(np.int64)
@@ -40,9 +40,17 @@ def phase_changes(record: Record, phases: str | Sequence[Phase]) -> list[tuple[f
     return [(p.begin, p.name) for p in phases]
 
 
+SCENE_SCRIPTS = ("three.min.js", "replay_shapes.js", "scene.js", "stage.js", "recorder.js")
+"""What a page needs to draw a scene."""
 _MARGIN = 0.04
 """Margin around what is drawn, as a share of its longest side."""
-_SPEEDS = ("0.5", "1", "2", "5")
+_RESOLUTION = 1.0 / 20_000
+"""The coarsest step of a place that is stored in 16 bits, as a share of the scene's longest side: a twentieth of a
+pixel of a large scene."""
+_FEW = 32
+"""Numbers that are not worth a scale of their own."""
+_SPEEDS = ("0.2", "0.5", "1", "2", "5")
+_VIEWS = ("start", "front", "side", "top")
 
 Drawn = Line | Body
 
@@ -56,22 +64,46 @@ def replay_section(replay: Replay, record: Record) -> Section:
         ValueError: a line or a body has neither one row nor as many as the record.
     """
     rows = frame_rows(record.time)
-    drawn: list[Drawn] = [_at(d, rows, len(record.time)) for d in (*replay.bodies, *replay.lines, *replay.fixed)]
-    low, high = _window(drawn) if replay.window is None else replay.window
-    content = {
+    drawn = _drawn(replay, record, rows)
+    return Section(
+        anchor="replay",
+        title="Replay",
+        html=_html(json_html(scene_content(replay, record)), drawn, len(rows), replay),
+        scripts=(*SCENE_SCRIPTS, "replay.js"),
+    )
+
+
+def scene_content(replay: Replay, record: Record, frames: int = MAX_FRAMES) -> dict[str, Any]:
+    """Return a scene and where everything is at some `frames` moments of the record, as `scene.js` takes it.
+
+    Raises:
+        ValueError: a line or a body has neither one row nor as many as the record.
+    """
+    rows = frame_rows(record.time, frames)
+    drawn = _drawn(replay, record, rows)
+    lowest, highest = _extent(drawn)
+    low, high = (lowest, highest) if replay.window is None else replay.window
+    step = _RESOLUTION * float(np.max(high - low))
+    return {
         "time": _packed(record.time[rows]),
         "phases": phase_changes(record, replay.phases),
         "eye": list(replay.eye),
         "low": np.round(low, 4).tolist(),
         "high": np.round(high, 4).tolist(),
-        "traces": [_trace(group) for group in _grouped(drawn)],
+        "weightless": replay.weightless,
+        "floor": round(float(lowest[2]) if replay.floor is None else replay.floor, 4),
+        "follow": replay.follow,
+        "traces": [_trace(group, step) for group in _grouped(drawn)],
     }
-    return Section(
-        anchor="replay",
-        title="Replay",
-        html=_html(json_html(content), drawn, len(rows), replay.notes),
-        scripts=("replay_shapes.js", "replay.js"),
-    )
+
+
+def drawn_groups(replay: Replay, record: Record) -> list[list[Drawn]]:
+    """Return what is drawn, in groups: each is a trace of `scene_content`, in its order."""
+    return _grouped(_drawn(replay, record, frame_rows(record.time)))
+
+
+def _drawn(replay: Replay, record: Record, rows: NDArray[np.int64]) -> list[Drawn]:
+    return [_at(d, rows, len(record.time)) for d in (*replay.bodies, *replay.lines, *replay.fixed)]
 
 
 def _at(drawn: Drawn, rows: NDArray[np.int64], all_rows: int) -> Drawn:
@@ -101,24 +133,24 @@ def _grouped(drawn: Sequence[Drawn]) -> list[list[Drawn]]:
     return list(groups.values())
 
 
-def _trace(group: Sequence[Drawn]) -> dict[str, Any]:
+def _trace(group: Sequence[Drawn], step: float) -> dict[str, Any]:
     first = group[0]
     look: dict[str, Any] = {"label": first.label, "colour": first.colour, "opacity": first.opacity}
     if isinstance(first, Line) and first.radii is None:
         line = {"width": first.width, "markers": first.markers, "trail": first.trail}
-        return {**look, **line, "points": _packed(first.points), "n": first.points.shape[1]}
-    return {**look, "parts": [_part(d) for d in group]}
+        return {**look, **line, "points": _packed_track(first.points, step), "n": first.points.shape[1]}
+    return {**look, "parts": [_part(d, step) for d in group]}
 
 
-def _part(solid: Drawn) -> dict[str, Any]:
+def _part(solid: Drawn, step: float) -> dict[str, Any]:
     if isinstance(solid, Line):
         assert solid.radii is not None
-        return {"points": _packed(solid.points), "radii": np.round(solid.radii, 5).tolist()}
+        return {"points": _packed_track(solid.points, step), "radii": np.round(solid.radii, 5).tolist()}
     return {
         "vertices": _packed(solid.mesh.vertices),
         "triangles": _packed(solid.mesh.triangles, "u2"),
-        "p": _packed(solid.p_WB),
-        "q": None if solid.q_WB is None else _packed(_continuous(solid.q_WB)),
+        "p": _packed_track(solid.p_WB, step),
+        "q": None if solid.q_WB is None else _packed_track(_continuous(solid.q_WB), _RESOLUTION),
     }
 
 
@@ -128,13 +160,30 @@ def _continuous(q: Floats) -> Floats:
     return q * np.concatenate([[1.0], np.cumprod(signs)])[:, None]
 
 
-def _packed(values: NDArray[Any], dtype: str = "f4") -> Mapping[str, str]:
+def _packed_track(values: Floats, step: float) -> dict[str, Any]:
+    """Return numbers over time as 16-bit multiples of a step that is at most the given one, above the lowest of them.
+
+    They take half of what single precision does, which is what they get where they range too far for such a step. 65535
+    stands for what is not finite.
+    """
+    finite = values[np.isfinite(values)]
+    if values.size <= _FEW or not finite.size:
+        return _packed(values)
+    low, span = float(finite.min()), float(np.ptp(finite))
+    if span > 65534 * step:
+        return _packed(values)
+    step = span / 65534 or step
+    multiples = np.rint((np.nan_to_num(values, nan=low, posinf=low, neginf=low) - low) / step)
+    return {**_packed(np.where(np.isfinite(values), multiples, 65535), "u2"), "low": low, "step": step}
+
+
+def _packed(values: NDArray[Any], dtype: str = "f4") -> dict[str, Any]:
     """Return values as the page's scripts unpack them, in single precision: 0.1 um at 1 m."""
     data = np.ascontiguousarray(values, dtype=f"<{dtype}").tobytes()
     return {"dtype": dtype, "bdata": base64.b64encode(data).decode()}
 
 
-def _window(drawn: Sequence[Drawn]) -> tuple[Floats, Floats]:
+def _extent(drawn: Sequence[Drawn]) -> tuple[Floats, Floats]:
     """Return minimum and maximum corner of all that is drawn at any time, with a margin around it."""
     with np.errstate(invalid="ignore"):
         corners = np.array([c for d in drawn for c in _corners(d)])
@@ -169,26 +218,48 @@ def _chip(drawn: Sequence[Drawn], label: str) -> str:
     return colours[0] if len(colours) == 1 else f"linear-gradient(90deg, {stripes})"
 
 
-def _html(data: Markup, drawn: Sequence[Drawn], frames: int, notes: Sequence[str]) -> Markup:
+def legend_html(drawn: Sequence[Drawn]) -> Markup:
+    """Return a chip with its colours for each label in a scene, which shows and hides what it names."""
     chips = [
         f'<button type="button" aria-pressed="true" data-label="{escape(name)}">'
         f'<i style="background: {escape(_chip(drawn, name))}"></i>{escape(name)}</button>'
         for name in dict.fromkeys(d.label for d in drawn)
     ]
+    return Markup("<div class='replay-legend' role='group' aria-label='what is shown'>{}</div>").format(
+        Markup("").join(Markup(c) for c in chips)
+    )
+
+
+def views_html(replay: Replay) -> Markup:
+    """Return buttons for the views of a scene."""
+    views = [f'<button type="button" data-view="{v}">{v}</button>' for v in _VIEWS]
+    if replay.follow:
+        pressed = 'aria-pressed="false" data-view="follow"'
+        views.append(f'<button type="button" {pressed}>follow {escape(replay.follow)}</button>')
+    return Markup(f'<div class="replay-views" role="group" aria-label="view">{"".join(views)}</div>')
+
+
+STAGE_HTML = Markup(
+    '<div class="replay-stage"><div class="replay-scene" role="img" aria-label="the scene in space"></div>'
+    '<button type="button" class="replay-wake">Tap to turn and zoom</button></div>'
+)
+"""Where a scene is drawn."""
+FILM_HTML = Markup('<button type="button" class="replay-film" hidden>save as film</button>')
+"""The button that records a scene, where the browser can."""
+
+
+def _html(data: Markup, drawn: Sequence[Drawn], frames: int, replay: Replay) -> Markup:
     speeds = [f'<option value="{s}"{" selected" if s == "1" else ""}>{s}&times;</option>' for s in _SPEEDS]
-    paragraphs = [f'<p class="soft">{escape(note)}</p>' for note in notes]
+    paragraphs = [f'<p class="soft">{escape(note)}</p>' for note in replay.notes]
     return Markup(
         f"<style>{asset('replay.css')}</style>"
         f'<div class="replay">{data}'
         '<p class="replay-missing" hidden>The replay needs WebGL, which this browser does not offer.</p>'
-        '<div class="replay-shown"><div class="replay-stage">'
-        '<div class="replay-scene" role="img" aria-label="the scene in space"></div>'
-        '<button type="button" class="replay-wake">Tap to turn and zoom</button></div>'
+        f'<div class="replay-shown">{STAGE_HTML}'
         '<div class="replay-controls"><button type="button" class="replay-play" aria-label="play">&#9654;&#xFE0E;'
         '</button><input type="range" class="replay-time" aria-label="time in the run" min="0" '
         f'max="{frames - 1}" step="1" value="0"><output class="replay-told"></output>'
         f'<select class="replay-speed" aria-label="speed of the replay">{"".join(speeds)}</select>'
-        '<button type="button" class="replay-reset">reset view</button></div>'
-        f'<div class="replay-legend" role="group" aria-label="what is shown">{"".join(chips)}</div>'
-        f"</div>{''.join(paragraphs)}</div>"
+        f'{views_html(replay)}<button type="button" class="replay-full">full screen</button></div>'
+        f'<div class="replay-foot">{legend_html(drawn)}{FILM_HTML}</div></div>{"".join(paragraphs)}</div>'
     )

@@ -13,6 +13,8 @@ from markupsafe import Markup
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.parameters import InvalidParameter, parameters_of
+from handover.scenarios.experiment.replay import Replay
+from handover.scenarios.experiment.time_plot import TimePlot
 from handover.scenarios.reporting.cpu_section import cpu_section
 from handover.scenarios.reporting.graph import graph_section
 from handover.scenarios.reporting.html import rows_table
@@ -40,10 +42,12 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> list[str]:
     """
     facts = RunFacts.read(folder)
     record, faults = record_of(folder), ToleratedFaults()
+    replay, plots = _sections_of_scenario(facts, record, faults)
     sections = [
+        replay,
         metrics_section(facts),
         published_section(facts),
-        *_sections_of_scenario(facts, record, faults),
+        plots,
         pictures_section(folder),
         _explorer(record, faults),
         *_sections_of_units(facts),
@@ -57,29 +61,55 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> list[str]:
     return faults.lines
 
 
-def _sections_of_scenario(facts: RunFacts, record: Record | None, faults: ToleratedFaults) -> Sequence[Section | None]:
-    """Return the scenario's plots and replay of the record; a section that says why where they cannot be made."""
+def _sections_of_scenario(
+    facts: RunFacts, record: Record | None, faults: ToleratedFaults
+) -> tuple[Section | None, Section | None]:
+    """Return the scenario's replay and plots of the record; one that says why where they cannot be made."""
     experiment = facts.experiment
     if experiment is None or record is None:
-        return ()
+        return None, None
+    replay_shown: Section | None = None
+    plots_shown: Section | None = None
     guarded = ToleratedFaults(InvalidParameter, KeyError)
-    record = LackingRecord(record, experiment.units)
-    sections: list[Section | None] = []
     try:
-        parameters: Any = parameters_of(type(experiment), facts.run["parameters"])
+        replay, plots, shown = replay_and_plots(facts, record, guarded)
         with guarded.tolerated("the plots over time could not be drawn"):
-            plots = record.drawable_plots(experiment.plots(parameters, record))
-            sections.append(time_plots_section(plots, record.time))
+            plots_shown = time_plots_section(plots, shown.time)
         with guarded.tolerated("the replay could not be drawn"):
-            replay = experiment.replay(parameters, record)
-            shown = None if replay is None else record.drawable_replay(replay)
-            sections.append(None if shown is None else replay_section(shown, record))
+            replay_shown = None if replay is None else replay_section(replay, shown)
     except (InvalidParameter, KeyError) as e:
         why = e.args[0] if e.args else e
         html = Markup("<p>The run is of another version of {}, so its plots and its replay are left out: {}.</p>")
-        return [Section(anchor="time", title="Over time", html=html.format(facts.scenario, why))]
-    faults.lines += [*guarded.lines, *record.lines]
-    return sections
+        return None, Section(anchor="time", title="Over time", html=html.format(facts.scenario, why))
+    faults.lines += guarded.lines
+    return replay_shown, plots_shown
+
+
+def replay_and_plots(
+    facts: RunFacts, record: Record, faults: ToleratedFaults
+) -> tuple[Replay | None, list[TimePlot], Record]:
+    """Return what a run's scenario shows of its record: its scene, its plots, and the record that they are of.
+
+    What cannot be made, or is left out for want of outputs, is noted in `faults`.
+
+    Raises:
+        InvalidParameter, KeyError: the run is of another version of the scenario.
+    """
+    experiment = facts.experiment
+    if experiment is None:
+        return None, [], record
+    guarded = ToleratedFaults(InvalidParameter, KeyError)
+    known = LackingRecord(record, experiment.units)
+    parameters: Any = parameters_of(type(experiment), facts.run["parameters"])
+    plots: list[TimePlot] = []
+    shown: Replay | None = None
+    with guarded.tolerated("the plots over time could not be drawn"):
+        plots += known.drawable_plots(experiment.plots(parameters, known))
+    with guarded.tolerated("the replay could not be drawn"):
+        replay = experiment.replay(parameters, known)
+        shown = None if replay is None else known.drawable_replay(replay)
+    faults.lines += [*guarded.lines, *known.lines]
+    return shown, plots, known
 
 
 def _explorer(record: Record | None, faults: ToleratedFaults) -> Section | None:

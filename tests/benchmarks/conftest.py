@@ -28,3 +28,9 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """The environment in which Ecos finds what it needs."""
     ecos = module("exchange", "ecos_command").Ecos(tmp_path_factory.mktemp("ecos")).environment
     return {**os.environ, **ecos, "PATH": f"{os.environ['PATH']}{os.pathsep}{ecos['PATH']}"}
+
+
+@pytest.fixture(scope="session")
+def wait_until() -> Callable[..., None]:
+    """Waits for a page in a browser: `opened_page.wait_until`."""
+    return module("scenarios", "opened_page").wait_until

@@ -4,7 +4,10 @@
 //   page.draw(div, figure)  draws a Plotly figure, and again when the colours change; returns a promise
 //   page.onDraw(change)     calls `change(div, layout)` before a figure is drawn
 //   page.onReady(act)       calls `act` when the figures that are in the page have been drawn; waits for its promise
-//   page.array(packed)      a typed array of one that Plotly has packed: {dtype, bdata}
+//   page.setTime(t, from)   moves the cursor in all plots over time to t, s; `from` is who moves it
+//   page.onTime(act)        calls `act(t, from)` when it has been moved
+//   page.array(packed)      a typed array of one that Plotly has packed: {dtype, bdata}; where it has {low, step}, too, its
+//                           numbers are low + n * step, and 65535 stands for NaN
 //   page.data(element)      the content of the JSON script within an element
 "use strict";
 const page = (() => {
@@ -13,7 +16,8 @@ const page = (() => {
   const touch = matchMedia("(pointer: coarse)").matches;
   const figures = new Map();
   let span = null;  // the range of time that was chosen
-  const listeners = [], changes = [], starts = [];
+  let cursor = null;  // the time that plots and replay show, s
+  const listeners = [], changes = [], starts = [], clocks = [];
 
   function colours() {
     const style = getComputedStyle(document.documentElement);
@@ -70,9 +74,33 @@ const page = (() => {
     div.dataset.width = div.clientWidth;
     const first = !div.layout;
     return Plotly.react(div, data, shown, {...settings, ...config}).then(() => {
-      if (first) div.on("plotly_relayout", change => follow(div, change));
+      if (first) {
+        div.on("plotly_relayout", change => follow(div, change));
+        if (figure.layout.meta?.time) div.on("plotly_click", ({points}) => setTime(points[0].x, div));
+      }
       return fit(div);
-    });
+    }).then(() => mark(div));
+  }
+
+  function setTime(t, from) {
+    cursor = t;
+    for (const div of figures.keys()) mark(div);
+    for (const act of clocks) act(t, from);
+  }
+
+  // Stands a line at the cursor's time in a plot over time. It lies over the plot, since Plotly takes long to draw one.
+  function mark(div) {
+    if (!clocks.length || !figures.get(div).layout.meta?.time || !div._fullLayout) return;
+    const {xaxis: x, yaxis: y} = div._fullLayout;
+    let line = div.querySelector(".cursor");
+    if (!line) {
+      line = document.createElement("i");
+      line.className = "cursor";
+      div.append(line);
+    }
+    const at = x.l2p(cursor);
+    line.hidden = cursor === null || !(at >= 0 && at <= x._length);
+    Object.assign(line.style, {left: `${x._offset + at}px`, top: `${y._offset}px`, height: `${y._length}px`});
   }
 
   // Lets a figure show the range of time that was chosen in one of them; all heights are theirs.
@@ -117,7 +145,9 @@ const page = (() => {
     if (Array.isArray(packed) || ArrayBuffer.isView(packed)) return packed;
     const text = atob(packed.bdata);
     const bytes = Uint8Array.from(text, c => c.charCodeAt(0));
-    return new arrays[packed.dtype](bytes.buffer);
+    const numbers = new arrays[packed.dtype](bytes.buffer);
+    if (packed.step === undefined) return numbers;
+    return Float64Array.from(numbers, n => n === 65535 ? NaN : packed.low + n * packed.step);
   }
 
   function data(element) {
@@ -152,7 +182,7 @@ const page = (() => {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
   matchMedia("print").addEventListener("change", recolour);
   return {
-    colours, draw, array, data,
+    colours, draw, array, data, setTime, onTime: act => clocks.push(act),
     onColours: act => listeners.push(act), onDraw: act => changes.push(act), onReady: act => starts.push(act),
   };
 })();

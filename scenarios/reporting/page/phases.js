@@ -1,5 +1,6 @@
 // Shades the phases of time plots and names them: `layout.meta.phases` is a list of {from, to, name}. Names are level
-// where they fit; a name that fits nowhere stands once, upright, over its longest phase (as in plotting.py).
+// where they fit; a name that fits nowhere stands once, upright, over its longest phase (as in plotting.py). In a plot with
+// data-brief names are level or missing, as it has neither height to spare nor buttons.
 "use strict";
 (() => {
   const LETTER = 6.6, UPRIGHT = 15, MARGINS = 70, BUTTONS = 150, HIGH = 22;  // px
@@ -12,7 +13,9 @@
     const spans = phases.filter(p => p.to > low && p.from < high);
     layout.shapes = [...(layout.shapes ?? []), ...phases.flatMap((p, k) => k % 2 ? [shade(p)] : [])];
     let up = 0, right = 0;  // px that the longest upright name takes, and from the left how far names reach
+    const brief = "brief" in div.dataset;
     const {level, upright} = named(spans, low, high, pixels);
+    if (brief) upright.length = 0;
     const put = (p, angle, wide) => {
       right = Math.max(right, p.middle * pixels + wide / 2);
       return name(p, low + p.middle, angle);
@@ -25,7 +28,7 @@
         return put(p, -90, UPRIGHT);
       }),
     ];
-    if (right > (high - low) * pixels - BUTTONS) up += HIGH;  // Plotly's buttons come over what stands there
+    if (!brief && right > (high - low) * pixels - BUTTONS) up += HIGH;  // Plotly's buttons come over what stands there
     layout.margin = {...layout.margin, t: 30 + up};
     div.dataset.more = up;
   }

@@ -1,11 +1,13 @@
 """The replay of a run in a browser: the slider moves what was recorded, play goes on, the legend hides."""
 
 from collections.abc import Generator
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 from opened_page import opened, wait_until
+from PIL import Image
 from playwright.sync_api import Browser, Page
 from scipy.spatial.transform import Rotation
 
@@ -17,10 +19,10 @@ from handover.scenarios.ir_grasp.plots import phases_of_grasp
 from handover.scenarios.reporting.replay_section import frame_rows, phase_changes
 
 SCENE = "document.querySelector('.replay-scene')"
-POINTS = """name => {
-    const trace = document.querySelector('.replay-scene').data.find(trace => trace.name === name);
-    return ['x', 'y', 'z'].map(axis => Array.from(trace[axis]));
-}"""
+EXACT = 1e-5
+"""How far from the record what is drawn may lie, m: the scene is 0.4 m long."""
+RINGS, SIDES = 3, 16
+"""Rings that round off an end of a tube, and corners of a ring."""
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +43,8 @@ def move(page: Page, frame: int) -> None:
 
 
 def points(page: Page, name: str) -> Floats:
-    return np.transpose(np.array(page.evaluate(POINTS, name), dtype=np.float64))
+    """Return where what is called so is drawn in W, shape (n, 3), m."""
+    return np.array(page.evaluate("name => replays[0].scene.points(name)", name), dtype=np.float64)
 
 
 def test_the_slider_moves_the_hand_to_where_it_was(page: Page, record: Record):
@@ -53,7 +56,7 @@ def test_the_slider_moves_the_hand_to_where_it_was(page: Page, record: Record):
         move(page, frame)
         row = rows[frame]
         turned = Rotation.from_quat(palm.q_WB[row], scalar_first=True).apply(palm.mesh.vertices)
-        np.testing.assert_allclose(points(page, "palm"), palm.p_WB[row] + turned, atol=1e-6)
+        np.testing.assert_allclose(points(page, "palm"), palm.p_WB[row] + turned, atol=EXACT)
         value = page.locator(".replay-told").inner_text()
         phase = [name for begin, name in phase_changes(record, phases_of_grasp(record)) if begin <= record.time[row]][
             -1
@@ -66,11 +69,11 @@ def test_the_slider_bends_a_finger_as_it_was(page: Page, record: Record):
     rows = frame_rows(record.time)
     thumb = next(line for line in IrGrasp().replay(Parameters(), record).lines if line.label == "thumb")
     move(page, len(rows) - 2)
-    rings = points(page, "thumb").reshape(-1, 12, 3)[2:-2]  # without those that round off its ends
-    np.testing.assert_allclose(rings.mean(axis=1), thumb.points[rows[-2]], atol=1e-6)
+    rings = points(page, "thumb").reshape(-1, SIDES, 3)[RINGS:-RINGS]
+    np.testing.assert_allclose(rings.mean(axis=1), thumb.points[rows[-2]], atol=EXACT)
     assert thumb.radii is not None
     reach = np.linalg.norm(rings - rings.mean(axis=1, keepdims=True), axis=2)
-    np.testing.assert_allclose(reach, np.broadcast_to(thumb.radii[:, None], reach.shape), atol=1e-6)
+    np.testing.assert_allclose(reach, np.broadcast_to(thumb.radii[:, None], reach.shape), atol=EXACT)
 
 
 def test_keys_move_the_slider(page: Page):
@@ -81,28 +84,72 @@ def test_keys_move_the_slider(page: Page):
 
 def test_play_goes_on_until_it_is_paused_and_leaves_the_view_as_it_is(page: Page):
     move(page, 0)
-    page.evaluate(f"Plotly.relayout({SCENE}, {{'scene.camera.eye': {{x: 0.5, y: 0.6, z: 1.7}}}})")
+    page.get_by_role("button", name="side").click()
+    before = view(page)
     page.get_by_label("play", exact=True).click()
     wait_until(page, f"{SCENE}.dataset.frame > 2")
     page.get_by_label("pause").click()
     assert page.get_by_label("play", exact=True).is_visible()
     assert float(page.locator(".replay-time").input_value()) > 0
-    assert page.evaluate(f"{SCENE}._fullLayout.scene.camera.eye") == {"x": 0.5, "y": 0.6, "z": 1.7}
-    page.get_by_role("button", name="reset view").click()
-    wait_until(page, f"{SCENE}._fullLayout.scene.camera.eye.x !== 0.5")
+    assert view(page) == before
 
 
-def azimuth(page: Page) -> float:
-    """Return from which side the scene is seen, an angle about the vertical (rad)."""
-    camera = page.evaluate(f"{SCENE}._fullLayout.scene.camera")
-    return np.arctan2(*(camera["eye"][axis] - camera["center"][axis] for axis in "yx"))
+def view(page: Page) -> dict[str, float]:
+    """Return from where the scene is seen: azimuth and elevation (rad), and distance (m)."""
+    return page.evaluate("replays[0].scene.view()")
+
+
+@pytest.mark.parametrize(
+    ("name", "azimuth", "elevation"),
+    [("front", -np.pi / 2.0, np.arctan(0.12)), ("side", 0.0, np.arctan(0.12)), ("top", -np.pi / 2.0, np.pi / 2.0)],
+)
+def test_a_view_looks_from_where_it_is_named_after(page: Page, name: str, azimuth: float, elevation: float):
+    page.get_by_role("button", name=name).click()
+    seen = view(page)
+    assert seen["azimuth"] == pytest.approx(azimuth, abs=1e-6)
+    assert seen["elevation"] == pytest.approx(elevation, abs=2e-3)
+    page.get_by_role("button", name="start").click()
+    assert view(page)["azimuth"] == pytest.approx(np.arctan2(-0.7, -0.35))
+
+
+def test_the_view_follows_the_palm_and_keeps_its_distance(page: Page):
+    move(page, 0)
+    button = page.get_by_role("button", name="follow palm")
+    button.click()
+    before = view(page), points(page, "palm").mean(axis=0)
+    move(page, 120)
+    assert np.linalg.norm(points(page, "palm").mean(axis=0) - before[1]) > 0.02
+    assert view(page) == pytest.approx(before[0])
+    looked_at = page.evaluate("replays[0].scene.looksAt()")
+    np.testing.assert_allclose(looked_at, points(page, "palm").mean(axis=0), atol=EXACT)
+    button.click()
+    assert button.get_attribute("aria-pressed") == "false"
+
+
+def test_plots_and_replay_share_a_cursor(page: Page, record: Record):
+    rows = frame_rows(record.time)
+    plot = page.locator("#time .plot").first
+    line = plot.locator(".cursor")
+    for frame in (20, 100):
+        move(page, frame)
+        drawn = plot.evaluate("div => ({x: div._fullLayout.xaxis.l2p(0), at: div._fullLayout.xaxis._offset})")
+        per_second = plot.evaluate("div => div._fullLayout.xaxis.l2p(1) - div._fullLayout.xaxis.l2p(0)")
+        left = float(line.evaluate("line => parseFloat(line.style.left)"))
+        assert left == pytest.approx(drawn["at"] + drawn["x"] + per_second * record.time[rows[frame]], abs=0.05)
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.5 * box["height"], steps=3)
+    plot.locator(".hoverlayer .legend, .hoverlayer .hovertext").first.wait_for()
+    page.mouse.click(box["x"] + 0.3 * box["width"], box["y"] + 0.5 * box["height"])
+    wait_until(page, f"{SCENE}.dataset.frame !== '100'")
+    shown = np.interp(float(page.evaluate(f"{SCENE}.dataset.frame")), np.arange(len(rows)), record.time[rows])
+    at = (float(line.evaluate("line => parseFloat(line.style.left)")) - drawn["at"] - drawn["x"]) / per_second
+    assert at == pytest.approx(shown, abs=1e-3)
 
 
 def turn(page: Page, width: int) -> float:
-    """Draw the mouse to the right over the scene and return the angle that it stands for (rad).
-
-    Plotly turns further by what its camera coasts between two pictures.
-    """
+    """Draw the mouse to the right over the scene and return the angle that it turns by (rad)."""
     page.locator(".replay-scene").scroll_into_view_if_needed()
     box = page.locator(".replay-scene").bounding_box()
     assert box is not None
@@ -111,36 +158,33 @@ def turn(page: Page, width: int) -> float:
     page.mouse.down()
     page.mouse.move(x + width, y, steps=8)
     page.mouse.up()
-    return np.pi * width / box["height"]
+    return 2.0 * np.pi * width / box["height"]
 
 
-def test_a_scene_is_turned_by_all_of_the_mouses_way_right_after_a_picture(page: Page):
-    page.get_by_role("button", name="reset view").click()
-    move(page, 5)
-    before = azimuth(page)
+def test_a_scene_is_turned_by_all_of_the_mouses_way(page: Page):
+    page.get_by_role("button", name="start").click()
+    before = view(page)["azimuth"]
     turned = turn(page, 80)
-    wait_until(page, f"{SCENE}.dataset.frame === '5'")
-    assert abs(np.angle(np.exp(1j * (azimuth(page) - before)))) > 0.8 * turned
+    assert np.angle(np.exp(1j * (before - view(page)["azimuth"]))) == pytest.approx(turned, rel=0.05)
 
 
 @pytest.mark.slow
 def test_a_scene_that_is_turned_while_it_plays_stays_turned(page: Page):
-    page.get_by_role("button", name="reset view").click()
+    page.get_by_role("button", name="start").click()
     move(page, 0)
     page.get_by_label("speed").select_option("0.5")
     page.get_by_label("play", exact=True).click()
-    before = azimuth(page)
+    before = view(page)["azimuth"]
     turned = turn(page, 80)
     seen = page.evaluate(f"{SCENE}.dataset.frame")
     wait_until(page, f"{SCENE}.dataset.frame !== '{seen}'")
     page.get_by_label("pause").click()
-    assert abs(np.angle(np.exp(1j * (azimuth(page) - before)))) > 0.8 * turned
-    page.get_by_role("button", name="reset view").click()
+    assert np.angle(np.exp(1j * (before - view(page)["azimuth"]))) == pytest.approx(turned, rel=0.05)
 
 
 @pytest.mark.slow
 def test_a_name_in_the_legend_hides_what_is_called_so(page: Page):
-    shown = f"{SCENE}.data.filter(trace => trace.name === 'beams').map(trace => trace.visible ?? true)"
+    shown = "replays[0].scene.visible('beams')"
     name = page.get_by_role("button", name="beams")
     name.click()
     wait_until(page, f"({shown}).every(visible => visible === false)")
@@ -149,34 +193,62 @@ def test_a_name_in_the_legend_hides_what_is_called_so(page: Page):
     wait_until(page, f"({shown}).every(visible => visible === true)")
 
 
-def test_axes_follow_the_page_into_the_dark_and_stay_as_they_are_in_space(page: Page):
-    axis = f"{SCENE}._fullLayout.scene.xaxis"
-    light, extent = page.evaluate(f"{axis}.gridcolor"), page.evaluate(f"{axis}.range")
+def brightness(page: Page) -> float:
+    """Return the mean brightness of the scene as it is seen, from 0 to 255."""
+    seen = Image.open(BytesIO(page.locator(".replay-scene").screenshot())).convert("L")
+    return float(np.mean(np.asarray(seen)))
+
+
+def test_the_scene_follows_the_page_into_the_dark(page: Page):
+    before = view(page)
+    assert brightness(page) > 200.0
     page.emulate_media(color_scheme="dark")
-    wait_until(page, f"{axis}.gridcolor !== '{light}'")
-    assert page.evaluate(f"{axis}.range") == extent
+    assert brightness(page) < 80.0
+    assert view(page) == before
     page.emulate_media(color_scheme="light")
-    wait_until(page, f"{axis}.gridcolor === '{light}'")
+    assert brightness(page) > 200.0
+
+
+def test_the_bar_is_as_long_as_it_says(page: Page):
+    pictures = page.evaluate(f"Number({SCENE}.dataset.pictures)")
+    page.get_by_role("button", name="top").click()
+    wait_until(page, f"{SCENE}.dataset.pictures > {pictures}")
+    text = page.locator(".scene-scale text:not([class])").text_content()
+    assert text == "5 cm"
+    bar = page.locator(".scene-scale path").get_attribute("d")
+    assert bar is not None
+    pixels = float(bar.split("h")[1].split("v")[0])
+    height = page.evaluate(f"{SCENE}.clientHeight")
+    per_metre = height / (2.0 * np.tan(np.radians(18.0)) * view(page)["distance"])
+    assert pixels / per_metre == pytest.approx(0.05, rel=0.01)
 
 
 def test_a_body_turns_as_its_quaternion_says_and_vanishes_without_a_place(page: Page):
     rng = np.random.default_rng(0)
     vertices, p_WB, q_WB = rng.normal(size=(5, 3)), rng.normal(size=(3, 3)), rng.normal(size=(3, 4))
     q_WB /= np.linalg.norm(q_WB, axis=1, keepdims=True)
+    q_WB[1] *= np.sign(q_WB[0] @ q_WB[1])
     p_WB[2] = np.nan
-    part = {"vertices": vertices.ravel().tolist(), "q": q_WB.ravel().tolist()}
+    part = {"vertices": vertices.ravel().tolist(), "triangles": [0, 1, 2], "q": q_WB.ravel().tolist()}
     numbers = ", ".join("NaN" if np.isnan(x) else repr(x) for x in p_WB.ravel().tolist())
+    page.evaluate(
+        f"""part => {{
+            const element = document.createElement("div");
+            document.body.append(element);
+            const trace = {{label: "b", colour: "#123456", opacity: 1, parts: [{{...part, p: [{numbers}]}}]}};
+            window.tumbling = sceneIn(element, {{traces: [trace], low: [-1, -1, -1], high: [1, 1, 1], eye: [1, 1, 1]}});
+        }}""",
+        part,
+    )
 
     def seen(u: float) -> Floats:
-        script = f"part => replayShapes.places({{parts: [{{...part, p: [{numbers}]}}]}}, {u}, [7, 8, 9])"
-        found = page.evaluate(script, part)
-        return np.column_stack([found[axis] for axis in "xyz"])
+        return np.array(page.evaluate(f"(tumbling.show({u}), tumbling.points('b'))"))
 
     turned = Rotation.from_quat(q_WB[1], scalar_first=True).apply(vertices)
-    np.testing.assert_allclose(seen(1), p_WB[1] + turned, atol=1e-12)
-    np.testing.assert_allclose(seen(2), np.broadcast_to([7.0, 8.0, 9.0], (5, 3)))
+    np.testing.assert_allclose(seen(1), p_WB[1] + turned, atol=1e-6)
     lengths = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
-    np.testing.assert_allclose(np.linalg.norm(np.diff(seen(0.4), axis=0), axis=1), lengths)
+    np.testing.assert_allclose(np.linalg.norm(np.diff(seen(0.4), axis=0), axis=1), lengths, atol=1e-6)
+    assert np.ptp(seen(2), axis=0) == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.slow

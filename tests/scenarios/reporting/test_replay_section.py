@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.replay import Body, Line, Replay, prism
-from handover.scenarios.reporting.replay_section import replay_section
+from handover.scenarios.reporting.replay_section import frame_rows, replay_section
 
 ROWS = 1000
 MOVING: Floats = np.column_stack([np.linspace(0.0, 2.0, ROWS), np.zeros(ROWS), np.zeros(ROWS)])
@@ -37,8 +37,25 @@ def data(replay: Replay, record: Record) -> dict[str, Any]:
     return json.loads(found[1])
 
 
-def numbers(packed: dict[str, str]) -> NDArray[np.float32]:
-    return np.frombuffer(base64.b64decode(packed["bdata"]), np.dtype(packed["dtype"]))
+def numbers(packed: dict[str, Any]) -> NDArray[np.float64]:
+    """Return an array of the page as its script unpacks it."""
+    values = np.frombuffer(base64.b64decode(packed["bdata"]), np.dtype(packed["dtype"])).astype(np.float64)
+    if "step" not in packed:
+        return values
+    return np.where(values == 65535, np.nan, packed["low"] + packed["step"] * values)
+
+
+@pytest.mark.parametrize("shift", [0.0, 1.0, 1e3])
+def test_a_place_is_kept_to_far_less_than_a_pixel_of_the_scene(record: Record, shift: float):
+    rng = np.random.default_rng(1)
+    p_WB = shift * np.linspace(0.0, 1.0, ROWS)[:, None] + rng.uniform(-1.0, 1.0, size=(ROWS, 3))
+    p_WB[[0, -1], 1] = np.nan
+    body, window = replace(CUBE, p_WB=p_WB), np.array([[-1.0] * 3, [1.0] * 3])
+    (trace,) = data(Replay(bodies=[body], window=window), record)["traces"]
+    packed = trace["parts"][0]["p"]
+    assert packed["dtype"] == ("f4" if shift > 100.0 else "u2")
+    kept = numbers(packed).reshape(-1, 3)
+    np.testing.assert_allclose(kept, p_WB[frame_rows(record.time)], rtol=1e-7, atol=2.0 / 20_000)
 
 
 def test_a_body_is_held_once_and_its_place_at_some_moments(record: Record):

@@ -1,0 +1,192 @@
+"""The command `handover film`: a run as a film, its scene beside plots with a cursor that moves."""
+
+import re
+import sys
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
+from handover.scenarios.cli.options import FiniteRange
+from handover.scenarios.execution.errors import FilmFailed, UsageError, one_line_errors, require_extra
+from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.results.run_folder import RunFolder, check_place
+
+if TYPE_CHECKING:
+    from handover.scenarios.film.film import FilmSettings
+
+_HELP = """Make a film of the run in DIR: its scene, and beside it plots over time with a cursor that moves.
+
+The suffix of FILE says what it is: .mp4, .webm or .gif. It is drawn without a window in Chromium, by software, which
+takes some seconds for each second of the film; on the report's page, "save as film" records the scene alone.
+"""
+_SUFFIXES = (".mp4", ".webm", ".gif")
+_VIEWS = ("start", "front", "side", "top", "follow")
+_GIF_RATE, _RATE, _FASTEST_GIF = 15.0, 30.0, 50.0
+_SMALLEST, _LARGEST = 240, 7680
+
+
+class Size(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (generic in newer versions only)
+    """Width and height in pixels, such as 1280x720."""
+
+    name = "size"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        """Return width and height."""
+        found = re.fullmatch(r"(\d{1,5})[x×](\d{1,5})", str(value))
+        size = (int(found[1]), int(found[2])) if found else (0, 0)
+        if any(n % 2 or not _SMALLEST <= n <= _LARGEST for n in size):
+            self.fail(
+                f"{value!r} is no size, such as 1280x720: two even numbers from {_SMALLEST} to {_LARGEST}", param, ctx
+            )
+        return size
+
+
+@click.command("film", help=_HELP, short_help="Make a film of a run: its scene beside plots.")
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option(
+    "--out", "file", metavar="FILE", type=click.Path(path_type=Path), help="The film.  [default: DIR/film.mp4]"
+)
+@click.option("--force", is_flag=True, help="Replace FILE if it is there.")
+@click.option(
+    "--plot",
+    "plots",
+    multiple=True,
+    metavar="TITLE|UNIT.PORT",
+    help="One of the report's plots by its title, or a signal; UNIT.PORT[2] is an element. Several are shown below each"
+    " other.  [default: the first one or two of the report's]",
+)
+@click.option("--no-plots", is_flag=True, help="Show the scene alone.")
+@click.option(
+    "--view", type=click.Choice(_VIEWS), default="start", show_default=True, help="From where the scene is seen."
+)
+@click.option("--size", type=Size(), default="1280x720", show_default=True, help="Width and height in pixels.")
+@click.option(
+    "--pace",
+    type=FiniteRange(min=0, min_open=True),
+    default=1.0,
+    show_default=True,
+    metavar="FACTOR",
+    help="Simulated seconds in one second of the film.",
+)
+@click.option(
+    "--fps",
+    type=FiniteRange(min=1, max=120),
+    metavar="N",
+    help=f"Pictures a second.  [default: {_RATE:g}; of a GIF {_GIF_RATE:g}]",
+)
+@click.option("--dark", is_flag=True, help="In the report's dark colours.")
+def film(
+    folder: Path,
+    file: Path | None,
+    plots: Sequence[str],
+    view: str,
+    size: tuple[int, int],
+    pace: float,
+    fps: float | None,
+    *,
+    force: bool,
+    no_plots: bool,
+    dark: bool,
+) -> None:
+    """Make a film of a run."""
+    with one_line_errors():
+        if not folder.is_dir():
+            raise UsageError(f"{folder} is no folder; name that of a run")
+        require_extra("film", "the film")
+        run, path = _run(folder), file or folder / "film.mp4"
+        _check(path, plots, fps, force=force, no_plots=no_plots)
+        from handover.scenarios.film.film import FilmSettings  # a browser's library takes long to load
+
+        rate = fps or (_GIF_RATE if path.suffix.lower() == ".gif" else _RATE)
+        settings = FilmSettings(size=size, pace=pace, rate=rate, view=view, dark=dark)
+        with Interruption():
+            pictures = _film(run, path, None if no_plots else plots, settings)
+    click.echo(f"film: {path}, {pictures} pictures, {pictures / rate:.1f} s")
+
+
+def _run(folder: Path) -> RunFolder:
+    """Return the folder of a run.
+
+    Raises:
+        UsageError: it is none.
+    """
+    if CampaignFolder(folder).is_there:
+        raise UsageError(f"{folder} is the folder of a campaign; name that of a run, as in {folder / 'runs'}")
+    if not RunFolder.of_run(folder).is_there:
+        raise UsageError(f"{folder} {OF_NEITHER}")
+    return RunFolder.of_run(folder)
+
+
+def _check(path: Path, plots: Sequence[str], fps: float | None, *, force: bool, no_plots: bool) -> None:
+    """Refuse a film's file or options before anything starts.
+
+    Raises:
+        UsageError: they contradict each other, or the file cannot be written.
+        InvalidRunFolder: its folder cannot be written to.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in _SUFFIXES:
+        raise UsageError(f"--out {path}: a film's name ends with {', '.join(_SUFFIXES[:-1])} or {_SUFFIXES[-1]}")
+    if path.is_dir():
+        raise UsageError(f"--out {path}: there is a folder of that name")
+    if path.exists() and not force:
+        raise UsageError(f"--out {path}: it is there already; --force replaces it")
+    if plots and no_plots:
+        raise UsageError("--plot and --no-plots contradict each other")
+    if suffix == ".gif" and fps and fps > _FASTEST_GIF:
+        raise UsageError(f"--fps {fps:g}: viewers slow down a GIF of more than {_FASTEST_GIF:g} pictures a second")
+    check_place(path.parent)
+
+
+def _film(run: RunFolder, path: Path, plots: Sequence[str] | None, settings: "FilmSettings") -> int:
+    """Write the film; return how many pictures it has.
+
+    Raises:
+        UsageError: there is no browser, or nothing to be shown.
+        FilmFailed: the browser failed.
+    """
+    from handover.scenarios.execution.resume import complete_signals
+    from handover.scenarios.film.browser import BrowserFailed, NoBrowser, window_of
+    from handover.scenarios.film.film import write_film
+    from handover.scenarios.film.film_page import NotFilmed, film_content
+    from handover.scenarios.results.run_facts import RunFacts
+
+    with run.held():
+        RunFacts.read(run)  # before anything is completed: it may be no run's folder at all
+        complete_signals(run)
+    try:
+        content = film_content(run, plots, window_of(settings.size)[0][1])
+        for line in content.notes:
+            click.echo(line, err=True)
+        with _progress(sys.stderr) as tell:
+            return write_film(content, path, settings, tell)
+    except (NotFilmed, NoBrowser) as e:
+        raise UsageError(str(e)) from e
+    except BrowserFailed as e:
+        raise FilmFailed(str(e)) from e
+
+
+@contextmanager
+def _progress(stream: TextIO) -> Generator[Callable[[int, int], None], None, None]:
+    """Show a bar where the stream is a terminal; give the function that takes how many of all pictures are taken."""
+    columns = (
+        TextColumn("{task.completed:.0f} of {task.total:.0f} pictures"),
+        BarColumn(bar_width=30),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    console = Console(file=stream)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("film", total=1.0)
+
+        def tell(taken: int, of: int) -> None:
+            progress.update(task, completed=taken, total=of)
+
+        yield tell

@@ -1,0 +1,131 @@
+"""The command `handover play`: a scenario in a browser, run anew whenever one of its parameters is changed there."""
+
+import asyncio
+import contextlib
+import signal
+import socket
+import sys
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from handover.scenarios.cli.options import FiniteRange, Seconds, scenario_options, stop_option
+from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.execution.request import RUNS, RunRequest
+from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.results.run_folder import RunFolder, dated_folder
+
+if TYPE_CHECKING:
+    from handover.scenarios.live.play_page import PlayPage, Session
+
+_HELP = """Play with the parameters of a SCENARIO in a browser, which shows its runs while they go on.
+
+The page has a field with a slider or a choice for each parameter, also of its units. Where one is changed, the run
+under way is ended and another one begins; verdicts of all runs stand side by side. Each is a run as of `handover run`,
+in a folder of its own, and the page tells that command; reports are written when the page asks for them.
+
+FILE.ssp and FILE.fmu can be played with, too: their signals are plotted. Ctrl-C ends the session.
+"""
+
+
+@click.command("play", help=_HELP, short_help="Play with a SCENARIO's parameters in a browser.")
+@click.argument("scenario", metavar="SCENARIO|FILE.ssp|FILE.fmu")
+@scenario_options
+@stop_option
+@click.option(
+    "--step",
+    type=Seconds(),
+    metavar="SECONDS",
+    help="Communication step of all units of FILE.ssp or FILE.fmu.  [default: what each FMU proposes]",
+)
+@click.option(
+    "--pace",
+    type=FiniteRange(min=0, min_open=True),
+    default=1.0,
+    show_default=True,
+    metavar="FACTOR",
+    help="Simulated seconds in one second of the wall clock, at first.",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Folder in which the runs' folders are made.  [default: one of its own in runs/]",
+)
+@click.help_option("-h", "--help")
+def play(
+    scenario: str,
+    parameters: Sequence[str],
+    seed: int,
+    replaced: Sequence[str],
+    stop: Fraction | None,
+    step: Fraction | None,
+    pace: float,
+    out: Path | None,
+) -> None:
+    """Play with the parameters of a SCENARIO, an SSP or an FMU."""
+    if sys.platform == "win32":
+        raise UsageError("handover play: not on Windows yet; `handover run` makes single runs")
+    require_extra("reports", "handover play")
+    require_extra("live", "handover play")
+    with one_line_errors(), contextlib.ExitStack() as opened:
+        request = RunRequest(
+            subject=scenario, parameters=parameters, seed=seed, units=replaced, stop=stop, step=step, presented=False
+        )
+        request.check_options()
+        subject = request.open(opened)
+        asked = subject.experiment
+        folder = out or dated_folder(RUNS, f"{Path(asked.name).stem}_play")
+        RunFolder(folder)  # which says where it cannot be made
+        options = _options(replaced, stop, step)
+        session = _session(request, asked, subject.parameters, options, folder, pace)
+    asyncio.run(_serve(session))
+
+
+def _options(replaced: Sequence[str], stop: Fraction | None, step: Fraction | None) -> list[str]:
+    """Return the options of `handover run` that all runs of a session have."""
+    given = [part for text in replaced for part in ("--unit", text)]
+    times = {"--stop": stop, "--step": step}
+    return given + [part for name, time in times.items() if time is not None for part in (name, str(time))]
+
+
+def _session(
+    request: RunRequest, asked: Experiment[Any], parameters: Any, options: Sequence[str], folder: Path, pace: float
+) -> "Session":  # fmt: skip
+    from handover.scenarios.live.parameter_fields import field_groups
+    from handover.scenarios.live.play_page import Session  # of the extra `live`, as below
+
+    return Session(
+        title=f"{asked.name}: {asked.title}",
+        request=request,
+        groups=field_groups(request),
+        headline=asked.headline,
+        seeded=asked.is_seeded,
+        pushable=bool(asked.pushes(parameters)),
+        options=options,
+        folder=folder,
+        pace=pace,
+    )
+
+
+async def _serve(session: "Session") -> None:
+    from handover.scenarios.live.play_page import PlayPage
+    from handover.scenarios.live.process import HOST
+    from handover.scenarios.live.server import serve
+
+    page = PlayPage(session)
+    with socket.create_server((HOST, 0)) as listening:
+        _end_by_signals(page)
+        click.echo(f"play: http://{HOST}:{listening.getsockname()[1]}/  (Ctrl-C ends the session)", err=True)
+        await serve(page, page.work(), listening)
+    runs = f"{page.runs} run{'' if page.runs == 1 else 's'}"
+    click.echo(f"{runs} in {session.folder}" if session.folder.exists() else "no run was begun", err=True)
+
+
+def _end_by_signals(page: "PlayPage") -> None:
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            loop.add_signal_handler(number, page.end)

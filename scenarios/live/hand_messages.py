@@ -1,0 +1,198 @@
+"""Samples of a hand as a page or a tracker sends them, and what is wrong with those that are none.
+
+A device connects to `ws://HOST:PORT/hand` of a live page and sends texts, some sixty a second. Each is a JSON object:
+
+| member | value |
+|---|---|
+| `p_WH` | position of the middle of the palm in the world W, three numbers, m |
+| `q_WH` | orientation in W, a unit quaternion, scalar first: x along straight fingers, y to the thumb |
+| `angles` | the 14 joints, rad, 0 to pi/2: thumb 2, index, middle, ring and little finger 3 each, each from its base |
+| `closed` | whether the hand grasps; one of `closed` and `angles` will do, the other follows |
+| `stamp` | when the device saw that, s of any clock that goes forward |
+| `device` | what it is, such as `"mouse"`; once is enough, it is kept with the run |
+
+The server answers first with `{"hand": {...}}`, where the hand is wanted as it stands, in the same members, and how far
+it goes (`centre`, `radius`, m); afterwards only with `{"refused": "why"}`, and the run goes on with the sample before.
+Whoever connects first leads the hand until the connection ends.
+"""
+
+import json
+import math
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, cast
+
+from handover.plants.free_flyer.hand.hand_kinematics import CLOSED, JOINT_MAX, JOINTS, STRAIGHT
+from handover.scenarios.experiment.outside import LedHand
+
+LONGEST = 2000
+"""Characters; no sample is longer."""
+MOST_A_SECOND = 250
+"""Samples that are taken within a second; a tracker gives a hundred or so."""
+_ROUNDING = 1e-6
+"""Metres and radians by which a sample may be beyond its limits."""
+_UNIT = 0.01
+"""How far a quaternion's norm may be from 1."""
+_LONGEST_NAME = 60
+_WINDOW = 600
+"""Over how many samples the clock of a device is compared with this computer's."""
+
+
+class InvalidHandMessage(ValueError):
+    """What came is no sample of a hand, or not one that may be used."""
+
+
+class HandSample(NamedTuple):
+    """A hand as a device sees it: pose in W, m, scalar first; joints, rad; whether it grasps; when, by its clock, s."""
+
+    p_WH: tuple[float, ...]
+    q_WH: tuple[float, ...]
+    angles: tuple[float, ...]
+    closed: bool
+    stamp: float
+    device: str = ""
+
+    def entries(self, led: LedHand) -> dict[str, Sequence[float]]:
+        """Return what an `InputBoard` takes of it."""
+        values = {
+            "p_WH_track": self.p_WH,
+            "q_WH_track": self.q_WH,
+            "finger_track": self.angles,
+            "closed_track": (float(self.closed),),
+        }
+        return {f"{led.unit}.{name}": entries for name, entries in values.items()}
+
+
+def parse_hand_message(text: str) -> HandSample:
+    """Return the sample that a text says.
+
+    Raises:
+        InvalidHandMessage: it says none.
+    """
+    if len(text) > LONGEST:
+        raise InvalidHandMessage(f"a sample has {LONGEST} characters at most, this one {len(text)}")
+    try:
+        content: Any = json.loads(text)
+    except (ValueError, RecursionError) as e:
+        raise InvalidHandMessage("it is not JSON") from e
+    return hand_sample(content)
+
+
+def hand_sample(content: Any) -> HandSample:
+    """Return the sample that an object says.
+
+    Raises:
+        InvalidHandMessage: it says none, with all that is wrong.
+    """
+    if not isinstance(content, dict):
+        raise InvalidHandMessage("it is no object with p_WH, q_WH, closed or angles, and stamp")
+    members, faults = cast(dict[str, Any], content), list[str]()
+
+    def numbers(name: str, size: int) -> tuple[float, ...]:
+        given: Any = members.get(name)
+        values = [_number(x) for x in cast(list[Any], given)] if isinstance(given, list) else []
+        if len(values) != size or not all(map(math.isfinite, values)):
+            faults.append(f"{name}: {size} finite numbers are right")
+            return (math.nan,) * size
+        return tuple(values)
+
+    p, q = numbers("p_WH", 3), numbers("q_WH", 4)
+    norm = math.hypot(*q)
+    if math.isfinite(norm) and abs(norm - 1.0) > _UNIT:
+        faults.append(f"q_WH: a quaternion of norm 1 is right, not {norm:.3g}")
+    stamp = _number(members.get("stamp"))
+    if not math.isfinite(stamp):
+        faults.append("stamp: a finite number of seconds is right")
+    closed, device = members.get("closed"), members.get("device", "")
+    if "closed" in members and not isinstance(closed, bool):
+        faults.append("closed: true or false is right")
+    if not isinstance(device, str) or len(device) > _LONGEST_NAME:
+        faults.append(f"device: a name of up to {_LONGEST_NAME} characters is right")
+    if "angles" in members:
+        angles = numbers("angles", JOINTS)
+        if any(angle < -_ROUNDING or angle > JOINT_MAX + _ROUNDING for angle in angles):
+            faults.append(f"angles: joints are within 0 and {JOINT_MAX:.4f} rad")
+        closed = _grasps(angles) if closed is None else closed
+    else:
+        if closed is None:
+            faults.append("closed or angles: one of them is needed")
+        angles = CLOSED if closed else STRAIGHT
+    if faults:
+        raise InvalidHandMessage("; ".join(faults))
+    q = tuple(x / norm for x in q)
+    return HandSample(p, q, tuple(min(max(a, 0.0), JOINT_MAX) for a in angles), bool(closed), stamp, str(device))
+
+
+def _number(value: Any) -> float:
+    """Return a number of JSON, NaN for what is none or beyond all numbers."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.nan
+
+
+def _grasps(angles: Sequence[float]) -> bool:
+    """Return whether a hand with these joints grasps: they are bent more than half as far as of a closed one."""
+    return sum(angles) > 0.5 * sum(CLOSED)
+
+
+class DeviceClock:
+    """Turns stamps of a device's clock into those of this computer's monotonic clock.
+
+    The least of arrival minus stamp over the last samples is taken for the difference of the clocks; so ages are too
+    short by the shortest time that a sample takes from the device to here, on one computer less than a millisecond.
+    """
+
+    def __init__(self) -> None:
+        self._differences: list[float] = []
+
+    def monotonic(self, stamp: float, arrival: float) -> float:
+        """Return the monotonic time, s, of a stamp, s, that arrived at the monotonic time `arrival`, s."""
+        self._differences.append(arrival - stamp)
+        del self._differences[:-_WINDOW]
+        return stamp + min(self._differences)
+
+
+class HandStream:
+    """Samples of one device, one after the other, as far as they may be used.
+
+    Args:
+        led: the hand.
+        clock: this computer's monotonic clock.
+    """
+
+    def __init__(self, led: LedHand, clock: Callable[[], float] = time.monotonic) -> None:
+        self._led, self._clock = led, clock
+        self._device_clock = DeviceClock()
+        self._last = -math.inf
+        self._arrivals: list[float] = []
+
+    def take(self, text: str) -> tuple[HandSample, float]:
+        """Return a sample, and its stamp by this computer's clock, s.
+
+        Raises:
+            InvalidHandMessage: it is none, is wanted beyond reach, is older than the one before, or one too many.
+        """
+        arrival = self._clock()
+        self._arrivals = [t for t in self._arrivals if arrival - t < 1.0]
+        if len(self._arrivals) >= MOST_A_SECOND:
+            raise InvalidHandMessage(f"{MOST_A_SECOND} samples a second are taken at most")
+        self._arrivals.append(arrival)
+        return self.check(parse_hand_message(text), arrival)
+
+    def check(self, sample: HandSample, arrival: float) -> tuple[HandSample, float]:
+        """Return a sample that arrived at the monotonic time `arrival`, s, and its stamp by this computer's clock, s.
+
+        Raises:
+            InvalidHandMessage: it is wanted beyond reach, or is older than the one before.
+        """
+        far = math.dist(sample.p_WH, self._led.p_WH_0)
+        if far > self._led.reach + _ROUNDING:
+            rest, reach = list(self._led.p_WH_0), self._led.reach
+            raise InvalidHandMessage(f"p_WH: {far:.3g} m from where the hand rests, {rest} m; it reaches {reach:g} m")
+        if sample.stamp <= self._last:
+            raise InvalidHandMessage(f"stamp: {sample.stamp:.6g} s is not after the one before, {self._last:.6g} s")
+        self._last = sample.stamp
+        return sample, self._device_clock.monotonic(sample.stamp, arrival)

@@ -1,0 +1,109 @@
+"""The seat of the one device that leads a run's hand: takes its samples, and tells it which it cannot take."""
+
+import asyncio
+import contextlib
+import json
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from handover.scenarios.experiment.outside import LedHand
+from handover.scenarios.live.hand_messages import HandSample, HandStream, InvalidHandMessage
+from handover.scenarios.live.input_board import InputBoard
+from handover.scenarios.results.run_folder import write_whole
+
+INPUTS_FILE = "inputs.json"
+"""Name of the file in a run's folder that says which devices led a hand, and how old samples were at their use."""
+_SLOWEST = 2.0
+"""How long a device may take to receive a message, s."""
+_BETWEEN = 0.5
+"""Time between two refusals for one reason that a device is told, s: who floods is not flooded."""
+
+
+class HandSeat:
+    """Takes the samples of one device at a time; others are told to wait.
+
+    Args:
+        led: the hand.
+        board: what the run reads.
+        now: returns where the hand is wanted as it stands.
+    """
+
+    def __init__(self, led: LedHand, board: InputBoard, now: Callable[[], HandSample]) -> None:
+        self._led, self._board, self._now = led, board, now
+        self._device: WebSocket | None = None
+        self._samples: Counter[str] = Counter()
+        self._refused: Counter[str] = Counter()
+
+    async def connection(self, device: WebSocket) -> None:
+        """Serve one device until its connection ends."""
+        origin = device.headers.get("origin")  # a tracker that is no browser gives none
+        if origin is not None and origin.partition("://")[2] != device.headers.get("host"):
+            await device.close(code=1008)
+            return
+        await device.accept()
+        if self._device is not None:
+            await _tell(device, {"refused": "another page or tracker leads the hand; it is free when that one goes"})
+            await device.close(code=1013)
+            return
+        self._device = device
+        try:
+            await _tell(device, {"hand": self._greeting()})
+            await self._follow(device)
+        except (WebSocketDisconnect, RuntimeError):
+            pass
+        finally:
+            self._device = None
+
+    async def _follow(self, device: WebSocket) -> None:
+        stream, name, told = HandStream(self._led), "", dict[str, float]()
+        while True:
+            text = await device.receive_text()
+            try:
+                sample, stamp = stream.take(text)
+            except InvalidHandMessage as e:
+                reason, now = str(e), time.monotonic()
+                kind = reason.partition(":")[0]
+                self._refused[kind] += 1
+                if now - told.get(kind, 0.0) >= _BETWEEN:
+                    told[kind] = now
+                    await _tell(device, {"refused": reason})
+                continue
+            name = sample.device or name
+            self._samples[name or "unnamed"] += 1
+            self._board.set(sample.entries(self._led), stamp)
+
+    def _greeting(self) -> dict[str, Any]:
+        now, led = self._now(), self._led
+        return {
+            "p_WH": list(now.p_WH),
+            "q_WH": list(now.q_WH),
+            "angles": list(now.angles),
+            "closed": now.closed,
+            "centre": list(led.p_WH_0),
+            "radius": led.reach,
+        }
+
+    def report(self) -> Mapping[str, Any]:
+        """Return by which devices the hand was led, what was refused, and how old samples were at their use."""
+        ages = self._board.ages()
+        age = {"uses": len(ages)}
+        if len(ages):
+            of_ages = {"median": np.median(ages), "p95": np.percentile(ages, 95), "most": np.max(ages)}
+            age |= {name: round(float(value), 6) for name, value in of_ages.items()}
+        return {"samples": dict(self._samples), "refused": dict(self._refused), "age_at_use": age}
+
+    def write_report(self, folder: Path) -> None:
+        """Leave the report in the run's folder, if anything came."""
+        if self._samples or self._refused:
+            write_whole(folder / INPUTS_FILE, json.dumps(self.report(), indent=2) + "\n")
+
+
+async def _tell(device: WebSocket, content: Mapping[str, Any]) -> None:
+    with contextlib.suppress(TimeoutError, asyncio.TimeoutError):
+        await asyncio.wait_for(device.send_text(json.dumps(content)), _SLOWEST)

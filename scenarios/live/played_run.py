@@ -1,0 +1,157 @@
+"""Runs that a session of `handover play` begins: each a process of its own, `handover run` with its parameters.
+
+The run's controls lie in a scratch folder that `--controls` names, see `LiveControl`. Where the session's process ends,
+however that is, the run ends after its step.
+"""
+
+import json
+import shlex
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from handover.cosim.master.live_control import LiveControl
+from handover.scenarios.execution.input_sources import external_inputs_of
+from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.live.process import CONTROL_FILE
+from handover.scenarios.live.waiting_command import WaitingCommand
+from handover.scenarios.live.watched_run import WatchedRun
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.results.tables import format_metric
+
+_ENTRY = "from handover.scenarios.cli.entry import main; main()"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a run of a session is asked to be, besides what all have in common.
+
+    Attributes:
+        parameters: texts by name, of those that are set.
+        seed: of all random numbers; None where there are none.
+        pushed: whether the page may push.
+    """
+
+    parameters: Mapping[str, str] = field(default_factory=dict[str, str])
+    seed: int | None = None
+    pushed: bool = False
+
+    def of(self, request: RunRequest) -> RunRequest:
+        """Return a request for such a run."""
+        given = [f"{name}={text}" for name, text in self.parameters.items()]
+        return replace(request, parameters=given, seed=self.seed or 0)
+
+    def arguments(self) -> list[str]:
+        """Return them as options of `handover run`."""
+        given = [part for name, text in self.parameters.items() for part in ("-p", f"{name}={text}")]
+        seed = ["--seed", str(self.seed)] if self.seed else []
+        return [*given, *seed, *(["--push"] if self.pushed else [])]
+
+
+class PlayedRun:
+    """A run of a session, from its begin on.
+
+    Args:
+        number: in the session, from 1.
+        choice: what was asked for.
+        subject: what is run, as the command takes it.
+        options: of `handover run`, that all runs of the session have.
+        folder: of the run, not there yet.
+        pace: simulated seconds per second at first.
+        waiting: the process that is to be the run's.
+    """
+
+    def __init__(
+        self, number: int, choice: Choice, subject: str, options: Sequence[str], folder: Path, pace: float,
+        waiting: WaitingCommand,
+    ) -> None:  # fmt: skip
+        self.number, self.choice, self._process = number, choice, waiting
+        self.control = LiveControl.create(waiting.folder / CONTROL_FILE, pace, paused=True)
+        self.watched = WatchedRun(folder)
+        self.controls = waiting.folder
+        self.superseded = False
+        """Whether it was ended since another one was asked for."""
+        self.has_report = False
+        self._common = [subject, *choice.arguments(), *options]
+        controls = ["--no-report", "--out", str(folder), "--controls", str(waiting.folder)]
+        waiting.call(["run", *self._common, *controls])
+
+    @property
+    def command(self) -> str:
+        """The command that makes the same run."""
+        try:
+            has_inputs = bool(external_inputs_of(self.watched.folder))
+        except InvalidRunFolder:  # it has not begun
+            has_inputs = False
+        folder = ["--inputs-from", str(self.watched.folder.shown)] if has_inputs else []
+        return f"handover run {shlex.join([*self._common, *folder])}"
+
+    @property
+    def is_over(self) -> bool:
+        """Whether its process has ended."""
+        return self._process.is_over
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether it has its verdict, or its process has ended without one."""
+        return self.watched.is_over or self.is_over
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether its process has ended before there was anything of the run."""
+        return self.is_over and not self.watched.folder.is_there
+
+    @property
+    def told(self) -> str:
+        """What its process told last on standard error."""
+        return self._process.told.removeprefix("Error: ")
+
+    def end(self) -> None:
+        """Let it end after its step."""
+        self.control.stop, self.control.paused = True, False
+
+    def kill(self) -> None:
+        """End its process, where that goes on."""
+        self._process.process.kill()
+
+    def close(self) -> None:
+        """Wait for its process, and remove what it left besides its folder."""
+        self._process.close()
+        self.control.close()
+
+    def write_report(self) -> str:
+        """Write its page; return why that failed, "" if it did not."""
+        given = [sys.executable, "-c", _ENTRY, "report", str(self.watched.folder.path)]
+        done = subprocess.run(given, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+        self.has_report = done.returncode == 0
+        return "" if self.has_report else (done.stderr.strip().splitlines() or ["it could not be written"])[-1]
+
+    def row(self, headline: Sequence[str]) -> dict[str, Any]:
+        """Return its row in the table of runs; metrics are those of a headline, or all where that is empty."""
+        facts = {
+            "number": self.number,
+            "parameters": dict(self.choice.parameters),
+            "seed": self.choice.seed,
+            "pushed": self.choice.pushed,
+            "command": self.command,
+            "folder": str(self.watched.folder.shown),
+            "report": self.has_report,
+        }
+        summary = _summary_of(self.watched.folder)
+        if not summary:
+            return {**facts, "state": "lost" if self.is_over else "under way", "reason": "", "metrics": []}
+        state = "succeeded" if summary.get("success") else "ended by a change" if self.superseded else "failed"
+        metrics: Mapping[str, Any] = summary.get("metrics", {})
+        shown = [(name, metrics[name]) for name in (headline or metrics) if name in metrics]
+        told = [{"name": name, "about": m.get("description", ""), "text": format_metric(m)} for name, m in shown]
+        return {**facts, "state": state, "reason": str(summary.get("reason", "")), "metrics": told}
+
+
+def _summary_of(folder: RunFolder) -> dict[str, Any]:
+    try:
+        return folder.read_summary()
+    except (InvalidRunFolder, json.JSONDecodeError):
+        return {}

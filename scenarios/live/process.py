@@ -1,0 +1,150 @@
+"""The process that serves a live page, beside the run's own."""
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from handover.cosim.master.live_control import LiveControl
+from handover.cosim.system.time_series import ExternalSource
+from handover.scenarios.experiment.outside import LedHand
+from handover.scenarios.live.input_board import InputBoard
+
+HOST = "127.0.0.1"
+CONTROL_FILE = "control"
+"""Name of the file of a run's controls, in a folder of both processes."""
+_PUSHES_FILE, _HAND_FILE = "pushes", "hand"
+_PATIENCE = 10.0
+"""How long the server may take to tell the pages of the end, s."""
+
+
+@dataclass(frozen=True)
+class PageInputs:
+    """Inputs of a run that its page sets, in files of both processes.
+
+    Attributes:
+        pushes: forces and points of bodies that are pushed; None where none can be.
+        hand: the samples of a hand that is led, which have an age of their own; None where there is none.
+    """
+
+    pushes: InputBoard | None = None
+    hand: InputBoard | None = None
+
+    @classmethod
+    def create(cls, folder: Path, pushes: Mapping[str, int], hand: LedHand | None) -> "PageInputs":
+        """Make the files of those that there are.
+
+        Args:
+            folder: of both processes.
+            pushes: names and sizes of the inputs of bodies that can be pushed.
+            hand: the one that can be led.
+        """
+        return cls(
+            InputBoard.create(folder / _PUSHES_FILE, pushes) if pushes else None,
+            InputBoard.create(folder / _HAND_FILE, hand.inputs, [hand.age]) if hand is not None else None,
+        )
+
+    @classmethod
+    def open(cls, folder: Path) -> "PageInputs":
+        """Return those that another process has made in a folder."""
+        boards = [InputBoard(folder / f) if (folder / f).is_file() else None for f in (_PUSHES_FILE, _HAND_FILE)]
+        return cls(*boards)
+
+    def sources(self) -> dict[str, ExternalSource]:
+        """Return who gives values to the inputs, by their names."""
+        return {name: source for board in self._boards for name, source in board.sources().items()}
+
+    def let_go(self) -> None:
+        """Push nothing any more."""
+        if self.pushes is not None:
+            self.pushes.set({name: [0.0] * size for name, size in self.pushes.sizes.items()}, time.monotonic())
+
+    def close(self) -> None:
+        """Release the files."""
+        for board in self._boards:
+            board.close()
+
+    @property
+    def _boards(self) -> list[InputBoard]:
+        return [board for board in (self.pushes, self.hand) if board is not None]
+
+
+@contextlib.contextmanager
+def live_page(
+    folder: Path, pace: float, pushes: Mapping[str, int], hand: LedHand | None = None
+) -> Generator[tuple[str, LiveControl, PageInputs], None, None]:
+    """Serve the page of a run that will write a folder; at the end, wait until pages have been told of the run's end.
+
+    Args:
+        folder: the run's.
+        pace: simulated seconds per second of wall time at first.
+        pushes: names and sizes of the inputs of bodies that the page may push.
+        hand: what the page, or a tracker, may lead.
+
+    Yields:
+        The page's address, the run's controls, and the inputs that the page sets. The run is paused until a page is
+        open.
+    """
+    with contextlib.ExitStack() as opened:
+        scratch = Path(opened.enter_context(tempfile.TemporaryDirectory(prefix="handover-live-")))
+        control = LiveControl.create(scratch / CONTROL_FILE, pace, paused=True)
+        opened.callback(control.close)
+        inputs = PageInputs.create(scratch, pushes, hand)
+        opened.callback(inputs.close)
+        listening = opened.enter_context(socket.create_server((HOST, 0)))
+        number = listening.fileno()
+        command = [sys.executable, "-m", "handover.scenarios.live", str(folder), str(scratch), str(number)]
+        server = subprocess.Popen(command, pass_fds=(number,), stdin=subprocess.DEVNULL)
+        over = threading.Event()
+        threading.Thread(target=_let_go_without, args=(server, control, inputs, over), daemon=True).start()
+        try:
+            yield f"http://{HOST}:{listening.getsockname()[1]}/", control, inputs
+            over.set()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                server.wait(_PATIENCE)
+        finally:
+            over.set()
+            server.kill()
+            server.wait()
+
+
+def _let_go_without(
+    server: "subprocess.Popen[bytes]", control: LiveControl, inputs: PageInputs, over: threading.Event
+) -> None:
+    """Let a run go on, and nobody push any more, whose page's server has ended before it."""
+    server.wait()
+    if not over.is_set():
+        inputs.let_go()
+    if not over.is_set() and control.paused:
+        control.paused = False
+        print("the live page has ended; the run goes on without it", file=sys.stderr)
+
+
+@contextlib.contextmanager
+def controlled_from(
+    folder: Path, pushes: Mapping[str, int], hand: LedHand | None
+) -> Generator[tuple[LiveControl, PageInputs], None, None]:
+    """Give the controls that another process, which began this one, has made in a folder; and inputs that it sets.
+
+    The run ends after its step where that process ends: then the standard input, a pipe from it, is closed.
+    """
+    control = LiveControl(folder / CONTROL_FILE)
+    threading.Thread(target=_end_with_standard_input, args=(control,), daemon=True).start()
+    inputs = PageInputs.create(folder, pushes, hand)
+    yield control, inputs
+    inputs.close()
+    control.close()
+
+
+def _end_with_standard_input(control: LiveControl) -> None:
+    with contextlib.suppress(OSError):
+        while os.read(0, 64):
+            pass
+    control.stop, control.paused = True, False

@@ -1,0 +1,103 @@
+"""The command `handover` in a process that has loaded what runs need, and waits for its arguments.
+
+So a run begins within some tenths of a second of when it is asked for. The arguments are a line of JSON on its standard
+input, which then stays open: that it is closed tells a run that the process which began it has ended.
+"""
+
+import contextlib
+import importlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+_LOADED = (
+    "pandas",
+    "handover.scenarios.cli.command",
+    "handover.scenarios.cli.run",
+    "handover.scenarios.execution.runner",
+    "handover.scenarios.live.process",
+)
+_PROGRAM = (
+    "from handover.scenarios.live.waiting_command import wait_for_arguments; wait_for_arguments();"
+    " from handover.scenarios.cli.entry import main; main()"
+)
+_PATIENCE = 10.0
+"""How long a process may take to end once its standard input is closed, s."""
+
+
+class WaitingCommand:
+    """Such a process, for one call of the command.
+
+    Args:
+        scenario: whose units' modules are loaded, where they are this package's.
+    """
+
+    def __init__(self, scenario: str) -> None:
+        self._scratch = tempfile.TemporaryDirectory(prefix="handover-play-")
+        self.folder = Path(self._scratch.name)
+        """A folder for what this process and that one share."""
+        with open(self.folder / "told", "wb") as told:
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", _PROGRAM, scenario],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=told,
+                start_new_session=True,
+            )
+
+    def call(self, arguments: Sequence[str]) -> None:
+        """Let it be the command with these arguments; if its process has ended, `is_over` says so."""
+        assert self.process.stdin is not None
+        try:
+            self.process.stdin.write(json.dumps(list(arguments)).encode() + b"\n")
+            self.process.stdin.flush()
+        except BrokenPipeError:
+            self.process.kill()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether its process has ended."""
+        return self.process.poll() is not None
+
+    @property
+    def told(self) -> str:
+        """The last line that it wrote on standard error."""
+        lines = (self.folder / "told").read_text(encoding="utf-8", errors="replace").strip().splitlines()
+        return lines[-1] if lines else ""
+
+    def close(self) -> None:
+        """Wait until its process has ended, and remove the folder."""
+        assert self.process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):
+            self.process.stdin.close()
+        try:
+            self.process.wait(_PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        self._scratch.cleanup()
+
+
+def _line() -> bytes:
+    """Return a line of standard input, of which nothing after it is read."""
+    line = b""
+    while not line.endswith(b"\n"):
+        byte = os.read(0, 1)
+        if not byte:
+            sys.exit()
+        line += byte
+    return line
+
+
+def wait_for_arguments() -> None:
+    """Load what a run needs, and wait; then `sys.argv` is the command's."""
+    from handover.scenarios.execution.selection import load_units  # of the process that waits alone
+
+    for module in _LOADED:
+        importlib.import_module(module)
+    load_units(sys.argv[1])
+    sys.argv = ["handover", *json.loads(_line())]

@@ -1,0 +1,168 @@
+// Shows runs under way, one after the other, and controls their pace. live_page.py sends: texts with a JSON object that
+// has one of begun, state, time with phase, plots, ended, refused; and after each time the places of all that is drawn,
+// as 64-bit floats. Other scripts of a page use:
+//   live.send(command, value)   sends a command
+//   live.on(name, act)          calls act(value) when an object comes that has the name; "shown" when a run's scene is there
+//   live.scene, live.run        of the run that is shown: its scene, and what was told as it began
+//   live.hand                   the hand that is led in it, see handInput; null or undefined where none is
+"use strict";
+const live = (() => {
+  const root = document.querySelector(".live"), host = document.getElementById("scene");
+  const byId = id => document.getElementById(id);
+  const told = root.querySelector(".replay-told"), plots = byId("plots");
+  const chosen = [], listeners = {};
+  const api = {
+    scene: null, run: null, send, on(name, act) { (listeners[name] ??= []).push(act); }, get hand() { return lead?.hand; },
+  };
+  let stage = null, slots = [], size = 0, paused = true, link = null, over = false, lead = null;
+
+  // Puts the scene of a run in the place of the one before, seen from where that was seen.
+  function begin(run) {
+    const before = stage?.scene.viewpoint();
+    stage?.close();
+    stage = null;
+    lead?.close();
+    over = false;
+    slots = run.scene ? replayShapes.unpack(run.scene) : [];
+    size = slots.reduce((sum, {of, key}) => sum + (of.trail ? 3 : of[key].length), 0);
+    host.replaceChildren();
+    if (run.scene) {
+      host.append(byId("scene-of-run").content.cloneNode(true));
+      for (const part of ["views", "legend"]) host.querySelector(".replay-" + part).outerHTML = run[part];
+      stage = stageIn(root, run.scene);
+      if (stage) recorderIn(stage, () => told.value);
+      if (before) stage?.scene.lookAs(before);
+    }
+    lead = run.hand && stage ? leadHandIn(stage.element, stage.scene.camera) : null;
+    byId("hand").hidden = byId("hand-help").hidden = !lead;
+    Object.assign(api, {run, scene: stage?.scene ?? null});
+    if (run.title) document.title = document.querySelector("h1").textContent = run.title;
+    byId("signals").replaceChildren(...run.signals.map(name => Object.assign(document.createElement("option"), {value: name})));
+    byId("verdict").hidden = byId("waiting").hidden = true;
+    byId("told").textContent = "";
+    for (const id of ["pause", "step", "stop", "pace", "signal"]) byId(id).disabled = false;
+    delete root.dataset.ended;
+    root.dataset.frames = 0;
+    root.dataset.begun = Number(root.dataset.begun ?? 0) + 1;
+    send("choose", chosen.filter(name => run.signals.includes(name)));
+  }
+
+  // Takes where everything is; the point of a trail is added to its way.
+  function place(numbers) {
+    if (numbers.length !== size) return;
+    let at = 0;
+    for (const {of, key} of slots) {
+      const size = of.trail ? 3 : of[key].length, values = numbers.subarray(at, at + size);
+      at += size;
+      if (of.trail) of.points = grown(of.points, values);
+      else of[key] = Float64Array.from(values);
+    }
+    api.scene?.show(Infinity);
+  }
+  function grown(points, more) {
+    if (points.length + 3 > 3 * sceneIn.longestTrail) points = points.filter((_, i) => Math.floor(i / 3) % 2 === 0);
+    const all = new Float64Array(points.length + 3);
+    all.set(points);
+    all.set(more, points.length);
+    return all;
+  }
+
+  function send(command, value) {
+    if (link?.readyState === WebSocket.OPEN) link.send(JSON.stringify({command, value}));
+  }
+
+  function tell(message) {
+    for (const name of Object.keys(message)) for (const act of listeners[name] ?? []) act(message[name]);
+    if (message.begun) {
+      begin(message.begun);
+      for (const act of listeners.shown ?? []) act();
+    }
+    else if (message.state) {
+      paused = message.state.paused;
+      byId("pause").textContent = paused ? "\u25b6\ufe0e" : "\u275a\u275a";
+      byId("pause").setAttribute("aria-label", paused ? "go on" : "pause");
+      const pace = String(message.state.pace), select = byId("pace");
+      if (![...select.options].some(o => o.value === pace)) select.add(new Option(`${pace}\u00d7`, pace), 0);
+      select.value = pace;
+    } else if ("time" in message) {
+      told.value = `${message.time.toFixed(2)} s${message.phase ? ", " + message.phase : ""}`;
+    } else if (message.plots) draw(message.plots);
+    else if (message.ended) end(message.ended);
+    else if (message.refused) byId("told").textContent = message.refused;
+  }
+
+  // Draws those plots that are seen; the server sends no others, since drawing takes long.
+  function draw(figures) {
+    figures.forEach(({title, figure}, i) => {
+      let part = plots.children[i];
+      if (!part) {
+        part = document.createElement("div");
+        part.append(document.createElement("h3"), document.createElement("div"));
+        part.lastChild.className = "plot";
+        part.lastChild.style.height = "280px";
+        plots.append(part);
+        seen.observe(part);
+      }
+      part.firstChild.textContent = title;
+      if (!figure) return;
+      page.draw(part.lastChild, JSON.parse(figure));
+    });
+    while (plots.children.length > figures.length) plots.lastChild.remove();
+  }
+
+  const shown = new Set();
+  const seen = new IntersectionObserver(entries => {
+    for (const {target, isIntersecting} of entries) shown[isIntersecting ? "add" : "delete"](target);
+    send("see", [...shown].map(part => [...plots.children].indexOf(part)).filter(i => i >= 0));
+  });
+
+  function end({success, reason, report}) {
+    over = true;
+    const verdict = byId("verdict");
+    verdict.hidden = false;
+    byId("waiting").hidden = true;
+    verdict.className = `verdict ${success ? "good" : "bad"}`;
+    verdict.innerHTML = "<b></b> ";
+    verdict.firstChild.textContent = success ? "Succeeded:" : "Failed:";
+    verdict.append(reason + ".");
+    byId("told").textContent = report ? `Its report: ${report}` : "The run has ended.";
+    for (const id of ["pause", "step", "stop"]) byId(id).disabled = true;
+    root.dataset.ended = success;
+  }
+
+  function choose(name) {
+    if (!api.run?.signals.includes(name) || chosen.includes(name)) return;
+    chosen.push(name);
+    const chip = document.createElement("button");
+    chip.type = "button";
+    chip.textContent = `${name} \u00d7`;
+    chip.addEventListener("click", () => {
+      chosen.splice(chosen.indexOf(name), 1);
+      chip.remove();
+      send("choose", chosen);
+    });
+    byId("chosen").append(chip);
+    byId("signal").value = "";
+    send("choose", chosen);
+  }
+
+  byId("signal").addEventListener("change", ({target}) => choose(target.value));
+  byId("pause").addEventListener("click", () => send(paused ? "go" : "pause"));
+  byId("step").addEventListener("click", () => send("step"));
+  byId("stop").addEventListener("click", () => send("stop"));
+  byId("pace").addEventListener("change", ({target}) => send("pace", Number(target.value)));
+
+  link = new WebSocket(`ws://${location.host}/run`);
+  link.binaryType = "arraybuffer";
+  link.addEventListener("message", ({data}) => {
+    if (typeof data === "string") tell(JSON.parse(data));
+    else {
+      place(new Float64Array(data));
+      root.dataset.frames = Number(root.dataset.frames ?? 0) + 1;
+    }
+  });
+  link.addEventListener("close", () => {
+    if (!over) byId("told").textContent = "The connection to the run is lost.";
+  });
+  return api;
+})();

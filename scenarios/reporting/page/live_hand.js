@@ -1,0 +1,77 @@
+// Lets the page lead the hand of a run under way; hand_messages.py says what is sent.
+//   const lead = leadHandIn(element, camera)
+//   lead.hand      see handInput; null until the server has told where the hand is
+//   lead.close()   leads it no more
+"use strict";
+const leadHandIn = (element, camera) => {
+  const part = name => document.getElementById("hand-" + name);
+  const HELP = {
+    pointer: "The hand is where the mouse is. The wheel moves it towards you and away; a click, or the space bar, closes and opens it; Q, E, "
+      + "W, S, A and D turn it, arrows move it. A finger takes it along, two fingers change its depth. With Alt, you turn the view instead.",
+    gamepad: "The left stick moves the hand, the triggers towards you and away, the right stick turns it, the first button closes and opens it.",
+    tracker: `A tracker sends texts such as {"p_WH": [-0.4, 0.1, -0.05], "q_WH": [1, 0, 0, 0], "closed": false, "stamp": 12.5} to `
+      + `ws://${location.host}/hand: m in the world, a quaternion with its scalar first, s.`,
+    nothing: "Nothing leads the hand: it stops, and keeps what it holds.",
+  };
+  const lead = {hand: null, close}, closed = new AbortController();
+  let link = null, told = 0;
+
+  function tell(text) {
+    part("told").value = text;
+    clearTimeout(told);
+    told = setTimeout(() => { part("told").value = ""; }, 4000);
+  }
+
+  function connect() {
+    const ours = link = new WebSocket(`ws://${location.host}/hand`);
+    ours.addEventListener("message", ({data}) => {
+      const message = JSON.parse(data);
+      if (message.refused) tell(`not taken: ${message.refused}`);
+      if (message.hand) begin(message.hand);
+    });
+    ours.addEventListener("close", () => {
+      lead.hand?.choose("nothing");
+      if (link === ours) part("grasp").disabled = true;
+    });
+  }
+
+  function begin(start) {
+    lead.hand?.end();
+    lead.hand = handInput({element, camera, start, onSample: send, onChange: show});
+    lead.hand.choose(part("device").value);
+    part("grasp").disabled = false;
+    show(start.closed);
+  }
+
+  const send = sample => link?.readyState === WebSocket.OPEN && link.bufferedAmount < 4000 && link.send(JSON.stringify(sample));
+
+  function show(closed) {
+    part("grasp").setAttribute("aria-pressed", closed);
+    part("grasp").textContent = closed ? "open the hand" : "close the hand";
+  }
+
+  // A tracker needs the seat, which one device has at a time.
+  function choose() {
+    const device = part("device").value;
+    part("help").textContent = HELP[device];
+    part("grasp").hidden = device !== "pointer";
+    element.closest(".replay").classList.toggle("awake", device === "pointer");  // the wheel is the hand's, not the page's
+    if (device === "tracker") {
+      const leaves = link;
+      link = null;
+      leaves?.close();
+    } else if (!link || link.readyState > WebSocket.OPEN) connect();
+    else lead.hand?.choose(device);
+  }
+
+  function close() {
+    closed.abort();
+    lead.hand?.end();
+    link?.close();
+  }
+
+  part("device").addEventListener("change", choose, {signal: closed.signal});
+  part("grasp").addEventListener("click", () => lead.hand?.grasp(!lead.hand.pose().closed), {signal: closed.signal});
+  choose();
+  return lead;
+};

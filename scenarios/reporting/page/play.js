@@ -1,0 +1,225 @@
+// Fields for the parameters of a scenario, and the table of a session's runs. play_page.py sends fields (once), choice
+// (what is asked for, and what is wrong with it) and runs; a change is sent when it has been left alone for a moment.
+"use strict";
+(() => {
+  const PAUSE = 350;  // ms after the last change until a run is asked for
+  const byId = id => document.getElementById(id);
+  const fields = new Map();  // by name: {field, root, entries, set(text), text()}
+  let seed = null, push = null, waiting = 0, busy = false;
+
+  const made = (name, properties = {}, ...children) => {
+    const node = Object.assign(document.createElement(name), properties);
+    node.append(...children);
+    return node;
+  };
+
+  // Numbers as short as they are: 0.1, not 0.1000000001.
+  const short = number => String(Number(Number(number).toPrecision(7)));
+  const sameNumbers = (a, b) => {
+    const [one, other] = [a, b].map(text => text.split(",").map(Number));
+    return one.length === other.length && one.every((x, i) => x === other[i]);
+  };
+
+  function ask() {
+    clearTimeout(waiting);
+    busy = true;
+    waiting = setTimeout(again, PAUSE);
+  }
+
+  function again() {
+    clearTimeout(waiting);
+    busy = false;
+    const set = [...fields.values()].filter(f => !f.isDefault()).map(f => [f.field.name, f.text()]);
+    live.send("set", {parameters: Object.fromEntries(set), seed: seed ? Number(seed.value) || 0 : null,
+      push: Boolean(push?.checked)});
+  }
+
+  // A slider with a number field beside it.
+  function numberEntry(field, [low, high, step], label) {
+    const slider = made("input", {type: "range", min: low, max: high, step: step || "any", disabled: !(high > low)});
+    const box = made("input", {type: "number", step: field.kind === "whole" ? 1 : "any"});
+    slider.setAttribute("aria-label", `${label}, slider`);
+    box.setAttribute("aria-label", label);
+    slider.addEventListener("input", () => { box.value = short(slider.value); change(field.name); });
+    box.addEventListener("input", () => { slider.value = box.value; change(field.name); });
+    return {
+      nodes: [slider, box],
+      get: () => box.value,
+      set(text) { box.value = text === "" ? "" : short(text); slider.value = text; },
+    };
+  }
+
+  function plainEntry(field) {
+    if (field.kind === "choice") {
+      const select = made("select", {}, ...field.items.map(item => new Option(item, item)));
+      return {nodes: [select], on: "change", get: () => select.value, set(text) { select.value = text; }};
+    }
+    if (field.kind === "switch") {
+      const box = made("input", {type: "checkbox"});
+      return {nodes: [box], on: "change", get: () => String(box.checked), set(text) { box.checked = text === "true"; }};
+    }
+    const box = made("input", {type: "text", spellcheck: false});
+    return {nodes: [box], on: "change", get: () => box.value, set(text) { box.value = text; }};
+  }
+
+  function fieldOf(field) {
+    const axes = field.sliders.length > 1 ? [..."xyzw"].slice(0, field.sliders.length) : [""];
+    const entries = field.sliders.length
+      ? field.sliders.map((range, i) => numberEntry(field, range, `${field.name} ${field.sliders.length > 1 ? i + 1 : ""}`.trim()))
+      : [plainEntry(field)];
+    const reset = made("button", {type: "button", className: "reset", textContent: "default"});
+    const label = made("label", {textContent: field.name.split(".").at(-1)});
+    const fault = made("p", {className: "fault", hidden: true});
+    const rows = entries.map(entry => made("div", {className: "entry"}, ...entry.nodes,
+      ...(field.unit ? [made("span", {className: "unit", textContent: field.unit})] : [])));
+    const head = made("div", {className: "field-head"}, label);
+    const inline = ["choice", "switch"].includes(field.kind);
+    if (inline) head.append(...entries[0].nodes);
+    head.append(reset);
+    const about = [field.description, field.range].filter(Boolean).join("; ");
+    const root = made("div", {className: "field"}, head, ...(inline ? [] : rows),
+      ...(about ? [made("p", {className: "field-about", textContent: about})] : []), fault);
+    root.dataset.name = field.name;
+    const first = entries[0].nodes.at(-1);
+    first.id = `field-${field.name}`;
+    label.htmlFor = first.id;
+    const numeric = field.sliders.length > 0;
+    const it = {
+      field, root, axes,
+      text: () => entries.map(e => e.get()).join(","),
+      set(text) {
+        const parts = numeric ? text.split(",") : [text];
+        entries.forEach((e, i) => e.set(parts[i] ?? ""));
+        it.mark();
+      },
+      isDefault: () => numeric || /^[-+.\d,e]+$/.test(field.default) ? sameNumbers(it.text(), shortened(field.default, numeric))
+        : it.text() === field.default,
+      mark() { root.classList.toggle("changed", !it.isDefault()); },
+      blame(text) {
+        fault.textContent = text ?? "";
+        fault.hidden = !text;
+        root.classList.toggle("wrong", Boolean(text));
+        if (text) root.closest("details").open = true;
+      },
+    };
+    for (const entry of entries) if (entry.on) entry.nodes[0].addEventListener(entry.on, () => change(field.name));
+    reset.addEventListener("click", () => { it.set(field.default); ask(); });
+    it.set(field.default);
+    return it;
+  }
+  const shortened = (text, numeric) => numeric ? text.split(",").map(short).join(",") : text;
+
+  function change(name) {
+    fields.get(name).mark();
+    ask();
+  }
+
+  live.on("fields", ({groups, seeded, pushable}) => {
+    if (fields.size) return;
+    const host = byId("groups");
+    for (const group of groups) {
+      const part = made("details", {open: group.open}, made("summary", {textContent: group.title}));
+      for (const field of group.fields) {
+        const it = fieldOf(field);
+        fields.set(field.name, it);
+        part.append(it.root);
+      }
+      host.append(part);
+    }
+    if (seeded) {
+      seed = made("input", {type: "number", min: 0, step: 1, id: "seed", value: 0});
+      seed.addEventListener("input", ask);
+      const next = made("button", {type: "button", textContent: "another"});
+      next.addEventListener("click", () => { seed.value = Number(seed.value) + 1; ask(); });
+      host.prepend(made("div", {className: "field"}, made("div", {className: "field-head"},
+        made("label", {textContent: "seed of all random numbers", htmlFor: "seed"}), seed, next)));
+    }
+    if (pushable) {
+      push = made("input", {type: "checkbox", id: "push"});
+      push.addEventListener("change", ask);
+      host.prepend(made("div", {className: "field"}, made("div", {className: "field-head"},
+        made("label", {textContent: "push by hand, in the scene", htmlFor: "push"}), push)));
+    }
+  });
+
+  live.on("choice", choice => {
+    for (const [name, it] of fields) {
+      if (!busy) it.set(choice.parameters[name] ?? it.field.default);
+      it.blame(choice.faults[name]);
+    }
+    if (seed && !busy) seed.value = choice.seed ?? 0;
+    if (push && !busy) push.checked = choice.push;
+    const general = byId("fault");
+    general.textContent = choice.faults[""] ?? "";
+    general.hidden = !choice.faults[""];
+  });
+
+  byId("again").addEventListener("click", again);
+  byId("defaults").addEventListener("click", () => {
+    for (const it of fields.values()) it.set(it.field.default);
+    if (seed) seed.value = 0;
+    again();
+  });
+  byId("search").addEventListener("input", ({target}) => {
+    const words = target.value.toLowerCase().split(/\s+/).filter(Boolean);
+    for (const part of byId("groups").querySelectorAll("details")) {
+      let shown = 0;
+      for (const root of part.querySelectorAll(".field")) {
+        const {name, description} = fields.get(root.dataset.name).field, text = `${name} ${description}`.toLowerCase();
+        root.hidden = !words.every(word => text.includes(word));
+        shown += !root.hidden;
+      }
+      part.hidden = !shown;
+      part.dataset.open ??= part.open;
+      part.open = words.length ? true : part.dataset.open === "true";
+      if (!words.length) delete part.dataset.open;
+    }
+  });
+
+  const SAID = {"under way": "", succeeded: "good", failed: "bad", lost: "bad", "ended by a change": "soft"};
+  live.on("runs", ({rows, seen}) => {
+    const names = [...new Map(rows.flatMap(row => row.metrics.map(m => [m.name, m.about])))];
+    byId("runs").hidden = byId("runs-heading").hidden = !rows.length;
+    const shown = rows.find(row => row.number === seen);
+    byId("command").hidden = !shown;
+    if (shown) byId("command").querySelector("code").textContent = shown.command;
+    const seeds = new Set(rows.map(row => row.seed)).size > 1;
+    const heads = ["run", "changed", ...(seeds ? ["seed"] : []), "verdict", "", ...names.map(([name]) => name.replaceAll("_", " "))];
+    byId("runs").tHead.replaceChildren(made("tr", {}, ...heads.map((text, i) => {
+      const about = names[i - heads.length + names.length]?.[1];
+      return made("th", {scope: "col", textContent: text, title: about ?? ""});
+    })));
+    byId("runs").tBodies[0].replaceChildren(...rows.toReversed().map(row => {
+      const changed = Object.entries(row.parameters).map(([name, text]) => `${name} = ${text}`);
+      if (row.pushed) changed.push("pushed by hand");
+      const cells = [
+        made("td", {textContent: row.number}),
+        made("td", {className: "set", textContent: changed.join(", ") || "nothing"}),
+        ...(seeds ? [made("td", {textContent: row.seed ?? ""})] : []),
+        made("td", {className: "reason"}, made("b", {className: SAID[row.state], textContent: row.state}),
+          row.reason ? `: ${row.reason}` : ""),
+        made("td", {className: "acts"}, ...acts(row, seen)),
+        ...names.map(([name]) => made("td", {className: "number", textContent: row.metrics.find(m => m.name === name)?.text ?? ""})),
+      ];
+      cells.forEach((cell, i) => { cell.dataset.label = heads[i]; });
+      const line = made("tr", {className: row.number === seen ? "seen" : ""}, ...cells);
+      line.dataset.state = row.state;
+      return line;
+    }));
+  });
+
+  function acts(row, seen) {
+    if (["under way", "lost"].includes(row.state)) return [];
+    const show = made("button", {type: "button", textContent: row.number === seen ? "show again" : "show it"});
+    show.addEventListener("click", () => { live.send("show", row.number); scrollTo({top: 0, behavior: "smooth"}); });
+    if (row.report)
+      return [show, " ", made("a", {href: `/report/${row.number}`, target: "_blank", textContent: "open the report"})];
+    const write = made("button", {type: "button", textContent: "write a report"});
+    write.addEventListener("click", () => {
+      write.disabled = true;
+      write.textContent = "being written";
+      live.send("report", row.number);
+    });
+    return [show, " ", write];
+  }
+})();

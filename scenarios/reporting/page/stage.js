@@ -1,0 +1,52 @@
+// A scene with what belongs to it on a page: views, legend, full screen, and the touch that wakes it.
+//   const stage = stageIn(root, content)   null without WebGL, after the page has said so; see sceneIn for the content
+//   stage.scene, stage.button     the scene, and the button that records it
+//   stage.close()                 ends the scene, before its elements are taken out of the page
+//   stage.onFollow = act                   is called when the view begins or ceases to follow
+"use strict";
+const stageIn = (root, content) => {
+  const part = name => root.querySelector(".replay-" + name);
+  const element = part("scene"), wake = part("wake"), full = part("full");
+  const scene = sceneIn(element, content);
+  if (!scene) {
+    part("missing").hidden = false;
+    part("shown").hidden = true;
+    return null;
+  }
+  const life = new AbortController();
+  const stage = {scene, element, button: part("film"), onFollow: () => {}, close() { life.abort(); scene.dispose(); }};
+
+  // A page scrolls over the scene until the scene is touched.
+  wake.addEventListener("click", () => root.classList.add("awake"));
+  element.addEventListener("pointerdown", () => root.classList.add("awake"), true);
+  element.addEventListener("wheel", event => {
+    if (!root.classList.contains("awake")) event.stopImmediatePropagation();
+  }, true);
+  document.addEventListener("pointerdown", event => {
+    if (!root.contains(event.target)) root.classList.remove("awake");
+  }, {signal: life.signal});
+
+  part("views").addEventListener("click", ({target}) => {
+    const button = target.closest("button");
+    if (!button) return;
+    if (button.dataset.view !== "follow") {
+      scene.turn(button.dataset.view);
+      return;
+    }
+    scene.follows = button.getAttribute("aria-pressed") !== "true";
+    button.setAttribute("aria-pressed", scene.follows);
+    stage.onFollow();
+  });
+  part("legend").addEventListener("click", ({target}) => {
+    const button = target.closest("button");
+    if (!button) return;
+    const shown = button.getAttribute("aria-pressed") !== "true";
+    button.setAttribute("aria-pressed", shown);
+    scene.setVisible(button.dataset.label, shown);
+  });
+  full.hidden = !document.fullscreenEnabled;
+  full.addEventListener("click", () => document.fullscreenElement ? document.exitFullscreen()
+    : part("shown").requestFullscreen());
+  page.onColours(() => life.signal.aborted || scene.recolour());
+  return stage;
+};

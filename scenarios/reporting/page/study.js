@@ -1,0 +1,239 @@
+// The page of a study: shows the screens that the server's protocol tells, one after the other, and a round's run.
+// Messages of both sides are in seat.py, the words of buttons in page_words.toml.
+"use strict";
+(() => {
+  const root = document.querySelector(".study"), {words} = page.data(root);
+  const byId = id => document.getElementById(id);
+  const main = byId("screen");
+  let shown = null, play = null, input = null, test = null, over = false, drawn = [];
+  const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
+  const device = () => shown?.device ?? "";
+
+  // A word of the page in the language of the study, with values in place of {names}.
+  function word(name, values = {}) {
+    const said = words[shown?.language] ?? Object.values(words)[0];
+    return (said[name] ?? name).replace(/\{(\w+)\}/g, (_, key) => values[key] ?? "");
+  }
+
+  function node(name, attributes = {}, ...children) {
+    const made = document.createElement(name);
+    for (const [key, value] of Object.entries(attributes)) {
+      if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
+      else if (key in made && typeof value === "boolean") made[key] = value;
+      else made.setAttribute(key, value);
+    }
+    made.append(...children);
+    return made;
+  }
+  const paragraphs = text => text.trim().split(/\n\s*\n/).map(part => node("p", {}, part.replace(/\s*\n\s*/g, " ")));
+
+  const link = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${location.pathname}seat`);
+  link.binaryType = "arraybuffer";
+  const send = message => link.readyState === WebSocket.OPEN && link.send(JSON.stringify(message));
+  const act = (action, value = null) => send({act: {action, value}});
+
+  function button(name, action, {first = false} = {}) {
+    const made = node("button", {type: "button", ...(first ? {class: "first"} : {})}, word(name));
+    made.addEventListener("click", () => {
+      main.querySelectorAll("button").forEach(b => { b.disabled = true; });
+      action();
+    });
+    return made;
+  }
+  const actions = (...buttons) => node("div", {class: "actions"}, ...buttons);
+
+  const screens = {
+    language: s => [node("h1", {}, word("choose_language")), node("div", {class: "study-choices"},
+      ...Object.entries(s.languages).map(([name, text]) => node("button",
+        {type: "button", class: "study-choice", lang: name, onclick: () => act("language", name)}, text)))],
+    consent: s => [node("h1", {}, word("welcome")), ...paragraphs(s.welcome), node("h2", {}, word("consent")),
+      ...paragraphs(s.consent),
+      actions(button("agree", () => act("consent", true), {first: true}), button("disagree", () => act("consent", false)))],
+    eligibility(s) {
+      const boxes = s.eligibility.map(text => node("label", {class: "study-check"},
+        node("input", {type: "checkbox"}), node("span", {}, text)));
+      const ticked = () => boxes.map(box => box.firstChild.checked);
+      const all = button("eligibility_all", () => act("eligibility", ticked()), {first: true});
+      const allow = () => { all.disabled = !ticked().every(Boolean); };
+      boxes.forEach(box => box.addEventListener("change", allow));
+      allow();
+      const none = button("eligibility_not", () => act("eligibility", boxes.map(() => false)));
+      return [node("h1", {}, word("eligibility")), ...boxes, actions(all, none)];
+    },
+    declined: () => [node("h1", {}, word("declined_title")), node("p", {}, word("declined")),
+      actions(button("next_participant", () => act("next")))],
+    device: s => [node("h1", {}, word("device")), node("div", {class: "study-choices"},
+      ...Object.keys(s.devices).map(name => node("button", {type: "button", class: "study-choice", "data-device": name,
+        onclick: () => act("device", {device: name, settings: settings()})},
+        node("b", {}, word(`device_${name}`)), node("span", {}, word(`help_${name}`)))))],
+    practice: s => [node("h1", {}, word("practice")), ...paragraphs(s.practice),
+      ...(s.reason ? [node("p", {}, word("practice_again", s))] : []),
+      node("p", {}, word(`help_${device()}`)),
+      node("p", {}, word("practice_for", {minutes: Number((s.seconds / 60).toFixed(1))})),
+      actions(button("begin", () => act("begin"), {first: true}))],
+    instruction: s => [node("h1", {}, s.name), ...paragraphs(s.instruction), node("p", {class: "soft"}, word(`help_${device()}`)),
+      actions(button("begin", () => act("begin"), {first: true}))],
+    practising: () => waiting(),
+    round: () => waiting(),
+    void: s => [node("h1", {}, word("void")), node("p", {}, word(s.again ? "void_again" : "void_on", s)),
+      actions(button("next", () => act("next"), {first: true}))],
+    rating,
+    questions,
+    thanks: s => [node("h1", {}, word("thanks")), ...paragraphs(s.thanks),
+      actions(button("next_participant", () => act("next")))],
+    withdrawn: () => [node("h1", {}, word("thanks")), node("p", {}, word("withdrawn")),
+      actions(button("next_participant", () => act("next")))],
+    complete: () => [node("h1", {}, word("thanks")), node("p", {}, word("complete"))],
+  };
+  const waiting = () => [node("p", {class: "study-wait"}, node("span", {}, word("getting_ready")))];
+  const settings = () => ({width: innerWidth, height: innerHeight, pixel_ratio: devicePixelRatio});
+
+  function rating(s) {
+    const {lowest, highest} = s.scale;
+    const steps = Array.from({length: highest - lowest + 1}, (_, i) => lowest + i);
+    const sets = Object.entries(s.statements).map(([name, text]) => node("fieldset", {class: "study-rating", "data-name": name},
+      node("legend", {}, text),
+      node("div", {class: "scale", style: `--steps: ${steps.length}`}, ...steps.map(step => node("label", {},
+        node("input", {type: "radio", name, value: step}), String(step)))),
+      node("p", {class: "ends"}, node("span", {}, `${lowest}: ${s.scale.low}`), node("span", {}, `${highest}: ${s.scale.high}`))));
+    const value = set => Number(set.querySelector(":checked")?.value ?? NaN);
+    const done = button("send", () => act("rate", Object.fromEntries(sets.map(set => [set.dataset.name, value(set)]))),
+      {first: true});
+    const allow = () => { done.disabled = !sets.every(set => Number.isFinite(value(set))); };
+    sets.forEach(set => set.addEventListener("change", allow));
+    allow();
+    keys = event => {
+      const set = sets.find(of => !Number.isFinite(value(of)));
+      const box = set?.querySelector(`input[value="${event.key}"]`);
+      if (!box || event.target.closest?.("textarea")) return;
+      box.checked = true;
+      box.focus();
+      allow();
+      if (!done.disabled) done.focus();
+    };
+    return [node("h1", {}, word("rating")), node("p", {}, word("rate_all", s.scale)), ...sets, actions(done)];
+  }
+
+  function questions(s) {
+    const asked = s.questions.map(({name, text, choices}) => choices.length
+      ? node("fieldset", {class: "study-question", "data-name": name}, node("legend", {}, text),
+        ...choices.map(c => node("label", {class: "option"}, node("input", {type: "radio", name, value: c.value}), c.text)))
+      : node("div", {class: "study-question", "data-name": name}, node("label", {for: `q-${name}`}, text),
+        node("textarea", {id: `q-${name}`, maxlength: 5000})));
+    const answer = of => of.querySelector(":checked")?.value ?? of.querySelector("textarea")?.value ?? "";
+    return [node("h1", {}, word("questions")), node("p", {class: "soft"}, word("no_answer")), ...asked, actions(
+      button("send", () => act("answer", Object.fromEntries(asked.map(of => [of.dataset.name, answer(of)]))), {first: true}))];
+  }
+
+  let keys = null;
+  addEventListener("keydown", event => {
+    if (!event.ctrlKey && !event.metaKey && !event.altKey) keys?.(event);
+  });
+
+  function show(screen) {
+    shown = screen;
+    keys = null;
+    document.documentElement.lang = screen.language;
+    document.title = screen.title;
+    tell("");
+    const playing = screen.screen === "round" || screen.screen === "practising";
+    if (!playing) endPlay();
+    byId("who").textContent = screen.participant ? word("participant", screen) : "";
+    byId("progress").textContent = screen.round ? word("round", screen) : "";
+    const sits = Boolean(screen.participant) && !["thanks", "withdrawn", "complete"].includes(screen.screen);
+    byId("withdraw").hidden = !sits;
+    byId("withdraw").textContent = word("withdraw");
+    main.replaceChildren(...screens[screen.screen](screen));
+    main.hidden = false;
+    root.dataset.screen = screen.screen;
+    main.focus({preventScroll: true});
+    scrollTo(0, 0);
+  }
+  byId("withdraw").addEventListener("click", () => confirm(word("withdraw_sure")) && act("withdraw"));
+
+  function tell(text) {
+    byId("told").textContent = text;
+    byId("told").hidden = !text;
+  }
+
+  // Draws the run's first state, leads the hand from now on, and then lets the run go.
+  function beginPlay(content, start) {
+    endPlay();
+    main.hidden = true;
+    byId("play").hidden = false;
+    play = studyScene(content, {eye: byId("eye"), side: byId("side"), photodiode: byId("photodiode"), onDrawn: note});
+    if (!play) {
+      tell(word("no_webgl"));
+      return;
+    }
+    play.sideShown = wantsSide();
+    nameViews();
+    byId("help").textContent = word(`help_${device()}`);
+    byId("task").textContent = shown.name ?? word("free_play");
+    for (const id of ["eye", "side"]) byId(id).setAttribute("aria-label", word(id === "eye" ? "view_eye" : "view_side"));
+    const onChange = closed => { byId("grasp").textContent = word(closed ? "open_hand" : "close_hand"); };
+    byId("grasp").hidden = device() !== "touch";
+    onChange(start.closed);
+    const onSample = hand => link.bufferedAmount < 4000 && send({hand});
+    input = handInput({element: byId("pad"), camera: play.scene.camera, start, onSample, onChange});
+    input.choose(INPUTS[device()] ?? "nothing");
+    byId("pad").focus({preventScroll: true});
+    keys = event => { if (event.key === "v" || event.key === "V") turnViews(); };
+    requestAnimationFrame(() => requestAnimationFrame(() => send({ready: true})));
+  }
+  function endPlay() {
+    flush();
+    input?.end();
+    play?.dispose();
+    input = play = null;
+    byId("play").hidden = true;
+  }
+  const wantsSide = () => (sessionStorage.getItem("views") ?? (innerWidth >= 900 ? "2" : "1")) === "2";
+  function turnViews() {
+    sessionStorage.setItem("views", wantsSide() ? "1" : "2");
+    if (play) play.sideShown = wantsSide();
+    nameViews();
+  }
+  const nameViews = () => { byId("views").textContent = word(wantsSide() ? "one_view" : "two_views"); };
+  byId("grasp").addEventListener("click", () => input?.grasp(!input.pose().closed));
+  byId("views").addEventListener("click", () => { turnViews(); byId("pad").focus({preventScroll: true}); });
+
+  // Times from samples to pictures, which the server keeps with the round.
+  function note(ms) {
+    drawn.push(Math.round(100 * Math.max(0, ms)) / 100);
+    root.dataset.drawn = Number(root.dataset.drawn ?? 0) + 1;
+    if (drawn.length >= 30) flush();
+  }
+  function flush() {
+    if (drawn.length) send({drawn});
+    drawn = [];
+  }
+
+  function ask(asked) {
+    test = asked;
+    play?.target(test.place);
+    const name = test.place ? "place_to_go" : test.name ? "make_fist" : "free_play";
+    byId("task").textContent = word(name, test);
+  }
+
+  link.addEventListener("message", ({data}) => {
+    if (typeof data !== "string") {
+      play?.take(data);
+      return;
+    }
+    const message = JSON.parse(data);
+    if (message.screen) show(message.screen);
+    else if (message.scene) beginPlay(message.scene, message.hand);
+    else if (message.target) ask(message.target);
+    else if (message.refused) tell(message.refused);
+    else if (message.gone) {
+      over = true;
+      endPlay();
+      main.replaceChildren(node("p", {}, word(message.gone)));
+      main.hidden = false;
+      root.dataset.screen = message.gone;
+    }
+  });
+  link.addEventListener("close", () => { if (!over) tell(word("lost_connection")); });
+  window.study = {send, get play() { return play; }, get screen() { return shown?.screen; }};
+})();

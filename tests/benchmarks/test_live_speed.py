@@ -1,0 +1,112 @@
+"""What watching a run costs it, and how often scenes are drawn: runs with a page and without, in a real browser.
+
+Run with `pytest tests/benchmarks/test_live_speed.py --benchmark-enable -s`. The browser draws by software, on the cores
+of the run. CPU time is that of the run's own process: its page's server and the browser have theirs.
+"""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, sync_playwright
+from pytest_benchmark.fixture import BenchmarkFixture
+
+pytestmark = pytest.mark.slow
+
+Waiter = Callable[[Page, str], None]
+
+HANDOVER = (sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()")
+FLAGS = ("--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+PACE = "4"
+SCENES = ("flyer_robot_to_human", "helix_handover", "ir_grasp", "vsl_model_based")
+"""A scenario of each of the four systems."""
+DRAW = """async seconds => {
+  const counted = document.querySelector(".scene") ?? document.querySelector("[data-pictures]");
+  const before = Number(counted.dataset.pictures), end = performance.now() + 1000 * seconds;
+  while (performance.now() < end) {
+    live.scene.show(Infinity);
+    await new Promise(requestAnimationFrame);
+  }
+  return (Number(counted.dataset.pictures) - before) / seconds;
+}"""
+"""Draws the scene as often as the browser can; gives pictures a second."""
+
+
+def summary_of(out: Path) -> dict[str, Any]:
+    return json.loads((out / "summary.json").read_text(encoding="utf-8"))
+
+
+@contextmanager
+def watched(wait_until: Waiter, scenario: str, out: Path, *given: str) -> Generator[Page, None, None]:
+    """Run a scenario with a page open, until it ends."""
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        pytest.skip("there is no chromium to look at pages with")
+    command = [*HANDOVER, "run", scenario, "--live", "--no-report", "--out", str(out), *given]
+    run = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, stdout=subprocess.DEVNULL)
+    assert run.stderr is not None
+    address = None
+    while address is None:
+        line = run.stderr.readline()
+        assert line, "the run ended before it told its address"
+        address = re.search(r"live: (http://\S+)", line)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        page = browser.new_page(viewport={"width": 1000, "height": 900})
+        page.set_default_timeout(300_000)
+        page.goto(address[1])
+        page.wait_for_selector(".live")
+        wait_until(page, "document.querySelector('.live').dataset.frames > 3")
+        yield page
+        wait_until(page, "document.querySelector('.live').dataset.ended")
+        browser.close()
+    run.communicate(timeout=300)
+
+
+def test_what_a_page_costs_its_run(benchmark: BenchmarkFixture, tmp_path: Path, wait_until: Waiter) -> None:
+    """A run with a page, beside the same run without, both paced alike and by turns."""
+    ratios: list[float] = []
+    missed: dict[str, list[float]] = {"watched": [], "alone": []}
+
+    def measure() -> None:
+        k = len(ratios)
+        outs = {name: tmp_path / f"{name}{k}" for name in missed}
+        alone = [*HANDOVER, "run", SCENES[0], "--no-report", "--pace", PACE, "--out", str(outs["alone"])]
+        subprocess.run(alone, check=True, capture_output=True)
+        with watched(wait_until, SCENES[0], outs["watched"], "--pace", PACE):
+            pass
+        found = {name: summary_of(out) for name, out in outs.items()}
+        ratios.append(found["watched"]["cpu_seconds"] / found["alone"]["cpu_seconds"])
+        for name, summary in found.items():
+            missed[name].append(100.0 * summary["pace"]["missed"] / summary["pace"]["deadlines"])
+
+    benchmark.pedantic(measure, rounds=3 if benchmark.enabled else 1)
+    ratio, late = float(np.median(ratios)), {name: float(np.median(shares)) for name, shares in missed.items()}
+    print(f"\nCPU time of a run with a page, over that without: {ratio:.3f} (each: {np.round(ratios, 3).tolist()})")
+    print(f"deadlines missed at pace {PACE}: {late['watched']:.1f} % with a page, {late['alone']:.1f} % without")
+    benchmark.extra_info.update(ratio=ratio, **late)
+
+
+@pytest.mark.parametrize("scenario", SCENES)
+def test_how_often_a_scene_is_drawn(
+    benchmark: BenchmarkFixture, tmp_path: Path, wait_until: Waiter, scenario: str
+) -> None:
+    """Pictures a second that the browser draws by software, while the run is paused."""
+    rates: list[float] = []
+    with watched(wait_until, scenario, tmp_path / "run") as page:
+        page.get_by_label("pause").click()
+        page.get_by_label("go on").wait_for()
+        benchmark.pedantic(lambda: rates.append(page.evaluate(DRAW, 3.0)), rounds=3 if benchmark.enabled else 1)
+        page.locator("#stop").click()
+    rate = float(np.median(rates))
+    print(f"\n{scenario}: {rate:.0f} pictures a second")
+    benchmark.extra_info.update(rate=rate)
+    assert rate > 0.0

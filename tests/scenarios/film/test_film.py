@@ -1,0 +1,219 @@
+"""`handover film`: its pictures are a run's moments, as asked for; what cannot be filmed is refused."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from numpy.typing import NDArray
+from PIL import Image
+
+from handover.cosim.record.reader import Record
+from handover.fmus.build import cached
+from handover.scenarios.cli.command import main
+from handover.scenarios.film.browser import open_camera, window_of
+from handover.scenarios.film.film import FilmSettings, film_times
+from handover.scenarios.film.film_page import film_content, film_html
+from handover.scenarios.results.run_folder import RunFolder
+
+Pixels = NDArray[np.uint8]
+WIDE, HIGH = 640, 360
+
+
+@pytest.fixture(scope="module", autouse=True)
+def chromium() -> None:
+    """Skip where there is no chromium; a film's browser is its own, as no other may be open in the tests' thread."""
+    if shutil.which("chromium") is None:
+        assert "CI" not in os.environ, "there is no chromium to draw films with"
+        pytest.skip("there is no chromium to draw films with")
+
+
+def film(*arguments: object) -> tuple[int, str]:
+    done = CliRunner().invoke(main, ["film", *map(str, arguments)])
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    return done.exit_code, done.output
+
+
+def pictures(file: Path) -> list[Pixels]:
+    """Return a film's pictures in shades of grey."""
+    video = cv2.VideoCapture(str(file))
+    found: list[Pixels] = []
+    while True:
+        there, picture = video.read()
+        if not there:
+            return found
+        found.append(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8))
+
+
+def cursor(picture: Pixels) -> float:
+    """Return where the cursor stands, px from the left: the darkest of the columns right of the scene."""
+    rows, left = slice(int(0.3 * HIGH), int(0.6 * HIGH)), int(0.66 * WIDE)
+    return left + float(np.argmin(picture[rows, left:].astype(float).mean(axis=0)))
+
+
+@pytest.fixture(scope="module")
+def mp4(grasp: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("films") / "grasp.mp4"
+    plot = "cost of thumb and ring, [Luberto] eq. (4)"
+    status, told = film(grasp, "--out", out, "--size", f"{WIDE}x{HIGH}", "--pace", 2.5, "--fps", 4, "--plot", plot)
+    assert status == 0, told
+    assert told.startswith(f"film: {out}, ")
+    assert [p.name for p in out.parent.iterdir()] == ["grasp.mp4"]
+    return out
+
+
+def test_a_film_has_the_runs_moments_in_its_size(mp4: Path, grasp: Path):
+    time = Record(grasp / "signals.parquet").time
+    shown = pictures(mp4)
+    assert len(shown) == int((time[-1] - time[0]) / 2.5 * 4) + 2  # the first, each 0.625 s after it, and the last
+    assert {p.shape for p in shown} == {(HIGH, WIDE)}
+    assert cv2.VideoCapture(str(mp4)).get(cv2.CAP_PROP_FPS) == pytest.approx(4.0)
+
+
+def test_the_scene_moves_and_the_cursor_with_the_time(mp4: Path):
+    shown = pictures(mp4)
+    scene = [p[60:300, 20:350].astype(float) for p in shown]
+    assert np.abs(scene[len(scene) // 2] - scene[0]).max() > 60.0
+    assert np.abs(scene[-1] - scene[0]).max() > 60.0
+    places = np.array([cursor(p) for p in shown[1:-1]])
+    order = np.arange(len(places))
+    per_picture, first = np.polyfit(order, places, 1)
+    np.testing.assert_allclose(places, first + per_picture * order, atol=2.0)
+    assert per_picture * len(shown) > 0.2 * WIDE
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".webm"])
+def test_a_gif_and_a_webm_have_the_same_moments(grasp: Path, tmp_path: Path, suffix: str):
+    out = tmp_path / f"film{suffix}"
+    status, told = film(
+        grasp, "--out", out, "--size", "320x240", "--no-plots", "--pace", 5, "--fps", 4, "--view", "top"
+    )
+    assert status == 0, told
+    expected = len(film_times(0.0, float(Record(grasp / "signals.parquet").time[-1]), FilmSettings(pace=5.0, rate=4.0)))
+    if suffix == ".webm":
+        assert [p.shape for p in pictures(out)] == expected * [(240, 320)]
+        return
+    gif = Image.open(out)
+    shown: list[Pixels] = []
+    for k in range(expected):
+        gif.seek(k)
+        assert gif.info["duration"] == 250
+        shown.append(np.asarray(gif.convert("L"), np.uint8))
+    with pytest.raises(EOFError):
+        gif.seek(expected)
+    assert {p.shape for p in shown} == {(240, 320)}
+    assert np.abs(shown[-1].astype(float) - shown[0]).max() > 60.0
+
+
+def test_a_moment_looks_the_same_whatever_was_shown_before(grasp: Path):
+    content = film_content(RunFolder.of_run(grasp), (), 720)
+    with open_camera(film_html(content, (1280, 720), "follow"), (1920, 1080), dark=True) as camera:
+        first, other, again = (camera(t) for t in (3.0, 8.0, 3.0))
+    assert first == again != other
+    picture = np.asarray(cv2.imdecode(np.frombuffer(first, np.uint8), cv2.IMREAD_GRAYSCALE))
+    assert picture.shape == (1080, 1920)
+    assert picture.mean() < 80.0  # it is dark
+
+
+def test_the_pictures_times_are_even_and_end_with_the_run():
+    settings = FilmSettings(pace=2.0, rate=10.0)
+    np.testing.assert_allclose(film_times(1.0, 2.0, settings), [1.0, 1.2, 1.4, 1.6, 1.8, 2.0])
+    np.testing.assert_allclose(film_times(1.0, 1.7, settings), [1.0, 1.2, 1.4, 1.6, 1.7])
+    np.testing.assert_allclose(film_times(0.0, 0.3, FilmSettings(pace=1.0, rate=10.0)), [0.0, 0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize(
+    ("size", "page", "scale"),
+    [((1280, 720), (1280, 720), 1.0), ((1920, 1080), (1280, 720), 1.5), ((3840, 2160), (1280, 720), 3.0),
+     ((640, 360), (640, 360), 1.0), ((1922, 1082), (1922, 1082), 1.0)],
+)  # fmt: skip
+def test_a_large_film_is_a_page_enlarged(size: tuple[int, int], page: tuple[int, int], scale: float):
+    assert window_of(size) == (page, scale)
+
+
+def test_a_run_without_a_scene_is_filmed_by_its_plots(tmp_path: Path):
+    run = ["run", str(cached("Push", 3)), "--stop", "0.2", "--no-report", "--out", str(tmp_path / "run")]
+    assert CliRunner().invoke(main, run).exit_code == 0
+    status, told = film(tmp_path / "run", "--size", "480x320", "--fps", 10)
+    assert status == 0, told
+    assert "has no scene: the film has plots only" in told
+    assert len(pictures(tmp_path / "run" / "film.mp4")) == 4  # it ends a step after 0.2 s
+    assert film(tmp_path / "run", "--force", "--no-plots")[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--plot", "scene.p_WX"], "--plot scene.p_WX: no plot or signal of that name; did you mean scene.p_W"),
+        (["--plot", "cost", "--plot", "scene.q[9]"], "--plot scene.q[9]: no plot or signal"),
+        (["--plot", "scene.q", "--no-plots"], "--plot and --no-plots contradict each other"),
+        (["--size", "320x240", *(f"--plot=scene.q[{k}]" for k in (1, 2, 3))], "3 plots do not fit into 320x240"),
+        (["--size", "641x360"], "'641x360' is no size, such as 1280x720"),
+        (["--size", "wide"], "'wide' is no size"),
+        (["--out", "x.avi"], "x.avi: a film's name ends with .mp4, .webm or .gif"),
+        (["--out", "x.gif", "--fps", "60"], "more than 50 pictures a second"),
+        (["--out", "folder.mp4"], "there is a folder of that name"),
+        (["--out", "there.mp4"], "it is there already; --force replaces it"),
+        (["--out", "there.mp4/x.mp4"], "is a file, so no folder can be made in it"),
+        (["--pace", "0"], "0"),
+    ],
+)
+def test_what_cannot_be_filmed_so_is_refused_in_a_line(
+    grasp: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: Sequence[str], told: str
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder.mp4").mkdir()
+    (tmp_path / "there.mp4").touch()
+    out = () if "--out" in arguments else ("--out", "x.mp4")
+    status, output = film(grasp, *out, *arguments)
+    assert status == 2
+    assert told in output
+    assert {p.name for p in tmp_path.iterdir()} == {"folder.mp4", "there.mp4"}
+
+
+def test_what_is_no_run_is_refused(tmp_path: Path):
+    assert film(tmp_path / "none") == (2, f"Error: {tmp_path / 'none'} is no folder; name that of a run\n")
+    assert "is the folder of neither a run" in film(tmp_path)[1]
+    (tmp_path / "campaign.json").write_text("{}")
+    assert film(tmp_path)[0] == 2
+
+
+def test_without_a_browser_the_way_to_one_is_told(grasp: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path / "none"))
+    monkeypatch.setattr("handover.scenarios.film.browser._NAMES", ("no-such-browser",))
+    status, told = film(grasp, "--out", tmp_path / "x.mp4")
+    assert status == 2
+    assert "there is no Chromium to draw the film. Cure: `python -m playwright install" in told
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_that_cannot_be_written_leaves_nothing(grasp: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", shutil.which("false") or "")
+    status, told = film(grasp, "--out", tmp_path / "x.mp4", "--pace", 10)
+    assert status == 3
+    assert f"{tmp_path / 'x.mp4'} cannot be written: " in told
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_a_film_and_leaves_nothing(grasp: Path, tmp_path: Path):
+    program = "from handover.scenarios.cli.entry import main; main()"
+    command = [sys.executable, "-c", program, "film", str(grasp), "--out", str(tmp_path / "x.mp4"), "--pace", "0.1"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    begun = time.monotonic()
+    while not list(tmp_path.iterdir()):
+        assert process.poll() is None
+        assert time.monotonic() - begun < 120.0
+        time.sleep(0.1)
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.communicate(timeout=60)[1].strip() == "Aborted!"
+    assert process.returncode == 130
+    assert list(tmp_path.iterdir()) == []

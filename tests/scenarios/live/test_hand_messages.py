@@ -1,0 +1,103 @@
+"""Samples of a hand: what is taken of them, and what is refused for which reason."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handover.plants.free_flyer.hand.hand_kinematics import CLOSED, STRAIGHT
+from handover.scenarios.experiment.outside import LedHand
+from handover.scenarios.live.hand_messages import (
+    LONGEST,
+    MOST_A_SECOND,
+    DeviceClock,
+    HandStream,
+    InvalidHandMessage,
+    parse_hand_message,
+)
+
+LED = LedHand("person", (-0.4, 0.1, -0.05), 0.9)
+SAMPLE: dict[str, Any] = {"p_WH": [-0.3, 0.0, 0.1], "q_WH": [1, 0, 0, 0], "closed": False, "stamp": 5}
+
+
+def text(**other: Any) -> str:
+    return json.dumps({name: value for name, value in {**SAMPLE, **other}.items() if value is not None})
+
+
+def test_a_sample_sets_the_four_inputs_of_a_hand():
+    sample = parse_hand_message(text(closed=True, q_WH=[0.999, 0.0, 0.0, 0.0], device="mouse"))
+    entries = sample.entries(LED)
+    assert {name: len(value) for name, value in entries.items()} == LED.inputs
+    assert entries["person.q_WH_track"] == (1.0, 0.0, 0.0, 0.0)
+    assert entries["person.finger_track"] == CLOSED
+    assert entries["person.closed_track"] == (1.0,)
+    assert (sample.stamp, sample.device) == (5.0, "mouse")
+    assert parse_hand_message(text()).angles == STRAIGHT
+
+
+def test_joints_say_whether_a_hand_grasps_unless_it_is_said():
+    bent = [0.9 * angle for angle in CLOSED]
+    assert parse_hand_message(text(closed=None, angles=bent)).closed
+    assert not parse_hand_message(text(closed=None, angles=[0.1] * 14)).closed
+    told = parse_hand_message(text(closed=False, angles=bent))
+    assert not told.closed
+    assert told.angles == tuple(bent)
+
+
+@pytest.mark.parametrize(
+    ("sent", "why"),
+    [
+        ("{", "not JSON"),
+        ("[" * 1500, "not JSON"),
+        ("[]", "no object"),
+        ("{}", "p_WH: 3 finite numbers are right; q_WH: 4 finite numbers are right; stamp: "),
+        (" " * (LONGEST + 1), f"{LONGEST} characters at most"),
+        (text(p_WH=[0.0, 0.0]), "p_WH: 3 finite numbers"),
+        (text(p_WH=[0.0, 0.0, float("nan")]), "p_WH: 3 finite numbers"),
+        (text(p_WH=[0.0, 0.0, 10**400]), "p_WH: 3 finite numbers"),
+        (text(p_WH=[0.0, 0.0, True]), "p_WH: 3 finite numbers"),
+        (text(q_WH=[0, 0, 0, 0]), "q_WH: a quaternion of norm 1 is right, not 0"),
+        (text(stamp=float("inf")), "stamp: a finite number"),
+        (text(closed=1), "closed: true or false"),
+        (text(closed=None), "closed or angles: one of them"),
+        (text(angles=[0.0] * 13), "angles: 14 finite numbers"),
+        (text(angles=[2.0] * 14), r"angles: joints are within 0 and 1\.5708"),
+        (text(device="m" * 61), "device: a name of up to 60"),
+    ],
+)
+def test_what_is_no_sample_is_refused_with_the_reason(sent: str, why: str):
+    with pytest.raises(InvalidHandMessage, match=why):
+        parse_hand_message(sent)
+
+
+def test_a_hand_wanted_beyond_reach_or_before_is_refused_and_the_next_one_taken():
+    stream = HandStream(LED)
+    with pytest.raises(InvalidHandMessage, match=r"p_WH: 1 m from where the hand rests.*it reaches 0\.9 m"):
+        stream.take(text(p_WH=[0.6, 0.1, -0.05]))
+    stream.take(text())
+    for stamp in (5, 4.9):
+        with pytest.raises(InvalidHandMessage, match=r"stamp: .* is not after the one before, 5 s"):
+            stream.take(text(stamp=stamp))
+    stream.take(text(stamp=5.1))
+
+
+def test_a_flood_is_refused_until_it_ebbs():
+    now = [100.0]
+    stream = HandStream(LED, lambda: now[0])
+    for k in range(MOST_A_SECOND):
+        stream.take(text(stamp=k))
+    with pytest.raises(InvalidHandMessage, match="250 samples a second"):
+        stream.take(text(stamp=300))
+    now[0] += 1.1
+    stream.take(text(stamp=301))
+
+
+def test_stamps_of_another_clock_are_told_by_this_ones():
+    rng = np.random.default_rng(0)
+    clock, ages = DeviceClock(), list[float]()
+    for k in range(200):
+        seen = 0.016 * k
+        stamp = clock.monotonic(seen - 1e4, seen + 0.0005 + float(rng.exponential(0.01)))
+        ages.append(seen - stamp)
+    assert np.abs(ages[50:]).max() < 0.002

@@ -1,0 +1,139 @@
+"""A run in a browser while it goes on: it is followed, paused, stepped, ended; its record is what it would be alone."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from live_runs import HANDOVER, LIVE, TOLD, live_run, shown
+from opened_page import wait_until
+from playwright.sync_api import Browser
+from scipy.spatial.transform import Rotation
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from handover.cosim.record.reader import Record
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.ir_grasp.parameters import Parameters
+
+
+def test_a_run_is_followed_paused_and_stepped_and_its_record_is_that_of_a_run_alone(browser: Browser, tmp_path: Path):
+    with live_run(tmp_path / "live") as (address, run), shown(browser, address) as page:
+        wait_until(page, f"{LIVE}.dataset.frames > 3")
+        page.get_by_label("pause").click()
+        page.get_by_label("go on").wait_for()
+        page.wait_for_timeout(500)
+        paused = page.evaluate(TOLD)
+        before = np.array(page.evaluate("live.scene.points('palm')"))
+        page.wait_for_timeout(500)
+        assert page.evaluate(TOLD) == paused
+        for _ in range(3):
+            page.locator("#step").click()
+        wait_until(page, f"{TOLD} !== '{paused}'")
+        page.locator("#pace").select_option("0")
+        page.get_by_label("go on").click()
+        wait_until(page, f"{LIVE}.dataset.ended")
+        assert page.locator(".verdict").inner_text().startswith("Succeeded: ")
+        after = np.array(page.evaluate("live.scene.points('palm')"))
+        shown_at = page.evaluate(TOLD).partition(",")[0]
+        run.wait(timeout=120)
+        assert run.returncode == 0
+    record = Record(tmp_path / "live" / "signals.parquet")
+    assert shown_at == f"{record.time[-1]:.2f} s"
+    palm = next(b for b in IrGrasp().replay(Parameters(), record.row(-1)).bodies if b.label == "palm")
+    assert palm.q_WB is not None
+    turned = Rotation.from_quat(palm.q_WB[0], scalar_first=True).apply(palm.mesh.vertices)
+    np.testing.assert_allclose(after, palm.p_WB[0] + turned, atol=1e-4)
+    assert np.linalg.norm(after.mean(axis=0) - before.mean(axis=0)) > 0.02
+    alone = [*HANDOVER, "run", "ir_grasp", "--no-report", "--out", str(tmp_path / "alone")]
+    subprocess.run(alone, check=True, capture_output=True)
+    assert pq.read_table(tmp_path / "live" / "signals.parquet").equals(
+        pq.read_table(tmp_path / "alone" / "signals.parquet")
+    )
+
+
+def test_the_page_plots_what_it_is_asked_for_and_ends_the_run(browser: Browser, tmp_path: Path):
+    with live_run(tmp_path / "live", "--pace", "0.5") as (address, run), shown(browser, address) as page:
+        page.locator("#signal").fill("scene.p_WO")
+        page.locator("#signal").dispatch_event("change")
+        wait_until(page, "[...document.querySelectorAll('#plots h3')].some(h => h.textContent === 'scene.p_WO')")
+        page.locator("#stop").click()
+        wait_until(page, f"{LIVE}.dataset.ended")
+        run.wait(timeout=120)
+        assert run.returncode != 0
+    summary = json.loads((tmp_path / "live" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["reason"].startswith("interrupted")
+    assert len(Record(tmp_path / "live" / "signals.parquet").time) > 10
+
+
+@pytest.mark.slow
+def test_a_run_under_way_is_saved_as_a_film(browser: Browser, tmp_path: Path):
+    with live_run(tmp_path / "live") as (address, _), shown(browser, address) as page:
+        page.get_by_role("button", name="save as film").click()
+        before = page.evaluate(f"Number({LIVE}.dataset.frames)")
+        wait_until(page, f"{LIVE}.dataset.frames > {before + 10}")
+        with page.expect_download() as saved:
+            page.get_by_role("button", name="save film").click()
+        saved.value.save_as(tmp_path / "film")
+        assert saved.value.suggested_filename.startswith("ir_grasp.")
+        video = cv2.VideoCapture(str(tmp_path / "film"))
+        assert sum(video.read()[0] for _ in range(10)) > 5
+
+
+def test_ctrl_c_ends_the_run_and_the_page_is_told_how(browser: Browser, tmp_path: Path):
+    with live_run(tmp_path / "live", "--pace", "0.5") as (address, run), shown(browser, address) as page:
+        wait_until(page, f"{LIVE}.dataset.frames > 3")
+        run.send_signal(signal.SIGINT)
+        wait_until(page, f"{LIVE}.dataset.ended")
+        assert "interrupted" in page.locator(".verdict").inner_text()
+        run.wait(timeout=120)
+
+
+def test_a_run_goes_on_without_its_page_if_the_pages_server_ends(tmp_path: Path):
+    with live_run(tmp_path / "live", "--pace", "100") as (_, run):
+        servers = subprocess.run(
+            ["pgrep", "-f", f"scenarios.live {tmp_path}"], capture_output=True, text=True, check=True
+        )
+        for number in servers.stdout.split():
+            os.kill(int(number), signal.SIGKILL)
+        _, told = run.communicate(timeout=120)
+        assert "the run goes on without it" in told
+        assert run.returncode == 0
+
+
+def test_the_readmes_command_refuses_who_is_not_the_page(tmp_path: Path):
+    readme = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
+    (scenario,) = re.findall(r"^\.venv/bin/handover run (\w+) --live$", readme, re.MULTILINE)
+    with live_run(tmp_path / "live", scenario=scenario) as (address, _):
+        host = address.removeprefix("http://").rstrip("/")
+        with pytest.raises(urllib.error.HTTPError, match="400"):
+            urllib.request.urlopen(urllib.request.Request(address, headers={"Host": "elsewhere.example"}))
+        with pytest.raises(InvalidStatus, match="403"):
+            connect(f"ws://{host}/run", origin="http://elsewhere.example")  # pyright: ignore[reportArgumentType]
+        with pytest.raises(urllib.error.HTTPError, match="404"):
+            urllib.request.urlopen(f"{address}etc/passwd")
+        with connect(f"ws://{host}/run", origin=f"http://{host}") as page:  # pyright: ignore[reportArgumentType]
+            wrong = {
+                "{": "not JSON",
+                "[]": "not of the form",
+                '{"command": "fly"}': "no command 'fly'",
+                '{"command": "pace", "value": -1}': "pace takes",
+                '{"command": "pace", "value": NaN}': "pace takes",
+                '{"command": "choose", "value": ["secret"]}': "names of signals",
+                '{"command": "see", "value": "all"}': "numbers of plots",
+                " " * 1500: "1000 bytes",
+            }
+            for text, why in wrong.items():
+                page.send(text)
+                answer = ""
+                while why not in answer:
+                    got = page.recv(timeout=60)
+                    answer = json.loads(got).get("refused", "") if isinstance(got, str) else ""
