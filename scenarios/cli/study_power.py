@@ -1,0 +1,128 @@
+"""The command `handover study power`: what a planned study could find, by simulation, before the first person comes."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from rich.table import Table
+
+from handover.scenarios.cli.console import open_console, print_json
+from handover.scenarios.cli.options import FiniteRange
+from handover.scenarios.cli.study import checked_plan
+from handover.scenarios.execution.errors import one_line_errors, require_extra
+
+if TYPE_CHECKING:
+    from handover.scenarios.campaign.statistics import Interval
+    from handover.scenarios.study.power import Power
+
+_HELP = """Simulate the ratings of the study in PLAN.toml many times, and print how often its tests find an effect.
+
+An effect is in standard deviations of the participants' differences between the two behaviours, each of means of the
+rounds of a task. Ratings come in whole steps. Tests are exact, of signed ranks, at 5 %, two-sided, with Holm's
+correction over all statements and tasks.
+"""
+_COLUMNS = (
+    ("alone", "one rating, uncorrected"),
+    ("first", "corrected, no other has it"),
+    ("all_have", "corrected, all have it"),
+    ("any_of_all", "any of all that have it"),
+    ("none", "anything, none has it"),
+    ("t_test", "t-test, uncorrected"),
+)
+
+
+class People(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (generic in newer versions only)
+    """Numbers of participants, such as 10,12,18."""
+
+    name = "people"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, ...]:
+        """Return the numbers."""
+        parts = str(value).split(",")
+        if not all(p.strip().isdecimal() and 2 <= int(p) <= _MOST for p in parts):
+            self.fail(f"{value!r}: whole numbers from 2 to {_MOST} are right, such as 10,12,18", param, ctx)
+        return tuple(int(p) for p in parts)
+
+
+_MOST = 200
+
+
+@click.command("power", help=_HELP, short_help="Simulate what a planned study could find.")
+@click.argument("file", metavar="PLAN.toml", type=click.Path(path_type=Path))
+@click.option(
+    "--effect",
+    type=FiniteRange(min=0),
+    default=0.8,
+    show_default=True,
+    metavar="SD",
+    help="Mean difference of the behaviours, in standard deviations of the participants' differences.",
+)
+@click.option("--participants", type=People(), metavar="N,...", help="So many.  [default: the plan's]")
+@click.option(
+    "--correlation",
+    type=FiniteRange(min=0, max=1),
+    default=0.6,
+    show_default=True,
+    help="Of a participant's differences in all statements and tasks. The default is assumed.",
+)
+@click.option(
+    "--spread",
+    type=FiniteRange(min=0, min_open=True),
+    default=1.5,
+    show_default=True,
+    metavar="POINTS",
+    help="The standard deviation in points of the scale, on which ties depend. The default is assumed.",
+)
+@click.option("--repeat", type=click.IntRange(100, 100000), default=2000, show_default=True, help="Simulated studies.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of their random numbers.")
+@click.option("--json", "as_json", is_flag=True, help="Print it as JSON, with intervals of the simulation.")
+def power(
+    file: Path,
+    effect: float,
+    participants: tuple[int, ...] | None,
+    correlation: float,
+    spread: float,
+    repeat: int,
+    seed: int,
+    *,
+    as_json: bool,
+) -> None:
+    """Simulate what a planned study could find."""
+    plan = checked_plan(file)
+    with one_line_errors():
+        require_extra("study", "the simulation of a study")
+        from handover.scenarios.study.power import PowerAssumptions, fewest_participants, simulated_power
+
+        assumed = PowerAssumptions(effect=effect, spread=spread, correlation=correlation, repeats=repeat, seed=seed)
+        found = [simulated_power(plan, n, assumed) for n in participants or (plan.participants,)]
+    tests = len(plan.statements) * len(plan.tasks)
+    least = fewest_participants(tests)
+    if as_json:
+        print_json({"assumed": vars(assumed), "least_participants": least, "power": [_data(p) for p in found]})
+        return
+    console = open_console()
+    console.print(
+        f"Effect {effect:g} SD of the participants' differences, {spread:g} points, correlated by {correlation:g} "
+        f"over {tests} ratings; {repeat} simulated studies each"
+    )
+    table = Table(box=None, padding=(0, 2))
+    for heading in ("participants", *(words for _, words in _COLUMNS)):
+        table.add_column(heading, justify="right", min_width=9, overflow="fold")
+    for p in found:
+        table.add_row(str(p.participants), *(_text(getattr(p, name), repeat) for name, _ in _COLUMNS))
+    console.print(table)
+    console.print(f"Corrected over {tests}, nothing can be found with fewer than {least} participants.")
+
+
+def _text(share: "Interval", repeats: int) -> str:
+    half = (share.high - share.low) / 2
+    return f"{_middle(share):.0%}" if half < 0.005 or repeats >= 1000 else f"{_middle(share):.0%} ± {half:.0%}"
+
+
+def _middle(share: "Interval") -> float:
+    return (share.low + share.high) / 2
+
+
+def _data(p: "Power") -> dict[str, Any]:
+    shares = {name: [getattr(p, name).low, getattr(p, name).high] for name, _ in _COLUMNS}
+    return {"participants": p.participants, **shares}

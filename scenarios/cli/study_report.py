@@ -1,0 +1,125 @@
+"""The commands `handover study report`, `replay` and `export`: what a study's folder shows."""
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.results.run_folder import RunFolder, check_place
+
+if TYPE_CHECKING:
+    from handover.scenarios.study.session_folder import SessionFolder
+    from handover.scenarios.study.study_folder import StudyFolder
+
+_FOLDER = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+
+
+@click.command("report", short_help="Write the page of a study, and all its tables.")
+@_FOLDER
+@click.option(
+    "--out", "file", metavar="FILE", type=click.Path(path_type=Path), help="The page.  [default: DIR/report.html]"
+)
+def report(folder: Path, file: Path | None) -> None:
+    """Write the page of the study in DIR: one HTML file that opens offline, and its results as CSV into DIR/results.
+
+    A study that goes on has its page, too: what is not complete is said, and what too few took part in is not tested.
+    """
+    with one_line_errors():
+        page = file or folder / "report.html"
+        if page.is_dir():
+            raise UsageError(f"{page} is a folder; name a file for the page")
+        require_extra("reports", "the page")
+        with _opened(folder) as study:
+            check_place(folder)
+            check_place(page.parent)
+            from handover.scenarios.study.report_page import write_study_report
+
+            write_study_report(study, page)
+    click.echo(f"report: {page}")
+
+
+@click.command("export", short_help="Write the tables of all participants.")
+@_FOLDER
+def export(folder: Path) -> None:
+    """Write the tables of all participants of the study in DIR: rounds, answers, questionnaire, sessions.
+
+    Each as CSV and as Parquet; DIR/codebook.csv has the columns' types, units and meanings.
+    """
+    with one_line_errors(), _opened(folder) as study:
+        check_place(folder)
+        study.write_tables()
+        from handover.scenarios.study.codebook import all_tables
+
+        for name in all_tables(study.plan):
+            click.echo(study.path / f"{name}.csv")
+
+
+@click.command("replay", short_help="Show a round: what happened, and its page.")
+@_FOLDER
+@click.argument("participant")
+@click.argument("number", metavar="ROUND", type=click.IntRange(1))
+def replay(folder: Path, participant: str, number: int) -> None:
+    """Show what happened in a ROUND of a PARTICIPANT, such as P01, and write the page of its run, with the replay."""
+    with one_line_errors(), _opened(folder) as study:
+        session = _session(study, participant)
+        planned = next((r for r in session.rounds if r.number == number), None)
+        if planned is None:
+            raise UsageError(f"the plan has {len(session.rounds)} rounds, none of number {number}")
+        record = session.records.get(number)
+        run = RunFolder.of_run(session.run_folder(number))
+        who = f"{session.session.pseudonym} ({session.session.kind}), round {number}"
+        click.echo(f"{who}: {planned.condition.task}, {planned.condition.behaviour}, period {planned.period}")
+        if record is None:
+            click.echo("it has not been played to its end")
+        else:
+            outcome = "succeeded" if record.success else "failed"
+            click.echo(f"{outcome}: {record.reason}")
+            rule = {True: "failed", False: "did not fail", None: "cannot be judged"}[record.failed_by_rule]
+            click.echo(f"by the rule of failures it {rule}")
+            if record.void:
+                click.echo(f"void, it does not count: {record.void_reason}")
+            ratings = session.answers.get(number, {})
+            click.echo(f"ratings: {', '.join(f'{k} = {v}' for k, v in ratings.items()) or 'none'}")
+            if record.latency_p95_ms is not None:
+                click.echo(f"latency: median {record.latency_median_ms:.0f} ms, 95 % {record.latency_p95_ms:.0f} ms")
+        if not run.is_there:
+            raise UsageError(f"{run.path} has no record of a run to be shown")
+        require_extra("reports", "the page")
+        from handover.scenarios.execution.resume import complete_signals
+        from handover.scenarios.reporting.run_page import write_run_page
+
+        with run.held():
+            complete_signals(run)
+            for line in write_run_page(run):
+                click.echo(line, err=True)
+    click.echo(f"page: {run.report}")
+
+
+@contextmanager
+def _opened(folder: Path) -> "Generator[StudyFolder, None, None]":
+    """Give the study in a folder.
+
+    Raises:
+        UsageError: there is no such folder. InvalidRunFolder: it is none of a study.
+    """
+    from handover.scenarios.study.study_folder import StudyFolder
+
+    if not folder.is_dir():
+        raise UsageError(f"{folder} is no folder; name that of a study")
+    yield StudyFolder.read(folder)
+
+
+def _session(study: "StudyFolder", participant: str) -> "SessionFolder":
+    """Return the session of a participant by number or pseudonym.
+
+    Raises:
+        UsageError: there is none.
+    """
+    digits = participant.upper().removeprefix("P")
+    if not digits.isdecimal() or int(digits) not in study.numbers:
+        known = ", ".join(s.session.pseudonym for s in study.sessions) or "none"
+        raise UsageError(f"no participant {participant!r}; sessions that have begun: {known}")
+    return study.session(int(digits))

@@ -1,0 +1,77 @@
+"""The command `handover study serve`: carries out a study on this computer, in a browser."""
+
+import asyncio
+import contextlib
+from pathlib import Path
+
+import click
+
+from handover.scenarios.cli.options import FiniteRange
+from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
+
+_HELP = """Carry out the study of PLAN.toml on this computer: a page, one participant after the other.
+
+The page goes from consent to thanks; what comes of it is in DIR, a folder a participant. The same command goes on
+with a session that was broken off: no finished round is lost. Ctrl-C ends it.
+
+The page is for this computer alone, unless --host names an address of it: then the page's address holds a token,
+and who knows it may take part.
+
+With a plan of scripted pilots (pilot = true) --pilot plays them, too: a script in the place of people, which leads
+the hand by what the page shows.
+"""
+
+
+@click.command("serve", help=_HELP, short_help="Carry out a study: the page that people take part in.")
+@click.argument("file", metavar="PLAN.toml", type=click.Path(path_type=Path))
+@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder of the study.")
+@click.option("--host", default="127.0.0.1", show_default=True, metavar="ADDRESS", help="Address that it listens on.")
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port.  [default: one that is free]")
+@click.option(
+    "--participant",
+    type=click.IntRange(1, 999),
+    metavar="N",
+    help="Number of the participant.  [default: whose session is not complete, or else the next]",
+)
+@click.option("--pilot", is_flag=True, help="Let a script take part in the place of people, until all have.")
+@click.option(
+    "--pace",
+    type=FiniteRange(0.1, 100.0),
+    metavar="N",
+    help="Of scripted pilots: simulated seconds per second.  [default: 1]",
+)
+@click.help_option("-h", "--help")
+def serve(
+    file: Path, out: Path, host: str, port: int, participant: int | None, *, pilot: bool, pace: float | None
+) -> None:
+    """Carry out a study."""
+    from handover.scenarios.cli.study import checked_plan
+
+    with one_line_errors():
+        for extra in ("reports", "live"):
+            require_extra(extra, "handover study serve")
+        plan = checked_plan(file)
+        if pilot and not plan.pilot:
+            raise UsageError(f"--pilot: {file} is of people; a plan of scripted pilots has pilot = true")
+        if pace is not None and not plan.pilot:
+            raise UsageError(f"--pace: {file} is of people, who live at pace 1; of scripted pilots it may be another")
+        if participant is not None and participant > plan.participants:
+            raise UsageError(f"--participant: the plan has {plan.participants}, not {participant}")
+        from handover.scenarios.study.sessions import NotServed, serve_study  # uvicorn and starlette, of the extra
+
+        try:
+            with contextlib.suppress(KeyboardInterrupt):
+                asyncio.run(
+                    serve_study(
+                        plan,
+                        out,
+                        host=host,
+                        port=port,
+                        number=participant,
+                        pace=pace or 1.0,
+                        pilot=pilot,
+                        tell=lambda line: click.echo(line, err=True),
+                    )
+                )
+        except NotServed as e:
+            raise UsageError(str(e)) from e

@@ -1,0 +1,310 @@
+"""What follows from a study's rounds and ratings: failures, tests of ratings, order effects, a mixed model.
+
+Differences are of the plan's first behaviour minus the second. Void rounds do not count. Means are a participant's own,
+so that a participant counts once in a test, however many rounds there were.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from handover.scenarios.campaign.statistics import holm, success_interval
+from handover.scenarios.study.mixed_ordinal import MixedModel, NotFitted, fit_mixed_ordinal
+from handover.scenarios.study.session_folder import SessionFolder
+from handover.scenarios.study.statistics import (
+    MIN_PARTICIPANTS,
+    Counts,
+    SignedRankTest,
+    permutation_test,
+    sign_flip_test,
+    signed_rank_test,
+    within_condition_slope,
+)
+from handover.scenarios.study.study_folder import StudyFolder
+
+FAILURE = "failure"
+"""As a measure beside the statements: 1 of a round that failed by the rule, 0 of one that did not."""
+
+_Row = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FailureCount:
+    """Rounds of a task and behaviour that failed by the rule, with the interval of Clopper and Pearson at 95 %.
+
+    Attributes:
+        rounds: that count and whose record says who held the object.
+        failures: of these, by the rule.
+        unjudged: rounds that count and whose record does not say it.
+        unsuccessful: rounds that count and did not succeed as `handover run` judges.
+        low, high: of the share of failures, None without rounds. It takes rounds for independent.
+    """
+
+    task: str
+    behaviour: str
+    rounds: int
+    failures: int
+    unjudged: int
+    unsuccessful: int
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FailureTest:
+    """Failures of a task compared within participants; p-values are None with fewer than six participants.
+
+    Attributes:
+        participants: with judged rounds of both behaviours.
+        difference: of their shares of failures, mean.
+        p_rounds: by permutation of the rounds within participants.
+        p_holm: the same, corrected over tasks.
+        p_participants: by flips of whole participants' differences: rounds of one may depend on each other. With void
+            rounds, a participant has the weight of the product of both numbers of rounds.
+    """
+
+    task: str
+    participants: int
+    difference: float | None
+    p_rounds: float | None
+    p_holm: float | None
+    p_participants: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PairedMeans:
+    """A participant's mean ratings of a statement in a task."""
+
+    participant: str
+    task: str
+    statement: str
+    first: float
+    second: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class RatingTest:
+    """Ratings of a statement in a task compared; `test` is None with fewer than six participants.
+
+    Attributes:
+        participants: with ratings of both behaviours.
+        first, second: means of the participants' means.
+        p_holm: corrected over all tests.
+    """
+
+    task: str
+    statement: str
+    participants: int
+    first: float | None
+    second: float | None
+    test: SignedRankTest | None
+    p_holm: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class OrderEffect:
+    """How a measure goes with the order, in the participants' slopes within conditions; `test` None if too few.
+
+    Attributes:
+        effect: "round", "period" or "carry-over".
+        measure: a statement, or "failure".
+        participants: whose rounds give a slope.
+    """
+
+    effect: str
+    measure: str
+    participants: int
+    test: SignedRankTest | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StatementModel:
+    """The mixed ordinal model of a statement; None with the reason why there is none.
+
+    Attributes:
+        names: of the effects, in order: of the behaviour in each task, of tasks, and of the period.
+    """
+
+    statement: str
+    names: Sequence[str]
+    model: MixedModel | None
+    reason: str
+
+
+class StudyAnalysis:
+    """The results of a study, as far as it has come.
+
+    Attributes:
+        study: its folder.
+        sessions: all that have begun.
+        rounds: rows of rounds that were played, see `codebook.ROUNDS`.
+        answers: rows of ratings.
+    """
+
+    def __init__(self, study: StudyFolder) -> None:
+        self.study, self.plan = study, study.plan
+        self.sessions: Sequence[SessionFolder] = study.sessions
+        self.rounds: list[_Row] = [row for s in self.sessions for row in s.rounds_rows()]
+        self.answers: list[_Row] = [row for s in self.sessions for row in s.answers_rows()]
+
+    @property
+    def counted(self) -> list[_Row]:
+        """Rounds that count."""
+        return [row for row in self.rounds if not row["void"]]
+
+    @cached_property
+    def failures(self) -> Sequence[FailureCount]:
+        """Failures by task and behaviour, in the plan's order."""
+        return [self._failures(c.task, c.behaviour) for c in self.plan.conditions]
+
+    def _failures(self, task: str, behaviour: str) -> FailureCount:
+        rows = [r for r in self.counted if (r["task"], r["behaviour"]) == (task, behaviour)]
+        judged = [r for r in rows if r["failed_by_rule"] is not None]
+        failed = sum(r["failed_by_rule"] for r in judged)
+        interval = success_interval(failed, len(judged)) if judged else None
+        return FailureCount(
+            task=task,
+            behaviour=behaviour,
+            rounds=len(judged),
+            failures=failed,
+            unjudged=len(rows) - len(judged),
+            unsuccessful=sum(not r["success"] for r in rows),
+            low=None if interval is None else interval.low,
+            high=None if interval is None else interval.high,
+        )
+
+    @cached_property
+    def failure_tests(self) -> Sequence[FailureTest]:
+        """Failures of each task compared within participants, corrected over tasks."""
+        tests = [self._failure_test(task) for task in self.plan.tasks]
+        corrected = _holm(t.p_rounds for t in tests)
+        return [replace(t, p_holm=p) for t, p in zip(tests, corrected, strict=True)]
+
+    def _failure_test(self, task: str) -> FailureTest:
+        counts = [c for s in self.sessions if (c := self._counts(s.session.pseudonym, task)) is not None]
+        shares = [c.first / c.of_first - c.second / c.of_second for c in counts]
+        enough = len(counts) >= MIN_PARTICIPANTS
+        crossed = [c.first * c.of_second - c.second * c.of_first for c in counts]
+        return FailureTest(
+            task=task,
+            participants=len(counts),
+            difference=float(np.mean(shares)) if shares else None,
+            p_rounds=permutation_test(counts) if enough else None,
+            p_holm=None,
+            p_participants=sign_flip_test(crossed) if enough else None,
+        )
+
+    def _counts(self, participant: str, task: str) -> Counts | None:
+        """Return a participant's failures in a task; None without judged rounds of both behaviours."""
+        rows = [r for r in self.counted if (r["participant"], r["task"]) == (participant, task)]
+        judged = {
+            b: [r["failed_by_rule"] for r in rows if r["behaviour"] == b and r["failed_by_rule"] is not None]
+            for b in self.plan.behaviours
+        }
+        first, second = (judged[b] for b in self.plan.behaviours)
+        return Counts(sum(first), len(first), sum(second), len(second)) if first and second else None
+
+    @cached_property
+    def means(self) -> Sequence[PairedMeans]:
+        """Participants' means of each task and statement with ratings of both behaviours."""
+        values: dict[tuple[str, str, str, str], list[int]] = {}
+        for a in self._rated:
+            values.setdefault((a["participant"], a["task"], a["statement"], a["behaviour"]), []).append(a["value"])
+        found: list[PairedMeans] = []
+        for task in self.plan.tasks:
+            for statement in self.plan.statements:
+                for s in self.sessions:
+                    who = s.session.pseudonym
+                    first, second = (values.get((who, task, statement, b)) for b in self.plan.behaviours)
+                    if first and second:
+                        means = (float(np.mean(first)), float(np.mean(second)))
+                        of = {"participant": who, "task": task, "statement": statement}
+                        found.append(PairedMeans(**of, first=means[0], second=means[1]))
+        return found
+
+    @property
+    def _rated(self) -> list[_Row]:
+        return [a for a in self.answers if not a["void"]]
+
+    @cached_property
+    def rating_tests(self) -> Sequence[RatingTest]:
+        """Ratings of each statement in each task compared, corrected over all of them."""
+        tests = [self._rating_test(task, name) for name in self.plan.statements for task in self.plan.tasks]
+        corrected = _holm(None if t.test is None else t.test.p for t in tests)
+        return [replace(t, p_holm=p) for t, p in zip(tests, corrected, strict=True)]
+
+    def _rating_test(self, task: str, statement: str) -> RatingTest:
+        pairs = [m for m in self.means if (m.task, m.statement) == (task, statement)]
+        return RatingTest(
+            task=task,
+            statement=statement,
+            participants=len(pairs),
+            first=float(np.mean([m.first for m in pairs])) if pairs else None,
+            second=float(np.mean([m.second for m in pairs])) if pairs else None,
+            test=signed_rank_test([m.first - m.second for m in pairs]),
+        )
+
+    @cached_property
+    def order_effects(self) -> Sequence[OrderEffect]:
+        """How ratings and failures go with the round's number, the period, and the behaviour of the round before."""
+        measured = {name: [a for a in self._rated if a["statement"] == name] for name in self.plan.statements}
+        judged = [r for r in self.counted if r["failed_by_rule"] is not None]
+        measured[FAILURE] = [{**r, "value": float(r["failed_by_rule"])} for r in judged]
+        effects = ["round", *(["period"] if self.plan.repetitions > 1 else []), "carry-over"]
+        return [self._order_effect(effect, name, rows) for effect in effects for name, rows in measured.items()]
+
+    def _order_effect(self, effect: str, measure: str, rows: Sequence[_Row]) -> OrderEffect:
+        slopes: list[float] = []
+        for s in self.sessions:
+            own = [r for r in rows if r["participant"] == s.session.pseudonym]
+            placed = [(x, r) for r in own if (x := self._place(effect, s, r["round"])) is not None]
+            if placed:
+                conditions = [(r["task"], r["behaviour"]) for _, r in placed]
+                slope = within_condition_slope([x for x, _ in placed], [r["value"] for _, r in placed], conditions)
+                slopes += [] if slope is None else [slope]
+        return OrderEffect(effect=effect, measure=measure, participants=len(slopes), test=signed_rank_test(slopes))
+
+    def _place(self, effect: str, session: SessionFolder, number: int) -> float | None:
+        """Return what a round has of an effect; None of the first round, which comes after nothing.
+
+        It is its number, its period, or 1 after a round of the first behaviour and 0 after one of the second.
+        """
+        if effect == "carry-over":
+            before = session.rounds[number - 2].condition.behaviour if number > 1 else None
+            return None if before is None else float(before == self.plan.behaviours[0])
+        return float(number if effect == "round" else session.rounds[number - 1].period)
+
+    @cached_property
+    def models(self) -> Sequence[StatementModel]:
+        """The mixed ordinal model of each statement."""
+        return [self._model(name) for name in self.plan.statements]
+
+    def _model(self, statement: str) -> StatementModel:
+        rows = [a for a in self._rated if a["statement"] == statement]
+        period = {(r["participant"], r["round"]): r["period"] for r in self.rounds}
+        tasks, first = self.plan.tasks, self.plan.behaviours[0]
+        names = [*(f"behaviour, {t}" for t in tasks), *(f"task {t}" for t in tasks[1:])]
+        names += ["period"] if self.plan.repetitions > 1 else []
+        if len({a["participant"] for a in rows}) < MIN_PARTICIPANTS:
+            reason = f"fewer than {MIN_PARTICIPANTS} participants"
+            return StatementModel(statement=statement, names=names, model=None, reason=reason)
+        x: list[list[float]] = []
+        for a in rows:
+            side = 0.5 if a["behaviour"] == first else -0.5
+            line = [side * (a["task"] == t) for t in tasks] + [float(a["task"] == t) for t in tasks[1:]]
+            x.append([*line, *([float(period[a["participant"], a["round"]])] if "period" in names else [])])
+        try:
+            model = fit_mixed_ordinal([a["value"] for a in rows], x, [a["participant"] for a in rows])
+        except NotFitted as e:
+            return StatementModel(statement=statement, names=names, model=None, reason=str(e))
+        return StatementModel(statement=statement, names=names, model=model, reason="")
+
+
+def _holm(p: Iterable[float | None]) -> list[float | None]:
+    """Return p-values corrected for the number of those that there are."""
+    values = list(p)
+    corrected = iter(holm([v for v in values if v is not None]))
+    return [None if v is None else next(corrected) for v in values]

@@ -1,0 +1,94 @@
+"""The test of a device before the first round: places to which the hand is to be moved, and fists.
+
+The thesis shows for its own device that the simulated hand follows along and about each axis, and closes, figures 4.21
+to 4.27: a hand was moved twice to the ends of what the device sees. Here a person moves it to the ends along each axis,
+one after the other, and closes it twice; how long each took is kept with the session. Turning is not tested: a mouse
+does not turn the hand.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
+
+_AT_REST = np.array([-0.40, 0.10, -0.05])
+"""Where the hand rests, in W, m: `p_WH_0` of the person's unit."""
+_ENDS = (("x", (0.18, 0.0, 0.0)), ("y", (0.0, 0.15, 0.0)), ("z", (0.0, 0.0, 0.12)))
+_CLOSE, _STAY = 0.03, 0.3
+"""How near to a place, m, and for how long, s, it counts as reached (assumed)."""
+_FISTS = 2
+
+
+@dataclass(frozen=True)
+class Reached:
+    """A place of the test that was reached, or a fist.
+
+    Attributes:
+        name: such as "+x", or "fist".
+        seconds: from when it was asked for.
+    """
+
+    name: str
+    seconds: float
+
+
+class DeviceTest:
+    """Asks for one place after the other, by what the run shows of the hand.
+
+    Attributes:
+        reached: what was done.
+    """
+
+    def __init__(self) -> None:
+        self._asked = _places()
+        self.reached: list[Reached] = []
+        self._since, self._there = 0.0, 0.0
+        self._last: float | None = None
+        self._was_closed = False
+
+    @property
+    def target(self) -> dict[str, Any]:
+        """What is asked for: name, place in W, m, None for a fist, and what is done of all."""
+        done, of = len(self.reached), len(self._asked)
+        if done == of:
+            return {"name": "", "place": None, "done": done, "of": of}
+        name, place = self._asked[done]
+        return {"name": name, "place": None if place is None else place.tolist(), "done": done, "of": of}
+
+    @property
+    def shown(self) -> dict[str, Any]:
+        """What is kept of the test."""
+        return {
+            "asked": [name for name, _ in self._asked],
+            "reached": [{"name": r.name, "seconds": round(r.seconds, 3)} for r in self.reached],
+        }
+
+    def observe(self, t: float, row: Record) -> bool:
+        """Take in the run at time t of the practice, s; return whether something else is asked for than before."""
+        first, self._last, dt = self._last is None, t, 0.0 if self._last is None else max(0.0, t - self._last)
+        if len(self.reached) == len(self._asked):
+            return first
+        name, place = self._asked[len(self.reached)]
+        closed = bool(row["person.closed_goal"][0])
+        if place is None:
+            is_done, self._was_closed = closed and not self._was_closed, closed
+        else:
+            near = float(np.linalg.norm(row["person.p_WH"][0] - place)) < _CLOSE
+            self._there = self._there + dt if near else 0.0
+            is_done, self._was_closed = self._there >= _STAY, closed
+        if not is_done:
+            return first
+        self.reached.append(Reached(name, t - self._since))
+        self._since, self._there = t, 0.0
+        return True
+
+
+def _places() -> list[tuple[str, Floats | None]]:
+    """Return what is asked for, in order: the ends along each axis, and fists."""
+    ends = [
+        (f"{sign}{axis}", _AT_REST + s * np.array(way)) for axis, way in _ENDS for sign, s in (("+", 1.0), ("-", -1.0))
+    ]
+    return [*ends, *(("fist", None) for _ in range(_FISTS))]

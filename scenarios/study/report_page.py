@@ -1,0 +1,180 @@
+"""Writes the page of a study: who took part, what did not count, the results, and the methods in words."""
+
+from collections import Counter
+from pathlib import Path
+
+from markupsafe import Markup
+
+from handover.scenarios.reporting.html import rows_table
+from handover.scenarios.reporting.page import Section, template, write_page
+from handover.scenarios.study.analysis import StudyAnalysis
+from handover.scenarios.study.codebook import PILOT
+from handover.scenarios.study.order import balance, order_row
+from handover.scenarios.study.report_sections import (
+    Words,
+    failures_section,
+    model_section,
+    note,
+    order_section,
+    published_section,
+    ratings_section,
+    tests_section,
+)
+from handover.scenarios.study.result_tables import result_columns, write_results
+from handover.scenarios.study.statistics import MIN_PARTICIPANTS
+from handover.scenarios.study.study_folder import StudyFolder
+
+NO_PERSON = f"{PILOT.capitalize()}: no person took part."
+"""On every section of a page whose sessions programs played."""
+
+
+def write_study_report(study: StudyFolder, file: Path | None = None) -> Path:
+    """Write the tables of all participants, the results, and the page; return the page.
+
+    Args:
+        study: it need not be complete.
+        file: where the page goes; by default `report.html` in the folder.
+
+    Raises:
+        InvalidRunFolder: what is kept of a session is damaged. RecordNotWritten: something cannot be written.
+    """
+    analysis = StudyAnalysis(study)
+    words = Words(analysis)
+    sections = [
+        _participants_section(analysis),
+        _exclusions_section(analysis, words),
+        failures_section(analysis, words),
+        published_section(analysis, words),
+        ratings_section(analysis, words),
+        tests_section(analysis, words),
+        order_section(analysis, words),
+        model_section(analysis, words),
+        _methods_section(analysis),
+        _files_section(analysis),
+    ]
+    study.write_tables()
+    write_results(analysis, study.path / "results")
+    page = file or study.path / "report.html"
+    title = f"{study.plan.title} ({PILOT})" if study.plan.pilot else study.plan.title
+    write_page(page, title, _header(analysis), [_marked(s, study.plan.pilot) for s in sections if s is not None])
+    return page
+
+
+def _marked(section: Section, pilot: bool) -> Section:
+    """Return a section that says, if it is so, that no person took part."""
+    if not pilot:
+        return section
+    html = Markup("<p class='soft'><b>{}</b></p>").format(NO_PERSON) + section.html
+    return Section(anchor=section.anchor, title=section.title, html=html, scripts=section.scripts)
+
+
+def _header(analysis: StudyAnalysis) -> Markup:
+    plan, n = analysis.plan, len(analysis.sessions)
+    incomplete = [s.session.pseudonym for s in analysis.sessions if not s.is_complete]
+    lines: list[Markup] = []
+    if plan.pilot:
+        lines.append(Markup("<p class='verdict bad'><b>Scripted pilot</b>: no person took part.</p>"))
+    who = _counted(n, PILOT if plan.pilot else "participant")
+    counted, played = len(analysis.counted), len(analysis.rounds)
+    told = f"{plan.participants} are planned; {counted} of {played} rounds that were played count."
+    if incomplete:
+        told += f" Not complete: {', '.join(incomplete)}."
+    lines.append(Markup("<p class='verdict'><b>{}</b>: {}</p>").format(who, told))
+    if n:
+        lines.append(note(balance(plan, n)))
+    if 0 < n < MIN_PARTICIPANTS:
+        lines.append(note(f"Fewer than {MIN_PARTICIPANTS} are too few for a test: none is made."))
+    return Markup("\n").join(lines)
+
+
+def _counted(n: int, what: str) -> str:
+    return f"{n} {what}" if n == 1 else f"{n} {what}s"
+
+
+def _participants_section(analysis: StudyAnalysis) -> Section:
+    """Return the sessions, and what participants said of themselves."""
+    rows: list[tuple[str, ...]] = []
+    for s in analysis.sessions:
+        row = s.sessions_row()
+        numbers = [str(row[name]) for name in ("rounds", "void_rounds", "marked_rounds", "failures")]
+        state = "complete" if s.is_complete else f"incomplete: {row['rounds']} of {analysis.plan.rounds} rounds"
+        who = (s.session.pseudonym, str(order_row(analysis.plan, s.session.number)), row["device"], row["language"])
+        rows.append((*who, *numbers, state))
+    if not rows:
+        return Section(anchor="participants", title="Who took part", html=note("No session has begun yet."))
+    header = ("participant", "order", "device", "language", "rounds", "void", "marked", "not successful", "session")
+    html = rows_table(header, rows, numbers=(1, 4, 5, 6, 7))
+    html += note("Order: row of the Williams square. Marked: rounds whose latency was above the limit; they count.")
+    return Section(anchor="participants", title="Who took part", html=html + _said(analysis))
+
+
+def _said(analysis: StudyAnalysis) -> Markup:
+    """Return how often each choice was made, and the texts that were written."""
+    plan, asked = analysis.plan, [q for s in analysis.sessions if (q := s.questionnaire) is not None]
+    text = next(iter(plan.texts.values()))
+    html = Markup()
+    for question in plan.questions:
+        given = [a for answers in asked if (a := answers.get(question.name))]
+        if question.choices:
+            words = dict(zip(question.choices, text.choices[question.name], strict=True))
+            found = Counter(given)
+            counts = ", ".join(f"{words[c]}: {found[c]}" for c in question.choices if found[c])
+            html += Markup("<p>{} <span class='soft'>{}</span></p>").format(
+                text.questions[question.name], counts or "–"
+            )
+        elif given:
+            quotes = Markup().join(Markup("<li>{}</li>").format(g) for g in given)
+            html += Markup("<details><summary>{} ({})</summary><ul>{}</ul></details>").format(
+                text.questions[question.name], len(given), quotes
+            )
+    return html
+
+
+def _exclusions_section(analysis: StudyAnalysis, words: Words) -> Section:
+    """Return the rounds that do not count, and those whose latency was above the limit."""
+    void = [r for r in analysis.rounds if r["void"]]
+    rows = [
+        (r["participant"], str(r["round"]), words.task(r["task"]), r["behaviour"], r["void_reason"] or "–")
+        for r in void
+    ]
+    html = Markup()
+    if rows:
+        header = ("participant", "round", "task", "behaviour", "why it does not count")
+        html += rows_table(header, rows, numbers=(1,))
+    else:
+        html += Markup("<p>No round is void.</p>")
+    limit = analysis.plan.latency_limit
+    measured = [r["latency_p95_ms"] for r in analysis.counted if r["latency_p95_ms"] is not None]
+    marked = sum(bool(r["marked_over_limit"]) for r in analysis.counted)
+    if measured:
+        html += note(
+            f"Latency from hand to picture, exceeded in 5 of 100 instants of a round: at most {max(measured):.0f} ms; "
+            f"{marked} of {len(measured)} rounds that count are above {limit:.0f} ms, and are marked, not left out."
+        )
+    unmeasured = len(analysis.counted) - len(measured)
+    if unmeasured:
+        html += note(f"{unmeasured} rounds that count have no latency: it was not measured.")
+    broken = [s for s in analysis.sessions if not s.is_complete]
+    for s in broken:
+        html += note(
+            f"{s.session.pseudonym}: the session is not complete; its rounds that were played and rated are in all "
+            "results where both behaviours have one."
+        )
+    return Section(anchor="exclusions", title="What does not count", html=html)
+
+
+def _methods_section(analysis: StudyAnalysis) -> Section:
+    html = template("study_methods.html").render(plan=analysis.plan)
+    return Section(anchor="methods", title="Methods", html=Markup(html))
+
+
+def _files_section(analysis: StudyAnalysis) -> Section:
+    tables = ", ".join(f"{name}.csv" for name in result_columns(analysis.plan))
+    rows = [
+        ("rounds, answers, questionnaire, sessions", "all participants' tables, as .csv and .parquet"),
+        ("codebook.csv, codebook.md", "their columns, with types, units and meanings"),
+        (f"results/{tables}", "what this page shows, with results/codebook.csv"),
+        ("participants/P01/rounds/01", "the record of a round: `handover study replay` shows it"),
+        ("plan.toml, versions.json", "the plan, and the versions that carried it out"),
+    ]
+    return Section(anchor="files", title="Files", html=rows_table(("file", "what it holds"), rows, cards=True))

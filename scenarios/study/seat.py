@@ -1,0 +1,348 @@
+"""The one seat of a study: its page is shown the protocol's screens, leads the hand in a round, and sees the run.
+
+Texts from the page are JSON objects with one member:
+
+| member | value | |
+|---|---|---|
+| `act` | `{"action": NAME, "value": VALUE}` | what the person does on a screen, see `Protocol.act` |
+| `hand` | see `hand_messages` | a sample of the hand, while a run goes on |
+| `ready` | - | the scene is drawn, and the run may begin |
+| `drawn` | list of ms | times from samples of the hand to the pictures that showed them |
+
+Texts to the page are JSON objects with one of `screen`, `scene`, `target`, `refused`, `gone`; a state of the run is a
+message of 64-bit floats, see `Frame`, sixty a second.
+"""
+
+import asyncio
+import contextlib
+import json
+import time
+import traceback
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from handover.cosim.exceptions import RecordNotWritten
+from handover.scenarios.results.run_folder import InvalidRunFolder
+from handover.scenarios.study.device_test import DeviceTest
+from handover.scenarios.study.protocol import InvalidAction, Protocol
+from handover.scenarios.study.study_scene import study_scene
+from handover.scenarios.study.trial import Trial, TrialFailed, Wanted, round_parameters
+
+PERIOD = 1.0 / 60.0
+"""Time between two states of the run that the page gets, s."""
+LONGEST = 20_000
+"""Characters of a message from the page at most."""
+MOST_A_SECOND = 300
+"""Messages a second that are taken from a page; further ones are refused."""
+FLOOD = 3000
+"""Messages a second at which a page is put out of its seat."""
+SILENCE = 3.0
+"""Time without a sample of the hand after which a device is lost, and the round void, s (assumed)."""
+_READY = 60.0
+"""How long a page may take to draw the scene for the first time, s."""
+_SLOWEST = 2.0
+"""How long a page may take to receive a message, s."""
+PRACTICE = "handover.scenarios.free_flyer.hand_practice:HandPractice"
+_LOST_FROM = 0.7
+"""How far from its first place the object of the practice is lost, m; the practice then begins anew (assumed)."""
+
+
+class StudySeat:
+    """One page at a time, and the trial that it plays.
+
+    Args:
+        protocol: what is shown.
+        pace: simulated seconds per second of wall time, which is 1 but for scripted pilots.
+    """
+
+    def __init__(self, protocol: Protocol, pace: float = 1.0) -> None:
+        self.protocol, self._pace = protocol, pace
+        self._page: WebSocket | None = None
+        self._trial: Trial | None = None
+        self._preparing: asyncio.Task[None] | None = None
+        self._playing: asyncio.Task[None] | None = None
+        self._page_ready, self._fault = asyncio.Event(), ""
+        self._last_sample = 0.0
+        self._test: DeviceTest | None = None
+        self._practised = 0.0
+
+    @property
+    def is_taken(self) -> bool:
+        """Whether a page has the seat."""
+        return self._page is not None
+
+    async def sit(self, page: WebSocket) -> None:
+        """Let a page that was accepted have the seat until it goes; another one is told that it is taken."""
+        if self._page is not None:
+            await page.send_text(json.dumps({"gone": "seat_taken"}))
+            await page.close(code=4001)
+            return
+        self._page = page
+        try:
+            await self._show()
+            await self._listen(page)
+        except (WebSocketDisconnect, RuntimeError):
+            pass
+        finally:
+            self._page = None
+            await self._leave("the page was closed, or its connection was lost")
+
+    async def close(self) -> None:
+        """End what is under way; a round that is not finished is played again."""
+        await self._leave("the server was ended")
+
+    async def _listen(self, page: WebSocket) -> None:
+        second, count, told = 0, 0, False
+        while True:
+            text = await page.receive_text()
+            if int(time.monotonic()) != second:
+                second, count, told = int(time.monotonic()), 0, False
+            count += 1
+            if count > FLOOD:
+                await self._send({"gone": "flood"})
+                await page.close(code=4002)
+                return
+            if count > MOST_A_SECOND:
+                if not told:
+                    await self._send({"refused": f"more than {MOST_A_SECOND} messages in a second"})
+                told = True
+                continue
+            try:
+                await self._take(text)
+            except (InvalidAction, ValueError) as e:
+                await self._send({"refused": str(e)})
+            except (RecordNotWritten, InvalidRunFolder) as e:
+                await self._send({"refused": f"it could not be kept: {e}"})
+
+    async def _take(self, text: str) -> None:
+        """Do what a message asks for.
+
+        Raises:
+            InvalidAction, ValueError: it is none, or not to be done.
+        """
+        name, value = parse_message(text)
+        if name == "hand":
+            self._lead(value)
+        elif name == "drawn":
+            if self._trial is not None:
+                self._trial.latency.add(value)
+        elif name == "ready":
+            self._page_ready.set()
+        else:
+            of = cast(dict[str, Any], value) if isinstance(value, dict) else {}
+            self.protocol.act(str(of.get("action")), of.get("value"))
+            if of.get("action") == "withdraw":
+                await self._drop_trial()
+            await self._show()
+
+    def _lead(self, value: Any) -> None:
+        trial = self._trial
+        if trial is None:
+            return
+        arrival = time.monotonic()
+        trial.lead(value, arrival)
+        self._last_sample = arrival
+
+    async def _show(self) -> None:
+        """Show the protocol's screen, and see to the trial that it needs."""
+        screen = self.protocol.screen
+        await self._send({"screen": self.protocol.content()})
+        if screen in ("instruction", "practice", "round", "practising") and self._preparing is None:
+            self._preparing = asyncio.create_task(self._prepare())
+        if screen in ("round", "practising") and self._playing is None:
+            self._playing = asyncio.create_task(self._play())
+
+    async def _prepare(self) -> None:
+        """Let the next run stand at its start, while the person reads what is to be done."""
+        self._fault = ""
+        try:
+            self._trial = trial = Trial(self._next_wanted())
+            await asyncio.get_running_loop().run_in_executor(None, trial.begin)
+        except TrialFailed as e:
+            self._fault = str(e)
+        except Exception as e:
+            traceback.print_exc()
+            self._fault = f"the server failed: {type(e).__name__}: {e}"
+
+    def _next_wanted(self) -> Wanted:
+        session, protocol = self.protocol.session, self.protocol
+        assert session is not None
+        told = {"kind": session.session.kind, "device": session.session.device}
+        if protocol.screen in ("practice", "practising"):
+            left = max(1.0, protocol.study.plan.practice - self._practised)
+            return Wanted(
+                PRACTICE, [f"duration={left!r}"], 0, _free_folder(session.path / "practice"), told, self._pace
+            )
+        planned = protocol.round
+        assert planned is not None
+        session.clear_unfinished(planned.number)
+        c = planned.condition
+        given = round_parameters(c)
+        return Wanted(c.scenario, given, planned.seed, session.run_folder(planned.number), told, self._pace)
+
+    async def _play(self) -> None:
+        """Carry out the round, or the practice, that is shown, to its end."""
+        is_round = self.protocol.screen == "round"
+        assert self._preparing is not None
+        fault: str | None = None
+        while True:
+            await self._preparing
+            trial = self._trial
+            fault = self._fault or (None if trial is None else await self._watched(trial))
+            if is_round or fault or trial is None or not self._goes_on(trial):
+                break
+            await self._drop_trial(keep_playing=True)
+            self._preparing = asyncio.create_task(self._prepare())
+        await self._conclude(is_round, fault)
+
+    async def _watched(self, trial: Trial) -> str | None:
+        """Show a run to its end; return why it is void, None if it is not. Faults of ours make it void, too."""
+        try:
+            return await self._run(trial)
+        except Exception as e:
+            traceback.print_exc()
+            return f"the server failed: {type(e).__name__}: {e}"
+
+    async def _run(self, trial: Trial) -> str | None:
+        """Show a run to its end; return why it is void, None if it is not."""
+        stage = trial.stage
+        assert stage is not None
+        self._page_ready.clear()
+        if self._test is None and self.protocol.screen == "practising":
+            self._test = DeviceTest()
+        await self._send({"scene": study_scene(stage), "hand": trial.hand})
+        await self._send_frame(trial, always=True)
+        try:
+            await asyncio.wait_for(self._page_ready.wait(), _READY)
+        except (TimeoutError, asyncio.TimeoutError):
+            return f"the page did not draw the scene within {_READY:.0f} s"
+        trial.go()
+        self._last_sample = time.monotonic()
+        while trial.is_running:
+            if not self.is_taken:  # up to Python 3.11, wait_for may swallow that this was cancelled
+                raise asyncio.CancelledError
+            began = time.monotonic()
+            if began - self._last_sample > SILENCE:
+                return f"no sample of the hand came for {SILENCE:.0f} s: the device or the page was lost"
+            await self._send_frame(trial)
+            await self._test_device(trial)
+            if self.protocol.screen == "practising" and _is_lost(trial):
+                trial.stop()
+            await asyncio.sleep(max(PERIOD - (time.monotonic() - began), 0.001))
+        return None
+
+    async def _test_device(self, trial: Trial) -> None:
+        row = trial.newest
+        if self._test is None or row is None or self.protocol.screen != "practising":
+            return
+        if self._test.observe(self._practised + float(row.time[0]), row):
+            await self._send({"target": self._test.target})
+
+    def _goes_on(self, trial: Trial) -> bool:
+        """Count the practice that has ended; return whether there is time left for more."""
+        self._practised += 0.0 if trial.newest is None else float(trial.newest.time[0])
+        return self.protocol.study.plan.practice - self._practised > 1.0
+
+    async def _conclude(self, is_round: bool, fault: str | None) -> None:
+        """Keep what was played, and show what comes next."""
+        trial, protocol = self._trial, self.protocol
+        try:
+            if fault is None and is_round and trial is not None:
+                protocol.end_round(await asyncio.get_running_loop().run_in_executor(None, trial.record))
+        except TrialFailed as e:
+            fault = str(e)
+        await self._drop_trial(keep_playing=True)
+        self._playing = None
+        if fault is not None:
+            self._note_fault(is_round, fault)
+        elif not is_round:
+            test = self._test or DeviceTest()
+            protocol.end_practice({"practised": round(self._practised, 3), **test.shown})
+            self._test, self._practised = None, 0.0
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            await self._show()
+
+    def _note_fault(self, is_round: bool, fault: str) -> None:
+        if is_round:
+            self.protocol.void_round(fault)
+        else:
+            self.protocol.break_off_practice(fault)
+
+    async def _leave(self, reason: str) -> None:
+        """End the trial under way, if any, since nobody sits there; its round is void."""
+        under_way = self._playing is not None
+        await self._drop_trial()
+        if under_way and self.protocol.screen in ("round", "practising"):
+            with contextlib.suppress(RecordNotWritten):
+                self._note_fault(self.protocol.screen == "round", reason)
+
+    async def _drop_trial(self, *, keep_playing: bool = False) -> None:
+        """End what plays or prepares a run, and then the run, which nobody may look at any more."""
+        tasks = [self._preparing, None if keep_playing else self._playing]
+        self._preparing = None
+        if not keep_playing:
+            self._playing = None
+        trial, self._trial = self._trial, None
+        for task in tasks:
+            if task is not None and not task.done():
+                task.cancel()
+                with contextlib.suppress(asyncio.CancelledError):
+                    await task
+        if trial is not None:
+            await asyncio.get_running_loop().run_in_executor(None, trial.close)
+
+    async def _send_frame(self, trial: Trial, *, always: bool = False) -> None:
+        frame = trial.frame(always=always)
+        page = self._page
+        if frame is not None and page is not None:
+            await self._within_time(page.send_bytes(frame.packed()))
+
+    async def _send(self, message: dict[str, Any]) -> None:
+        page = self._page
+        if page is not None:
+            await self._within_time(page.send_text(json.dumps(message)))
+
+    @staticmethod
+    async def _within_time(sending: Any) -> None:
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError, asyncio.TimeoutError):
+            await asyncio.wait_for(sending, _SLOWEST)
+
+
+def parse_message(text: str) -> tuple[str, Any]:
+    """Return the name and the value of a message from the page.
+
+    Raises:
+        InvalidAction: it is none.
+    """
+    if len(text) > LONGEST:
+        raise InvalidAction(f"a message has {LONGEST} characters at most, this one {len(text)}")
+    try:
+        content: Any = json.loads(text)
+    except (ValueError, RecursionError) as e:
+        raise InvalidAction("it is not JSON") from e
+    members = cast(dict[str, Any], content) if isinstance(content, dict) else {}
+    if len(members) != 1 or not members.keys() <= _MESSAGES:
+        raise InvalidAction(f"it is not an object with one of {', '.join(sorted(_MESSAGES))}")
+    return next(iter(members.items()))
+
+
+_MESSAGES = {"act", "hand", "ready", "drawn"}
+
+
+def _free_folder(path: Path) -> Path:
+    """Return a folder in another that is not there yet: 01, 02, ..."""
+    k = 1
+    while (free := path / f"{k:02d}").exists():
+        k += 1
+    return free
+
+
+def _is_lost(trial: Trial) -> bool:
+    """Return whether the object of the practice is where no hand can get it."""
+    row = trial.newest
+    if row is None or trial.first_place is None:
+        return False
+    return float(np.linalg.norm(row["person.p_WO"][0] - trial.first_place)) > _LOST_FROM

@@ -1,0 +1,126 @@
+"""Serves a study's page, one seat at a time, and nothing else.
+
+On loopback, pages of other sites are kept away by the host that is asked for and by the origin of a connection. On
+another address the page is below a token that only its own address holds.
+"""
+
+import asyncio
+import contextlib
+import secrets
+import signal
+import socket
+from collections.abc import AsyncGenerator, Generator
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from handover.scenarios.study.seat import LONGEST, StudySeat
+from handover.scenarios.study.study_page import study_html
+
+_GRACE = 30
+"""Time for a run under way to end when the server does, s."""
+LOOPBACK = ("127.0.0.1", "localhost")
+_HEADERS = {
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+}
+
+
+class StudyServer:
+    """The server of one study.
+
+    Args:
+        seat: that pages may take.
+        host: the address on which it listens; on loopback no token is needed.
+
+    Attributes:
+        token: part of the page's address; "" on loopback.
+    """
+
+    def __init__(self, seat: StudySeat, host: str = LOOPBACK[0]) -> None:
+        self.seat, self.host = seat, host
+        self.token = "" if host in LOOPBACK else secrets.token_urlsafe(16)
+
+    @property
+    def path(self) -> str:
+        """The page's path."""
+        return f"/{self.token}/" if self.token else "/"
+
+    def application(self) -> Starlette:
+        """Return the application."""
+        hosts = [*LOOPBACK] if not self.token else ["*"]  # who knows the token knows the address, by whatever name
+        return Starlette(
+            routes=[Route(self.path, self._page), WebSocketRoute(f"{self.path}seat", self._connection)],
+            middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=hosts)],
+            lifespan=self._lifespan,
+        )
+
+    @contextlib.asynccontextmanager
+    async def _lifespan(self, _app: Starlette) -> AsyncGenerator[None, None]:
+        yield
+        await self.seat.close()
+
+    async def _page(self, _request: Request) -> Response:
+        return HTMLResponse(study_html(self.seat.protocol.study.plan), headers=_HEADERS)
+
+    async def _connection(self, page: WebSocket) -> None:
+        origin = page.headers.get("origin", "")
+        if origin.partition("://")[2] != page.headers.get("host"):
+            await page.close(code=1008)
+            return
+        await page.accept()
+        await self.seat.sit(page)
+
+
+def listening_socket(host: str, port: int) -> socket.socket:
+    """Return a socket that listens on an address; port 0 is any that is free.
+
+    Raises:
+        OSError: it cannot, as where the port is taken.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    return socket.create_server((host, port), family=family)
+
+
+class _Server(uvicorn.Server):
+    """A server that ends at Ctrl-C and SIGTERM, and leaves the rest of the command to be told of it."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Generator[None, None, None]:
+        """Let both end it in order."""
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, self._end)
+        try:
+            yield
+        finally:
+            for number in (signal.SIGINT, signal.SIGTERM):
+                loop.remove_signal_handler(number)
+
+    def _end(self) -> None:
+        self.should_exit = True
+
+
+def uvicorn_config(server: StudyServer) -> uvicorn.Config:
+    """Return how a study's page is served."""
+    return uvicorn.Config(
+        server.application(),
+        log_level="error",
+        ws="websockets-sansio",
+        ws_max_size=4 * LONGEST,
+        server_header=False,
+        timeout_graceful_shutdown=_GRACE,
+    )
+
+
+def uvicorn_server(server: StudyServer) -> uvicorn.Server:
+    """Return what serves a study's page on a socket, by `serve(sockets=[...])`, until Ctrl-C or SIGTERM."""
+    return _Server(uvicorn_config(server))

@@ -1,0 +1,166 @@
+"""Exact tests of a study's paired data: pure functions of numbers, which know nothing of plans and folders.
+
+Every null distribution here is that of a sum of independent terms given the data, made by convolution: exact for any
+number of participants, with ties. SciPy's `wilcoxon` is exact with ties only by going through all 2^n signs; the tests
+compare the two where that is possible.
+
+[Wilcoxon1945] Wilcoxon, Individual comparisons by ranking methods.
+[Pratt1959] Pratt, Remarks on zeros and ties in the Wilcoxon signed rank procedures.
+[Hodges1963] Hodges, Lehmann, Estimates of location based on rank tests.
+[Noether1967] Noether, Wilcoxon confidence intervals for location parameters in the discrete case.
+[Streitberg1986] Streitberg, Röhmel, Exact distributions for permutation and rank tests.
+[Edgington2007] Edgington, Onghena, Randomization tests.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.stats import hypergeom, rankdata
+
+from handover.cosim.blocks.ports import Floats
+from handover.scenarios.campaign.statistics import LEVEL
+
+MIN_PARTICIPANTS = 6
+"""Fewer cannot reject at 5 % by any test of signs: five that differ alike have p = 2 / 2^5 = 0.0625."""
+
+_DIGITS = 9
+"""Decimals to which differences are compared: means of whole ratings that are equal have other last bits."""
+
+
+@dataclass(frozen=True)
+class SignedRankTest:
+    """Wilcoxon's signed-rank test of differences, with the shift that belongs to it.
+
+    Attributes:
+        n: differences, one a participant.
+        zeros: of these, how many are 0.
+        rank_sum: of positive differences.
+        p: two-sided.
+        estimate: of Hodges and Lehmann: the median of the means of all pairs of differences.
+        low, high: of its interval at 95 % at least.
+    """
+
+    n: int
+    zeros: int
+    rank_sum: float
+    p: float
+    estimate: float
+    low: float
+    high: float
+
+
+def signed_rank_test(differences: Sequence[float]) -> SignedRankTest | None:
+    """Return the exact test that differences are symmetric about 0; None of fewer than six.
+
+    Absolute differences that are equal share their mean rank; zeros take part in the ranking and are then left out
+    [Pratt1959]. Given the ranks, each sign is as likely as the other: the distribution of the sum of positive ranks is
+    exact with ties and zeros [Streitberg1986].
+
+    The interval has the means of pairs, of each difference with itself too, between which untied ranks would not
+    reject. Closed, it covers with 95 % at least where values are tied, too [Noether1967]; it is then wider than the
+    test, and may have 0 in it though p is just below 0.05.
+    """
+    d: Floats = np.round(np.asarray(differences, dtype=np.float64), _DIGITS)
+    if len(d) < MIN_PARTICIPANTS:
+        return None
+    low, high = shift_interval(d)
+    return SignedRankTest(
+        n=len(d),
+        zeros=int((d == 0.0).sum()),
+        rank_sum=float(rankdata(np.abs(d))[d > 0.0].sum()),
+        p=signed_rank_p(d),
+        estimate=float(np.median(pair_means(d))),
+        low=low,
+        high=high,
+    )
+
+
+def signed_rank_p(d: Floats) -> float:
+    """Return the p-value of `signed_rank_test`, whatever the number of differences."""
+    doubled = np.rint(2.0 * rankdata(np.abs(d))).astype(np.int64)  # mean ranks are halves
+    weights = tuple(np.sort(doubled[d != 0.0]).tolist())
+    return _two_sided(_sum_of_chosen(weights), int(doubled[d > 0.0].sum()))
+
+
+def pair_means(d: Floats) -> Floats:
+    """Return the means of all pairs of differences, each with itself too, in order: Walsh's averages [Hodges1963]."""
+    i, j = np.triu_indices(len(d))
+    return np.sort((d[i] + d[j]) / 2)
+
+
+def shift_interval(d: Floats) -> tuple[float, float]:
+    """Return the closed interval of a shift, at 95 % at least, of six differences [Hodges1963], [Noether1967]."""
+    below = np.cumsum(_sum_of_chosen(tuple(range(1, len(d) + 1))))
+    k = int(np.searchsorted(below, LEVEL / 2, side="right")) - 1  # the largest sum that is too improbable to keep
+    means = pair_means(d)
+    return float(means[k]), float(means[len(means) - 1 - k])
+
+
+def sign_flip_test(differences: Sequence[int]) -> float:
+    """Return the exact p-value, two-sided, that whole differences of participants are as likely with the other sign.
+
+    What a participant does in one round may depend on the others as it likes: participants are what is drawn.
+    [Edgington2007]
+    """
+    weights = sorted(abs(x) for x in differences if x)
+    return _two_sided(_sum_of_chosen(tuple(weights)), sum(x for x in differences if x > 0))
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Failures of a participant in a task: of the first behaviour's rounds, and of the second's."""
+
+    first: int
+    of_first: int
+    second: int
+    of_second: int
+
+
+def permutation_test(counts: Sequence[Counts]) -> float:
+    """Return the exact p-value, two-sided, that failures do not depend on behaviour, given how many each person had.
+
+    If the behaviour makes no difference to any round, a participant's rounds of a task might have had the two
+    behaviours in any arrangement: failures of the first are hypergeometric within each participant, and independent
+    between them. Pooling all rounds would take people for alike. [Edgington2007]
+    """
+    total: Floats = np.ones(1)
+    for c in counts:
+        failed, n = c.first + c.second, c.of_first + c.of_second
+        total = np.convolve(total, hypergeom.pmf(np.arange(failed + 1), n, failed, c.of_first))
+    return _two_sided(total, sum(c.first for c in counts))
+
+
+def within_condition_slope(x: Sequence[float], y: Sequence[float], condition: Sequence[object]) -> float | None:
+    """Return by how much y grows with x in one participant, by least squares with a mean of its own each condition.
+
+    None where x does not vary within any condition.
+    """
+    xs: Floats = np.asarray(x, dtype=np.float64)
+    ys: Floats = np.asarray(y, dtype=np.float64)
+    for kind in dict.fromkeys(condition):
+        same = np.array([c == kind for c in condition])
+        xs = np.where(same, xs - xs[same].mean(), xs)
+        ys = np.where(same, ys - ys[same].mean(), ys)
+    square = float(xs @ xs)
+    return float(xs @ ys) / square if square > 1e-9 else None
+
+
+@lru_cache(maxsize=4096)
+def _sum_of_chosen(weights: tuple[int, ...]) -> Floats:
+    """Return the probabilities of sums from 0, if each weight is added or not with the same probability."""
+    p: Floats = np.ones(1)
+    for w in weights:
+        longer: Floats = np.zeros(len(p) + w)
+        longer[: len(p)] += p / 2
+        longer[w:] += p / 2
+        p = longer
+    return p
+
+
+def _two_sided(probabilities: Floats, found: int) -> float:
+    """Return how probable it is to be as far from the mean as what was found, either way."""
+    sums = np.arange(len(probabilities))
+    far = np.abs(sums - sums @ probabilities)
+    return min(1.0, float(probabilities[far >= far[found] - 1e-9].sum()))

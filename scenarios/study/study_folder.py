@@ -1,0 +1,180 @@
+"""The folder of a study: its plan, the versions of what carries it out, the codebook, and the folders of sessions.
+
+OUT/plan.toml, versions.json, codebook.csv, codebook.md, and participants/P01/, P02/, ..., see `SessionFolder`. The
+tables of all participants, rounds, answers, questionnaire and sessions, are made of these when they are asked for.
+"""
+
+import contextlib
+import json
+from collections.abc import Generator
+from dataclasses import asdict
+from pathlib import Path
+
+from handover.scenarios.results.run_folder import (
+    InvalidRunFolder,
+    RunFolder,
+    disk_errors_reported,
+    folder_held,
+    versions,
+    write_whole,
+)
+from handover.scenarios.study.codebook import PERSON, PILOT, all_tables, write_codebook, write_csv, write_parquet
+from handover.scenarios.study.order import order_row
+from handover.scenarios.study.plan import InvalidPlan, StudyPlan, parse_plan
+from handover.scenarios.study.session_folder import Session, SessionFolder, pseudonym_of
+
+
+class StudyFolder:
+    """The folder of a study.
+
+    Attributes:
+        path: where it is.
+        plan: the study's.
+    """
+
+    def __init__(self, path: Path, plan: StudyPlan) -> None:
+        self.path, self.plan = path, plan
+
+    @classmethod
+    def opened(cls, path: Path, plan: StudyPlan) -> "StudyFolder":
+        """Return the folder of a plan's study: a new one is made, one that is there goes on.
+
+        Raises:
+            InvalidRunFolder: it is another plan's, or something else. RecordNotWritten: it cannot be written.
+        """
+        folder = cls(path, plan)
+        if folder._plan_file.is_file():
+            if cls.read(path).plan.source != plan.source:
+                fault = "its study has another plan, plan.toml; name a new folder, or that plan"
+                raise InvalidRunFolder(path, fault)
+            return folder
+        RunFolder(path)  # a new or an empty one
+        with disk_errors_reported(path):
+            folder.participants.mkdir(parents=True)
+        write_codebook(path, plan)
+        write_whole(path / "versions.json", json.dumps(versions(), indent=2) + "\n")
+        write_whole(folder._plan_file, plan.source)
+        return folder
+
+    @classmethod
+    def read(cls, path: Path) -> "StudyFolder":
+        """Return the folder of a study that has begun.
+
+        Raises:
+            InvalidRunFolder: it is none, or its plan is damaged.
+        """
+        file = path / "plan.toml"
+        if not file.is_file():
+            raise InvalidRunFolder(path, "it is not the folder of a study: it has no plan.toml")
+        try:
+            return cls(path, parse_plan(file.read_text(encoding="utf-8"), file))
+        except (OSError, UnicodeDecodeError, InvalidPlan) as e:
+            raise InvalidRunFolder(path, f"its plan.toml is damaged: {e}") from e
+
+    @property
+    def participants(self) -> Path:
+        """The folder of the sessions' folders."""
+        return self.path / "participants"
+
+    @property
+    def _plan_file(self) -> Path:
+        return self.path / "plan.toml"
+
+    @property
+    def numbers(self) -> list[int]:
+        """Numbers of the participants whose sessions have begun."""
+        found = [f.parent.name[1:] for f in self.participants.glob("P*/session.json")]
+        return sorted(int(n) for n in found if n.isdecimal())
+
+    @property
+    def next_number(self) -> int:
+        """The number of the participant who comes next."""
+        return max(self.numbers, default=0) + 1
+
+    @property
+    def sessions(self) -> list["SessionFolder"]:
+        """All sessions that have begun."""
+        return [self.session(n) for n in self.numbers]
+
+    def session(self, number: int) -> "SessionFolder":
+        """Return a session that has begun.
+
+        Raises:
+            InvalidRunFolder: there is none of that number, or its session.json is damaged.
+        """
+        return SessionFolder.read(self.participants / pseudonym_of(number), self.plan)
+
+    def begin(self, session: Session) -> "SessionFolder":
+        """Write the first file of a session, whose participant has agreed and may take part.
+
+        Raises:
+            InvalidRunFolder: there is one of that number, or the plan does not allow it, with all reasons.
+            RecordNotWritten: it cannot be written.
+        """
+        path = self.participants / session.pseudonym
+        if faults := _faults_of(session, self.plan, path):
+            raise InvalidRunFolder(path, "; ".join(faults))
+        data = {
+            "participant": session.pseudonym,
+            "kind": session.kind,
+            **asdict(session),
+            "order_row": order_row(self.plan, session.number),
+            "latency_limit_ms": self.plan.latency_limit,
+        }
+        with disk_errors_reported(path):
+            (path / "rounds").mkdir(parents=True, exist_ok=True)
+        write_whole(path / "session.json", json.dumps(data, indent=2, allow_nan=False) + "\n")
+        begun = SessionFolder(path, self.plan, session)
+        begun.write_tables()
+        return begun
+
+    def write_tables(self) -> None:
+        """Write the tables of all participants, as CSV and Parquet, beside the codebook that explains them.
+
+        Raises:
+            InvalidRunFolder: what is kept of a session is damaged. RecordNotWritten: they cannot be written.
+        """
+        sessions = self.sessions
+        rows = {
+            "rounds": [row for s in sessions for row in s.rounds_rows()],
+            "answers": [row for s in sessions for row in s.answers_rows()],
+            "void_attempts": [row for s in sessions for row in s.void_attempts_rows()],
+            "questionnaire": [row for s in sessions for row in s.questionnaire_rows()],
+            "sessions": [s.sessions_row() for s in sessions],
+        }
+        for name, columns in all_tables(self.plan).items():
+            write_csv(self.path / f"{name}.csv", columns, rows[name])
+            write_parquet(self.path / f"{name}.parquet", columns, rows[name])
+
+    @contextlib.contextmanager
+    def held(self) -> Generator[None, None, None]:
+        """Lock the folder against other processes that call this.
+
+        Raises:
+            InvalidRunFolder: another process holds it.
+        """
+        with folder_held(self.path, "another process carries out its study"):
+            yield
+
+
+def _faults_of(session: Session, plan: StudyPlan, path: Path) -> list[str]:
+    """Return why a session cannot begin; a person who may not take part leaves nothing."""
+    faults = ["a session has begun in it"] if (path / "session.json").exists() else []
+    if not session.pilot:
+        faults += _not_confirmed(session, plan)
+    if session.device not in plan.devices:
+        faults.append(f"the plan has no device {session.device!r}; it has {', '.join(plan.devices)}")
+    if session.language not in plan.texts:
+        faults.append(f"the plan has no text in {session.language!r}; it has {', '.join(plan.texts)}")
+    if session.pilot != plan.pilot:
+        kinds = (PILOT if plan.pilot else PERSON, session.kind)
+        faults.append(f"the plan is of a {kinds[0]}, the session of a {kinds[1]}; they do not mix in one study")
+    return faults
+
+
+def _not_confirmed(session: Session, plan: StudyPlan) -> list[str]:
+    faults = [] if session.consent else ["the participant has not agreed to take part"]
+    needed = [len(text.eligibility) for name, text in plan.texts.items() if name == session.language]
+    if not all(session.eligibility) or [len(session.eligibility)] != needed:
+        faults.append("the participant has not confirmed all that taking part needs")
+    return faults

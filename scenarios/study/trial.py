@@ -1,0 +1,264 @@
+"""A trial: one run in a process of its own, whose hand is led from outside and whose state is seen as it goes on."""
+
+import contextlib
+import json
+import math
+import subprocess
+import sys
+import tempfile
+import time
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.master.live_control import LiveControl
+from handover.cosim.record.reader import Record
+from handover.scenarios.execution.selection import find_scenario
+from handover.scenarios.experiment.outside import LedHand
+from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.live.hand_messages import HandStream, hand_sample
+from handover.scenarios.live.input_board import InputBoard
+from handover.scenarios.live.stage import Stage
+from handover.scenarios.live.watched_run import WatchedRun
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.study.latency import LatencyLog, median_ms
+from handover.scenarios.study.plan import Condition
+from handover.scenarios.study.protocol import now
+from handover.scenarios.study.session_folder import RoundRecord, failed_by_rule
+
+_POLL = 0.02
+"""How often a run's folder is looked at until it stands at its start, s."""
+_PATIENCE = 60.0
+"""How long a run may take until its first row, s."""
+_GRACE = 5.0
+"""How long a run may take to end once it is told to, s."""
+_MOST_STAMPS = 4096
+
+
+class NoHand(ValueError):
+    """A scenario in which nobody outside can lead a hand."""
+
+
+def round_parameters(condition: Condition) -> list[str]:
+    """Return the parameters of a round: those of the plan, and that its hand is led from outside."""
+    return [*condition.given, "hand=outside"]
+
+
+def led_hand_of(scenario: str, parameters: Sequence[str]) -> LedHand:
+    """Return the hand that somebody outside leads in a scenario with parameters, texts `NAME=VALUE`.
+
+    Raises:
+        NoHand: there is none. InvalidParameter: a value is invalid.
+    """
+    kind = find_scenario(scenario)
+    led = kind().led_hand(parse_parameters(kind, parameters))
+    if led is None:
+        raise NoHand(f"in {scenario} nobody outside can lead a hand")
+    return led
+
+
+class TrialFailed(RuntimeError):
+    """A run that did not come to its end, for a reason that is not the participant's."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be run.
+
+    Attributes:
+        scenario: its name or path.
+        parameters: texts `NAME=VALUE`.
+        seed: of all random numbers.
+        out: the run's folder.
+        told: what the run's folder is to say of who leads the hand.
+        pace: simulated seconds per second of wall time.
+    """
+
+    scenario: str
+    parameters: Sequence[str]
+    seed: int
+    out: Path
+    told: Mapping[str, Any]
+    pace: float = 1.0
+
+
+class Frame:
+    """What a page needs for a picture.
+
+    Attributes:
+        time: simulated time, s.
+        stamp: page's stamp, s, of the newest sample of the hand whose effect is in it; NaN before the first.
+        places: where all that is drawn is, see `Stage.places`.
+    """
+
+    def __init__(self, time: float, stamp: float, places: Floats) -> None:
+        self.time, self.stamp, self.places = time, stamp, places
+
+    def packed(self) -> bytes:
+        """Return it as 64-bit floats: time, stamp, places."""
+        return np.concatenate([[self.time, self.stamp], self.places]).astype("<f8").tobytes()
+
+
+class Trial:
+    """A run that waits at its start until `go`; it is killed at `close` at the latest.
+
+    Attributes:
+        latency: times that the page has measured.
+        stage: what is seen of the run; None until `begin` has returned.
+        first_place: of the object, in W, m; None before the run stands at its start.
+    """
+
+    def __init__(self, wanted: Wanted) -> None:
+        self.wanted = wanted
+        self.latency = LatencyLog()
+        self.stage: Stage | None = None
+        self.first_place: Floats | None = None
+        self._scratch = tempfile.TemporaryDirectory(prefix="handover-study-")
+        place = Path(self._scratch.name)
+        self._control = LiveControl.create(place / "control", wanted.pace, paused=True)
+        self.led = led_hand_of(wanted.scenario, wanted.parameters)
+        self._board = InputBoard.create(place / "board", self.led.inputs, [self.led.age])
+        self._stream = HandStream(self.led)
+        self._stamps: deque[tuple[int, float]] = deque(maxlen=_MOST_STAMPS)
+        spec = {
+            "scenario": wanted.scenario,
+            "parameters": list(wanted.parameters),
+            "seed": wanted.seed,
+            "out": str(wanted.out),
+            "control": str(place / "control"),
+            "board": str(place / "board"),
+            "told": {"from": "page", **wanted.told},
+        }
+        self._told = open(place / "told", "w+b")  # noqa: SIM115 (closed by `close`)
+        command = [sys.executable, "-m", "handover.scenarios.study", json.dumps(spec)]
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=self._told, start_new_session=True
+        )
+        self._run = WatchedRun(wanted.out)
+
+    def begin(self) -> None:
+        """Wait until the run stands at its start.
+
+        Raises:
+            TrialFailed: it did not get there.
+        """
+        late = time.monotonic() + _PATIENCE
+        while self.stage is None:
+            if not self.is_running or time.monotonic() > late:
+                raise TrialFailed(self._why())
+            self.stage = self._run.stage()
+            time.sleep(_POLL)
+        if f"{self.led.unit}.p_WO" in self.stage.newest:
+            self.first_place = self.stage.newest[f"{self.led.unit}.p_WO"][0].copy()
+
+    @property
+    def is_running(self) -> bool:
+        """Whether its process is there."""
+        return self._process.poll() is None
+
+    @property
+    def newest(self) -> Record | None:
+        """The newest row of the run."""
+        return None if self.stage is None else self.stage.newest
+
+    def go(self) -> None:
+        """Let the run go on."""
+        self._control.paused = False
+
+    def stop(self) -> None:
+        """Let the run end after its step."""
+        self._control.stop, self._control.paused = True, False
+
+    def lead(self, content: Any, arrival: float) -> None:
+        """Lead the hand by a sample that arrived at the monotonic time `arrival`, s.
+
+        Raises:
+            InvalidHandMessage: it is none, is wanted beyond reach, or is older than the one before.
+        """
+        sample, at = self._stream.check(hand_sample(content), arrival)
+        number = self._board.set(sample.entries(self.led), at)
+        self._stamps.append((number, sample.stamp))
+
+    @property
+    def hand(self) -> dict[str, Any]:
+        """Where the hand is wanted as it stands, and how far it goes, as `handInput` takes it."""
+        assert self.stage is not None
+        wanted = self.stage.wanted_hand(self.led)
+        pose = {"p_WH": list(wanted.p_WH), "q_WH": list(wanted.q_WH), "closed": wanted.closed}
+        return {**pose, "centre": list(self.led.p_WH_0), "radius": self.led.reach}
+
+    def frame(self, *, always: bool = False) -> Frame | None:
+        """Return what is there to be seen, None if nothing is new; `always`: also then."""
+        stage = self.stage
+        if stage is None or not (stage.refresh() or always):
+            return None
+        return Frame(stage.time, self._stamp_seen(stage.time), stage.places())
+
+    def _stamp_seen(self, t: float) -> float:
+        """Return the page's stamp of the sample that was used at the last communication point before t, s."""
+        uses = self._board.uses()
+        k = int(np.searchsorted(uses["t"], t - 1e-9)) - 1
+        if k < 0:
+            return math.nan
+        number = int(uses["number"][k])
+        while self._stamps and self._stamps[0][0] < number:
+            self._stamps.popleft()
+        return self._stamps[0][1] if self._stamps and self._stamps[0][0] == number else math.nan
+
+    def record(self) -> RoundRecord:
+        """Return what is known of a run that has come to its end.
+
+        Raises:
+            TrialFailed: it has not, or its folder is damaged.
+        """
+        self._process.wait(_GRACE)
+        run = RunFolder.of_run(self.wanted.out)
+        try:
+            summary = run.read_summary()
+            rule = failed_by_rule(run)
+        except InvalidRunFolder as e:
+            raise TrialFailed(self._why()) from e
+        if summary.get("failure") or not summary.get("complete", True):
+            raise TrialFailed(f"the run did not come to its end: {summary.get('reason', '')}")
+        pace: Mapping[str, Any] = summary.get("pace") or {}
+        return RoundRecord(
+            ended=now(),
+            success=bool(summary.get("success")),
+            reason=str(summary.get("reason", "")),
+            failed_by_rule=rule,
+            latency_median_ms=self.latency.median,
+            latency_p95_ms=self.latency.p95,
+            latency_max_ms=self.latency.longest,
+            age_at_use_ms=median_ms(self._board.ages().tolist()),
+            missed_deadlines=pace.get("missed"),
+        )
+
+    def _why(self) -> str:
+        """Return why the run did not come to its end, as its process said it."""
+        status = self._process.poll()
+        if status is None:
+            return f"the simulation did not begin within {_PATIENCE:.0f} s"
+        self._told.seek(0)
+        lines = self._told.read().decode(errors="replace").strip().splitlines()
+        how = f"killed by signal {-status}" if status < 0 else f"status {status}"
+        return f"the simulation's process ended ({how})" + (f": {lines[-1][:300]}" if lines else "")
+
+    def close(self) -> None:
+        """End the run's process, if it is there, and release what is shared with it."""
+        if self.is_running:
+            self.stop()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(_GRACE)
+        self._process.kill()
+        self._process.wait()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+        self._told.close()
+        self._board.close()
+        self._control.close()
+        self._scratch.cleanup()

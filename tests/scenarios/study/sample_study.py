@@ -1,0 +1,74 @@
+"""Studies that are written through the session folder, with numbers that are known."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from handover.scenarios.study.order import Round
+from handover.scenarios.study.plan import StudyPlan, default_plan, parse_plan
+from handover.scenarios.study.session_folder import RoundRecord, Session, SessionFolder
+from handover.scenarios.study.study_folder import StudyFolder
+
+PLAN = parse_plan(default_plan())
+PILOT_PLAN = parse_plan(default_plan().replace("pilot = false", "pilot = true").replace('"mouse"', '"script"'))
+
+
+def session(number: int, plan: StudyPlan = PLAN) -> Session:
+    """Return a session of a participant who may take part."""
+    return Session(
+        number=number,
+        device=plan.devices[0],
+        device_settings={"gain": 1.5},
+        language="en",
+        consent=True,
+        eligibility=[True] * len(plan.texts["en"].eligibility),
+        pilot=plan.pilot,
+        started="2026-11-24T09:00:00",
+    )
+
+
+def record(success: bool = True, latency: float = 60.0, void: bool = False) -> RoundRecord:
+    """Return what is known of a round."""
+    return RoundRecord(
+        ended="2026-11-24T09:20:00",
+        success=success,
+        reason="the person had the object" if success else "the hand closed beside the object, 31 mm in depth",
+        failed_by_rule=not success,
+        void=void,
+        void_reason="tracking lost, hand out of view" if void else "",
+        latency_median_ms=latency - 20.0,
+        latency_p95_ms=latency,
+        latency_max_ms=latency + 40.0,
+        age_at_use_ms=12.5,
+        missed_deadlines=2,
+    )
+
+
+Rate = Callable[[int, Round, str], int]
+Fails = Callable[[int, Round], bool]
+
+
+def never(_number: int, _planned: Round) -> bool:
+    """Say that nobody failed."""
+    return False
+
+
+def same(_number: int, _planned: Round, _statement: str) -> int:
+    """Rate everything alike."""
+    return 5
+
+
+def play(folder: SessionFolder, rate: Rate, fails: Fails = never) -> None:
+    """Play a session to its end: `rate` gives a participant's rating of a round's statement, `fails` who failed."""
+    number = folder.session.number
+    for planned in folder.rounds:
+        folder.record_round(planned.number, record(success=not fails(number, planned)))
+        folder.record_answers(planned.number, {name: rate(number, planned, name) for name in folder.plan.statements})
+    folder.record_questionnaire({"age_group": "21-30", "background": "engineering", "comments": 'a "quoted", text\n2'})
+
+
+def write_study(path: Path, people: int, rate: Rate, fails: Fails = never, plan: StudyPlan = PLAN) -> StudyFolder:
+    """Write a study of so many people."""
+    study = StudyFolder.opened(path, plan)
+    for number in range(1, people + 1):
+        play(study.begin(session(number, plan)), rate, fails)
+    return study

@@ -1,0 +1,139 @@
+"""Results of studies with numbers that are known, written through the session folder."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from sample_study import PLAN, play, record, same, session, write_study
+
+from handover.scenarios.study.analysis import FAILURE, StudyAnalysis
+from handover.scenarios.study.order import Round
+from handover.scenarios.study.study_folder import StudyFolder
+
+
+def rigid_is_better(number: int, planned: Round, statement: str) -> int:
+    """Rate rigid rounds two points higher, in S1 only; some people rate higher than others."""
+    above = 2 if planned.condition.behaviour == "rigid" and statement == "S1" else 0
+    return 3 + number % 4 + above
+
+
+def compliant_fails(number: int, planned: Round) -> bool:
+    """Fail both compliant rounds of the second task, if the number is even."""
+    return number % 2 == 0 and (planned.condition.task, planned.condition.behaviour) == ("human_to_robot", "compliant")
+
+
+def test_ratings_of_one_statement_that_differ_are_found(tmp_path: Path):
+    analysis = StudyAnalysis(write_study(tmp_path / "out", 12, rigid_is_better))
+    tests = {(t.statement, t.task): t for t in analysis.rating_tests}
+    assert len(tests) == 9
+    found = tests["S1", "collaborative"]
+    assert found.test is not None
+    assert found.p_holm is not None
+    assert (found.participants, found.test.estimate, found.test.low, found.test.high) == (12, 2.0, 2.0, 2.0)
+    assert found.test.p == pytest.approx(2 / 2**12)
+    assert found.p_holm == pytest.approx(9 * 2 / 2**12)
+    assert found.first == pytest.approx(6.5)
+    assert found.second == pytest.approx(4.5)
+    other = tests["S2", "collaborative"]
+    assert other.test is not None
+    assert (other.test.p, other.p_holm, other.test.zeros) == (1.0, 1.0, 12)
+
+
+def test_failures_are_compared_within_persons(tmp_path: Path):
+    analysis = StudyAnalysis(write_study(tmp_path / "out", 12, same, compliant_fails))
+    counts = {(c.task, c.behaviour): c for c in analysis.failures}
+    assert (counts["human_to_robot", "compliant"].failures, counts["human_to_robot", "compliant"].rounds) == (12, 24)
+    assert counts["human_to_robot", "rigid"].failures == counts["collaborative", "compliant"].failures == 0
+    assert counts["human_to_robot", "compliant"].low == pytest.approx(0.2912, abs=1e-4)  # Clopper-Pearson of 12 of 24
+    test = {t.task: t for t in analysis.failure_tests}["human_to_robot"]
+    assert test.p_rounds == pytest.approx(2 / 6**6)  # each of six: both failures in the same two of four rounds
+    assert test.p_holm == pytest.approx(3 * 2 / 6**6)
+    assert test.p_participants == pytest.approx(2 / 2**6)
+    assert test.difference == pytest.approx(-0.5)
+
+
+def test_void_rounds_and_rounds_that_nobody_can_judge_do_not_count(tmp_path: Path):
+    study = StudyFolder.opened(tmp_path / "out", PLAN)
+    folder = study.begin(session(1))
+    for planned in folder.rounds[:4]:
+        played = replace(record(success=False, void=planned.number == 1))
+        folder.record_round(planned.number, replace(played, failed_by_rule=None) if planned.number == 2 else played)
+        if planned.number > 1:
+            folder.record_answers(planned.number, {"S1": 9, "S2": 9, "S3": 9})
+    analysis = StudyAnalysis(study)
+    assert sum(c.rounds for c in analysis.failures) == sum(c.failures for c in analysis.failures) == 2
+    assert sum(c.unjudged for c in analysis.failures) == 1
+    assert sum(c.unsuccessful for c in analysis.failures) == 3
+    assert {a["round"] for a in analysis.answers} == {2, 3, 4}
+
+
+@pytest.mark.parametrize("people", [0, 1, 5])
+def test_too_few_are_not_tested(people: int, tmp_path: Path):
+    analysis = StudyAnalysis(write_study(tmp_path / "out", people, rigid_is_better, compliant_fails))
+    assert all(t.test is None and t.p_holm is None for t in analysis.rating_tests)
+    assert all(t.p_rounds is None and t.p_participants is None for t in analysis.failure_tests)
+    assert all(e.test is None for e in analysis.order_effects)
+    assert all(m.model is None and "fewer than 6" in m.reason for m in analysis.models)
+
+
+def test_gains_by_practice_are_found_and_do_not_touch_the_comparison(tmp_path: Path):
+    def learns(number: int, planned: Round, statement: str) -> int:
+        return 1 + (planned.number + number % 3) // 2 if statement == "S2" else 5
+
+    analysis = StudyAnalysis(write_study(tmp_path / "out", 12, learns))
+    effects = {(e.effect, e.measure): e.test for e in analysis.order_effects}
+    slope, period = effects["round", "S2"], effects["period", "S2"]
+    assert slope is not None
+    assert period is not None
+    assert slope.estimate == pytest.approx(0.5, abs=0.02)
+    assert slope.p < 0.001
+    assert period.p < 0.001
+    nothing = effects["round", "S1"]
+    assert nothing is not None
+    assert nothing.p == 1.0
+    assert all(t.p_holm is not None and t.p_holm > 0.9 for t in analysis.rating_tests)
+
+
+def test_what_a_rigid_round_leaves_behind_is_carry_over(tmp_path: Path):
+    rounds = {n: StudyFolder.opened(tmp_path / "plan", PLAN).begin(session(n)).rounds for n in range(1, 13)}
+
+    def carried(number: int, planned: Round, statement: str) -> int:
+        before = rounds[number][planned.number - 2].condition.behaviour if planned.number > 1 else ""
+        return 6 if before == "rigid" and statement == "S3" else 5
+
+    analysis = StudyAnalysis(write_study(tmp_path / "out", 12, carried))
+    effects = {(e.effect, e.measure): e.test for e in analysis.order_effects}
+    carry, none = effects["carry-over", "S3"], effects["carry-over", FAILURE]
+    assert carry is not None
+    assert none is not None
+    assert carry.estimate == pytest.approx(1.0)
+    assert carry.p < 0.001
+    assert none.p == 1.0
+
+
+def test_the_model_has_the_behaviours_effect_in_each_task(tmp_path: Path):
+    def rates(number: int, planned: Round, statement: str) -> int:
+        noise = (7 * number + 3 * planned.number + 5 * int(statement[1])) % 5 - 2
+        above = 2 if planned.condition.behaviour == "rigid" and planned.condition.task == "collaborative" else 0
+        return min(9, max(1, 4 + number % 3 + noise // 2 + above))
+
+    analysis = StudyAnalysis(write_study(tmp_path / "out", 12, rates))
+    found = analysis.models[0]
+    assert found.model is not None, found.reason
+    effects = dict(zip(found.names, found.model.effects, strict=True))
+    assert list(effects)[:3] == [f"behaviour, {t}" for t in PLAN.tasks]
+    assert list(effects)[-1] == "period"
+    assert effects["behaviour, collaborative"].low > 0.0
+    assert effects["behaviour, robot_to_human"].low < 0.0 < effects["behaviour, robot_to_human"].high
+
+
+def test_a_session_that_was_broken_off_gives_what_it_has(tmp_path: Path):
+    study = write_study(tmp_path / "out", 6, rigid_is_better)
+    folder = study.begin(session(7))
+    for planned in folder.rounds[:6]:
+        folder.record_round(planned.number, record())
+        folder.record_answers(planned.number, {n: rigid_is_better(7, planned, n) for n in PLAN.statements})
+    play(study.begin(session(8)), rigid_is_better)
+    analysis = StudyAnalysis(study)
+    assert not analysis.sessions[6].is_complete
+    assert {t.participants for t in analysis.rating_tests} == {8}

@@ -1,0 +1,138 @@
+"""What a participant goes through: screens, what may be done on them, and what is kept."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from sample_study import PLAN, record
+
+from handover.scenarios.study.device_test import DeviceTest
+from handover.scenarios.study.protocol import MOST_ATTEMPTS, SCREENS, InvalidAction, Protocol
+from handover.scenarios.study.study_folder import StudyFolder
+
+RATINGS = {"S1": 7, "S2": 8, "S3": 9}
+
+
+def begun(path: Path) -> Protocol:
+    """Return a protocol of which a participant has chosen the device."""
+    protocol = Protocol(StudyFolder.opened(path, PLAN), PLAN.devices)
+    protocol.act("language", "en")
+    protocol.act("consent", True)
+    protocol.act("eligibility", [True] * 3)
+    protocol.act("device", {"device": "mouse", "settings": {"gain": 2.0, "wrong": [1], "nan": float("nan")}})
+    return protocol
+
+
+def practised(path: Path) -> Protocol:
+    protocol = begun(path)
+    protocol.act("begin")
+    protocol.end_practice(DeviceTest().shown)
+    return protocol
+
+
+def test_a_session_goes_from_consent_to_thanks_and_all_of_it_is_kept(tmp_path: Path):
+    protocol = begun(tmp_path / "study")
+    seen = [protocol.screen]
+    protocol.act("begin")
+    seen.append(protocol.screen)
+    protocol.end_practice(DeviceTest().shown)
+    for planned in list(protocol.study.session(1).rounds):
+        seen.append(protocol.screen)
+        assert protocol.content()["task"] == planned.condition.task
+        assert planned.condition.behaviour not in str(protocol.content())
+        protocol.act("begin")
+        protocol.end_round(record())
+        assert protocol.content()["statements"]["S2"] == "I was satisfied with the interaction."
+        protocol.act("rate", RATINGS)
+    protocol.act("answer", {"age_group": "21-30", "comments": "none"})
+    assert [*dict.fromkeys(seen), protocol.screen] == ["practice", "practising", "instruction", "thanks"]
+    session = protocol.study.session(1)
+    assert session.is_complete
+    assert session.session.device_settings == {"gain": 2.0}
+    assert session.notes.practice is not None
+    answers = pd.read_csv(session.path / "answers.csv")
+    assert len(answers) == 36
+    assert answers["value"].min() == 7
+    assert answers["value"].max() == 9
+    protocol.act("next")
+    assert (protocol.number, protocol.screen) == (2, "language")
+
+
+@pytest.mark.parametrize(("action", "value"), [("consent", False), ("eligibility", [True, True, False])])
+def test_who_does_not_agree_or_may_not_take_part_leaves_nothing(action: str, value: object, tmp_path: Path):
+    protocol = Protocol(StudyFolder.opened(tmp_path / "study", PLAN), PLAN.devices)
+    protocol.act("language", "de")
+    if action == "eligibility":
+        protocol.act("consent", True)
+    protocol.act(action, value)
+    assert protocol.screen == "declined"
+    assert list((tmp_path / "study" / "participants").iterdir()) == []
+    protocol.act("next")
+    assert (protocol.number, protocol.screen) == (1, "language")
+
+
+def test_a_session_that_was_broken_off_goes_on_at_what_was_not_finished(tmp_path: Path):
+    protocol = practised(tmp_path / "study")
+    protocol.act("begin")
+    protocol.end_round(record())
+    again = Protocol(StudyFolder.opened(tmp_path / "study", PLAN), PLAN.devices)
+    assert (again.number, again.screen, again.content()["round"]) == (1, "rating", 1)
+    again.act("rate", RATINGS)
+    third = Protocol(StudyFolder.opened(tmp_path / "study", PLAN), PLAN.devices)
+    assert (third.screen, third.content()["round"]) == ("instruction", 2)
+
+
+def test_a_void_round_is_played_again_with_its_reason_and_at_last_kept_as_void(tmp_path: Path):
+    protocol = practised(tmp_path / "study")
+    session = protocol.study.session(1)
+    for attempt in range(1, MOST_ATTEMPTS + 1):
+        protocol.act("begin")
+        session.run_folder(1).mkdir()
+        protocol.void_round(f"the page was closed, {attempt}")
+        assert protocol.content()["reason"] == f"the page was closed, {attempt}"
+        protocol.act("next")
+    assert protocol.content()["round"] == 2
+    rounds = pd.read_csv(session.path / "rounds.csv")
+    assert rounds["void"].tolist() == [True]
+    assert rounds["void_reason"].tolist() == ["the page was closed, 3"]
+    attempts = pd.read_csv(session.path / "void_attempts.csv")
+    assert attempts["folder"].tolist() == ["01_unfinished_1", "01_unfinished_2"]
+    assert attempts["reason"].tolist() == ["the page was closed, 1", "the page was closed, 2"]
+    assert session.answers == {}
+
+
+def test_who_withdraws_is_not_asked_again_and_what_was_kept_stays(tmp_path: Path):
+    protocol = practised(tmp_path / "study")
+    protocol.act("begin")
+    protocol.end_round(record())
+    protocol.act("withdraw")
+    assert protocol.screen == "withdrawn"
+    assert len(protocol.study.session(1).records) == 1
+    assert Protocol(StudyFolder.opened(tmp_path / "study", PLAN), PLAN.devices).number == 2
+
+
+@pytest.mark.parametrize(
+    ("action", "value", "why"),
+    [
+        ("rate", {"S1": 7, "S2": 8}, "S3 is not rated"),
+        ("rate", {"S1": 7, "S2": 8, "S3": 10}, "a whole number from 1 to 9"),
+        ("rate", {"S1": 7, "S2": 8, "S3": "9"}, "a whole number from 1 to 9"),
+        ("rate", [7, 8, 9], "a number for each statement"),
+        ("begin", None, "'rating'"),
+        ("fly", None, "rate is"),
+    ],
+)
+def test_what_is_not_to_be_done_is_refused_and_changes_nothing(action: str, value: object, why: str, tmp_path: Path):
+    protocol = practised(tmp_path / "study")
+    protocol.act("begin")
+    protocol.end_round(record())
+    with pytest.raises(InvalidAction, match=why):
+        protocol.act(action, value)
+    assert protocol.screen == "rating"
+    assert protocol.study.session(1).answers == {}
+
+
+def test_when_all_participants_have_come_the_page_says_so(tmp_path: Path):
+    protocol = Protocol(StudyFolder.opened(tmp_path / "study", PLAN), PLAN.devices, number=19)
+    assert protocol.screen == "complete"
+    assert set(SCREENS) >= {protocol.screen}

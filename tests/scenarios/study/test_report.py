@@ -1,0 +1,182 @@
+"""The page and the tables of a study, of people and of scripted pilots, complete, broken off, and too small."""
+
+import re
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner, Result
+from flyer_runs import run
+from sample_study import PILOT_PLAN, PLAN, never, record, session, write_study
+from test_analysis import compliant_fails, rigid_is_better
+from test_session_folder import read_by_codebook
+
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.cli.command import main
+from handover.scenarios.study.codebook import PILOT
+from handover.scenarios.study.plan import default_plan, parse_plan
+from handover.scenarios.study.study_folder import StudyFolder
+
+csv_of: Any = pd.read_csv  # pyright: ignore[reportUnknownVariableType, reportUnknownMemberType]
+
+
+def study(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, ["study", *map(str, arguments)])
+
+
+def report_of(folder: Path) -> str:
+    done = study("report", folder)
+    assert done.exit_code == 0, done.output
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+def text_of(page: str) -> str:
+    """Return what a reader sees of a page, in one line."""
+    shown = re.sub(r"<(script|style)\b.*?</\1>", " ", page, flags=re.DOTALL)
+    return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]+>", " ", shown)))
+
+
+def test_the_page_has_all_results_with_their_origin(tmp_path: Path):
+    write_study(tmp_path / "out", 12, rigid_is_better, compliant_fails)
+    page = report_of(tmp_path / "out")
+    text = text_of(page)
+    assert "12 participants : 18 are planned; 144 of 144 rounds that were played count." in text
+    assert "orders of 12 participants are balanced" in text
+    assert "Human to robot compliant 12 24 50 % (29 to 71 %) 12" in text
+    assert "Human to robot compliant 2 of 20, 10 % 12 of 24, 50 %" in text
+    assert "Human to robot 12 -50 % 4.3e-05 0.00013 0.031" in text
+    assert "S1 Collaborative task 12 6.50 4.50 +2.00 (+2.00 to +2.00) 0.00049 0.0044" in text
+    assert "S1 Human to robot 0.0132 0.00049" in text
+    assert "[Pratt1959]" in text
+    assert page.count('class="plot"') == 4
+    assert "default-src 'none'" in unescape(page)
+    assert not re.search(r'(?:src|href)="https?:', re.sub(r"<script\b.*?</script>", "", page, flags=re.DOTALL))
+    assert PILOT not in text.lower()
+
+
+def test_scripted_pilots_are_told_in_every_section_and_file(tmp_path: Path):
+    write_study(tmp_path / "out", 6, rigid_is_better, compliant_fails, PILOT_PLAN)
+    page = report_of(tmp_path / "out")
+    assert "<title>Object handover between people and a free-flying robot (scripted pilot)</title>" in page
+    sections = re.findall(r"<section id=.*?</section>", page, flags=re.DOTALL)
+    assert len(sections) == 10
+    assert all("Scripted pilot: no person took part." in s for s in sections)
+    assert "task behaviour published scripted pilot" in text_of(page)
+    assert " ours " not in text_of(page)
+    tables = [f for f in (tmp_path / "out").rglob("*.csv") if f.name != "codebook.csv"]
+    assert len(tables) == 5 + 6 + 4 * 6
+    for file in tables:
+        assert set(csv_of(file)["kind"]) <= {PILOT}, file  # no attempt was void
+    for file in (tmp_path / "out").rglob("codebook.md"):
+        assert "no person took part" in file.read_text(encoding="utf-8")
+
+
+def test_pandas_reads_all_tables_by_their_codebooks(tmp_path: Path):
+    folder = tmp_path / "out"
+    write_study(folder, 7, rigid_is_better, compliant_fails)
+    assert study("export", folder).exit_code == 0
+    rounds = read_by_codebook(folder, "rounds", folder / "rounds.csv")
+    answers = read_by_codebook(folder, "answers", folder / "answers.csv")
+    sessions = read_by_codebook(folder, "sessions", folder / "sessions.csv")
+    assert len(read_by_codebook(folder, "questionnaire", folder / "questionnaire.csv")) == 7
+    assert (len(rounds), len(answers), len(sessions)) == (84, 252, 7)
+    means = answers[answers["statement"] == "S1"].groupby("behaviour")["value"].mean()
+    assert means["rigid"] - means["compliant"] == pytest.approx(2.0)
+    assert pq.read_table(folder / "answers.parquet").num_rows == 252
+    assert sessions["failures"].sum() == (~rounds["success"]).sum() == 6
+    report_of(folder)
+    for name in ("failures", "failure_tests", "rating_means", "rating_tests", "order_effects", "mixed_model"):
+        assert len(read_by_codebook(folder / "results", name, folder / "results" / f"{name}.csv")) > 2
+    tests = csv_of(folder / "results" / "rating_tests.csv").set_index(["statement", "task"])
+    assert tests.loc[("S1", "collaborative"), "estimate"] == pytest.approx(2.0)
+    assert tests.loc[("S1", "collaborative"), "p"] == pytest.approx(2 / 2**7)
+
+
+@pytest.mark.parametrize("people", [0, 3])
+def test_too_few_are_told_and_nothing_is_computed(people: int, tmp_path: Path):
+    write_study(tmp_path / "out", people, rigid_is_better, compliant_fails)
+    text = text_of(report_of(tmp_path / "out"))
+    tests = csv_of(tmp_path / "out" / "results" / "rating_tests.csv")
+    assert tests[["p", "p_holm", "estimate", "low", "high"]].isna().all(axis=None)
+    assert list(tests["participants"]) == [people] * 9
+    assert "no exact test of signs can reject at 5 %, so that none is made" in text
+    assert "no model, as fewer than 6 participants" in text
+    assert ("Fewer than 6 are too few for a test" in text) == (people == 3)
+
+
+def test_a_session_broken_off_and_void_rounds_are_told(tmp_path: Path):
+    study_folder = write_study(tmp_path / "out", 6, rigid_is_better)
+    folder = study_folder.begin(session(7))
+    for planned in folder.rounds[:5]:
+        folder.record_round(planned.number, record(void=planned.number == 2, latency=140.0))
+        if planned.number != 2:
+            folder.record_answers(planned.number, dict.fromkeys(PLAN.statements, 5))
+    text = text_of(report_of(tmp_path / "out"))
+    assert "Not complete: P07." in text
+    assert "incomplete: 5 of 12 rounds" in text
+    assert "tracking lost, hand out of view" in text
+    assert "4 of 76 rounds that count are above 100 ms" in text
+    assert "76 of 77 rounds that were played count" in text
+
+
+def test_a_plan_of_other_tasks_has_a_page_without_the_thesis(tmp_path: Path):
+    text = default_plan().replace("repetitions = 2", "repetitions = 1").replace('title = "', 'title = "<b>bold</b> & ')
+    for scenario in ("flyer_robot_to_human", "flyer_human_to_robot", "flyer_collaborative"):
+        text = text.replace(f'scenario = "{scenario}"', 'scenario = "ir_grasp"')
+    for behaviour, strategy in (("rigid", "blind"), ("compliant", "reflex")):
+        text = text.replace(f'behaviour = "{behaviour}"', f'strategy = "{strategy}"')
+    write_study(tmp_path / "out", 6, lambda n, r, s: 5 if s == "S1" else 1 + (n + r.number) % 9, plan=parse_plan(text))
+    page = report_of(tmp_path / "out")
+    assert "<h1>&lt;b&gt;bold&lt;/b&gt; &amp; Object" in page
+    assert 'id="published"' not in page
+    assert "S1: no model, as all ratings are the same." in text_of(page)
+    effects = csv_of(tmp_path / "out" / "results" / "order_effects.csv")
+    assert set(effects["effect"]) == {"round", "carry-over"}
+    assert set(effects["participants"]) == {0}  # each condition comes once: within it nothing goes with the order
+
+
+def test_what_is_no_study_is_told(tmp_path: Path):
+    for command in ("report", "export"):
+        assert "is no folder" in study(command, tmp_path / "none").output
+        refused = study(command, tmp_path)
+        assert refused.exit_code == 2
+        assert "it is not the folder of a study" in refused.output
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_round_is_shown_with_its_page(tmp_path: Path):
+    folder = StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1))
+    planned = folder.rounds[0].condition
+    run(SCENARIOS[planned.scenario], folder.run_folder(1), *planned.given)
+    folder.record_round(1, record())
+    folder.record_answers(1, {"S1": 9, "S2": 8, "S3": 7})
+    shown = study("replay", tmp_path / "out", "p01", "1")
+    assert shown.exit_code == 0, shown.output
+    assert f"P01 (person), round 1: {planned.task}, {planned.behaviour}, period 1" in shown.output
+    assert "ratings: S1 = 9, S2 = 8, S3 = 7" in shown.output
+    assert "latency: median 40 ms, 95 % 60 ms" in shown.output
+    page = folder.run_folder(1) / "report.html"
+    assert f"page: {page}" in shown.output
+    assert planned.scenario in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("who", "number", "told"),
+    [("P09", "1", "no participant 'P09'; sessions that have begun: P01"), ("1", "13", "the plan has 12 rounds, none")],
+)
+def test_a_round_that_is_not_there_is_told(who: str, number: str, told: str, tmp_path: Path):
+    write_study(tmp_path / "out", 1, rigid_is_better, never)
+    shown = study("replay", tmp_path / "out", who, number)
+    assert shown.exit_code == 2
+    assert told in shown.output
+
+
+def test_a_round_whose_record_is_gone_is_told(tmp_path: Path):
+    write_study(tmp_path / "out", 1, rigid_is_better, never)
+    shown = study("replay", tmp_path / "out", "1", "3")
+    assert shown.exit_code == 2
+    assert "succeeded: the person had the object" in shown.output
+    assert "has no record of a run to be shown" in shown.output

@@ -1,0 +1,229 @@
+"""What a session keeps: tables that pandas reads by the codebook, rounds that outlive a kill, and refusals."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from flyer_runs import run
+from sample_study import PILOT_PLAN, PLAN, play, record, same, session, write_study
+
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.study.codebook import PILOT
+from handover.scenarios.study.order import rounds_of
+from handover.scenarios.study.plan import default_plan, parse_plan
+from handover.scenarios.study.session_folder import SessionFolder, failed_by_rule
+from handover.scenarios.study.study_folder import StudyFolder
+
+_TYPES = {"text": "string", "whole number": "Int64", "number": "Float64", "true or false": "boolean"}
+
+
+csv_of: Any = pd.read_csv  # pyright: ignore[reportUnknownVariableType, reportUnknownMemberType]
+"""Returns frames, whose types are open."""
+
+
+def read_by_codebook(study: Path, table: str, file: Path) -> Any:
+    """Read a table as somebody does who knows the codebook alone."""
+    codebook = csv_of(study / "codebook.csv", keep_default_na=False)
+    columns = codebook[codebook["table"] == table]
+    types = {name: _TYPES[kind] for name, kind in zip(columns["column"], columns["type"], strict=True)}
+    found = csv_of(file, dtype=types)
+    assert list(found.columns) == list(columns["column"])
+    filled = columns[columns["may_be_empty"] == "no"]["column"]
+    assert not found[filled].isna().any(axis=None)
+    return found
+
+
+def test_pandas_reads_every_table_by_the_codebook(tmp_path: Path):
+    study = write_study(tmp_path / "out", 2, lambda n, r, s: 1 + (n + r.number + int(s[1])) % 9, lambda n, _: n == 2)
+    folder = study.session(2)
+    rounds = read_by_codebook(study.path, "rounds", folder.path / "rounds.csv")
+    assert list(rounds["round"]) == list(range(1, 13))
+    assert not rounds["success"].any()
+    assert rounds["failed_by_rule"].all()
+    assert list(rounds["seed"]) == [r.seed for r in rounds_of(PLAN, 2)]
+    assert set(rounds["participant"]) == {"P02"}
+    assert not rounds["marked_over_limit"].any()
+    answers = read_by_codebook(study.path, "answers", folder.path / "answers.csv")
+    assert len(answers) == 36
+    assert answers.set_index(["round", "statement"]).loc[(5, "S3"), "value"] == 1 + (2 + 5 + 3) % 9
+    asked = read_by_codebook(study.path, "questionnaire", folder.path / "questionnaire.csv")
+    assert asked["comments"][0] == 'a "quoted", text\n2'
+    assert asked["age_group"][0] == "21-30"
+
+
+def test_the_codebook_tells_every_column_with_its_unit(tmp_path: Path):
+    study = write_study(tmp_path / "out", 1, same)
+    codebook = csv_of(study.path / "codebook.csv", keep_default_na=False).set_index(["table", "column"])
+    assert codebook.loc[("rounds", "latency_p95_ms"), "unit"] == "ms"
+    assert PLAN.texts["en"].statements["S2"] in codebook.loc[("answers", "statement"), "meaning"]
+    assert (codebook["meaning"].str.len() > 10).all()
+    assert set(codebook[codebook["type"].isin(["whole number", "number"])]["unit"]) == {"1", "ms"}
+    in_words = (study.path / "codebook.md").read_text(encoding="utf-8")
+    assert all(f"| `{column}` |" in in_words for _, column in codebook.index)
+
+
+def test_parquet_has_the_same_rows_with_units(tmp_path: Path):
+    folder = write_study(tmp_path / "out", 1, same).session(1)
+    table = pq.read_table(folder.path / "rounds.parquet")
+    rounds = read_by_codebook(tmp_path / "out", "rounds", folder.path / "rounds.csv")
+    assert table.num_rows == 12
+    for name in ("round", "seed", "latency_p95_ms", "success", "task"):
+        assert table.column(name).to_pylist() == rounds[name].to_list()
+    assert (table.schema.field("latency_max_ms").metadata or {})[b"unit"] == b"ms"
+
+
+def test_a_round_over_the_limit_is_marked_and_one_that_was_not_measured_is_neither(tmp_path: Path):
+    folder = StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1))
+    folder.record_round(1, record(latency=100.0))
+    folder.record_round(2, record(latency=100.1))
+    folder.record_round(3, replace(record(), latency_p95_ms=float("nan"), missed_deadlines=None))
+    rounds = read_by_codebook(tmp_path / "out", "rounds", folder.path / "rounds.csv")
+    assert [bool(x) for x in rounds["marked_over_limit"][:2]] == [False, True]
+    assert rounds["marked_over_limit"].isna()[2]
+    assert rounds["missed_deadlines"].isna()[2]
+
+
+def test_rounds_come_in_turn_and_want_ratings_unless_void(tmp_path: Path):
+    folder = StudyFolder.opened(tmp_path / "out", PLAN).begin(session(3))
+    assert folder.next_round == rounds_of(PLAN, 3)[0]
+    with pytest.raises(ValueError, match="round 2 cannot be kept: 1 is the next one"):
+        folder.record_round(2, record())
+    folder.record_round(1, record(void=True))
+    assert folder.unrated_round is None
+    folder.record_round(2, record())
+    assert folder.unrated_round == rounds_of(PLAN, 3)[1]
+    with pytest.raises(
+        ValueError, match="S2 is not rated; there is no statement S4; S1 = 10: a whole number from 1 to 9"
+    ):
+        folder.record_answers(2, {"S1": 10, "S3": 1, "S4": 2})
+    folder.record_answers(2, {"S1": 9, "S2": 1, "S3": 5})
+    assert folder.unrated_round is None
+    assert folder.answers == {2: {"S1": 9, "S2": 1, "S3": 5}}
+    with pytest.raises(ValueError, match="age_group = '200': 18-20, 21-30"):
+        folder.record_questionnaire({"age_group": "200"})
+    assert not folder.is_complete
+
+
+_PLAYS = """
+import sys
+from pathlib import Path
+from sample_study import PLAN, record, session
+from handover.scenarios.study.study_folder import StudyFolder
+folder = StudyFolder.opened(Path(sys.argv[1]), PLAN).begin(session(1))
+for planned in folder.rounds:
+    folder.record_round(planned.number, record())
+    folder.record_answers(planned.number, dict.fromkeys(PLAN.statements, 5))
+    print(planned.number, flush=True)
+"""
+
+
+def test_a_kill_in_the_middle_keeps_the_rounds_before_and_the_study_goes_on(tmp_path: Path):
+    here = str(Path(__file__).parent)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([here, os.environ.get("PYTHONPATH", "")])}
+    command = [sys.executable, "-c", _PLAYS, str(tmp_path / "out")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stdout is not None
+        told = 0
+        while told < 4:
+            told = int(process.stdout.readline())
+        process.send_signal(signal.SIGKILL)
+    folder = StudyFolder.opened(tmp_path / "out", PLAN).session(1)
+    finished = sorted(folder.records)
+    assert finished == list(range(1, len(finished) + 1))
+    assert 4 <= len(finished) <= 12
+    folder.write_tables()
+    rounds = read_by_codebook(tmp_path / "out", "rounds", folder.path / "rounds.csv")
+    assert list(rounds["round"]) == finished
+    assert (folder.next_round is None) == (len(finished) == 12)
+
+
+def test_a_run_that_was_killed_is_put_aside_and_one_that_ended_is_not(tmp_path: Path):
+    folder = StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1))
+    for _ in range(2):
+        folder.run_folder(1).mkdir()
+        (folder.run_folder(1) / "run.json").write_text("{}")
+        assert folder.clear_unfinished(1) is not None
+    assert not folder.run_folder(1).exists()
+    assert (folder.path / "rounds" / "01_unfinished_2" / "run.json").is_file()
+    folder.run_folder(1).mkdir()
+    folder.record_round(1, record())
+    assert folder.clear_unfinished(1) is None
+    assert folder.run_folder(1).exists()
+
+
+def test_who_may_not_take_part_leaves_nothing(tmp_path: Path):
+    study = StudyFolder.opened(tmp_path / "out", PLAN)
+    with pytest.raises(InvalidRunFolder, match=r"not agreed to take part; .*not confirmed all.*no device 'script'"):
+        study.begin(replace(session(1), consent=False, eligibility=[True, False, True], device="script"))
+    with pytest.raises(InvalidRunFolder, match="do not mix in one study"):
+        study.begin(replace(session(1), pilot=True))
+    assert study.numbers == []
+    assert not list(study.participants.iterdir())
+
+
+def test_a_folder_of_another_plan_or_of_something_else_is_refused(tmp_path: Path):
+    StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1))
+    other = parse_plan(default_plan().replace("seed = 2020", "seed = 2021"))
+    with pytest.raises(InvalidRunFolder, match="its study has another plan"):
+        StudyFolder.opened(tmp_path / "out", other)
+    with pytest.raises(InvalidRunFolder, match="it is not the folder of a study"):
+        StudyFolder.read(tmp_path)
+    with pytest.raises(InvalidRunFolder, match="it is not empty"):
+        StudyFolder.opened(tmp_path, PLAN)
+    with pytest.raises(InvalidRunFolder, match="a session has begun in it"):
+        StudyFolder.read(tmp_path / "out").begin(session(1))
+    with pytest.raises(InvalidRunFolder, match="no session has begun in it"):
+        StudyFolder.read(tmp_path / "out").session(2)
+    assert StudyFolder.read(tmp_path / "out").next_number == 2
+
+
+def test_a_damaged_file_is_told_by_its_name(tmp_path: Path):
+    folder = StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1))
+    folder.record_round(1, record())
+    (folder.path / "rounds" / "01.json").write_text('{"record": {"success": true}}')
+    with pytest.raises(InvalidRunFolder, match=r"its 01.json is damaged"):
+        _ = folder.records
+    (folder.path / "session.json").write_text("{")
+    with pytest.raises(InvalidRunFolder, match=r"its session.json is damaged"):
+        SessionFolder.read(folder.path, PLAN)
+
+
+def test_scripted_pilots_are_named_so_in_every_file_of_a_session(tmp_path: Path):
+    study = StudyFolder.opened(tmp_path / "out", PILOT_PLAN)
+    folder = study.begin(session(1, PILOT_PLAN))
+    play(folder, same)
+    for name in ("rounds.csv", "answers.csv", "questionnaire.csv"):
+        lines = csv_of(folder.path / name)
+        assert set(lines["kind"]) == {PILOT}
+    assert json.loads((folder.path / "session.json").read_text())["kind"] == PILOT
+    assert set(pq.read_table(folder.path / "rounds.parquet").column("kind").to_pylist()) == {PILOT}
+    assert "no person took part" in (study.path / "codebook.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("scenario", "given", "failed"),
+    [
+        ("flyer_robot_to_human", (), False),
+        ("flyer_human_to_robot", (), False),
+        ("flyer_collaborative", (), False),
+        ("flyer_robot_to_human", ("strength=0.1", "patience=5"), True),
+    ],
+)
+def test_the_thesis_rule_by_who_held_the_object(scenario: str, given: tuple[str, ...], failed: bool, tmp_path: Path):
+    ended = run(SCENARIOS[scenario], tmp_path / "run", *given)
+    assert bool(ended.summary["success"]) is not failed
+    assert failed_by_rule(RunFolder.of_run(tmp_path / "run")) is failed
+
+
+def test_a_record_that_does_not_say_who_held_the_object_is_not_judged_by_the_rule(tmp_path: Path):
+    run(SCENARIOS["flyer_impedance"], tmp_path / "run")
+    assert failed_by_rule(RunFolder.of_run(tmp_path / "run")) is None

@@ -1,0 +1,68 @@
+"""`handover study new` and `plan`: a plan to start from, and what follows from it."""
+
+import json
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from handover.scenarios.cli.command import main
+from handover.scenarios.study.order import rounds_of
+from handover.scenarios.study.plan import default_plan, parse_plan
+
+
+def study(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, ["study", *map(str, arguments)])
+
+
+def test_a_new_plan_can_be_followed_as_it_is(tmp_path: Path):
+    file = tmp_path / "mine" / "plan.toml"
+    assert study("new", file).exit_code == 0
+    assert file.read_text(encoding="utf-8") == default_plan()
+    shown = study("plan", file)
+    assert shown.exit_code == 0, shown.output
+    assert "P18" in shown.output
+    assert "orders of 18 participants are balanced" in shown.output
+    assert "mouse, mouse and keyboard" in shown.output
+    again = study("new", file)
+    assert again.exit_code == 2
+    assert "is there already" in again.output
+
+
+@pytest.mark.parametrize(("people", "told"), [(10, "are not balanced"), (12, "are balanced"), (18, "are balanced")])
+def test_ten_are_not_balanced_twelve_are(people: int, told: str, tmp_path: Path):
+    study("new", tmp_path / "plan.toml")
+    assert told in study("plan", tmp_path / "plan.toml", "--participants", str(people)).output
+
+
+def test_the_orders_as_json_are_those_that_are_played(tmp_path: Path):
+    study("new", tmp_path / "plan.toml")
+    data = json.loads(study("plan", tmp_path / "plan.toml", "--participants", "12", "--json").output)
+    assert len(data["orders"]) == 12
+    assert set(Counter(of["order_row"] for of in data["orders"]).values()) == {2}
+    planned = rounds_of(parse_plan(default_plan()), 7)
+    assert [(r["behaviour"], r["seed"]) for r in data["orders"][6]["rounds"]] == [
+        (r.condition.behaviour, r.seed) for r in planned
+    ]
+
+
+def test_the_duration_goes_by_the_scenarios_parameters(tmp_path: Path):
+    study("new", tmp_path / "plan.toml")
+    before = json.loads(study("plan", tmp_path / "plan.toml", "--json").output)["longest_session"]
+    text = default_plan().replace("practice = 600", "practice = 300").replace("repetitions = 2", "repetitions = 1")
+    (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
+    after = json.loads(study("plan", tmp_path / "plan.toml", "--json").output)["longest_session"]
+    assert before["practice"] - after["practice"] == 300.0
+    assert after["rounds"] == pytest.approx(before["rounds"] / 2)
+    assert before["together"] == sum(before[part] for part in ("practice", "rounds", "ratings"))
+
+
+def test_every_fault_of_a_plan_has_its_line(tmp_path: Path):
+    file = tmp_path / "plan.toml"
+    file.write_text(default_plan().replace("seed = 2020", "sed = 1").replace('"mouse"', '"mose"'), encoding="utf-8")
+    told = study("plan", file)
+    assert told.exit_code == 2
+    assert "3 faults in the plan" in told.output
+    assert "\n  sed: no such key; did you mean seed" in told.output
+    assert "\n  devices: no device 'mose'" in told.output

@@ -1,0 +1,160 @@
+"""A study in a browser, and a whole session of a scripted pilot, whose rounds can be played back and analysed."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from opened_page import overflow, wait_until
+from playwright.sync_api import Browser, Page
+
+from handover.scenarios.study.plan import default_plan, parse_plan
+from handover.scenarios.study.study_folder import StudyFolder
+
+SEEN_AT = """(() => {
+    const scene = study.play.scene, box = document.querySelector("#eye canvas").getBoundingClientRect();
+    const p = scene.camera.position.clone().set(...study.play.hand().p_WH).project(scene.camera);
+    return [box.left + (p.x + 1) / 2 * box.width, box.top + (1 - p.y) / 2 * box.height];
+})()"""
+"""Where the hand is seen in the view from the person's eye, in pixels of the page."""
+HANDOVER = (sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()")
+
+
+def pilot_plan(path: Path, *, devices: str, patience: float, practice: float, repetitions: int) -> Path:
+    text = default_plan()
+    for name, value in {
+        "pilot": "true",
+        "participants": 1,
+        "repetitions": repetitions,
+        "practice": practice,
+        "devices": devices,
+    }.items():
+        text = re.sub(rf"^{name} = .*$", f"{name} = {value}", text, count=1, flags=re.MULTILINE)
+    path.write_text(f"{text}\n[parameters]\npatience = {patience}\n", encoding="utf-8")
+    return path
+
+
+@contextmanager
+def served(plan: Path, out: Path, *more: str) -> Generator[tuple[str, "subprocess.Popen[str]"], None, None]:
+    command = [*HANDOVER, "study", "serve", str(plan), "--out", str(out), *more]
+    server = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        assert server.stderr is not None
+        address = re.search(r"study: (http://\S+)", server.stderr.readline())
+        assert address
+        yield address[1], server
+    finally:
+        server.send_signal(signal.SIGINT)
+        _, told = server.communicate(timeout=120)
+        assert "Traceback" not in told, told
+
+
+def at(page: Page, screen: str) -> None:
+    wait_until(page, f"document.querySelector('.study').dataset.screen === '{screen}'")
+
+
+def to_round(page: Page) -> None:
+    at(page, "language")
+    page.get_by_role("button", name="English").click()
+    at(page, "consent")
+    page.get_by_role("button", name="I agree").click()
+    at(page, "eligibility")
+    assert page.get_by_role("button", name="All of this applies to me").is_disabled()
+    for box in page.get_by_role("checkbox").all():
+        box.check()
+    page.get_by_role("button", name="All of this applies to me").click()
+    at(page, "device")
+    page.get_by_role("button", name="Mouse and keyboard").click()
+    at(page, "instruction")
+
+
+@pytest.mark.slow
+def test_a_round_is_played_with_the_mouse_and_rated_by_keys(browser: Browser, tmp_path: Path):
+    plan = pilot_plan(tmp_path / "plan.toml", devices='["mouse"]', patience=15, practice=0, repetitions=1)
+    with served(plan, tmp_path / "study", "--pace", "4") as (address, _):
+        page = browser.new_page(viewport={"width": 1000, "height": 600})
+        page.set_default_timeout(120_000)
+        messages: list[str] = []
+        page.on("pageerror", lambda error: messages.append(str(error)))
+        page.goto(address)
+        to_round(page)
+        assert overflow(page) == 0
+        assert page.locator(".study-pilot").inner_text() == "Scripted pilot"
+        page.get_by_role("button", name="Begin").click()
+        wait_until(page, "study.play?.time > 0.5")
+        before = page.evaluate("study.play.hand().p_WH")
+        page.mouse.move(250, 200)
+        page.mouse.move(350, 220)
+        page.mouse.wheel(0, -200)
+        wait_until(page, f"Math.hypot(...study.play.hand().p_WH.map((x, i) => x - {before}[i])) > 0.05")
+        wait_until(page, "document.querySelector('.study').dataset.drawn > 5")
+        assert not page.locator("#side").is_hidden()
+        wait_until(page, f"Math.hypot(...{SEEN_AT}.map((x, i) => x - [350, 220][i])) < 15")
+        at(page, "rating")
+        for key in "739":
+            page.keyboard.press(key)
+        page.get_by_role("button", name="Send").click()
+        at(page, "instruction")
+        assert page.locator("#progress").inner_text() == "Round 2 of 6"
+        page.close()
+        assert messages == []
+    session = StudyFolder.read(tmp_path / "study").session(1)
+    assert session.answers == {1: {"S1": 7, "S2": 3, "S3": 9}}
+    record = session.records[1]
+    assert not record.void
+    assert record.latency_median_ms is not None
+    assert record.age_at_use_ms is not None
+    assert record.missed_deadlines is not None
+
+
+@pytest.mark.slow
+def test_a_scripted_pilot_plays_twelve_rounds_that_survive_a_kill_and_are_played_back(tmp_path: Path):
+    plan = pilot_plan(tmp_path / "plan.toml", devices='["script"]', patience=60, practice=5, repetitions=2)
+    out = tmp_path / "study"
+    command = [*HANDOVER, "study", "serve", str(plan), "--out", str(out), "--pilot", "--pace", "4"]
+    killed = subprocess.Popen(command, start_new_session=True)
+    session_folder = out / "participants" / "P01"
+    while not (session_folder / "rounds" / "02.json").exists():
+        assert killed.poll() is None
+        try:
+            killed.wait(0.2)
+        except subprocess.TimeoutExpired:
+            continue
+    os.kill(killed.pid, signal.SIGKILL)
+    killed.wait()
+    first = (session_folder / "rounds" / "01.json").read_bytes()
+    subprocess.run(command, check=True, timeout=3000)
+    assert (session_folder / "rounds" / "01.json").read_bytes() == first
+    rounds = pd.read_csv(session_folder / "rounds.csv")
+    assert rounds["round"].tolist() == list(range(1, 13))
+    assert rounds["behaviour"].value_counts().to_dict() == {"rigid": 6, "compliant": 6}
+    assert (rounds["kind"] == "scripted pilot").all()
+    assert not rounds["void"].any()
+    assert rounds["success"].sum() >= 9, rounds[["task", "behaviour", "reason"]].to_string()
+    assert pd.read_parquet(session_folder / "rounds.parquet")["latency_p95_ms"].notna().all()
+    assert len(pd.read_csv(session_folder / "answers.csv")) == 36
+    planned = StudyFolder.read(out).session(1).rounds[0]
+    given = [text for p in (*planned.condition.given, "hand=outside") for text in ("-p", p)]
+    again = [*HANDOVER, "run", planned.condition.scenario, *given, "--seed", str(planned.seed), "--no-report"]
+    played = session_folder / "rounds" / "01"
+    subprocess.run([*again, "--inputs-from", str(played), "--out", str(tmp_path / "again")], check=False)
+    assert pq.read_table(tmp_path / "again" / "signals.parquet").equals(pq.read_table(played / "signals.parquet"))
+
+
+def test_what_a_plan_does_not_allow_is_told_in_one_line(tmp_path: Path):
+    plan = tmp_path / "plan.toml"
+    plan.write_text(default_plan(), encoding="utf-8")
+    for more, why in ((["--pilot"], "of people"), (["--pace", "2"], "pace 1"), (["--participant", "99"], "18, not 99")):
+        command = [*HANDOVER, "study", "serve", str(plan), "--out", str(tmp_path / "study"), *more]
+        ended = subprocess.run(command, capture_output=True, text=True)
+        assert ended.returncode == 2
+        assert why in ended.stderr
+    assert parse_plan(default_plan()).participants == 18
+    assert not (tmp_path / "study").exists()

@@ -1,0 +1,234 @@
+"""Who is not a study's page is refused, and what a page sends that it should not; a round is void, never wrong."""
+
+import contextlib
+import json
+import socket
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import uvicorn
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from handover.scenarios.study import seat as seat_module
+from handover.scenarios.study.plan import default_plan, parse_plan
+from handover.scenarios.study.protocol import Protocol
+from handover.scenarios.study.seat import StudySeat
+from handover.scenarios.study.server import StudyServer, uvicorn_config
+from handover.scenarios.study.sessions import NotServed, check_hands
+from handover.scenarios.study.study_folder import StudyFolder
+
+HOST = "127.0.0.1"
+SHORT = default_plan().replace("practice = 600 ", "practice = 0 ") + "\n[parameters]\npatience = 30\n"
+PLAN = parse_plan(SHORT)
+HAND = {"p_WH": [-0.4, 0.1, -0.05], "q_WH": [1.0, 0.0, 0.0, 0.0], "closed": False}
+
+
+def server_of(path: Path, host: str = HOST) -> StudyServer:
+    return StudyServer(StudySeat(Protocol(StudyFolder.opened(path, PLAN), ["mouse"])), host)
+
+
+@contextmanager
+def served(server: StudyServer) -> Generator[str, None, None]:
+    """Serve a study in a thread; yield host and port. A run under way ends with it."""
+    running = uvicorn.Server(uvicorn_config(server))
+    with socket.create_server((HOST, 0)) as listening:
+        thread = threading.Thread(target=running.run, kwargs={"sockets": [listening]})
+        thread.start()
+        try:
+            yield f"{HOST}:{listening.getsockname()[1]}"
+        finally:
+            running.should_exit = True
+            thread.join()
+
+
+@contextmanager
+def page_at(where: str, path: str = "/", origin: str | None = None) -> Generator[ClientConnection, None, None]:
+    own = f"http://{where}" if origin is None else origin
+    with connect(f"ws://{where}{path}seat", origin=own, max_size=None, max_queue=None) as page:  # pyright: ignore[reportArgumentType]
+        yield page
+
+
+@contextmanager
+def page_of(server: StudyServer) -> Generator[ClientConnection, None, None]:
+    with served(server) as where, page_at(where) as page:
+        yield page
+
+
+def status(where: str, path: str, host: str = "") -> int:
+    """Return the status by which a server answers a path."""
+    request = urllib.request.Request(f"http://{where}{path}", headers={"Host": host} if host else {})
+    try:
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            return answer.status
+    except urllib.error.HTTPError as e:
+        return e.code
+
+
+def told(page: ClientConnection, name: str) -> Any:
+    """Return the next message of a name; states of the run are passed over."""
+    while True:
+        message = page.recv(timeout=120)
+        content: dict[str, Any] = json.loads(message) if isinstance(message, str) else {}
+        if name in content:
+            return content[name]
+
+
+def act(page: ClientConnection, action: str, value: Any = None) -> None:
+    page.send(json.dumps({"act": {"action": action, "value": value}}))
+
+
+def to_instruction(page: ClientConnection) -> None:
+    act(page, "language", "en")
+    act(page, "consent", True)
+    act(page, "eligibility", [True] * 3)
+    act(page, "device", "mouse")
+    while told(page, "screen")["screen"] != "instruction":
+        pass
+
+
+def to_round(page: ClientConnection) -> None:
+    to_instruction(page)
+    act(page, "begin")
+    told(page, "scene")
+    page.send('{"ready": true}')
+
+
+def test_the_page_alone_is_served_and_to_this_computer_alone(tmp_path: Path):
+    with served(server_of(tmp_path / "study")) as where:
+        with urllib.request.urlopen(f"http://{where}/") as answer:
+            page = answer.read().decode()
+            assert answer.headers["x-frame-options"] == "DENY"
+        assert "script-src &#39;sha256-" in page
+        assert "unsafe-eval" not in page
+        for path in ("/plan.toml", "/participants/P01/session.json", "/static/../plan.toml", "/seat"):
+            assert status(where, path) == 404, path
+        assert status(where, "/", host="elsewhere.example") == 400
+
+
+@pytest.mark.parametrize("origin", ["http://elsewhere.example", "null"])
+def test_a_connection_of_another_origin_is_refused(origin: str, tmp_path: Path):
+    with (
+        served(server_of(tmp_path / "study")) as where,
+        pytest.raises(InvalidStatus, match="403"),
+        page_at(where, origin=origin),
+    ):
+        pass
+
+
+def test_on_another_address_the_page_is_below_a_token(tmp_path: Path):
+    server = server_of(tmp_path / "study", host="192.0.2.7")
+    assert len(server.token) > 20
+    assert server.token != server_of(tmp_path / "study", host="192.0.2.7").token
+    with served(server) as where:
+        assert status(where, server.path) == 200
+        for path in ("/", "/seat", "/wrong/", f"/{server.token[:-1]}/"):
+            assert status(where, path) == 404, path
+        with pytest.raises(InvalidStatus), page_at(where):
+            pass
+        with page_at(where, server.path) as page:
+            assert told(page, "screen")["screen"] == "language"
+
+
+def test_a_second_page_is_told_that_the_seat_is_taken_and_the_first_stays(tmp_path: Path):
+    with served(server_of(tmp_path / "study")) as where:
+        with page_at(where) as first:
+            assert told(first, "screen")["screen"] == "language"
+            with page_at(where) as second:
+                assert told(second, "gone") == "seat_taken"
+            act(first, "language", "de")
+            assert told(first, "screen")["screen"] == "consent"
+        time.sleep(0.5)
+        with page_at(where) as third:
+            assert told(third, "screen")["screen"] == "consent"
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("{", "not JSON"),
+        ("[" * 5000, "not JSON"),
+        ("[]", "not an object"),
+        ('{"act": 1, "hand": 2}', "not an object"),
+        ('{"run": "rm"}', "not an object"),
+        ('{"act": 3}', "'None' is not for"),
+        ('{"act": {"action": "consent", "value": true}}', "'consent' is not for the screen 'language'"),
+        ('{"act": {"action": "language", "value": "../.."}}', "no language"),
+        (" " * 30_000, "characters at most"),
+    ],
+)
+def test_what_is_no_message_of_the_page_is_refused_with_the_reason(text: str, why: str, tmp_path: Path):
+    with page_of(server_of(tmp_path / "study")) as page:
+        page.send(text)
+        assert why in told(page, "refused")
+        act(page, "language", "en")
+        assert told(page, "screen")["screen"] == "consent"
+
+
+def test_samples_that_cannot_be_used_are_refused_and_the_round_goes_on(tmp_path: Path):
+    with page_of(server_of(tmp_path / "study")) as page:
+        to_round(page)
+        wrong: list[tuple[dict[str, Any], str]] = [
+            ({**HAND, "stamp": 1.0, "p_WH": [float("nan"), 0.0, 0.0]}, "p_WH: 3 finite numbers"),
+            ({**HAND, "stamp": 1.0, "p_WH": [9.0, 0.0, 0.0]}, "reaches"),
+            ({**HAND, "stamp": float("inf")}, "stamp"),
+            ({**HAND, "stamp": 0.5}, "not after the one before"),
+        ]
+        page.send(json.dumps({"hand": {**HAND, "stamp": 0.9}}))
+        for sample, why in wrong:
+            page.send(json.dumps({"hand": sample}))
+            assert why in told(page, "refused")
+        page.send(json.dumps({"drawn": [-1.0]}))
+        assert "0 to 60000 ms" in told(page, "refused")
+    session = StudyFolder.opened(tmp_path / "study", PLAN).session(1)
+    assert session.records == {}
+
+
+def test_a_page_that_is_closed_makes_its_round_void_and_it_is_played_again(tmp_path: Path):
+    server = server_of(tmp_path / "study")
+    with served(server) as where:
+        with page_at(where) as page:
+            to_round(page)
+            page.send(json.dumps({"hand": {**HAND, "stamp": 1.0}}))
+        late = time.monotonic() + 60.0
+        while server.seat.protocol.screen == "round" and time.monotonic() < late:
+            time.sleep(0.05)
+    attempts = StudyFolder.opened(tmp_path / "study", PLAN).session(1).notes.void_attempts
+    assert [(a.number, a.attempt) for a in attempts] == [(1, 1)], attempts
+    assert "the page was closed" in attempts[0].reason
+    assert server.seat.protocol.screen == "void"
+
+
+def test_a_device_that_falls_silent_makes_the_round_void(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(seat_module, "SILENCE", 0.5)
+    with page_of(server_of(tmp_path / "study")) as page:
+        to_round(page)
+        shown = told(page, "screen")
+        assert shown["screen"] == "void"
+        assert "no sample of the hand" in shown["reason"]
+        act(page, "next")
+        assert told(page, "screen")["round"] == 1
+
+
+def test_a_page_that_floods_is_refused_and_at_last_put_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(seat_module, "MOST_A_SECOND", 20)
+    monkeypatch.setattr(seat_module, "FLOOD", 200)
+    with page_of(server_of(tmp_path / "study")) as page:
+        with contextlib.suppress(ConnectionClosed):
+            for _ in range(1000):
+                page.send('{"drawn": []}')
+        assert "more than 20 messages in a second" in told(page, "refused")
+        assert told(page, "gone") == "flood"
+
+
+def test_a_plan_in_whose_rounds_nobody_can_lead_a_hand_is_told():
+    plan = parse_plan(SHORT.replace('"flyer_robot_to_human"', '"flyer_two_robots"'))
+    with pytest.raises(NotServed, match=r"tasks\.robot_to_human, rigid"):
+        check_hands(plan)
