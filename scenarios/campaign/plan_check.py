@@ -122,17 +122,20 @@ def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
         first.setdefault(_chosen_units(plan, point), number)
     for chosen, number in first.items():
         system = built_system(instance, parameters, plan.seed, plan.fmus(number, fmus), {})
-        _check_unit_values(system, plan, [p for p in plan.points if _chosen_units(plan, p) == chosen])
+        _check_unit_values(instance, system, plan, [p for p in plan.points if _chosen_units(plan, p) == chosen])
         Master(system, plan.options)
 
 
-def _check_unit_values(system: System, plan: CampaignPlan, points: Sequence[Mapping[str, str]]) -> None:
+def _check_unit_values(
+    experiment: Experiment[Any], system: System, plan: CampaignPlan, points: Sequence[Mapping[str, str]]
+) -> None:
     """Check each value of a unit's parameter that the plan has for the points with the system's units."""
     given = [item for values in (plan.fixed, *points) for item in values.items() if is_unit_value(item[0])]
     faults: dict[str, None] = {}
     for name, value in dict.fromkeys(given):
         try:
             set_values(system, {name: value})
+            experiment.check_unit_values(system, [name])
         except InvalidParameter as e:
             faults |= dict.fromkeys(e.faults)
     if faults:

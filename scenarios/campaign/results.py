@@ -15,7 +15,7 @@ from handover.scenarios.campaign.plan import is_number
 from handover.scenarios.campaign.statistics import Interval, success_interval, time_interval
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.catalog import scenario_of
-from handover.scenarios.experiment.display_unit import display_unit
+from handover.scenarios.experiment.display_unit import display_unit, unit_symbol
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import InvalidRunFolder
 
@@ -211,6 +211,8 @@ class CampaignResults:
             return parameter.replace("_", " ") if text.lower() == "true" else f"not {parameter.replace('_', ' ')}"
         if self.is_number(parameter):
             return display_unit(self.unit(parameter), float(text)).text(float(text))
+        if _is_array(text):
+            return f"{text} {unit_symbol(self.unit(parameter))}".rstrip()
         return self.words(parameter, text)
 
     def words(self, parameter: str, text: str) -> str:  # noqa: ARG002 (a name may be shown as it was given)
@@ -223,9 +225,14 @@ class CampaignResults:
         return ", ".join(texts) or (DEFAULTS if self.varied else "all runs")
 
     def named_value(self, parameter: str, text: str) -> str:
-        """Return a parameter's value as one reads it by itself: a number with the parameter's name."""
+        """Return a parameter's value as one reads it by itself: a number, or an array, with the parameter's name."""
         value = self.value_text(parameter, text)
-        return f"{parameter.replace('_', ' ')} {value}" if self.is_number(parameter) else value
+        return f"{parameter.replace('_', ' ')} {value}" if self.is_number(parameter) or _is_array(text) else value
+
+
+def _is_array(text: str) -> bool:
+    """Return whether a value is several numbers."""
+    return "," in text and all(map(is_number, text.split(",")))
 
 
 DEFAULTS = "nothing changed"

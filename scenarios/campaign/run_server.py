@@ -7,7 +7,6 @@ its files while it runs; the result is a `JobResult`. It ends when its input is 
 Where processes cannot be forked (Windows) it runs jobs itself, and a unit that crashes crashes the server.
 """
 
-import contextlib
 import gc
 import importlib
 import os
@@ -21,7 +20,6 @@ from pathlib import Path
 from typing import BinaryIO, NoReturn
 
 from handover.cosim.fmu.heartbeat import Heartbeat
-from handover.fmus.catalog import find_unit, import_class
 from handover.scenarios.campaign.run_job import (
     finish,
     job_result,
@@ -31,10 +29,10 @@ from handover.scenarios.campaign.run_job import (
     run_job,
 )
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, read_message, write_message
-from handover.scenarios.catalog import InvalidScenario, named_scenario
 from handover.scenarios.execution import supervisor
 from handover.scenarios.execution.child_process import ChildEnd, ForkedChild
 from handover.scenarios.execution.crash import Crash
+from handover.scenarios.execution.selection import load_units
 from handover.scenarios.results.summary import ElapsedTime
 
 IDLE = 60.0
@@ -80,15 +78,8 @@ class RunServer:
         if job.modules or job.scenario in self._loaded:
             return
         self._loaded.add(job.scenario)
-        try:
-            units = named_scenario(job.scenario).units
-        except (KeyError, InvalidScenario):  # the run will report it
-            return
-        for unit in units.values():
-            with contextlib.suppress(Exception):  # likewise
-                block = import_class(find_unit(unit).block)
-                for module in getattr(block, "deferred", ()):
-                    importlib.import_module(module)
+        importlib.import_module("pandas")  # pyarrow does as a record is looked through: a tenth of a short run
+        load_units(job.scenario)
         gc.collect()
         gc.freeze()  # else the collector of each child touches, and so copies, all that is loaded
 

@@ -1,6 +1,7 @@
 """Figures of a campaign for papers: success rates and metrics by point, with intervals."""
 
 import math
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,6 +18,16 @@ from handover.scenarios.experiment.plotting import COLOURS, figure
 
 _LINE = 0.24
 """Height of a row where points are a list, in inches."""
+_NEXT_LINE = 0.17
+"""Height of each further line of a label there, in inches."""
+_LETTER = 0.073
+"""Width of a letter of a label, about, in inches."""
+_PLOT = 4.2
+"""Width that a list leaves for what is drawn, in inches."""
+_LONGEST = 60
+"""Letters of a line of a label in a list: a longer label takes several lines."""
+
+_UNBROKEN = "\u00a0"  # a space at which `textwrap` does not break
 
 _MAX_ENTRIES = 80
 _LETTERS_ALONG = 60  # that fit along a horizontal axis
@@ -106,7 +117,22 @@ def _ordered(layout: PointLayout, places: Floats, values: Floats) -> tuple[Float
 
 
 def _size(layout: PointLayout) -> tuple[float, float]:
-    return (8.0, 1.0 + _LINE * max(len(layout.places), 2)) if layout.listed else (8.0, 3.6)
+    """Return width and height, in inches, with room for the longest label of a list."""
+    if not layout.listed:
+        return 8.0, 3.6
+    labels = _labels(layout)
+    longest = max((len(line) for label in labels for line in label.split("\n")), default=0)
+    row = _LINE + _NEXT_LINE * max((label.count("\n") for label in labels), default=0)
+    return max(8.0, _PLOT + _LETTER * longest), 1.0 + row * max(len(layout.places), 2)
+
+
+def _labels(layout: PointLayout) -> list[str]:
+    """Return the names of the points along their axis; long ones of a list in several lines, broken after commas."""
+    names = [name for _, name in layout.ticks or ()]
+    if not layout.listed:
+        return names
+    whole = [", ".join(part.replace(" ", _UNBROKEN) for part in name.split(", ")) for name in names]
+    return ["\n".join(textwrap.wrap(name, _LONGEST)).replace(_UNBROKEN, " ") for name in whole]
 
 
 def _set_value_axis(axes: Axes, layout: PointLayout, title: str, limits: tuple[float, float] | None) -> None:
@@ -126,7 +152,7 @@ def _set_point_axis(axes: Axes, layout: PointLayout) -> None:
         axes.set(xlim=(low, high), xlabel=layout.title)
         axes.grid(visible=False, axis="x")
     if layout.ticks is not None:
-        places, names = [place for place, _ in layout.ticks], [name for _, name in layout.ticks]
+        places, names = [place for place, _ in layout.ticks], _labels(layout)
         (axes.set_yticks if layout.listed else axes.set_xticks)(places, names)
         if not layout.listed and _crowded(names):
             axes.tick_params(axis="x", rotation=30)

@@ -89,6 +89,8 @@ def _median(results: CampaignResults, point: PointResults, metric: str, unit: Di
     return Cell(line if number == len(point.done) else f"{line}, of {number}", median)
 
 
+_BETWEEN = 9
+"""Pixels between names of several lines, below each other."""
 _SCREEN = 15
 """Points of a list that fit a screen; a longer list has its value axis at the top."""
 
@@ -157,7 +159,8 @@ def plot_height(layout: PointLayout) -> int:
     if not layout.listed:
         return 340
     lines = [1 + _broken(name).count("<br>") for _, name in layout.ticks or ()]
-    return 110 + max(30, 17 * max(lines, default=1)) * len(layout.places)
+    most = max(lines, default=1)
+    return 110 + max(30, 17 * most + _BETWEEN * (most > 1)) * len(layout.places)
 
 
 def _broken(name: str) -> str:

@@ -121,6 +121,7 @@ class _Group:
     kind: str
     reason: str
     rows: list[int] = field(default_factory=list[int])
+    reasons: set[str] = field(default_factory=set[str])
 
 
 def failures_section(results: CampaignResults, folder: Path) -> Section | None:
@@ -146,8 +147,10 @@ def failures_section(results: CampaignResults, folder: Path) -> Section | None:
     left = len(groups) - _MAX_REASONS
     line = Markup("<p class='soft'>{} more reason{}, of fewer runs each.</p>")
     more = line.format(left, "s" if left > 1 else "") if left > 0 else Markup()
+    merged = any(len(g.reasons) > 1 for g in groups[:_MAX_REASONS])
+    same = Markup("<p class='soft'>Runs whose reasons differ only in numbers are in one row, with the first one's.</p>")
     table = rows_table(("runs", "how", "reason, such as", "examples"), rows, numbers=(0,), cards=True)
-    return Section(anchor="failures", title="Failures", html=table + more)
+    return Section(anchor="failures", title="Failures", html=table + (same if merged else Markup()) + more)
 
 
 def _groups(results: CampaignResults) -> Sequence[_Group]:
@@ -158,5 +161,7 @@ def _groups(results: CampaignResults) -> Sequence[_Group]:
             continue
         kind = "task failed" if state == "done" else f"run {state}"
         pattern = _NUMBER.sub("#", reason or "")
-        groups.setdefault((kind, pattern), _Group(kind, reason or "no reason given")).rows.append(row)
+        group = groups.setdefault((kind, pattern), _Group(kind, reason or "no reason given"))
+        group.rows.append(row)
+        group.reasons.add(reason or "")
     return sorted(groups.values(), key=lambda g: -len(g.rows))

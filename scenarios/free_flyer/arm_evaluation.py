@@ -151,7 +151,8 @@ class ArmImpedanceEvaluator(Evaluator):
         )
         verb = "agreed with" if agrees else "departed from"
         joined = "and" if agrees is self._at_rest else "but"
-        reason = f"{back}, {joined} {verb} the impedance model by {1000 * by[0]:.1f} mm and {by[1]:.3f} rad"
+        extent = f"{'within' if agrees else 'by'} {1000 * by[0]:.1f} mm and {by[1]:.3f} rad"
+        reason = f"{back}, {joined} {verb} the impedance model {extent}"
         return Outcome(success=self._at_rest and agrees, reason=reason + self.parameters.stuck, metrics=metrics)
 
     def _metrics(self, motion: Columns, by: tuple[float, float]) -> dict[str, Metric]:
@@ -166,9 +167,11 @@ class ArmImpedanceEvaluator(Evaluator):
             "base_displacement": Metric(float(base.max()), "m", "base from where it was at most"),
             "base_turn": Metric(float(turn.max()), "rad", "base from its first attitude at most"),
             "joint_motion": Metric(float(joints.max()), "rad", "a joint from its first angle at most"),
-            "thrust_impulse": Metric(float(impulse), "N.s", "of the thrusters, whatever its direction"),
-            "disagreement_position": Metric(by[0], "m", f"actual against calculated position error, {model}"),
-            "disagreement_orientation": Metric(by[1], "rad", f"actual against calculated orientation error, {model}"),
+            "thrust_impulse": Metric(float(impulse), "N.s", "impulse of the thrusters, whatever its direction"),
+            "disagreement_position": Metric(by[0], "m", f"actual against calculated position error at most, {model}"),
+            "disagreement_orientation": Metric(
+                by[1], "rad", f"actual against calculated orientation error at most, {model}"
+            ),
             "saturated_share": Metric(
                 self._saturated / len(self._rows), "1", "share of the time for which the thrusters were at their limits"
             ),

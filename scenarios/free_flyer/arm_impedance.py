@@ -15,15 +15,8 @@ from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.free_flyer.arm_evaluation import ArmImpedanceEvaluator
 from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters
-from handover.scenarios.free_flyer.parameters import Wrench
 from handover.scenarios.free_flyer.places import PLACES_OF_ARM_PUSH
-from handover.scenarios.free_flyer.robot_wiring import (
-    expected_lag,
-    thruster_settings,
-    wire_controller,
-    wire_forces,
-    wire_navigation,
-)
+from handover.scenarios.free_flyer.robot_wiring import wired_push
 
 
 class FlyerArmImpedance(Experiment[ArmImpedanceEvaluator]):
@@ -58,45 +51,25 @@ class FlyerArmImpedance(Experiment[ArmImpedanceEvaluator]):
         """Wire robot, thrusters, navigation, controller and push; the gripper starts at its place of rest."""
         p, target = parameters, parameters.target()
         p_BG, R_BG = p.gripper_at_start()
-        s = System()
-        impedance = s.add(
-            "impedance",
-            fmu("impedance"),
+        controller = {
             **p.controller(),
-            delay=p.delay + p.navigation_delay if p.delay_known else 0.0,
-            lag=expected_lag(p.propulsion),
-            p_WG_goal=target.p_WG,
-            q_WG_goal=np.array([1.0, 0.0, 0.0, 0.0]) if p.fixed else quaternion_of(R_BG),
-            active=True,
-        )
-        thrusters = s.add("thrusters", fmu("thrusters"), **thruster_settings(p.propulsion, p.delay, p.stuck_nozzle))
-        push = s.add(
-            "push",
-            fmu("push"),
-            axis=p.axis.name.lower(),
-            force=p.force if p.kind is Wrench.FORCE else 0.0,
-            torque=p.torque if p.kind is Wrench.TORQUE else 0.0,
-            start=p.begin,
-            duration=p.duration,
-        )
-        robot = s.add(
-            "robot",
-            fmu("robot"),
+            "p_WG_goal": target.p_WG,
+            "q_WG_goal": np.array([1.0, 0.0, 0.0, 0.0]) if p.fixed else quaternion_of(R_BG),
+        }
+        robot = {
             **vars(p.robot),
             **p.arm(p.arm_factor),
-            q_J_0=p.posture,
-            tolerance_J=p.tolerance,
-            friction_J=np.full(3, p.friction),
-            lock_time=p.lock_time,
-            p_WB_0=target.p_WG - p_BG,
-        )
-        navigation = s.add("navigation", fmu("navigation"), seed=seed, delay=p.navigation_delay)
-        wire_controller(s, impedance, navigation, thrusters)
-        wire_navigation(s, robot, navigation)
-        wire_forces(s, robot, thrusters, push)
+            "q_J_0": p.posture,
+            "tolerance_J": p.tolerance,
+            "friction_J": np.full(3, p.friction),
+            "lock_time": p.lock_time,
+            "p_WB_0": target.p_WG - p_BG,
+        }
+        s = wired_push(fmu, p, seed, controller, robot)
+        arm, impedance = s.units["robot"], s.units["impedance"]
         for name in ("q_J", "v_J"):
-            s.connect(getattr(robot.y, name), getattr(impedance.u, name))
-        s.connect(impedance.y.tau_J_cmd, robot.u.tau_J)
+            s.connect(getattr(arm.y, name), getattr(impedance.u, name))
+        s.connect(impedance.y.tau_J_cmd, arm.u.tau_J)
         return s
 
     def stop_time(self, parameters: ArmPushParameters) -> Fraction:

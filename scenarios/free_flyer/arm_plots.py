@@ -12,7 +12,13 @@ from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, facet
 from handover.scenarios.experiment.time_plot import Curve, Phase, TimeFigure, TimePlot
 from handover.scenarios.free_flyer.arm_evaluation import columns_of, errors_with_arm
 from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters
-from handover.scenarios.free_flyer.plots import CAPTION, errors_over_time, phases_of_push, plot_thrust, push_over_time
+from handover.scenarios.free_flyer.push_plots import (
+    CAPTION,
+    errors_over_time,
+    phases_of_push,
+    plot_thrust,
+    push_over_time,
+)
 from handover.scenarios.free_flyer.replay import frame_at, push_arrows
 from handover.scenarios.free_flyer.scene import EDGE
 
@@ -74,8 +80,10 @@ def replay_arm_push(parameters: ArmPushParameters, record: Record) -> Replay:
     """Return base, links and gripper, the gripper's place of rest, and what pushes it."""
     path = Line(label="path of the gripper", colour=_PATH, points=record["robot.p_WG"][:, None], trail=True)
     return Replay(
+        weightless=True,
+        follow="gripper",
         bodies=_robot(parameters, record),
-        lines=[path, *push_arrows(record)],
+        lines=[path, *push_arrows(parameters.kind, record)],
         fixed=frame_at("place of rest", parameters.target().p_WG),
         eye=(-1.0, -1.15, 0.6),
         phases=phases_of_push(parameters, record),

@@ -4,116 +4,60 @@ A handover has one or two transfers (`Transfer`): the object passes from robot t
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 
 from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.free_flyer.led_hand import end_of_track
 from handover.scenarios.free_flyer.parameters import HandoverParameters
 from handover.scenarios.free_flyer.person_evaluation import Cause, Miss, PersonsDeeds
 from handover.scenarios.free_flyer.robot_wiring import stability_metrics
+from handover.scenarios.free_flyer.transfer import Approach, Transfer
 
-
-@dataclass
-class Transfer:
-    """A transfer under way or done.
-
-    Attributes:
-        receiver: who is to have the object, `HAND` or `GRIPPER`.
-        signalled: when the robot first gave the signal for it, s.
-        asked: when it last gave the signal, s; later than `signalled` after a failed reception.
-        felt: when, since then, it took the gripper's speed for a pull or a push, s; None before.
-        in_vain: times at which it had felt one in receptions that failed, s.
-        speed: the gripper's speed when it was felt, m/s.
-        fastest: maximum speed while the robot has been waiting since it last asked, m/s.
-        at_rest: the same until the person first touches the gripper, or what it holds, since the robot asked, m/s.
-        touched: whether the person has, since then.
-        farthest: maximum distance of the gripper from its place, from the signal for as long as it yields, m.
-        farthest_along: the same along each axis of W.
-        hardest: greatest force on the hand, from the signal until the receiver has the object alone, N.
-        done: when the receiver had the object alone, s; None before.
-    """
-
-    receiver: str
-    signalled: float
-    asked: float = field(init=False)
-    felt: float | None = None
-    in_vain: list[float] = field(default_factory=list[float])
-    speed: float = 0.0
-    fastest: float = 0.0
-    at_rest: float = 0.0
-    touched: bool = False
-    farthest: float = 0.0
-    farthest_along: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    hardest: float = 0.0
-    done: float | None = None
-
-    def __post_init__(self) -> None:
-        self.asked = self.signalled
-
-    def asked_again(self, t: float) -> None:
-        """Restart the transfer as the robot signals once more: what it had felt was in vain."""
-        if self.felt is not None:
-            self.in_vain.append(self.felt)
-        self.asked, self.felt, self.fastest, self.touched = t, None, 0.0, False
-
-    def waited(self, speed: float) -> None:
-        """Update the maximum speeds by the gripper's, m/s, while the robot waits to be pulled or pushed."""
-        self.fastest = max(self.fastest, speed)
-        if not self.touched:
-            self.at_rest = max(self.at_rest, speed)
-
-    def displaced(self, p_WG: tuple[float, float, float], place: tuple[float, float, float]) -> None:
-        """Update the displacement by the gripper's position and its handover place."""
-        (x, y, z), (p_x, p_y, p_z), (far_x, far_y, far_z) = p_WG, place, self.farthest_along
-        x, y, z = abs(x - p_x), abs(y - p_y), abs(z - p_z)
-        self.farthest = max(self.farthest, math.hypot(x, y, z))
-        self.farthest_along = [max(far_x, x), max(far_y, y), max(far_z, z)]
-
-    def metrics(self, prefix: str) -> dict[str, Metric]:
-        """Return the transfer's metrics, their names with a prefix."""
-        whom = "person" if self.receiver == "HAND" else "robot"
-        touch = "pull" if self.receiver == "HAND" else "push"
-        act = "let go" if self.receiver == "HAND" else "closed"
-        metrics = {
-            "displacement": Metric(
-                self.farthest, "m", f"gripper from its handover place at most, while the {whom} takes the object"
-            ),
-            **{
-                f"displacement_{axis}": Metric(
-                    away,
-                    "m",
-                    f"gripper from its handover place at most along {axis} of W, while the {whom} takes the object",
-                )
-                for axis, away in zip("xyz", self.farthest_along, strict=True)
-            },
-            "force": Metric(self.hardest, "N", f"force on the hand at most, until the {whom} has the object"),
-            "rest_speed": Metric(
-                self.at_rest,
-                "m/s",
-                "gripper's speed at most, as the robot sees it, while it waits and nobody touches it",
-            ),
-        }
-        if self.felt is not None:
-            metrics["speed"] = Metric(self.speed, "m/s", f"gripper's speed when the robot felt the {touch} and {act}")
-            since = f"from the last signal until the robot felt the {touch} and {act}"
-            metrics["felt_after"] = Metric(self.felt - self.asked, "s", since)
-        if self.done is not None:
-            since = f"from the {'first ' if self.in_vain else ''}signal until the {whom} has the object"
-            metrics["time"] = Metric(self.done - self.signalled, "s", since)
-        return {f"{prefix}_{name}": metric for name, metric in metrics.items()}
-
-
+_GATE = ("gate_error", "tolerance", "gate_speed")
+"""Parameters of the unit that decides: how near its place the gripper is there, m, when it is to yield, and otherwise;
+and below which speed it is at rest, m/s."""
 _SETTLING = 1.0
 """How long the receiver must keep the object when the robot is done, s (assumed)."""
 
+_LINGERING = 3.0
+"""Seconds after the end of a hand's track in which it may still come to rest, and the robot be touched (assumed)."""
 _CLOSING = ("GRASP_OBJECT", "CLOSE_GRIPPER")
 """Phases at whose end the gripper is closed."""
 
+_SAMPLES = 0.1
+"""Seconds by which a phase may be shorter than the robot's patience that ended it: a few of its samples."""
 _TOUCH = {"HAND": "pull", "GRIPPER": "push"}
+_ARRIVING = ("MOVE_TO_OBJECT", "MOVE_TO_HANDOVER", "ACTIVATE_IMPEDANCE", "OPEN_GRIPPER", "RETREAT")
+"""Phases that end when the gripper is at rest in its place."""
 _NOT_YIELDING = ("DEACTIVATE_IMPEDANCE", "RETREAT", "DONE", "GIVEN_UP")
+_OPENING = ("RELEASE_OBJECT", "VERIFY_RELEASE", "DEACTIVATE_IMPEDANCE", "ACTIVATE_IMPEDANCE", "OPEN_GRIPPER")
+_PLURALS = {"delivery": "deliveries", "reception": "receptions"}
 _PEOPLE = {"HAND": "the person", "GRIPPER": "the robot"}
+
+
+def counted(failed: int, what: str) -> str:
+    """Return how many deliveries or receptions failed, in words."""
+    return f"{failed} failed {what if failed == 1 else _PLURALS[what]}"
+
+
+def within_patience(phases: Sequence[tuple[str, float]], patience: float) -> str:
+    """Return " within the patience of ... s" if the phase before a robot gave up had lasted so long, else "".
+
+    Args:
+        phases: the robot's phases with the times at which they began, s, GIVEN_UP the last.
+        patience: the scenario's parameter, s.
+    """
+    if len(phases) < 2 or phases[-1][1] - phases[-2][1] < patience - _SAMPLES:
+        return ""
+    return f" within the patience of {patience:g} s"
+
+
+def not_over(within: str) -> str:
+    """Return that a phase was not over within a time, as `within_patience` says it; "" for none."""
+    return f", which was not over{within}" if within else ""
 
 
 class HandoverEvaluator(Evaluator):
@@ -121,8 +65,11 @@ class HandoverEvaluator(Evaluator):
 
     It is a success when the object reached each receiver in turn "without being supported anywhere else and always in
     contact with at least one of the participants" once it was held at all, [Fernandes2020] sec. 3.1.2, and the robot
-    took an empty gripper for a failed reception as often as it had one. A failure has a `Cause`, the metric
-    `decided_by`, which is told apart by what the person did (`PersonsDeeds`).
+    took an empty gripper for a failed reception, and a full one that had opened for a failed delivery, as often as it
+    had one. Where it closes on an object that it had released and that floats, before the object is lost for good, the
+    delivery has failed, not yet the handover. A failure has a `Cause`, the metric `decided_by`, which is told apart by
+    what the person did (`PersonsDeeds`). A robot that gives up after the last transfer, on its way back, has handed the
+    object over, but not ended the handover: the metric `handed_over` tells the two apart.
 
     Attributes:
         phases: phases of the robot and when they began, s, in chronological order; a phase may recur.
@@ -130,7 +77,7 @@ class HandoverEvaluator(Evaluator):
         transfers: those that the robot signalled for.
     """
 
-    records = (Metric, Transfer, PersonsDeeds, Miss)
+    records = (Metric, Transfer, Approach, PersonsDeeds, Miss)
 
     def __init__(self, parameters: HandoverParameters, receivers: Sequence[str], failures: int = 0) -> None:
         self.parameters, self.receivers, self.failures = parameters, tuple(receivers), failures
@@ -140,42 +87,63 @@ class HandoverEvaluator(Evaluator):
         x, y, z = parameters.p_WG_handover.tolist()
         self._place = (x, y, z)
         self._t = 0.0
-        self._steps = self._saturated = self._failed = 0
+        self._steps = self._saturated = self._failed = self._failed_deliveries = 0
         self._codes = (-1, -1)
         self._arrival: tuple[float, float] | None = None
-        self._nearest = math.inf
+        self._approach: Approach | None = None  # of the phase under way, where it has a place to come to
+        self._gate = tuple(float(paper_values("free_flyer", "decision")[name]) for name in _GATE)
         self._angles: dict[str, float] = {}
         self._unprovoked = 0
         self._lost: tuple[float, str, str] | None = None  # when, who had held it, and the robot's phase
-        self._deeds = PersonsDeeds()
-        self._empty = 0
+        self._track_end = end_of_track(parameters.hand_track)
+        self._deeds = PersonsDeeds(led=parameters.is_led, by_track=bool(parameters.hand_track))
+        self._off: float | None = None  # of the object from the fingers that last closed on nothing, m
+        self._undelivered = False
+        self._empty = self._full = self._disturbed = 0
         self._stability: dict[str, Metric] = {}
+
+    def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
+        """Read the limits of arrival of the unit that decides; one that has no such keeps those of `paper.toml`."""
+        if "decision" in units:
+            start = units["decision"].start
+            self._gate = tuple(float(start.get(name, x)) for name, x in zip(_GATE, self._gate, strict=True))
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Follow phases, holder and gripper."""
         self._t = t
         self._steps += 1
-        self._saturated += bool(signals["thrusters.saturated"])
-        codes = (int(signals["decision.phase"]), int(signals["person.holder"]))
-        x, y, z = signals["robot.p_WG"].tolist()
-        speed = float(signals["decision.speed_G"])
+        plain = signals.plain
+        self._saturated += bool(plain("thrusters.saturated"))
+        codes = (plain("decision.phase"), plain("person.holder"))
+        x, y, z = plain("robot.p_WG")
         held_before = self._holder
         if codes != self._codes:
-            self._change(t, signals, (x, y, z), speed)
+            self._change(t, signals, (x, y, z), plain("decision.speed_G"))
             self._codes = codes
-        if self._under_way is not None:
-            self._under_way.hardest = max(self._under_way.hardest, math.hypot(*signals["person.f_H"].tolist()))
+        phase, holder, transfer = self._phase, self._holder, self._under_way
+        if transfer is not None:
+            transfer.hardest = max(transfer.hardest, math.hypot(*plain("person.f_H")))
         if self._lost is None or t < self._lost[0] + _SETTLING:
-            self._deeds.follow(t, signals, self._holder, held_before)
-        self._nearest = min(self._nearest, math.dist((x, y, z), self._place))
-        if self.transfers and self._phase not in _NOT_YIELDING:
+            self._deeds.follow(t, signals, holder, held_before)
+        if phase in _ARRIVING:
+            self._approached(phase, (x, y, z), plain("decision.p_WG_goal"), plain("decision.speed_G"))
+        if self.transfers and phase not in _NOT_YIELDING:
             self.transfers[-1].displaced((x, y, z), self._place)
-            if self._phase in ("SIGNAL", "CHECK_VELOCITY"):
-                pushed = self._holder != "GRIPPER" and bool(signals["person.f_G"].any())
-                touches = pushed or self._holder == "BOTH"
-                self.transfers[-1].touched |= touches
-            if self._phase == "CHECK_VELOCITY":
-                self.transfers[-1].waited(speed)
+            if phase in ("SIGNAL", "CHECK_VELOCITY"):
+                # an object in the gripper pulls at it by its own inertia, too: there the hand tells a touch
+                felt = plain("person.f_H" if holder == "GRIPPER" else "person.f_G")
+                self.transfers[-1].touched |= holder == "BOTH" or any(felt)
+            if phase == "CHECK_VELOCITY":
+                self.transfers[-1].waited(plain("decision.speed_G"))
+
+    def _approached(
+        self, phase: str, p_WG: tuple[float, float, float], goal: tuple[float, float, float], speed: float
+    ) -> None:
+        """Follow the gripper's way to a goal, m, from a new goal on anew."""
+        if self._approach is None or self._approach.p_WG_goal != goal:
+            gate_error, tolerance, _ = self._gate
+            self._approach = Approach(goal, gate_error if phase == "MOVE_TO_HANDOVER" else tolerance)
+        self._approach.moved(p_WG, speed)
 
     def _change(self, t: float, signals: Signals, p_WG: tuple[float, float, float], speed: float) -> None:
         """Handle a change of phase or holder."""
@@ -183,21 +151,32 @@ class HandoverEvaluator(Evaluator):
             self._stability = stability_metrics(signals, ("impedance", "pose"))
         phase, holder = signals.text("decision.phase"), signals.text("person.holder")
         self._failed = int(signals["decision.failed_receptions"])
+        failed = int(signals["decision.failed_deliveries"]) if "decision.failed_deliveries" in signals else 0
+        self._undelivered |= phase == "GIVEN_UP" and failed > self._failed_deliveries
+        self._failed_deliveries = failed
         if phase != self._phase:
             left, _ = self.phases[-1] if self.phases else ("", 0.0)
             self.phases.append((phase, t))
             if left in _CLOSING:
                 self._closed(float(signals["person.gripper_angle"]), holder)
+                self._off = self._deeds.from_fingers(signals)
             self._enter(phase, left, t, p_WG, speed)
         if holder != self._holder:
             self.holders.append((holder, t))
             self._receive(holder, t)
 
     def _enter(self, phase: str, left: str, t: float, p_WG: tuple[float, float, float], speed: float) -> None:
+        if phase in _ARRIVING:
+            self._approach = None
         if phase == "ACTIVATE_IMPEDANCE" and self._arrival is None:
             self._arrival = (math.dist(p_WG, self._place), speed)
         if phase == "CHECK_ANGLE" and self._holder not in ("GRIPPER", "BOTH"):
             self._empty += 1
+        if left == "VERIFY_RELEASE" and self._holder in ("GRIPPER", "BOTH"):
+            self._full += 1
+            self._disturbed += self._holder == "BOTH"
+            if self.transfers:
+                self.transfers[-1].done = None
         if phase == "SIGNAL":
             self._deeds.signalled()
         if phase == "SIGNAL" and self._under_way is not None:
@@ -218,6 +197,8 @@ class HandoverEvaluator(Evaluator):
     def _receive(self, holder: str, t: float) -> None:
         if holder == "FREE" and len(self.holders) > 1 and self._lost is None:
             self._lost = (t, self.holders[-2][0], self._phase)
+        if holder == "GRIPPER" and self._phase == "VERIFY_RELEASE":
+            self._lost = None
         if self._under_way is not None and holder == self._under_way.receiver:
             self._under_way.done = t
 
@@ -235,19 +216,37 @@ class HandoverEvaluator(Evaluator):
 
     @property
     def over(self) -> bool:
-        """Whether the robot is done or has given up, or the object is lost."""
-        if self._lost is not None and self._t >= self._lost[0] + _SETTLING:
+        """Whether the robot is done or has given up, the object is lost, or a recorded hand has ended before its part.
+
+        That hand stays where it is, and the robot, at rest in its place, would wait for it until its patience ends.
+        """
+        if self._is_forsaken:
+            return True
+        if self._lost is not None and self._t >= self._lost[0] + _SETTLING and self._phase != "VERIFY_RELEASE":
             return True
         return self._phase in ("DONE", "GIVEN_UP") and self._t >= self.phases[-1][1] + _SETTLING
+
+    @property
+    def _handed_over(self) -> bool:
+        """Whether each receiver has had the object in turn, and the last one has it, never out of both hands."""
+        received = [t.receiver for t in self.transfers if t.done is not None]
+        return self._lost is None and received == list(self.receivers) and self._holder == self.receivers[-1]
+
+    @property
+    def _is_forsaken(self) -> bool:
+        """Whether the robot waits for a pull or push, and the track that leads the hand ended a while ago."""
+        transfer, end = self._under_way, self._track_end
+        if end is None or transfer is None or self._phase != "CHECK_VELOCITY" or transfer.touched:
+            return False
+        return self._lost is None and self._t >= max(end, transfer.asked) + _LINGERING
 
     def outcome(self) -> Outcome:
         """Return whether the object changed hands as it should, why, and the metrics."""
         success = (
-            self._lost is None
+            self._handed_over
             and self._phase == "DONE"
-            and [t.receiver for t in self.transfers if t.done is not None] == list(self.receivers)
-            and self._holder == self.receivers[-1]
             and self._failed == self._empty >= self.failures
+            and self._failed_deliveries == self._full
         )
         cause, reason = (Cause.NONE, self._success()) if success else self._failure()
         return Outcome(
@@ -255,12 +254,18 @@ class HandoverEvaluator(Evaluator):
         )
 
     def _metrics(self) -> dict[str, Metric]:
-        metrics: dict[str, Metric] = {}
+        handed = "1 if each receiver got the object in turn, never out of both hands, whatever the robot did after it"
+        metrics = {"handed_over": Metric(float(self._handed_over), "1", handed)}
         for prefix, transfer in zip(("transfer", "return"), self.transfers, strict=False):
             metrics |= transfer.metrics(prefix)
         if "GRIPPER" in self.receivers:
             empty = "receptions after which the robot found its gripper empty"
             metrics["failed_receptions"] = Metric(self._failed, "1", empty)
+        if "HAND" in self.receivers:
+            full = "deliveries after which the robot found the object still between its fingers, or gone unreleased"
+            metrics["failed_deliveries"] = Metric(self._failed_deliveries, "1", full)
+            both = "times that the robot looked whether the object was gone, and closed on it in the person's hand"
+            metrics["disturbed_deliveries"] = Metric(self._disturbed, "1", both)
         if self.transfers:
             alone = "times that the robot let go, or closed, though nobody had touched it since its signal"
             metrics["unprovoked"] = Metric(self._unprovoked, "1", alone)
@@ -304,13 +309,21 @@ class HandoverEvaluator(Evaluator):
 
     def _success(self) -> str:
         received = [f"{_PEOPLE[t.receiver]} had the object at {t.done:.1f} s" for t in self.transfers]
-        again = f" after {self._failed} failed reception{'s' * (self._failed > 1)}" if self._failed else ""
-        return " and ".join(received) + again + ", and it was never out of both hands"
+        counts = {"delivery": self._failed_deliveries, "reception": self._failed}
+        failed = [counted(n, what) for what, n in counts.items() if n]
+        after = f" after {' and '.join(failed)}" if failed else ""
+        never = "never lost" if self._failed_deliveries else "never out of both hands"
+        return " and ".join(received) + after + f", and it was {never}"
 
     def _failure(self) -> tuple[Cause, str]:
         """Return why the object was lost, or the robot did not finish, or finished otherwise than it should."""
         if self._lost is not None:
             return self._loss(*self._lost)
+        if self._is_forsaken and self._under_way is not None:
+            transfer, end = self._under_way, self._track_end
+            cause, why = self._deeds.untouched(_TOUCH[transfer.receiver], transfer.asked, end)
+            after = f", until the track ended at {end:.1f} s" if end is not None and end >= transfer.asked else ""
+            return cause, f"nobody answered the robot's signal of {transfer.asked:.1f} s: {why}{after}; {self._where}"
         if self._phase not in ("DONE", "GIVEN_UP"):
             text = f"stopped at {self._t:.1f} s in phase {self._phase}, before the handover was done; {self._where}"
             return Cause.OUT_OF_TIME, text
@@ -322,6 +335,9 @@ class HandoverEvaluator(Evaluator):
             return Cause.SLIPPED, f"{text}; {self._where}"
         if self._failed > self._empty:
             return Cause.OTHER, f"the robot took its gripper for empty, which held the object; {self._where}"
+        if self._failed_deliveries < self._full:
+            text = "the robot took its gripper for empty, which had closed on the object that it had released"
+            return Cause.OTHER, f"{text}; {self._where}"
         if self._failed < self.failures:
             text = f"{self._failed} failed receptions where {self.failures} was staged; {self._where}"
             return Cause.OTHER, text
@@ -329,8 +345,7 @@ class HandoverEvaluator(Evaluator):
 
     def _loss(self, t: float, holder: str, phase: str) -> tuple[Cause, str]:
         """Return why the object was lost at t by a holder in a phase of the robot."""
-        opens = phase in ("RELEASE_OBJECT", "DEACTIVATE_IMPEDANCE", "ACTIVATE_IMPEDANCE", "OPEN_GRIPPER")
-        if holder == "GRIPPER" and opens:
+        if holder == "GRIPPER" and phase in _OPENING:
             return self._deeds.released(t)
         if holder == "HAND":
             return self._deeds.dropped(t)
@@ -342,22 +357,41 @@ class HandoverEvaluator(Evaluator):
         transfer = self._under_way
         if before == "CHECK_VELOCITY" and transfer is not None:
             waited, touch = self.phases[-1][1] - transfer.asked, _TOUCH[transfer.receiver]
-            cause, why = self._deeds.unfelt(touch, transfer.fastest, self._threshold(transfer.receiver))
-            return cause, f"the robot never felt a {touch} within {waited:.0f} s of its signal: {why}"
+            if self.parameters.is_led and not transfer.touched:
+                cause, why = self._deeds.untouched(touch, transfer.asked, self._track_end)
+            else:
+                threshold = self.parameters.threshold(transfer.receiver)
+                cause, why = self._deeds.unfelt(touch, transfer.fastest, threshold)
+            for_how_long = self._in_patience or f" within {waited:.0f} s"
+            return cause, f"the robot never felt a {touch}{for_how_long} after its signal: {why}"
         if before == "CHECK_ANGLE":
             text = f"the robot gave up after {self._failed} failed receptions{self._deeds.receptions()}"
             return Cause.RECEPTIONS_FAILED, text
+        if self._undelivered:
+            how = "still held what it had released" if before == "VERIFY_RELEASE" else "was empty, and had not opened"
+            often = counted(self._failed_deliveries, "delivery")
+            return Cause.DELIVERIES_FAILED, f"the robot gave up after {often}: its gripper {how}"
         if before == "GRASP_OBJECT":
-            return Cause.NOT_FETCHED, "the robot closed its gripper and found nothing in it"
-        if before == "MOVE_TO_HANDOVER":
-            place = "(" + ", ".join(f"{x:.2f}" for x in self._place) + ")"
-            nearest = f"the gripper came no nearer than {self._nearest:.2f} m to its place at {place} m"
-            return Cause.OUT_OF_REACH, f"out of reach, or not at rest in time: {nearest}"
-        return Cause.OTHER, f"the robot gave up in phase {before}"
+            off = "" if self._off is None else f": the object was {1000.0 * self._off:.0f} mm from its fingers"
+            return Cause.NOT_FETCHED, f"the robot closed its gripper and found nothing in it{off}"
+        if before in _ARRIVING and self._approach is not None:
+            return self._not_arrived(before, self._approach)
+        return Cause.OTHER, f"the robot gave up in phase {before}{not_over(self._in_patience)}"
 
-    def _threshold(self, receiver: str) -> float:
-        """Return the speed above which the robot feels a receiver's pull or push, as published, m/s."""
-        return float(paper_values("free_flyer", "published")[f"velocity_{receiver.lower()}"][self.parameters.behaviour])
+    @property
+    def _in_patience(self) -> str:
+        """Within which time the robot has not done what it gave up, for a sentence; "" if it had the time."""
+        return within_patience(self.phases, self.parameters.patience)
+
+    def _not_arrived(self, phase: str, approach: Approach) -> tuple[Cause, str]:
+        """Return why the robot gave up in a phase that is to bring its gripper to rest in a place."""
+        waited = self.phases[-1][1] - self.phases[-2][1]
+        gate_error, _, rest = self._gate
+        for_how_long = not_over(self._in_patience) or f" after {waited:.0f} s"
+        text = f"the robot gave up in phase {phase}{for_how_long}: {approach.fault(rest)}"
+        if self._handed_over:
+            return Cause.NOT_RETREATED, f"the object changed hands, but then {text}"
+        return (Cause.NOT_SETTLED if approach.nearest < gate_error else Cause.OUT_OF_REACH), text
 
     @property
     def _where(self) -> str:

@@ -15,22 +15,31 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.cosim.system.system import System
-from handover.plants.free_flyer.hand.hand_track import InvalidTrack, read_track
-from handover.plants.free_flyer.hand.parameters import Params
+from handover.cosim.system.system import PortName, System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.outside import LedHand
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.places import Place
+from handover.scenarios.experiment.pushable import Pushable
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
-from handover.scenarios.free_flyer.parameters import HandoverParameters, Task, TaskParameters
+from handover.scenarios.free_flyer.led_hand import faults_of_person, leader
+from handover.scenarios.free_flyer.parameters import Hand, HandoverParameters, Task, TaskParameters
 from handover.scenarios.free_flyer.places import PLACES_OF_HANDOVER
 from handover.scenarios.free_flyer.published import published_of_giving, published_of_receiving
-from handover.scenarios.free_flyer.robot_wiring import common_period, expected_lag, thruster_settings, wire_handover
+from handover.scenarios.free_flyer.robot_wiring import (
+    PUSHES,
+    add_controllers,
+    add_robot,
+    check_reach,
+    common_period,
+    decision_settings,
+    undriven_joints,
+    wire_handover,
+)
 
 _FLIGHT = 120
 """Time for flying, fetching and retreating, without the waiting for the person, s (assumed)."""
@@ -58,6 +67,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         "return_speed",
         "return_displacement",
         "failed_receptions",
+        "failed_deliveries",
         "arrival_error",
         "saturated_share",
         "pole_margin_impedance",
@@ -82,32 +92,16 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
             InvalidParameter: the handover place is out of the person's reach, or the hand's track cannot be followed.
         """
         p = parameters
-        _check_reach(p.p_WG_handover)
+        check_reach(p.p_WG_handover, paper_values("free_flyer", "person"))
         navigation_seed, person_seed = (int(n) for n in np.random.SeedSequence(seed).generate_state(2) >> 1)
         at = {name: np.array(value) for name, value in paper_values("free_flyer", "handover_place").items()}
-        p_WO_0, behaviour = at["p_WO_0"], p.behaviour.item
-        robot, model, lag = p.robot, vars(p.model), expected_lag(p.propulsion)
-        delay = p.delay + p.navigation_delay
+        p_WO_0 = at["p_WO_0"]
         s = System()
-        s.add(
-            "decision",
-            fmu("decision"),
-            task=self.task,
-            behaviour=behaviour,
-            p_BG=p.model.p_BG,
-            p_WG_handover=p.p_WG_handover,
-            p_WO_0=p_WO_0,
-            p_OG=at["p_OG"],
-            gated=p.gated,
-            gradual=p.gradual,
-            patience=p.patience,
-        )
-        s.add("impedance", fmu("impedance"), behaviour=behaviour, **model, delay=delay, lag=lag)
-        s.add("pose", fmu("pose"), **model, delay=delay, lag=lag)
+        decision = decision_settings(p)
+        s.add("decision", fmu("decision"), task=self.task, p_WO_0=p_WO_0, p_OG=at["p_OG"], **decision)
+        add_controllers(s, fmu, p)
         step = common_period([s.units[name] for name in self.cycle()])
-        s.add("thrusters", fmu("thrusters"), period=step, **thruster_settings(p.propulsion, p.delay, p.stuck_nozzle))
-        s.add("robot", fmu("robot"), period=step, **vars(robot), p_WB_0=at["p_WG_0"] - robot.p_BG)
-        s.add("navigation", fmu("navigation"), period=step, seed=navigation_seed, delay=p.navigation_delay)
+        add_robot(s, fmu, p, at["p_WG_0"], period=step, seed=navigation_seed)
         s.add(
             "person",
             fmu("person"),
@@ -118,15 +112,35 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
             **p.traits,
             grip_fades=p.gradual,
             **self.person,
-            **_leader(p.hand_track),
+            **leader(p, float(self.stop_time(p))),
         )
         wire_handover(s)
+        if led := self.led_hand(p):
+            for name in (*led.inputs, led.age):
+                s.external(PortName(*name.split(".")))
         return s
+
+    def check_unit_values(self, system: System, given: Sequence[str]) -> None:
+        """Reject an arm that nothing drives, and what only a simulated person has where there is none.
+
+        Raises:
+            InvalidParameter: with all such values.
+        """
+        if faults := undriven_joints(system) + faults_of_person(system, given):
+            raise InvalidParameter(faults)
 
     def stop_time(self, parameters: HandoverParameters) -> Fraction:
         """Return the robot's patience for each signal, plus time for flying."""
         waits = len(self.receivers) + self.failures
         return Fraction(round(1000 * parameters.patience), 1000) * waits + _FLIGHT
+
+    def led_hand(self, parameters: HandoverParameters) -> LedHand | None:
+        """Return the person's hand, if it comes from outside."""
+        if parameters.hand is not Hand.OUTSIDE:
+            return None
+        person = paper_values("free_flyer", "person")
+        x, y, z = (float(n) for n in person["p_WH_0"])
+        return LedHand("person", (x, y, z), float(person["arm_reach"]))
 
     def evaluator(self, parameters: HandoverParameters) -> HandoverEvaluator:
         """Return the evaluator of one handover."""
@@ -150,48 +164,19 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
 
     def time_figures(self, parameters: HandoverParameters, record: Record) -> list[TimeFigure]:
         """Return paths, the gripper, who holds the object, and thrust over time."""
-        from handover.scenarios.free_flyer.plots import figures_of_handover
+        from handover.scenarios.free_flyer.handover_plots import figures_of_handover
 
         return figures_of_handover(parameters, record)
+
+    def pushes(self, parameters: HandoverParameters) -> tuple[Pushable, ...]:  # noqa: ARG002
+        """Return the robot."""
+        return PUSHES
 
     def replay(self, parameters: HandoverParameters, record: Record) -> Replay:  # noqa: ARG002
         """Return robot, hand and object in space."""
         from handover.scenarios.free_flyer.replay import replay_handover
 
         return replay_handover(record)
-
-
-def _leader(track: str) -> dict[str, Any]:
-    """Return what leads the hand, as the parameters of the person's unit: none of them if it is a simulated person.
-
-    The file's path is absolute, since a unit may run in another folder.
-
-    Raises:
-        InvalidParameter: the track cannot be followed.
-    """
-    if not track:
-        return {}
-    path = Path(track).absolute()
-    try:
-        read_track(path, Params().age_max)
-    except InvalidTrack as e:
-        raise InvalidParameter([f"hand_track: {fault}" for fault in e.faults]) from e
-    return {"driven_by": "track", "track": str(path)}
-
-
-def _check_reach(p_WG: Floats) -> None:
-    """Reject a handover place where the person could not reach the object's other end.
-
-    Raises:
-        InvalidParameter: it is one.
-    """
-    person = {name: np.array(value) for name, value in paper_values("free_flyer", "person").items()}
-    p_WH = p_WG + person["p_OH"] - person["p_OG"]
-    distance, reach = float(np.linalg.norm(p_WH - person["p_WH_0"])), float(person["arm_reach"])
-    if distance > reach:
-        place = ", ".join(f"{x:g}" for x in p_WG)
-        text = f"the hand would be {distance:.2f} m from where it rests, and can be {reach:g} m from it"
-        raise InvalidParameter([f"p_WG_handover: [{place}] m is out of the person's reach: {text}"])
 
 
 class Collaborative(FlyerHandover):
@@ -235,7 +220,7 @@ class RobotToHuman(FlyerHandover):
     name: ClassVar[str] = "flyer_robot_to_human"
     title: ClassVar[str] = "a free-flyer fetches an object and gives it to a person"
     task: ClassVar[str] = "robot_to_human"
-    person: ClassVar[Mapping[str, Any]] = {"motion": "take", "object_with": "free"}
+    person: ClassVar[Mapping[str, Any]] = {"motion": "take", "motion_again": "take", "object_with": "free"}
     receivers: ClassVar[tuple[str, ...]] = ("HAND",)
 
     def published(self, parameters: HandoverParameters) -> Sequence[PublishedValue]:

@@ -11,20 +11,16 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
+from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.places import Place
+from handover.scenarios.experiment.pushable import Pushable
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.free_flyer.impedance_evaluation import ImpedanceEvaluator
-from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Wrench
+from handover.scenarios.free_flyer.parameters import ImpedanceParameters
 from handover.scenarios.free_flyer.places import PLACES_OF_PUSH
 from handover.scenarios.free_flyer.published import published_of_push
-from handover.scenarios.free_flyer.robot_wiring import (
-    expected_lag,
-    thruster_settings,
-    wire_controller,
-    wire_forces,
-    wire_navigation,
-)
+from handover.scenarios.free_flyer.robot_wiring import PUSHES, undriven_joints, wired_push
 
 
 class FlyerImpedance(Experiment[ImpedanceEvaluator]):
@@ -56,36 +52,23 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
 
     def build(self, parameters: ImpedanceParameters, seed: int, fmu: FmuOf) -> System:
         """Wire robot, thrusters, navigation, impedance controller and push; the gripper starts at its place of rest."""
-        p = parameters
-        p_WG, robot_body = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"]), p.robot
-        s = System()
-        impedance = s.add(
-            "impedance",
-            fmu("impedance"),
-            behaviour=p.behaviour.item,
-            delay=p.delay + p.navigation_delay if p.delay_known else 0.0,
-            lag=expected_lag(p.propulsion),
-            **vars(p.model),
-            p_WG_goal=p_WG,
-            q_WG_goal=np.array([1.0, 0.0, 0.0, 0.0]),
-            active=True,
-        )
-        thrusters = s.add("thrusters", fmu("thrusters"), **thruster_settings(p.propulsion, p.delay, p.stuck_nozzle))
-        push = s.add(
-            "push",
-            fmu("push"),
-            axis=p.axis.name.lower(),
-            force=p.force if p.kind is Wrench.FORCE else 0.0,
-            torque=p.torque if p.kind is Wrench.TORQUE else 0.0,
-            start=p.begin,
-            duration=p.duration,
-        )
-        robot = s.add("robot", fmu("robot"), **vars(robot_body), p_WB_0=p_WG - robot_body.p_BG)
-        navigation = s.add("navigation", fmu("navigation"), seed=seed, delay=p.navigation_delay)
-        wire_controller(s, impedance, navigation, thrusters)
-        wire_navigation(s, robot, navigation)
-        wire_forces(s, robot, thrusters, push)
-        return s
+        p_WG, robot = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"]), parameters.robot
+        controller = {
+            "behaviour": parameters.behaviour.item,
+            **vars(parameters.model),
+            "p_WG_goal": p_WG,
+            "q_WG_goal": np.array([1.0, 0.0, 0.0, 0.0]),
+        }
+        return wired_push(fmu, parameters, seed, controller, {**vars(robot), "p_WB_0": p_WG - robot.p_BG})
+
+    def check_unit_values(self, system: System, given: Sequence[str]) -> None:  # noqa: ARG002
+        """Reject an arm that nothing drives.
+
+        Raises:
+            InvalidParameter: a robot has such a one.
+        """
+        if faults := undriven_joints(system):
+            raise InvalidParameter(faults)
 
     def stop_time(self, parameters: ImpedanceParameters) -> Fraction:
         """Return the end of the push, plus the patience for the return to rest."""
@@ -117,9 +100,13 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
 
     def time_figures(self, parameters: ImpedanceParameters, record: Record) -> list[TimeFigure]:
         """Return errors actual and calculated, push and thrust over time."""
-        from handover.scenarios.free_flyer.plots import figures_of_push
+        from handover.scenarios.free_flyer.push_plots import figures_of_push
 
         return figures_of_push(parameters, record)
+
+    def pushes(self, parameters: ImpedanceParameters) -> tuple[Pushable, ...]:  # noqa: ARG002
+        """Return the robot."""
+        return PUSHES
 
     def replay(self, parameters: ImpedanceParameters, record: Record) -> Replay:
         """Return the robot, its gripper's place of rest and the push in space."""

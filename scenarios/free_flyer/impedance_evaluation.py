@@ -181,7 +181,7 @@ def _times(M: Floats, v: Floats) -> Floats:
 _REST_POSITION, _REST_ANGLE = 0.010, 0.030
 """Errors below which the robot counts as at rest, m and rad: some three times the noise of its navigation (assumed)."""
 
-_BAND = f"{1000 * _REST_POSITION:.0f} mm and {_REST_ANGLE:g} rad"
+_BAND = f"{1000 * _REST_POSITION:.0f} mm and {math.degrees(_REST_ANGLE):.1f}°"
 _MODEL = "[Fernandes2020] eq. (4.4)"
 
 _RESTING = 5.0
@@ -271,7 +271,7 @@ class ImpedanceEvaluator(Evaluator):
 
     def _reason(self, agrees: bool, by: tuple[float, float], share: float) -> str:
         far = f"{1000 * by[0]:.1f} mm" if by[0] < 1.0 else f"{by[0]:.1f} m"
-        apart = f"{far} and {by[1]:.3f} rad"
+        apart = f"{far} and {math.degrees(by[1]):.2f}°"
         model = (
             f"agreed with the impedance model within {apart}"
             if agrees
@@ -293,5 +293,5 @@ class ImpedanceEvaluator(Evaluator):
             return f"stopped at {self._t:.1f} s, before the robot could come to rest"
         return (
             f"the gripper did not come back to rest, within {_BAND}, in {p.patience:.0f} s: {self._last[0]:.2f} m and "
-            f"{self._last[1]:.2f} rad away at the end"
+            f"{math.degrees(self._last[1]):.1f}° away at the end"
         )

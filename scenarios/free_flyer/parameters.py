@@ -7,14 +7,16 @@ from fractions import Fraction
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
-from handover.cosim.blocks.units import Metre, Newton, NewtonMetre, Number, Second
+from handover.cosim.blocks.units import Kilogram, Metre, Newton, NewtonMetre, Number, Second
 from handover.scenarios.experiment.paper import paper_values
 
 _UNSKILLED_ERRORS = 8.0
-"""Errors of sight and timing at skill 0, over those at skill 1 (assumed)."""
+"""Errors of sight, timing and effort at skill 0, over those at skill 1 (assumed)."""
+_HASTE = 0.3
+"""Share of attempts at skill 0 in which the person does not wait for the gripper (assumed)."""
 _YIELDING = 1.5
 """Force at which the person's arm yields, over the strength of a pull (assumed)."""
-_SCALED = ("timing_error", "reaction_time")
+_SCALED = ("timing_error", "effort_spread", "reaction_time")
 
 
 class _OfUnit(enum.IntEnum):
@@ -39,6 +41,13 @@ class Propulsion(_OfUnit):
     IDEAL = 0
     LIMITED = 1
     NOZZLES = 2
+
+
+class Hand(_OfUnit):
+    """Who moves the person's hand: a simulated person, or somebody outside the simulation, such as its watcher."""
+
+    SIMULATED = 0
+    OUTSIDE = 1
 
 
 @dataclass(frozen=True)
@@ -105,6 +114,10 @@ class HandoverParameters(RobotAndModel):
     strength: Newton = parameter(
         4.0, "force with which the person pulls; with half of it, pushes", minimum=0.1, maximum=20.0
     )
+    hand: Hand = parameter(
+        Hand.SIMULATED,
+        "who moves the person's hand: a simulated person, or inputs from outside, as of the page of --live",
+    )
     hand_track: str = parameter(
         "",
         "file of a recorded track that leads the hand, of `handover flyer-track`; empty: a simulated person. A track "
@@ -112,7 +125,8 @@ class HandoverParameters(RobotAndModel):
     )
     skill: Number = parameter(
         1.0,
-        "the person's skill: 0 sees and times with eight times the errors, and reacts in twice the time",
+        "the person's skill: 0 has eight times the errors of sight, timing and effort, reacts in twice the time, and "
+        "does not wait for the gripper in three of ten attempts",
         minimum=0.0,
         maximum=1.0,
     )
@@ -127,13 +141,29 @@ class HandoverParameters(RobotAndModel):
     propulsion: Propulsion = parameter(Propulsion.LIMITED, "what the thrusters are like")
     delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
     gradual: bool = parameter(False, "whether the fingers follow pull and push, and their grip fades as they open")
+    verify: bool = parameter(
+        False, "whether the robot closes its gripper again after a release, to notice an object that was not taken"
+    )
     navigation_delay: Second = parameter(
-        0.0, "age of the estimate of the robot's pose and velocities", minimum=0.0, maximum=0.2
+        0.0,
+        "age of the estimate of the robot's pose and velocities, which the controllers expect and reject where they"
+        " would be unstable with it; of one that they do not know, set navigation.delay",
+        minimum=0.0,
+        maximum=0.2,
     )
     gated: bool = parameter(True, "whether the robot yields and signals only once it is at rest in its place")
     patience: Second = parameter(
         60.0, "time in any one phase after which the robot gives up", minimum=1.0, maximum=600.0
     )
+
+    @property
+    def is_led(self) -> bool:
+        """Whether a track or inputs from outside lead the hand, whose wishes nobody can know but from its poses."""
+        return bool(self.hand_track) or self.hand is Hand.OUTSIDE
+
+    def threshold(self, receiver: str) -> float:
+        """Return the speed above which the robot feels a pull by a `HAND`, or a push at its `GRIPPER`, m/s."""
+        return float(paper_values("free_flyer", "published")[f"velocity_{receiver.lower()}"][self.behaviour])
 
     @property
     def traits(self) -> dict[str, float]:
@@ -148,6 +178,8 @@ class HandoverParameters(RobotAndModel):
             "sight_error": worse * self.sight_error,
             "depth_error": worse * self.depth_error,
             "timing_error": worse * skilled["timing_error"],
+            "effort_spread": worse * skilled["effort_spread"],
+            "haste": _HASTE * (1.0 - self.skill),
             "reaction_time": (2.0 - self.skill) * skilled["reaction_time"],
             "interface_delay": self.interface_delay,
         }
@@ -167,6 +199,52 @@ class TaskParameters(HandoverParameters):
     """One handover of any kind."""
 
     task: Task = parameter(Task.ROBOT_TO_HUMAN, "which of the four handovers")
+
+
+class TeamTask(_OfUnit):
+    """The two handovers of two robots."""
+
+    ROBOTS_TO_HUMAN = 0
+    HUMAN_TO_ROBOTS = 1
+
+
+ROBOTS = ("1", "2")
+"""Numbers of two robots, by which the names of their units and ports end."""
+
+
+class Hands(_OfUnit):
+    """With which hands the person holds a large object, and where."""
+
+    TWO = 0
+    ONE_AT_MIDDLE = 1
+    ONE_AT_END = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class TeamParameters(HandoverParameters):
+    """One handover of a large object by two robots, which are alike."""
+
+    task: TeamTask = parameter(TeamTask.ROBOTS_TO_HUMAN, "who gives the object to whom")
+    p_WG_handover: Vector3[Metre] = parameter(
+        np.array([0.28, 0.0, 0.0]),
+        "where the middle between the grippers waits for the person, in W",
+        minimum=-1.0,
+        maximum=1.0,
+    )
+    strength: Newton = parameter(
+        4.0, "force with which each hand of the person pulls; with half of it, pushes", minimum=0.1, maximum=20.0
+    )
+    hands: Hands = parameter(Hands.TWO, "with which hands the person holds the object, and where")
+    hand_delay: Second = parameter(
+        0.0, "how much later than the first the second hand closes and opens", minimum=0.0, maximum=5.0
+    )
+    together: bool = parameter(True, "whether the robots decide together; else each for itself")
+    object_mass: Kilogram = parameter(3.0, "mass of the object", minimum=0.1, maximum=50.0)
+
+    @property
+    def hand_numbers(self) -> tuple[str, ...]:
+        """Numbers of the hands that the person uses, by which the names of their signals end."""
+        return ("1", "2") if self.hands is Hands.TWO else ("1",)
 
 
 class Axis(enum.IntEnum):
@@ -200,7 +278,10 @@ class ImpedanceParameters(RobotAndModel):
     )
     delay: Second = parameter(0.0, "delay between a command and its thrust", minimum=0.0, maximum=0.2)
     navigation_delay: Second = parameter(
-        0.0, "age of the estimate of the robot's pose and velocities", minimum=0.0, maximum=0.2
+        0.0,
+        "age of the estimate of the robot's pose and velocities, which the controller expects if delay_known",
+        minimum=0.0,
+        maximum=0.2,
     )
     delay_known: bool = parameter(
         True, "whether the controller knows both delays, and rejects ones it is unstable with"

@@ -1,5 +1,7 @@
 """What a unit needs to take a place in the scenarios of the free-flyer."""
 
+from collections.abc import Mapping
+
 from handover.scenarios.experiment.places import Place
 
 _FRAMES = (
@@ -15,7 +17,8 @@ _ESTIMATE = {
 _TRUTH = {"p_WB": "in W", "q_WB": "scalar first", "v_WB": "in W", "w_WB": "in W"}
 _WRENCH = {"f_B": "at the centre of mass, in B", "tau_B": "in B"}
 _ON_GRIPPER = {"f_G": "at G, in W", "tau_G": "in W"}
-_MOTION = {"p_WG": "in W", "q_WG": "scalar first", "v_WG": "in W", "w_WB": "in W"}
+_AT_GRIPPER = {"p_WG": "in W", "q_WG": "scalar first", "v_WG": "in W"}
+_MOTION = {**_AT_GRIPPER, "w_WG": "in W"}
 _BODY = {"mass": "as the scenario's factors make it", "I_B": "in B, likewise", "p_BG": "in B, likewise"}
 _CONTROLLER = Place(
     required={"f_cmd": "at the centre of mass, in B", "tau_cmd": "in B"},
@@ -29,6 +32,7 @@ _CONTROLLER = Place(
         "pole_radius": "of metrics of the closed loop, which want damping_ratio and pole_frequency too",
         "damping_ratio": "see pole_radius",
         "pole_frequency": "see pole_radius",
+        "slowest_decay": "a metric of the closed loop, besides those",
         "behaviour": "the scenario's parameter",
         **_BODY,
         "delay": "the sum of the scenario's delay and navigation_delay",
@@ -57,8 +61,13 @@ def _thrusters(*controllers: str) -> Place:
 
 
 _ROBOT = Place(
-    required={**_WRENCH, **_ON_GRIPPER, **_TRUTH, **_MOTION},
-    optional={**_BODY, "p_WB_0": "in W"},
+    required={**_WRENCH, **_ON_GRIPPER, **_TRUTH, **_AT_GRIPPER},
+    optional={
+        **_BODY,
+        "p_WB_0": "in W",
+        "f_P": "in W, of a person's push in a live page, which cannot push without it",
+        "p_BP": "in B, where that acts",
+    },
     remarks=_FRAMES,
 )
 _NAVIGATION = Place(
@@ -132,13 +141,14 @@ PLACES_OF_HANDOVER = {
         optional={
             **_ESTIMATE,
             "gripper_angle": "",
+            "failed_deliveries": "a metric, 0 without it",
             **dict.fromkeys(
-                ("task", "behaviour", "p_WG_handover", "gated", "gradual", "patience"),
+                ("task", "behaviour", "p_WG_handover", "gated", "gradual", "verify", "patience"),
                 "the scenario's, or its parameter's value",
             ),
             "p_BG": "in B",
             "p_WO_0": "in W",
-            "p_OG": "in the object's frame",
+            "p_OG": "from the object's centre, in W",
         },
         remarks=_FRAMES,
     ),
@@ -164,24 +174,124 @@ PLACES_OF_HANDOVER = {
         },
         optional={
             "v_WO": "in W",
-            "activity": "shown as a signal",
+            "activity": "by it, with f_H, the run says why a handover failed",
+            **dict.fromkeys(
+                ("p_WH_goal", "q_WH_goal", "finger_goal", "closed_goal"), "of what `handover flyer-track` writes"
+            ),
             "motion_again": "the scenario's",
             "seed": "follows from the run's seed",
             "p_WO_0": "in W",
             "angle_0": "",
             **dict.fromkeys(
-                ("driven_by", "track"), "of the scenario's parameter hand_track; not set for a simulated person"
+                ("driven_by", "track"),
+                "of the scenario's parameters hand and hand_track; not set for a simulated person",
+            ),
+            **dict.fromkeys(
+                ("p_WH_track", "q_WH_track", "finger_track", "closed_track", "age"),
+                "from outside, with the scenario's parameter hand=outside",
             ),
             "effort": "the scenario's parameter strength",
             "arm_force_max": "follows from the scenario's parameter strength",
             "grip_fades": "the scenario's parameter gradual",
             **dict.fromkeys(("sight_error", "depth_error"), "the scenario's parameter, times what skill makes of it"),
-            **dict.fromkeys(("timing_error", "reaction_time"), "follows from the scenario's parameter skill"),
+            **dict.fromkeys(
+                ("timing_error", "effort_spread", "haste", "reaction_time"),
+                "follows from the scenario's parameter skill",
+            ),
             "interface_delay": "the scenario's parameter",
         },
         remarks=_FRAMES,
     ),
-    "robot": _ROBOT,
+    "robot": Place(required={**_ROBOT.required, **_MOTION}, optional=_ROBOT.optional, remarks=_FRAMES),
     "navigation": _NAVIGATION,
 }
 """Of the handovers, by the units' names in the system."""
+
+_HANDOVER_OF = {
+    "robot": PLACES_OF_HANDOVER["robot"],
+    "navigation": _NAVIGATION,
+    "impedance": _CONTROLLER,
+    "pose": _POSE,
+}
+
+
+def _of_each(names: Mapping[str, str]) -> dict[str, str]:
+    """Return ports of both robots by the names of one's."""
+    return {f"{name}_{i}": text for i in (1, 2) for name, text in names.items()}
+
+
+PLACES_OF_TEAM = {
+    "decision": Place(
+        required=_of_each(
+            {
+                "impedance": "whether the robot's unit impedance is to be active",
+                "pose": "whether its unit pose is to be active",
+                "p_WG_goal": "in W",
+                "q_WG_goal": "scalar first",
+                "closure": "",
+                "light": "by both the person knows when to act",
+                "phase": "by it the run is judged, and ends",
+                "failed_receptions": "a metric",
+                "speed": "by which a pull or push is felt",
+            }
+        ),
+        optional={
+            **_of_each({**_ESTIMATE, "gripper_angle": "", "failed_deliveries": "a metric, 0 without it"}),
+            **dict.fromkeys(
+                ("task", "behaviour", "p_WG_handover", "gated", "gradual", "verify", "patience", "together"),
+                "the scenario's parameter, or follows from it",
+            ),
+            "p_BG": "in B",
+            "p_WO_0": "in W",
+            "p_OG": "in the object's frame, the middle between its handles",
+            "grip_spacing": "between the handles, along y of the object",
+        },
+        remarks=_FRAMES,
+    ),
+    **{f"{name}_{i}": place for i in (1, 2) for name, place in _HANDOVER_OF.items()},
+    **{f"thrusters_{i}": _thrusters("impedance", "pose") for i in (1, 2)},
+    "person": Place(
+        required={
+            **_of_each(
+                {
+                    **_ON_GRIPPER,
+                    **_MOTION,
+                    "closure": "",
+                    "light": "",
+                    "gripper_angle": "",
+                    "p_WH": "in W",
+                    "q_WH": "scalar first",
+                    "finger": "shown in space",
+                    "f_H": "in W",
+                }
+            ),
+            "p_WO": "in W",
+            "q_WO": "scalar first",
+            "grippers_holding": "by it the run is judged",
+            "hands_holding": "by it the run is judged",
+            "motion": "follows from the scenario's parameter task",
+            "object_with": "likewise",
+        },
+        optional={
+            "activity": "shown as a signal",
+            "seed": "follows from the run's seed",
+            "p_WO_0": "in W",
+            "angle_0": "",
+            **dict.fromkeys(("object_mass", "hand_delay", "interface_delay"), "the scenario's parameter"),
+            "p_OG": "as the unit decision has it",
+            "grip_spacing": "likewise",
+            **dict.fromkeys(("hands", "p_OH"), "follows from the scenario's parameter hands"),
+            **dict.fromkeys(
+                ("effort", "arm_force_max"), "follows from the scenario's parameter strength, of each hand"
+            ),
+            "grip_fades": "the scenario's parameter gradual",
+            **dict.fromkeys(("sight_error", "depth_error"), "the scenario's parameter, times what skill makes of it"),
+            **dict.fromkeys(
+                ("timing_error", "reaction_time", "effort_spread", "haste"),
+                "follows from the scenario's parameter skill",
+            ),
+        },
+        remarks=_FRAMES,
+    ),
+}
+"""Of `TwoRobots`, by the units' names in the system."""

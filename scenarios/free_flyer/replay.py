@@ -1,5 +1,7 @@
 """The free-flyer in space: with a person, the object and the hand that takes it, or pushed at its gripper."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -7,28 +9,93 @@ from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, faceted, hull
-from handover.scenarios.free_flyer.parameters import ImpedanceParameters
-from handover.scenarios.free_flyer.plots import phases_of_push
-from handover.scenarios.free_flyer.scene import FINGER_WIDTH, Solid, finger_points, jaw_gap, person_at, robot_at
+from handover.scenarios.experiment.replay import Body, Line, Mesh, PersonView, Replay, ball, faceted, hull
+from handover.scenarios.free_flyer.parameters import ROBOTS, ImpedanceParameters, TeamParameters, Wrench
+from handover.scenarios.free_flyer.push_plots import phases_of_push
+from handover.scenarios.free_flyer.scene import (
+    EDGE,
+    FINGER_WIDTH,
+    Solid,
+    finger_points,
+    hand_at,
+    jaw_gap,
+    large_object_at,
+    person_at,
+    robot_at,
+)
 
 _PUSH, _TWIST, _PATH = "#d1602b", "#8357a8", "#b58a1b"
 _PER_NEWTON, _PER_NEWTON_METRE = 0.04, 0.08
 """Lengths of arrows, m/N and m/(N m)."""
 _ARROW_HEAD, _CLEAR, _AXIS_LENGTH = 0.7, 0.035, 0.12
 """Share of an arrow before its head, its distance from G, m, and length of the axes of a frame, m."""
+_ROOM = 0.1
+"""Metres around the ways of gripper, object and hand: a hand's length."""
+_LAMP, _LIGHT = "#5b6470", "#ffc400"
+_LAMP_RADIUS = 0.028
+_LAMP_PLACE = np.array([-EDGE / 2, 0.0, 0.10])
+"""The signal light: at the face that looks at the person, in B, m (assumed; drawn large, for it is to be seen)."""
+_SEEN_BY_PERSON = PersonView((-1.0, 0.10, 0.42), np.array([[-0.55, -0.42, -0.26], [0.36, 0.34, 0.26]]))
+"""From behind the hand's rest, over gripper and object to the robot (assumed)."""
 _AXES = ("#c0392b", "#2e8b57", "#2f6db5")
 
 
 def replay_handover(record: Record) -> Replay:
     """Return robot, object and hand over a run's time."""
     return Replay(
-        bodies=[*_robot(record, jaw_gap(record)), *_person(record)],
-        lines=_fingers(record),
+        bodies=[*_robot(record, jaw_gap(record)), *_lamp(record), *_person(record)],
+        lines=[*_light(record), *_fingers(record), *_hand_push(record)],
         eye=(-0.9, -1.05, 0.65),
         phases="decision.phase",
+        weightless=True,
+        follow="object",
+        window=_around_transfer(record),
         notes=("No up and no down: in microgravity. The person's arm is not shown.",),
+        person_view=_SEEN_BY_PERSON,
     )
+
+
+def replay_practice(record: Record) -> Replay:
+    """Return object and hand over a run's time."""
+    return Replay(
+        bodies=_person(record),
+        lines=_fingers(record),
+        eye=(-0.9, -1.05, 0.65),
+        weightless=True,
+        follow="object",
+        window=_around_transfer(record, _WAYS[1:]),
+        notes=("No up and no down: in microgravity. The person's arm is not shown.",),
+        person_view=_SEEN_BY_PERSON,
+    )
+
+
+def replay_team(parameters: TeamParameters, record: Record) -> Replay:
+    """Return two robots, the object with its handles, and the hands that the person uses, over a run's time."""
+    hands = [f"_{h}" for h in parameters.hand_numbers]
+    robots = [body for r in ROBOTS for body in _robot(record, jaw_gap(record, f"_{r}"), f"robot_{r}")]
+    thing, *handles = large_object_at(record, 0, parameters.hands)
+    parts = [_body(record, "object", "O", thing), *(_body(record, "handles", "O", handle) for handle in handles)]
+    palms = [_body(record, "hand", f"H{h}", hand_at(record, 0, h)[0]) for h in hands]
+    ways = ("robot_1.p_WG", "robot_2.p_WG", "person.p_WO", *(f"person.p_WH{h}" for h in hands))
+    return Replay(
+        bodies=[*robots, *parts, *palms],
+        lines=[finger for h in hands for finger in _fingers(record, h)],
+        eye=(-1.2, -1.3, 1.3),
+        phases="decision.phase_1",
+        weightless=True,
+        follow="object",
+        window=_around_transfer(record, ways),
+        notes=("No up and no down: in microgravity. The person's arms are not shown.",),
+    )
+
+
+_WAYS = ("robot.p_WG", "person.p_WO", "person.p_WH")
+
+
+def _around_transfer(record: Record, names: Sequence[str] = _WAYS) -> Floats:
+    """Return corners around the ways of grippers, object and hands, shape (2, 3), m; robots stand out of them."""
+    ways = np.vstack([record[name] for name in names])
+    return np.array([ways.min(axis=0) - _ROOM, ways.max(axis=0) + _ROOM])
 
 
 def replay_push(parameters: ImpedanceParameters, record: Record) -> Replay:
@@ -36,27 +103,40 @@ def replay_push(parameters: ImpedanceParameters, record: Record) -> Replay:
     path = Line(label="path of the gripper", colour=_PATH, points=record["robot.p_WG"][:, None], trail=True)
     return Replay(
         bodies=_robot(record, np.zeros(len(record.time))),
-        lines=[path, *push_arrows(record)],
+        lines=[path, *push_arrows(parameters.kind, record), *_hand_push(record)],
         fixed=frame_at("place of rest", np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])),
         eye=(-1.0, -1.15, 0.6),
         phases=phases_of_push(parameters, record),
+        weightless=True,
+        follow="robot",
         notes=(f"Arrows: {1000 * _PER_NEWTON:.0f} mm a newton, {1000 * _PER_NEWTON_METRE:.0f} mm a newton metre.",),
     )
 
 
-def push_arrows(record: Record) -> list[Line]:
-    """Return arrows of the push and the twist, where there are any."""
+def push_arrows(kind: Wrench, record: Record) -> list[Line]:
+    """Return an arrow of the push or the twist, and of the other if there is any."""
     pushes = (
-        ("push", _PUSH, _PER_NEWTON * record["push.f_G"]),
-        ("twist", _TWIST, _PER_NEWTON_METRE * record["push.tau_G"]),
+        (Wrench.FORCE, "push", _PUSH, _PER_NEWTON * record["push.f_G"]),
+        (Wrench.TORQUE, "twist", _TWIST, _PER_NEWTON_METRE * record["push.tau_G"]),
     )
-    return [_arrow(label, colour, record, along) for label, colour, along in pushes if np.any(along)]
+    return [_arrow(label, colour, record, along) for of, label, colour, along in pushes if of is kind or np.any(along)]
 
 
-def _robot(record: Record, gap: Floats) -> list[Body]:
+def _hand_push(record: Record) -> list[Line]:
+    """Return an arrow of the force with which a person pushes the robot in a live page, if the run let it."""
+    if "robot.f_P" not in record or "robot.p_BP" not in record:
+        return []
+    R_WB = Rotation.from_quat(record["robot.q_WB"], scalar_first=True).as_matrix()
+    p_WP = record["robot.p_WB"] + np.einsum("rij,rj->ri", R_WB, record["robot.p_BP"])
+    along = _PER_NEWTON * record["robot.f_P"]
+    shown = np.where(np.any(along != 0.0, axis=1, keepdims=True), along, np.nan)
+    return [_arrow_at("push by hand", _TWIST, p_WP, shown)]
+
+
+def _robot(record: Record, gap: Floats, robot: str = "robot") -> list[Body]:
     """Return cube, arm with palm, and jaws with a gap between them, shape (rows,), m."""
-    p_WB, q_WB = record["robot.p_WB"], record["robot.q_WB"]
-    cube, arm, palm, *jaws = robot_at(record, 0, 0.0)
+    p_WB, q_WB = record[f"{robot}.p_WB"], record[f"{robot}.q_WB"]
+    cube, arm, palm, *jaws = robot_at(record, 0, 0.0, robot)
     bodies = [
         Body(label=label, colour=part.colour, mesh=_own(part, p_WB[0], q_WB[0]), p_WB=p_WB, q_WB=q_WB)
         for label, part in (("robot", cube), ("arm", arm), ("gripper", palm))
@@ -68,27 +148,47 @@ def _robot(record: Record, gap: Floats) -> list[Body]:
     return bodies
 
 
-def _person(record: Record) -> list[Body]:
-    """Return the object and the palm of the hand."""
-    parts = zip(("object", "hand"), ("O", "H"), person_at(record, 0), strict=False)
+def _lamp(record: Record) -> list[Body]:
+    """Return the lamp by which the robot gives its signal."""
+    p_WB, q_WB = record["robot.p_WB"], record["robot.q_WB"]
+    mesh = ball(_LAMP_RADIUS).moved(_LAMP_PLACE)
+    return [Body(label="signal light", colour=_LAMP, mesh=mesh, p_WB=p_WB, q_WB=q_WB)]
+
+
+def _light(record: Record) -> list[Line]:
+    """Return the lamp's light, a ball around it, which is gone while it is off."""
+    R_WB = Rotation.from_quat(record["robot.q_WB"], scalar_first=True).as_matrix()
+    ends = _LAMP_PLACE + np.array([[0.0, 0.0, 0.0], [1e-4, 0.0, 0.0]])
+    points = record["robot.p_WB"][:, None] + np.einsum("rij,nj->rni", R_WB, ends)
+    is_on = record["decision.light"][:, None, None] > 0.5
     return [
-        Body(
-            label=label,
-            colour=part.colour,
-            mesh=_own(part, record[f"person.p_W{frame}"][0], record[f"person.q_W{frame}"][0]),
-            p_WB=record[f"person.p_W{frame}"],
-            q_WB=record[f"person.q_W{frame}"],
+        Line(
+            label="signal light",
+            colour=_LIGHT,
+            points=np.where(is_on, points, np.nan),
+            radii=np.full(2, 1.15 * _LAMP_RADIUS),
         )
-        for label, frame, part in parts
     ]
 
 
-def _fingers(record: Record) -> list[Line]:
-    """Return thumb and fingers."""
-    p_WH = record["person.p_WH"]
-    R_WH = Rotation.from_quat(record["person.q_WH"], scalar_first=True).as_matrix()
-    bent = [finger_points(angles) for angles in record["person.finger"]]
-    colour = person_at(record, 0)[1].colour
+def _person(record: Record) -> list[Body]:
+    """Return the object and the palm of the hand."""
+    thing, palm = person_at(record, 0)[:2]
+    return [_body(record, "object", "O", thing), _body(record, "hand", "H", palm)]
+
+
+def _body(record: Record, label: str, frame: str, part: Solid) -> Body:
+    """Return a part, as it is at the start, that moves with a frame of the person's unit."""
+    p_WF, q_WF = record[f"person.p_W{frame}"], record[f"person.q_W{frame}"]
+    return Body(label=label, colour=part.colour, mesh=_own(part, p_WF[0], q_WF[0]), p_WB=p_WF, q_WB=q_WF)
+
+
+def _fingers(record: Record, suffix: str = "") -> list[Line]:
+    """Return thumb and fingers of the hand, or of one with a suffix."""
+    p_WH = record[f"person.p_WH{suffix}"]
+    R_WH = Rotation.from_quat(record[f"person.q_WH{suffix}"], scalar_first=True).as_matrix()
+    bent = [finger_points(angles) for angles in record[f"person.finger{suffix}"]]
+    colour = hand_at(record, 0, suffix)[0].colour
     fingers: list[Line] = []
     for chain in zip(*bent, strict=True):
         points = p_WH[:, None] + np.einsum("rij,rnj->rni", R_WH, np.array(chain))
@@ -112,7 +212,12 @@ def _arrow(label: str, colour: str, record: Record, along: Floats) -> Line:
     ahead = shown / np.where(length > 0.0, length, 1.0)
     inwards = np.einsum("ij,ij->i", along, record["robot.p_WB"] - p_WG)[:, None] > 0.0
     first = p_WG + np.where(inwards, -shown - _CLEAR * ahead, _CLEAR * ahead)
-    points = np.stack([first + share * shown for share in (0.0, _ARROW_HEAD, _ARROW_HEAD, 1.0)], axis=1)
+    return _arrow_at(label, colour, first, shown)
+
+
+def _arrow_at(label: str, colour: str, first: Floats, along: Floats) -> Line:
+    """Return an arrow from a point, both of shape (rows, 3), m; it is hidden where its length is not a number."""
+    points = np.stack([first + share * along for share in (0.0, _ARROW_HEAD, _ARROW_HEAD, 1.0)], axis=1)
     return Line(label=label, colour=colour, points=points, radii=np.array([0.006, 0.006, 0.018, 0.0005]))
 
 

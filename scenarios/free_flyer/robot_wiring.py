@@ -3,24 +3,28 @@
 Also the metrics of the controllers' closed loops, which they compute by their own models at the start.
 """
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from handover.controllers.free_flyer.ports import PERIOD
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
-from handover.scenarios.experiment.experiment import Metric
+from handover.scenarios.experiment.experiment import FmuOf, Metric
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
-from handover.scenarios.free_flyer.parameters import Propulsion
+from handover.scenarios.experiment.pushable import Pushable
+from handover.scenarios.free_flyer.parameters import HandoverParameters, ImpedanceParameters, Propulsion, Wrench
 
+PUSHES = (Pushable(labels=("robot", "arm", "gripper"), unit="robot", force="f_P", point="p_BP", greatest=5.0),)
+"""A person may push the robot anywhere; with at most the force of the thesis's validation, sec. 4.1.3."""
 _TRUE = ("p_WB", "q_WB", "v_WB", "w_WB")
 _MEASURED = ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")
-_SEEN = ("p_WG", "q_WG", "v_WG", "w_WB")
+_ROBOT = "FreeFlyer"
+_SEEN = ("p_WG", "q_WG", "v_WG", "w_WG")
 
 
 def expected_lag(propulsion: Propulsion) -> float:
@@ -52,6 +56,36 @@ def thruster_settings(propulsion: Propulsion, delay: float, stuck_nozzle: int) -
     return settings | {"flapper_range": opens}
 
 
+def check_reach(p_WG: Floats, person: Mapping[str, Any]) -> None:
+    """Reject a handover place where a person, by parameters of its unit, could not reach the object.
+
+    Raises:
+        InvalidParameter: it is one.
+    """
+    at = {name: np.array(person[name]) for name in ("p_OH", "p_OG", "p_WH_0")}
+    p_WH = p_WG + at["p_OH"] - at["p_OG"]
+    distance, reach = float(np.linalg.norm(p_WH - at["p_WH_0"])), float(person["arm_reach"])
+    if distance > reach:
+        place = ", ".join(f"{x:g}" for x in p_WG)
+        text = f"the hand would be {distance:.2f} m from where it rests, and can be {reach:g} m from it"
+        text += "; move the place towards person.p_WH_0, or raise person.arm_reach"
+        raise InvalidParameter([f"p_WG_handover: [{place}] m is out of the person's reach: {text}"])
+
+
+def undriven_joints(system: System) -> list[str]:
+    """Return what is wrong with robots whose arms have joints that are free to move, and that nothing drives."""
+    return [
+        f"{name}.joints: nothing drives an arm's joints here; {name}.joints=0 is right, or {name}.tolerance_J=0, which "
+        "fixes them; the controller of flyer_arm_impedance drives joints"
+        for name, unit in system.units.items()
+        if unit.description.name == _ROBOT
+        and unit.start.get("joints", 0) > 0
+        and unit.start.get("tolerance_J", 1.0) > 0.0
+        and unit.start.get("lock_time", 1.0) > 0.0
+        and "tau_J" not in system.fed_inputs(name)
+    ]
+
+
 def common_period(controllers: Sequence[PlacedUnit]) -> Fraction | None:
     """Return the period, s, that controllers of another rate than the robot's own share, for its plants to step by.
 
@@ -62,51 +96,125 @@ def common_period(controllers: Sequence[PlacedUnit]) -> Fraction | None:
     return None if len(periods) != 1 or periods == {PERIOD} else periods.pop()
 
 
+def decision_settings(p: HandoverParameters) -> dict[str, Any]:
+    """Return the parameters of the unit that decides, as far as the scenario's say them."""
+    names = ("p_WG_handover", "gated", "gradual", "verify", "patience")
+    return {"behaviour": p.behaviour.item, "p_BG": p.model.p_BG, **{name: getattr(p, name) for name in names}}
+
+
+def add_controllers(s: System, fmu: FmuOf, p: HandoverParameters, suffix: str = "") -> None:
+    """Add a robot's impedance and pose control, under names that end in its suffix."""
+    known: dict[str, Any] = {
+        **vars(p.model),
+        "delay": p.delay + p.navigation_delay,
+        "lag": expected_lag(p.propulsion),
+    }
+    s.add(f"impedance{suffix}", fmu(f"impedance{suffix}"), behaviour=p.behaviour.item, **known)
+    s.add(f"pose{suffix}", fmu(f"pose{suffix}"), **known)
+
+
+def add_robot(
+    s: System,
+    fmu: FmuOf,
+    p: HandoverParameters,
+    p_WG_0: Floats,
+    *,
+    period: Fraction | None,
+    seed: int,
+    suffix: str = "",
+) -> None:
+    """Add a robot, its gripper at p_WG_0, m in W, its thrusters and its navigation, whose noise has the seed."""
+    settings = thruster_settings(p.propulsion, p.delay, p.stuck_nozzle)
+    s.add(f"thrusters{suffix}", fmu(f"thrusters{suffix}"), period=period, **settings)
+    robot = p.robot
+    s.add(f"robot{suffix}", fmu(f"robot{suffix}"), period=period, **vars(robot), p_WB_0=p_WG_0 - robot.p_BG)
+    navigation = f"navigation{suffix}"
+    s.add(navigation, fmu(navigation), period=period, seed=seed, delay=p.navigation_delay)
+
+
 def wire_navigation(s: System, robot: PlacedUnit, navigation: PlacedUnit) -> None:
     """Connect the robot's pose and velocities to the unit that estimates them."""
     for name in _TRUE:
         s.connect(getattr(robot.y, name), getattr(navigation.u, name))
 
 
-def wire_controller(s: System, controller: PlacedUnit, navigation: PlacedUnit, thrusters: PlacedUnit) -> None:
-    """Connect the estimate of the robot's state to a controller, and the controller to the thrusters."""
+def wire_controller(
+    s: System, controller: PlacedUnit, navigation: PlacedUnit, thrusters: PlacedUnit, kind: str = ""
+) -> None:
+    """Connect the estimate of the robot's state to a controller, and the controller to the thrusters.
+
+    `kind` is the name by which the thrusters know it, where that is not its own.
+    """
     wire_estimate(s, navigation, controller)
     for what in ("f", "tau"):
-        s.connect(getattr(controller.y, f"{what}_cmd"), getattr(thrusters.u, f"{what}_{controller.name}"))
+        s.connect(getattr(controller.y, f"{what}_cmd"), getattr(thrusters.u, f"{what}_{kind or controller.name}"))
 
 
-def wire_estimate(s: System, navigation: PlacedUnit, observer: PlacedUnit) -> None:
-    """Connect the estimate of the robot's state to a unit."""
+def wire_estimate(s: System, navigation: PlacedUnit, observer: PlacedUnit, suffix: str = "") -> None:
+    """Connect the estimate of the robot's state to a unit, to inputs whose names may end in a robot's suffix."""
     for name in _MEASURED:
-        s.connect(getattr(navigation.y, name), getattr(observer.u, name))
+        s.connect(getattr(navigation.y, name), getattr(observer.u, name + suffix))
 
 
-def wire_forces(s: System, robot: PlacedUnit, thrusters: PlacedUnit, external: PlacedUnit) -> None:
-    """Connect the thrust to the robot, and an external wrench to its gripper."""
+def wire_forces(s: System, robot: PlacedUnit, thrusters: PlacedUnit, external: PlacedUnit, suffix: str = "") -> None:
+    """Connect the thrust to the robot, and an external wrench, of a suffix, to its gripper."""
     for name in ("f_B", "tau_B"):
         s.connect(getattr(thrusters.y, name), getattr(robot.u, name))
     for name in ("f_G", "tau_G"):
-        s.connect(getattr(external.y, name), getattr(robot.u, name))
+        s.connect(getattr(external.y, name + suffix), getattr(robot.u, name))
 
 
-def wire_handover(s: System) -> None:
-    """Wire all units of a handover that were added under the names of `FlyerHandover.units`."""
-    robot, thrusters, person = (s.units[n] for n in ("robot", "thrusters", "person"))
-    navigation, decision = (s.units[n] for n in ("navigation", "decision"))
-    wire_forces(s, robot, thrusters, person)
+def wired_push(
+    fmu: FmuOf, p: ImpedanceParameters, seed: int, controller: Mapping[str, Any], robot: Mapping[str, Any]
+) -> System:
+    """Return a system of robot, thrusters, navigation, impedance controller and push.
+
+    Args:
+        fmu: gives the units' FMUs.
+        p: the scenario's parameters.
+        seed: of the navigation's noise.
+        controller: parameters of the controller, and its goal, besides what it knows of delays.
+        robot: parameters of the robot.
+    """
+    s = System()
+    lateness: dict[str, Any] = {
+        "delay": p.delay + p.navigation_delay if p.delay_known else 0.0,
+        "lag": expected_lag(p.propulsion),
+    }
+    impedance = s.add("impedance", fmu("impedance"), **lateness, **controller, active=True)
+    thrusters = s.add("thrusters", fmu("thrusters"), **thruster_settings(p.propulsion, p.delay, p.stuck_nozzle))
+    is_force = p.kind is Wrench.FORCE
+    pushed: dict[str, Any] = {"force": p.force if is_force else 0.0, "torque": 0.0 if is_force else p.torque}
+    push = s.add("push", fmu("push"), axis=p.axis.name.lower(), **pushed, start=p.begin, duration=p.duration)
+    body = s.add("robot", fmu("robot"), **robot)
+    navigation = s.add("navigation", fmu("navigation"), seed=seed, delay=p.navigation_delay)
+    wire_controller(s, impedance, navigation, thrusters)
+    wire_navigation(s, body, navigation)
+    wire_forces(s, body, thrusters, push)
+    return s
+
+
+def wire_handover(s: System, suffix: str = "") -> None:
+    """Wire all units of a handover that were added under the names of `FlyerHandover.units`.
+
+    Of two robots the names of each end in its suffix, and so do those of its ports at `decision` and `person`.
+    """
+    robot, thrusters, navigation = (s.units[n + suffix] for n in ("robot", "thrusters", "navigation"))
+    person, decision = (s.units[n] for n in ("person", "decision"))
+    wire_forces(s, robot, thrusters, person, suffix)
     wire_navigation(s, robot, navigation)
-    wire_estimate(s, navigation, decision)
-    s.connect(person.y.gripper_angle, decision.u.gripper_angle)
+    wire_estimate(s, navigation, decision, suffix)
+    s.connect(getattr(person.y, f"gripper_angle{suffix}"), getattr(decision.u, f"gripper_angle{suffix}"))
     for name in ("impedance", "pose"):
-        controller = s.units[name]
-        wire_controller(s, controller, navigation, thrusters)
-        s.connect(getattr(decision.y, name), controller.u.active)
+        controller = s.units[name + suffix]
+        wire_controller(s, controller, navigation, thrusters, name)
+        s.connect(getattr(decision.y, name + suffix), controller.u.active)
         for goal in ("p_WG_goal", "q_WG_goal"):
-            s.connect(getattr(decision.y, goal), getattr(controller.u, goal))
+            s.connect(getattr(decision.y, goal + suffix), getattr(controller.u, goal))
     for name in _SEEN:
-        s.connect(getattr(robot.y, name), getattr(person.u, name))
+        s.connect(getattr(robot.y, name), getattr(person.u, name + suffix))
     for name in ("closure", "light"):
-        s.connect(getattr(decision.y, name), getattr(person.u, name))
+        s.connect(getattr(decision.y, name + suffix), getattr(person.u, name + suffix))
 
 
 _SLOWEST_MODE = {"pose": "the slowest mode, the integrator's"}
@@ -127,10 +235,10 @@ def stability_metrics(signals: Signals, controllers: Sequence[str]) -> dict[str,
         metrics[f"pole_margin_{name}"] = Metric(
             1.0 - radius, "1", f"outermost pole to unit circle, 1 - |z|, above 0 if stable: {text}"
         )
-        slowest = -PERIOD / math.log(radius) if 0.0 < radius < 1.0 else math.inf
-        metrics[f"slowest_decay_{name}"] = Metric(
-            slowest, "s", f"time constant of {_SLOWEST_MODE.get(name, 'the slowest mode')}: {text}"
-        )
+        if f"{name}.slowest_decay" in signals:
+            slowest = float(signals[f"{name}.slowest_decay"])
+            mode = _SLOWEST_MODE.get(name, "the slowest mode")
+            metrics[f"slowest_decay_{name}"] = Metric(slowest, "s", f"time constant of {mode}: {text}")
         metrics[f"damping_ratio_{name}"] = Metric(damping, "1", f"least damping ratio: {text}")
         metrics[f"frequency_{name}"] = Metric(frequency, "rad/s", f"frequency of the least damped poles: {text}")
     return metrics

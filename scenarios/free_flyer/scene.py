@@ -1,5 +1,6 @@
 """The free-flyer's scene as solids, drawn to scale from the side and from above: cube, arm, gripper, hand, object."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -17,6 +18,7 @@ from handover.plants.free_flyer.hand.hand_kinematics import FINGERS, PALM, PALM_
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import figure
+from handover.scenarios.free_flyer.parameters import Hands
 
 _CUBE, _ARM, _JAW, _SKIN, _THING = "#c9d3df", "#8793a3", "#2f6db5", "#e3b591", "#d1602b"
 
@@ -63,16 +65,16 @@ class Solid:
     colour: str
 
 
-def jaw_gap(record: Record) -> Floats:
-    """Return the room between the gripper's jaws over time, shape (rows,), m."""
-    g = paper_values("free_flyer", "person")
-    return g["aperture"] * (record["person.gripper_angle"] - g["angle_empty"]) / (g["angle_open"] - g["angle_empty"])
+def jaw_gap(record: Record, suffix: str = "") -> Floats:
+    """Return the room between the jaws of the gripper, or of a robot's with a suffix, over time, shape (rows,), m."""
+    g, angle = paper_values("free_flyer", "person"), record[f"person.gripper_angle{suffix}"]
+    return g["aperture"] * (angle - g["angle_empty"]) / (g["angle_open"] - g["angle_empty"])
 
 
-def robot_at(record: Record, row: int, gap: float) -> list[Solid]:
-    """Return cube, arm, palm and jaws at one row of a record; `gap` is the room between the jaws, m."""
-    R_WB = rotation_of(_at(record, "robot.q_WB", row))
-    p_WB, p_WG = _at(record, "robot.p_WB", row), _at(record, "robot.p_WG", row)
+def robot_at(record: Record, row: int, gap: float, robot: str = "robot") -> list[Solid]:
+    """Return cube, arm, palm and jaws of a robot at one row of a record; `gap` is the room between the jaws, m."""
+    R_WB = rotation_of(_at(record, f"{robot}.q_WB", row))
+    p_WB, p_WG = _at(record, f"{robot}.p_WB", row), _at(record, f"{robot}.p_WG", row)
     p_BG: Floats = np.transpose(R_WB) @ (p_WG - p_WB)
     face, palm = np.array([-EDGE / 2, 0.0, 0.0]), p_BG + np.array([PALM_DEPTH + _PALM_SIDES[0] / 2, 0.0, 0.0])
     arm = (float(np.linalg.norm(palm - face)), _ARM_WIDTH, _ARM_WIDTH)
@@ -94,9 +96,42 @@ def _at(record: Record, signal: str, row: int) -> Floats:
 def person_at(record: Record, row: int) -> list[Solid]:
     """Return object, palm and fingers at one row of a record."""
     thing = _box(_at(record, "person.p_WO", row), rotation_of(_at(record, "person.q_WO", row)), OBJECT, _THING)
-    p_WH, R_WH = _at(record, "person.p_WH", row), rotation_of(_at(record, "person.q_WH", row))
+    return [thing, *hand_at(record, row)]
+
+
+def hand_at(record: Record, row: int, suffix: str = "") -> list[Solid]:
+    """Return palm and fingers of the hand, or of one with a suffix, at one row of a record."""
+    p_WH, q_WH, finger = (_at(record, f"person.{name}{suffix}", row) for name in ("p_WH", "q_WH", "finger"))
+    R_WH = rotation_of(q_WH)
     palm = p_WH + R_WH @ np.array(PALM)
-    return [thing, _box(palm, R_WH, PALM_SIDES, _SKIN), *_fingers(p_WH, R_WH, _at(record, "person.finger", row))]
+    return [_box(palm, R_WH, PALM_SIDES, _SKIN), *_fingers(p_WH, R_WH, finger)]
+
+
+def large_object_at(record: Record, row: int, hands: Hands) -> list[Solid]:
+    """Return a large object, and then its handles, where they are for the hands that hold it, at one row of a record.
+
+    One hand in the middle has its handle there, in place of the two at the ends. The posts on which handles stand are
+    drawn only: nothing touches them.
+    """
+    large = {name: np.array(value) for name, value in paper_values("free_flyer", "large_object").items()}
+    p_WO, R_WO = _at(record, "person.p_WO", row), rotation_of(_at(record, "person.q_WO", row))
+    length, width, thick = large["object_size"].tolist()
+    bars = large["handle_size"].tolist()
+    beside = np.array([0.0, 0.5, 0.0])
+    if hands is Hands.ONE_AT_MIDDLE:
+        large["hand_spacing"] = np.zeros(1)
+    places = [
+        large[place] + side * large[spacing] * beside
+        for place, spacing in (("p_OG", "grip_spacing"), ("p_OH", "hand_spacing"))
+        for side in (1.0, -1.0)
+    ]
+    handles = [_box(p_WO + R_WO @ place, R_WO, (bars[0], bars[1], bars[2]), _ARM) for place in places]
+    for x, y, z in places:
+        edge = math.copysign(length / 2.0, x)
+        for end in (-0.5, 0.5):
+            middle = np.array([(x + edge) / 2.0, y + end * (bars[1] - bars[2]), z])
+            handles.append(_box(p_WO + R_WO @ middle, R_WO, (abs(x - edge), bars[2], bars[2]), _ARM))
+    return [_box(p_WO, R_WO, (length, width, thick), _THING), *handles]
 
 
 def draw_scene(moments: Mapping[str, Sequence[Solid]], caption: str, folder: Path) -> Figure:

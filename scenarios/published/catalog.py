@@ -6,6 +6,7 @@ from handover.scenarios.published.free_flyer.flyer_approaches import FlyerApproa
 from handover.scenarios.published.free_flyer.flyer_controllers import FlyerControllers
 from handover.scenarios.published.free_flyer.flyer_handover import FlyerHandoverTable
 from handover.scenarios.published.free_flyer.flyer_impedance import FlyerImpedanceTable
+from handover.scenarios.published.free_flyer.flyer_navigation import FlyerNavigation
 from handover.scenarios.published.free_flyer.flyer_stability import FlyerStability
 from handover.scenarios.published.free_flyer.flyer_study import FlyerStudy
 from handover.scenarios.published.helix.helix_1 import Helix1
@@ -23,6 +24,7 @@ _ALL: tuple[type[PublishedExperiment], ...] = (
     FlyerControllers,
     FlyerHandoverTable,
     FlyerImpedanceTable,
+    FlyerNavigation,
     FlyerStability,
     FlyerStudy,
     Helix1,

@@ -74,7 +74,7 @@ class Claim:
             "measured": self.measured,
             "interval": None if self.interval is None else list(self.interval),
             "unit": self.unit,
-            "verdict": self.verdict.value,
+            "verdict": self.verdict_text,
             "reason": self.reason,
             "where": self.where,
             "beyond": self.beyond,
@@ -90,7 +90,9 @@ class Claim:
         interval = data["interval"]
         other_fields: dict[str, Any] = {k: v for k, v in data.items() if k not in ("interval", "verdict")}
         low_high = None if interval is None else (float(interval[0]), float(interval[1]))
-        return cls(interval=low_high, verdict=Verdict(data["verdict"]), **other_fields)
+        named = {words: verdict for verdict, words in _BEYOND.items()} if data["beyond"] else {}
+        verdict = named.get(data["verdict"]) or Verdict(data["verdict"])
+        return cls(interval=low_high, verdict=verdict, **other_fields)
 
 
 def verdict_counts(claims: Sequence[Claim], beyond: bool) -> Sequence[tuple[int, Verdict, str]]:

@@ -59,7 +59,7 @@ def rate_claim(claim: str, where: str, published: tuple[int, int], measured: tup
         published=format_rate(*published),
         measured=format_rate(*measured),
         interval=(ours.low, ours.high),
-        verdict=_verdict(p >= LEVEL, could_be_either=(low, high) != (0, n)),
+        verdict=verdict_of(p >= LEVEL, could_be_either=(low, high) != (0, n)),
         reason=reason,
         where=where,
     )
@@ -83,7 +83,7 @@ def every_claim(claim: str, where: str, published: tuple[int, int], measured: tu
         published=told,
         measured=format_rate(*measured),
         interval=(interval.low, interval.high),
-        verdict=_verdict(all_do, could_be_either=measured[1] >= _MIN_FOR_EVERY),
+        verdict=verdict_of(all_do, could_be_either=measured[1] >= _MIN_FOR_EVERY),
         reason=_with_shortfall(f"{rule} {note}", measured[1], _MIN_FOR_EVERY),
         where=where,
         beyond=not published[1],
@@ -116,7 +116,7 @@ def order_claim(
         claim=claim,
         published=published,
         measured=f"{format_rate(sum(first), n)} against {format_rate(sum(second), n)}",
-        verdict=_verdict(test.first_is_better, could_be_either=n >= _MIN_DIFFERING),
+        verdict=verdict_of(test.first_is_better, could_be_either=n >= _MIN_DIFFERING),
         reason=_with_shortfall(reason, n, _MIN_DIFFERING),
         where=where,
         beyond=beyond,
@@ -144,7 +144,7 @@ def no_worse_claim(claim: str, first: Sequence[bool], second: Sequence[bool]) ->
         published="",
         measured=f"{format_rate(sum(first), n)} against {format_rate(sum(second), n)}",
         interval=(interval.low, interval.high),
-        verdict=_verdict(interval.high < FEW, could_be_either=n >= min_trials_for(FEW)),
+        verdict=verdict_of(interval.high < FEW, could_be_either=n >= min_trials_for(FEW)),
         reason=_with_shortfall(reason, n, min_trials_for(FEW)),
         beyond=True,
     )
@@ -177,7 +177,7 @@ def nothing_measured(
     where: str = "",
     published: str = "",
     beyond: bool = False,
-    reason: str = "None of its runs came to its end.",
+    reason: str = "No run that it is judged by is in the plan, or came to its end.",
 ) -> Claim:
     """Return a claim on which there is no run, or there are too few."""
     return Claim(
@@ -212,13 +212,14 @@ def _of_rate(
         published=published,
         measured=format_rate(*measured),
         interval=(interval.low, interval.high),
-        verdict=_verdict(met, could_be_either=measured[1] >= min_trials),
+        verdict=verdict_of(met, could_be_either=measured[1] >= min_trials),
         reason=_with_shortfall(rule, measured[1], min_trials),
         where=where,
     )
 
 
-def _verdict(met: bool, could_be_either: bool) -> Verdict:
+def verdict_of(met: bool, could_be_either: bool = True) -> Verdict:
+    """Return the verdict on a rule that was met or not, by runs that could have led to either or not."""
     if not could_be_either:
         return Verdict.NOT_COMPARABLE
     return Verdict.REPRODUCED if met else Verdict.NOT_REPRODUCED

@@ -1,6 +1,6 @@
 """Approaches to places where nobody is: how safely a robot at rest is told from one that is pulled or pushed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
@@ -11,23 +11,25 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import success_interval
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.experiment.plotting import COLOURS, figure
+from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
 from handover.scenarios.free_flyer.handovers import HandoverOfTask
-from handover.scenarios.free_flyer.parameters import Behaviour
-from handover.scenarios.published.free_flyer.flyer_handover_figures import legend_below
-from handover.scenarios.published.free_flyer.handover_runs import (
-    GIVING,
-    RECEIVING,
+from handover.scenarios.free_flyer.parameters import Behaviour, TaskParameters
+from handover.scenarios.published.free_flyer.handover_runs import GIVING, RECEIVING, Exchange
+from handover.scenarios.published.free_flyer.variations import (
     USUAL,
-    Exchange,
+    Row,
     Variation,
-    is_of,
+    acted_alone,
+    has,
+    names_of,
+    noise_times,
+    unfinished_note,
     values_of,
 )
-from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment, Verdict
-from handover.scenarios.published.verdicts import nothing_measured
+from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
+from handover.scenarios.published.verdicts import nothing_measured, verdict_of
 
+_DEFAULT = TaskParameters()
 _STOP = Fraction(36)
 """When a run ends, s: the robot has then waited for ten seconds or more."""
 _LOW, _HIGH = (-0.10, -0.35, -0.25), (0.20, 0.20, 0.25)
@@ -36,22 +38,19 @@ _PLACES, _REPETITIONS = 125, 2
 _OTHER_PLACES = 5
 """Places that robots which are otherwise than they should be fly to."""
 _QUICK_PLACES = 5
+_MIN_APPROACHES = 100
+"""Approaches of which it is concluded that something never happens."""
 
 
-def _noise(factor: float) -> Variation:
-    usual = paper_values("free_flyer", "navigation")
-    names = [f"{what}_noise" for what in ("position", "attitude", "velocity", "rate")]
-    return Variation(f"noise x {factor:g}", {f"navigation.{name}": f"{factor * usual[name]:g}" for name in names})
-
-
-CASES = (
+_MILD = (
     *(Variation(f"mass {100 * (k - 1):+.0f} %", {"mass_factor": f"{k:g}"}) for k in (0.7, 1.3)),
     *(Variation(f"inertia {100 * (k - 1):+.0f} %", {"inertia_factor": f"{k:g}"}) for k in (0.7, 1.3)),
-    *(_noise(factor) for factor in (2.0, 4.0, 8.0)),
+    noise_times(2.0),
 )
+CASES = (*_MILD, noise_times(4.0), noise_times(8.0))
 """Robots whose mass or inertia is not what their controllers assume, or whose navigation is worse."""
 
-_NAMES = tuple(dict.fromkeys(name for case in CASES for name in case.parameters))
+_NAMES = names_of(CASES)
 _EXCHANGES = (GIVING, RECEIVING)
 
 
@@ -91,7 +90,7 @@ class FlyerApproaches(PublishedExperiment):
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
         """Judge whether the robot ever acts with nobody there, as it should be, and otherwise."""
-        return [_never_alone(_Approaches(table)), _bears(_Approaches(table))]
+        return [_never_alone(_Approaches(table)), _tolerates(_Approaches(table))]
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return how often the robot signalled and acted, and its speed at rest beside the threshold."""
@@ -112,28 +111,21 @@ def _point(place: str, exchange: Exchange, behaviour: Behaviour, case: Variation
 
 
 class _Approaches:
-    """Rows of the runs that came to their end, by what they are of."""
+    """Rows of the runs by what they are of, also of those that did not come to their end: they never signalled."""
 
     def __init__(self, table: CampaignTable) -> None:
-        self._rows = [row for row in table.rows if row["status"] == "done"]
+        self._rows: Sequence[Row] = table.rows
 
-    def of(self, exchange: Exchange, behaviour: Behaviour, case: Variation = USUAL) -> list[Mapping[str, Any]]:
-        return [
-            row
-            for row in self._rows
-            if row["task"] == exchange.task.item and row["behaviour"] == behaviour.item and is_of(row, case, _NAMES)
-        ]
+    def of(self, exchange: Exchange, behaviour: Behaviour, case: Variation = USUAL) -> list[Row]:
+        wanted = {"task": exchange.task.item, "behaviour": behaviour.item, **case.parameters}
+        return [row for row in self._rows if has(row, wanted, _NAMES, _DEFAULT)]
 
-    def all_of(self, case: Variation = USUAL) -> list[Mapping[str, Any]]:
+    def all_of(self, case: Variation = USUAL) -> list[Row]:
         return [row for exchange, behaviour in _kinds() for row in self.of(exchange, behaviour, case)]
 
 
-def _signalled(rows: Sequence[Mapping[str, Any]]) -> int:
+def _signalled(rows: Sequence[Row]) -> int:
     return len(values_of(rows, "phase_check_velocity"))
-
-
-def _alone(rows: Sequence[Mapping[str, Any]]) -> int:
-    return int((values_of(rows, "unprovoked") > 0).sum())
 
 
 def _never_alone(runs: _Approaches) -> Claim:
@@ -142,39 +134,41 @@ def _never_alone(runs: _Approaches) -> Claim:
         "published": "",
         "beyond": True,
     }
-    rows = [row for row in runs.all_of() if row.get("phase_check_velocity") is not None]
+    tried = runs.all_of()
+    rows = [row for row in tried if row.get("phase_check_velocity") is not None]
     if not rows:
         return nothing_measured(**facts)
-    n, k = len(rows), _alone(rows)
+    silent = len(tried) - len(rows)
+    n, k = len(rows), acted_alone(rows)
     interval = success_interval(k, n)
     waited = sum(float(row["simulated_seconds"]) - float(row["phase_check_velocity"]) for row in rows)
     return Claim(
         **facts,
         measured=f"{k} of {n:,} approaches, in {waited / 3600:.1f} h of waiting",
         interval=(interval.low, interval.high),
-        verdict=Verdict.NOT_COMPARABLE if n < 100 else (Verdict.REPRODUCED if k == 0 else Verdict.NOT_REPRODUCED),
-        reason="Holds if it never happens, in a hundred approaches or more in which the robot came and signalled; the "
-        "interval is Clopper and Pearson's.",
+        verdict=verdict_of(k == 0 and not silent, could_be_either=n >= _MIN_APPROACHES),
+        reason=f"Holds if it never happens, in {_MIN_APPROACHES} approaches or more, in each of which the robot came "
+        f"and signalled; {silent} others never signalled. The interval is Clopper and Pearson's. "
+        f"{unfinished_note(tried)}".strip(),
     )
 
 
-def _bears(runs: _Approaches) -> Claim:
+def _tolerates(runs: _Approaches) -> Claim:
     facts: dict[str, Any] = {
         "claim": "So it is with mass or inertia 30 % off, and with twice the noise of the navigation",
         "published": "",
         "beyond": True,
     }
-    mild = [case for case in CASES if "noise" not in case.label or case.label == _noise(2.0).label]
-    found = {case.label: runs.all_of(case) for case in mild}
+    found = {case.label: runs.all_of(case) for case in _MILD}
     rows = [row for rows_of in found.values() for row in rows_of]
     if not rows:
         return nothing_measured(**facts)
-    failing = {what: (_alone(r), len(r) - _signalled(r), len(r)) for what, r in found.items()}
+    failing = {what: (acted_alone(r), len(r) - _signalled(r), len(r)) for what, r in found.items()}
     faults = [f"{w}: acted alone {a}, never signalled {s} of {n}" for w, (a, s, n) in failing.items() if a or s]
     return Claim(
         **facts,
-        measured=f"{_alone(rows)} of {len(rows)} acted alone, {_signalled(rows)} signalled",
-        verdict=Verdict.REPRODUCED if not faults else Verdict.NOT_REPRODUCED,
+        measured=f"{acted_alone(rows)} of {len(rows)} acted alone, {_signalled(rows)} signalled",
+        verdict=verdict_of(not faults),
         reason="Holds if every such robot comes, signals, and neither lets go nor closes. "
         + (f"It did not: {'; '.join(faults)}." if faults else ""),
     )
@@ -196,7 +190,7 @@ def _table(runs: _Approaches) -> ComparisonTable:
                         "gives" if exchange.gives else "receives",
                         behaviour.item,
                         f"{_signalled(found)} of {len(found)}",
-                        str(_alone(found)),
+                        str(acted_alone(found)),
                         f"{1e3 * arrived.max():.1f}" if len(arrived) else "",
                         fastest,
                         f"{1e3 * threshold:.0f}",

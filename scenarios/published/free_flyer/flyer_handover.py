@@ -1,8 +1,8 @@
 """The validation of the free-flyer's handovers: [Fernandes2020] sec. 4.3, figs. 4.29 to 4.38."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from handover.scenarios.published.free_flyer.flyer_handover_figures import (
     draw_handovers,
     draw_margins,
     draw_strengths,
+    draw_yielding,
     figure_number,
 )
 from handover.scenarios.published.free_flyer.handover_runs import (
@@ -29,29 +30,34 @@ from handover.scenarios.published.free_flyer.handover_runs import (
     RATES,
     RECEIVING,
     STRENGTHS,
-    TASKS,
     THRUSTS,
     UNGATED,
-    USUAL,
+    USUAL_FORCE,
     Exchange,
     HandoverRuns,
-    Variation,
     point_of,
+)
+from handover.scenarios.published.free_flyer.variations import (
+    PATIENCE,
+    TASKS,
+    USUAL,
+    Row,
+    Variation,
+    acted_alone,
+    succeeded,
     values_of,
 )
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 
 _REPETITIONS = 3
-_PATIENCE = "30"
-"""Time after which a robot that feels nothing gives up, s: its flights take half of that."""
 
 
 class FlyerHandoverTable(PublishedExperiment):
-    """The four handovers by the rigid and by the compliant robot, with Astrobee's limits and with ideal thrust.
+    """The four handovers by the rigid and by the compliant robot, with ideal thrust, Astrobee's limits and its nozzles.
 
     Besides, where the robot gives: persons who pull with other forces, arms of other lengths, other places; and where
     it gives or receives: the control rate that the thesis prints, and a robot that yields while it still moves, for
-    the thesis names no condition of rest. The quick plan is one run of each of the first sixteen.
+    the thesis names no condition of rest. The quick plan is one run of each of the first 24.
     """
 
     name: ClassVar[str] = "flyer-handover"
@@ -70,7 +76,7 @@ class FlyerHandoverTable(PublishedExperiment):
         return CampaignPlan(
             scenario=self.scenario,
             points=points,
-            fixed={"patience": _PATIENCE},
+            fixed={"patience": PATIENCE},
             repetitions=1 if quick else _REPETITIONS,
             seed=1,
             paired=True,
@@ -89,9 +95,10 @@ class FlyerHandoverTable(PublishedExperiment):
         return [t for t in tables if t.rows]
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:
-        """Draw figs. 4.29 to 4.38, the margins of the thresholds, and how far the gripper goes by the force."""
+        """Draw figs. 4.29 to 4.38, the gripper beside python-control's, margins, and displacement by force."""
         rows = HandoverRuns(table)
-        return [*draw_handovers(rows, runs, folder), *draw_margins(rows, folder), *draw_strengths(rows, folder)]
+        over_time = [*draw_handovers(rows, runs, folder), *draw_yielding(rows, runs, folder)]
+        return [*over_time, *draw_margins(rows, folder), *draw_strengths(rows, folder)]
 
 
 def _transfers(runs: HandoverRuns) -> ComparisonTable:
@@ -110,6 +117,7 @@ def _transfers(runs: HandoverRuns) -> ComparisonTable:
             "handover",
             "behaviour",
             "thrust",
+            "received",
             "succeeded",
             "along x, mm",
             "along y, mm",
@@ -120,20 +128,29 @@ def _transfers(runs: HandoverRuns) -> ComparisonTable:
             "at the limits, %",
         ],
         rows=rows,
-        note="Medians: how far the gripper went from its place along the axes of W from the signal for as long as the "
-        "robot yielded, from the last signal to release or closing, from the first signal until the receiver had the "
-        "object alone, and the share of the run for which the thrusters were at their limits. Published: 40 mm (rigid) "
-        "and 140 mm (compliant) along z where the robot gives, and twice as much of the compliant robot along x where "
-        "it receives.",
+        note="Received: the receiver of this transfer got the object, whatever came of the rest. Medians of runs that "
+        "succeeded, or in parentheses, where none did, of what they reached: how far the gripper went at most from its "
+        "place along the axes of W from the signal for as long as the robot yielded, which is on after the object has "
+        "left; the times from the last signal to release or closing, and from the first signal until the receiver had "
+        "the object alone; and the share of the run for which the thrusters were at their limits. Published: 40 mm "
+        "(rigid) and 140 mm (compliant) along z where the robot gives, and twice as much of the compliant robot along "
+        "x where it receives.",
     )
 
 
-def _facts(exchange: Exchange, rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    done = sum(bool(row["success"]) for row in rows)
-    away = [_mm(exchange.of(rows, f"displacement{axis}")) for axis in ("_x", "_y", "_z", "")]
-    times = [_median(exchange.of(rows, what), "{:.1f}") for what in ("felt_after", "time")]
-    share = _median(100.0 * values_of(rows, "saturated_share"), "{:.0f}")
-    return [f"{done} of {len(rows)}", *away, *times, share]
+def _facts(exchange: Exchange, rows: Sequence[Row]) -> list[str]:
+    done = _succeeded(rows)
+    shown = done or rows
+    away = [_mm(exchange.of(shown, f"displacement{axis}")) for axis in ("_x", "_y", "_z", "")]
+    times = [_median(exchange.of(shown, what), "{:.1f}") for what in ("felt_after", "time")]
+    share = _median(100.0 * values_of(shown, "saturated_share"), "{:.0f}")
+    cells = [*away, *times, share]
+    counts = [f"{n} of {len(rows)}" for n in (len(exchange.of(rows, "time")), len(done))]
+    return [*counts, *(cells if done else [f"({cell})" if cell else "" for cell in cells])]
+
+
+def _succeeded(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if succeeded([row])]
 
 
 def _margins(runs: HandoverRuns) -> ComparisonTable:
@@ -152,12 +169,12 @@ def _margins(runs: HandoverRuns) -> ComparisonTable:
                         exchange.label,
                         behaviour.item,
                         propulsion.item,
-                        f"{1e3 * threshold:.0f}",
-                        f"{1e3 * rest.max():.1f}" if len(rest) else "",
+                        f"{threshold:.3f}",
+                        f"{rest.max():.4f}" if len(rest) else "",
                         margin,
-                        _range(1e3 * felt, "{:.0f}"),
-                        _range(values_of(found, "angle_full"), "{:.3f}"),
-                        _range(values_of(found, "angle_empty"), "{:.3f}"),
+                        _range(felt, "{:.3f}"),
+                        _range(np.degrees(values_of(found, "angle_full")), "{:.1f}"),
+                        _range(np.degrees(values_of(found, "angle_empty")), "{:.1f}"),
                     ]
                 )
     beta = float(paper_values("free_flyer", "published")["angle_threshold"])
@@ -167,33 +184,37 @@ def _margins(runs: HandoverRuns) -> ComparisonTable:
             "handover",
             "behaviour",
             "thrust",
-            "threshold, mm/s",
-            "at rest, mm/s",
+            "threshold, m/s",
+            "at rest, m/s",
             "threshold over rest",
-            "when felt, mm/s",
-            "angle if full, rad",
-            "angle if empty, rad",
+            "when felt, m/s",
+            "angle if full, °",
+            "angle if empty, °",
         ],
         rows=rows,
-        note="Speeds of the gripper as the robot sees it: the greatest in any run while it waits and nobody "
-        "touches it, and those at which it felt the person, from least to greatest. Angles of the closed gripper with "
-        f"the object in it and without, which the robot tells apart at {beta:g} rad; what they are is assumed here.",
+        note="Speeds of the gripper as the robot sees it: the greatest in any run while it waits and nobody touches "
+        "it, and those at which it took its motion for a touch, from least to greatest. Angles of the closed gripper "
+        f"with the object in it and without, which the robot tells apart at {np.degrees(beta):.1f}°; what they are is "
+        "assumed here.",
     )
 
 
 def _varied(runs: HandoverRuns) -> ComparisonTable:
     rows: list[list[str]] = []
-    usual = Variation("as usual, 4 N")
+    usual = Variation(f"as usual, {USUAL_FORCE}")
     for variation in (usual, *STRENGTHS, *ARMS, *PLACES):
         for propulsion in THRUSTS:
             found = [runs.of(GIVING.task, b, propulsion, variation) for b in Behaviour]
             if not all(found):
                 continue
-            away = [GIVING.of(rows_of, "displacement_z") for rows_of in found]
+            done = [_succeeded(rows_of) for rows_of in found]
+            away = [GIVING.of(rows_of, "displacement_z") for rows_of in done]
             ratio = f"{np.median(away[1]) / np.median(away[0]):.1f}" if all(len(x) for x in away) else ""
             felt = [f"{len(GIVING.of(rows_of, 'speed'))} of {len(rows_of)}" for rows_of in found]
+            whole = [f"{len(rows_of)} of {len(all_of)}" for rows_of, all_of in zip(done, found, strict=True)]
             shares = [_median(100.0 * values_of(rows_of, "saturated_share"), "{:.0f}") for rows_of in found]
-            rows.append([variation.label, propulsion.item, *felt, *map(_mm, away), ratio, " and ".join(shares)])
+            cells = [*felt, *whole, *map(_mm, away), ratio, " and ".join(shares)]
+            rows.append([variation.label, propulsion.item, *cells])
     shown = rows if any(row[0] != usual.label for row in rows) else []
     return ComparisonTable(
         title="Where the behaviours differ, as the robot gives",
@@ -202,15 +223,18 @@ def _varied(runs: HandoverRuns) -> ComparisonTable:
             "thrust",
             "rigid felt it",
             "compliant felt it",
+            "rigid succeeded",
+            "compliant succeeded",
             "rigid along z, mm",
             "compliant along z, mm",
             "compliant over rigid",
             "at the limits, %",
         ],
         rows=shown,
-        note="How often the robot felt the pull of a person who pulls with at most that force, and medians of how far "
-        "its gripper went along z. Published: 40 and 140 mm, 3.5 times as far. Arms are those of the robot and of its "
-        "controllers' model. Shares of the run at the limits of thrust: rigid and compliant.",
+        note="How often the robot took a motion for the pull of a person who pulls with at most that force, how often "
+        "the handover succeeded, and, of those that did, medians of how far the gripper went along z: what an unfelt "
+        "pull does is in the figure by force. Published: 40 and 140 mm, 3.5 times as far. Arms are those of the robot "
+        "and of its controllers' model. Shares of the run at the limits of thrust: rigid and compliant.",
     )
 
 
@@ -221,7 +245,7 @@ def _ungated(runs: HandoverRuns) -> ComparisonTable:
             cells: list[str] = []
             for variation in (USUAL, *UNGATED):
                 found = runs.of(exchange.task, behaviour, Propulsion.LIMITED, variation)
-                alone = sum(row["unprovoked"] > 0 for row in found if row.get("unprovoked") is not None)
+                alone = acted_alone(found)
                 cells.append(f"{alone} of {len(found)}" if found else "")
             if cells[-1]:
                 rows.append([exchange.label, behaviour.item, *cells])
@@ -258,9 +282,9 @@ def _rates(runs: HandoverRuns) -> ComparisonTable:
         ],
         rows=rows,
         note="How far the gripper went from its place at most, with Astrobee's limits, in a run in which nothing is "
-        "random: neither noise nor tremor, and always the same reaction time. What differs is the rate of decision "
-        f"and controllers alone. {TASKS[Task.ROBOT_TO_HUMAN].capitalize()} the gripper goes on until it has opened, so "
-        "a release that comes a sample later adds what it moves in that time.",
+        "random: neither noise, tremor nor errors of sight and timing, and always the same reaction and effort. What "
+        f"differs is the rate of decision and controllers alone. {TASKS[Task.ROBOT_TO_HUMAN].capitalize()} the gripper "
+        "goes on until it has opened, so a release that comes a sample later adds what it moves in that time.",
     )
 
 

@@ -1,32 +1,32 @@
 """Figures of the free-flyer's handovers: as [Fernandes2020] figs. 4.29 to 4.38, margins, and displacement by force."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
-from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.experiment.plotting import COLOURS, draw_time_figures, figure
+from handover.scenarios.experiment.plotting import COLOURS, draw_time_figures, figure, legend_below
 from handover.scenarios.experiment.time_plot import TimeFigure, TimePlot
+from handover.scenarios.free_flyer.handover_plots import figures_of_handover
 from handover.scenarios.free_flyer.parameters import Behaviour, HandoverParameters, Propulsion, Task
-from handover.scenarios.free_flyer.plots import figures_of_handover
 from handover.scenarios.published.free_flyer.handover_runs import (
     EXCHANGES,
     GIVING,
     STRENGTHS,
-    TASKS,
     THRUSTS,
-    USUAL,
     Exchange,
     HandoverRuns,
-    Variation,
 )
+from handover.scenarios.published.free_flyer.push_runs import linear_loop
+from handover.scenarios.published.free_flyer.variations import TASKS, USUAL, Variation
 
 _FIGURES = {
     (Task.ROBOT_TO_HUMAN, Behaviour.RIGID): (29, 30),
@@ -36,6 +36,11 @@ _FIGURES = {
     (Task.FAILED_RECEPTION, Behaviour.COMPLIANT): (37, 38),
 }
 """Numbers of the thesis's figures in chapter 4, of motion and of gripper; it has none of the other handovers."""
+_IN_WORDS = {
+    Propulsion.IDEAL: "ideal thrust",
+    Propulsion.LIMITED: "Astrobee's limits",
+    Propulsion.NOZZLES: "Astrobee's nozzles",
+}
 _LEAST = 2.0
 """What a plot of angles shows at least, up and down, °."""
 
@@ -89,13 +94,84 @@ def _not_magnified(plot: TimePlot) -> TimePlot:
     return replace(plot, limits=(min(1.1 * low, -_LEAST), max(1.1 * high, _LEAST)))
 
 
+@dataclass(frozen=True)
+class _Yielding:
+    """The gripper from its place while the robot yields: s, and in W position, m, and rotation vector, rad, (n, 3)."""
+
+    t: Floats
+    p: Floats
+    turn: Floats
+    p_linear: Floats
+    turn_linear: Floats
+
+
+def _yielding(record: Record, behaviour: Behaviour) -> _Yielding | None:
+    """Return the gripper in the first transfer, actual and by python-control; None if the robot never yielded.
+
+    The linear one is the response of the body near rest, from rest in its place on, to what the person does to the
+    gripper, with the object between them: eq. (3.25) at the controller's period, ideal thrust and exact navigation.
+    """
+    active = record["decision.impedance"].astype(bool)
+    if not active.any():
+        return None
+    first = int(np.argmax(active))
+    n = int(np.argmin(active[first:])) or len(active) - first
+    span = slice(first, first + n)
+    R_WG, R_WD = (
+        Rotation.from_quat(record[name][span], scalar_first=True) for name in ("robot.q_WG", "decision.q_WG_goal")
+    )
+    turn: Floats = (cast(Any, R_WG) * cast(Any, R_WD).inv()).as_rotvec()
+    wrench = np.hstack([record["person.f_G"][span], record["person.tau_G"][span]])
+    moved = linear_loop(behaviour).response(wrench)
+    p = record["robot.p_WG"][span] - record["decision.p_WG_goal"][span]
+    return _Yielding(record.time[span], p, turn, moved[:, :3], moved[:, 3:6])
+
+
+def draw_yielding(rows: HandoverRuns, runs: Path, folder: Path) -> list[Figure]:
+    """Draw how the gripper yields in the first run of each task with ideal thrust, beside python-control's response."""
+    figures: list[Figure] = []
+    for task in Task:
+        found: list[tuple[Behaviour, _Yielding]] = []
+        for behaviour in Behaviour:
+            paths = [runs / row["run"] / "signals.parquet" for row in rows.of(task, behaviour, Propulsion.IDEAL)[:1]]
+            moved = [m for path in paths if path.exists() and (m := _yielding(Record(path), behaviour)) is not None]
+            found += [(behaviour, m) for m in moved]
+        if found:
+            figures.append(_draw_yielding(task, found, folder))
+    return figures
+
+
+def _draw_yielding(task: Task, found: Sequence[tuple[Behaviour, _Yielding]], folder: Path) -> Figure:
+    name = f"yielding_{task.item}"
+    with figure(folder / name, len(found), 2, size=(9.0, 0.9 + 2.3 * len(found))) as panels:
+        for k, (behaviour, m) in enumerate(found):
+            shown = ((m.p, m.p_linear, 1e3, "position (mm)"), (m.turn, m.turn_linear, np.degrees(1.0), "turn (°)"))
+            for axes, (actual, linear, scale, label) in zip(panels[2 * k : 2 * k + 2], shown, strict=True):
+                for i in range(3):
+                    axes.plot(m.t, scale * actual[:, i], "-", lw=1.6, color=COLOURS[i])
+                    axes.plot(m.t, scale * linear[:, i], ":", lw=1.6, color="#1c2330")
+                low, high = axes.get_ylim()
+                least = _LEAST if "°" in label else 0.0
+                axes.set(title=behaviour.item, ylabel=label, ylim=(min(low, -least), max(high, least)))
+        for axes in panels[-2:]:
+            axes.set_xlabel("time (s)")
+        entries = {axis: Line2D([], [], color=COLOURS[i], lw=1.6) for i, axis in enumerate("xyz")}
+        entries["by python-control"] = Line2D([], [], color="#1c2330", ls=":", lw=1.6)
+        legend_below(panels[0], entries)
+    caption = (
+        f"Gripper from its place in W while the robot first yields, {TASKS[task]}, with ideal thrust; dotted: the "
+        "linear response of the controller's model, by python-control, to what the person does to the gripper."
+    )
+    return Figure(name, caption)
+
+
 def draw_margins(rows: HandoverRuns, folder: Path) -> list[Figure]:
     """Draw the gripper's speeds at rest and when the robot felt the person, beside the thresholds."""
     cases = [
         (exchange, behaviour, propulsion, found)
         for exchange in EXCHANGES
         for behaviour in Behaviour
-        for propulsion in (Propulsion.LIMITED, Propulsion.IDEAL)
+        for propulsion in THRUSTS
         if (found := rows.of(exchange.task, behaviour, propulsion))
     ]
     if not cases:
@@ -105,25 +181,18 @@ def draw_margins(rows: HandoverRuns, folder: Path) -> list[Figure]:
             rest, felt = exchange.of(found, "rest_speed"), exchange.of(found, "speed")
             alpha = exchange.threshold(behaviour)
             labels = ("at rest", "when felt", "threshold") if k == 0 else (None, None, None)
-            axes.plot(1e3 * rest, np.full(len(rest), k), "o", ms=4, color=COLOURS[0], label=labels[0])
-            axes.plot(1e3 * felt, np.full(len(felt), k), "D", ms=4, color=COLOURS[1], label=labels[1])
-            axes.plot([1e3 * alpha] * 2, [k - 0.42, k + 0.42], color=COLOURS[5], lw=1.6, label=labels[2])
+            axes.plot(rest, np.full(len(rest), k), "o", ms=4, color=COLOURS[0], label=labels[0])
+            axes.plot(felt, np.full(len(felt), k), "D", ms=4, color=COLOURS[1], label=labels[1])
+            axes.plot([alpha] * 2, [k - 0.42, k + 0.42], color=COLOURS[5], lw=1.6, label=labels[2])
         axes.set_yticks(range(len(cases)), [f"{e.label}, {b.item}, {p.item}" for e, b, p, _ in cases], fontsize=8)
         axes.invert_yaxis()
-        axes.set(xlabel="speed of the gripper (mm/s)", xlim=(0.0, None))
+        axes.set(xlabel="speed of the gripper (m/s)", xlim=(0.0, None))
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
     caption = (
         "Speed of the gripper as the robot sees it: the greatest while it waits and nobody touches it, and when it "
         "felt the person, in each run; between them its threshold, that of sec. 4.1.2."
     )
     return [Figure("margins", caption)]
-
-
-def legend_below(axes: Axes) -> None:
-    """Write a figure's legend, of what one of its axes has, below all of them."""
-    canvas: Any = axes.get_figure(root=True)
-    handles, labels = axes.get_legend_handles_labels()
-    canvas.legend(handles, labels, loc="outside lower center", ncols=len(labels))
 
 
 def _by_force(
@@ -149,11 +218,13 @@ def draw_strengths(rows: HandoverRuns, folder: Path) -> list[Figure]:
     if any(len(points) < 3 for points in found.values()):
         return []
     published = [1e3 * float(x) for x in paper_values("free_flyer", "published")["transfer_displacement_z"]]
-    with figure(folder / "strength", 1, 2, size=(8.0, 3.7)) as panels:
-        for axes, propulsion in zip(panels, (Propulsion.IDEAL, Propulsion.LIMITED), strict=True):
+    with figure(folder / "strength", 1, len(THRUSTS), size=(9.0, 3.7)) as panels:
+        for axes, propulsion in zip(panels, THRUSTS, strict=True):
             for behaviour in Behaviour:
                 points, colour = found[propulsion, behaviour], COLOURS[int(behaviour)]
-                axes.plot([s for s, _, _ in points], [np.median(z) for _, z, _ in points], "-", lw=1.2, color=colour)
+                felt_at = [(strength, float(np.median(z))) for strength, z, felt in points if felt]
+                if felt_at:
+                    axes.plot(*zip(*felt_at, strict=True), "-", lw=1.2, color=colour)
                 for strength, z, felt in points:
                     inside = colour if felt else "white"
                     axes.plot(np.full(len(z), strength), z, "o", ms=5, color=colour, markerfacecolor=inside)
@@ -161,8 +232,9 @@ def draw_strengths(rows: HandoverRuns, folder: Path) -> list[Figure]:
                 axes.axhline(published[behaviour], color=colour, ls=(0, (7, 3)), lw=1.0)
             axes.plot([], [], "o", ms=5, color=COLOURS[5], markerfacecolor="white", label="not felt")
             axes.plot([], [], color=COLOURS[5], ls=(0, (7, 3)), lw=1.0, label="published")
-            thrust = "ideal thrust" if propulsion is Propulsion.IDEAL else "Astrobee's limits"
-            axes.set(title=thrust, xlabel="force of the pull at most (N)", xlim=(0.0, None), ylim=(0.0, None))
+            axes.set(
+                title=_IN_WORDS[propulsion], xlabel="force of the pull at most (N)", xlim=(0.0, None), ylim=(0.0, None)
+            )
         top = max(axes.get_ylim()[1] for axes in panels)
         for axes in panels:
             axes.set_ylim(0.0, top)
@@ -170,7 +242,7 @@ def draw_strengths(rows: HandoverRuns, folder: Path) -> list[Figure]:
         legend_below(panels[0])
     caption = (
         "How far the gripper goes from its place along z of W as the robot gives, by the force with which the person "
-        "pulls at most, which the thesis does not say: each run, and medians; hollow where the robot did not feel the "
-        "pull in all runs, and the person gave up. Dashed: sec. 4.3.1."
+        "pulls at most, which the thesis does not say: each run, and lines through the medians of those that the robot "
+        "felt in all runs; hollow where it did not, and the person gave up. Dashed: sec. 4.3.1."
     )
     return [Figure("strength", caption)]

@@ -1,8 +1,10 @@
 """The validation of the free-flyer's impedance control: [Fernandes2020] sec. 4.1.3, figs. 4.5 to 4.16."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
+
+import numpy as np
 
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
@@ -14,12 +16,12 @@ from handover.scenarios.published.free_flyer.flyer_impedance_figures import draw
 from handover.scenarios.published.free_flyer.push_runs import (
     CHANGES,
     DURATIONS,
-    EXACT,
     PUSHES,
     Push,
     PushRuns,
     predicted_greatest,
 )
+from handover.scenarios.published.free_flyer.variations import EXACT, Row
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 
 _IDEAL, _LIMITED = ({"propulsion": p.item} for p in (Propulsion.IDEAL, Propulsion.LIMITED))
@@ -101,8 +103,8 @@ def _pushes(runs: PushRuns) -> ComparisonTable:
         rows=rows,
         note="Greatest errors of the gripper's position and orientation with ideal thrust; the push's own one by the "
         "linear response of the controller's model; the largest difference to eq. (4.4) along any axis, with and "
-        "without the navigation's noise (published: at most 7 mm and 0.02 rad); greatest errors with Astrobee's limits "
-        "of thrust, and whether the robot then comes back to rest within a minute.",
+        "without the navigation's noise (published: at most 7 mm and 1.1°, its 0.02 rad); greatest errors with "
+        "Astrobee's limits of thrust, and whether the robot then comes back to rest within a minute.",
     )
 
 
@@ -157,20 +159,20 @@ def _predicted_ratio(axis: Axis, duration: float) -> float:
     return compliant / rigid
 
 
-def _is_back(row: Mapping[str, Any]) -> bool:
+def _is_back(row: Row) -> bool:
     return row.get("settling_time") is not None
 
 
-def _errors(row: Mapping[str, Any] | None) -> str:
+def _errors(row: Row | None) -> str:
     if row is None:
         return ""
     return f"{_length(row['greatest_position_error'])}, {_angle(row['greatest_orientation_error'])}"
 
 
-def _agreement(row: Mapping[str, Any] | None) -> str:
+def _agreement(row: Row | None) -> str:
     if row is None:
         return ""
-    return f"{1e3 * row['disagreement_position']:.2f} mm, {1e3 * row['disagreement_orientation']:.2f} mrad"
+    return f"{1e3 * row['disagreement_position']:.2f} mm, {np.degrees(row['disagreement_orientation']):.2f}°"
 
 
 def _length(metres: float) -> str:
@@ -178,4 +180,4 @@ def _length(metres: float) -> str:
 
 
 def _angle(radians: float) -> str:
-    return f"{radians:.3f} rad"
+    return f"{np.degrees(radians):.1f}°"

@@ -1,7 +1,9 @@
 """Claims on the free-flyer's impedance control: [Fernandes2020] sec. 4.1.3, and what its plots leave open."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
 
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Propulsion
@@ -12,8 +14,9 @@ from handover.scenarios.published.free_flyer.push_runs import (
     PushRuns,
     predicted_greatest,
 )
+from handover.scenarios.published.free_flyer.variations import Row, is_done, unfinished_note, values_of
 from handover.scenarios.published.published_experiment import Claim, Verdict
-from handover.scenarios.published.verdicts import nothing_measured
+from handover.scenarios.published.verdicts import nothing_measured, verdict_of
 
 _WHERE = "sec. 4.1.3"
 _AS_PUBLISHED = 0.05
@@ -27,10 +30,6 @@ _PREDICTED = 0.05
 def claims_of_pushes(runs: PushRuns) -> Sequence[Claim]:
     """Judge the thesis's discussion, and beyond it what noise, limits and a wrong model do, and the linear model."""
     return [_ratio(runs), _yields_more(runs), _comes_back(runs), _agrees(runs), *_beyond(runs)]
-
-
-def _verdict(holds: bool) -> Verdict:
-    return Verdict.REPRODUCED if holds else Verdict.NOT_REPRODUCED
 
 
 def _ratio(runs: PushRuns) -> Claim:
@@ -54,7 +53,7 @@ def _ratio(runs: PushRuns) -> Claim:
     return Claim(
         **facts,
         measured=" and ".join(shown),
-        verdict=_verdict(bool(fits)) if decides else Verdict.NOT_COMPARABLE,
+        verdict=verdict_of(bool(fits)) if decides else Verdict.NOT_COMPARABLE,
         reason="The thesis does not say how long its pushes lasted. Reproduced if there is a duration among those "
         f"tried, {min(DURATIONS):g} to {max(DURATIONS):g} s, at which the ratio is within {100 * _AS_PUBLISHED:.0f} % "
         f"of it along all three axes.{first}",
@@ -77,7 +76,7 @@ def _yields_more(runs: PushRuns) -> Claim:
     return Claim(
         **facts,
         measured=f"{min(ratios):.1f} to {max(ratios):.1f} times as much",
-        verdict=_verdict(min(ratios) > 1.0) if len(ratios) == len(PUSHES) else Verdict.NOT_COMPARABLE,
+        verdict=verdict_of(min(ratios) > 1.0) if len(ratios) == len(PUSHES) else Verdict.NOT_COMPARABLE,
         reason="Reproduced if each of the six pushes moves the compliant robot's gripper farther, or turns it more, "
         "than the rigid one's.",
     )
@@ -98,7 +97,8 @@ def _comes_back(runs: PushRuns) -> Claim:
         **facts,
         measured=f"{len(times)} of {len(rows)}{within}",
         verdict=_verdict_of_all(len(times), rows),
-        reason="Reproduced if the gripper is back at rest within a minute in all twelve, with ideal thrust.",
+        reason=f"Reproduced if the gripper is back at rest within a minute in all twelve, with ideal thrust. "
+        f"{unfinished_note(rows)}".strip(),
     )
 
 
@@ -107,7 +107,7 @@ def _agrees(runs: PushRuns) -> Claim:
     return _agreement(
         {
             "claim": "The motion is the impedance model's",
-            "published": f"within {1e3 * bounds[0]:.0f} mm and {bounds[1]:g} rad",
+            "published": f"within {1e3 * bounds[0]:.0f} mm and {np.degrees(bounds[1]):.1f}° ({bounds[1]:g} rad)",
             "where": f"{_WHERE}, eq. (4.4)",
         },
         runs.all_of(),
@@ -116,24 +116,22 @@ def _agrees(runs: PushRuns) -> Claim:
     )
 
 
-def _agreement(
-    facts: dict[str, Any], rows: Sequence[Mapping[str, Any]], bounds: tuple[float, float], word: str
-) -> Claim:
+def _agreement(facts: dict[str, Any], rows: Sequence[Row], bounds: tuple[float, float], word: str) -> Claim:
     if not rows:
         return nothing_measured(**facts)
-    off = [max(float(row[f"disagreement_{what}"]) for row in rows) for what in ("position", "orientation")]
-    within = off[0] <= bounds[0] and off[1] <= bounds[1]
+    off = [values_of(rows, f"disagreement_{what}").max(initial=0.0) for what in ("position", "orientation")]
+    within = all(map(is_done, rows)) and off[0] <= bounds[0] and off[1] <= bounds[1]
     return Claim(
         **facts,
-        measured=f"{1e3 * off[0]:.2f} mm and {1e3 * off[1]:.2f} mrad at most, of {len(rows)}",
-        verdict=_verdict(within) if len(rows) == 2 * len(PUSHES) else Verdict.NOT_COMPARABLE,
+        measured=f"{1e3 * off[0]:.2f} mm and {np.degrees(off[1]):.3f}° at most, of {len(rows)}",
+        verdict=verdict_of(within) if len(rows) == 2 * len(PUSHES) else Verdict.NOT_COMPARABLE,
         reason=f"{word} if no actual error differs from eq. (4.4)'s by more than {1e3 * bounds[0]:g} mm along an axis "
-        f"or {1e3 * bounds[1]:g} mrad in any of the twelve, with ideal thrust.",
+        f"or {np.degrees(bounds[1]):.2g}° in any of the twelve, with ideal thrust. {unfinished_note(rows)}".strip(),
     )
 
 
-def _verdict_of_all(count: int, rows: Sequence[Mapping[str, Any]]) -> Verdict:
-    return _verdict(count == len(rows)) if len(rows) == 2 * len(PUSHES) else Verdict.NOT_COMPARABLE
+def _verdict_of_all(count: int, rows: Sequence[Row]) -> Verdict:
+    return verdict_of(count == len(rows)) if len(rows) == 2 * len(PUSHES) else Verdict.NOT_COMPARABLE
 
 
 def _beyond(runs: PushRuns) -> list[Claim]:
@@ -148,7 +146,7 @@ def _beyond(runs: PushRuns) -> list[Claim]:
 
 def _foreseen(runs: PushRuns) -> Claim:
     facts: dict[str, Any] = {
-        "claim": "The linear response of the controller's model foretells the greatest errors",
+        "claim": "The linear response of the controller's model predicts the greatest errors",
         "published": "",
         "beyond": True,
     }
@@ -164,7 +162,7 @@ def _foreseen(runs: PushRuns) -> Claim:
     return Claim(
         **facts,
         measured=f"{100 * off[most]:.1f} % off at most ({most})",
-        verdict=_verdict(off[most] <= _PREDICTED) if len(off) == 2 * len(PUSHES) else Verdict.NOT_COMPARABLE,
+        verdict=verdict_of(off[most] <= _PREDICTED) if len(off) == 2 * len(PUSHES) else Verdict.NOT_COMPARABLE,
         reason=f"Holds if it is within {100 * _PREDICTED:.0f} % of what ideal thrust and exact navigation give, under "
         "each push. It is the response near rest: a robot that turns by a radian is beyond that.",
     )
@@ -186,7 +184,7 @@ def _bears_limits(runs: PushRuns) -> Claim:
         measured=f"{len(back)} of {len(rows)}, {twisted} of them twists",
         verdict=_verdict_of_all(len(back), rows),
         reason="Holds if all twelve end at rest within a minute. What is published needs thrust without limits: 3 N·m "
-        "is forty times what Astrobee has.",
+        f"is forty times what Astrobee has. {unfinished_note(rows)}".strip(),
     )
 
 
@@ -212,7 +210,7 @@ def _tells_wrong_models(runs: PushRuns) -> Claim:
     return Claim(
         **facts,
         measured=f"in {shown} of {cases} cases",
-        verdict=_verdict(shown == cases),
+        verdict=verdict_of(shown == cases),
         reason="Holds if under one of the six pushes at least the motion is farther from eq. (4.4) than the thesis's "
         "bound, for each of mass and inertia, up and down, and both behaviours.",
     )

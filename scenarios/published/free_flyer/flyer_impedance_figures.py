@@ -1,7 +1,6 @@
 """Figures of the pushed free-flyer: errors over time like [Fernandes2020] figs. 4.5 to 4.16, and ratios by duration."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +10,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.experiment.plotting import COLOURS, figure
+from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
 from handover.scenarios.free_flyer.impedance_evaluation import MOTION_SIGNALS, Errors, Motion, errors_of
 from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Wrench
 from handover.scenarios.published.free_flyer.push_runs import (
@@ -54,7 +53,7 @@ def _draw_kind(rows: PushRuns, runs: Path, folder: Path, behaviour: Behaviour, k
             _draw_push(panels[2 * i : 2 * i + 2], push, behaviour, errors)
         for axis in panels[-2:]:
             axis.set_xlabel("time (s)")
-        _name_curves(panels[0])
+        legend_below(panels[0], _entries())
     numbers = f"{found[0][0].figure_number(behaviour)} to {found[-1][0].figure_number(behaviour).removeprefix('fig. ')}"
     caption = (
         f"Errors of the gripper's pose in W, rest minus actual, of the {behaviour.item} robot with ideal thrust, like "
@@ -88,12 +87,10 @@ def _draw_push(panels: list[Axes], push: Push, behaviour: Behaviour, errors: Err
         axis.set_ylim(min(low, -least), max(high, least))
 
 
-def _name_curves(axis: Axes) -> None:
-    """Name colours and strokes below the panels of an axis's figure."""
-    handles = [Line2D([], [], color=COLOURS[k], lw=1.6) for k in range(3)]
-    handles += [Line2D([], [], color=COLOURS[5], ls=style, lw=1.3) for style in _STROKES.values()]
-    canvas: Any = axis.get_figure(root=True)
-    canvas.legend(handles, [*"xyz", *_STROKES], loc="outside lower center", ncols=len(handles))
+def _entries() -> dict[str, Line2D]:
+    """Return the legend's entries of colours and strokes."""
+    axes = {axis: Line2D([], [], color=COLOURS[k], lw=1.6) for k, axis in enumerate("xyz")}
+    return axes | {name: Line2D([], [], color=COLOURS[5], ls=style, lw=1.3) for name, style in _STROKES.items()}
 
 
 def draw_ratios(rows: PushRuns, folder: Path) -> list[Figure]:

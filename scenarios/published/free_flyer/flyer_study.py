@@ -5,19 +5,20 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from matplotlib.lines import Line2D
 
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.statistics import success_interval
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.experiment.plotting import COLOURS, figure
+from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
 from handover.scenarios.free_flyer.handovers import HandoverOfTask
 from handover.scenarios.free_flyer.parameters import Behaviour
 from handover.scenarios.free_flyer.person_evaluation import Cause
 from handover.scenarios.published.free_flyer.flyer_study_claims import claims_of_study, published_failures
 from handover.scenarios.published.free_flyer.study_runs import (
     SKILLS,
-    TASKS,
+    STUDIED,
     TRAITS,
     StudyRuns,
     causes,
@@ -25,9 +26,13 @@ from handover.scenarios.published.free_flyer.study_runs import (
     participants,
     trials,
 )
+from handover.scenarios.published.free_flyer.variations import TASKS
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 from handover.scenarios.published.verdicts import format_interval, format_share
 
+_STROKES = {Behaviour.RIGID: (0, (1, 1)), Behaviour.COMPLIANT: (0, (5, 2))}
+"""Of the thesis's counts."""
+_WORDS = tuple(TASKS[task] for task in STUDIED)
 _TRIALS = 20
 """Of each participant, task and behaviour; of each skill likewise."""
 
@@ -50,7 +55,7 @@ class FlyerStudy(PublishedExperiment):
         skills = [{"skill": f"{s:g}"} for s in (SKILLS[:: len(SKILLS) - 1] if quick else SKILLS)]
         return CampaignPlan(
             scenario=self.scenario,
-            points=trials(tuple(TASKS), skills if quick else [*participants(), *skills]),
+            points=trials(STUDIED, skills if quick else [*participants(), *skills]),
             repetitions=4 if quick else _TRIALS,
             seed=510,
             paired=True,
@@ -65,7 +70,8 @@ class FlyerStudy(PublishedExperiment):
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return table 5.1 beside ours, what decided the failures, the participants, and failures by skill."""
         runs = StudyRuns(table)
-        return [t for t in (_failures(runs), _causes(runs), _participants(runs), _by_skill(runs)) if t.rows]
+        made = (_failures(runs), _by_participant(runs), _causes(runs), _participants(runs), _by_skill(runs))
+        return [t for t in made if t.rows]
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002
         """Draw failures by skill, and what decided those of the participants."""
@@ -75,12 +81,12 @@ class FlyerStudy(PublishedExperiment):
 
 def _failures(runs: StudyRuns) -> ComparisonTable:
     rows: list[list[str]] = []
-    for task, words in TASKS.items():
+    for task in STUDIED:
         for behaviour in Behaviour:
             ours = failures(runs.of_participants(task, behaviour))
             if ours[1]:
                 cells = [_share(*published_failures(task, behaviour)), _share(*ours)]
-                rows.append([words, behaviour.item, *cells])
+                rows.append([TASKS[task], behaviour.item, *cells])
     return ComparisonTable(
         title="Table 5.1: handovers that failed",
         header=["task", "behaviour", "published", "ours"],
@@ -92,9 +98,9 @@ def _failures(runs: StudyRuns) -> ComparisonTable:
 
 
 def _causes(runs: StudyRuns) -> ComparisonTable:
-    found = {(task, b): causes(runs.of_participants(task, b)) for task in TASKS for b in Behaviour}
+    found = {(task, b): causes(runs.of_participants(task, b)) for task in STUDIED for b in Behaviour}
     total = sum(found.values(), start=causes([]))
-    columns = [(task, b) for task in TASKS for b in Behaviour]
+    columns = [(task, b) for task in STUDIED for b in Behaviour]
     return ComparisonTable(
         title="What decided the failures",
         header=["cause", *(f"{TASKS[task]}, {b.item}" for task, b in columns)],
@@ -106,30 +112,46 @@ def _causes(runs: StudyRuns) -> ComparisonTable:
 def _participants(runs: StudyRuns) -> ComparisonTable:
     rows: list[list[str]] = []
     for number, person in enumerate(participants()):
-        counts = [failures([r for b in Behaviour for r in runs.of_participants(task, b, number)]) for task in TASKS]
-        if any(n for _, n in counts):
-            traits = [f"{t.scale * float(person[t.name]):.3g}" for t in TRAITS]
-            rows.append([str(number + 1), *traits, *(f"{k} of {n}" if n else "" for k, n in counts)])
+        if any(number in runs.by_participant(task, b) for task in STUDIED for b in Behaviour):
+            rows.append([str(number + 1), *(f"{t.scale * float(person[t.name]):.3g}" for t in TRAITS)])
     return ComparisonTable(
         title="The participants",
-        header=["number", *(t.label for t in TRAITS), *(f"failures, {words}" for words in TASKS.values())],
+        header=["number", *(t.label for t in TRAITS)],
         rows=rows,
         note="Each trait is drawn evenly from a range that is assumed. Reach: how far the hand goes from its rest.",
+    )
+
+
+def _by_participant(runs: StudyRuns) -> ComparisonTable:
+    """Return the failures of each participant in each task, and of all, above those of table 5.1."""
+    columns = [(task, b) for task in STUDIED for b in Behaviour]
+    found = {column: runs.by_participant(*column) for column in columns}
+    numbers = sorted({number for by_person in found.values() for number in by_person})
+    rows = [[str(k + 1), *(_share(*failures(found[c].get(k, ()))) for c in columns)] for k in numbers]
+    if rows:
+        rows.append(["all", *(_share(*failures(runs.of_participants(*c))) for c in columns)])
+        rows.append(["table 5.1", *(_share(*published_failures(*c)) for c in columns)])
+    return ComparisonTable(
+        title="Participants and tasks, beside table 5.1",
+        header=["participant", *(f"{TASKS[task]}, {b.item}" for task, b in columns)],
+        rows=rows,
+        note="Failures of trials, with the exact interval of Clopper and Pearson at 95 %, which takes trials for "
+        "independent. The participants are simulated; table 5.1 has ten persons, two rounds each, together.",
     )
 
 
 def _by_skill(runs: StudyRuns) -> ComparisonTable:
     rows: list[list[str]] = []
     for skill in SKILLS:
-        counts = [failures(runs.of_skill(skill, task, b)) for task in TASKS for b in Behaviour]
+        counts = [failures(runs.of_skill(skill, task, b)) for task in STUDIED for b in Behaviour]
         if any(n for _, n in counts):
             rows.append([f"{skill:g}", *(_share(*count) for count in counts)])
     return ComparisonTable(
         title="Failures by skill",
-        header=["skill", *(f"{words}, {b.item}" for words in TASKS.values() for b in Behaviour)],
+        header=["skill", *(f"{words}, {b.item}" for words in _WORDS for b in Behaviour)],
         rows=rows,
-        note="Persons who are nominal in all but their skill. Errors of sight and of timing at skill 0 are eight times "
-        "those at skill 1, and reactions take twice as long.",
+        note="Persons who are nominal in all but their skill. Errors of sight, timing and effort at skill 0 are eight "
+        "times those at skill 1, reactions take twice as long, and three of ten attempts do not wait for the gripper.",
     )
 
 
@@ -143,13 +165,13 @@ def _share(count: int, n: int) -> str:
 def _draw_by_skill(runs: StudyRuns, folder: Path) -> list[Figure]:
     found = {
         (task, b): [(s, *c) for s in SKILLS if (c := failures(runs.of_skill(s, task, b)))[1]]
-        for task in TASKS
+        for task in STUDIED
         for b in Behaviour
     }
     if any(len(points) < 2 for points in found.values()):
         return []
-    with figure(folder / "skill", 1, len(TASKS), size=(9.0, 3.3)) as panels:
-        for axis, (task, words) in zip(panels, TASKS.items(), strict=True):
+    with figure(folder / "skill", 1, len(STUDIED), size=(9.0, 3.3)) as panels:
+        for axis, (task, words) in zip(panels, zip(STUDIED, _WORDS, strict=True), strict=True):
             for behaviour in Behaviour:
                 skill, k, n = (np.array(a, dtype=np.float64) for a in zip(*found[task, behaviour], strict=True))
                 low, high = _bounds(k, n)
@@ -157,10 +179,10 @@ def _draw_by_skill(runs: StudyRuns, folder: Path) -> list[Figure]:
                 errors = [100 * (k / n - low), 100 * (high - k / n)]
                 axis.errorbar(skill + aside, 100 * k / n, errors, fmt="o-", ms=4, lw=1.2, capsize=2, color=colour)
                 failed, of = published_failures(task, behaviour)
-                axis.axhline(100 * failed / of, color=colour, ls=(0, (5, 2) if behaviour else (1, 1)), lw=1.0)
+                axis.axhline(100 * failed / of, color=colour, ls=_STROKES[behaviour], lw=1.0)
             axis.set(title=words, xlabel="skill (1)", ylim=(-3.0, 103.0))
         panels[0].set_ylabel("handovers that failed (%)")
-        _name_curves(panels[0])
+        legend_below(panels[0], _entries())
     caption = (
         "Failures of simulated persons by skill, with intervals at 95 %, who are nominal in all else. Dashed and "
         "dotted: the thesis's participants, table 5.1."
@@ -173,18 +195,15 @@ def _bounds(k: Any, n: Any) -> tuple[Any, Any]:
     return np.array([i.low for i in intervals]), np.array([i.high for i in intervals])
 
 
-def _name_curves(axis: Any) -> None:
-    """Name behaviours and strokes below the panels of an axis's figure."""
-    from matplotlib.lines import Line2D
-
-    handles = [Line2D([], [], color=COLOURS[int(b)], marker="o", ms=4, lw=1.2) for b in Behaviour]
-    handles += [Line2D([], [], color=COLOURS[int(b)], ls=(0, (5, 2) if b else (1, 1)), lw=1.0) for b in Behaviour]
-    labels = [*(b.item for b in Behaviour), *(f"{b.item}, published" for b in Behaviour)]
-    axis.get_figure(root=True).legend(handles, labels, loc="outside lower center", ncols=4)
+def _entries() -> dict[str, Line2D]:
+    """Return the legend's entries of behaviours and strokes."""
+    ours = {b.item: Line2D([], [], color=COLOURS[int(b)], marker="o", ms=4, lw=1.2) for b in Behaviour}
+    theirs = {f"{b.item}, published": Line2D([], [], color=COLOURS[int(b)], ls=_STROKES[b], lw=1.0) for b in Behaviour}
+    return {**ours, **theirs}
 
 
 def _draw_causes(runs: StudyRuns, folder: Path) -> list[Figure]:
-    found = {f"{TASKS[t]}, {b.item}": runs.of_participants(t, b) for t in TASKS for b in Behaviour}
+    found = {f"{TASKS[t]}, {b.item}": runs.of_participants(t, b) for t in STUDIED for b in Behaviour}
     counted = {name: causes(rows) for name, rows in found.items() if rows}
     shown = [cause for cause in Cause if any(count[cause] for count in counted.values())]
     if not shown:

@@ -1,28 +1,27 @@
 """Handovers of the free-flyer that a campaign runs, their rows, and the thresholds of [Fernandes2020] sec. 4.1.2."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
-
-import numpy as np
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task, TaskParameters
+from handover.scenarios.published.free_flyer.variations import (
+    EXACT,
+    TASKS,
+    USUAL,
+    Row,
+    Variation,
+    has,
+    names_of,
+    values_of,
+)
 
 _DEFAULT = TaskParameters()
 
-TASKS = {
-    Task.ROBOT_TO_HUMAN: "robot to human",
-    Task.HUMAN_TO_ROBOT: "human to robot",
-    Task.FAILED_RECEPTION: "failed reception",
-    Task.COLLABORATIVE: "collaborative",
-}
-"""The four handovers in words."""
-
-THRUSTS = (Propulsion.IDEAL, Propulsion.LIMITED)
-"""The thesis's pushes need the first; Astrobee's limits of each axis are the second."""
+THRUSTS = (Propulsion.IDEAL, Propulsion.LIMITED, Propulsion.NOZZLES)
+"""The thesis's pushes need the first; Astrobee's limits are those of each axis, or of twelve nozzles that share."""
 
 _RATE = "handover.controllers.free_flyer.published_rate"
 AT_PUBLISHED_RATE = {
@@ -32,27 +31,18 @@ AT_PUBLISHED_RATE = {
 }
 """The units on the robot's computer that run at the thesis's 67.5 Hz, by the places that they take."""
 WITHOUT_CHANCE = {
-    **{f"navigation.{what}_noise": "0" for what in ("position", "attitude", "velocity", "rate")},
-    **{f"person.{what}": "0" for what in ("tremor_rms", "drift_rms", "reaction_spread")},
+    **EXACT,
+    **dict.fromkeys(("sight_error", "depth_error"), "0"),
+    **{
+        f"person.{what}": "0"
+        for what in ("tremor_rms", "drift_rms", "reaction_spread", "timing_error", "effort_spread")
+    },
 }
-"""Parameters of a navigation without noise and of a hand that does not shake, and always reacts in the same time."""
+"""Parameters of a navigation without noise, and of a hand that does not shake, sees and times without error, always
+reacts in the same time and pulls with the same effort."""
 
-
-@dataclass(frozen=True)
-class Variation:
-    """Something that is otherwise than in the scenario's defaults.
-
-    Attributes:
-        label: what, and by how much, in words.
-        parameters: that make it, as texts; {} for the defaults.
-    """
-
-    label: str
-    parameters: Mapping[str, str] = field(default_factory=dict[str, str])
-
-
-USUAL = Variation("")
-
+USUAL_FORCE = f"{_DEFAULT.strength:g} N"
+"""Force with which the scenario's person pulls at most, in words."""
 STRENGTHS = tuple(Variation(f"{n:g} N", {"strength": f"{n:g}"}) for n in (0.3, 0.5, 1.0, 2.0, 8.0))
 """Persons who pull with other forces than the default's at most."""
 ARMS = tuple(
@@ -74,7 +64,7 @@ RATES = (
 )
 """Astrobee's rate of control, and that which the thesis prints; nothing is random in either."""
 
-_VARIED = tuple(dict.fromkeys(name for v in (*STRENGTHS, *ARMS, *PLACES, *UNGATED, *RATES) for name in v.parameters))
+_VARIED = names_of((*STRENGTHS, *ARMS, *PLACES, *UNGATED, *RATES))
 
 
 @dataclass(frozen=True)
@@ -102,7 +92,7 @@ class Exchange:
         published = paper_values("free_flyer", "published")
         return float(published["velocity_hand" if self.gives else "velocity_gripper"][behaviour])
 
-    def of(self, rows: Sequence[Mapping[str, Any]], metric: str) -> Floats:
+    def of(self, rows: Sequence[Row], metric: str) -> Floats:
         """Return a metric of it in those rows that have it."""
         return values_of(rows, f"{self.metrics}_{metric}")
 
@@ -118,12 +108,6 @@ EXCHANGES = (
 )
 
 
-def values_of(rows: Sequence[Mapping[str, Any]], column: str) -> Floats:
-    """Return a column's values in those rows that have it, in their order."""
-    found = [row.get(column) for row in rows]
-    return np.array([float(x) for x in found if x is not None and x == x])
-
-
 def point_of(task: Task, behaviour: Behaviour, propulsion: Propulsion, variation: Variation = USUAL) -> dict[str, str]:
     """Return the parameters of a handover, as texts."""
     given = {"task": task.item, "behaviour": behaviour.item, "propulsion": propulsion.item}
@@ -131,10 +115,13 @@ def point_of(task: Task, behaviour: Behaviour, propulsion: Propulsion, variation
 
 
 class HandoverRuns:
-    """Rows of the campaign's table of runs that came to their end, by what they are for."""
+    """Rows of the campaign's table by what they are for, those of runs that did not come to their end as well.
+
+    Such a run has no metrics and is no success: whatever counts successes counts it as a failure.
+    """
 
     def __init__(self, table: CampaignTable) -> None:
-        self._rows = [row for row in table.rows if row["status"] == "done"]
+        self._rows: Sequence[Row] = table.rows
 
     def of(
         self,
@@ -142,38 +129,12 @@ class HandoverRuns:
         behaviour: Behaviour,
         propulsion: Propulsion = Propulsion.LIMITED,
         variation: Variation = USUAL,
-    ) -> list[Mapping[str, Any]]:
+    ) -> list[Row]:
         """Return the runs of a task, in the order of their repetitions."""
-        wanted = point_of(task, behaviour, propulsion)
-        return [
-            row
-            for row in self._rows
-            if all(row[name] == text for name, text in wanted.items()) and is_of(row, variation, _VARIED)
-        ]
+        wanted = point_of(task, behaviour, propulsion, variation)
+        return [row for row in self._rows if has(row, wanted, _VARIED, _DEFAULT)]
 
-    def usual(self, task: Task | None = None) -> list[Mapping[str, Any]]:
+    def usual(self, task: Task | None = None) -> list[Row]:
         """Return the runs of a task, or of all, with the scenario's own values, whatever behaviour and propulsion."""
         tasks = Task if task is None else (task,)
         return [row for t in tasks for b in Behaviour for p in THRUSTS for row in self.of(t, b, p)]
-
-
-def is_of(row: Mapping[str, Any], variation: Variation, names: Sequence[str]) -> bool:
-    """Return whether, of the named parameters, a row has those of a variation, and no other but the defaults."""
-    return all(_is(row, name, variation.parameters.get(name)) for name in names)
-
-
-def _is(row: Mapping[str, Any], name: str, text: str | None) -> bool:
-    """Return whether a row has a parameter's value; None: that it was not set, or to the scenario's default."""
-    value: Any = row.get(name)
-    default = getattr(_DEFAULT, name, None)
-    if text is None:
-        if value is None or value == "" or value != value:
-            return True
-        return default is not None and np.array_equal(np.asarray(value), np.asarray(default))
-    if isinstance(value, str):
-        return value == text
-    return value is not None and np.array_equal(np.atleast_1d(value), _numbers(text))
-
-
-def _numbers(text: str) -> Floats:
-    return np.array([{"true": 1.0, "false": 0.0}[x] if x in ("true", "false") else float(x) for x in text.split(",")])

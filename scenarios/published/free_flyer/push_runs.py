@@ -1,6 +1,6 @@
 """Pushes against the free-flyer's gripper that a campaign runs, their rows, and what the linear model predicts."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -15,9 +15,7 @@ from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Propulsion, Wrench
-
-EXACT = {f"navigation.{what}_noise": "0" for what in ("position", "attitude", "velocity", "rate")}
-"""Parameters of a navigation without noise."""
+from handover.scenarios.published.free_flyer.variations import EXACT, Row, has, is_done
 
 _DEFAULT = ImpedanceParameters()
 _AFTER = 30.0
@@ -87,13 +85,20 @@ PUSHES = tuple(Push(kind, axis) for kind in Wrench for axis in Axis)
 """The six of [Fernandes2020] sec. 4.1.3, in the order of its figures."""
 
 
+_VARIED = (*EXACT, *(change.name for change in CHANGES))
+
+
 class PushRuns:
-    """Rows of the campaign's table of runs that came to their end, by what they are for."""
+    """Rows of the campaign's table by what they are for."""
 
     def __init__(self, table: CampaignTable) -> None:
-        self._rows = [row for row in table.rows if row["status"] == "done"]
+        self._rows: Sequence[Row] = table.rows
 
-    def of(
+    def of(self, push: Push, behaviour: Behaviour, **which: Any) -> Row | None:
+        """Return the run of a push that came to its end, None where there is none; see `tried`."""
+        return next((row for row in self.tried(push, behaviour, **which) if is_done(row)), None)
+
+    def tried(
         self,
         push: Push,
         behaviour: Behaviour,
@@ -102,8 +107,8 @@ class PushRuns:
         exact: bool = False,
         duration: float = _DEFAULT.duration,
         change: Change | None = None,
-    ) -> Mapping[str, Any] | None:
-        """Return the run of a push, None where there is none.
+    ) -> list[Row]:
+        """Return the runs of a push, whether or not they came to their end.
 
         Args:
             push: what acts on the gripper.
@@ -113,33 +118,22 @@ class PushRuns:
             duration: of the push, s.
             change: what of the robot is otherwise than its controller assumes.
         """
-        wanted: dict[str, Any] = {**push.parameters, "behaviour": behaviour.item, "duration": duration}
-        wanted |= {"propulsion": propulsion.item, **{c.name: 1.0 for c in CHANGES}}
-        if change is not None:
-            wanted[change.name] = change.factor
-        for row in self._rows:
-            if (_value(row, "navigation.position_noise") == 0.0) is exact and all(
-                _value(row, name) == x for name, x in wanted.items()
-            ):
-                return row
-        return None
+        wanted = {**push.parameters, "behaviour": behaviour.item, "propulsion": propulsion.item}
+        wanted |= {"duration": f"{duration:g}", **(EXACT if exact else {}), **(change.parameters if change else {})}
+        return [row for row in self._rows if has(row, wanted, _VARIED, _DEFAULT)]
 
-    def all_of(self, **which: Any) -> list[Mapping[str, Any]]:
-        """Return the runs that there are of the six pushes under both behaviours; the arguments are those of `of`."""
-        found = [self.of(push, behaviour, **which) for behaviour in Behaviour for push in PUSHES]
-        return [row for row in found if row is not None]
+    def all_of(self, **which: Any) -> list[Row]:
+        """Return the runs that there are of the six pushes under both behaviours; the arguments are those of `tried`.
+
+        Those that did not come to their end are among them: they have no metrics.
+        """
+        return [row for b in Behaviour for push in PUSHES for row in self.tried(push, b, **which)]
 
     def ratio(self, axis: Axis, duration: float) -> float | None:
         """Return compliant over rigid greatest position error under a force along an axis; None without both runs."""
         push = Push(Wrench.FORCE, axis)
         rigid, compliant = (self.of(push, b, duration=duration) for b in (Behaviour.RIGID, Behaviour.COMPLIANT))
         return None if rigid is None or compliant is None else float(compliant[push.metric] / rigid[push.metric])
-
-
-def _value(row: Mapping[str, Any], name: str) -> Any:
-    """Return what a row has of a parameter, the scenario's default where it was not set, None of a unit's."""
-    value = row.get(name)
-    return getattr(_DEFAULT, name, None) if value is None or value != value else value
 
 
 @cache

@@ -8,22 +8,20 @@ from typing import Any
 
 import numpy as np
 
+from handover.cosim.blocks.ports import Floats
+from handover.scenarios.campaign.statistics import LEVEL, RESAMPLES
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.free_flyer.parameters import Behaviour, Task
+from handover.scenarios.free_flyer.parameters import Behaviour, Task, TaskParameters
 from handover.scenarios.free_flyer.person_evaluation import Cause
+from handover.scenarios.published.free_flyer.variations import Row, has, is_done, succeeded
 
-TASKS = {
-    Task.ROBOT_TO_HUMAN: "robot to human",
-    Task.HUMAN_TO_ROBOT: "human to robot",
-    Task.COLLABORATIVE: "collaborative",
-}
-"""The three of sec. 5.5 in words, in the order of table 5.1."""
+_DEFAULT = TaskParameters()
+
+STUDIED = (Task.ROBOT_TO_HUMAN, Task.HUMAN_TO_ROBOT, Task.COLLABORATIVE)
+"""The three of sec. 5.5, in the order of table 5.1."""
 
 SKILLS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Of persons who are alike in all else."""
-
-ROUNDS = 2
-"""Trials of each participant for each task and behaviour in the thesis, sec. 5.7."""
 
 Count = tuple[int, int]
 """Failures, and trials."""
@@ -78,46 +76,75 @@ def trials(tasks: Sequence[Task], persons: Sequence[Mapping[str, str]]) -> list[
 
 
 class StudyRuns:
-    """Rows of the campaign's table of runs that came to their end: of participants, and of persons of a given skill."""
+    """Rows of the campaign's table: of participants, and of persons of a given skill.
+
+    Runs that did not come to their end are among them, and count as failures.
+    """
 
     def __init__(self, table: CampaignTable) -> None:
-        self._rows = [row for row in table.rows if row["status"] == "done"]
-        names = [t.name for t in TRAITS]
-        self._persons = {tuple(float(p[n]) for n in names): k for k, p in enumerate(participants())}
-        self._who = [self._persons.get(tuple(_number(row, n) for n in names)) for row in self._rows]
+        self._trials: dict[tuple[Any, ...], list[Row]] = {}
+        for row in table.rows:
+            key = (_who(row), row.get("task"), row.get("behaviour"))
+            self._trials.setdefault(key, []).append(row)
 
-    def of_participants(self, task: Task, behaviour: Behaviour, number: int | None = None) -> list[Mapping[str, Any]]:
-        """Return the trials of the participants, or of one of them, from 0, in the order of persons and repetitions."""
-        found = [
-            (who, row["seed"], row)
-            for who, row in zip(self._who, self._rows, strict=True)
-            if who is not None and number in (None, who) and _is_of(row, task, behaviour)
-        ]
-        return [row for _, _, row in sorted(found, key=lambda entry: entry[:2])]
+    def of_participants(self, task: Task, behaviour: Behaviour, number: int | None = None) -> list[Row]:
+        """Return the trials of the participants, or of one of them, from 0, in the order of persons and seeds."""
+        by_person = self.by_participant(task, behaviour)
+        return [row for who, rows in by_person.items() for row in rows if number in (None, who)]
 
-    def of_skill(self, skill: float, task: Task, behaviour: Behaviour) -> list[Mapping[str, Any]]:
+    def by_participant(self, task: Task, behaviour: Behaviour) -> dict[int, list[Row]]:
+        """Return the trials of each participant that there are trials of, in the order of their seeds."""
+        found = {who: self._trials.get((who, task.item, behaviour.item)) for who in range(len(participants()))}
+        return {who: sorted(rows, key=lambda row: row["seed"]) for who, rows in found.items() if rows}
+
+    def of_skill(self, skill: float, task: Task, behaviour: Behaviour) -> list[Row]:
         """Return the trials of persons with a skill, who are nominal in all else."""
-        return [
-            row
-            for who, row in zip(self._who, self._rows, strict=True)
-            if who is None and _number(row, "skill") == skill and _is_of(row, task, behaviour)
-        ]
+        names = [t.name for t in TRAITS if t.name != "skill"]
+        found = self._trials.get((None, task.item, behaviour.item), [])
+        return [row for row in found if has(row, {"skill": f"{skill:g}"}, names, _DEFAULT)]
 
 
-def _is_of(row: Mapping[str, Any], task: Task, behaviour: Behaviour) -> bool:
-    return row["task"] == task.item and row["behaviour"] == behaviour.item
+def _who(row: Row) -> int | None:
+    """Return whose trial it is, as a participant's number from 0; None if it is nobody's of them."""
+    return next((k for k, person in enumerate(participants()) if has(row, person, (), _DEFAULT)), None)
 
 
-def _number(row: Mapping[str, Any], name: str) -> float:
-    value = row.get(name)
-    return float("nan") if value is None else float(value)
+def paired(first: Sequence[Row], second: Sequence[Row]) -> list[tuple[bool, bool]]:
+    """Return the successes of trials that share a seed; one whose like is missing is left out."""
+    others = {row["seed"]: row for row in second}
+    return [(_succeeded(row), _succeeded(others[row["seed"]])) for row in first if row["seed"] in others]
 
 
-def failures(rows: Sequence[Mapping[str, Any]]) -> Count:
-    """Return how many trials failed, of how many."""
-    return sum(not row["success"] for row in rows), len(rows)
+def _succeeded(row: Row) -> bool:
+    return succeeded([row]) == 1
 
 
-def causes(rows: Sequence[Mapping[str, Any]]) -> Counter[Cause]:
-    """Return what decided the trials that failed, with how often."""
-    return Counter(Cause(int(row["decided_by"])) for row in rows if not row["success"])
+def sign_flip_test(differences: Sequence[int]) -> float:
+    """Return the exact p-value, two-sided, that differences of independent persons have a sum so far from 0.
+
+    If neither of two ways does better, each person's difference is as likely to have the other sign. Trials of one
+    person may depend on each other as they like: the persons are what is drawn.
+    """
+    sums: Floats = np.zeros(1)
+    for x in differences:
+        sums = np.concatenate([sums + x, sums - x])
+    return float(np.mean(np.abs(sums) >= abs(sum(differences))))
+
+
+def interval_by_person(by_person: Mapping[int, Sequence[Row]]) -> tuple[float, float]:
+    """Return the interval of a rate of failure by bootstrap, in which whole persons with all their trials are drawn."""
+    counts: Floats = np.array([failures(rows) for rows in by_person.values()], dtype=np.float64)
+    drawn = np.random.default_rng(0).integers(len(counts), size=(RESAMPLES, len(counts)))
+    totals: Floats = counts[drawn].sum(axis=1)
+    low, high = (float(q) for q in np.quantile(totals[:, 0] / totals[:, 1], [LEVEL / 2, 1.0 - LEVEL / 2]))
+    return low, high
+
+
+def failures(rows: Sequence[Row]) -> Count:
+    """Return how many trials failed, of how many; one that did not come to its end failed."""
+    return len(rows) - succeeded(rows), len(rows)
+
+
+def causes(rows: Sequence[Row]) -> Counter[Cause]:
+    """Return what decided the trials that failed, with how often; one that did not come to its end has no cause."""
+    return Counter(Cause(int(row["decided_by"])) for row in rows if is_done(row) and not row["success"])

@@ -43,6 +43,19 @@ def test_labels_have_the_names_of_numbers_and_paths_as_they_are():
     assert [results.label(p) for p in results.points[:2]] == ["baby cup a, my_own:Reflex", "baby cup a, b_1.fmu"]
 
 
+def test_an_array_has_a_label_with_its_name_and_unit(tmp_path: Path):
+    soft = "impedance.stiffness_translation"
+    points = [{"p_WG_handover": "0,-0.07,0", soft: ",".join(f"{k}00010001")} for k in (1, 2)]
+    plan = CampaignPlan(scenario="flyer_robot_to_human", points=points)
+    folder = CampaignFolder(tmp_path / "c")
+    with folder.opened(plan, {"impedance": cached("ImpedanceController", 3)}, lambda _path: None):
+        pass
+    metadata = folder.read()
+    results = CampaignResults(metadata, table_of(metadata["points"], 1))
+    assert results.label(results.points[1]) == "impedance.stiffness translation 2,0,0,0,1,0,0,0,1 N/m"
+    assert results.named_value("p_WG_handover", "0,-0.07,0") == "p WG handover 0,-0.07,0 m"
+
+
 def test_units_parameters_have_the_units_that_their_fmus_declare(tmp_path: Path):
     plan = CampaignPlan(scenario="ir_grasp", points=[{"scene.wrist_speed": value} for value in ("0.05", "0.1", "0.2")])
     folder = CampaignFolder(tmp_path / "c")

@@ -53,6 +53,7 @@ def test_failures_are_one_if_but_their_numbers_differ(tmp_path: Path):
     part = html[html.index('id="failures"') : html.index('id="runs"')]
     assert part.count("slipped at") == part.count("slipped at 0.1 s") == 1
     assert "000_r0001, 001_r0001" in part
+    assert "whose reasons differ only in numbers are in one row" in part
 
 
 def test_failures_are_one_if_but_a_numbers_sign_differs(tmp_path: Path):

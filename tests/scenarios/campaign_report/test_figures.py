@@ -46,6 +46,30 @@ def test_names_of_points_do_not_overlap(points: list[dict[str, str]], tmp_path: 
         assert not any(a.overlaps(b) for a, b in pairwise(along))
 
 
+@pytest.mark.parametrize("letters", [10, 70, 240])
+def test_names_of_a_list_are_not_cut_off_and_leave_room_for_what_is_drawn(
+    letters: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    found: list[tuple[Bbox, float, float]] = []
+
+    def look(canvas: Canvas, _path: Path) -> None:
+        canvas.draw_without_rendering()
+        labels = [label.get_window_extent() for label in canvas.axes[0].yaxis.get_ticklabels() if label.get_text()]
+        drawn = canvas.axes[0].get_window_extent()
+        assert not any(a.overlaps(b) for a, b in pairwise(labels))
+        found.append((Bbox.union(labels), drawn.width / canvas.bbox.width, drawn.width / canvas.dpi))
+
+    monkeypatch.setattr("handover.scenarios.experiment.plotting._save", look)
+    names = ("word " * 60)[: letters - 3].strip()
+    points = [{"thing": f"{names} {k}", "strategy": f"s{k}", "perturbed": str(k)} for k in range(12)]
+    draw_campaign(results_of("ir_grasp", points), tmp_path)
+    ((labels, share, width),) = found
+    assert labels.x0 >= 0.0
+    assert labels.y0 >= 0.0
+    assert share > 0.35
+    assert width > 3.0
+
+
 def test_of_more_points_than_a_figure_has_room_for_there_is_none(tmp_path: Path):
     points = [{"thing": f"thing_{k}", "strategy": f"s{k}", "perturbed": str(k)} for k in range(81)]
     assert draw_campaign(results_of("ir_grasp", points), tmp_path / "figures") == []

@@ -1,20 +1,87 @@
-"""What the free-flyer's scene shows: a robot that drifts away."""
+"""What the free-flyer's scene shows, by its axes: a robot that drifts away, and what is in front of what."""
 
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from matplotlib import image
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 
-from handover.scenarios.free_flyer.scene import Solid, draw_scene
+from handover.cosim.blocks.ports import Floats
+from handover.scenarios.experiment.plotting import figure
+from handover.scenarios.free_flyer import scene
+from handover.scenarios.free_flyer.scene import Solid, draw_near, draw_scene
+
+CUBE: Floats = np.array([[x, y, z] for x in (0.0, 0.3) for y in (0.0, 0.3) for z in (0.0, 0.3)])
+GREY, BLUE = "#c9d3df", "#2f6db5"
+NEAR = [Solid(CUBE, GREY)]
+BEFORE, BEHIND = Solid(CUBE - [0.0, 0.5, 0.0], BLUE), Solid(CUBE, GREY)
 
 
-def test_a_robot_that_drifts_away_stays_large_in_the_scene(tmp_path: Path):
-    for name in ("apart", "together"):
-        (tmp_path / name).mkdir()
-    cube = np.array([[x, y, z] for x in (0.0, 0.3) for y in (0.0, 0.3) for z in (0.0, 0.3)])
-    near, far = [Solid(cube, "#c9d3df")], [Solid(cube + 80.0, "#c9d3df")]
-    draw_scene({"start": near, "end": far}, "", tmp_path / "apart")
-    draw_scene({"start": near, "end": near}, "", tmp_path / "together")
-    apart, together = (image.imread(tmp_path / name / "scene.png") for name in ("apart", "together"))
-    assert apart.shape == together.shape
-    assert np.mean(apart[..., :3] < 0.9) > 0.9 * np.mean(together[..., :3] < 0.9)
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Axes]:
+    """The axes of what is drawn, row by row."""
+    kept: list[Axes] = []
+
+    @contextmanager
+    def keep(*args: Any, **kwargs: Any) -> Generator[list[Axes], None, None]:
+        with figure(*args, **kwargs) as axes:
+            yield axes
+            kept.extend(axes)
+
+    monkeypatch.setattr(scene, "figure", keep)
+    return kept
+
+
+def faces(axes: Axes) -> tuple[list[Floats], Floats]:
+    """Return the drawn polygons, the farthest first, and their colours."""
+    (drawn,) = (c for c in axes.collections if isinstance(c, PolyCollection))
+    return [np.asarray(path.vertices) for path in drawn.get_paths()], np.asarray(drawn.get_facecolor())
+
+
+def span(limits: Sequence[float]) -> float:
+    return limits[1] - limits[0]
+
+
+def test_a_robot_that_drifts_away_stays_large_in_the_scene(tmp_path: Path, drawn: list[Axes]):
+    draw_scene({"start": NEAR, "end": [Solid(CUBE + 80.0, GREY)]}, "", tmp_path)
+    for axes, at in zip(drawn, (0.0, 80.0, 0.0, 80.0), strict=True):
+        (face,), _ = faces(axes)
+        assert face.min() == at
+        assert axes.get_xlim()[0] < at < at + 0.3 < axes.get_xlim()[1]
+        assert axes.get_ylim()[0] < at < at + 0.3 < axes.get_ylim()[1]
+        assert 0.7 * span(axes.get_xlim()) < 0.3
+
+
+def test_the_scene_names_its_moments_views_and_axes(tmp_path: Path, drawn: list[Axes]):
+    draw_scene({"0.0 s, start": NEAR, "9.0 s, end": NEAR}, "", tmp_path)
+    side = ["0.0 s, start\nfrom the side", "9.0 s, end\nfrom the side"]
+    assert [axes.get_title() for axes in drawn] == [*side, "from above", "from above"]
+    assert [(axes.get_xlabel(), axes.get_ylabel()) for axes in drawn] == [("x (m)", "z (m)")] * 2 + [
+        ("x (m)", "y (m)")
+    ] * 2
+    assert {path.name for path in tmp_path.iterdir()} == {"scene.png", "scene.svg"}
+
+
+def test_from_the_side_what_is_nearer_hides_what_is_behind_it(tmp_path: Path, drawn: list[Axes]):
+    draw_scene({"start": [BEFORE, BEHIND]}, "", tmp_path)
+    from_side, from_above = drawn
+    polygons, colours = faces(from_side)
+    np.testing.assert_array_equal(polygons[0], polygons[1])
+    assert colours[0][0] > colours[1][0]  # the blue one, of less red, is drawn over the grey one
+    apart, _ = faces(from_above)
+    assert abs(apart[0].mean(axis=0) - apart[1].mean(axis=0))[1] == pytest.approx(0.5)
+
+
+def test_a_transfer_is_shown_from_near_around_its_middle(tmp_path: Path, drawn: list[Axes]):
+    middle = np.array([0.1, -0.2, 0.3])
+    draw_near({"5.0 s, transfer": NEAR}, {"5.0 s, transfer": middle}, tmp_path)
+    titles = [axes.get_title() for axes in drawn]
+    assert titles == ["5.0 s, transfer, from the side", "5.0 s, transfer, from above"]
+    for axes, up in zip(drawn, (middle[2], middle[1]), strict=True):
+        assert np.mean(axes.get_xlim()) == pytest.approx(middle[0])
+        assert np.mean(axes.get_ylim()) == pytest.approx(up)
+        assert span(axes.get_xlim()) == pytest.approx(0.4)

@@ -1,5 +1,6 @@
 """Verdicts on handovers in microgravity, from staged signals."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -25,9 +26,12 @@ def signals(
     speed: float = 0.0,
     away: float = 0.0,
     failed: int = 0,
+    undelivered: int = 0,
     saturated: bool = False,
     force: float = 0.0,
+    on_hand: bool = True,
     angle: float = 0.6,
+    goal: Sequence[float] | None = None,
 ) -> Signals:
     loop = {"pole_radius": [0.99], "damping_ratio": [0.3], "pole_frequency": [2.7]}
     values: dict[str, dict[str, Any]] = {
@@ -35,11 +39,17 @@ def signals(
         "thrusters": {"saturated": [saturated]},
         "impedance": loop,
         "pose": loop,
-        "decision": {"phase": [int(phase)], "speed_G": [speed], "failed_receptions": [failed]},
+        "decision": {
+            "phase": [int(phase)],
+            "speed_G": [speed],
+            "p_WG_goal": PLACE if goal is None else np.array(goal),
+            "failed_receptions": [failed],
+            "failed_deliveries": [undelivered],
+        },
         "person": {
             "holder": [int(holder)],
             "f_G": np.array([force, 0.0, 0.0]),
-            "f_H": np.array([-force, 0.0, 0.0]),
+            "f_H": np.array([-force if on_hand else 0.0, 0.0, 0.0]),
             "gripper_angle": [angle],
         },
     }
@@ -55,7 +65,7 @@ def signals(
                 causality=Causality.OUTPUT,
                 fmi_type="",
                 references=(),
-                shape=(3,) if name in ("p_WG", "f_G", "f_H") else (),
+                shape=(3,) if name in ("p_WG", "p_WG_goal", "f_G", "f_H") else (),
                 items=tuple((i.name, int(i)) for i in items[name]) if name in items else (),
             )
             for name in ys
@@ -128,7 +138,7 @@ def test_a_pull_that_never_came_is_reported_with_the_greatest_speed():
     assert evaluator.over
     outcome = evaluator.outcome()
     assert not outcome.success
-    assert "never felt a pull within 61 s" in outcome.reason
+    assert "never felt a pull within the patience of 60 s after its signal" in outcome.reason
     assert "below the threshold: 0.013 of 0.059 m/s" in outcome.reason
     assert Cause(int(outcome.metrics["decided_by"].value)) is Cause.NOT_FELT
     assert "transfer_time" not in outcome.metrics
@@ -201,14 +211,43 @@ def test_a_push_in_vain_is_kept_apart_from_the_one_that_counts():
 
 def test_a_wait_after_a_failed_reception_is_distinguished_from_the_last_signal():
     reason = follow(asked_again(), (92.0, signals(Phase.GIVEN_UP, Holder.HAND, failed=1))).outcome().reason
-    assert "never felt a push within 62 s" in reason
+    assert "never felt a push within the patience of 60 s after its signal" in reason
     assert "below the threshold: 0.004 of 0.021 m/s" in reason
 
 
-def test_a_robot_that_gave_up_on_the_way_to_the_object_is_not_reported_of_the_handover_place():
-    way = [(t, signals(Phase.MOVE_TO_OBJECT, Holder.FREE, away=0.6)) for t in (1.0, 30.0)]
-    reason = follow(to_person(), *way, (61.0, signals(Phase.GIVEN_UP, Holder.FREE, away=0.6))).outcome().reason
-    assert reason == "the robot gave up in phase MOVE_TO_OBJECT; nobody holds it"
+def test_a_robot_that_gave_up_on_the_way_to_the_object_is_reported_of_the_place_of_the_object():
+    goal = (0.0, -0.07, 0.9)  # the gripper is 0.6 m from its handover place, in the direction of z
+    way = [(t, signals(Phase.MOVE_TO_OBJECT, Holder.FREE, away=0.6, goal=goal)) for t in (1.0, 30.0)]
+    outcome = follow(to_person(), *way, (61.0, signals(Phase.GIVEN_UP, Holder.FREE, away=0.6))).outcome()
+    assert outcome.reason == (
+        "the robot gave up in phase MOVE_TO_OBJECT, which was not over within the patience of 60 s: the gripper came "
+        "no nearer than 0.30 m to its place at (0.00, -0.07, 0.90) m, of which 0.01 m count as there; nobody holds it"
+    )
+    assert Cause(int(outcome.metrics["decided_by"].value)) is Cause.OUT_OF_REACH
+
+
+@pytest.mark.parametrize(
+    ("speed", "words"),
+    [
+        (0.0103, "there: never slower than 0.0103 m/s, where less than 0.01 m/s is rest"),
+        (0.004, "there for long enough"),
+    ],
+)
+def test_a_robot_that_was_in_its_place_but_not_at_rest_is_not_called_out_of_reach(speed: float, words: str):
+    there = [(t, signals(Phase.MOVE_TO_HANDOVER, Holder.GRIPPER, speed=speed, away=0.03)) for t in (20.0, 60.0)]
+    ends = (70.0, signals(Phase.GIVEN_UP, Holder.GRIPPER))
+    outcome = follow(to_person(), *given()[:3], *there, ends).outcome()
+    assert outcome.reason.endswith(f"by the robot's estimate never at rest and aligned {words}; the robot holds it")
+    assert Cause(int(outcome.metrics["decided_by"].value)) is Cause.NOT_SETTLED
+
+
+def test_an_object_that_changed_hands_before_the_robot_gave_up_was_handed_over():
+    retreat = [(t, signals(Phase.RETREAT, Holder.HAND, away=0.02)) for t in (25.0, 40.0)]
+    outcome = follow(to_person(), *given()[:8], *retreat, (55.0, signals(Phase.GIVEN_UP, Holder.HAND))).outcome()
+    assert not outcome.success
+    assert outcome.metrics["handed_over"].value == 1.0
+    assert Cause(int(outcome.metrics["decided_by"].value)) is Cause.NOT_RETREATED
+    assert outcome.reason.startswith("the object changed hands, but then the robot gave up in phase RETREAT after 30 s")
 
 
 def test_an_object_that_is_still_in_both_hands_at_the_end_was_not_delivered():
@@ -242,11 +281,23 @@ def test_the_speed_at_rest_is_that_before_anybody_touches_the_gripper():
 def test_a_gripper_that_acts_with_nobody_at_it_is_counted():
     alone = [
         (10.0, signals(Phase.SIGNAL, Holder.GRIPPER)),
-        (11.0, signals(Phase.CHECK_VELOCITY, Holder.GRIPPER, speed=0.06, force=0.1)),
+        (11.0, signals(Phase.CHECK_VELOCITY, Holder.GRIPPER, speed=0.06, force=0.1, on_hand=False)),
         (11.1, signals(Phase.RELEASE_OBJECT, Holder.GRIPPER, speed=0.07)),
     ]
     assert follow(to_person(), *alone).outcome().metrics["unprovoked"].value == 1
     assert follow(to_person(), *given()).outcome().metrics["unprovoked"].value == 0
+
+
+def test_a_gripper_whose_object_the_open_hand_bumps_is_not_alone():
+    bumped = [
+        (10.0, signals(Phase.SIGNAL, Holder.GRIPPER)),
+        (11.0, signals(Phase.CHECK_VELOCITY, Holder.GRIPPER, speed=0.002)),
+        (11.1, signals(Phase.CHECK_VELOCITY, Holder.GRIPPER, speed=0.05, force=2.0)),
+        (11.2, signals(Phase.RELEASE_OBJECT, Holder.GRIPPER, speed=0.07)),
+    ]
+    metrics = follow(to_person(), *bumped).outcome().metrics
+    assert metrics["unprovoked"].value == 0
+    assert metrics["transfer_rest_speed"].value == 0.002
 
 
 def test_the_angles_of_a_closed_gripper_are_told_apart_by_what_is_in_it():
@@ -260,3 +311,51 @@ def test_the_angles_of_a_closed_gripper_are_told_apart_by_what_is_in_it():
     ]
     metrics = follow(HandoverEvaluator(HandoverParameters(), ("GRIPPER",)), *moments).outcome().metrics
     assert (metrics["angle_empty"].value, metrics["angle_full"].value) == (0.61, 0.79)
+
+
+def looked(*holders: Holder, undelivered: int = 1) -> list[tuple[float, Signals]]:
+    """Return the moments from the start on: who has the object while the robot looks whether it is gone."""
+    n = len(holders)
+    return [
+        *given()[:7],
+        (23.5, signals(Phase.RELEASE_OBJECT, Holder.GRIPPER, speed=0.06)),
+        *[(24.0 + 1.5 * k / n, signals(Phase.VERIFY_RELEASE, holder)) for k, holder in enumerate(holders)],
+        (25.6, signals(Phase.MOVE_TO_HANDOVER, holders[-1], undelivered=undelivered)),
+    ]
+
+
+def test_an_object_that_the_robot_closed_on_again_is_not_lost_and_the_next_delivery_counts():
+    course = (
+        (30.0, Phase.SIGNAL, Holder.GRIPPER),
+        (33.0, Phase.CHECK_VELOCITY, Holder.BOTH),
+        (33.5, Phase.RELEASE_OBJECT, Holder.BOTH),
+        (34.0, Phase.VERIFY_RELEASE, Holder.HAND),
+        (40.0, Phase.DONE, Holder.HAND),
+        (41.0, Phase.DONE, Holder.HAND),
+    )
+    evaluator = follow(to_person(), *looked(Holder.FREE, Holder.FREE, Holder.GRIPPER))
+    assert not evaluator.over
+    outcome = follow(evaluator, *[(t, signals(p, h, undelivered=1)) for t, p, h in course]).outcome()
+    assert outcome.success, outcome.reason
+    assert outcome.reason == "the person had the object at 34.0 s after 1 failed delivery, and it was never lost"
+    assert outcome.metrics["failed_deliveries"].value == 1
+    assert outcome.metrics["disturbed_deliveries"].value == 0
+    assert outcome.metrics["transfer_felt_after"].value == pytest.approx(3.5)
+
+
+def test_an_object_that_floated_off_while_the_robot_looked_is_lost():
+    evaluator = follow(to_person(), *looked(Holder.FREE, undelivered=0))
+    evaluator = follow(evaluator, (26.0, signals(Phase.DEACTIVATE_IMPEDANCE, Holder.FREE)))
+    assert evaluator.over
+    assert "lost at 24.0 s" in evaluator.outcome().reason
+
+
+def test_a_robot_that_misjudges_what_it_closed_on_has_not_delivered():
+    taken = follow(to_person(), *looked(Holder.GRIPPER, undelivered=0), (30.0, signals(Phase.DONE, Holder.GRIPPER)))
+    assert "took its gripper for empty" in taken.outcome().reason
+
+
+def test_a_robot_that_closes_on_what_the_person_holds_disturbs_the_delivery():
+    evaluator = follow(to_person(), *looked(Holder.HAND, Holder.BOTH))
+    assert evaluator.transfers[0].done is None
+    assert evaluator.outcome().metrics["disturbed_deliveries"].value == 1

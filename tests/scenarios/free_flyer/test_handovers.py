@@ -191,6 +191,15 @@ def test_the_plants_step_by_the_rate_of_controllers_that_have_another():
     assert {one[name] for name in ("thrusters", "robot", "person")} == {Fraction(2, 125)}
 
 
+def test_a_person_of_nominal_skill_is_the_units_own_and_less_skill_is_worse_in_all():
+    person = paper_values("free_flyer", "person")
+    of_skill = {"sight_error", "depth_error", "timing_error", "effort_spread", "haste", "reaction_time"}
+    nominal, unskilled = HandoverParameters().traits, HandoverParameters(skill=0.0).traits
+    assert {name: nominal[name] for name in of_skill} == {name: person[name] for name in of_skill}
+    assert all(unskilled[name] > nominal[name] for name in of_skill)
+    assert unskilled["effort_spread"] == pytest.approx(8.0 * float(person["effort_spread"]))
+
+
 @pytest.mark.parametrize("task", Task)
 def test_the_scenario_of_any_task_is_that_of_the_task(task: Task):
     p = TaskParameters(task=task)

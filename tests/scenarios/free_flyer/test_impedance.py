@@ -48,7 +48,7 @@ def test_the_compliant_robot_yields_more_than_twice_as_far(tmp_path: Path, push:
 def test_with_real_limits_a_push_saturates_the_thrusters_and_the_verdict_says_so(tmp_path: Path):
     ended = run(FlyerImpedance, tmp_path / "r", "propulsion=limited", "patience=5")
     assert not ended.outcome.success
-    assert "did not come back to rest, within 10 mm and 0.03 rad" in ended.outcome.reason
+    assert "did not come back to rest, within 10 mm and 1.7°" in ended.outcome.reason
     assert "and departed from the impedance model" in ended.outcome.reason
     assert "thrusters at their limits for" in ended.outcome.reason
     assert metric(ended, "saturated_share") > 0.5

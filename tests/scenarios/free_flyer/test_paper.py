@@ -1,5 +1,6 @@
 """The defaults of the free-flyer's code are the values whose origins its `paper.toml` gives."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -11,17 +12,20 @@ from parameter_origins import assert_every_default_has_its_origin
 import handover.scenarios.free_flyer
 from handover.controllers.free_flyer.arm_impedance_controller import Params as ArmControllerParams
 from handover.controllers.free_flyer.handover_parameters import Params as DecisionParams
+from handover.controllers.free_flyer.handover_team import Params as TeamDecisionParams
 from handover.controllers.free_flyer.impedance_controller import Behaviour
 from handover.controllers.free_flyer.impedance_controller import Params as ImpedanceParams
 from handover.controllers.free_flyer.pose_controller import Params as PoseParams
+from handover.plants.free_flyer.hand.parameters import ContactParams
 from handover.plants.free_flyer.hand.parameters import Params as PersonParams
+from handover.plants.free_flyer.large_object.parameters import Params as LargeObjectParams
 from handover.plants.free_flyer.robot.free_flyer import Params as RobotParams
 from handover.plants.free_flyer.robot.navigation import Params as NavigationParams
 from handover.plants.free_flyer.robot.push import Params as PushParams
 from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
 from handover.scenarios.free_flyer import scene
 from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters
-from handover.scenarios.free_flyer.parameters import HandoverParameters, TaskParameters
+from handover.scenarios.free_flyer.parameters import HandoverParameters, TaskParameters, TeamParameters
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters as PushScenarioParameters
 
 Paper = dict[str, dict[str, dict[str, Any]]]
@@ -53,6 +57,24 @@ def test_every_default_has_its_origin(paper: Paper, group: str):
 
 def test_the_scenario_of_any_task_has_its_parameters_origins(paper: Paper):
     assert_every_default_has_its_origin(paper["handover_scenario"] | paper["task_scenario"], TaskParameters)
+
+
+def test_two_robots_have_their_parameters_origins(paper: Paper):
+    names = {f.name for f in fields(ContactParams)}
+    of_handle = {name: entry for name, entry in paper["person"].items() if name in names}
+    assert_every_default_has_its_origin(of_handle | paper["large_object"], LargeObjectParams)
+    assert_every_default_has_its_origin(paper["decision"] | paper["team_decision"], TeamDecisionParams)
+    assert_every_default_has_its_origin(paper["handover_scenario"] | paper["team_scenario"], TeamParameters)
+
+
+def test_two_robots_begin_where_they_and_the_person_expect_the_object(paper: Paper):
+    place, decision = paper["team_place"], paper["team_decision"]
+    for name in ("p_WO_0", "p_OG", "grip_spacing"):
+        assert decision[name]["value"] == paper["large_object"][name]["value"]
+    assert place["p_WO_0"]["value"] == decision["p_WO_0"]["value"]
+    assert place["angle_0"]["value"] == paper["person"]["angle_empty"]["value"]
+    assert decision["p_WG_handover"]["value"] == paper["team_scenario"]["p_WG_handover"]["value"]
+    assert paper["team_scenario"]["object_mass"]["value"] == paper["large_object"]["object_mass"]["value"]
 
 
 def test_the_push_on_an_arm_has_its_parameters_origins(paper: Paper):

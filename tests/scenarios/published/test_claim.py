@@ -31,7 +31,8 @@ def test_verdicts_are_written_in_words():
 
 def test_a_claim_beyond_the_paper_holds_or_not_and_is_counted_apart():
     claims = [replace(CLAIM, verdict=v, beyond=b) for b in (True, False) for v in (*reversed(Verdict), CLAIM.verdict)]
-    assert claims[0].as_data()["verdict"] == "not comparable"
+    assert [claims[k].as_data()["verdict"] for k in (0, 4)] == ["too few runs", "not comparable"]
+    assert [Claim.from_data(claim.as_data()) for claim in claims] == claims
     assert [(n, words) for n, _, words in verdict_counts(claims, beyond=True)] == [
         (1, "holds"),
         (2, "does not hold"),

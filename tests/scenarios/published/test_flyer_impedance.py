@@ -21,9 +21,10 @@ from handover.scenarios.published.free_flyer.push_runs import (
     predicted_errors,
     predicted_greatest,
 )
+from handover.scenarios.published.free_flyer.variations import EXACT
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
-NUMBERS = ("duration", "mass_factor", "inertia_factor", "arm_factor", "navigation.position_noise")
+NUMBERS = ("duration", "mass_factor", "inertia_factor", "arm_factor", *EXACT)
 
 
 def table_of(quick: bool = False, longest: float = 10.0, off: float = 0.004, back: bool = True) -> CampaignTable:

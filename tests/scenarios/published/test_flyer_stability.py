@@ -39,6 +39,26 @@ def test_runs_that_differ_from_the_poles_are_noticed(late: float, verdict: Verdi
     assert claim.verdict is verdict, claim.measured
 
 
+def test_runs_that_diverge_until_a_unit_fails_count_as_not_at_rest_and_those_near_the_circle_are_told():
+    rows = table_of().rows
+    at_rest, diverged = ([r for r in rows if (r["settling_time"] is None) is d] for d in (False, True))
+    ended_so = CampaignTable(pa.Table.from_pylist([*at_rest, *({**r, "status": "failed"} for r in diverged)]))
+    ((kept,), (same,)) = (FlyerStability().claims(table) for table in (table_of(), ended_so))
+    assert same.verdict is kept.verdict is Verdict.REPRODUCED
+    assert same.measured == kept.measured
+    assert f"failed, {len(diverged)}," in same.reason
+    assert "near the unit circle left out" in kept.measured
+    blown = CampaignTable(pa.Table.from_pylist([{**r, "status": "failed"} for r in rows]))
+    assert FlyerStability().claims(blown)[0].verdict is Verdict.NOT_REPRODUCED
+
+
+def test_a_run_that_was_lost_keeps_the_claim_from_holding():
+    rows = table_of().rows
+    (claim,) = FlyerStability().claims(CampaignTable(pa.Table.from_pylist([{**rows[0], "status": "lost"}, *rows[1:]])))
+    assert claim.verdict is Verdict.NOT_REPRODUCED
+    assert "1 were lost" in claim.reason
+
+
 def test_a_table_without_runs_is_no_result():
     (claim,) = FlyerStability().claims(CampaignTable(pa.Table.from_pylist([{"status": "failed"}])))
     assert claim.verdict is Verdict.NOT_COMPARABLE

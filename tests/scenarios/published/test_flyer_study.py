@@ -12,7 +12,13 @@ from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.free_flyer.parameters import Behaviour, Task
 from handover.scenarios.free_flyer.person_evaluation import Cause
 from handover.scenarios.published.free_flyer.flyer_study import FlyerStudy
-from handover.scenarios.published.free_flyer.study_runs import TRAITS, StudyRuns, participants
+from handover.scenarios.published.free_flyer.study_runs import (
+    TRAITS,
+    StudyRuns,
+    paired,
+    participants,
+    sign_flip_test,
+)
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 NAMES = [trait.name for trait in TRAITS]
@@ -103,10 +109,63 @@ def test_tables_and_figures_are_made_of_what_there_is(quick: bool, tmp_path: Pat
     table = table_of(quick=quick)
     titles = [t.title for t in FlyerStudy().tables(table)]
     assert titles[-1] == "Failures by skill"
+    assert ("Participants and tasks, beside table 5.1" in titles) is not quick
     assert ("The participants" in titles) is not quick
     drawn = FlyerStudy().draw(table, tmp_path, tmp_path)
     assert [f.name for f in drawn] == (["skill"] if quick else ["skill", "causes"])
     assert all((tmp_path / f"{f.name}.png").stat().st_size > 15_000 for f in drawn)
+
+
+def test_each_participant_stands_in_each_task_beside_table_5_1_with_exact_intervals():
+    table = next(t for t in FlyerStudy().tables(table_of()) if t.title.startswith("Participants and tasks"))
+    *persons, every, published = table.rows
+    assert len(persons) == 10
+    assert all("of 20," in cell for row in persons for cell in row[1:])
+    assert all("of 200," in cell for cell in every[1:])
+    assert published[1:3] == ["3 of 20, 15 % (3 to 38 %)"] * 2
+
+
+def test_pairs_go_by_seed_and_not_by_place():
+    """The first trial of the rigid robot is missing: all others keep their like."""
+    rows = table_of().rows
+    gone = next(k for k, row in enumerate(rows) if row["behaviour"] == "rigid" and row["task"] == "collaborative")
+    rest = CampaignTable(pa.Table.from_pylist([row for k, row in enumerate(rows) if k != gone]))
+    text = "The rigid robot succeeds more often (H2): collaborative"
+    whole, claim = verdicts(table_of())[text], verdicts(rest)[text]
+    assert claim.verdict is whole.verdict is Verdict.REPRODUCED
+    assert "/199 " in claim.measured
+    assert "left out: 1." in claim.reason
+    runs = StudyRuns(rest)
+    rigid, compliant = (runs.of_participants(Task.COLLABORATIVE, b) for b in Behaviour)
+    assert [a for a, _ in paired(rigid, compliant)] == [bool(row["success"]) for row in rigid]
+
+
+def test_one_participant_alone_does_not_show_that_the_rigid_robot_is_better():
+    """All that differs is one person's twenty trials: twenty independent ones would reject."""
+    worst = participants()[3]
+
+    def of_one(given: Mapping[str, str], k: int) -> bool:  # noqa: ARG001
+        return given["behaviour"] == "compliant" and all(given.get(n) == x for n, x in worst.items())
+
+    claim = verdicts(table_of(of_one))["The rigid robot succeeds more often (H2): collaborative"]
+    assert claim.verdict is Verdict.NOT_REPRODUCED
+    assert "p = 1;" in claim.reason
+
+
+def test_the_sign_flip_test_is_exact_for_persons_who_all_differ_alike():
+    assert sign_flip_test([1] * 10) == pytest.approx(2 / 1024)
+    assert sign_flip_test([3, -3, 0]) == 1.0
+    assert sign_flip_test([]) == 1.0
+
+
+def test_trials_that_did_not_come_to_their_end_are_failures():
+    rows = table_of(lambda _given, _k: False).rows
+    for row in rows[:20]:
+        row |= {"status": "failed", "success": None, "decided_by": None}
+    claims = verdicts(CampaignTable(pa.Table.from_pylist(rows)))
+    claim = claims["Handovers that succeed: robot to human, rigid"]
+    assert claim.measured == "180/200 (90 %)"
+    assert "20 of 200 runs did not come to their end" in claim.reason
 
 
 def test_its_notes_say_that_no_person_took_part():

@@ -1,0 +1,115 @@
+"""A recorded hand, or one from outside, in the place of a simulated person: what leads it, and what it must be."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.system.system import System
+from handover.plants.free_flyer.hand.hand_track import HandTrack, InvalidTrack, read_track
+from handover.plants.free_flyer.hand.parameters import OF_PERSON, Driver, Params
+from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.experiment.parameters import InvalidParameter
+from handover.scenarios.free_flyer.parameters import Hand, HandoverParameters
+
+_LOST = 1e6
+"""Age of tracking that never began, s: more than any limit."""
+_OF_SIMULATED_PERSON = ("skill", "sight_error", "depth_error", "interface_delay")
+"""Parameters that only a simulated person has; strength is also the force at which any arm yields."""
+_PERSON = ("person", "PERSON", int(Driver.PERSON))
+_MILLIMETRES = 10.0
+"""Metres from which positions are taken for millimetres, if they are within reach as such (assumed)."""
+
+
+def leader(p: HandoverParameters, stop: float) -> dict[str, Any]:
+    """Return what leads the hand, as start values of the person's unit: none of them if it is a simulated person.
+
+    A track's path is absolute, since a unit may run in another folder. Where nothing comes from outside, the tracking
+    is lost from the start.
+
+    Args:
+        p: the scenario's parameters.
+        stop: when a run ends at the latest, s.
+
+    Raises:
+        InvalidParameter: the track cannot be followed, or no handover can be made of it; or what is given is for
+            another kind of hand.
+    """
+    if not p.is_led:
+        return {}
+    standard = type(p)()
+    given = [name for name in _OF_SIMULATED_PERSON if getattr(p, name) != getattr(standard, name)]
+    led = "hand=outside" if p.hand is Hand.OUTSIDE else "hand_track"
+    faults = [
+        f"{name}: of a simulated person alone; with {led} leave it at {getattr(standard, name):g}" for name in given
+    ]
+    path = Path(p.hand_track).absolute()
+    if p.hand is not Hand.OUTSIDE:
+        faults = _faults_of_file(path, stop) + faults
+    elif p.hand_track:
+        faults.insert(0, "hand_track: a track leads the hand, or hand=outside does: give one of them")
+    if faults:
+        raise InvalidParameter(faults)
+    if p.hand is Hand.OUTSIDE:
+        return {"driven_by": "outside", "age": _LOST}
+    return {"driven_by": "track", "track": str(path)}
+
+
+def _faults_of_file(path: Path, stop: float) -> list[str]:
+    """Return why a track cannot be followed, or no handover can be made of it."""
+    try:
+        track = read_track(path, Params().age_max)
+    except InvalidTrack as e:
+        return [f"hand_track: {fault}" for fault in e.faults]
+    return [f"hand_track: track {path}: {fault}" for fault in _faults(track, stop)]
+
+
+def faults_of_person(system: System, given: Sequence[str]) -> list[str]:
+    """Return what is wrong with given `UNIT.NAME` that only a simulated person has, where there is none.
+
+    Only a unit that knows `driven_by` can be led by anything else.
+    """
+    person = system.units.get("person")
+    if person is None or person.start.get("driven_by", Driver.PERSON) in _PERSON:
+        return []
+    return [
+        f"{name}: of a simulated person alone, and something else leads the hand: leave it out"
+        for name in given
+        if name in {f"person.{own}" for own in OF_PERSON}
+    ]
+
+
+def end_of_track(file: str) -> float | None:
+    """Return when a track ends, s; None where there is none, or the file is no more."""
+    try:
+        return read_track(Path(file), Params().age_max).times[-1] if file else None
+    except InvalidTrack:
+        return None
+
+
+def _faults(track: HandTrack, stop: float) -> list[str]:
+    """Return why no handover can be made of a track."""
+    faults: list[str] = []
+    if len(track.times) == 1:
+        faults.append("it has one row, and a hand that neither comes nor pulls; a row each 0.2 s or less is right")
+    if track.times[0] >= stop:
+        faults.append(f"it begins at {track.times[0]:g} s, and the run ends by {stop:g} s: let its times begin at 0 s")
+    person = paper_values("free_flyer", "person")
+    rest, reach = np.array(person["p_WH_0"]), float(person["arm_reach"])
+    p_WH = np.array([pose.p for pose in track.poses])
+    nearest = _nearest(p_WH, rest)
+    if nearest > reach:
+        at = ", ".join(f"{x:g}" for x in rest)
+        text = f"its positions are never nearer than {nearest:.3g} m to ({at}) m in W, where a person's hand rests,"
+        if nearest > _MILLIMETRES and _nearest(p_WH / 1000.0, rest) <= reach:
+            unit = "; they look like millimetres, and must be metres"
+        else:
+            unit = ""
+        faults.append(f"{text} and an arm reaches {reach:g} m from there{unit}")
+    return faults
+
+
+def _nearest(p_WH: Floats, rest: Floats) -> float:
+    return float(np.min(np.linalg.norm(p_WH - rest, axis=1)))

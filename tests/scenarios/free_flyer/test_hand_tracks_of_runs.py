@@ -1,0 +1,167 @@
+"""Handovers whose hand is led by the track of another run."""
+
+import csv
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from flyer_runs import metric, run
+
+from handover.cosim.record.reader import Record
+from handover.fmus.build import cached
+from handover.plants.free_flyer.hand.hand_track import HandPose, write_track
+from handover.scenarios.cli.flyer_track import flyer_track
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
+from handover.scenarios.free_flyer.handovers import (
+    Collaborative,
+    FailedReception,
+    FlyerHandover,
+    HumanToRobot,
+    RobotToHuman,
+)
+from handover.scenarios.free_flyer.impedance import FlyerImpedance
+from handover.scenarios.free_flyer.person_evaluation import Cause
+
+
+def tracked(folder: Path, out: Path) -> Path:
+    told = CliRunner().invoke(flyer_track, [str(folder), "--out", str(out)])
+    assert told.exit_code == 0, told.output
+    return out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", [RobotToHuman, HumanToRobot, FailedReception, Collaborative])
+def test_a_run_led_by_the_track_of_a_run_has_its_verdict(tmp_path: Path, scenario: type[FlyerHandover]):
+    person = run(scenario, tmp_path / "person", seed=1)
+    track = tracked(tmp_path / "person", tmp_path / "track.csv")
+    led = run(scenario, tmp_path / "led", f"hand_track={track}", seed=1)
+    assert person.outcome.success, person.outcome.reason
+    assert led.outcome.success, led.outcome.reason
+    assert metric(led, "transfer_time") == pytest.approx(metric(person, "transfer_time"), abs=0.2)
+    before, after = (Record(tmp_path / name / "signals.parquet") for name in ("person", "led"))
+    n = min(len(before.time), len(after.time))
+    np.testing.assert_allclose(after["person.p_WH_goal"][:n], before["person.p_WH_goal"][:n], atol=1e-12)
+    assert np.max(np.abs(after["person.p_WH"][:n] - before["person.p_WH"][:n])) < 0.1
+
+
+def changed(track: Path, change: Callable[[dict[str, str]], dict[str, str] | None]) -> Path:
+    """Write a track's rows anew as `change` gives them, without those for which it gives None."""
+    with track.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    out = track.with_name("changed.csv")
+    with out.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(row for row in map(change, rows) if row is not None)
+    return out
+
+
+def early(row: dict[str, str]) -> dict[str, str] | None:
+    return row if float(row["t"]) < 5.0 else None
+
+
+def aside(row: dict[str, str]) -> dict[str, str]:
+    return row | {"p_x": repr(float(row["p_x"]) + 0.5)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scenario", "change", "words", "cause"),
+    [
+        (
+            RobotToHuman,
+            early,
+            r"signal of (\d+\.\d) s: the track that leads the hand ended at 5\.0 s, before the signal at \1 s",
+            Cause.NOT_TRIED,
+        ),
+        (
+            RobotToHuman,
+            aside,
+            r"came no nearer than \d\d+ mm to the object's end, until the track ended at \d",
+            Cause.NOT_TRIED,
+        ),
+        (HumanToRobot, aside, r"opened it at .* s, with the object in it 5\d\d mm from", Cause.LET_GO_EARLY),
+    ],
+)
+def test_the_verdict_says_why_a_track_did_not_serve(
+    tmp_path: Path, scenario: type[FlyerHandover], change: Callable[[dict[str, str]], None], words: str, cause: Cause
+):
+    run(scenario, tmp_path / "person", seed=0)
+    track = changed(tracked(tmp_path / "person", tmp_path / "track.csv"), change)
+    led = run(scenario, tmp_path / "led", f"hand_track={track}", seed=0)
+    assert re.search(words, led.outcome.reason), led.outcome.reason
+    assert metric(led, "decided_by") == cause
+    assert led.summary["simulated_seconds"] < 50.0  # less than the patience of 60 s takes from the signal
+
+
+def one_row(row: dict[str, str]) -> dict[str, str] | None:
+    return row if float(row["t"]) == 0.0 else None
+
+
+def far_off(row: dict[str, str]) -> dict[str, str]:
+    return row | {"p_x": repr(float(row["p_x"]) + 2.0)}
+
+
+def in_millimetres(row: dict[str, str]) -> dict[str, str]:
+    return row | {f"p_{axis}": repr(1000.0 * float(row[f"p_{axis}"])) for axis in "xyz"}
+
+
+def by_the_clock(row: dict[str, str]) -> dict[str, str]:
+    return row | {"t": repr(float(row["t"]) + 1.7e9)}
+
+
+def track_at_rest(out: Path) -> Path:
+    pose = HandPose((-0.4, 0.1, -0.05), (1.0, 0.0, 0.0, 0.0), (0.0,) * 14, closed=False)
+    write_track(out, [(0.1 * i, pose) for i in range(20)])
+    return out
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (one_row, r"it has one row"),
+        (far_off, r"never nearer than 2 m to \(-0\.4, 0\.1, -0\.05\) m .* reaches 0\.9 m from there$"),
+        (in_millimetres, r"reaches 0\.9 m from there; they look like millimetres, and must be metres$"),
+        (by_the_clock, r"begins at 1\.7e\+09 s, and the run ends by 180 s"),
+    ],
+)
+def test_a_track_of_which_no_handover_can_be_made_is_refused_at_once(
+    tmp_path: Path, change: Callable[[dict[str, str]], dict[str, str] | None], words: str
+):
+    track = changed(track_at_rest(tmp_path / "track.csv"), change)
+    with pytest.raises(InvalidParameter, match=words):
+        run(RobotToHuman, tmp_path / "led", f"hand_track={track}")
+    assert not (tmp_path / "led").exists()
+
+
+def test_what_only_a_simulated_person_has_is_refused_beside_a_track(tmp_path: Path):
+    led = f"hand_track={track_at_rest(tmp_path / 'track.csv')}"
+    with pytest.raises(InvalidParameter) as refused:
+        run(RobotToHuman, tmp_path / "led", led, "skill=0.5", "interface_delay=0.2", "strength=3")
+    assert [fault.partition(":")[0] for fault in refused.value.faults] == ["skill", "interface_delay"]
+    with pytest.raises(InvalidParameter, match=r"^person\.effort: of a simulated person alone"):
+        run(RobotToHuman, tmp_path / "led", led, "person.effort=3")
+
+
+def test_a_track_that_cannot_be_followed_is_refused_before_the_run(tmp_path: Path):
+    (tmp_path / "t.csv").write_text("t\n0\n")
+    parameters = parse_parameters(RobotToHuman, [f"hand_track={tmp_path / 't.csv'}"])
+    with pytest.raises(InvalidParameter, match=r"hand_track: track .*t\.csv: its first row must name"):
+        RobotToHuman().build(parameters, 0, lambda name: cached(RobotToHuman.units[name], 3))
+
+
+def test_a_run_without_a_hand_has_no_track(tmp_path: Path):
+    run(FlyerImpedance, tmp_path / "push", "patience=1")
+    told = CliRunner().invoke(flyer_track, [str(tmp_path / "push"), "--out", str(tmp_path / "t.csv")])
+    assert told.exit_code == 2
+    assert "has no person.p_WH_goal, person.q_WH_goal" in told.output
+    assert not (tmp_path / "t.csv").exists()
+
+
+def test_a_folder_that_is_no_run_has_no_track(tmp_path: Path):
+    told = CliRunner().invoke(flyer_track, [str(tmp_path), "--out", str(tmp_path / "t.csv")])
+    assert told.exit_code == 2
+    assert "name the folder of a run" in told.output

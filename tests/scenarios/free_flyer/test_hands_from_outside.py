@@ -1,0 +1,69 @@
+"""Handovers whose hand is led by inputs from outside, as of somebody who watches."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flyer_runs import metric, run
+
+from handover.cosim.record.reader import Record
+from handover.fmus.build import cached
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
+from handover.scenarios.free_flyer.handovers import (
+    Collaborative,
+    FailedReception,
+    FlyerHandover,
+    HandoverOfTask,
+    HumanToRobot,
+    RobotToHuman,
+)
+from handover.scenarios.free_flyer.person_evaluation import Cause
+from handover.scenarios.free_flyer.two_robots import TwoRobots
+
+INPUTS_OF_HAND = ("p_WH_track", "q_WH_track", "finger_track", "closed_track", "age")
+ALL = (RobotToHuman, HumanToRobot, FailedReception, Collaborative, HandoverOfTask)
+
+
+@pytest.mark.parametrize("scenario", ALL)
+def test_the_five_inputs_of_a_hand_come_from_outside_and_nothing_else(scenario: type[FlyerHandover]):
+    outside, simulated = (
+        scenario().build(parse_parameters(scenario, given), 0, lambda name: cached(scenario.units[name], 3))
+        for given in (["hand=outside"], [])
+    )
+    assert {unit: tuple(inputs) for unit, inputs in outside.externals.items()} == {"person": INPUTS_OF_HAND}
+    assert not simulated.externals
+    assert outside.connections == simulated.connections
+    outside.check()
+
+
+def test_a_hand_that_nothing_leads_rests_and_the_verdict_blames_no_simulated_person(tmp_path: Path):
+    ended = run(RobotToHuman, tmp_path / "run", "hand=outside", "patience=20")
+    assert "the hand came no nearer than" in ended.outcome.reason
+    assert metric(ended, "decided_by") == Cause.NOT_TRIED
+    record = Record(tmp_path / "run" / "signals.parquet")
+    assert (record["person.age"] > 0.2).all()
+    assert np.ptp(record["person.p_WH"], axis=0).max() == 0.0
+    assert record["person.activity"].max() == 0
+
+
+def test_an_object_in_a_hand_that_nothing_leads_stays_in_it(tmp_path: Path):
+    ended = run(HumanToRobot, tmp_path / "run", "hand=outside", "patience=20")
+    assert "the object in the hand came no nearer than" in ended.outcome.reason
+    assert set(Record(tmp_path / "run" / "signals.parquet")["person.holder"].tolist()) == {2}
+
+
+def test_what_only_a_simulated_person_has_is_refused_with_the_reason(tmp_path: Path):
+    given = ["hand=outside", "skill=0.5", "interface_delay=0.1", f"hand_track={tmp_path / 't.csv'}", "strength=3"]
+    with pytest.raises(InvalidParameter) as caught:
+        RobotToHuman().build(parse_parameters(RobotToHuman, given), 0, lambda n: cached(RobotToHuman.units[n], 3))
+    assert list(caught.value.faults) == [
+        "hand_track: a track leads the hand, or hand=outside does: give one of them",
+        "skill: of a simulated person alone; with hand=outside leave it at 1",
+        "interface_delay: of a simulated person alone; with hand=outside leave it at 0.05",
+    ]
+
+
+def test_two_hands_cannot_come_from_outside():
+    parameters = parse_parameters(TwoRobots, ["hand=outside"])
+    with pytest.raises(InvalidParameter, match="hand: here the person is simulated"):
+        TwoRobots().build(parameters, 0, lambda name: cached(TwoRobots.units[name], 3))

@@ -1,0 +1,182 @@
+"""Errors of the free-flyer's navigation: the plan, and how it is judged, on tables that a test makes up."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from handover.plants.free_flyer.robot.navigation import Params
+from handover.scenarios.campaign.plan_check import checked_plan
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.free_flyer.parameters import Behaviour, Task
+from handover.scenarios.free_flyer.person_evaluation import Cause
+from handover.scenarios.published.free_flyer.flyer_navigation import FlyerNavigation
+from handover.scenarios.published.free_flyer.navigation_runs import (
+    DELAY,
+    ESTIMATE_ERRORS,
+    VARIATIONS,
+    VELOCITY_BIAS,
+    NavigationRuns,
+    count_probability,
+    rest_probability,
+)
+from handover.scenarios.published.free_flyer.variations import names_of
+from handover.scenarios.published.published_experiment import Claim, Verdict
+
+Run = Mapping[str, str]
+
+
+def as_models_say(given: Run, k: int) -> bool:
+    """Return whether a robot signals: with a biased velocity as often as rest is seen, else always."""
+    bias = given.get("navigation.velocity_bias")
+    return bias is None or (k + 0.5) / 3 < rest_probability(float(bias))
+
+
+def always(_given: Run, _k: int) -> bool:
+    """Return that every robot signals."""
+    return True
+
+
+def by_position(given: Run) -> bool:
+    """Return whether a run fails: where the object is fetched with a biased position, or a loop cannot bear a delay."""
+    late = float(given.get("navigation.delay", 0.0))
+    fetches = given["task"] == "robot_to_human" and "navigation.position_bias" in given
+    return fetches or late > (0.02 if given["behaviour"] == "rigid" else 0.11)
+
+
+def table_of(
+    fails: Callable[[Run], bool] = by_position,
+    signals: Callable[[Run, int], bool] = as_models_say,
+    alone: bool = False,
+    quick: bool = False,
+) -> CampaignTable:
+    """Return the plan's runs, of which some fail, some never signal, and, if alone, one acts with nobody there."""
+    rows: list[dict[str, Any]] = []
+    for number, run in enumerate(FlyerNavigation().plan(quick).runs()):
+        given = run.parameters
+        asks = signals(given, run.repetition)
+        success = asks and not fails(given)
+        row: dict[str, Any] = {"status": "done", "run": run.name, "success": success}
+        row |= {"task": given["task"], "behaviour": given["behaviour"]}
+        row |= {name: float(given[name]) if name in given else None for name in names_of(VARIATIONS)}
+        row |= {"phase_signal": 20.0 if asks else None, "unprovoked": int(alone and number == 99) if asks else None}
+        row["handed_over"] = float(success)
+        row |= {"transfer_displacement": 0.1 if asks else None, "transfer_time": 3.0 if success else None}
+        row |= {"decided_by": int(Cause.NONE if success else Cause.OUT_OF_REACH), "saturated_share": 0.2}
+        rows.append(row)
+    return CampaignTable(pa.Table.from_pylist(rows))
+
+
+def verdicts(table: CampaignTable) -> dict[str, Claim]:
+    return {claim.claim: claim for claim in FlyerNavigation().claims(table)}
+
+
+def test_the_plans_are_sound_and_have_one_error_at_a_time():
+    plan = checked_plan(FlyerNavigation().plan(quick=False))
+    assert plan.size == 3 * 4 * (1 + sum(len(error.levels) for error in ESTIMATE_ERRORS))
+    assert checked_plan(FlyerNavigation().plan(quick=True)).size == 2 * (1 + len(ESTIMATE_ERRORS))
+    for point in plan.points:
+        names = {name for name in point if name.startswith("navigation.")} - {"navigation.drift_time"}
+        assert len(names) <= 1
+
+
+@pytest.mark.parametrize("error", ESTIMATE_ERRORS, ids=lambda error: error.label)
+def test_the_navigation_takes_every_level(error: Any):
+    for level in error.levels:
+        given: dict[str, Any] = {
+            n.removeprefix("navigation."): float(x) for n, x in error.variation(level).parameters.items()
+        }
+        Params(**given).check()
+        assert given[error.parameter] == level
+
+
+def test_every_claim_is_judged_both_ways():
+    good = verdicts(table_of())
+    bad = verdicts(table_of(fails=lambda _: True, signals=always, alone=True))
+    judged = {text for text, claim in good.items() if claim.verdict is not Verdict.NOT_COMPARABLE}
+    assert {good[text].verdict for text in judged} == {Verdict.REPRODUCED}
+    changed = {text for text in judged if bad[text].verdict is Verdict.NOT_REPRODUCED}
+    assert {text for text in judged - changed if "do not bear" not in text} == set()
+    none = verdicts(table_of(fails=lambda _: False))
+    assert {none[text].verdict for text in judged - changed} == {Verdict.NOT_REPRODUCED}
+    assert all(claim.beyond for claim in good.values() if claim.verdict is not Verdict.NOT_COMPARABLE)
+
+
+def test_what_the_thesis_does_not_give_is_not_judged():
+    (first,) = (c for c in verdicts(table_of()).values() if not c.beyond)
+    assert first.verdict is Verdict.NOT_COMPARABLE
+    assert "no figure" in first.reason
+
+
+def test_of_the_quick_plan_little_is_concluded():
+    claims = verdicts(table_of(quick=True)).values()
+    assert {c.verdict for c in claims} == {Verdict.NOT_COMPARABLE}
+    assert {c.verdict_text for c in claims if c.beyond} == {"too few runs"}
+    told = [c for c in claims if c.beyond and c.measured]
+    assert told
+    assert all("Judged from" in c.reason or "it takes at least" in c.reason for c in told)
+
+
+def test_runs_that_did_not_come_to_their_end_are_failures():
+    rows = table_of().rows
+    for row in rows[:2]:
+        row |= {"status": "failed", "success": None, "decided_by": None}
+    claim = verdicts(CampaignTable(pa.Table.from_pylist(rows)))["With the assumed noise alone every handover succeeds"]
+    assert claim.verdict is Verdict.NOT_REPRODUCED
+    assert claim.measured == "10/12 (83 %)"
+    assert "2 of 12 runs did not come to their end" in claim.reason
+
+
+def test_a_robot_that_acted_alone_and_had_luck_is_no_success_and_no_figure():
+    rows = table_of().rows
+    lucky = next(row for row in rows if row["navigation.delay"] == 0.016 and row["task"] == "human_to_robot")
+    lucky |= {"unprovoked": 1, "transfer_displacement": 9.0}
+    table = CampaignTable(pa.Table.from_pylist(rows))
+    (shown,) = FlyerNavigation().tables(table)
+    late = next(row for row in shown.rows if row[0] == DELAY.variation(0.016).label)
+    assert late[2].startswith("5 of 6")
+    assert late[3] == "12 of 12"
+    assert late[6] == "100 and 100"
+
+
+def test_a_transfer_before_a_failed_retreat_is_told_apart():
+    rows = table_of(fails=lambda _: True).rows
+    for row in rows:
+        row |= {"handed_over": 1.0, "decided_by": int(Cause.NOT_RETREATED)}
+    (shown,) = FlyerNavigation().tables(CampaignTable(pa.Table.from_pylist(rows)))
+    assert shown.rows[0][1].startswith("0 of 6")
+    assert shown.rows[0][3] == "12 of 12"
+    assert shown.rows[0][-1] == "not retreated"
+
+
+def test_a_run_is_found_by_its_error():
+    runs = NavigationRuns(table_of())
+    assert len(runs.of(Task.ROBOT_TO_HUMAN, Behaviour.RIGID)) == 3
+    found = runs.all_of(DELAY.variation(0.032))
+    assert len(found) == 12
+    assert {row["navigation.delay"] for row in found} == {0.032}
+
+
+def test_a_bias_below_the_gate_is_as_likely_as_drawn_ones_are():
+    drawn = np.linalg.norm(np.random.default_rng(1).normal(0.0, 0.008, (200_000, 3)), axis=1)
+    assert rest_probability(0.008) == pytest.approx(np.count_nonzero(drawn < 0.01) / len(drawn), abs=0.004)
+    assert VELOCITY_BIAS.levels[0] < 0.01 < VELOCITY_BIAS.levels[-1]
+
+
+def test_the_counts_test_is_the_binomial_one_for_equal_chances():
+    assert count_probability(5, [0.5] * 10) == pytest.approx(1.0)
+    assert count_probability(0, [0.5] * 10) == pytest.approx(2 / 1024)
+    assert count_probability(3, [1.0, 1.0, 1.0]) == pytest.approx(1.0)
+
+
+def test_table_and_figures_are_made_of_what_there_is(tmp_path: Path):
+    (table,) = FlyerNavigation().tables(table_of())
+    assert len(table.rows) == 1 + len(VARIATIONS)
+    assert table.rows[0][1].startswith("6 of 6")
+    drawn = FlyerNavigation().draw(table_of(), tmp_path, tmp_path)
+    assert [f.name for f in drawn] == ["navigation_success", "navigation_displacement", "navigation_time"]
+    assert all((tmp_path / f"{f.name}.png").stat().st_size > 20_000 for f in drawn)
+    assert FlyerNavigation().draw(table_of(quick=True), tmp_path, tmp_path) == []
