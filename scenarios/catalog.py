@@ -128,6 +128,10 @@ SYSTEMS = (
                 "handover.scenarios.free_flyer.handovers:HandoverOfTask",
                 "a free-flyer and a person hand an object over, in one of the four ways",
             ),
+            "flyer_two_robots": ScenarioEntry(
+                "handover.scenarios.free_flyer.two_robots:TwoRobots",
+                "two free-flyers and a person with two hands hand a large object over",
+            ),
         },
     ),
     RobotSystem(

@@ -25,6 +25,9 @@ ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", README, flags=re.DOTALL | re.MULTILINE)
 COMMANDS = [line for kind, text in BLOCKS if not kind for line in text.splitlines() if line.startswith(".venv/")]
+RUNS = [c for c in COMMANDS if " run " in c and "--live" not in c]
+LIVE_RUNS = [c for c in COMMANDS if "--live" in c]
+"""Begins once its page is open: tests/scenarios/live runs it."""
 PROGRAMS = [text for kind, text in BLOCKS if kind == "python"]
 IN_PYTHON, STEPS, AGENT, OWN_SYSTEM, IN_FMPY, OWN_BLOCK, OWN_BUILD = PROGRAMS
 
@@ -42,7 +45,8 @@ def program(text: str, folder: Path) -> str:
 
 
 def test_the_readme_has_what_is_tested_here():
-    assert len([c for c in COMMANDS if " run " in c]) == 13
+    assert len(RUNS) == 13
+    assert len(LIVE_RUNS) == 1
     assert len([c for c in COMMANDS if " export " in c]) == 1
     assert len([c for c in COMMANDS if " build " in c]) == 2
     assert len([c for c in COMMANDS if " check " in c]) == 1
@@ -51,6 +55,9 @@ def test_the_readme_has_what_is_tested_here():
     assert len([c for c in COMMANDS if " compare " in c]) == 1
     assert len([c for c in COMMANDS if " paper " in c]) == 1
     assert len([c for c in COMMANDS if " report " in c]) == 1
+    assert len([c for c in COMMANDS if " film " in c]) == 1
+    assert len([c for c in COMMANDS if " play " in c]) == 1
+    assert len([c for c in COMMANDS if " study " in c]) == 2
 
 
 def test_the_citation_is_of_this_version():
@@ -218,7 +225,7 @@ def test_a_block_of_ones_own_is_built(tmp_path: Path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", [c for c in COMMANDS if " run " in c])
+@pytest.mark.parametrize("command", RUNS)
 def test_the_runs_succeed(command: str, tmp_path: Path):
     needed = [" build TendonArm ", " vsl-train "] if "units/" in command or "vsl_model.json" in command else []
     needed += [" export "] if ".ssp" in command else []
@@ -229,9 +236,11 @@ def test_the_runs_succeed(command: str, tmp_path: Path):
     done = handover(command, tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "succeeded" in done.stdout
-    again = command_with(" report ")
+    again, filmed = command_with(" report "), command_with(" film ")
     if command.endswith(f" --out {again.split()[-1]}"):
         assert handover(again, tmp_path).returncode == 0
+        done = handover(filmed, tmp_path) if shutil.which("chromium") else done
+        assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.slow
@@ -255,3 +264,11 @@ def test_campaigns_are_compared(tmp_path: Path):
     found = json.loads((comparison / "comparison.json").read_bytes())
     assert all(test["paired"] for test in found["tests"])  # "run by run where they share seeds, as these do"
     assert {p.suffix for p in (comparison / "figures").iterdir()} == {".png", ".svg"}
+
+
+def test_the_plan_of_a_study_is_written_and_checked(tmp_path: Path):
+    new, check = (c for c in COMMANDS if " study " in c)
+    assert handover(new, tmp_path).returncode == 0
+    done = handover(check, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "12" in done.stdout

@@ -16,11 +16,11 @@ from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.buffers import Views
 from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.start_values import entries_of
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import Connection, PlacedUnit, PortName, System
 from handover.cosim.system.time_series import HeldValue
 from handover.scenarios.api.arguments import InvalidInput
-from handover.scenarios.execution.input_file import entries_of
 
 HELD_KINDS = (Kind.REAL, Kind.INTEGER, Kind.BOOLEAN, Kind.ENUMERATION)
 """Kinds of values that can be set from outside."""
@@ -73,6 +73,8 @@ class OpenSystem:
         for name in self.system.units:
             for port, series in system.followed.get(name, {}).items():
                 self.system.follow(PortName(name, port), series)
+            for port, source in system.externals.get(name, {}).items():
+                self.system.external(PortName(name, port), source)
         for name, unit in self.system.units.items():
             fed = {*self.system.fed_inputs(name)}
             for port in unit.description.inputs.values():

@@ -22,6 +22,7 @@ from handover.scenarios.api.arguments import (
 from handover.scenarios.api.progress import bar
 from handover.scenarios.api.run_result import Run
 from handover.scenarios.execution.errors import require_extra
+from handover.scenarios.execution.input_sources import played_back
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.request import RunRequest, check_subject
 from handover.scenarios.execution.runner import run_task
@@ -42,6 +43,7 @@ def run(
     stop: Seconds | None = None,
     step: Seconds | None = None,
     inputs: Path | str | None = None,
+    inputs_from: Path | str | None = None,
     formats: Sequence[str] = (),
     checkpoint: Seconds | None = None,
     algorithm: str | Algorithm | None = None,
@@ -67,6 +69,7 @@ def run(
         stop: when it ends, s, if its evaluation does not end it before; only a system has no stop time of its own.
         step: of an SSP or FMU: the communication step of all units, s.
         inputs: of an FMU: a CSV file of its inputs over time.
+        inputs_from: folder of a run whose inputs from outside, such as a hand's, are played back.
         formats: of the record besides Parquet: `csv`, `mat`.
         checkpoint: simulated seconds between checkpoints, from which `handover resume` continues.
         algorithm: `jacobi`, `gauss-seidel`, `fixed-point` or `newton`.
@@ -96,6 +99,7 @@ def run(
             stop=exact("stop", stop),
             step=exact("step", step),
             inputs=None if inputs is None else Path(inputs),
+            sources=None if inputs_from is None else played_back(Path(inputs_from)),
             formats=formats_of(formats),
             every=exact("checkpoint", checkpoint),
             options=master_options(options, algorithm, isolate),

@@ -20,14 +20,20 @@ Run
   handover run helix_handover            one run; leaves a folder with a report
   handover run x.ssp --stop 5            a system from another tool, for 5 s
   handover run x.fmu --input u.csv       one unit from any tool, with inputs from a table
+  handover play flyer_impedance          the same in a browser, with sliders for its parameters
   handover resume runs/long              resumes a run with checkpoints
   handover sweep ir_grasp strategy=reflex,blind --repeat 20
                                          a campaign: many runs, one table
   handover compare ours theirs           campaigns, or runs, on one page: rates, tests, curves
   handover paper ir-table                a paper's experiment: ours beside the published
   handover report runs/long              writes its page again, also of a killed run
+  handover film runs/long --out x.mp4    its scene beside plots, as a film
   handover vsl-train --out model.json    kinematics learned on the VSL arm
   handover flyer-track runs/x            the hand's track, for -p hand_track=FILE
+
+\b
+Study with people
+  handover study new plan.toml           its plan; see `handover study --help`
 
 \b
 Your own
@@ -125,6 +131,9 @@ COMMANDS = (
         short_help="Write a SCENARIO as an SSP, for other tools.",
     ),
     DeferredCommand(
+        "film", "handover.scenarios.cli.film:film", short_help="Make a film of a run: its scene beside plots."
+    ),
+    DeferredCommand(
         "flyer-track",
         "handover.scenarios.cli.flyer_track:flyer_track",
         help="Write the track of the hand in a handover of the free-flyer, of the run in DIR.",
@@ -148,6 +157,11 @@ COMMANDS = (
         help="Run a paper's EXPERIMENT, and compare its results with the published ones.",
     ),
     DeferredCommand(
+        "play",
+        "handover.scenarios.cli.play:play",
+        short_help="Play with a SCENARIO's parameters in a browser.",
+    ),
+    DeferredCommand(
         "report", "handover.scenarios.cli.report:report", short_help="Write the page of a run or of a campaign."
     ),
     DeferredCommand(
@@ -157,6 +171,11 @@ COMMANDS = (
         "run",
         "handover.scenarios.cli.run:run",
         help="Run a SCENARIO once and write summary, signals, figures and a report into a folder.",
+    ),
+    DeferredCommand(
+        "study",
+        "handover.scenarios.cli.study:study",
+        short_help="Carry out a user study: its plan, sessions, report.",
     ),
     DeferredCommand(
         "sweep",

@@ -8,6 +8,7 @@ from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.results.run_folder import RunFolder, check_place
 
 _PATH = click.Path(path_type=Path)
+_SIGNALS = ("person.p_WH_goal", "person.q_WH_goal", "person.finger_goal", "person.closed_goal")
 
 
 @click.command("flyer-track")
@@ -37,10 +38,18 @@ def flyer_track(folder: Path, out: Path) -> None:
 
 
 def _write(run: RunFolder, out: Path) -> int:
-    from handover.cosim.record.reader import Record  # pyarrow is slow to import
-    from handover.scenarios.free_flyer.recorded_hand import NoHand, write_hand_track
+    """Write where person or tracker wanted the hand, without what arm and object made of it; return the rows.
 
-    try:
-        return write_hand_track(Record(run.signals), out)
-    except NoHand as e:
-        raise UsageError(f"{run.shown}: {e}") from e
+    Raises:
+        UsageError: the run has no such signals.
+    """
+    from handover.cosim.record.reader import Record  # pyarrow is slow to import
+    from handover.plants.free_flyer.hand.hand_track import HandPose, write_track
+
+    record = Record(run.signals)
+    if lacking := [name for name in _SIGNALS if name not in record]:
+        raise UsageError(f"{run.shown}: the run has no {', '.join(lacking)}; a handover of the free-flyer has")
+    p, q, angles, closed = (record[name].tolist() for name in _SIGNALS)
+    poses = (HandPose(tuple(a), tuple(b), tuple(c), bool(d)) for a, b, c, d in zip(p, q, angles, closed, strict=True))
+    write_track(out, zip(record.time.tolist(), poses, strict=True))
+    return len(record.time)

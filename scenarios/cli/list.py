@@ -141,6 +141,9 @@ def print_scenario(experiment: type[Experiment[Any]]) -> None:
     print_rows(console, [(v.name, plain(v.start), allowed(v), v.description) for v in experiment.parameters()])
     console.print("Units, to be replaced with --unit name=file.fmu or name=module:Class")
     print_rows(console, list(experiment.units.items()))
+    for name, kind in list(experiment.units.items())[:1]:
+        text = f"A unit's own parameters are set with -p {name}.parameter=value: handover list {kind}"
+        console.print(text, markup=False, soft_wrap=True)
     if experiment.places:
         text = f"What a unit needs to take a place: handover list {_named(experiment)} --unit name"
         console.print(text, markup=False, soft_wrap=True)

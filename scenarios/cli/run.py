@@ -2,7 +2,7 @@
 
 import contextlib
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
@@ -11,6 +11,7 @@ from typing import Any
 
 import click
 
+from handover.cosim.master.live_control import LiveControl
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.cli.config_file import ConfiguredCommand, config_option
@@ -26,11 +27,14 @@ from handover.scenarios.cli.options import (
     stop_option,
 )
 from handover.scenarios.cli.summaries.run import AS_JSON, exit_with
-from handover.scenarios.execution.errors import one_line_errors, require_extra
+from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.execution.input_sources import played_back
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import log_told, progress_bar
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import run_task
+from handover.scenarios.experiment.pushable import inputs_of
+from handover.scenarios.results.task import InputSources, Task
 
 _option = partial(click.option, cls=HeadedOption, heading="Of FILE.ssp and FILE.fmu")
 _STEP = _option(
@@ -84,6 +88,25 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
     help="Refuse an FMU whose description breaks the standard, even where it can be run nonetheless; see"
     " `handover check`.  [default: warn]",
 )
+@click.option(
+    "--live",
+    is_flag=True,
+    help="Show the run in a browser while it goes on, at real time or --pace; it begins once the page is open.",
+)
+@click.option(
+    "--push",
+    is_flag=True,
+    help="Let the page of --live push bodies that the scenario says; the record then has forces and points, and with"
+    " --inputs-from and --push the same run is made once more.",
+)
+@click.option("--controls", type=click.Path(path_type=Path), hidden=True, help="Folder of a process that controls it.")
+@click.option(
+    "--inputs-from",
+    type=click.Path(path_type=Path),
+    metavar="RUN",
+    help="Folder of a run whose inputs from outside, such as a hand's, are played back: the same run once more, or"
+    " another robot that meets the same hand.",
+)
 @click.option(AS_JSON, "as_json", is_flag=True, help="Print the summary as JSON, with the run's folder.")
 @click.help_option("-h", "--help")
 @file_options
@@ -115,6 +138,10 @@ def run(
     formats: Sequence[str],
     every: Fraction | None,
     no_report: bool,
+    live: bool,
+    push: bool,
+    controls: Path | None,
+    inputs_from: Path | None,
     as_json: bool,
     log_level: str | None,
     strict: bool,
@@ -127,6 +154,11 @@ def run(
     with Interruption() as interruption, one_line_errors(), log_told(log_level), contextlib.ExitStack() as opened:
         if not no_report:
             require_extra("reports", "report and figures", "--no-report")
+        if live:
+            if sys.platform == "win32":
+                raise UsageError("--live: not on Windows yet; `handover report` shows a run that has ended")
+            require_extra("reports", "--live")
+            require_extra("live", "--live")
         request = RunRequest(
             subject=scenario,
             parameters=parameters,
@@ -136,13 +168,41 @@ def run(
             stop=stop,
             step=step,
             inputs=inputs,
+            sources=None if inputs_from is None else played_back(inputs_from),
             formats=formats,
             every=every,
             presented=not no_report,
+            pushed=push,
         )
         request.check_options()
         options = MasterOptions(**coupling_of(coupling), **limits(call_limit, pace), strict=strict)
         task = replace(request, options=options).task(opened)
+        control: LiveControl | None = None
+        if live or controls:
+            task, control = opened.enter_context(_live(task, pace, controls))
         with progress_bar(sys.stderr) as progress:
-            result = run_task(task, progress, interruption)
+            result = run_task(task, progress, interruption, control=control)
     exit_with(result, task, json_to=json_to)
+
+
+@contextlib.contextmanager
+def _live(task: Task, pace: float | None, controls: Path | None) -> Generator[tuple[Task, LiveControl], None, None]:
+    """Serve the run's page while it goes on, and a moment longer; or take another process's controls of the run.
+
+    Yields:
+        The task, whose inputs from outside the page gives if nobody else does, and the run's controls.
+    """
+    from handover.scenarios.live.process import controlled_from, live_page
+
+    scenario, free = task.experiment, task.inputs is None
+    pushes: Mapping[str, int] = inputs_of(scenario.pushes(task.parameters)) if task.pushed and free else {}
+    hand = scenario.led_hand(task.parameters) if free else None
+    with contextlib.ExitStack() as opened:
+        if controls is not None:
+            control, inputs = opened.enter_context(controlled_from(controls, pushes, hand))
+        else:
+            address, control, inputs = opened.enter_context(live_page(task.folder.path, pace or 1.0, pushes, hand))
+            click.echo(f"live: {address}  (the run begins once the page is open)", err=True)
+        if sources := inputs.sources():
+            task = replace(task, inputs=InputSources(sources, {"from": "page"}))
+        yield task, control

@@ -38,6 +38,12 @@ class RunNotWritten(click.ClickException):
     exit_code = UNIT_FAILED
 
 
+class FilmFailed(click.ClickException):
+    """A film that could not be drawn to its end; nothing of it is kept."""
+
+    exit_code = UNIT_FAILED
+
+
 class WorkersLost(click.ClickException):
     """A campaign whose workers were lost; runs that have ended are kept; run the same command again to resume."""
 

@@ -14,15 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.blocks.start_values import numbers_of, range_of
+from handover.cosim.blocks.start_values import range_of
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.description import FmuPort, indices_of
+from handover.cosim.fmu.start_values import entries_of, parsed_number
 from handover.cosim.system.time_series import TimeSeries
 from handover.scenarios.execution.errors import UsageError
 
 TIME = "time"
-_BOOLEANS = {"true": 1, "1": 1, "false": 0, "0": 0}
 _MAX_FAULTS = 5
 
 Column = tuple[FmuPort, int]
@@ -89,15 +89,6 @@ def value_of(port: FmuPort, text: str) -> int | float:
     return _value(port, text.strip())
 
 
-def entries_of(port: FmuPort, start: Mapping[str, Any]) -> list[Any]:
-    """Return the entries of a port's start value, the given one or its FMU's; 0 where there is none."""
-    if port.name in start:
-        return numbers_of(port, start[port.name]).tolist()
-    texts = (port.start or "0").split() or ["0"]
-    entries = [_parsed(port, text) for text in texts]
-    return entries * port.size if len(entries) == 1 else entries
-
-
 def _numbered(reader: Any) -> Iterator[tuple[int, Sequence[str]]]:
     """Yield each row with the number of the line on which it ends."""
     for row in reader:
@@ -142,29 +133,13 @@ def _numbers(
 
 
 def _value(port: FmuPort, text: str) -> int | float:
-    value = _parsed(port, text)
+    value = parsed_number(port, text)
     low, high = port.minimum, port.maximum
     if (low is not None and value < low) or (high is not None and value > high):
         raise ValueError(f"it is out of range: {range_of(port)}")
     if port.kind is Kind.INTEGER and port.width is not None and not port.width.holds(value):
         raise ValueError(f"it does not fit {port.width.range_text}")
     return value
-
-
-def _parsed(port: FmuPort, text: str) -> int | float:
-    if port.kind is Kind.BOOLEAN:
-        if text.lower() not in _BOOLEANS:
-            raise ValueError("true, false, 1 or 0 is right")
-        return _BOOLEANS[text.lower()]
-    if port.kind is Kind.ENUMERATION:
-        items = {name.upper(): value for name, value in port.items} | {str(value): value for _, value in port.items}
-        if text.upper() not in items:
-            raise ValueError(f"one of {', '.join(name.lower() for name, _ in port.items)} is right")
-        return items[text.upper()]
-    try:
-        return int(text) if port.kind is Kind.INTEGER else float(text)
-    except ValueError:
-        raise ValueError(f"a {'whole ' if port.kind is Kind.INTEGER else ''}number is right") from None
 
 
 def _series(

@@ -21,7 +21,7 @@ from handover.scenarios.execution.ssp_run import is_ssp, open_experiment, source
 from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.experiment.experiment import Experiment, NoParameters
 from handover.scenarios.results.run_folder import RunFolder, dated_folder
-from handover.scenarios.results.task import Task
+from handover.scenarios.results.task import InputSources, Task
 
 RUNS = Path("runs")
 """Where runs' folders are if nothing names one."""
@@ -57,7 +57,8 @@ class RunRequest:
         stop: when the run ends, s; a scenario, an SSP and an FMU may have a time of their own.
         step: of all units of an SSP or FMU, s.
         inputs: a file of inputs over time, of an FMU by itself.
-        formats, every, options, presented: as of `Task`.
+        sources: who gives values to inputs from outside, see `played_back`.
+        formats, every, options, presented, pushed: as of `Task`.
     """
 
     subject: str | System | type[Experiment[Any]]
@@ -68,10 +69,12 @@ class RunRequest:
     stop: Fraction | None = None
     step: Fraction | None = None
     inputs: Path | None = None
+    sources: InputSources | None = None
     formats: Sequence[str] = ()
     every: Fraction | None = None
     options: MasterOptions = field(default_factory=MasterOptions)
     presented: bool = True
+    pushed: bool = False
 
     def task(self, opened: contextlib.ExitStack) -> Task:
         """Return the task, all parts of which are checked; `opened` closes what that opens.
@@ -94,7 +97,9 @@ class RunRequest:
             source=asked.source,
             options=self.options,
             presented=self.presented,
+            pushed=self.pushed,
             stop=asked.stop,
+            inputs=self.sources,
         )
 
     def check_options(self) -> None:
@@ -146,7 +151,7 @@ class RunRequest:
             return OpenedSubject(system_experiment("system", "a system wired in Python", self.subject, self.stop))
         if isinstance(self.subject, type):
             return self._of_class(self.subject)
-        path = Path(self.subject)
+        path = self.path
         if is_ssp(self.subject):
             of_ssp = open_experiment(path, self.stop, self.step, opened, self.parameters)
             until = of_ssp.stop_time(NoParameters())
@@ -184,6 +189,11 @@ class RunRequest:
         values = split_parameters(scenario, self.parameters)
         path = path_of_class(scenario)
         return OpenedSubject(scenario(), *values, {} if path is None else own_source(path), self.stop)
+
+    @property
+    def path(self) -> Path:
+        """The file that is to be run, of an SSP or an FMU."""
+        return Path(str(self.subject))
 
     def _is_file(self, is_of_kind: Callable[[str], bool]) -> bool:
         return isinstance(self.subject, str) and is_of_kind(self.subject)

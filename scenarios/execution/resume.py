@@ -13,6 +13,7 @@ from handover.cosim.record.stream import complete_record
 from handover.fmus.build import cached, is_of_cache
 from handover.scenarios.catalog import SCENARIOS, InvalidScenario, ScenarioSource
 from handover.scenarios.execution.fmu_run import reopened
+from handover.scenarios.execution.input_sources import resumed_inputs
 from handover.scenarios.execution.resumption import Resumption
 from handover.scenarios.execution.ssp_run import open_experiment
 from handover.scenarios.execution.unit_values import built_system
@@ -92,6 +93,7 @@ class InterruptedRun:
                 unit_values=description.get("unit_values", {}),
                 options=self.resumption.options,
                 stop=None if stop is None else Fraction(stop),
+                inputs=resumed_inputs(self.folder, description.get("inputs")),
             )
         except InvalidRunFolder:
             raise

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from handover.cosim.exceptions import UnitFailure
+from handover.cosim.exceptions import InitializationError, UnitFailure
 from handover.cosim.master.checkpoint import Checkpointer, check_states, remove_checkpoint
+from handover.cosim.master.live_control import ControlledPacer, LiveControl
 from handover.cosim.master.master import Master
 from handover.cosim.plan.memory import note_crashes
 from handover.cosim.record.recorder import Recorder
@@ -14,11 +15,13 @@ from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import ObserveAfter, Observer, Signals
 from handover.cosim.system.system import System
 from handover.scenarios.execution.exit_status import status_of_run
+from handover.scenarios.execution.input_sources import give_inputs
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.resumption import Resumption, pack
 from handover.scenarios.execution.supervisor import heartbeat_of_run, is_supervised
-from handover.scenarios.execution.unit_values import built_system
+from handover.scenarios.execution.unit_values import built_system, settings_behind
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, Outcome
+from handover.scenarios.experiment.pushable import let_push
 from handover.scenarios.results.not_finite import NotFiniteData, outputs_not_finite
 from handover.scenarios.results.pictures import write_picture_files
 from handover.scenarios.results.run_facts import record_of
@@ -56,13 +59,16 @@ def experiment_system(
 
 
 def run_task(
-    task: Task, progress: Progress, interruption: Interruption, resumption: Resumption | None = None
-) -> RunResult:
+    task: Task, progress: Progress, interruption: Interruption, resumption: Resumption | None = None,
+    control: LiveControl | None = None,
+) -> RunResult:  # fmt: skip
     """Run a scenario to its end, its failure or its interruption and write its folder; or resume a run.
+
+    Where there is a `control`, another process may change its pace, pause it, and end it after its step.
 
     Raises:
         WiringError, ScheduleError, InvalidFmu, InitializationError, StateNotSaved, InvalidRunFolder,
-            InvalidCheckpoint, ScenarioFailed: before anything was written.
+            InvalidCheckpoint, ScenarioFailed, UsageError: before anything was written.
         UnitHung, UnitCrashed: a unit does not return, or an isolated one ends its process, as it is loaded or
             initialised; nothing was written.
         KeyboardInterrupt: it was aborted; what was recorded stays.
@@ -81,6 +87,9 @@ def run_task(
             evaluator.packed()
         experiment.stop_time(parameters)
     system = experiment_system(experiment, parameters, task.seed, task.fmus, task.unit_values, task.options)
+    if task.pushed:
+        let_push(system, experiment.pushes(parameters))
+    give_inputs(system, task.inputs)
     evaluator.note_units(system.units)
     failure: UnitFailure | None = None
     if task.every is not None:
@@ -88,6 +97,8 @@ def run_task(
     master = Master(system, replace(task.options, cpu_times=True), heartbeat_of_run())
     if is_supervised():
         note_crashes(master.heartbeat)
+    if control is not None:
+        master.pacer = ControlledPacer(control)
     began, not_finite = False, list[NotFiniteData]()
     try:
         with master:
@@ -96,9 +107,13 @@ def run_task(
             interruption.begin()
             began = True
             _begin_folder(task, master, resumption)
-            failure = _run(task, master, evaluator, resumption, _Surroundings(progress, interruption, clock))
+            failure = _run(task, master, evaluator, resumption, _Surroundings(progress, interruption, clock, control))
             with disk_errors_reported(task.folder.signals):  # before units end: one may hang as its library is unloaded
                 not_finite = outputs_not_finite(task.folder.signals, master.system)
+    except InitializationError as e:
+        with scenario_code(experiment):
+            told = settings_behind(e.failure.unit, experiment, parameters, task.seed, task.fmus)
+        raise InitializationError(e.failure, told) from e
     except UnitFailure as e:  # as units were loaded, terminated or freed
         if not began:
             raise
@@ -109,11 +124,18 @@ def run_task(
 
 @dataclass(frozen=True)
 class _Surroundings:
-    """What surrounds a run in the command: where progress goes, what interrupts it, and its clock."""
+    """What surrounds a run in the command: where progress goes, what interrupts and controls it, and its clock."""
 
     progress: Progress
     interruption: Interruption
     clock: Callable[[], ElapsedTime]
+    control: LiveControl | None
+
+    def take_in_stop(self) -> bool:
+        """Take a stop by the controls for a signal; return whether the run is to end after its step."""
+        if self.control is not None and self.control.stop:
+            self.interruption.asked = True
+        return self.interruption.asked
 
 
 def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> None:
@@ -153,7 +175,7 @@ def _run(
         if resumption is not None:
             observers = [ObserveAfter(resumption.checkpoint.time, observe) for observe in observers]
         try:
-            master.run(stop, [*observers, report_progress], until=lambda: evaluator.over or interruption.asked)
+            master.run(stop, [*observers, report_progress], until=lambda: evaluator.over or around.take_in_stop())
             if master.ended is not None:
                 evaluator.note_end(master.ended.unit, master.ended.reached)
             elif interruption.asked and not evaluator.over and not evaluator.fault:

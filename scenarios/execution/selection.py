@@ -1,5 +1,8 @@
 """Finds what a command names: a scenario, and the FMUs that take the place of its units."""
 
+import ast
+import contextlib
+import importlib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
@@ -7,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.exceptions import nearest
-from handover.fmus.catalog import UNITS, UnknownBlock, UnknownUnit
+from handover.fmus.catalog import UNITS, UnknownBlock, UnknownUnit, find_unit, import_class
 from handover.scenarios.catalog import (
     SCENARIOS,
     InvalidScenario,
@@ -95,6 +98,8 @@ def select_fmus(
     fmus: dict[str, Path] = {}
     for name, unit in experiment.units.items():
         other = others.get(name, "")
+        if file := _python_file(other):
+            raise UsageError(f"unit {name}: {other}: {_path_in(file)}")
         if other and re.fullmatch(r"\w+", other) and other not in UNITS and not Path(other).exists():
             own = "; a file ends in .fmu, and a block of your own is named MODULE:CLASS"
             raise UsageError(f"unit {name}: no unit {other!r}: {nearest(other, UNITS)}{own}")
@@ -108,6 +113,46 @@ def select_fmus(
         except OSError as e:
             raise UsageError(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
     return fmus
+
+
+def _python_file(other: str) -> Path | None:
+    """Return the Python file that a text such as `gentle.py`, `gentle.py:Gentle` or `gentle` names; None for none."""
+    stem = other.partition(".py:")[0].removesuffix(".py")
+    if not stem or ":" in stem or (stem == other and (other in UNITS or Path(other).exists())):
+        return None
+    file = Path(f"{stem}.py")
+    return file if file.is_file() else None
+
+
+def _path_in(file: Path) -> str:
+    """Return how a block in a Python file is named."""
+    try:
+        nodes = ast.parse(file.read_bytes()).body
+    except (OSError, SyntaxError, ValueError):
+        nodes = []
+    classes = [node for node in nodes if isinstance(node, ast.ClassDef)]
+    blocks = [c.name for c in classes if any(isinstance(n, ast.FunctionDef) and n.name == "step" for n in c.body)]
+    named = " or ".join(f"{file.stem}:{block}" for block in blocks) or f"{file.stem}:CLASS"
+    folder = "" if file.parent == Path() else f", from the folder {file.parent}"
+    return f"a block in a Python file is named MODULE:CLASS: {named}{folder}"
+
+
+def load_units(scenario: str) -> None:
+    """Load what the units of one of this package's or an installed package's scenarios import; of others nothing.
+
+    What is wrong with a scenario or a unit is left to whoever runs it.
+    """
+    if ":" in scenario:  # its author may change it meanwhile
+        return
+    try:
+        units = named_scenario(scenario).units
+    except (KeyError, InvalidScenario):
+        return
+    for unit in units.values():
+        with contextlib.suppress(Exception):
+            block = import_class(find_unit(unit).block)
+            for module in getattr(block, "deferred", ()):
+                importlib.import_module(module)
 
 
 def _invalid_blocks() -> tuple[type[Exception], ...]:

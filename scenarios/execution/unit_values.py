@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import CosimError, nearest
 from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.start_values import entries_of
 from handover.cosim.system.system import PlacedUnit, System
-from handover.scenarios.execution.input_file import columns_of, entries_of, value_of
+from handover.scenarios.execution.input_file import columns_of, value_of
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
 from handover.scenarios.results.tolerated_faults import scenario_code
 
 
@@ -145,7 +146,39 @@ def built_system(
     with scenario_code(experiment):
         system = experiment.wire(parameters, seed, lambda unit: fmus[unit])
     set_values(system, values)
+    with scenario_code(experiment):
+        experiment.check_unit_values(system, tuple(values))
     return system
+
+
+def settings_behind(
+    unit: str, experiment: Experiment[Any], parameters: Any, seed: int, fmus: Mapping[str, Path]
+) -> str:
+    """Return which values of a unit follow from what of the scenario's parameters was set, as the end of a sentence.
+
+    The scenario is wired again with each of them at its default: a start value that then differs follows from it.
+    """
+
+    def start_with(values: Any) -> Mapping[str, Any]:
+        return experiment.wire(values, seed, lambda name: fmus[name]).units[unit].start
+
+    usual, found = experiment.parameters_type(), list[str]()
+    pairs = [(v, getattr(parameters, v.name), getattr(usual, v.name)) for v in experiment.parameters()]
+    changed = [(v, value, default) for v, value, default in pairs if not np.array_equal(value, default)]
+    start: Mapping[str, Any] = start_with(parameters) if changed else {}
+    for v, value, default in changed:
+        try:
+            other = start_with(replace(parameters, **{v.name: default}))
+        except (InvalidParameter, CosimError):  # the default does not go with what else was set
+            continue
+        either: dict[str, Any] = {**start, **other}
+        if ports := [n for n in either if not _equal(n, start, other)]:
+            found.append(f"{v.name}={text_of(v, value)} sets its {', '.join(ports)}")
+    return f"; {'; '.join(found)}" if found else ""
+
+
+def _equal(name: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
+    return name in a and name in b and np.array_equal(a[name], b[name])
 
 
 def set_values(system: System, values: Mapping[str, str]) -> None:

@@ -20,9 +20,11 @@ from handover.cosim.blocks.variable import Causality, Variable
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
+from handover.scenarios.experiment.outside import LedHand
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place, fit_places
+from handover.scenarios.experiment.pushable import Pushable
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure, TimePlot
 
@@ -188,6 +190,17 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         fit_places(system, self.places, self.units)
         return system
 
+    def check_unit_values(self, system: System, given: Sequence[str]) -> None:
+        """Reject values of units' parameters that their units take and the scenario can do nothing with.
+
+        Args:
+            system: as it is wired, with the values set.
+            given: names of the parameters that were set, as `UNIT.NAME`.
+
+        Raises:
+            InvalidParameter: with what is wrong, and what would be right.
+        """
+
     @abc.abstractmethod
     def stop_time(self, parameters: Any) -> Fraction:
         """Return the time at which a run ends at the latest, in seconds."""
@@ -212,6 +225,13 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         A record holds no camera pictures: those that the run's folder keeps are given.
         """
         return self.evaluator(parameters)
+
+    def led_hand(self, parameters: Any) -> LedHand | None:  # noqa: ARG002
+        """Return the hand that somebody outside leads; by default there is none.
+
+        Its inputs are declared in `build` by `System.external`.
+        """
+        return None
 
     def cycle(self) -> tuple[str, ...]:
         """Return the units of one control cycle, whose CPU time per cycle is a metric; none by default."""
@@ -240,6 +260,10 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
     def replay(self, parameters: Any, record: Record) -> Replay | None:  # noqa: ARG002
         """Return the scene that the report animates; none by default."""
         return None
+
+    def pushes(self, parameters: Any) -> Sequence[Pushable]:  # noqa: ARG002
+        """Return the bodies that a person may push in a live page; none by default."""
+        return ()
 
     def published(self, parameters: Any) -> Sequence[PublishedValue]:  # noqa: ARG002
         """Return what the paper published of runs with such parameters; nothing by default."""

@@ -87,7 +87,8 @@ def parse_value(variable: Variable, text: str) -> tuple[Any, str | None]:
         if variable.shape and numbers:
             value = np.array(numbers).reshape(variable.shape) if len(numbers) == variable.size else np.array(numbers)
         elif len(numbers) == 1:
-            value = numbers[0]
+            [number] = numbers
+            value = int(number) if variable.kind is Kind.INTEGER and number.is_integer() else number
     fault = fault_of(variable, value)
     if fault is None and variable.enumeration is not None:
         value = next(e for e in variable.enumeration if e.name == str(text).upper())

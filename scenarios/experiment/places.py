@@ -124,13 +124,15 @@ class _Fitting:
         v, d = port.declared, self._unit.description
         others = [n for n in _ports(d)[v.causality] if n not in {p.declared.name for p in self._ports}]
         elsewhere = next((c for c in _CAUSALITIES if v.name in _ports(d)[c] and c is not Causality.PARAMETER), None)
-        hint = f"; its {v.name} is an {elsewhere.value}" if elsewhere else _near(v.name, others)
+        like = [n for n in others if (p := _ports(d)[v.causality][n]).unit == v.unit and not _difference(p, v)]
+        by_name = _near(v.name, others) or (f"; did you mean {' or '.join(like[:3])}?" if like else "")
+        hint = f"; its {v.name} is an {elsewhere.value}" if elsewhere else by_name
         return f"{self._what} needs the {v.causality.value} {v.name} ({signature(v)}): {port.sentence}{hint}"
 
     def _note(self, absent: Mapping[Causality, Sequence[str]]) -> None:
         """Note what is left out, and which of the unit's inputs nothing feeds: their names may be misspelled."""
-        if parts := [_listed(causality, names) for causality, names in absent.items() if names]:
-            self._system.notes.append(f"{self._what} does without {'; '.join(parts)}: left out")
+        if parts := [_without(causality, names) for causality, names in absent.items() if names]:
+            self._system.notes.append(f"{self._what} has {'; '.join(parts)}")
         fed = {*self._system.fed_inputs(self._unit.name), *self._unit.start}
         missing = [n for names in absent.values() for n in names]
         for name in self._unit.description.inputs:
@@ -146,8 +148,15 @@ def signature(v: Variable) -> str:
     return f"{v.kind.value}{shape}{unit}"
 
 
-def _listed(causality: Causality, names: Sequence[str]) -> str:
-    return f"{causality.value}{'s' if len(names) > 1 else ''} {', '.join(names)}"
+def _without(causality: Causality, names: Sequence[str]) -> str:
+    """Return which ports a unit does not have, and what the scenario does without them."""
+    many = len(names) > 1
+    what = {
+        Causality.INPUT: f"what the scenario would feed {'them' if many else 'it'} is not connected",
+        Causality.OUTPUT: f"what the scenario would make of {'them' if many else 'it'} is left out",
+        Causality.PARAMETER: f"what the scenario would set {'them' if many else 'it'} to is not used",
+    }
+    return f"no {causality.value}{'s' if many else ''} {', '.join(names)}: {what[causality]}"
 
 
 def _near(name: str, valid: Sequence[str]) -> str:

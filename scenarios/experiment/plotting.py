@@ -1,6 +1,6 @@
 """Figures for papers by matplotlib: the style that all of them share, and time plots drawn in it."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import cycle
 from math import ceil
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
@@ -64,6 +65,12 @@ def figure(
         axes_by_row: list[Axes] = axes.reshape(-1).tolist()
         yield axes_by_row
         _save(canvas, path)
+
+
+def legend_below(axes: Axes, entries: Mapping[str, Artist] | None = None, columns: int | None = None) -> None:
+    """Write a figure's legend below all of its axes: entries by their labels, or else what one of its axes has."""
+    handles, labels = axes.get_legend_handles_labels() if entries is None else (list(entries.values()), list(entries))
+    _canvas(axes).legend(handles, labels, loc="outside lower center", ncols=columns or len(labels))
 
 
 def draw_time_figures(figures: Sequence[TimeFigure], time: Floats, folder: Path) -> list[Figure]:

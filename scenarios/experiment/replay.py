@@ -6,6 +6,7 @@ frame.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -26,8 +27,22 @@ class Mesh(NamedTuple):
         return Mesh(self.vertices + p, self.triangles)
 
 
+_HULLS: dict[bytes, Mesh] = {}
+"""Hulls that were asked for, by their points to a nanometre: a scene that is shown live asks for them at each row."""
+_MOST_HULLS = 2000
+
+
 def hull(points: Floats) -> Mesh:
-    """Return the convex hull of points, shape (n, 3)."""
+    """Return the convex hull of points, shape (n, 3), or that of points which are the same to a nanometre."""
+    key = np.rint(1e9 * np.asarray(points)).astype(np.int64).tobytes()
+    if key not in _HULLS:
+        if len(_HULLS) >= _MOST_HULLS:
+            _HULLS.clear()
+        _HULLS[key] = _convex_hull(np.asarray(points))
+    return _HULLS[key]
+
+
+def _convex_hull(points: Floats) -> Mesh:
     from scipy.spatial import ConvexHull  # slow to import, and scenarios import this module without making meshes
 
     convex = ConvexHull(points)
@@ -50,6 +65,7 @@ def prism(outline: Floats, low: float, high: float) -> Mesh:
     return faceted(hull(np.vstack([np.column_stack([outline, np.full(len(outline), z)]) for z in (low, high)])))
 
 
+@cache
 def ball(radius: float, finer: int = 2) -> Mesh:
     """Return a sphere about the origin: an icosahedron whose triangles are divided into four `finer` times."""
     golden = (1.0 + np.sqrt(5.0)) / 2.0
@@ -152,9 +168,19 @@ class Body:
     opacity: float = 1.0
 
 
+class PersonView(NamedTuple):
+    """How a person in a scene sees it: direction in W from the scene to the eye; corners of what is seen, (2, 3), m."""
+
+    eye: tuple[float, float, float]
+    window: Floats
+
+
 @dataclass(frozen=True, kw_only=True)
 class Replay:
     """A scene over a record's time.
+
+    What is drawn, and in which order, does not depend on what was recorded, and where it is at a time depends on that
+    time alone: a run under way is shown from its newest row.
 
     Attributes:
         lines, bodies: what moves; each has as many rows as the record, or one.
@@ -164,6 +190,10 @@ class Replay:
             whose value it is; "" for nothing.
         notes: sentences below the scene.
         window: minimum and maximum corner of what is shown, shape (2, 3), m; None: everything that is drawn.
+        weightless: whether there is neither up nor down, so that stars are around and no floor is below.
+        floor: height of the floor, m; None: below all that is drawn.
+        follow: label of what the view can be told to follow; "" for nothing.
+        person_view: what the person in it sees who takes part; None where there is none.
     """
 
     lines: Sequence[Line] = ()
@@ -173,3 +203,7 @@ class Replay:
     phases: str | Sequence[Phase] = ""
     notes: Sequence[str] = field(default_factory=tuple[str, ...])
     window: Floats | None = None
+    weightless: bool = False
+    floor: float | None = None
+    follow: str = ""
+    person_view: PersonView | None = None

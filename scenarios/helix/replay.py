@@ -40,6 +40,7 @@ def replay_handover(record: Record, watching: Iterable[Pinhole] = (), bowl: Bowl
         fixed=cameras,
         eye=(-0.35, -1.25, 0.35),
         phases="servo.phase" if "servo.phase" in record else "",
+        follow="gripper",
         notes=("Where things were; orange: where the controller took ball and gripper to be.",) if estimates else (),
         window=_window(record, cameras, [body.p_WB + p for body in table for p in body.mesh.vertices]),
     )
@@ -113,8 +114,10 @@ def _hand_body(record: Record) -> list[Body]:
     seen = np.array([hand(p).points[2:] - p for p in p_WH])
     pointing = seen[:, -2, 2] - seen[:, 0, 0]
     yaw = np.unwrap(np.arctan2(pointing[:, 1], pointing[:, 0]))
-    q_WH = Rotation.from_euler("z", (yaw - yaw[0])[:, None]).as_quat(scalar_first=True)
-    return [Body(label="hand", colour=_SKIN, mesh=_solid(seen[0], hand(p_WH[0]).radii[2:]), p_WB=p_WH, q_WB=q_WH)]
+    R_HW = Rotation.from_euler("z", -float(yaw[0])).as_matrix()
+    mesh = _solid(seen[0] @ np.transpose(R_HW), hand(p_WH[0]).radii[2:])
+    q_WH = Rotation.from_euler("z", yaw[:, None]).as_quat(scalar_first=True)
+    return [Body(label="hand", colour=_SKIN, mesh=mesh, p_WB=p_WH, q_WB=q_WH)]
 
 
 def _forearm(record: Record) -> list[Line]:

@@ -34,6 +34,8 @@ def replay_grasp(parameters: Parameters, record: Record) -> Replay:
         lines=[*fingers, *beams],
         eye=(-0.35, -0.7, 1.35),
         phases=phases_of_grasp(record),
+        floor=0.0,
+        follow="palm",
         notes=("The scene is planar; heights above the table are for display only. Beams end at what they meet.",),
     )
 

@@ -30,12 +30,14 @@ from handover.scenarios.results.task import Task
 class _OfSomeConfigurations(TypedDict, total=False):
     unit_values: dict[str, str]
     stop: str
+    inputs: dict[str, Any]
 
 
 class Configuration(_OfSomeConfigurations):
     """What determines a run's signals; `seed` is None where nothing is random, `master` as `MasterOptions.as_data`.
 
-    `unit_values` and `stop`, s, are there only if some are given, see `Task`.
+    `unit_values`, `stop`, s, and `inputs`, where those from outside came from, are there only if some are given, see
+    `Task`.
     """
 
     scenario: str
@@ -106,15 +108,16 @@ class _OfSomeRuns(TypedDict, total=False):
     conversions: list[dict[str, Any]]
     warnings: list[str]
     notes: list[str]
+    external_inputs: list[str]
     failure: dict[str, Any] | None
 
 
 class RunData(Configuration, _OfSomeRuns):
     """What another process needs to resume a run, or to present it: see `Task` and `Experiment`.
 
-    A run that started has `system` and `conversions`, `warnings` of its FMUs if there are any, and `notes` on what its
-    units do not have and the wiring leaves out; one that could not start has `failure`; `units` are the FMUs' names and
-    hashes.
+    A run that started has `system` and `conversions`, `warnings` of its FMUs if there are any, `notes` on what its
+    units do not have and the wiring leaves out, and the names of `external_inputs`, which came from outside; one that
+    could not start has `failure`; `units` are the FMUs' names and hashes.
     """
 
     source: dict[str, Any]
@@ -146,6 +149,8 @@ def configuration(task: Task) -> Configuration:
     given: _OfSomeConfigurations = {"unit_values": dict(task.unit_values)} if task.unit_values else {}
     if task.stop is not None:
         given["stop"] = str(task.stop)
+    if task.inputs is not None:
+        given["inputs"] = dict(task.inputs.told)
     return Configuration(
         **given,
         scenario=task.experiment.name,
@@ -251,6 +256,8 @@ def begun_run(task: Task, master: Master) -> RunData:
         of_this_run["warnings"] = warned
     if master.system.notes:
         of_this_run["notes"] = master.system.notes
+    if outside := [f"{unit}.{name}" for unit, inputs in master.system.externals.items() for name in inputs]:
+        of_this_run["external_inputs"] = outside
     return _run_data(task, fmus, of_this_run)
 
 
@@ -293,6 +300,9 @@ def _given_rows(task: Task) -> list[list[str]]:
     given: Sequence[str] = task.source.get("parameters", ())
     rows = [[*(part.strip() for part in text.split("=", 1)), "given start value"] for text in given]
     rows += [[name, text, "given value of the unit's parameter"] for name, text in task.unit_values.items()]
+    if task.inputs is not None:
+        told = ", ".join(f"{name} {value}" for name, value in task.inputs.told.items())
+        rows.append(["inputs", told, "where the inputs from outside came from"])
     return rows if task.stop is None else [*rows, ["stop", f"{float(task.stop):g} s", "given stop time of the run"]]
 
 

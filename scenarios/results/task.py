@@ -7,8 +7,26 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.stepping.options import MasterOptions
+from handover.cosim.system.time_series import ExternalSource
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import RunFolder
+
+
+@dataclass(frozen=True)
+class InputSources:
+    """Who gives values to a system's inputs from outside.
+
+    Attributes:
+        sources: by `unit.input`; inputs from outside that are not among them keep what the system says of them.
+        told: what the run's folder is to say of that, as JSON can hold it; `from` is "run", "page" or "program".
+        where: how a message names them.
+        is_complete: whether all the system's inputs from outside must be among them.
+    """
+
+    sources: Mapping[str, ExternalSource]
+    told: Mapping[str, Any]
+    where: str = "inputs from outside"
+    is_complete: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +44,8 @@ class Task:
         options: of the master, which runs the units.
         presented: whether figures and a report are made at the end.
         stop: when the run ends, s, at the first communication point at or after it; None: as the scenario says.
+        inputs: who gives values to inputs from outside; None: as the scenario says, by itself nobody.
+        pushed: whether bodies that can be pushed may be: then forces and points are inputs from outside.
     """
 
     experiment: Experiment[Any]
@@ -40,6 +60,8 @@ class Task:
     options: MasterOptions = field(default_factory=MasterOptions)
     presented: bool = True
     stop: Fraction | None = None
+    inputs: InputSources | None = None
+    pushed: bool = False
 
     @property
     def stop_time(self) -> Fraction:

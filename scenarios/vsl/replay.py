@@ -14,6 +14,8 @@ _LINK, _SERVO, _GROUND, _LOAD = "#8fb3d9", "#4d5866", "#9aa3af", "#b58a1b"
 _DESIRED, _TIP_PATH, _ESTIMATE = "#3c8d53", "#d1602b", "#8357a8"
 _RADIUS_RATIO = 1.2
 """Radius of servos, base and gripper over that of the links (assumed)."""
+_REACH = ArmParams().L_2 + ArmParams().L_3
+"""How far the arm can be from its base along the ground, m."""
 _DENSITY, _BELOW = 2700.0, 0.03
 """Density of the ball that the load is drawn as, kg/m3, and how far below the gripper it hangs, m (assumed)."""
 
@@ -22,11 +24,13 @@ def replay_path(parameters: Parameters, record: Record, *, hybrid: bool) -> Repl
     """Return the arm over a run's time; if `hybrid`, with the model's estimate of the tip."""
     shape = record["arm.shape"]
     return Replay(
-        bodies=[_ground(shape), *_joints(shape), *_load(parameters, shape)],
+        bodies=[_ground(), *_joints(shape), *_load(parameters, shape)],
         lines=[*_arm(shape), *_hook(parameters, shape), *_tips(record, hybrid)],
         fixed=[Line(label="desired path", colour=_DESIRED, points=_desired_path(parameters)[None], width=4.0)],
         eye=(0.45, -1.45, 0.35),
         phases=phases_of_path(record),
+        floor=0.0,
+        follow="gripper",
         notes=("The path of the tip is the true one, not that by the tracker.",),
     )
 
@@ -84,9 +88,8 @@ def _tips(record: Record, hybrid: bool) -> list[Line]:
     return [tip_path, Line(label="tip, by the hybrid model", colour=_ESTIMATE, points=estimate, width=6.0)]
 
 
-def _ground(shape: Floats) -> Body:
+def _ground() -> Body:
     """Return a plate below the arm."""
-    reach = 0.06 + float(np.max(shape[..., 0]))
-    side = max(0.15, 0.05 + float(np.max(np.abs(shape[..., 1]))))
+    reach, side = 0.06 + _REACH, 0.15
     outline = np.array([[-0.1, -side], [reach, -side], [reach, side], [-0.1, side]])
     return Body(label="ground", colour=_GROUND, mesh=prism(outline, -0.006, 0.0), p_WB=np.zeros((1, 3)), opacity=0.5)

@@ -32,12 +32,16 @@ class Offer:
         widest: how far the fingers opened from what they held, rad.
         ended: the robot's last phase.
         fastest: the gripper's speed, as it is monitored, at most, m/s.
+        failed: deliveries that the robot found to have failed.
+        holder: who has the object at the end.
     """
 
     dropped: bool = False
     widest: float = 0.0
     ended: HandoverPhase = HandoverPhase.OPEN_GRIPPER
     fastest: float = 0.0
+    failed: int = 0
+    holder: Holder = Holder.FREE
 
 
 def offer(force: Floats, duration: float, behaviour: Behaviour, seed: int = 0, **decision: Any) -> Offer:
@@ -68,13 +72,13 @@ def offer(force: Floats, duration: float, behaviour: Behaviour, seed: int = 0, *
         knocked = since >= 0.0 and WAITING <= t - since < WAITING + duration - 1e-9
         f_G = o.f_G + force if knocked else o.f_G
         r = robot.step(t, T, free_flyer.Inputs(f_B=y.f_B, tau_B=y.tau_B, f_G=f_G, tau_G=o.tau_G))
-        gripper = {k: getattr(r, k) for k in ("p_WG", "q_WG", "v_WG", "w_WB")}
+        gripper = {k: getattr(r, k) for k in ("p_WG", "q_WG", "v_WG", "w_WG")}
         o = person.step(t, T, hand_and_object.Inputs(**gripper, closure=d.closure, light=d.light))
         if since >= 0.0:
             found.dropped |= o.holder is not Holder.GRIPPER
             found.widest = max(found.widest, o.gripper_angle - held)
             found.fastest = max(found.fastest, d.speed_G)
-            found.ended = d.phase
+            found.ended, found.failed, found.holder = d.phase, d.failed_deliveries, o.holder
             if t - since > WAITING + duration + 4.0:
                 break
     return found

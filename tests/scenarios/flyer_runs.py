@@ -20,9 +20,11 @@ def run(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, 
 
 def task_of(scenario: type[Experiment[Any]], out: Path, *given: str, seed: int = 0, drawn: bool = False) -> Task:
     """Return what `run` runs."""
+    of_units = [text for text in given if "." in text.partition("=")[0]]
     return Task(
         experiment=scenario(),
-        parameters=parse_parameters(scenario, given),
+        parameters=parse_parameters(scenario, [text for text in given if text not in of_units]),
+        unit_values=dict(text.split("=", 1) for text in of_units),
         seed=seed,
         fmus={name: cached(unit, 3) for name, unit in scenario.units.items()},
         folder=RunFolder(out),

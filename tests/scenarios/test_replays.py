@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from flyer_runs import run
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import SCENARIOS
@@ -20,9 +21,10 @@ MUST_SHOW: dict[str, set[str]] = {
     "flyer_impedance": {"robot", "gripper", "push", "place of rest"},
     "flyer_arm_impedance": {"robot", "link 1", "link 2", "gripper", "push", "place of rest"},
     **{
-        f"flyer_{task}": {"robot", "arm", "gripper", "object", "hand"}
+        f"flyer_{task}": {"robot", "arm", "gripper", "signal light", "object", "hand"}
         for task in ("robot_to_human", "human_to_robot", "failed_reception", "collaborative")
     },
+    "flyer_two_robots": {"robot", "arm", "gripper", "object", "handles", "hand"},
     "ir_grasp": {"palm", "thumb", "index", "ring", "object", "beams"},
 }
 FIRST = ("helix_handover", "vsl_hybrid", "flyer_human_to_robot")
@@ -43,12 +45,30 @@ def test_a_scenario_is_shown_in_space(name: str, tmp_path: Path):
     assert any(len(np.unique(positions(d), axis=0)) > 1 for d in (*replay.bodies, *replay.lines)), "nothing moves"
     for d in drawn:
         check(d, len(record.time))
+    for k in (0, len(record.time) // 2, -1):
+        one = SCENARIOS[name]().replay(parse_parameters(SCENARIOS[name], given), record.row(k))
+        assert one is not None
+        alone = [*one.bodies, *one.lines, *one.fixed]
+        assert [d.label for d in alone] == [d.label for d in drawn]
+        for whole, row in zip(drawn, alone, strict=True):
+            np.testing.assert_allclose(placed(row, -1), placed(whole, k), atol=1e-6, err_msg=f"{whole.label}, row {k}")
     assert any(phase for _, phase in phase_changes(record, replay.phases)), "no phase is shown beside the time"
     assert len(replay_section(replay, record).html) < LARGEST
 
 
 def positions(drawn: Line | Body) -> NDArray[np.float64]:
     return drawn.points if isinstance(drawn, Line) else drawn.p_WB
+
+
+def placed(drawn: Line | Body, k: int) -> NDArray[np.float64]:
+    """Return where the points of a line or a body's corners are at a row, which may be the only one it has."""
+    if isinstance(drawn, Line):
+        return drawn.points[k if len(drawn.points) > 1 else 0]
+    moves, turns = len(drawn.p_WB) > 1, drawn.q_WB is not None and len(drawn.q_WB) > 1
+    p = drawn.p_WB[k if moves else 0]
+    if drawn.q_WB is None:
+        return p + drawn.mesh.vertices
+    return p + Rotation.from_quat(drawn.q_WB[k if turns else 0], scalar_first=True).apply(drawn.mesh.vertices)
 
 
 def check(drawn: Line | Body, rows: int) -> None:

@@ -156,8 +156,10 @@ def test_python_runs_and_steps_on_the_base_installation_and_names_the_extra_of_a
         (["run", "flyer_impedance", "--no-report", "--out", "r"], "robots", "control"),
         (["sweep", "ir_grasp", "strategy=reflex,blind", "--out", "r"], "campaigns", "distributed"),
         (["paper", "ir-table", "--out", "r"], "campaigns", "distributed"),
+        (["run", "flyer_impedance", "--no-report", "--live", "--out", "r"], "reports", "plotly"),
         (["report", "."], "reports", "matplotlib"),
         (["compare", ".", "."], "reports", "plotly"),
+        (["film", "."], "film", "playwright"),
     ],
 )
 def test_what_needs_an_extra_names_it_in_one_line_and_writes_nothing(

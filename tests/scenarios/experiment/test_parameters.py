@@ -1,6 +1,7 @@
 import pytest
 
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
+from handover.scenarios.free_flyer.handovers import RobotToHuman
 from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.helix.parameters import HandPlace
@@ -39,3 +40,12 @@ def test_all_faults_are_reported_together():
     with pytest.raises(InvalidParameter) as caught:
         parse_parameters(HelixHandover, ["alpha=2", "radius=-1", "nothing=3", "alpha=0.1"])
     assert len(caught.value.faults) == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [("13", "stuck_nozzle: 13 is out of range: from 0 to 12"), ("1.5", "stuck_nozzle: 1.5 is not a whole number")],
+)
+def test_a_fault_quotes_a_whole_number_as_it_was_given(text: str, fault: str):
+    with pytest.raises(InvalidParameter, match=fault):
+        parse_parameters(RobotToHuman, [f"stuck_nozzle={text}"])

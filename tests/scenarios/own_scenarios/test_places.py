@@ -71,7 +71,10 @@ def test_a_controller_without_the_optional_ports_runs_and_what_is_left_out_is_no
     done = call(here, "run", SCENE, *options, "--out", "run")
     assert done.returncode == 1, done.stderr  # it moves, and not to where the scenario has its goal
     assert "KeyError" not in done.stderr + done.stdout
-    note = "unit controller (Joints) does without output energy; parameter p_WG: left out"
+    note = (
+        "unit controller (Joints) has no output energy: what the scenario would make of it is left out; "
+        "no parameter p_WG: what the scenario would set it to is not used"
+    )
     assert done.stderr.count(note) == 1
     assert json.loads((here / "run" / "run.json").read_text())["notes"] == [note]
     assert note in (here / "run" / "report.html").read_text(encoding="utf-8")
@@ -86,10 +89,10 @@ def test_a_controller_without_the_optional_ports_runs_and_what_is_left_out_is_no
 @pytest.mark.slow
 def test_the_scenarios_own_unit_has_nothing_left_out(here: Path):
     done = call(here, "run", SCENE, "--out", "run", "--no-report", "-p", "patience=0.2")
-    assert "left out" not in done.stderr
+    assert "unit controller" not in done.stderr
     assert "notes" not in json.loads((here / "run" / "run.json").read_text())
     exported = call(here, "export", SCENE, "--unit", "controller=joints:Joints", "--ssp", "reach.ssp")
-    assert "unit controller (Joints) does without" in exported.stderr
+    assert "unit controller (Joints) has no output energy" in exported.stderr
     succeeded(here, "run", "reach.ssp", "--out", "exported", "--no-report")
 
 
@@ -101,6 +104,12 @@ def test_all_that_a_controller_lacks_is_told_in_one_line_before_anything_starts(
     assert "unit controller (Misspelled) needs the output tau (real [2] N.m): " in line
     assert "positive turns left, as seen from above; did you mean taw?" in line
     assert "controller.energy (integer): it must be real, as that of Telling" in line
+
+
+def test_an_output_of_the_same_kind_is_named_where_no_name_is_near(here: Path):
+    write_controller(here, "other", MISSPELLED.replace("taw", "moment"))
+    line = refused(here, "run", SCENE, "--unit", "controller=other:Misspelled", "--out", "r")
+    assert "positive turns left, as seen from above; did you mean moment?" in line
 
 
 def test_an_input_that_nothing_feeds_is_noted_with_the_nearest_name(here: Path):
@@ -142,7 +151,7 @@ def test_the_shortest_controller_of_the_helix_brings_the_gripper_over_the_ball(t
     sweep = ["sweep", "helix_handover", "place=front,left", *unit, "-p", "patience=15", "--out", "places"]
     done = call(tmp_path, *sweep, limit=1500)
     assert "2 of 2 runs done" in done.stdout, done.stderr
-    assert done.stderr.count("unit servo (Proportional) does without inputs p_WR_meas, seen_O") == 1
+    assert done.stderr.count("unit servo (Proportional) has no inputs p_WR_meas, seen_O") == 1
     runs = sorted(tmp_path.glob("places/runs/*"))
     assert len(runs) == 2
     for run in runs:

@@ -1,0 +1,96 @@
+"""Who gives values to the inputs of a run from outside: a run that was recorded, a page, or a program."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from handover.cosim.exceptions import nearest
+from handover.cosim.system.system import PortName, System
+from handover.cosim.system.time_series import ExternalSource, TimeSeries
+from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.results.run_facts import whole_record_of
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, sha256_of
+from handover.scenarios.results.task import InputSources
+
+
+def played_back(path: Path) -> InputSources:
+    """Return the inputs from outside of a recorded run, to be given to another.
+
+    Raises:
+        InvalidRunFolder: it is not the folder of a run, the run had no inputs from outside, or its record lacks them.
+    """
+    folder = RunFolder.of_run(path)
+    names = external_inputs_of(folder)
+    record = whole_record_of(folder)
+    if not names:
+        raise InvalidRunFolder(path, "the run had no inputs from outside that could be played back")
+    if record is None or not len(record.time):
+        raise InvalidRunFolder(path, "it has no record of its inputs from outside")
+    if lacking := [name for name in names if name not in record]:
+        raise InvalidRunFolder(path, f"its record lacks inputs from outside: {', '.join(lacking)}")
+    told = {"from": "run", "folder": str(folder.path), "sha256": sha256_of(folder.signals)}
+    series = {name: record.series(name) for name in names}
+    return InputSources(series, told, where=f"inputs from {path}", is_complete=True)
+
+
+def external_inputs_of(folder: RunFolder) -> Sequence[str]:
+    """Return the names of the inputs that came from outside in a run.
+
+    Raises:
+        InvalidRunFolder: it is not the folder of a run, or its run.json is damaged.
+    """
+    names: Any = folder.read_run().get("external_inputs", [])
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):  # pyright: ignore[reportUnknownVariableType]
+        raise InvalidRunFolder(folder.path, "its run.json is damaged: 'external_inputs' is no list of names")
+    return names  # pyright: ignore[reportUnknownVariableType]
+
+
+def resumed_inputs(folder: RunFolder, told: Mapping[str, Any] | None) -> InputSources | None:
+    """Return the sources of a run that is resumed, by what its folder tells of them.
+
+    Raises:
+        InvalidRunFolder: they are gone: the run that was played back is not what it was, or somebody gave them.
+    """
+    if told is None:
+        return None
+    if told.get("from") != "run":
+        text = f"its inputs came from outside, from a {told.get('from')}, which is gone; begin a new run"
+        raise InvalidRunFolder(folder.path, text)
+    sources = played_back(Path(told["folder"]))
+    if sources.told != told:
+        raise InvalidRunFolder(folder.path, f"the record of {told['folder']}, whose inputs it took, is another one")
+    return sources
+
+
+def give_inputs(system: System, inputs: InputSources | None) -> None:
+    """Let sources give values to inputs of a system from outside.
+
+    Raises:
+        UsageError: the system does not take them so, with all that is wrong.
+    """
+    if inputs is None:
+        return
+    own = external_inputs(system)
+    faults = [fault for name, source in inputs.sources.items() if (fault := _fault(system, own, name, source))]
+    if inputs.is_complete:
+        lacking = [name for name in own if name not in inputs.sources]
+        faults += [f"{name}: comes from outside in this run, and did not in the recorded one" for name in lacking]
+    if faults:
+        raise UsageError(f"{inputs.where}: {'; '.join(faults)}")
+    for name, source in inputs.sources.items():
+        system.external(own[name], source)
+
+
+def external_inputs(system: System) -> dict[str, PortName]:
+    """Return the inputs of a system that come from outside, by `unit.input`."""
+    return {f"{unit}.{name}": PortName(unit, name) for unit, names in system.externals.items() for name in names}
+
+
+def _fault(system: System, own: Mapping[str, PortName], name: str, source: ExternalSource) -> str | None:
+    """Return why an input of a system does not take values from a source, or None."""
+    if name not in own:
+        return f"{name}: this run takes no values from outside for it" + (f"; {nearest(name, own)}" if own else "")
+    end = own[name]
+    port = system.units[end.unit].description.inputs.get(end.port)
+    fault = source.fault(port) if isinstance(source, TimeSeries) and port is not None else None
+    return None if fault is None else f"{name}: {fault}"

@@ -1,0 +1,45 @@
+"""Bodies of a scenario that a person may push while its run goes on, in a live page."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from handover.cosim.system.system import PortName, System
+from handover.cosim.system.time_series import NoSource
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pushable:
+    """A body that can be pushed at any of its points, by two inputs of a unit.
+
+    Attributes:
+        labels: of the replay's bodies that can be pressed; the first body of the first label is the unit's frame B.
+        unit: name of the unit.
+        force: its input of the force, N, shape (3,), in W.
+        point: its input of the point at which the force acts, m, shape (3,), in B.
+        greatest: magnitude of the greatest force, N.
+    """
+
+    labels: tuple[str, ...]
+    unit: str
+    force: str
+    point: str
+    greatest: float
+
+    @property
+    def inputs(self) -> tuple[PortName, PortName]:
+        """The inputs of force and point."""
+        return PortName(self.unit, self.force), PortName(self.unit, self.point)
+
+
+def inputs_of(pushes: Sequence[Pushable]) -> Mapping[str, int]:
+    """Return the sizes of the inputs of pushes by their names, `unit.input`."""
+    return {f"{end.unit}.{end.port}": 3 for push in pushes for end in push.inputs}
+
+
+def let_push(system: System, pushes: Sequence[Pushable]) -> None:
+    """Let the forces come from outside, from nobody yet; a unit that has no such inputs is not pushed."""
+    for push in pushes:
+        unit = system.units.get(push.unit)
+        if unit is not None and {push.force, push.point} <= unit.description.inputs.keys():
+            for end in push.inputs:
+                system.external(end, NoSource())

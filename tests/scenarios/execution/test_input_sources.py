@@ -1,0 +1,169 @@
+"""Runs whose inputs come from outside: from a board, from the record of a run, or from where they cannot."""
+
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from flyer_runs import run, task_of
+from native_units import native_fmu
+from numpy.typing import NDArray
+
+import handover
+from handover.cosim.record.reader import Record
+from handover.cosim.system.system import System
+from handover.cosim.system.time_series import ExternalSource, TimeSeries
+from handover.scenarios.cli.run import run as run_command
+from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.input_sources import give_inputs, played_back, resumed_inputs
+from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.execution.runner import run_task
+from handover.scenarios.free_flyer.handovers import RobotToHuman
+from handover.scenarios.live.input_board import InputBoard
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.results.task import InputSources
+
+GOALS = {
+    "person.p_WH_track": "person.p_WH_goal",
+    "person.q_WH_track": "person.q_WH_goal",
+    "person.finger_track": "person.finger_goal",
+    "person.closed_track": "person.closed_goal",
+}
+
+
+class Scripted:
+    """Has a hand do what another one wanted at the time, by a board, before the board is asked."""
+
+    def __init__(self, board: InputBoard, wanted: Record) -> None:
+        self._board = board
+        self._series = {name: wanted.series(goal) for name, goal in GOALS.items()}
+        self._written = -1.0
+
+    def sources(self) -> dict[str, ExternalSource]:
+        return {name: _After(self, source) for name, source in self._board.sources().items()}
+
+    def write(self, t: float) -> None:
+        if t != self._written:
+            self._written = t
+            self._board.set({name: series.at(t) for name, series in self._series.items()}, time.monotonic())
+
+
+class _After:
+    def __init__(self, script: Scripted, source: ExternalSource) -> None:
+        self._script, self._source = script, source
+
+    def at(self, t: float) -> Sequence[Any] | NDArray[Any] | None:
+        self._script.write(t)
+        return self._source.at(t)
+
+
+def tell_nobody(*_: float) -> None:
+    pass
+
+
+def led_by_script(wanted: Path, out: Path, *given: str) -> bool:
+    sizes = {"person.p_WH_track": 3, "person.q_WH_track": 4, "person.finger_track": 14, "person.closed_track": 1}
+    board = InputBoard.create(out.with_suffix(".board"), sizes, ["person.age"])
+    script = Scripted(board, Record(wanted / "signals.parquet"))
+    inputs = InputSources(script.sources(), {"from": "program", "what": "a script"})
+    task = replace(task_of(RobotToHuman, out, "hand=outside", *given), inputs=inputs)
+    return run_task(task, tell_nobody, Interruption()).outcome.success
+
+
+def test_a_run_led_by_a_board_is_played_back_byte_for_byte(tmp_path: Path):
+    run(RobotToHuman, tmp_path / "person", "skill=1")
+    assert led_by_script(tmp_path / "person", tmp_path / "led")
+    led = Record(tmp_path / "led" / "signals.parquet")
+    assert led["person.age"].max() < 0.2
+    assert led["person.closed_track"].any()
+    again = handover.run(
+        "flyer_robot_to_human", hand="outside", inputs_from=tmp_path / "led", out=tmp_path / "again", progress=False
+    )
+    assert again.success
+    a, b = ((tmp_path / name / "signals.parquet").read_bytes() for name in ("led", "again"))
+    assert a == b
+    told = [json.loads((tmp_path / name / "run.json").read_text()) for name in ("led", "again")]
+    assert told[0]["inputs"] == {"from": "program", "what": "a script"}
+    assert told[1]["inputs"]["from"] == "run"
+    assert told[1]["inputs"]["folder"] == str(tmp_path / "led")
+    assert told[0]["external_inputs"] == told[1]["external_inputs"] == [*GOALS, "person.age"]
+    compliant = ["flyer_robot_to_human", "-p", "hand=outside", "-p", "behaviour=compliant", "--no-report"]
+    other = [*compliant, "--inputs-from", str(tmp_path / "led"), "--out", str(tmp_path / "other")]
+    assert "Traceback" not in CliRunner().invoke(run_command, other).output
+    meets_the_same_hand = Record(tmp_path / "other" / "signals.parquet")
+    n = min(len(meets_the_same_hand.time), len(led.time))
+    np.testing.assert_array_equal(meets_the_same_hand["person.p_WH_track"][:n], led["person.p_WH_track"][:n])
+    assert np.abs(meets_the_same_hand["robot.p_WG"][:n] - led["robot.p_WG"][:n]).max() > 0.001
+
+
+def pushed_mass(source: ExternalSource | None) -> System:
+    system = System()
+    mass = system.add("mass", native_fmu("mass", 3))
+    system.external(mass.u.f, source)
+    return system
+
+
+def test_a_system_wired_in_python_is_played_back(tmp_path: Path):
+    pushes = TimeSeries([0.0, 0.1, 0.3], [[0.0], [2.0], [-1.0]], linear=False)
+    at: dict[str, Any] = {"stop": Fraction(1, 2), "progress": False}
+    handover.run(pushed_mass(pushes), out=tmp_path / "a", **at)
+    handover.run(pushed_mass(None), out=tmp_path / "b", inputs_from=tmp_path / "a", **at)
+    a, b = ((tmp_path / name / "signals.parquet").read_bytes() for name in "ab")
+    assert a == b
+    assert Record(tmp_path / "b" / "signals.parquet")["mass.v"][-1] != 0.0
+
+
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        (
+            ["flyer_robot_to_human", "-p", "hand=outside"],
+            "person.age: comes from outside in this run, and did not in the recorded one",
+        ),
+        (["flyer_robot_to_human"], "mass.f: this run takes no values from outside for it"),
+    ],
+)
+def test_a_run_that_lacks_inputs_is_refused_before_anything_is_written(tmp_path: Path, given: list[str], why: str):
+    handover.run(pushed_mass(None), out=tmp_path / "mass", stop=Fraction(1, 10), progress=False)
+    out = tmp_path / "out"
+    told = CliRunner().invoke(run_command, [*given, "--inputs-from", str(tmp_path / "mass"), "--out", str(out)])
+    assert told.exit_code == 2
+    assert why in told.output
+    assert not out.exists()
+
+
+def test_a_folder_without_inputs_from_outside_is_refused(tmp_path: Path):
+    with pytest.raises(InvalidRunFolder, match="not the folder of a run"):
+        played_back(tmp_path)
+    (tmp_path / "run.json").write_text("{}")
+    with pytest.raises(InvalidRunFolder, match="the run had no inputs from outside"):
+        played_back(tmp_path)
+    (tmp_path / "run.json").write_text('{"external_inputs": ["mass.f"]}')
+    with pytest.raises(InvalidRunFolder, match="no record"):
+        played_back(tmp_path)
+
+
+def test_a_series_of_another_size_is_refused():
+    inputs: Mapping[str, ExternalSource] = {"mass.f": TimeSeries([0.0], [[1.0, 2.0]], linear=False)}
+    with pytest.raises(UsageError, match=r"mass\.f: 2 values a time where 1 is right"):
+        give_inputs(pushed_mass(None), InputSources(inputs, {}))
+
+
+def test_a_run_is_resumed_with_the_inputs_that_it_played_back_and_not_with_those_of_a_page(tmp_path: Path):
+    handover.run(pushed_mass(None), out=tmp_path / "mass", stop=Fraction(1, 10), progress=False)
+    told = played_back(tmp_path / "mass").told
+    folder = RunFolder(tmp_path / "resumed")
+    assert resumed_inputs(folder, None) is None
+    inputs = resumed_inputs(folder, told)
+    assert inputs is not None
+    assert list(inputs.sources) == ["mass.f"]
+    with pytest.raises(InvalidRunFolder, match="from a page, which is gone"):
+        resumed_inputs(folder, {"from": "page"})
+    with pytest.raises(InvalidRunFolder, match="is another one"):
+        resumed_inputs(folder, {**told, "sha256": "0"})
