@@ -20,13 +20,24 @@ _RAISED = re.compile(r'\A[\s\S]*^  File "[^\n]*\n(?:[ \t][^\n]*\n)*(\S[\s\S]*)',
 """A traceback, as far as to what was raised, whose message may have several lines."""
 
 
-def nearest(name: str, valid: Iterable[str]) -> str:
-    """Return "did you mean ...?" with the nearest valid names, those as near by name, or all when none is near."""
+def did_you_mean(names: Sequence[str]) -> str:
+    """Return "did you mean ...?" with the first of some names, "" without any."""
+    return f"did you mean {' or '.join(names[:3])}?" if names else ""
+
+
+def suggestion(name: str, valid: Iterable[str]) -> str:
+    """Return "did you mean ...?" with the valid names that are nearest, "" where none is near."""
     names = sorted(set(valid))
     near = difflib.get_close_matches(name, names, n=len(names) or 1, cutoff=0.5)
     near.sort(key=lambda n: (-difflib.SequenceMatcher(None, n, name).ratio(), n))
-    if near:
-        return f"did you mean {' or '.join(near[:3])}?"
+    return did_you_mean(near)
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """Return the suggestion of valid names; where none is near, all of them."""
+    names = sorted(set(valid))
+    if near := suggestion(name, names):
+        return near
     if not names:
         return "there are none"
     return f"valid: {', '.join(names[:20])}{', ...' if len(names) > 20 else ''}"

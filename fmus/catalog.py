@@ -15,7 +15,7 @@ from typing import Any
 
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.description import describe
-from handover.cosim.exceptions import nearest, one_line
+from handover.cosim.exceptions import nearest, one_line, suggestion
 from handover.fmus.import_failure import explain_import, is_of_a_package
 
 
@@ -260,8 +260,8 @@ def import_class(path: str) -> type[Any]:
     except (Exception, SystemExit) as e:  # a module may raise anything while it is loaded
         fault = f"its module cannot be loaded{_line_of(e, module_name)}: {type(e).__name__}: {one_line(e)}"
         if isinstance(e, ModuleNotFoundError) and e.name == module_name:
-            near = nearest(module_name, [file.stem for file in Path.cwd().glob("*.py")])
-            hint = f"; {near}" if near.startswith("did you mean") else ""
+            meant = suggestion(module_name, [file.stem for file in Path.cwd().glob("*.py")])
+            hint = f"; {meant}" if meant else ""
             fault = f"there is no module {module_name!r}, neither installed nor in {Path.cwd()}{hint}"
         elif isinstance(e, SystemExit):
             fault = f"its module calls sys.exit({e.code!r}) as it is loaded{_line_of(e, module_name)}"

@@ -33,7 +33,7 @@ from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import log_told, progress_bar
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import run_task
-from handover.scenarios.experiment.pushable import inputs_of
+from handover.scenarios.experiment.live_inputs import inputs_of_pushes
 from handover.scenarios.results.task import InputSources, Task
 
 _option = partial(click.option, cls=HeadedOption, heading="Of FILE.ssp and FILE.fmu")
@@ -195,7 +195,7 @@ def _live(task: Task, pace: float | None, controls: Path | None) -> Generator[tu
     from handover.scenarios.live.process import controlled_from, live_page
 
     scenario, free = task.experiment, task.inputs is None
-    pushes: Mapping[str, int] = inputs_of(scenario.pushes(task.parameters)) if task.pushed and free else {}
+    pushes: Mapping[str, int] = inputs_of_pushes(scenario.pushes(task.parameters)) if task.pushed and free else {}
     hand = scenario.led_hand(task.parameters) if free else None
     with contextlib.ExitStack() as opened:
         if controls is not None:

@@ -20,7 +20,7 @@ def played_back(path: Path) -> InputSources:
         InvalidRunFolder: it is not the folder of a run, the run had no inputs from outside, or its record lacks them.
     """
     folder = RunFolder.of_run(path)
-    names = external_inputs_of(folder)
+    names = recorded_input_names(folder)
     record = whole_record_of(folder)
     if not names:
         raise InvalidRunFolder(path, "the run had no inputs from outside that could be played back")
@@ -33,7 +33,7 @@ def played_back(path: Path) -> InputSources:
     return InputSources(series, told, where=f"inputs from {path}", is_complete=True)
 
 
-def external_inputs_of(folder: RunFolder) -> Sequence[str]:
+def recorded_input_names(folder: RunFolder) -> Sequence[str]:
     """Return the names of the inputs that came from outside in a run.
 
     Raises:

@@ -21,7 +21,7 @@ from handover.scenarios.execution.resumption import Resumption, pack
 from handover.scenarios.execution.supervisor import heartbeat_of_run, is_supervised
 from handover.scenarios.execution.unit_values import built_system, settings_behind
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, Outcome
-from handover.scenarios.experiment.pushable import let_push
+from handover.scenarios.experiment.live_inputs import let_push
 from handover.scenarios.results.not_finite import NotFiniteData, outputs_not_finite
 from handover.scenarios.results.pictures import write_picture_files
 from handover.scenarios.results.run_facts import record_of

@@ -20,11 +20,10 @@ from handover.cosim.blocks.variable import Causality, Variable
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
-from handover.scenarios.experiment.outside import LedHand
+from handover.scenarios.experiment.live_inputs import LedHand, Pushable
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place, fit_places
-from handover.scenarios.experiment.pushable import Pushable
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure, TimePlot
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from handover.cosim.blocks.start_values import fault_of, range_of
 from handover.cosim.blocks.variable import Kind, Variable
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import nearest, suggestion
 from handover.scenarios.experiment.experiment import Experiment
 
 
@@ -97,7 +97,7 @@ def parse_value(variable: Variable, text: str) -> tuple[Any, str | None]:
     valid_range = range_of(variable)
     if fault and valid_range and valid_range not in fault:
         fault += f", {valid_range}"
-    if fault and variable.items and "did you mean" in (hint := nearest(text, [n.lower() for n, _ in variable.items])):
+    if fault and variable.items and (hint := suggestion(text, [n.lower() for n, _ in variable.items])):
         fault += f"; {hint}"
     return value, fault
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.variable import Causality, Kind, Variable
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import did_you_mean, suggestion
 from handover.cosim.fmu.description import FmuDescription, FmuPort
 from handover.cosim.system.conversion import needs_no_conversion
 from handover.cosim.system.system import PlacedUnit, PortName, System
@@ -125,7 +125,8 @@ class _Fitting:
         others = [n for n in _ports(d)[v.causality] if n not in {p.declared.name for p in self._ports}]
         elsewhere = next((c for c in _CAUSALITIES if v.name in _ports(d)[c] and c is not Causality.PARAMETER), None)
         like = [n for n in others if (p := _ports(d)[v.causality][n]).unit == v.unit and not _difference(p, v)]
-        by_name = _near(v.name, others) or (f"; did you mean {' or '.join(like[:3])}?" if like else "")
+        meant = suggestion(v.name, others) or did_you_mean(like)
+        by_name = f"; {meant}" if meant else ""
         hint = f"; its {v.name} is an {elsewhere.value}" if elsewhere else by_name
         return f"{self._what} needs the {v.causality.value} {v.name} ({signature(v)}): {port.sentence}{hint}"
 
@@ -138,7 +139,8 @@ class _Fitting:
         for name in self._unit.description.inputs:
             if name not in fed and all(p.declared.name != name for p in self._ports):
                 text = f"{self._unit.name}.{name}: nothing feeds it, so it stays at its start value"
-                self._system.notes.append(f"{text}{_near(name, missing)}")
+                meant = suggestion(name, missing)
+                self._system.notes.append(f"{text}; {meant}" if meant else text)
 
 
 def signature(v: Variable) -> str:
@@ -157,11 +159,6 @@ def _without(causality: Causality, names: Sequence[str]) -> str:
         Causality.PARAMETER: f"what the scenario would set {'them' if many else 'it'} to is not used",
     }
     return f"no {causality.value}{'s' if many else ''} {', '.join(names)}: {what[causality]}"
-
-
-def _near(name: str, valid: Sequence[str]) -> str:
-    text = nearest(name, valid)
-    return f"; {text}" if text.startswith("did you mean") else ""
 
 
 def _difference(found: FmuPort, wanted: Variable) -> str | None:

@@ -13,7 +13,7 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PortName, System
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Metric, Outcome
-from handover.scenarios.experiment.outside import LedHand
+from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.replay import Replay
 

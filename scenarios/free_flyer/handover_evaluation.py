@@ -339,7 +339,8 @@ class HandoverEvaluator(Evaluator):
             text = "the robot took its gripper for empty, which had closed on the object that it had released"
             return Cause.OTHER, f"{text}; {self._where}"
         if self._failed < self.failures:
-            text = f"{self._failed} failed receptions where {self.failures} was staged; {self._where}"
+            whose = "was asked of the hand that is led" if self.parameters.is_led else "was staged"
+            text = f"{self._failed} failed receptions where {self.failures} {whose}; {self._where}"
             return Cause.OTHER, text
         return Cause.OTHER, f"the robot was done, but the object did not go where it should; {self._where}"
 

@@ -10,10 +10,10 @@ import numpy as np
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.places import Place
-from handover.scenarios.experiment.pushable import Pushable
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.free_flyer.impedance_evaluation import ImpedanceEvaluator

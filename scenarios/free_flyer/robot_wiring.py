@@ -14,9 +14,9 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
 from handover.scenarios.experiment.experiment import FmuOf, Metric
+from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
-from handover.scenarios.experiment.pushable import Pushable
 from handover.scenarios.free_flyer.parameters import HandoverParameters, ImpedanceParameters, Propulsion, Wrench
 
 PUSHES = (Pushable(labels=("robot", "arm", "gripper"), unit="robot", force="f_P", point="p_BP", greatest=5.0),)

@@ -24,7 +24,7 @@ import math
 from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple, cast
 
-from handover.scenarios.experiment.pushable import Pushable
+from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.live.played_run import Choice
 
 COMMANDS = ("pace", "pause", "go", "step", "stop", "choose", "see", "push")

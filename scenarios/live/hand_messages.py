@@ -23,7 +23,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, cast
 
 from handover.plants.free_flyer.hand.hand_kinematics import CLOSED, JOINT_MAX, JOINTS, STRAIGHT
-from handover.scenarios.experiment.outside import LedHand
+from handover.scenarios.experiment.live_inputs import LedHand
 
 LONGEST = 2000
 """Characters; no sample is longer."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from handover.scenarios.experiment.outside import LedHand
+from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live.hand_messages import HandSample, HandStream, InvalidHandMessage
 from handover.scenarios.live.input_board import InputBoard
 from handover.scenarios.results.run_folder import write_whole

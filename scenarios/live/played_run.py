@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.master.live_control import LiveControl
-from handover.scenarios.execution.input_sources import external_inputs_of
+from handover.scenarios.execution.input_sources import recorded_input_names
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.live.process import CONTROL_FILE
 from handover.scenarios.live.waiting_command import WaitingCommand
@@ -83,7 +83,7 @@ class PlayedRun:
     def command(self) -> str:
         """The command that makes the same run."""
         try:
-            has_inputs = bool(external_inputs_of(self.watched.folder))
+            has_inputs = bool(recorded_input_names(self.watched.folder))
         except InvalidRunFolder:  # it has not begun
             has_inputs = False
         folder = ["--inputs-from", str(self.watched.folder.shown)] if has_inputs else []

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.system.time_series import ExternalSource
-from handover.scenarios.experiment.outside import LedHand
+from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live.input_board import InputBoard
 
 HOST = "127.0.0.1"

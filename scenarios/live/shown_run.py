@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from handover.cosim.master.live_control import LiveControl
-from handover.scenarios.experiment.pushable import Pushable
+from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.live.commands import Push
 from handover.scenarios.live.hand_seat import HandSeat
 from handover.scenarios.live.process import PageInputs

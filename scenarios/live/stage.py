@@ -14,8 +14,7 @@ from handover.cosim.record.reader import Record
 from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.outside import LedHand
-from handover.scenarios.experiment.pushable import Pushable
+from handover.scenarios.experiment.live_inputs import LedHand, Pushable
 from handover.scenarios.experiment.replay import Body, Line, Replay
 from handover.scenarios.experiment.time_plot import Curve, TimePlot, phases_of
 from handover.scenarios.live.hand_messages import HandSample

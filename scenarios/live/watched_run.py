@@ -7,7 +7,7 @@ from typing import Any
 from handover.cosim.record.growing_record import GrowingRecord, NoRows
 from handover.scenarios.catalog import scenario_of
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.outside import LedHand
+from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.experiment.parameters import InvalidParameter, parameters_of
 from handover.scenarios.live.stage import PastStage, Stage
 from handover.scenarios.results.run_facts import whole_record_of

@@ -19,7 +19,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.record.reader import Record
 from handover.scenarios.execution.selection import find_scenario
-from handover.scenarios.experiment.outside import LedHand
+from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.live.hand_messages import HandStream, hand_sample
 from handover.scenarios.live.input_board import InputBoard

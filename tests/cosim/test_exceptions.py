@@ -4,7 +4,7 @@ import traceback
 
 import pytest
 
-from handover.cosim.exceptions import last_line, nearest
+from handover.cosim.exceptions import last_line, nearest, suggestion
 
 
 @pytest.mark.parametrize(
@@ -19,6 +19,11 @@ from handover.cosim.exceptions import last_line, nearest
 )
 def test_the_nearest_come_first_and_those_as_near_by_name(name: str, valid: list[str], text: str):
     assert nearest(name, iter(valid)).startswith(text)
+
+
+def test_a_suggestion_is_empty_where_no_name_is_near():
+    assert suggestion("forse", iter(["force", "mass"])) == "did you mean force?"
+    assert suggestion("x", ["alpha", "beta"]) == suggestion("x", []) == ""
 
 
 def test_of_a_traceback_all_that_was_raised_is_the_last_line():

@@ -13,7 +13,7 @@ from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.plants.free_flyer.hand.hand_and_object import Holder
 from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
-from handover.scenarios.free_flyer.parameters import HandoverParameters
+from handover.scenarios.free_flyer.parameters import Hand, HandoverParameters
 from handover.scenarios.free_flyer.person_evaluation import Cause
 
 PLACE = np.array([0.0, -0.07, 0.0])
@@ -155,8 +155,8 @@ def test_a_gripper_that_closed_beside_the_object_is_reported():
     assert "found nothing" in evaluator.outcome().reason
 
 
-def received(failed: int, empty: int = 1) -> HandoverEvaluator:
-    evaluator = HandoverEvaluator(HandoverParameters(), ("GRIPPER",), failures=1)
+def received(failed: int, empty: int = 1, hand: Hand = Hand.SIMULATED) -> HandoverEvaluator:
+    evaluator = HandoverEvaluator(HandoverParameters(hand=hand), ("GRIPPER",), failures=1)
     return follow(
         evaluator,
         (0.0, signals(Phase.MOVE_TO_HANDOVER, Holder.HAND)),
@@ -177,6 +177,8 @@ def test_the_staged_failure_must_have_been_noticed():
     outcome = received(failed=0, empty=0).outcome()
     assert not outcome.success
     assert "0 failed receptions where 1 was staged" in outcome.reason
+    led = received(failed=0, empty=0, hand=Hand.OUTSIDE).outcome()  # nobody stages what somebody's own hand does
+    assert "0 failed receptions where 1 was asked of the hand that is led" in led.reason
 
 
 @pytest.mark.parametrize(("failed", "empty", "taken"), [(2, 1, "for empty"), (1, 2, "for full")])

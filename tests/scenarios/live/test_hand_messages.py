@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from handover.plants.free_flyer.hand.hand_kinematics import CLOSED, STRAIGHT
-from handover.scenarios.experiment.outside import LedHand
+from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live.hand_messages import (
     LONGEST,
     MOST_A_SECOND,

@@ -1,10 +1,12 @@
-"""Bodies of a scenario that a person may push while its run goes on, in a live page."""
+"""What a person may do in a scenario while its run goes on, in a live page: push bodies, lead a hand."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from handover.cosim.system.system import PortName, System
 from handover.cosim.system.time_series import NoSource
+
+_HAND_SIZES = {"p_WH_track": 3, "q_WH_track": 4, "finger_track": 14, "closed_track": 1}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +33,7 @@ class Pushable:
         return PortName(self.unit, self.force), PortName(self.unit, self.point)
 
 
-def inputs_of(pushes: Sequence[Pushable]) -> Mapping[str, int]:
+def inputs_of_pushes(pushes: Sequence[Pushable]) -> Mapping[str, int]:
     """Return the sizes of the inputs of pushes by their names, `unit.input`."""
     return {f"{end.unit}.{end.port}": 3 for push in pushes for end in push.inputs}
 
@@ -43,3 +45,28 @@ def let_push(system: System, pushes: Sequence[Pushable]) -> None:
         if unit is not None and {push.force, push.point} <= unit.description.inputs.keys():
             for end in push.inputs:
                 system.external(end, NoSource())
+
+
+@dataclass(frozen=True)
+class LedHand:
+    """A hand that inputs from outside lead.
+
+    Attributes:
+        unit: whose inputs they are: `p_WH_track`, `q_WH_track`, `finger_track`, `closed_track`, `age`.
+        p_WH_0: where it rests, in W, m.
+        reach: how far from there it may be wanted, m.
+    """
+
+    unit: str
+    p_WH_0: tuple[float, float, float]
+    reach: float
+
+    @property
+    def inputs(self) -> Mapping[str, int]:
+        """The inputs that a sample of a hand sets, as `unit.input`, and how many entries each has."""
+        return {f"{self.unit}.{name}": size for name, size in _HAND_SIZES.items()}
+
+    @property
+    def age(self) -> str:
+        """The input that tells how old the sample is."""
+        return f"{self.unit}.age"
