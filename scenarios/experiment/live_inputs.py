@@ -11,26 +11,27 @@ _HAND_SIZES = {"p_WH_track": 3, "q_WH_track": 4, "finger_track": 14, "closed_tra
 
 @dataclass(frozen=True, kw_only=True)
 class Pushable:
-    """A body that can be pushed at any of its points, by two inputs of a unit.
+    """A body that can be pushed at any of its points, by two inputs of a unit, or at one of them, by a single input.
 
     Attributes:
-        labels: of the replay's bodies that can be pressed; the first body of the first label is the unit's frame B.
+        labels: of the replay's bodies that can be pressed; the first body of the first label is the points' frame.
         unit: name of the unit.
         force: its input of the force, N, shape (3,), in W.
-        point: its input of the point at which the force acts, m, shape (3,), in B.
+        point: its input of the point at which the force acts, m, shape (3,), in that frame; None where it acts at the
+            same point wherever the body is pressed.
         greatest: magnitude of the greatest force, N.
     """
 
     labels: tuple[str, ...]
     unit: str
     force: str
-    point: str
+    point: str | None
     greatest: float
 
     @property
-    def inputs(self) -> tuple[PortName, PortName]:
-        """The inputs of force and point."""
-        return PortName(self.unit, self.force), PortName(self.unit, self.point)
+    def inputs(self) -> tuple[PortName, ...]:
+        """The inputs of force and, if there is one, of the point."""
+        return tuple(PortName(self.unit, name) for name in (self.force, self.point) if name is not None)
 
 
 def inputs_of_pushes(pushes: Sequence[Pushable]) -> Mapping[str, int]:
@@ -42,7 +43,7 @@ def let_push(system: System, pushes: Sequence[Pushable]) -> None:
     """Let the forces come from outside, from nobody yet; a unit that has no such inputs is not pushed."""
     for push in pushes:
         unit = system.units.get(push.unit)
-        if unit is not None and {push.force, push.point} <= unit.description.inputs.keys():
+        if unit is not None and {end.port for end in push.inputs} <= unit.description.inputs.keys():
             for end in push.inputs:
                 system.external(end, NoSource())
 

@@ -10,13 +10,14 @@ from handover.cosim.blocks.geometry import quaternion_of
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, FmuOf
+from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.free_flyer.arm_evaluation import ArmImpedanceEvaluator
 from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters
 from handover.scenarios.free_flyer.places import PLACES_OF_ARM_PUSH
-from handover.scenarios.free_flyer.robot_wiring import wired_push
+from handover.scenarios.free_flyer.robot_wiring import PUSHES_WITH_JOINTS, wired_push
 
 
 class FlyerArmImpedance(Experiment[ArmImpedanceEvaluator]):
@@ -93,6 +94,10 @@ class FlyerArmImpedance(Experiment[ArmImpedanceEvaluator]):
         from handover.scenarios.free_flyer.arm_plots import figures_of_arm_push
 
         return figures_of_arm_push(parameters, record)
+
+    def pushes(self, parameters: ArmPushParameters) -> tuple[Pushable, ...]:  # noqa: ARG002
+        """Return base and gripper; its links have no input of a force."""
+        return PUSHES_WITH_JOINTS
 
     def replay(self, parameters: ArmPushParameters, record: Record) -> Replay:
         """Return base and links, the gripper's place of rest and the push in space."""

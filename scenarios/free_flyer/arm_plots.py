@@ -19,7 +19,7 @@ from handover.scenarios.free_flyer.push_plots import (
     plot_thrust,
     push_over_time,
 )
-from handover.scenarios.free_flyer.replay import frame_at, push_arrows
+from handover.scenarios.free_flyer.replay import frame_at, hand_pushes, push_arrows
 from handover.scenarios.free_flyer.scene import EDGE
 
 _CUBE, _LINKS, _GRIPPER, _PATH = "#c9d3df", ("#8793a3", "#6b7686", "#8793a3"), "#2f6db5", "#b58a1b"
@@ -83,7 +83,7 @@ def replay_arm_push(parameters: ArmPushParameters, record: Record) -> Replay:
         weightless=True,
         follow="gripper",
         bodies=_robot(parameters, record),
-        lines=[path, *push_arrows(parameters.kind, record)],
+        lines=[path, *push_arrows(parameters.kind, record), *hand_pushes(record)],
         fixed=frame_at("place of rest", parameters.target().p_WG),
         eye=(-1.0, -1.15, 0.6),
         phases=phases_of_push(parameters, record),

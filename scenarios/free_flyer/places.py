@@ -119,6 +119,8 @@ PLACES_OF_ARM_PUSH = {
             "tolerance_J": "the scenario's parameter",
             "friction_J": "the scenario's parameter",
             "lock_time": "the scenario's parameter",
+            "f_Q": "in W, of a person's push on the gripper in a live page, which cannot push it without",
+            "p_GQ": "in G, where that acts",
         },
         remarks=_FRAMES,
     ),

@@ -44,7 +44,7 @@ def replay_handover(record: Record) -> Replay:
     """Return robot, object and hand over a run's time."""
     return Replay(
         bodies=[*_robot(record, jaw_gap(record)), *_lamp(record), *_person(record)],
-        lines=[*_light(record), *_fingers(record), *_hand_push(record)],
+        lines=[*_light(record), *_fingers(record), *hand_pushes(record)],
         eye=(-0.9, -1.05, 0.65),
         phases="decision.phase",
         weightless=True,
@@ -72,14 +72,17 @@ def replay_practice(record: Record) -> Replay:
 def replay_team(parameters: TeamParameters, record: Record) -> Replay:
     """Return two robots, the object with its handles, and the hands that the person uses, over a run's time."""
     hands = [f"_{h}" for h in parameters.hand_numbers]
-    robots = [body for r in ROBOTS for body in _robot(record, jaw_gap(record, f"_{r}"), f"robot_{r}")]
+    robots = [body for r in ROBOTS for body in _robot(record, jaw_gap(record, f"_{r}"), f"_{r}")]
     thing, *handles = large_object_at(record, 0, parameters.hands)
     parts = [_body(record, "object", "O", thing), *(_body(record, "handles", "O", handle) for handle in handles)]
     palms = [_body(record, "hand", f"H{h}", hand_at(record, 0, h)[0]) for h in hands]
     ways = ("robot_1.p_WG", "robot_2.p_WG", "person.p_WO", *(f"person.p_WH{h}" for h in hands))
     return Replay(
         bodies=[*robots, *parts, *palms],
-        lines=[finger for h in hands for finger in _fingers(record, h)],
+        lines=[
+            *(finger for h in hands for finger in _fingers(record, h)),
+            *(arrow for r in ROBOTS for arrow in hand_pushes(record, f"robot_{r}")),
+        ],
         eye=(-1.2, -1.3, 1.3),
         phases="decision.phase_1",
         weightless=True,
@@ -103,7 +106,7 @@ def replay_push(parameters: ImpedanceParameters, record: Record) -> Replay:
     path = Line(label="path of the gripper", colour=_PATH, points=record["robot.p_WG"][:, None], trail=True)
     return Replay(
         bodies=_robot(record, np.zeros(len(record.time))),
-        lines=[path, *push_arrows(parameters.kind, record), *_hand_push(record)],
+        lines=[path, *push_arrows(parameters.kind, record), *hand_pushes(record)],
         fixed=frame_at("place of rest", np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])),
         eye=(-1.0, -1.15, 0.6),
         phases=phases_of_push(parameters, record),
@@ -122,29 +125,34 @@ def push_arrows(kind: Wrench, record: Record) -> list[Line]:
     return [_arrow(label, colour, record, along) for of, label, colour, along in pushes if of is kind or np.any(along)]
 
 
-def _hand_push(record: Record) -> list[Line]:
-    """Return an arrow of the force with which a person pushes the robot in a live page, if the run let it."""
-    if "robot.f_P" not in record or "robot.p_BP" not in record:
-        return []
-    R_WB = Rotation.from_quat(record["robot.q_WB"], scalar_first=True).as_matrix()
-    p_WP = record["robot.p_WB"] + np.einsum("rij,rj->ri", R_WB, record["robot.p_BP"])
-    along = _PER_NEWTON * record["robot.f_P"]
-    shown = np.where(np.any(along != 0.0, axis=1, keepdims=True), along, np.nan)
-    return [_arrow_at("push by hand", _TWIST, p_WP, shown)]
+def hand_pushes(record: Record, robot: str = "robot") -> list[Line]:
+    """Return arrows of the forces with which a person pushes a robot in a live page, if the run let it."""
+    arrows: list[Line] = []
+    for frame, force, point in (("B", "f_P", "p_BP"), ("G", "f_Q", "p_GQ")):
+        if f"{robot}.{force}" not in record or f"{robot}.{point}" not in record:
+            continue
+        R_WF = Rotation.from_quat(record[f"{robot}.q_W{frame}"], scalar_first=True).as_matrix()
+        p_WP = record[f"{robot}.p_W{frame}"] + np.einsum("rij,rj->ri", R_WF, record[f"{robot}.{point}"])
+        along = _PER_NEWTON * record[f"{robot}.{force}"]
+        shown = np.where(np.any(along != 0.0, axis=1, keepdims=True), along, np.nan)
+        arrows.append(_arrow_at("push by hand", _TWIST, p_WP, shown))
+    return arrows
 
 
-def _robot(record: Record, gap: Floats, robot: str = "robot") -> list[Body]:
-    """Return cube, arm with palm, and jaws with a gap between them, shape (rows,), m."""
+def _robot(record: Record, gap: Floats, suffix: str = "") -> list[Body]:
+    """Return cube, arm with palm, and jaws with a gap between them, shape (rows,), m, of one robot, or one of two."""
+    robot, one = f"robot{suffix}", suffix.replace("_", " ")
     p_WB, q_WB = record[f"{robot}.p_WB"], record[f"{robot}.q_WB"]
     cube, arm, palm, *jaws = robot_at(record, 0, 0.0, robot)
     bodies = [
-        Body(label=label, colour=part.colour, mesh=_own(part, p_WB[0], q_WB[0]), p_WB=p_WB, q_WB=q_WB)
+        Body(label=f"{label}{one}", colour=part.colour, mesh=_own(part, p_WB[0], q_WB[0]), p_WB=p_WB, q_WB=q_WB)
         for label, part in (("robot", cube), ("arm", arm), ("gripper", palm))
     ]
     z_B = Rotation.from_quat(q_WB, scalar_first=True).as_matrix()[:, :, 2]
     for jaw, side in zip(jaws, (0.5, -0.5), strict=True):
         p_WJ = p_WB + side * gap[:, None] * z_B
-        bodies.append(Body(label="gripper", colour=jaw.colour, mesh=_own(jaw, p_WB[0], q_WB[0]), p_WB=p_WJ, q_WB=q_WB))
+        mesh = _own(jaw, p_WB[0], q_WB[0])
+        bodies.append(Body(label=f"gripper{one}", colour=jaw.colour, mesh=mesh, p_WB=p_WJ, q_WB=q_WB))
     return bodies
 
 

@@ -17,10 +17,36 @@ from handover.scenarios.experiment.experiment import FmuOf, Metric
 from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
-from handover.scenarios.free_flyer.parameters import HandoverParameters, ImpedanceParameters, Propulsion, Wrench
+from handover.scenarios.free_flyer.parameters import (
+    ROBOTS,
+    HandoverParameters,
+    ImpedanceParameters,
+    Propulsion,
+    Wrench,
+)
 
-PUSHES = (Pushable(labels=("robot", "arm", "gripper"), unit="robot", force="f_P", point="p_BP", greatest=5.0),)
-"""A person may push the robot anywhere; with at most the force of the thesis's validation, sec. 4.1.3."""
+_GREATEST_PUSH = 5.0
+"""Force of the thesis's validation, sec. 4.1.3, N: no person's push on a robot is greater."""
+PUSHES = (
+    Pushable(labels=("robot", "arm", "gripper"), unit="robot", force="f_P", point="p_BP", greatest=_GREATEST_PUSH),
+)
+"""A person may push a robot whose arm is fixed anywhere."""
+PUSHES_WITH_JOINTS = (
+    Pushable(labels=("robot",), unit="robot", force="f_P", point="p_BP", greatest=_GREATEST_PUSH),
+    Pushable(labels=("gripper",), unit="robot", force="f_Q", point="p_GQ", greatest=_GREATEST_PUSH),
+)
+"""Of one whose arm has joints the base and the gripper."""
+PUSHES_OF_TEAM = tuple(
+    Pushable(
+        labels=tuple(f"{part} {r}" for part in ("robot", "arm", "gripper")),
+        unit=f"robot_{r}",
+        force="f_P",
+        point="p_BP",
+        greatest=_GREATEST_PUSH,
+    )
+    for r in ROBOTS
+)
+"""Each of two robots anywhere."""
 _TRUE = ("p_WB", "q_WB", "v_WB", "w_WB")
 _MEASURED = ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")
 _ROBOT = "FreeFlyer"

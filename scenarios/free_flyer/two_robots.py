@@ -10,6 +10,7 @@ import numpy as np
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.places import Place
@@ -18,6 +19,7 @@ from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.free_flyer.parameters import ROBOTS, Hand, Hands, TeamParameters, TeamTask
 from handover.scenarios.free_flyer.places import PLACES_OF_TEAM
 from handover.scenarios.free_flyer.robot_wiring import (
+    PUSHES_OF_TEAM,
     add_controllers,
     add_robot,
     check_reach,
@@ -154,6 +156,10 @@ class TwoRobots(Experiment[TeamEvaluator]):
         from handover.scenarios.free_flyer.team_plots import figures_of_team
 
         return figures_of_team(parameters, record)
+
+    def pushes(self, parameters: TeamParameters) -> tuple[Pushable, ...]:  # noqa: ARG002
+        """Return both robots."""
+        return PUSHES_OF_TEAM
 
     def replay(self, parameters: TeamParameters, record: Record) -> Replay:
         """Return robots, hands and object in space."""

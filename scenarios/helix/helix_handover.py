@@ -16,6 +16,7 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.plants.helix.hand.partner_parameters import Params as PartnerParams
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
+from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place
@@ -24,7 +25,7 @@ from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.helix.cameras import calibrated, camera_parameters, marker_fault, pinholes
 from handover.scenarios.helix.disturbances import Disturbances
 from handover.scenarios.helix.evaluation import HandoverEvaluator
-from handover.scenarios.helix.parameters import Parameters, StepRule, Tuning
+from handover.scenarios.helix.parameters import PUSHES, Parameters, StepRule, Tuning
 from handover.scenarios.helix.places import PLACES
 
 _PAPER = "helix"
@@ -206,6 +207,10 @@ class HelixHandover(Experiment[HandoverEvaluator]):
         from handover.scenarios.helix.plots import figures_of_handover
 
         return figures_of_handover(parameters, record)
+
+    def pushes(self, parameters: Parameters) -> tuple[Pushable, ...]:  # noqa: ARG002
+        """Return the gripper."""
+        return PUSHES
 
     def replay(self, parameters: Parameters, record: Record) -> Replay:
         """Return arm, gripper, hand, ball and cameras in space."""

@@ -17,11 +17,12 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Metric, Outcome
+from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import Curve, TimeFigure, TimePlot, phases_of
-from handover.scenarios.helix.parameters import CAMERA_PERIOD
+from handover.scenarios.helix.parameters import CAMERA_PERIOD, PUSHES
 from handover.scenarios.helix.places import PLACES
 
 _KNOWN = 1e-8
@@ -127,6 +128,10 @@ class HelixReach(Experiment[ReachEvaluator]):
     def evaluator(self, parameters: ReachParameters) -> ReachEvaluator:
         """Return the evaluator of one place."""
         return ReachEvaluator(parameters)
+
+    def pushes(self, parameters: ReachParameters) -> tuple[Pushable, ...]:  # noqa: ARG002
+        """Return the gripper."""
+        return PUSHES
 
     def replay(self, parameters: ReachParameters, record: Record) -> Replay:  # noqa: ARG002
         """Return arm, gripper and the place, as a ball in a hand."""

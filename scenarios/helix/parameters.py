@@ -10,10 +10,13 @@ import numpy as np
 from handover.controllers.helix.vision.vision_parameters import Detector
 from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.units import Metre, Number, Radian, Second
+from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.helix.cameras import CameraPlaces
 from handover.scenarios.helix.disturbances import Disturbances
 
+PUSHES = (Pushable(labels=("gripper",), unit="arm", force="f_P", point=None, greatest=0.5),)
+"""A person may push the gripper; the soft arm yields some centimetres to the greatest force (assumed)."""
 CAMERA_PERIOD = Fraction(1, 30)
 """Period of the cameras, s."""
 

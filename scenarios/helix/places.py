@@ -131,6 +131,7 @@ PLACES = {
         optional={
             "closure": "",
             "f_G": "in W; by it a person guides the gripper",
+            "f_P": "in W, of a person's push in a live page, which cannot push without it",
             "tension": "shown over time",
             "EA": "by the scenario's arm_stiffness",
             "EI": "by the scenario's arm_stiffness",

@@ -21,6 +21,8 @@ _SKIN, _SLEEVE, _BALL, _CAMERA, _ESTIMATE = "#dba98a", "#54708f", "#3fb54a", "#8
 _PLATE_THICKNESS, _PLATE_RADIUS = 0.008, 1.15
 """Thickness, m, and radius over that of the arm (assumed)."""
 
+_PUSH, _PER_NEWTON = "#8357a8", 0.3
+"""Colour of a person's push, and its length, m/N."""
 _FRUSTUM = 0.09
 """Length at which a camera's frustum is drawn, m."""
 _PICTURE_CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
@@ -36,7 +38,7 @@ def replay_handover(record: Record, watching: Iterable[Pinhole] = (), bowl: Bowl
     cameras, estimates = [_frustum(camera) for camera in watching], _estimates(record)
     return Replay(
         bodies=[*_plates(record), _collar(record), *_gripper_body(record), *_hand_body(record), _ball(record), *table],
-        lines=[arm, *_fingers(record), *_forearm(record), *estimates],
+        lines=[arm, *_fingers(record), *_forearm(record), *estimates, *_hand_push(record)],
         fixed=cameras,
         eye=(-0.35, -1.25, 0.35),
         phases="servo.phase" if "servo.phase" in record else "",
@@ -44,6 +46,15 @@ def replay_handover(record: Record, watching: Iterable[Pinhole] = (), bowl: Bowl
         notes=("Where things were; orange: where the controller took ball and gripper to be.",) if estimates else (),
         window=_window(record, cameras, [body.p_WB + p for body in table for p in body.mesh.vertices]),
     )
+
+
+def _hand_push(record: Record) -> list[Line]:
+    """Return a line along the force with which a person pushes the gripper in a live page, if the run let it."""
+    if "arm.f_P" not in record:
+        return []
+    p_WG, along = record["arm.p_WG"], _PER_NEWTON * record["arm.f_P"]
+    shown = np.where(np.any(along != 0.0, axis=1, keepdims=True), along, np.nan)
+    return [Line(label="push by hand", colour=_PUSH, points=np.stack([p_WG, p_WG + shown], axis=1), width=6.0)]
 
 
 def _ball(record: Record) -> Body:

@@ -57,6 +57,6 @@ class ShownRun:
     def push(self, asked: Push) -> None:
         """Push a body."""
         assert self.inputs.pushes is not None
-        force, point = asked.body.inputs
-        values = {f"{force.unit}.{force.port}": asked.force, f"{point.unit}.{point.port}": asked.point}
+        given = zip(asked.body.inputs, (asked.force, asked.point), strict=False)  # some bodies have no input of a point
+        values = {f"{end.unit}.{end.port}": value for end, value in given}
         self.inputs.pushes.set(values, time.monotonic())

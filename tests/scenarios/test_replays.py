@@ -24,7 +24,8 @@ MUST_SHOW: dict[str, set[str]] = {
         f"flyer_{task}": {"robot", "arm", "gripper", "signal light", "object", "hand"}
         for task in ("robot_to_human", "human_to_robot", "failed_reception", "collaborative")
     },
-    "flyer_two_robots": {"robot", "arm", "gripper", "object", "handles", "hand"},
+    "flyer_two_robots": {f"{part} {r}" for part in ("robot", "arm", "gripper") for r in (1, 2)}
+    | {"object", "handles", "hand"},
     "ir_grasp": {"palm", "thumb", "index", "ring", "object", "beams"},
 }
 FIRST = ("helix_handover", "vsl_hybrid", "flyer_human_to_robot")

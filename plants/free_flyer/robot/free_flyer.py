@@ -101,6 +101,10 @@ class Inputs:
     p_BP: Vector3[Metre] = port(
         np.zeros(3), "where it acts, seen from B in the robot's frame", minimum=-5.0, maximum=5.0
     )
+    f_Q: Vector3[Newton] = port(np.zeros(3), "force of a person's push on the gripper, in the world")
+    p_GQ: Vector3[Metre] = port(
+        np.zeros(3), "where it acts, seen from G in the gripper's frame", minimum=-5.0, maximum=5.0
+    )
     tau_J: Vector3[NewtonMetre] = port(np.zeros(3), "torques on the joints; beyond the last joint not used")
 
 
@@ -126,7 +130,7 @@ class FreeFlyer:
     Without joints: m v' = R f_B + f_G, L' = R tau_B + (R p_BG) x f_G + tau_G, [Fernandes2020] eqs. (3.18)-(3.24) with
     eq. (4.1). With joints: eq. (3.23) as it is, C of base and arm in the place of B where their momenta are concerned;
     B stays at the base's centre of mass. In place of Euler angles both have a unit quaternion whose sign is continuous.
-    During a step propulsion and push are held in the robot's frame, the wrench on the gripper in the world, and the
+    During a step propulsion and a push are held in the robot's frame, what acts on the gripper in the world, and the
     joints' torques, of at most `torque_max_J`; steps are cut into equal parts of at most `substep`, in which base
     and joints turn by at most `turn`: a robot at rest needs few of them, and one that tumbles is followed as closely.
 
@@ -165,7 +169,10 @@ class FreeFlyer:
         f_B, tau_B = vector(u.f_B), vector(u.tau_B)
         if u.f_P.any():
             f_B, tau_B = self._pushed(f_B, tau_B, u)
-        wrench = f_B, tau_B, vector(u.f_G), vector(u.tau_G)
+        f_G, tau_G = vector(u.f_G), vector(u.tau_G)
+        if u.f_Q.any():
+            f_G, tau_G = self._gripper_pushed(f_G, tau_G, u)
+        wrench = f_B, tau_B, f_G, tau_G
         h = dt / (count := self._substeps(dt))
         if isinstance(self._body, RigidBody):
             advance = self._body.advance
@@ -186,6 +193,12 @@ class FreeFlyer:
         R_WB = rotation_matrix(b.q if isinstance(b, RigidBody) else b.motion().q_WB)
         f_P = inverse_rotate(R_WB, vector(u.f_P))
         return add(f_B, f_P), add_cross(tau_B, vector(u.p_BP), f_P)
+
+    def _gripper_pushed(self, f_G: Vector, tau_G: Vector, u: Inputs) -> tuple[Vector, Vector]:
+        """Return force and torque on the gripper with those of a push: f_G + f_Q, tau_G + (R_WG p_GQ) x f_Q."""
+        b, f_Q = self._body, vector(u.f_Q)
+        q_WG = b.q if isinstance(b, RigidBody) else b.motion().q_WG
+        return add(f_G, f_Q), add_cross(tau_G, rotate(rotation_matrix(q_WG), vector(u.p_GQ)), f_Q)
 
     def get_state(self) -> bytes:
         """Return the complete state."""

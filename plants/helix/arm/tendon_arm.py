@@ -61,7 +61,7 @@ class TendonArm:
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Advance from t by dt with u held."""
         steps = internal_steps(dt, self._params.internal_step, "TendonArm")
-        self._chain.pull(np.clip(u.dl_t, *self._params.end_stops), R_WB @ u.f_G)
+        self._chain.pull(np.clip(u.dl_t, *self._params.end_stops), R_WB @ (u.f_G + u.f_P))
         self._chain.edge.advance(t, steps)
         self._grip = closed_towards(self._grip, u.closure, dt / self._params.closing_time)
         return self.outputs(t + dt, u)

@@ -66,7 +66,7 @@ class TendonArmFast:
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Advance from t by dt with u held."""
         steps = internal_steps(dt, self._params.internal_step, "TendonArmFast")
-        failure = self._chain.advance(np.clip(u.dl_t, *self._params.end_stops), R_WB @ u.f_G, steps)
+        failure = self._chain.advance(np.clip(u.dl_t, *self._params.end_stops), R_WB @ (u.f_G + u.f_P), steps)
         if failure is not None:
             raise SolverFailure("TendonArmFast", t + failure, "Newton's method does not converge")
         self._grip = closed_towards(self._grip, u.closure, dt / self._params.closing_time)

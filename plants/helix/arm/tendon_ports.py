@@ -44,6 +44,7 @@ class Inputs:
         "tendon length changes from calibration, three of each segment, positive longer; the motors have end stops",
     )
     f_G: Vector3[Newton] = port(np.zeros(3), "external force on the gripper, in the world")
+    f_P: Vector3[Newton] = port(np.zeros(3), "force of a person's push on the gripper, in the world, besides f_G")
     closure: Number = port(0.0, "commanded closure of the gripper: 0 open, 1 closed", minimum=0.0, maximum=1.0)
 
 

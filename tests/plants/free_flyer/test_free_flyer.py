@@ -125,6 +125,20 @@ def test_a_push_at_the_gripper_is_the_force_there_and_none_changes_nothing():
     np.testing.assert_array_equal(flat(moved(TUMBLING, idle, 1.6)), flat(moved(TUMBLING, wrench(), 1.6)))
 
 
+@pytest.mark.parametrize("joints", [0, 2])
+def test_a_push_on_the_gripper_is_the_wrench_there_and_one_on_the_base_moves_its_joints(joints: int):
+    q = Rotation.from_euler("xyz", [0.3, -0.5, 0.9]).as_quat(scalar_first=True)
+    p = replace(DEFAULT, q_WB_0=q, joints=joints, q_J_0=np.array([0.4, -0.7, 0.0]))
+    force, p_GQ = np.array([0.3, -0.2, 0.5]), np.array([0.02, -0.03, 0.05])
+    R_WG = matrix(FreeFlyer(p).outputs(0.0, Inputs()).q_WG)
+    wrench_there = Inputs(f_G=force, tau_G=np.cross(R_WG @ p_GQ, force))
+    by_hand = moved(p, Inputs(f_Q=force, p_GQ=p_GQ), 0.016)
+    np.testing.assert_allclose(flat(by_hand), flat(moved(p, wrench_there, 0.016)), rtol=0.0, atol=1e-12)
+    on_base = moved(p, Inputs(f_P=force, p_BP=np.array([0.0, 0.1, 0.0])), 0.16)
+    assert np.all(on_base.v_J[:joints] != 0.0)  # the arm stays behind
+    assert np.dot(on_base.v_WB, force) > 0.0
+
+
 def test_turns_about_a_principal_axis_as_in_closed_form():
     y = moved(DEFAULT, Inputs(tau_B=np.array([0.0, 0.0, 0.1623])), 1.6)
     assert y.w_WB[2] == pytest.approx(1.6, rel=1e-12)

@@ -128,6 +128,12 @@ def test_a_small_force_moves_the_gripper_its_way_in_proportion():
     assert two[1] == pytest.approx(2.0 * one[1], rel=0.02)
 
 
+def test_a_persons_push_adds_to_what_else_pulls_at_the_gripper():
+    both = Inputs(f_G=np.array([0.0, 0.03, 0.01]), f_P=np.array([0.02, 0.02, -0.01]))
+    one = Inputs(f_G=np.array([0.02, 0.05, 0.0]))
+    np.testing.assert_allclose(settled(both, seconds=0.2).p_WG, settled(one, seconds=0.2).p_WG, atol=1e-12)
+
+
 def test_swinging_dies_out_and_faster_with_more_damping():
     def swing(damping: float) -> tuple[float, float]:
         arm = TendonArm(Params(damping=damping))

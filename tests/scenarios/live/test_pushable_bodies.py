@@ -1,0 +1,73 @@
+"""Which bodies of which scenarios can be pushed: their inputs are there, and a push moves what is pressed."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from flyer_runs import task_of
+
+from handover.cosim.record.reader import Record
+from handover.cosim.system.time_series import TimeSeries
+from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.execution.runner import run_task
+from handover.scenarios.results.task import InputSources
+
+_STOP = 0.4
+
+
+def tell_nobody(*_: float) -> None:
+    pass
+
+
+def pushed_run(name: str, out: Path, forces: dict[str, Sequence[float]], *given: str) -> Record:
+    """Run a scenario for a moment with constant forces and points on what can be pushed."""
+    series = {end: TimeSeries([0.0], [list(value)], linear=False) for end, value in forces.items()}
+    task: Any = task_of(SCENARIOS[name], out, *given)
+    inputs = InputSources(series, {"from": "program"})
+    run_task(replace(task, pushed=True, stop=Fraction(str(_STOP)), inputs=inputs), tell_nobody, Interruption())
+    return Record(out / "signals.parquet")
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "unit"),
+    [
+        ("flyer_two_robots", (), "robot_1"),
+        ("flyer_two_robots", (), "robot_2"),
+        ("flyer_arm_impedance", ("begin=30",), "robot"),
+        ("helix_reach", (), "arm"),
+    ],
+)
+def test_each_of_its_bodies_yields_to_a_push_and_the_scene_shows_it(
+    tmp_path: Path, name: str, given: Sequence[str], unit: str
+):
+    experiment = SCENARIOS[name]()
+    parameters = task_of(SCENARIOS[name], tmp_path / "unused", *given).parameters
+    pushes = [push for push in experiment.pushes(parameters) if push.unit == unit]
+    assert pushes
+    alone = pushed_run(name, tmp_path / "alone", {}, *given)
+    for k, push in enumerate(pushes):
+        force = push.greatest * np.array([0.0, 0.6, 0.8])
+        values = {f"{unit}.{push.force}": force} | ({f"{unit}.{push.point}": np.zeros(3)} if push.point else {})
+        record = pushed_run(name, tmp_path / f"pushed{k}", values, *given)
+        assert (record[f"{unit}.{push.force}"] == force).all()
+        way = record[f"{unit}.p_WG"][-1] - alone[f"{unit}.p_WG"][-1]
+        assert way @ force > 0.0
+        assert np.linalg.norm(way) > 1e-3
+        scene = experiment.replay(parameters, record)
+        assert scene is not None
+        assert set(push.labels) <= {body.label for body in scene.bodies}
+        arrows = [line.points[-1] for line in scene.lines if line.label == "push by hand"]
+        assert sum(bool(np.isfinite(points).all()) for points in arrows) == 1
+
+
+def test_the_pushed_gripper_of_a_robot_with_an_arm_leads_its_base(tmp_path: Path):
+    force = {"robot.f_Q": [0.0, 3.0, 0.0], "robot.p_GQ": [0.0, 0.0, 0.0]}
+    record = pushed_run("flyer_arm_impedance", tmp_path / "gripper", force, "begin=30")
+    moved = {name: np.linalg.norm(np.ptp(record[f"robot.{name}"], axis=0)) for name in ("p_WG", "p_WB")}
+    assert moved["p_WG"] > 2.0 * moved["p_WB"]
+    assert np.abs(record["robot.q_J"][-1] - record["robot.q_J"][0]).max() > 0.01
