@@ -4,10 +4,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from handover.cosim.exceptions import nearest
 from handover.cosim.system.system import PortName, System
 from handover.cosim.system.time_series import ExternalSource, TimeSeries
 from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.experiment.live_inputs import LedHand, Pushable
 from handover.scenarios.results.run_facts import whole_record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, sha256_of
 from handover.scenarios.results.task import InputSources
@@ -45,21 +49,65 @@ def recorded_input_names(folder: RunFolder) -> Sequence[str]:
     return names  # pyright: ignore[reportUnknownVariableType]
 
 
-def resumed_inputs(folder: RunFolder, told: Mapping[str, Any] | None) -> InputSources | None:
+def resumed_inputs(
+    folder: RunFolder, told: Mapping[str, Any] | None, pushes: Sequence[Pushable] = (), hand: LedHand | None = None
+) -> InputSources | None:
     """Return the sources of a run that is resumed, by what its folder tells of them.
 
+    What a page gave is taken from the record as far as that goes. From then on nobody pushes, and the hand that was led
+    stays as its last sample says, which grows old.
+
+    Args:
+        folder: the run's, its record complete as far as it goes.
+        told: what it tells of its sources; None if nobody gave values.
+        pushes: bodies of the scenario that can be pushed.
+        hand: the hand of the scenario that is led.
+
     Raises:
-        InvalidRunFolder: they are gone: the run that was played back is not what it was, or somebody gave them.
+        InvalidRunFolder: they are gone: the run that was played back is not what it was, or a program gave them.
     """
     if told is None:
         return None
+    if told.get("from") == "page":
+        recorded, names = whole_record_of(folder), recorded_input_names(folder)
+        lacking = [name for name in names if recorded is None or name not in recorded]
+        if recorded is None or lacking:
+            raise InvalidRunFolder(folder.path, f"its record lacks what its page gave: {', '.join(lacking)}")
+        series = {name: recorded.series(name) for name in names}
+        forces = {f"{push.unit}.{push.force}" for push in pushes}
+        age = "" if hand is None else hand.age
+        end = float(recorded.time[-1])
+        sources = {name: _Recorded(one, is_force=name in forces, is_age=name == age) for name, one in series.items()}
+        return InputSources(sources, {**told, "until": min(end, float(told.get("until", end)))})
     if told.get("from") != "run":
-        text = f"its inputs came from outside, from a {told.get('from')}, which is gone; begin a new run"
-        raise InvalidRunFolder(folder.path, text)
+        text = f"its inputs came from outside, from a {told.get('from')}, which is gone"
+        instead = f"begin it once more with --inputs-from {folder.path}, which gives it those that it recorded"
+        raise InvalidRunFolder(folder.path, f"{text}; {instead}")
     sources = played_back(Path(told["folder"]))
     if sources.told != told:
         raise InvalidRunFolder(folder.path, f"the record of {told['folder']}, whose inputs it took, is another one")
     return sources
+
+
+class _Recorded:
+    """Gives an input of a page that is gone: what was recorded, and after that what holds with nobody there.
+
+    Args:
+        series: what was recorded.
+        is_force: whether it is a force, which then ceases; all else holds.
+        is_age: whether it is how old a sample is, which then grows.
+    """
+
+    def __init__(self, series: TimeSeries, *, is_force: bool, is_age: bool) -> None:
+        self._series, self._is_force, self._is_age = series, is_force, is_age
+
+    def at(self, t: float) -> NDArray[Any]:
+        """Return the entries for the communication point at t, s."""
+        entries = self._series.at(t)
+        after = t - float(self._series.times[-1])
+        if after <= 0.0:
+            return entries
+        return np.zeros_like(entries) if self._is_force else entries + after if self._is_age else entries
 
 
 def give_inputs(system: System, inputs: InputSources | None) -> None:

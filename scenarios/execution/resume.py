@@ -13,11 +13,12 @@ from handover.cosim.record.stream import complete_record
 from handover.fmus.build import cached, is_of_cache
 from handover.scenarios.catalog import SCENARIOS, InvalidScenario, ScenarioSource
 from handover.scenarios.execution.fmu_run import reopened
-from handover.scenarios.execution.input_sources import resumed_inputs
+from handover.scenarios.execution.input_sources import recorded_input_names, resumed_inputs
 from handover.scenarios.execution.resumption import Resumption
 from handover.scenarios.execution.ssp_run import open_experiment
 from handover.scenarios.execution.unit_values import built_system
 from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.live_inputs import inputs_of_pushes
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
     RunFolder,
@@ -81,9 +82,11 @@ class InterruptedRun:
             experiment = self._experiment(opened)
             fmus = {name: self._fmu(name, unit) for name, unit in experiment.units.items()}
             every, stop = description["checkpoint"], description.get("stop")
+            parameters = self.resumption.parameters(type(experiment))
+            pushes, hand = experiment.pushes(parameters), experiment.led_hand(parameters)
             task = Task(
                 experiment=experiment,
-                parameters=self.resumption.parameters(type(experiment)),
+                parameters=parameters,
                 seed=int(description["seed"] or 0),
                 fmus=fmus,
                 folder=self.folder,
@@ -93,7 +96,8 @@ class InterruptedRun:
                 unit_values=description.get("unit_values", {}),
                 options=self.resumption.options,
                 stop=None if stop is None else Fraction(stop),
-                inputs=resumed_inputs(self.folder, description.get("inputs")),
+                inputs=resumed_inputs(self.folder, description.get("inputs"), pushes, hand),
+                pushed=not inputs_of_pushes(pushes).keys().isdisjoint(recorded_input_names(self.folder)),
             )
         except InvalidRunFolder:
             raise

@@ -1,6 +1,7 @@
 """Runs whose inputs come from outside: from a board, from the record of a run, or from where they cannot."""
 
 import json
+import shutil
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -19,12 +20,14 @@ import handover
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.cosim.system.time_series import ExternalSource, TimeSeries
+from handover.scenarios.cli.command import main
 from handover.scenarios.cli.run import run as run_command
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.input_sources import give_inputs, played_back, resumed_inputs
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.free_flyer.handovers import RobotToHuman
+from handover.scenarios.free_flyer.impedance import FlyerImpedance
 from handover.scenarios.live.input_board import InputBoard
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.task import InputSources
@@ -155,7 +158,7 @@ def test_a_series_of_another_size_is_refused():
         give_inputs(pushed_mass(None), InputSources(inputs, {}))
 
 
-def test_a_run_is_resumed_with_the_inputs_that_it_played_back_and_not_with_those_of_a_page(tmp_path: Path):
+def test_a_run_is_resumed_with_the_inputs_that_it_played_back_and_not_with_those_of_a_program(tmp_path: Path):
     handover.run(pushed_mass(None), out=tmp_path / "mass", stop=Fraction(1, 10), progress=False)
     told = played_back(tmp_path / "mass").told
     folder = RunFolder(tmp_path / "resumed")
@@ -163,7 +166,67 @@ def test_a_run_is_resumed_with_the_inputs_that_it_played_back_and_not_with_those
     inputs = resumed_inputs(folder, told)
     assert inputs is not None
     assert list(inputs.sources) == ["mass.f"]
-    with pytest.raises(InvalidRunFolder, match="from a page, which is gone"):
-        resumed_inputs(folder, {"from": "page"})
+    with pytest.raises(InvalidRunFolder, match="from a program, which is gone; begin it once more with --inputs-from"):
+        resumed_inputs(folder, {"from": "program"})
     with pytest.raises(InvalidRunFolder, match="is another one"):
         resumed_inputs(folder, {**told, "sha256": "0"})
+
+
+def held_until(released: float, force: float) -> dict[str, ExternalSource]:
+    """Return a push at a point that a person holds until a time, s."""
+    times = [0.0, 0.1, released]
+    return {
+        "robot.f_P": TimeSeries(times, [[0.0] * 3, [0.0, force, 0.0], [0.0] * 3], linear=False),
+        "robot.p_BP": TimeSeries(times, [[0.0] * 3, [0.16, 0.0, 0.1], [0.16, 0.0, 0.1]], linear=False),
+    }
+
+
+@pytest.mark.parametrize("is_page", [True, False], ids=["pushed by a page", "with nobody"])
+def test_a_run_that_could_be_pushed_is_resumed_as_it_was_recorded_and_is_then_let_go(tmp_path: Path, is_page: bool):
+    task = task_of(FlyerImpedance, tmp_path / "whole", "begin=30")
+    inputs = InputSources(held_until(0.6, 4.0), {"from": "page"}) if is_page else None
+    task = replace(task, every=Fraction(1, 5), stop=Fraction(1), pushed=True, inputs=inputs)
+    at = {"held": 0.45, "released": 0.75}  # when the run is killed: as it is, its folder is copied
+
+    def snapshot(t: float, _stop: float) -> None:
+        for name, when in at.items():
+            if t >= when and not (tmp_path / name).exists():
+                shutil.copytree(tmp_path / "whole", tmp_path / name)
+
+    run_task(task, snapshot, Interruption())
+    whole = Record(tmp_path / "whole" / "signals.parquet")
+    for name in at:
+        told = CliRunner().invoke(main, ["resume", str(tmp_path / name), "--no-report"])
+        assert "Traceback" not in told.output
+        assert (tmp_path / name / "summary.json").is_file(), told.output
+    released, held = (tmp_path / name / "signals.parquet" for name in ("released", "held"))
+    assert released.read_bytes() == (tmp_path / "whole" / "signals.parquet").read_bytes()
+    record = Record(held)
+    assert len(record.time) == len(whole.time)
+    before = whole.time <= 0.45
+    np.testing.assert_array_equal(record["robot.p_WB"][before], whole["robot.p_WB"][before])
+    if is_page:
+        assert record["robot.f_P"][before].max() == whole["robot.f_P"][~before].max() == 4.0
+        assert record["robot.f_P"][whole.time > 0.47].max() == 0.0
+        run_json = json.loads((tmp_path / "held" / "run.json").read_text())
+        assert run_json["inputs"]["from"] == "page"
+        assert run_json["inputs"]["until"] == pytest.approx(0.45, abs=0.02)
+
+
+def test_a_hand_whose_page_is_gone_stays_and_its_sample_grows_old(tmp_path: Path):
+    short = Fraction(1, 2)
+    run_task(replace(task_of(RobotToHuman, tmp_path / "person"), stop=short), tell_nobody, Interruption())
+    wanted = Record(tmp_path / "person" / "signals.parquet")
+    sources: dict[str, ExternalSource] = {name: wanted.series(goal) for name, goal in GOALS.items()}
+    sources["person.age"] = TimeSeries([0.0], [[0.02]], linear=False)
+    inputs = InputSources(sources, {"from": "page"})
+    task = replace(task_of(RobotToHuman, tmp_path / "led", "hand=outside"), inputs=inputs, stop=short)
+    run_task(task, tell_nobody, Interruption())
+    led = RobotToHuman().led_hand(task.parameters)
+    resumed = resumed_inputs(task.folder, {"from": "page"}, (), led)
+    assert resumed is not None
+    end = Record(tmp_path / "led" / "signals.parquet").time[-1]
+    assert np.asarray(resumed.sources["person.age"].at(end)).tolist() == [0.02]
+    assert np.asarray(resumed.sources["person.age"].at(end + 3.0)) == pytest.approx([3.02])
+    last = wanted.series("person.p_WH_goal").at(end)
+    np.testing.assert_array_equal(resumed.sources["person.p_WH_track"].at(end + 3.0), last)
