@@ -10,6 +10,7 @@ float, array and int all the same.
 """
 
 import enum
+import re
 from dataclasses import dataclass, field
 from typing import Annotated, Any, TypeVar
 
@@ -83,6 +84,9 @@ class Shape:
     extents: tuple[int, ...]
 
 
+_RASTER_MIME = re.compile(r"image/x-raw-bgr; width=(\d{1,5}); height=(\d{1,5})")
+
+
 @dataclass(frozen=True)
 class Raster:
     """A raw picture, blue, green, red, 8 bits each, rows from the top: `width * height * 3` bytes."""
@@ -99,6 +103,12 @@ class Raster:
     def size(self) -> int:
         """Number of bytes."""
         return self.width * self.height * 3
+
+    @classmethod
+    def of_mime(cls, mime: str | None) -> "Raster | None":
+        """Return the raster of a MIME type; None if it is another one."""
+        found = _RASTER_MIME.fullmatch(mime or "")
+        return None if found is None else cls(int(found[1]), int(found[2]))
 
 
 Vector2 = TypeAliasType("Vector2", Annotated[Floats, Shape((2,))], type_params=(U,))

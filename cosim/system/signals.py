@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.ports import Raster
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.buffers import Views
@@ -90,6 +91,11 @@ class Signals:
         if port.kind is Kind.STRING:
             return _text(int(views[0][0]))
         return {v: n for n, v in port.items}.get(int(views[0][0]), str(views[0][0]))
+
+    def rasters(self) -> dict[str, Raster]:
+        """Return which signals are single pictures, and of which size."""
+        found = {name: Raster.of_mime(port.mime) for name, port in self._ports.items() if not port.shape}
+        return {name: raster for name, raster in found.items() if raster is not None}
 
     def columns(self) -> list[Column]:
         """Return all real, integer, boolean and enumeration outputs as scalars."""

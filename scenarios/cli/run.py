@@ -14,6 +14,7 @@ import click
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import MasterOptions
+from handover.cosim.system.signals import Observer
 from handover.scenarios.cli.config_file import ConfiguredCommand, config_option
 from handover.scenarios.cli.console import reserve_stdout
 from handover.scenarios.cli.master_options import coupling_of, master_options
@@ -178,19 +179,23 @@ def run(
         options = MasterOptions(**coupling_of(coupling), **limits(call_limit, pace), strict=strict)
         task = replace(request, options=options).task(opened)
         control: LiveControl | None = None
+        observer: Observer | None = None
         if live or controls:
-            task, control = opened.enter_context(_live(task, pace, controls))
+            task, control, observer = opened.enter_context(_live(task, pace, controls))
         with progress_bar(sys.stderr) as progress:
-            result = run_task(task, progress, interruption, control=control)
+            result = run_task(task, progress, interruption, control=control, observer=observer)
     exit_with(result, task, json_to=json_to)
 
 
 @contextlib.contextmanager
-def _live(task: Task, pace: float | None, controls: Path | None) -> Generator[tuple[Task, LiveControl], None, None]:
+def _live(
+    task: Task, pace: float | None, controls: Path | None
+) -> Generator[tuple[Task, LiveControl, Observer | None], None, None]:
     """Serve the run's page while it goes on, and a moment longer; or take another process's controls of the run.
 
     Yields:
-        The task, whose inputs from outside the page gives if nobody else does, and the run's controls.
+        The task, whose inputs from outside the page gives if nobody else does, the run's controls, and what shows its
+        camera pictures.
     """
     from handover.scenarios.live.process import controlled_from, live_page
 
@@ -205,4 +210,4 @@ def _live(task: Task, pace: float | None, controls: Path | None) -> Generator[tu
             click.echo(f"live: {address}  (the run begins once the page is open)", err=True)
         if sources := inputs.sources():
             task = replace(task, inputs=InputSources(sources, {"from": "page"}))
-        yield task, control
+        yield task, control, inputs.pictures

@@ -60,11 +60,12 @@ def experiment_system(
 
 def run_task(
     task: Task, progress: Progress, interruption: Interruption, resumption: Resumption | None = None,
-    control: LiveControl | None = None,
+    control: LiveControl | None = None, observer: Observer | None = None,
 ) -> RunResult:  # fmt: skip
     """Run a scenario to its end, its failure or its interruption and write its folder; or resume a run.
 
-    Where there is a `control`, another process may change its pace, pause it, and end it after its step.
+    Where there is a `control`, another process may change its pace, pause it, and end it after its step; an `observer`
+    sees each communication point, too, as for a page that shows pictures.
 
     Raises:
         WiringError, ScheduleError, InvalidFmu, InitializationError, StateNotSaved, InvalidRunFolder,
@@ -107,7 +108,8 @@ def run_task(
             interruption.begin()
             began = True
             _begin_folder(task, master, resumption)
-            failure = _run(task, master, evaluator, resumption, _Surroundings(progress, interruption, clock, control))
+            around = _Surroundings(progress, interruption, clock, control, observer)
+            failure = _run(task, master, evaluator, resumption, around)
             with disk_errors_reported(task.folder.signals):  # before units end: one may hang as its library is unloaded
                 not_finite = outputs_not_finite(task.folder.signals, master.system)
     except InitializationError as e:
@@ -124,12 +126,13 @@ def run_task(
 
 @dataclass(frozen=True)
 class _Surroundings:
-    """What surrounds a run in the command: where progress goes, what interrupts and controls it, and its clock."""
+    """What surrounds a run in the command: where progress goes, what interrupts, controls, sees it, its clock."""
 
     progress: Progress
     interruption: Interruption
     clock: Callable[[], ElapsedTime]
     control: LiveControl | None
+    observer: Observer | None
 
     def take_in_stop(self) -> bool:
         """Take a stop by the controls for a signal; return whether the run is to end after its step."""
@@ -174,6 +177,8 @@ def _run(
         observers: list[Observer] = [recorder, evaluator, write_due_checkpoints]
         if resumption is not None:
             observers = [ObserveAfter(resumption.checkpoint.time, observe) for observe in observers]
+        if around.observer is not None:
+            observers.append(around.observer)
         try:
             master.run(stop, [*observers, report_progress], until=lambda: evaluator.over or around.take_in_stop())
             if master.ended is not None:

@@ -42,6 +42,8 @@ from handover.scenarios.results.run_facts import whole_record_of
 
 FRAME_PERIOD, PLOT_PERIOD = 1.0 / 30.0, 1.0
 """Time between two frames, and between two states of the plots, s."""
+_PICTURE_PERIOD = 0.1
+"""How often camera pictures are looked for, s."""
 _SLOWEST = 2.0
 """How long a page may take to receive a message, s; it gets no more after that."""
 _PATIENCE = 120.0
@@ -201,9 +203,13 @@ class LivePage:
 
     async def _follow(self, shown: ShownRun, stage: Stage, failed: Callable[[], bool]) -> None:
         loop = asyncio.get_running_loop()
-        last_plots, started = 0.0, False
+        last_plots, last_pictures, started = 0.0, 0.0, False
         while not shown.run.is_over and not failed():
             began = loop.time()
+            if self._ready() and began - last_pictures >= _PICTURE_PERIOD:
+                last_pictures = began
+                if pictures := await asyncio.to_thread(shown.pictures):
+                    await self.tell({"pictures": pictures})
             if self._pages and not started:
                 started, shown.control.paused = True, False
                 await self._tell_states()

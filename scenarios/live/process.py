@@ -16,26 +16,36 @@ from handover.cosim.master.live_control import LiveControl
 from handover.cosim.system.time_series import ExternalSource
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live.input_board import InputBoard
+from handover.scenarios.live.picture_board import PictureWriter
 
 HOST = "127.0.0.1"
 CONTROL_FILE = "control"
 """Name of the file of a run's controls, in a folder of both processes."""
 _PUSHES_FILE, _HAND_FILE = "pushes", "hand"
+PICTURE_FILE = "pictures"
+"""Name of the file of a run's camera pictures, in that folder."""
 _PATIENCE = 10.0
 """How long the server may take to tell the pages of the end, s."""
 
 
 @dataclass(frozen=True)
 class PageInputs:
-    """Inputs of a run that its page sets, in files of both processes.
+    """Inputs of a run that its page sets, and pictures that it shows, in files of both processes.
 
     Attributes:
+        folder: of both processes.
         pushes: forces and points of bodies that are pushed; None where none can be.
         hand: the samples of a hand that is led, which have an age of their own; None where there is none.
     """
 
+    folder: Path | None = None
     pushes: InputBoard | None = None
     hand: InputBoard | None = None
+
+    @property
+    def pictures(self) -> PictureWriter | None:
+        """What shows the run's camera pictures to the page, as an observer of the run."""
+        return None if self.folder is None else PictureWriter(self.folder / PICTURE_FILE)
 
     @classmethod
     def create(cls, folder: Path, pushes: Mapping[str, int], hand: LedHand | None) -> "PageInputs":
@@ -47,6 +57,7 @@ class PageInputs:
             hand: the one that can be led.
         """
         return cls(
+            folder,
             InputBoard.create(folder / _PUSHES_FILE, pushes) if pushes else None,
             InputBoard.create(folder / _HAND_FILE, hand.inputs, [hand.age]) if hand is not None else None,
         )
@@ -55,7 +66,7 @@ class PageInputs:
     def open(cls, folder: Path) -> "PageInputs":
         """Return those that another process has made in a folder."""
         boards = [InputBoard(folder / f) if (folder / f).is_file() else None for f in (_PUSHES_FILE, _HAND_FILE)]
-        return cls(*boards)
+        return cls(folder, *boards)
 
     def sources(self) -> dict[str, ExternalSource]:
         """Return who gives values to the inputs, by their names."""

@@ -1,15 +1,19 @@
 """A run that a live page shows: its folder, its controls, what is seen of it, and what a page does in it."""
 
+import base64
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from handover.cosim.master.live_control import LiveControl
 from handover.scenarios.experiment.live_inputs import Pushable
+from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.live.commands import Push
 from handover.scenarios.live.hand_seat import HandSeat
-from handover.scenarios.live.process import PageInputs
+from handover.scenarios.live.picture_board import PictureReader, Pixels
+from handover.scenarios.live.process import PICTURE_FILE, PageInputs
 from handover.scenarios.live.stage import Stage
 from handover.scenarios.live.watched_run import WatchedRun
 
@@ -33,6 +37,22 @@ class ShownRun:
     stage: Stage | None = None
     inputs: PageInputs = field(default_factory=PageInputs)
     seat: HandSeat | None = None
+
+    def __post_init__(self) -> None:
+        self._pictures = PictureReader(self.controls / PICTURE_FILE)
+        self._not_black = set[str]()
+
+    def pictures(self) -> dict[str, Any] | None:
+        """Return the newest pictures of its cameras for a page, and ask the run for the next; None without new ones.
+
+        A camera that has shown nothing but black, as the one that a robot lacks, is left out.
+        """
+        seen = self._pictures.take()
+        if seen is None:
+            return None
+        self._not_black |= {name for name, pixels in seen.pictures.items() if pixels.any()}
+        shown = {name: _jpeg(seen.t, name, pixels) for name, pixels in seen.pictures.items() if name in self._not_black}
+        return {"time": seen.t, "cameras": shown} if shown else None
 
     def begin(self, stage: Stage) -> None:
         """Take in the run's stage, and let pages set its inputs."""
@@ -60,3 +80,11 @@ class ShownRun:
         given = zip(asked.body.inputs, (asked.force, asked.point), strict=False)  # some bodies have no input of a point
         values = {f"{end.unit}.{end.port}": value for end, value in given}
         self.inputs.pushes.set(values, time.monotonic())
+
+
+def _jpeg(t: float, camera: str, pixels: Pixels) -> str:
+    """Return a picture as JPEG in base64, as wide as a page shows it."""
+    import cv2  # no part of what a page without pictures needs
+
+    fewer: Any = cv2.resize(pixels, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    return base64.b64encode(CameraPicture.take(t=t, camera=camera, role="", pixels=fewer).jpeg).decode()

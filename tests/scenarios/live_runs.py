@@ -36,8 +36,10 @@ def live_run(
 
 
 @contextmanager
-def shown(browser: Browser, address: str) -> Generator[Page, None, None]:
-    page = browser.new_page(viewport={"width": 1000, "height": 900})
+def shown(browser: Browser, address: str, *, has_touch: bool = False, script: str = "") -> Generator[Page, None, None]:
+    """Open the page; a script runs before its own."""
+    page = browser.new_page(viewport={"width": 1000, "height": 900}, has_touch=has_touch)
+    page.add_init_script(script)
     page.set_default_timeout(120_000)
     messages: list[str] = []
     page.on("pageerror", lambda error: messages.append(str(error)))

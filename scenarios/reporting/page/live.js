@@ -29,7 +29,7 @@ const live = (() => {
     if (run.scene) {
       host.append(byId("scene-of-run").content.cloneNode(true));
       for (const part of ["views", "legend"]) host.querySelector(".replay-" + part).outerHTML = run[part];
-      stage = stageIn(root, run.scene);
+      stage = stageIn(root, {...run.scene, live: true});
       if (stage) recorderIn(stage, () => told.value);
       if (before) stage?.scene.lookAs(before);
     }
@@ -38,6 +38,8 @@ const live = (() => {
     Object.assign(api, {run, scene: stage?.scene ?? null});
     if (run.title) document.title = document.querySelector("h1").textContent = run.title;
     byId("signals").replaceChildren(...run.signals.map(name => Object.assign(document.createElement("option"), {value: name})));
+    byId("cameras").replaceChildren();
+    byId("cameras").hidden = true;
     byId("verdict").hidden = byId("waiting").hidden = true;
     byId("told").textContent = "";
     for (const id of ["pause", "step", "stop", "pace", "signal"]) byId(id).disabled = false;
@@ -87,8 +89,30 @@ const live = (() => {
     } else if ("time" in message) {
       told.value = `${message.time.toFixed(2)} s${message.phase ? ", " + message.phase : ""}`;
     } else if (message.plots) draw(message.plots);
+    else if (message.pictures) showPictures(message.pictures);
     else if (message.ended) end(message.ended);
     else if (message.refused) byId("told").textContent = message.refused;
+  }
+
+  // Shows what the cameras see; pictures come a few times a second.
+  function showPictures({time, cameras}) {
+    const names = Object.keys(cameras), host = byId("cameras");
+    host.hidden = false;
+    if (host.children.length !== names.length) {
+      host.replaceChildren(...names.map(() => {
+        const figure = document.createElement("figure");
+        figure.append(document.createElement("img"), document.createElement("figcaption"));
+        figure.lastChild.className = "soft";
+        return figure;
+      }));
+    }
+    names.forEach((name, i) => {
+      const [picture, caption] = host.children[i].children;
+      picture.src = `data:image/jpeg;base64,${cameras[name]}`;
+      picture.alt = `picture of ${name}`;
+      caption.textContent = `${name}, ${time.toFixed(1)} s`;
+    });
+    host.dataset.pictures = Number(host.dataset.pictures ?? 0) + 1;
   }
 
   // Draws those plots that are seen; the server sends no others, since drawing takes long.

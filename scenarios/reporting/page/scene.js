@@ -1,7 +1,9 @@
 // Draws bodies, tubes and lines in space, with three.js; what they are comes from replay_section.py.
-//   const scene = sceneIn(element, {traces, low, high, eye, weightless, floor, follow, played})
+//   const scene = sceneIn(element, {traces, low, high, eye, weightless, floor, follow, played, live})
 //                                 played: a person acts in it, so that pictures come fast also where no graphics card
 //                                 draws them, and shadows fall straight down
+//                                 live: pictures follow a run under way: those that come late are drawn with fewer pixels,
+//                                 then without shadows (data-coarse of the element counts the steps)
 //   scene.show(u)                 everything u frames after the first; u may lie between two
 //   scene.turn(view)              looks from one of scene.views: "start", "front", "side", "top"
 //   scene.follows = true          the view moves with the body of that label from now on
@@ -26,6 +28,7 @@
 "use strict";
 const sceneIn = (() => {
   const FIELD = 36 * Math.PI / 180, ROOM = 0.94;  // of the view from top to bottom, and the share of it for the box
+  const LATE = 50, FORGOTTEN = 3000;  // ms from when a picture is wanted until it is drawn: too long; not because of what it costs
   const LONGEST_TRAIL = 4000;  // points of a way that grows
   const VIEWS = {front: [0, -1, 0.12], side: [1, 0, 0.12], top: [0, -0.001, 1]};
   const hasWebGl = () => Boolean(document.createElement("canvas").getContext("webgl2"));
@@ -198,7 +201,7 @@ const sceneIn = (() => {
     const grid = new THREE.LineSegments(geometry,
       new THREE.LineBasicMaterial({vertexColors: true, transparent: true, depthWrite: false}));
     group.add(plane, grid);
-    return {group, recolour: colour => grid.material.color.set(colour)};
+    return {group, plane, recolour: colour => grid.material.color.set(colour)};
   }
 
   function stars(far) {
@@ -247,14 +250,14 @@ const sceneIn = (() => {
     };
   }
 
-  const made = (element, {traces, low, high, eye, weightless = false, floor = low[2], follow = "", played = false}) => {
+  const made = (element, {traces, low, high, eye, weightless = false, floor = low[2], follow = "", played = false, live = false}) => {
     if (!hasWebGl()) return null;
     const sides = high.map((x, i) => x - low[i]), centre = high.map((x, i) => (x + low[i]) / 2);
     const reach = Math.hypot(...sides) / 2;
     const scene = new THREE.Scene();
     const camera = new THREE.PerspectiveCamera(FIELD * 180 / Math.PI, 1, reach / 100, 60 * reach);
     camera.up.set(0, 0, 1);
-    const plain = played && drawsBySoftware();
+    const plain = (played || live) && drawsBySoftware();
     const renderer = new THREE.WebGLRenderer({antialias: !plain, alpha: true});
     renderer.setPixelRatio(plain ? 0.75 : Math.min(devicePixelRatio, 2));
     renderer.shadowMap.enabled = true;
@@ -292,18 +295,49 @@ const sceneIn = (() => {
     });
     for (const {object} of drawn) scene.add(object);
 
-    let wanted = 0, follows = false;
+    // What is given up, one after the other, where pictures come late.
+    const savings = !live ? [] : [
+      () => setPixelRatio(Math.min(renderer.getPixelRatio(), 0.75)),
+      () => {
+        sun.castShadow = false;
+        if (ground) ground.plane.visible = false;
+      },
+      () => setPixelRatio(0.5),
+    ];
+    const delays = [];
+    function setPixelRatio(ratio) {
+      renderer.setPixelRatio(ratio);
+      renderer.setSize(element.clientWidth, element.clientHeight, false);
+    }
+    // Takes how long a picture was waited for, ms; a page that was not seen waited for nothing.
+    function economise(delay) {
+      if (!savings.length || document.hidden || delay > FORGOTTEN) return;
+      delays.push(delay);
+      if (delays.length < 6) return;
+      const middle = delays.sort((a, b) => a - b)[3];
+      delays.length = 0;
+      if (middle < LATE) return;
+      savings.shift()();
+      element.dataset.coarse = Number(element.dataset.coarse ?? 0) + 1;
+    }
+
+    let wanted = 0, follows = false, asked = 0;
     const target = new THREE.Vector3(...centre);
     const perMetre = () => element.clientHeight / (2 * Math.tan(FIELD / 2) * camera.position.distanceTo(controls.target));
     function draw() {
       wanted = 0;
+      economise(performance.now() - asked);
       api.beforePicture();
       renderer.render(scene, camera);
       ruler(camera, perMetre());
       api.onPicture();
       element.dataset.pictures = Number(element.dataset.pictures ?? 0) + 1;
     }
-    const request = () => { wanted ||= requestAnimationFrame(draw); };
+    const request = () => {
+      if (wanted) return;
+      asked = performance.now();
+      wanted = requestAnimationFrame(draw);
+    };
 
     // From the side of `towards`, at a distance from where the whole box is just seen.
     function lookFrom(towards) {

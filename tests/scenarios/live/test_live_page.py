@@ -1,5 +1,6 @@
 """A run in a browser while it goes on: it is followed, paused, stepped, ended; its record is what it would be alone."""
 
+import base64
 import json
 import os
 import re
@@ -23,6 +24,7 @@ from websockets.sync.client import connect
 from handover.cosim.record.reader import Record
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
+from handover.scenarios.results.pictures import read_picture_files
 
 
 def test_a_run_is_followed_paused_and_stepped_and_its_record_is_that_of_a_run_alone(browser: Browser, tmp_path: Path):
@@ -86,6 +88,51 @@ def test_a_run_under_way_is_saved_as_a_film(browser: Browser, tmp_path: Path):
         assert saved.value.suggested_filename.startswith("ir_grasp.")
         video = cv2.VideoCapture(str(tmp_path / "film"))
         assert sum(video.read()[0] for _ in range(10)) > 5
+
+
+@pytest.mark.slow
+def test_pictures_that_come_late_are_drawn_with_fewer_pixels_and_without_shadows(browser: Browser, tmp_path: Path):
+    coarse = "Number(document.querySelector('.replay-scene').dataset.coarse)"
+    with live_run(tmp_path / "live", "--pace", "0.2") as (address, _), shown(browser, address) as page:
+        wait_until(page, f"{LIVE}.dataset.frames > 3")
+        page.evaluate(
+            """() => {
+                const busy = () => { for (const end = performance.now() + 100; performance.now() < end;); };
+                setInterval(busy, 110);
+            }"""
+        )
+        wait_until(page, f"{coarse} === 3")
+        wide, shown_wide = page.evaluate("[live.scene.canvas.width, live.scene.canvas.clientWidth]")
+        assert wide == pytest.approx(0.5 * shown_wide, abs=1.0)
+        pictures = page.evaluate("Number(document.querySelector('.replay-scene').dataset.pictures)")
+        wait_until(page, f"Number(document.querySelector('.replay-scene').dataset.pictures) > {pictures + 2}")
+
+
+@pytest.mark.slow
+def test_the_page_shows_what_the_cameras_see_and_the_run_is_the_same(browser: Browser, tmp_path: Path):
+    given, cameras = ("-p", "patience=2"), "document.getElementById('cameras')"
+    with (
+        live_run(tmp_path / "live", *given, "--pace", "3", scenario="helix_handover") as (address, run),
+        shown(browser, address) as page,
+    ):
+        wait_until(page, f"{cameras}.dataset.pictures > 2")
+        pictures = page.locator("#cameras img")
+        assert pictures.count() == 2  # the third camera, which is not there, is left out
+        wait_until(page, f"[...{cameras}.querySelectorAll('img')].every(i => i.complete && i.naturalWidth === 640)")
+        captions = page.locator("#cameras figcaption").all_inner_texts()
+        assert [caption.partition(",")[0] for caption in captions] == ["camera.left", "camera.right"]
+        coded = str(pictures.first.get_attribute("src")).partition("base64,")[2]
+        wait_until(page, f"{LIVE}.dataset.ended")
+        run.wait(timeout=120)
+    seen = cv2.imdecode(np.frombuffer(base64.b64decode(coded), dtype=np.uint8), cv2.IMREAD_COLOR)
+    alone = [*HANDOVER, "run", "helix_handover", *given, "--no-report", "--out", str(tmp_path / "alone")]
+    subprocess.run(alone, check=False, capture_output=True)
+    kept = read_picture_files(tmp_path / "alone" / "pictures")
+    left = next(picture.pixels for picture in kept if picture.camera == "left")
+    whole = cv2.resize(left, (640, 360), interpolation=cv2.INTER_AREA)
+    assert np.mean(np.abs(seen.astype(float) - whole)) < 8.0  # the arm has moved little
+    a, b = ((tmp_path / name / "signals.parquet").read_bytes() for name in ("live", "alone"))
+    assert a == b
 
 
 def test_ctrl_c_ends_the_run_and_the_page_is_told_how(browser: Browser, tmp_path: Path):

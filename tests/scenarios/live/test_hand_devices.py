@@ -1,0 +1,125 @@
+"""Fingers on a screen and a gamepad lead the hand in a real browser, as the mouse does in `test_live_hand.py`."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from live_runs import live_run, shown
+from numpy.typing import NDArray
+from opened_page import wait_until
+from playwright.sync_api import Browser, CDPSession, Page
+
+pytestmark = pytest.mark.slow
+
+SCENARIO = "flyer_robot_to_human"
+GIVEN = ("-p", "hand=outside", "--pace", "0.5")
+SEEN = """(() => {
+    const {position, matrixWorld} = live.scene.camera, hand = new THREE.Vector3(...live.hand.pose().p_WH);
+    const box = document.querySelector(".replay-scene").getBoundingClientRect();
+    const [x, y] = live.scene.toPixels(hand.toArray());
+    const back = new THREE.Vector3().setFromMatrixColumn(matrixWorld, 2);
+    return [box.left + x, box.top + y, position.clone().sub(hand).dot(back)];
+})()"""
+"""Where the hand is seen, in pixels of the window, and how deep below the eye, m."""
+NO_PAD = """
+    window.pad = null;
+    Object.defineProperty(navigator, "getGamepads", {value: () => [null, window.pad]});
+"""
+
+
+def seen(page: Page) -> NDArray[np.float64]:
+    return np.array(page.evaluate(SEEN))
+
+
+def touch(screen: CDPSession, kind: str, *fingers: tuple[float, float]) -> None:
+    points = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(fingers)]
+    screen.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+
+def told(out: Path) -> dict[str, Any]:
+    return json.loads((out / "inputs.json").read_text(encoding="utf-8"))
+
+
+def end_run(page: Page) -> None:
+    page.locator("#stop").click()
+    wait_until(page, "document.querySelector('.live').dataset.ended")
+
+
+def test_a_finger_takes_the_hand_along_and_two_change_its_depth(browser: Browser, tmp_path: Path):
+    with live_run(tmp_path / "led", *GIVEN, scenario=SCENARIO) as (address, run):
+        with shown(browser, address, has_touch=True) as page:
+            wait_until(page, "live.hand")
+            page.locator("[data-view=top]").click()
+            screen = page.context.new_cdp_session(page)
+            x, y = 500.0, 400.0
+            before = seen(page)
+            touch(screen, "touchStart", (x, y))
+            for k in range(1, 6):
+                touch(screen, "touchMove", (x + 10.0 * k, y - 4.0 * k))
+            page.wait_for_timeout(500)  # moves come with the next picture
+            along = seen(page)
+            assert (along - before)[:2] == pytest.approx([50.0, -20.0], abs=1.0)
+            assert along[2] == pytest.approx(before[2], abs=1e-6)
+            touch(screen, "touchStart", (x + 50.0, y - 20.0), (x + 150.0, y - 20.0))
+            for k in range(1, 6):
+                touch(screen, "touchMove", (x + 50.0, y - 20.0), (x + 150.0 + 10.0 * k, y - 20.0))
+            page.wait_for_timeout(500)
+            near = seen(page)
+            assert along[2] - near[2] == pytest.approx(0.1, abs=0.005)  # 2 mm a pixel
+            touch(screen, "touchEnd")
+            touch(screen, "touchStart", (x, y))  # where a finger comes down is nothing to the hand
+            touch(screen, "touchEnd")
+            page.wait_for_timeout(500)
+            assert seen(page) == pytest.approx(near, abs=1e-6)
+            assert not page.evaluate("live.hand.pose().closed")
+            page.locator("#hand-grasp").click()
+            assert page.evaluate("live.hand.pose().closed")
+            end_run(page)
+        run.wait(timeout=120)
+    assert told(tmp_path / "led")["samples"]["touch"] > 5
+
+
+def test_a_gamepads_sticks_triggers_and_button_lead_the_hand(browser: Browser, tmp_path: Path):
+    def hold(page: Page, axes: tuple[float, ...] = (0.0,) * 4, **buttons: float) -> None:
+        values = [buttons.get(f"b{i}", 0.0) for i in range(17)]
+        pad = {"axes": list(axes), "buttons": [{"value": v, "pressed": v > 0.5} for v in values]}
+        page.evaluate("pad => { window.pad = pad; }", pad)
+        page.wait_for_timeout(400)
+
+    with live_run(tmp_path / "led", *GIVEN, scenario=SCENARIO) as (address, run):
+        with shown(browser, address, script=NO_PAD) as page:
+            wait_until(page, "live.hand")
+            page.locator("[data-view=top]").click()
+            page.locator("#hand-device").select_option("gamepad")
+            start = seen(page)
+            page.wait_for_timeout(300)
+            assert seen(page) == pytest.approx(start, abs=1e-9)  # without a gamepad the hand stays
+            hold(page, (0.1, -0.1, 0.1, 0.1))
+            assert seen(page) == pytest.approx(start, abs=1e-9)  # a stick that is not quite in its middle
+            hold(page, (0.5, 0.0, 0.0, 0.0))
+            hold(page)
+            right = seen(page) - start
+            assert right[0] > 5.0
+            assert abs(right[1]) < 1.0
+            hold(page, (0.0, -0.5, 0.0, 0.0))
+            hold(page)
+            up = seen(page) - start - right
+            assert up[1] < -5.0
+            before = seen(page)
+            hold(page, b7=0.5)
+            hold(page)
+            assert seen(page)[2] < before[2] - 0.01  # towards the eye
+            q = page.evaluate("live.hand.pose().q_WH")
+            hold(page, (0.0, 0.0, 0.8, 0.0))
+            hold(page)
+            assert abs(np.dot(q, page.evaluate("live.hand.pose().q_WH"))) < 0.999
+            hold(page, b0=1.0)
+            assert page.evaluate("live.hand.pose().closed")  # once, however long it is held
+            hold(page)
+            hold(page, b0=1.0)
+            assert not page.evaluate("live.hand.pose().closed")
+            end_run(page)
+        run.wait(timeout=120)
+    assert told(tmp_path / "led")["samples"]["gamepad"] > 20
