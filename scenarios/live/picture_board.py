@@ -20,7 +20,7 @@ from handover.cosim.system.signals import Signals
 
 PERIOD = 0.3
 """Least wall time between two moments whose pictures are shown, s."""
-_STATE = np.dtype([("asked", "<i8"), ("begun", "<i8"), ("ended", "<i8"), ("t", "<f8")])
+_STATE = np.dtype([("asked", "<i8"), ("ended", "<i8"), ("t", "<f8")])
 _ALIGNED = 8
 
 Pixels = NDArray[np.uint8]
@@ -47,16 +47,16 @@ class PictureWriter:
             self._rasters = signals.rasters()
             if self._rasters:
                 self._create(self._rasters)
-        if self._state is None or self._state["asked"] <= self._state["ended"] or self._clock() < self._next:
+        state: Any = self._state
+        if state is None or state["asked"] <= state["ended"] or self._clock() < self._next:
             return
         self._next = self._clock() + PERIOD
-        self._state["begun"] += 1
         for name, place in self._places.items():
             pixels = signals[name]
             if pixels.size == place.size:  # a camera may have given nothing yet
                 place[...] = pixels.ravel()
-        self._state["t"] = t
-        self._state["ended"] = self._state["asked"]
+        state["t"] = t
+        state["ended"] = state["asked"]  # until then the page waits, and asks for no others
 
     def _create(self, rasters: Mapping[str, Raster]) -> None:
         head = json.dumps({name: [r.width, r.height] for name, r in rasters.items()}).encode() + b"\n"
@@ -90,28 +90,25 @@ class PictureReader:
 
     def take(self) -> Seen | None:
         """Return the pictures that were asked for last, and ask for the next ones; None while they are not there."""
-        if self._state is None and not self._open():
+        if self._state is None:
+            self._open()
+        state: Any = self._state
+        if state is None or state["asked"] > state["ended"]:
             return None
-        if self._state["asked"] > self._state["ended"]:
-            return None
-        begun = int(self._state["begun"])
-        taken = {name: np.array(place).reshape(r.height, r.width, 3) for (name, place), r in self._of_each()}
-        seen = Seen(float(self._state["t"]), taken) if begun else None
-        self._state["asked"] = self._state["ended"] + 1
+        rasters = self._rasters
+        taken = {name: np.array(p).reshape(rasters[name].height, -1, 3) for name, p in self._places.items()}
+        seen = Seen(float(state["t"]), taken) if int(state["ended"]) else None
+        state["asked"] = state["ended"] + 1
         return seen
 
-    def _of_each(self) -> Any:
-        return zip(self._places.items(), self._rasters.values(), strict=True)
-
-    def _open(self) -> bool:
+    def _open(self) -> None:
         if not self._path.is_file():
-            return False
+            return
         with open(self._path, "r+b") as file:
             mapped = mmap.mmap(file.fileno(), 0)
         head = mapped.readline()
         self._rasters = {name: Raster(*size) for name, size in json.loads(head).items()}
         self._state, self._places = _arrays(mapped, head, self._rasters)
-        return True
 
 
 def _arrays(mapped: mmap.mmap, head: bytes, rasters: Mapping[str, Raster]) -> tuple[Any, dict[str, Pixels]]:

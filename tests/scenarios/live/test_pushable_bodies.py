@@ -1,6 +1,6 @@
 """Which bodies of which scenarios can be pushed: their inputs are there, and a push moves what is pressed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from flyer_runs import task_of
 
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.time_series import TimeSeries
 from handover.scenarios.catalog import SCENARIOS
@@ -24,7 +25,7 @@ def tell_nobody(*_: float) -> None:
     pass
 
 
-def pushed_run(name: str, out: Path, forces: dict[str, Sequence[float]], *given: str) -> Record:
+def pushed_run(name: str, out: Path, forces: Mapping[str, Sequence[float] | Floats], *given: str) -> Record:
     """Run a scenario for a moment with constant forces and points on what can be pushed."""
     series = {end: TimeSeries([0.0], [list(value)], linear=False) for end, value in forces.items()}
     task: Any = task_of(SCENARIOS[name], out, *given)
