@@ -101,35 +101,35 @@ SYSTEMS = (
         "free_flyer",
         {
             "flyer_impedance": ScenarioEntry(
-                "handover.scenarios.free_flyer.impedance:FlyerImpedance",
+                "handover.scenarios.free_flyer.push.impedance:FlyerImpedance",
                 "a free-flyer yields to a push against its gripper and comes back",
             ),
             "flyer_arm_impedance": ScenarioEntry(
-                "handover.scenarios.free_flyer.arm_impedance:FlyerArmImpedance",
+                "handover.scenarios.free_flyer.push.arm_impedance:FlyerArmImpedance",
                 "a free-flyer yields to a push against its gripper with base and arm",
             ),
             "flyer_robot_to_human": ScenarioEntry(
-                "handover.scenarios.free_flyer.handovers:RobotToHuman",
+                "handover.scenarios.free_flyer.handover.handovers:RobotToHuman",
                 "a free-flyer fetches an object and gives it to a person",
             ),
             "flyer_human_to_robot": ScenarioEntry(
-                "handover.scenarios.free_flyer.handovers:HumanToRobot",
+                "handover.scenarios.free_flyer.handover.handovers:HumanToRobot",
                 "a person gives an object to a free-flyer",
             ),
             "flyer_failed_reception": ScenarioEntry(
-                "handover.scenarios.free_flyer.handovers:FailedReception",
+                "handover.scenarios.free_flyer.handover.handovers:FailedReception",
                 "a free-flyer closes its gripper on nothing, notices, and asks again",
             ),
             "flyer_collaborative": ScenarioEntry(
-                "handover.scenarios.free_flyer.handovers:Collaborative",
+                "handover.scenarios.free_flyer.handover.handovers:Collaborative",
                 "a free-flyer gives an object to a person, waits, and takes it back",
             ),
             "flyer_handover": ScenarioEntry(
-                "handover.scenarios.free_flyer.handovers:HandoverOfTask",
+                "handover.scenarios.free_flyer.handover.handovers:HandoverOfTask",
                 "a free-flyer and a person hand an object over, in one of the four ways",
             ),
             "flyer_two_robots": ScenarioEntry(
-                "handover.scenarios.free_flyer.two_robots:TwoRobots",
+                "handover.scenarios.free_flyer.two_robots.two_robots:TwoRobots",
                 "two free-flyers and a person with two hands hand a large object over",
             ),
         },

@@ -6,9 +6,9 @@ import numpy as np
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
-from handover.scenarios.free_flyer.impedance_evaluation import Errors
+from handover.scenarios.free_flyer.handover.handover_evaluation import HandoverEvaluator
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Wrench
+from handover.scenarios.free_flyer.push.impedance_evaluation import Errors
 from handover.scenarios.free_flyer.scene import draw_near, draw_scene, jaw_gap, person_at, robot_at
 
 

@@ -11,7 +11,7 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.replay import Body, Line, Mesh, PersonView, Replay, ball, faceted, hull
 from handover.scenarios.free_flyer.parameters import ROBOTS, ImpedanceParameters, TeamParameters, Wrench
-from handover.scenarios.free_flyer.push_plots import phases_of_push
+from handover.scenarios.free_flyer.push.push_plots import phases_of_push
 from handover.scenarios.free_flyer.scene import (
     EDGE,
     FINGER_WIDTH,

@@ -45,7 +45,7 @@ _READY = 60.0
 """How long a page may take to draw the scene for the first time, s."""
 _SLOWEST = 2.0
 """How long a page may take to receive a message, s."""
-PRACTICE = "handover.scenarios.free_flyer.hand_practice:HandPractice"
+PRACTICE = "handover.scenarios.free_flyer.handover.hand_practice:HandPractice"
 _LOST_FROM = 0.7
 """How far from its first place the object of the practice is lost, m; the practice then begins anew (assumed)."""
 

@@ -17,8 +17,8 @@ from handover.cosim.fmu.description import describe_fmu, indices_of
 from handover.cosim.master.master import Master
 from handover.cosim.system.signals import Signals
 from handover.fmus.build import build_block, cached
-from handover.scenarios.free_flyer.impedance import FlyerImpedance
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters
+from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 
 BLOCK = "sample_units.every_kind:EveryKind"
 

@@ -12,7 +12,7 @@ from handover.scenarios.campaign.statistics import success_interval
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
-from handover.scenarios.free_flyer.handovers import HandoverOfTask
+from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
 from handover.scenarios.free_flyer.parameters import Behaviour, TaskParameters
 from handover.scenarios.published.free_flyer.handover_runs import GIVING, RECEIVING, Exchange
 from handover.scenarios.published.free_flyer.variations import (

@@ -12,7 +12,7 @@ from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
-from handover.scenarios.free_flyer.handovers import HandoverOfTask
+from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
 from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task, TaskParameters
 from handover.scenarios.published.free_flyer.push_runs import linear_loop
 from handover.scenarios.published.free_flyer.variations import (

@@ -11,7 +11,7 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.free_flyer.handovers import HandoverOfTask
+from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
 from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task
 from handover.scenarios.published.free_flyer.flyer_handover_claims import claims_of_handovers
 from handover.scenarios.published.free_flyer.flyer_handover_figures import (

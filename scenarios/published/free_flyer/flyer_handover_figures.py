@@ -15,7 +15,7 @@ from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, draw_time_figures, figure, legend_below
 from handover.scenarios.experiment.time_plot import TimeFigure, TimePlot
-from handover.scenarios.free_flyer.handover_plots import figures_of_handover
+from handover.scenarios.free_flyer.handover.handover_plots import figures_of_handover
 from handover.scenarios.free_flyer.parameters import Behaviour, HandoverParameters, Propulsion, Task
 from handover.scenarios.published.free_flyer.handover_runs import (
     EXCHANGES,

@@ -9,8 +9,8 @@ import numpy as np
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.free_flyer.impedance import FlyerImpedance
 from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Propulsion, Wrench
+from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 from handover.scenarios.published.free_flyer.flyer_impedance_claims import claims_of_pushes
 from handover.scenarios.published.free_flyer.flyer_impedance_figures import draw_errors, draw_ratios
 from handover.scenarios.published.free_flyer.push_runs import (

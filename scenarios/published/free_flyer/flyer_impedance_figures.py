@@ -11,8 +11,8 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
-from handover.scenarios.free_flyer.impedance_evaluation import MOTION_SIGNALS, Errors, Motion, errors_of
 from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Wrench
+from handover.scenarios.free_flyer.push.impedance_evaluation import MOTION_SIGNALS, Errors, Motion, errors_of
 from handover.scenarios.published.free_flyer.push_runs import (
     DURATIONS,
     Push,

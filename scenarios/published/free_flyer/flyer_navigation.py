@@ -12,9 +12,9 @@ from handover.scenarios.campaign.statistics import success_interval
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
-from handover.scenarios.free_flyer.handovers import HandoverOfTask
+from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
+from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.free_flyer.parameters import Behaviour, Task
-from handover.scenarios.free_flyer.person_evaluation import Cause
 from handover.scenarios.published.free_flyer.flyer_navigation_claims import claims_of_navigation
 from handover.scenarios.published.free_flyer.navigation_runs import (
     DRIFT_TIME,

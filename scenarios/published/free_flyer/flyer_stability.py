@@ -15,8 +15,8 @@ from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
-from handover.scenarios.free_flyer.impedance import FlyerImpedance
 from handover.scenarios.free_flyer.parameters import Behaviour
+from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 from handover.scenarios.published.free_flyer.push_runs import linear_loop
 from handover.scenarios.published.free_flyer.variations import is_done
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment

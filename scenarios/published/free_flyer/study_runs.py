@@ -11,8 +11,8 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.statistics import LEVEL, RESAMPLES
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.free_flyer.parameters import Behaviour, Task, TaskParameters
-from handover.scenarios.free_flyer.person_evaluation import Cause
 from handover.scenarios.published.free_flyer.variations import Row, has, is_done, succeeded
 
 _DEFAULT = TaskParameters()

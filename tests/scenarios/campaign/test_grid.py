@@ -4,7 +4,7 @@ import pytest
 
 from handover.scenarios.campaign.grid import parse_grid, set_parameters
 from handover.scenarios.experiment.parameters import InvalidParameter
-from handover.scenarios.free_flyer.handovers import RobotToHuman
+from handover.scenarios.free_flyer.handover.handovers import RobotToHuman
 from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.vsl.path_experiments import VslHybrid

@@ -26,8 +26,8 @@ from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.input_sources import give_inputs, played_back, resumed_inputs
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
-from handover.scenarios.free_flyer.handovers import RobotToHuman
-from handover.scenarios.free_flyer.impedance import FlyerImpedance
+from handover.scenarios.free_flyer.handover.handovers import RobotToHuman
+from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 from handover.scenarios.live.input_board import InputBoard
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.task import InputSources

@@ -14,7 +14,7 @@ from flyer_runs import run
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.cli.command import main
-from handover.scenarios.free_flyer.impedance import FlyerImpedance
+from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.results.summary import parameter_rows
 from handover.scenarios.results.system_facts import describe_system

@@ -1,7 +1,7 @@
 import pytest
 
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
-from handover.scenarios.free_flyer.handovers import RobotToHuman
+from handover.scenarios.free_flyer.handover.handovers import RobotToHuman
 from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.helix.parameters import HandPlace

@@ -8,8 +8,8 @@ from flyer_runs import metric, run
 
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.record.reader import Record
-from handover.scenarios.free_flyer.arm_impedance import FlyerArmImpedance
-from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters
+from handover.scenarios.free_flyer.push.arm_impedance import FlyerArmImpedance
+from handover.scenarios.free_flyer.push.arm_parameters import ArmPushParameters
 
 
 def test_a_pushed_robot_yields_with_its_arm_and_moves_as_the_impedance_model_says(tmp_path: Path):

@@ -9,9 +9,9 @@ import pytest
 from flyer_runs import metric, run
 
 import handover
-from handover.scenarios.free_flyer.handovers import RobotToHuman
+from handover.scenarios.free_flyer.handover.handovers import RobotToHuman
+from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.free_flyer.parameters import HandoverParameters
-from handover.scenarios.free_flyer.person_evaluation import Cause
 
 GIVES, RECEIVES, BOTH = "flyer_robot_to_human", "flyer_human_to_robot", "flyer_collaborative"
 NOBODY = {"person.motion": "none"}

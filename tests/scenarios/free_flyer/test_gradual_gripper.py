@@ -9,7 +9,7 @@ from flyer_runs import metric, run
 
 from handover.controllers.free_flyer.handover_state_machine import HandoverPhase
 from handover.controllers.free_flyer.impedance_controller import Behaviour
-from handover.scenarios.free_flyer.handovers import HumanToRobot, RobotToHuman
+from handover.scenarios.free_flyer.handover.handovers import HumanToRobot, RobotToHuman
 
 
 def test_a_knock_that_drops_the_object_is_survived_by_gradual_fingers():

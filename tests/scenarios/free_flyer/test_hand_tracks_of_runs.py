@@ -15,15 +15,15 @@ from handover.fmus.build import cached
 from handover.plants.free_flyer.hand.hand_track import HandPose, write_track
 from handover.scenarios.cli.flyer_track import flyer_track
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
-from handover.scenarios.free_flyer.handovers import (
+from handover.scenarios.free_flyer.handover.handovers import (
     Collaborative,
     FailedReception,
     FlyerHandover,
     HumanToRobot,
     RobotToHuman,
 )
-from handover.scenarios.free_flyer.impedance import FlyerImpedance
-from handover.scenarios.free_flyer.person_evaluation import Cause
+from handover.scenarios.free_flyer.handover.person_evaluation import Cause
+from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 
 
 def tracked(folder: Path, out: Path) -> Path:

@@ -12,9 +12,9 @@ from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.plants.free_flyer.hand.hand_and_object import Holder
-from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
+from handover.scenarios.free_flyer.handover.handover_evaluation import HandoverEvaluator
+from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.free_flyer.parameters import Hand, HandoverParameters
-from handover.scenarios.free_flyer.person_evaluation import Cause
 
 PLACE = np.array([0.0, -0.07, 0.0])
 

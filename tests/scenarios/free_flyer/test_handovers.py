@@ -15,7 +15,7 @@ from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
-from handover.scenarios.free_flyer.handovers import (
+from handover.scenarios.free_flyer.handover.handovers import (
     Collaborative,
     FailedReception,
     FlyerHandover,

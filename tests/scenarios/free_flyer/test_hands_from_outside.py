@@ -9,7 +9,7 @@ from flyer_runs import metric, run
 from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
-from handover.scenarios.free_flyer.handovers import (
+from handover.scenarios.free_flyer.handover.handovers import (
     Collaborative,
     FailedReception,
     FlyerHandover,
@@ -17,8 +17,8 @@ from handover.scenarios.free_flyer.handovers import (
     HumanToRobot,
     RobotToHuman,
 )
-from handover.scenarios.free_flyer.person_evaluation import Cause
-from handover.scenarios.free_flyer.two_robots import TwoRobots
+from handover.scenarios.free_flyer.handover.person_evaluation import Cause
+from handover.scenarios.free_flyer.two_robots.two_robots import TwoRobots
 
 INPUTS_OF_HAND = ("p_WH_track", "q_WH_track", "finger_track", "closed_track", "age")
 ALL = (RobotToHuman, HumanToRobot, FailedReception, Collaborative, HandoverOfTask)

@@ -9,8 +9,8 @@ from flyer_runs import metric, run
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.parameters import InvalidParameter
-from handover.scenarios.free_flyer.impedance import FlyerImpedance
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Propulsion
+from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 from handover.scenarios.free_flyer.robot_wiring import expected_lag, thruster_settings
 
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.free_flyer.impedance_evaluation import Errors, Motion, errors_of
 from handover.scenarios.free_flyer.parameters import Behaviour, Body
+from handover.scenarios.free_flyer.push.impedance_evaluation import Errors, Motion, errors_of
 
 MASS, INERTIA, ARM = 9.584, np.array([0.1534, 0.1427, 0.1623]), np.array([-0.30, 0.0, 0.0])
 GOAL = np.array([0.0, -0.07, 0.0])

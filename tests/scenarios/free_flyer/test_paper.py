@@ -24,9 +24,9 @@ from handover.plants.free_flyer.robot.navigation import Params as NavigationPara
 from handover.plants.free_flyer.robot.push import Params as PushParams
 from handover.plants.free_flyer.robot.thrusters import Params as ThrustersParams
 from handover.scenarios.free_flyer import scene
-from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters
 from handover.scenarios.free_flyer.parameters import HandoverParameters, TaskParameters, TeamParameters
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters as PushScenarioParameters
+from handover.scenarios.free_flyer.push.arm_parameters import ArmPushParameters
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 

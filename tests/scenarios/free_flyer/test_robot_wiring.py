@@ -13,10 +13,10 @@ from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter
-from handover.scenarios.free_flyer.handovers import RobotToHuman
-from handover.scenarios.free_flyer.impedance import FlyerImpedance
+from handover.scenarios.free_flyer.handover.handovers import RobotToHuman
+from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 from handover.scenarios.free_flyer.robot_wiring import stability_metrics
-from handover.scenarios.free_flyer.two_robots import TwoRobots
+from handover.scenarios.free_flyer.two_robots.two_robots import TwoRobots
 
 
 def test_a_controller_that_does_not_give_its_poles_has_no_metrics_of_them():

@@ -9,10 +9,10 @@ from handover.controllers.free_flyer.handover_state_machine import HandoverPhase
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.cosim.system.signals import Signals
+from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.free_flyer.parameters import TeamParameters
-from handover.scenarios.free_flyer.person_evaluation import Cause
-from handover.scenarios.free_flyer.team_evaluation import TeamEvaluator
-from handover.scenarios.free_flyer.team_member import TeamCause
+from handover.scenarios.free_flyer.two_robots.team_evaluation import TeamEvaluator
+from handover.scenarios.free_flyer.two_robots.team_member import TeamCause
 
 UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
 

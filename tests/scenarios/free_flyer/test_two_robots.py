@@ -9,9 +9,9 @@ from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
 from handover.scenarios.free_flyer.parameters import Hands, TeamParameters, TeamTask
-from handover.scenarios.free_flyer.team_evaluation import TeamEvaluator
-from handover.scenarios.free_flyer.team_member import OneRobot, TeamCause
-from handover.scenarios.free_flyer.two_robots import TwoRobots
+from handover.scenarios.free_flyer.two_robots.team_evaluation import TeamEvaluator
+from handover.scenarios.free_flyer.two_robots.team_member import OneRobot, TeamCause
+from handover.scenarios.free_flyer.two_robots.two_robots import TwoRobots
 
 
 def cause(metrics: float) -> TeamCause:

@@ -9,7 +9,7 @@ from flyer_runs import metric, run
 from handover.controllers.free_flyer.handover_state_machine import HandoverPhase
 from handover.controllers.free_flyer.impedance_controller import Behaviour
 from handover.plants.free_flyer.hand.hand_and_object import Holder
-from handover.scenarios.free_flyer.handovers import RobotToHuman
+from handover.scenarios.free_flyer.handover.handovers import RobotToHuman
 
 ALONG_Z = np.array([0.0, 0.0, 1.0])
 

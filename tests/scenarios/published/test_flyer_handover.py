@@ -14,7 +14,7 @@ from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.free_flyer.handovers import HandoverOfTask
+from handover.scenarios.free_flyer.handover.handovers import HandoverOfTask
 from handover.scenarios.free_flyer.parameters import Behaviour, Propulsion, Task
 from handover.scenarios.published.free_flyer.flyer_approaches import CASES, FlyerApproaches, places
 from handover.scenarios.published.free_flyer.flyer_handover import FlyerHandoverTable

@@ -10,8 +10,8 @@ import pytest
 from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.free_flyer.impedance import FlyerImpedance
 from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Wrench
+from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 from handover.scenarios.published.free_flyer.flyer_impedance import FlyerImpedanceTable
 from handover.scenarios.published.free_flyer.push_runs import (
     DURATIONS,

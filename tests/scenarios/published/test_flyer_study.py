@@ -9,8 +9,8 @@ import pytest
 
 from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.free_flyer.parameters import Behaviour, Task
-from handover.scenarios.free_flyer.person_evaluation import Cause
 from handover.scenarios.published.free_flyer.flyer_study import FlyerStudy
 from handover.scenarios.published.free_flyer.study_runs import (
     TRAITS,

@@ -16,8 +16,8 @@ from handover.cosim.system.system import System
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Outcome
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.free_flyer.impedance import FlyerImpedance
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters
+from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 from handover.scenarios.reporting.run_figures import draw_figures
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results import run_facts

@@ -20,9 +20,9 @@ from handover.cosim.system.signals import Signals
 from handover.plants.free_flyer.hand.box import Box
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.free_flyer.handover_evaluation import counted, not_over, within_patience
+from handover.scenarios.free_flyer.handover.handover_evaluation import counted, not_over, within_patience
 from handover.scenarios.free_flyer.parameters import TeamParameters, TeamTask
-from handover.scenarios.free_flyer.team_member import OneRobot, TeamCause
+from handover.scenarios.free_flyer.two_robots.team_member import OneRobot, TeamCause
 
 _SETTLING = 1.0
 """How long the receiver must keep the object when the robots are done, s (assumed)."""

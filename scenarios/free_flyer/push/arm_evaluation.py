@@ -23,8 +23,8 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters, ArmTarget
-from handover.scenarios.free_flyer.impedance_evaluation import Errors, mean_between, steps_of_period
+from handover.scenarios.free_flyer.push.arm_parameters import ArmPushParameters, ArmTarget
+from handover.scenarios.free_flyer.push.impedance_evaluation import Errors, mean_between, steps_of_period
 from handover.scenarios.free_flyer.robot_wiring import stability_metrics
 
 SIGNALS = (

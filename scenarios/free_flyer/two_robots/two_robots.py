@@ -28,7 +28,7 @@ from handover.scenarios.free_flyer.robot_wiring import (
     undriven_joints,
     wire_handover,
 )
-from handover.scenarios.free_flyer.team_evaluation import TeamEvaluator
+from handover.scenarios.free_flyer.two_robots.team_evaluation import TeamEvaluator
 
 _FLIGHT = 150
 """Time for flying, fetching and retreating, without the waiting for the person, s (assumed)."""
@@ -147,13 +147,13 @@ class TwoRobots(Experiment[TeamEvaluator]):
 
     def draw(self, parameters: TeamParameters, evaluator: TeamEvaluator, record: Record, folder: Path) -> list[Figure]:
         """Draw the scene at the start, the signal, the transfer and the end."""
-        from handover.scenarios.free_flyer.team_plots import draw_team  # matplotlib is slow to import
+        from handover.scenarios.free_flyer.two_robots.team_plots import draw_team  # matplotlib is slow to import
 
         return draw_team(parameters, evaluator, record, folder)
 
     def time_figures(self, parameters: TeamParameters, record: Record) -> list[TimeFigure]:
         """Return paths, forces, who holds the object, grippers, speeds, and thrust over time."""
-        from handover.scenarios.free_flyer.team_plots import figures_of_team
+        from handover.scenarios.free_flyer.two_robots.team_plots import figures_of_team
 
         return figures_of_team(parameters, record)
 

@@ -11,8 +11,8 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.time_plot import Curve, Phase, Stroke, TimeFigure, TimePlot
-from handover.scenarios.free_flyer.impedance_evaluation import MOTION_SIGNALS, Motion, errors_of
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Wrench
+from handover.scenarios.free_flyer.push.impedance_evaluation import MOTION_SIGNALS, Motion, errors_of
 
 _BEYOND = 2.0
 """Range of the plots, over the thrusters' maximum output: a command may be twenty times as much."""

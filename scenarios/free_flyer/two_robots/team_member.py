@@ -3,7 +3,7 @@
 import enum
 from dataclasses import dataclass, field
 
-from handover.scenarios.free_flyer.person_evaluation import Cause
+from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 
 
 class TeamCause(enum.IntEnum):

@@ -14,9 +14,9 @@ from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
-from handover.scenarios.free_flyer.arm_evaluation import ArmImpedanceEvaluator
-from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters
 from handover.scenarios.free_flyer.places import PLACES_OF_ARM_PUSH
+from handover.scenarios.free_flyer.push.arm_evaluation import ArmImpedanceEvaluator
+from handover.scenarios.free_flyer.push.arm_parameters import ArmPushParameters
 from handover.scenarios.free_flyer.robot_wiring import PUSHES_WITH_JOINTS, wired_push
 
 
@@ -91,7 +91,7 @@ class FlyerArmImpedance(Experiment[ArmImpedanceEvaluator]):
 
     def time_figures(self, parameters: ArmPushParameters, record: Record) -> list[TimeFigure]:
         """Return errors actual and calculated, base and joints, push and thrust over time."""
-        from handover.scenarios.free_flyer.arm_plots import figures_of_arm_push
+        from handover.scenarios.free_flyer.push.arm_plots import figures_of_arm_push
 
         return figures_of_arm_push(parameters, record)
 
@@ -101,6 +101,6 @@ class FlyerArmImpedance(Experiment[ArmImpedanceEvaluator]):
 
     def replay(self, parameters: ArmPushParameters, record: Record) -> Replay:
         """Return base and links, the gripper's place of rest and the push in space."""
-        from handover.scenarios.free_flyer.arm_plots import replay_arm_push
+        from handover.scenarios.free_flyer.push.arm_plots import replay_arm_push
 
         return replay_arm_push(parameters, record)

@@ -16,10 +16,10 @@ from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
-from handover.scenarios.free_flyer.impedance_evaluation import ImpedanceEvaluator
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters
 from handover.scenarios.free_flyer.places import PLACES_OF_PUSH
 from handover.scenarios.free_flyer.published import published_of_push
+from handover.scenarios.free_flyer.push.impedance_evaluation import ImpedanceEvaluator
 from handover.scenarios.free_flyer.robot_wiring import PUSHES, undriven_joints, wired_push
 
 
@@ -100,7 +100,7 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
 
     def time_figures(self, parameters: ImpedanceParameters, record: Record) -> list[TimeFigure]:
         """Return errors actual and calculated, push and thrust over time."""
-        from handover.scenarios.free_flyer.push_plots import figures_of_push
+        from handover.scenarios.free_flyer.push.push_plots import figures_of_push
 
         return figures_of_push(parameters, record)
 

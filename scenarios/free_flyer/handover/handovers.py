@@ -24,8 +24,8 @@ from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
-from handover.scenarios.free_flyer.handover_evaluation import HandoverEvaluator
-from handover.scenarios.free_flyer.led_hand import faults_of_person, leader
+from handover.scenarios.free_flyer.handover.handover_evaluation import HandoverEvaluator
+from handover.scenarios.free_flyer.handover.led_hand import faults_of_person, leader
 from handover.scenarios.free_flyer.parameters import Hand, HandoverParameters, Task, TaskParameters
 from handover.scenarios.free_flyer.places import PLACES_OF_HANDOVER
 from handover.scenarios.free_flyer.published import published_of_giving, published_of_receiving
@@ -163,7 +163,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
 
     def time_figures(self, parameters: HandoverParameters, record: Record) -> list[TimeFigure]:
         """Return paths, the gripper, who holds the object, and thrust over time."""
-        from handover.scenarios.free_flyer.handover_plots import figures_of_handover
+        from handover.scenarios.free_flyer.handover.handover_plots import figures_of_handover
 
         return figures_of_handover(parameters, record)
 

@@ -12,9 +12,9 @@ from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.time_plot import Curve, Level, Phase, TimeFigure, TimePlot, phases_of
 from handover.scenarios.free_flyer.parameters import ROBOTS, TeamParameters, TeamTask
-from handover.scenarios.free_flyer.push_plots import CAPTION, plot_thrust
+from handover.scenarios.free_flyer.push.push_plots import CAPTION, plot_thrust
 from handover.scenarios.free_flyer.scene import Solid, draw_scene, hand_at, jaw_gap, large_object_at, robot_at
-from handover.scenarios.free_flyer.team_evaluation import TeamEvaluator, internal_force
+from handover.scenarios.free_flyer.two_robots.team_evaluation import TeamEvaluator, internal_force
 
 _PALETTE = ("gripper 1", "gripper 2", "object", "hand 1", "hand 2")
 

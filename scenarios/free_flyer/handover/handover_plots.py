@@ -13,7 +13,7 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.time_plot import Curve, Level, Phase, Stroke, TimeFigure, TimePlot, phases_of
 from handover.scenarios.free_flyer.parameters import HandoverParameters
-from handover.scenarios.free_flyer.push_plots import CAPTION, plot_thrust
+from handover.scenarios.free_flyer.push.push_plots import CAPTION, plot_thrust
 
 _FOLLOWED: tuple[tuple[str, str, Stroke], ...] = (
     ("gripper", "robot.{}_WG", "solid"),

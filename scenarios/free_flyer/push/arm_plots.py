@@ -10,9 +10,9 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, faceted, hull, rod
 from handover.scenarios.experiment.time_plot import Curve, Phase, TimeFigure, TimePlot
-from handover.scenarios.free_flyer.arm_evaluation import columns_of, errors_with_arm
-from handover.scenarios.free_flyer.arm_parameters import ArmPushParameters
-from handover.scenarios.free_flyer.push_plots import (
+from handover.scenarios.free_flyer.push.arm_evaluation import columns_of, errors_with_arm
+from handover.scenarios.free_flyer.push.arm_parameters import ArmPushParameters
+from handover.scenarios.free_flyer.push.push_plots import (
     CAPTION,
     errors_over_time,
     phases_of_push,

@@ -10,11 +10,11 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.free_flyer.led_hand import end_of_track
+from handover.scenarios.free_flyer.handover.led_hand import end_of_track
+from handover.scenarios.free_flyer.handover.person_evaluation import Cause, Miss, PersonsDeeds
+from handover.scenarios.free_flyer.handover.transfer import Approach, Transfer
 from handover.scenarios.free_flyer.parameters import HandoverParameters
-from handover.scenarios.free_flyer.person_evaluation import Cause, Miss, PersonsDeeds
 from handover.scenarios.free_flyer.robot_wiring import stability_metrics
-from handover.scenarios.free_flyer.transfer import Approach, Transfer
 
 _GATE = ("gate_error", "tolerance", "gate_speed")
 """Parameters of the unit that decides: how near its place the gripper is there, m, when it is to yield, and otherwise;
