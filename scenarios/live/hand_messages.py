@@ -9,6 +9,7 @@ A device connects to `ws://HOST:PORT/hand` of a live page and sends texts, some 
 | `angles` | the 14 joints, rad, 0 to pi/2: thumb 2, index, middle, ring and little finger 3 each, each from its base |
 | `closed` | whether the hand grasps; one of `closed` and `angles` will do, the other follows |
 | `stamp` | when the device saw that, s of any clock that goes forward |
+| `sent` | when it was sent, s of the same clock, where that is well after `stamp`, as a camera's picture is looked at first |
 | `device` | what it is, such as `"mouse"`; once is enough, it is kept with the run |
 
 The server answers first with `{"hand": {...}}`, where the hand is wanted as it stands, in the same members, and how far
@@ -43,7 +44,7 @@ class InvalidHandMessage(ValueError):
 
 
 class HandSample(NamedTuple):
-    """A hand as a device sees it: pose in W, m, scalar first; joints, rad; whether it grasps; when, by its clock, s."""
+    """A hand as a device sees it: pose in W, m, scalar first; joints, rad; whether it grasps; when seen and sent, s."""
 
     p_WH: tuple[float, ...]
     q_WH: tuple[float, ...]
@@ -51,6 +52,7 @@ class HandSample(NamedTuple):
     closed: bool
     stamp: float
     device: str = ""
+    sent: float | None = None
 
     def entries(self, led: LedHand) -> dict[str, Sequence[float]]:
         """Return what an `InputBoard` takes of it."""
@@ -103,6 +105,9 @@ def hand_sample(content: Any) -> HandSample:
     stamp = _number(members.get("stamp"))
     if not math.isfinite(stamp):
         faults.append("stamp: a finite number of seconds is right")
+    sent = _number(members["sent"]) if "sent" in members else None
+    if sent is not None and not stamp <= sent < math.inf:
+        faults.append("sent: a finite number of seconds is right, not before stamp")
     closed, device = members.get("closed"), members.get("device", "")
     if "closed" in members and not isinstance(closed, bool):
         faults.append("closed: true or false is right")
@@ -120,7 +125,7 @@ def hand_sample(content: Any) -> HandSample:
     if faults:
         raise InvalidHandMessage("; ".join(faults))
     q = tuple(x / norm for x in q)
-    return HandSample(p, q, tuple(min(max(a, 0.0), JOINT_MAX) for a in angles), bool(closed), stamp, str(device))
+    return HandSample(p, q, tuple(min(max(a, 0.0), JOINT_MAX) for a in angles), bool(closed), stamp, str(device), sent)
 
 
 def _number(value: Any) -> float:
@@ -141,16 +146,17 @@ def _grasps(angles: Sequence[float]) -> bool:
 class DeviceClock:
     """Turns stamps of a device's clock into those of this computer's monotonic clock.
 
-    The least of arrival minus stamp over the last samples is taken for the difference of the clocks; so ages are too
+    The least of arrival minus sending over the last samples is taken for the difference of the clocks; so ages are too
     short by the shortest time that a sample takes from the device to here, on one computer less than a millisecond.
+    Where a device does not tell when it sends, that is its stamp, and what it takes to see a hand is not known.
     """
 
     def __init__(self) -> None:
         self._differences: list[float] = []
 
-    def monotonic(self, stamp: float, arrival: float) -> float:
-        """Return the monotonic time, s, of a stamp, s, that arrived at the monotonic time `arrival`, s."""
-        self._differences.append(arrival - stamp)
+    def monotonic(self, stamp: float, arrival: float, sent: float | None = None) -> float:
+        """Return the monotonic time, s, of a stamp, s, that was sent at `sent` and arrived at the monotonic `arrival`, s."""
+        self._differences.append(arrival - (stamp if sent is None else sent))
         del self._differences[:-_WINDOW]
         return stamp + min(self._differences)
 
@@ -195,4 +201,4 @@ class HandStream:
         if sample.stamp <= self._last:
             raise InvalidHandMessage(f"stamp: {sample.stamp:.6g} s is not after the one before, {self._last:.6g} s")
         self._last = sample.stamp
-        return sample, self._device_clock.monotonic(sample.stamp, arrival)
+        return sample, self._device_clock.monotonic(sample.stamp, arrival, sample.sent)

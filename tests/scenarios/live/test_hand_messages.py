@@ -101,3 +101,13 @@ def test_stamps_of_another_clock_are_told_by_this_ones():
         stamp = clock.monotonic(seen - 1e4, seen + 0.0005 + float(rng.exponential(0.01)))
         ages.append(seen - stamp)
     assert np.abs(ages[50:]).max() < 0.002
+
+
+def test_a_device_that_looks_at_pictures_first_tells_how_long_that_takes():
+    clock = DeviceClock()
+    ages = [t - clock.monotonic(t - 0.08, t, sent=t - 0.001) for t in np.arange(0.0, 1.0, 0.03)]
+    assert ages == pytest.approx([0.079] * len(ages), abs=1e-9)
+    assert parse_hand_message(text(stamp=5, sent=5.08)).sent == 5.08
+    for sent in (4.9, float("inf"), "soon"):
+        with pytest.raises(InvalidHandMessage, match="sent: a finite number of seconds is right, not before stamp"):
+            parse_hand_message(text(sent=sent))
