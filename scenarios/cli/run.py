@@ -100,6 +100,13 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
     help="Let the page of --live push bodies that the scenario says; the record then has forces and points, and with"
     " --inputs-from and --push the same run is made once more.",
 )
+@click.option(
+    "--webcam",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Let a webcam lead the hand in the page of --live, by MediaPipe: the unpacked npm package"
+    " @mediapipe/tasks-vision with the model hand_landmarker.task in it.  [default: not offered]",
+)
 @click.option("--controls", type=click.Path(path_type=Path), hidden=True, help="Folder of a process that controls it.")
 @click.option(
     "--inputs-from",
@@ -141,6 +148,7 @@ def run(
     no_report: bool,
     live: bool,
     push: bool,
+    webcam: Path | None,
     controls: Path | None,
     inputs_from: Path | None,
     as_json: bool,
@@ -160,6 +168,8 @@ def run(
                 raise UsageError("--live: not on Windows yet; `handover report` shows a run that has ended")
             require_extra("reports", "--live")
             require_extra("live", "--live")
+        if webcam is not None:
+            _check_webcam(webcam, live=live)
         request = RunRequest(
             subject=scenario,
             parameters=parameters,
@@ -181,15 +191,27 @@ def run(
         control: LiveControl | None = None
         observer: Observer | None = None
         if live or controls:
-            task, control, observer = opened.enter_context(_live(task, pace, controls))
+            task, control, observer = opened.enter_context(_live(task, pace, controls, webcam))
         with progress_bar(sys.stderr) as progress:
             result = run_task(task, progress, interruption, control=control, observer=observer)
     exit_with(result, task, json_to=json_to)
 
 
+def _check_webcam(folder: Path, *, live: bool) -> None:
+    """Refuse a webcam that no page can offer, before anything starts."""
+    if not live:
+        raise UsageError("--webcam: it is the page of --live in which a webcam leads the hand")
+    from handover.scenarios.live.webcam import InvalidWebcamFiles, WebcamFiles  # of the extra `live`
+
+    try:
+        WebcamFiles.read(folder)
+    except InvalidWebcamFiles as e:
+        raise UsageError(f"--webcam: {e}") from e
+
+
 @contextlib.contextmanager
 def _live(
-    task: Task, pace: float | None, controls: Path | None
+    task: Task, pace: float | None, controls: Path | None, webcam: Path | None
 ) -> Generator[tuple[Task, LiveControl, Observer | None], None, None]:
     """Serve the run's page while it goes on, and a moment longer; or take another process's controls of the run.
 
@@ -202,11 +224,17 @@ def _live(
     scenario, free = task.experiment, task.inputs is None
     pushes: Mapping[str, int] = inputs_of_pushes(scenario.pushes(task.parameters)) if task.pushed and free else {}
     hand = scenario.led_hand(task.parameters) if free else None
+    if webcam is not None and hand is None:
+        raise UsageError(
+            f"--webcam: nobody leads a hand in this run of {scenario.name}; in a handover, -p hand=outside lets one"
+        )
     with contextlib.ExitStack() as opened:
         if controls is not None:
             control, inputs = opened.enter_context(controlled_from(controls, pushes, hand))
         else:
-            address, control, inputs = opened.enter_context(live_page(task.folder.path, pace or 1.0, pushes, hand))
+            address, control, inputs = opened.enter_context(
+                live_page(task.folder.path, pace or 1.0, pushes, hand, webcam)
+            )
             click.echo(f"live: {address}  (the run begins once the page is open)", err=True)
         if sources := inputs.sources():
             task = replace(task, inputs=InputSources(sources, {"from": "page"}))

@@ -1,4 +1,4 @@
-"""Serves the page of a run: `python -m handover.scenarios.live FOLDER CONTROLS SOCKET`, for `handover run`."""
+"""Serves the page of a run: `python -m handover.scenarios.live FOLDER CONTROLS SOCKET [WEBCAM]`, for `handover run`."""
 
 import signal
 import socket
@@ -9,5 +9,5 @@ from handover.scenarios.live.server import watch
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run's: it ends, and this with it
-    folder, controls, number = sys.argv[1:]
-    watch(Path(folder), Path(controls), socket.socket(fileno=int(number)))
+    folder, controls, number, *webcam = sys.argv[1:]
+    watch(Path(folder), Path(controls), socket.socket(fileno=int(number)), *map(Path, webcam))

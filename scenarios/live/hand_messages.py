@@ -9,7 +9,7 @@ A device connects to `ws://HOST:PORT/hand` of a live page and sends texts, some 
 | `angles` | the 14 joints, rad, 0 to pi/2: thumb 2, index, middle, ring and little finger 3 each, each from its base |
 | `closed` | whether the hand grasps; one of `closed` and `angles` will do, the other follows |
 | `stamp` | when the device saw that, s of any clock that goes forward |
-| `sent` | when it was sent, s of the same clock, where that is well after `stamp`, as a camera's picture is looked at first |
+| `sent` | when it was sent, s of the same clock, if well after `stamp`, as where a picture is looked at first |
 | `device` | what it is, such as `"mouse"`; once is enough, it is kept with the run |
 
 The server answers first with `{"hand": {...}}`, where the hand is wanted as it stands, in the same members, and how far
@@ -155,7 +155,13 @@ class DeviceClock:
         self._differences: list[float] = []
 
     def monotonic(self, stamp: float, arrival: float, sent: float | None = None) -> float:
-        """Return the monotonic time, s, of a stamp, s, that was sent at `sent` and arrived at the monotonic `arrival`, s."""
+        """Return the monotonic time, s, of a stamp, s.
+
+        Args:
+            stamp: by the device's clock, s.
+            arrival: when the sample arrived, monotonic time, s.
+            sent: when it was sent, by the device's clock, s; None where the device does not tell.
+        """
         self._differences.append(arrival - (stamp if sent is None else sent))
         del self._differences[:-_WINDOW]
         return stamp + min(self._differences)

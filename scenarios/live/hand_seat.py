@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -32,10 +33,17 @@ class HandSeat:
         led: the hand.
         board: what the run reads.
         now: returns where the hand is wanted as it stands.
+        webcam: hashes of the files by which a webcam leads it, for the report; empty where it is not offered.
     """
 
-    def __init__(self, led: LedHand, board: InputBoard, now: Callable[[], HandSample]) -> None:
-        self._led, self._board, self._now = led, board, now
+    def __init__(
+        self,
+        led: LedHand,
+        board: InputBoard,
+        now: Callable[[], HandSample],
+        webcam: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
+        self._led, self._board, self._now, self._webcam = led, board, now, webcam
         self._device: WebSocket | None = None
         self._samples: Counter[str] = Counter()
         self._refused: Counter[str] = Counter()
@@ -96,7 +104,8 @@ class HandSeat:
         if len(ages):
             of_ages = {"median": np.median(ages), "p95": np.percentile(ages, 95), "most": np.max(ages)}
             age |= {name: round(float(value), 6) for name, value in of_ages.items()}
-        return {"samples": dict(self._samples), "refused": dict(self._refused), "age_at_use": age}
+        report = {"samples": dict(self._samples), "refused": dict(self._refused), "age_at_use": age}
+        return {**report, "webcam": {"sha256": dict(self._webcam)}} if self._webcam else report
 
     def write_report(self, folder: Path) -> None:
         """Leave the report in the run's folder, if anything came."""

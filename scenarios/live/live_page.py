@@ -34,6 +34,7 @@ from handover.scenarios.live.commands import (
 )
 from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.stage import Stage
+from handover.scenarios.live.webcam import WEBCAM_SCRIPTS, WebcamFiles
 from handover.scenarios.reporting.html import packed_json
 from handover.scenarios.reporting.page import Section, asset, page_html, template
 from handover.scenarios.reporting.replay_section import FILM_HTML, SCENE_SCRIPTS, STAGE_HTML
@@ -64,25 +65,30 @@ class _Viewer:
 
 
 class LivePage:
-    """A page for any number of browsers that shows one run after the other."""
+    """A page for any number of browsers that shows one run after the other.
+
+    Args:
+        webcam: files by which a webcam leads a hand; None where it is not offered.
+    """
 
     longest = LONGEST
     """Bytes; no command of a page is longer."""
     commands: Sequence[str] = COMMANDS
 
-    def __init__(self) -> None:
+    def __init__(self, webcam: WebcamFiles | None = None) -> None:
+        self._webcam = webcam
         self.shown: ShownRun | None = None
         self._pages: dict[WebSocket, _Viewer] = {}
         self._size: int | None = None  # how many numbers a frame has
         self._pushing: WebSocket | None = None
 
     def routes(self) -> Sequence[BaseRoute]:
-        """Return what is served besides the page and its connection; nothing by default."""
-        return ()
+        """Return what is served besides the page and its connection: what a webcam needs, where it is offered."""
+        return () if self._webcam is None else self._webcam.routes()
 
     def html(self) -> str:
         """Return the page."""
-        return live_html(self.shown.run.title if self.shown is not None else "")
+        return live_html(self.shown.run.title if self.shown is not None else "", webcam=self._webcam is not None)
 
     async def page(self, _request: Request) -> Response:
         """Answer with the page."""
@@ -355,7 +361,14 @@ def stage_content(shown: ShownRun) -> dict[str, Any]:
     return {**told, **surroundings, "hand": shown.seat is not None}
 
 
-def live_html(title: str, beside: Markup | None = None, scripts: Sequence[str] = (), styles: Sequence[str] = ()) -> str:
+def live_html(
+    title: str,
+    beside: Markup | None = None,
+    scripts: Sequence[str] = (),
+    styles: Sequence[str] = (),
+    *,
+    webcam: bool = False,
+) -> str:
     """Return the page of runs under way, which draws what its connection tells.
 
     Args:
@@ -363,14 +376,19 @@ def live_html(title: str, beside: Markup | None = None, scripts: Sequence[str] =
         beside: what stands beside the scene.
         scripts: names of further scripts.
         styles: names of further styles.
+        webcam: whether one is offered to lead a hand.
     """
-    hand = Markup(asset("live_hand.html"))
+    hand = Markup(template("live_hand.html").render(webcam=webcam))
     html = template("live.html").render(stage=STAGE_HTML, film=FILM_HTML, hand=hand, beside=beside or Markup())
     style = Markup("<style>{}</style>").format(Markup("\n".join(map(asset, ("replay.css", "live.css", *styles)))))
     section = Section(
         anchor="live",
         title="Live",
         html=style + Markup(html),
-        scripts=(*SCENE_SCRIPTS, "phases.js", "hand_input.js", "live_hand.js", "live.js", "push.js", *scripts),
+        scripts=(
+            *(*SCENE_SCRIPTS, "phases.js", "hand_input.js"),
+            *(WEBCAM_SCRIPTS if webcam else ()),
+            *("live_hand.js", "live.js", "push.js", *scripts),
+        ),
     )
-    return page_html(title, Markup(""), [section], connects=True)
+    return page_html(title, Markup(""), [section], connects=True, works=webcam)

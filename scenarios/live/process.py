@@ -89,7 +89,7 @@ class PageInputs:
 
 @contextlib.contextmanager
 def live_page(
-    folder: Path, pace: float, pushes: Mapping[str, int], hand: LedHand | None = None
+    folder: Path, pace: float, pushes: Mapping[str, int], hand: LedHand | None = None, webcam: Path | None = None
 ) -> Generator[tuple[str, LiveControl, PageInputs], None, None]:
     """Serve the page of a run that will write a folder; at the end, wait until pages have been told of the run's end.
 
@@ -98,6 +98,7 @@ def live_page(
         pace: simulated seconds per second of wall time at first.
         pushes: names and sizes of the inputs of bodies that the page may push.
         hand: what the page, or a tracker, may lead.
+        webcam: folder of the files by which a webcam leads it; None where it is not offered.
 
     Yields:
         The page's address, the run's controls, and the inputs that the page sets. The run is paused until a page is
@@ -112,6 +113,7 @@ def live_page(
         listening = opened.enter_context(socket.create_server((HOST, 0)))
         number = listening.fileno()
         command = [sys.executable, "-m", "handover.scenarios.live", str(folder), str(scratch), str(number)]
+        command += [] if webcam is None else [str(webcam)]
         server = subprocess.Popen(command, pass_fds=(number,), stdin=subprocess.DEVNULL)
         over = threading.Event()
         threading.Thread(target=_let_go_without, args=(server, control, inputs, over), daemon=True).start()

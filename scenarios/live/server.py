@@ -22,6 +22,7 @@ from handover.scenarios.live.live_page import LivePage
 from handover.scenarios.live.process import CONTROL_FILE, HOST
 from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.watched_run import WatchedRun
+from handover.scenarios.live.webcam import WebcamFiles
 
 
 class _Server(uvicorn.Server):
@@ -62,11 +63,21 @@ async def serve(page: LivePage, work: Coroutine[Any, Any, None], listening: sock
     await job
 
 
-async def _watch(shown: ShownRun, listening: socket.socket) -> None:
-    page = LivePage()
+async def _watch(shown: ShownRun, listening: socket.socket, webcam: WebcamFiles | None) -> None:
+    page = LivePage(webcam)
     await serve(page, page.show(shown), listening)
 
 
-def watch(folder: Path, controls: Path, listening: socket.socket) -> None:
-    """Serve the page of a run's folder, whose controls are in another; returns when the run has ended."""
-    asyncio.run(_watch(ShownRun(WatchedRun(folder), LiveControl(controls / CONTROL_FILE), controls), listening))
+def watch(folder: Path, controls: Path, listening: socket.socket, webcam: Path | None = None) -> None:
+    """Serve the page of a run's folder; returns when the run has ended.
+
+    Args:
+        folder: the run's.
+        controls: folder of its controls.
+        listening: the socket on which browsers connect.
+        webcam: folder of the files by which a webcam leads a hand; None where it is not offered.
+    """
+    files = None if webcam is None else WebcamFiles.read(webcam)
+    control = LiveControl(controls / CONTROL_FILE)
+    shown = ShownRun(WatchedRun(folder), control, controls, webcam={} if files is None else files.hashes())
+    asyncio.run(_watch(shown, listening, files))

@@ -2,7 +2,7 @@
 
 import base64
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ class ShownRun:
         stage: its scene and plots, None until its first row.
         inputs: these inputs, likewise.
         seat: of the device that leads a hand, likewise; None where none is led.
+        webcam: hashes of the files by which a webcam leads it; empty where it is not offered.
     """
 
     run: WatchedRun
@@ -37,6 +38,7 @@ class ShownRun:
     stage: Stage | None = None
     inputs: PageInputs = field(default_factory=PageInputs)
     seat: HandSeat | None = None
+    webcam: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def __post_init__(self) -> None:
         self._pictures = PictureReader(self.controls / PICTURE_FILE)
@@ -59,7 +61,7 @@ class ShownRun:
         self.stage, self.inputs = stage, PageInputs.open(self.controls)
         led = None if self.inputs.hand is None else self.run.led_hand()
         if self.inputs.hand is not None and led is not None:
-            self.seat = HandSeat(led, self.inputs.hand, lambda: stage.wanted_hand(led))
+            self.seat = HandSeat(led, self.inputs.hand, lambda: stage.wanted_hand(led), self.webcam)
 
     def end(self) -> None:
         """Leave in the run's folder what led its hand."""

@@ -76,7 +76,9 @@ def write_page(path: Path, title: str, header: Markup, sections: Sequence[Sectio
     write_whole(path, page_html(title, header, sections))
 
 
-def page_html(title: str, header: Markup, sections: Sequence[Section], *, connects: bool = False) -> str:
+def page_html(
+    title: str, header: Markup, sections: Sequence[Section], *, connects: bool = False, works: bool = False
+) -> str:
     """Return a page.
 
     Args:
@@ -84,6 +86,7 @@ def page_html(title: str, header: Markup, sections: Sequence[Section], *, connec
         header: what stands under the heading.
         sections: in order of appearance; Plotly is included if one of them has plots or scripts.
         connects: whether its scripts may connect to where the page comes from.
+        works: whether its scripts may begin threads (workers) of scripts from there.
     """
     names = [_SCRIPT, *dict.fromkeys(name for s in sections for name in s.scripts)]
     has_plots = any(s.scripts or 'class="plot"' in s.html for s in sections)
@@ -94,7 +97,7 @@ def page_html(title: str, header: Markup, sections: Sequence[Section], *, connec
         sections=[replace(s, html=Markup(non_breaking(s.html))) for s in sections],
         style=Markup(asset("page.css")),
         scripts=[Markup(s) for s in scripts],
-        policy=_policy(scripts, connects=connects),
+        policy=_policy(scripts, connects=connects, works=works),
     )
 
 
@@ -135,11 +138,11 @@ def _plotly() -> str:
     return get_plotlyjs()
 
 
-def _policy(scripts: Sequence[str], *, connects: bool) -> str:
+def _policy(scripts: Sequence[str], *, connects: bool, works: bool = False) -> str:
     """Return the page's Content-Security-Policy: its scripts by their hashes, inline styles, embedded pictures.
 
     Plotly sets inline styles, and hands over pictures to be saved as data and blobs.
     """
     hashes = " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in scripts)
-    own = "; connect-src 'self'" if connects else ""
+    own = "; connect-src 'self'" * connects + "; worker-src 'self'" * works
     return f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:{own}"

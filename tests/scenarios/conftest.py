@@ -1,4 +1,3 @@
-import os
 import shutil
 from collections.abc import Generator
 from pathlib import Path
@@ -6,28 +5,17 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
-from playwright.sync_api import Browser, sync_playwright
+from opened_page import launched
+from playwright.sync_api import Browser
 
 from handover.scenarios.cli.command import main
-
-_FLAGS = (
-    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-)  # fmt: skip
-"""No network, no screen; space is drawn by software."""
 
 
 @pytest.fixture(scope="module")
 def browser() -> Generator[Browser, None, None]:
     """Return a browser for a file's tests: as long as it is there, an event loop runs in the tests' thread."""
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        assert "CI" not in os.environ, "there is no chromium to look at pages with"
-        pytest.skip("there is no chromium to look at pages with")
-    with sync_playwright() as playwright:
-        made = playwright.chromium.launch(executable_path=chromium, args=_FLAGS)
+    with launched() as made:
         yield made
-        made.close()
 
 
 @pytest.fixture(scope="session")

@@ -1,17 +1,40 @@
-"""A page in a browser; errors on its console and network requests fail the test."""
+"""A browser, and a page in it; errors on its console and network requests fail the test."""
 
+import os
+import shutil
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
-from playwright.sync_api import Browser, ConsoleMessage, Page, Request
+import pytest
+from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
 
+_FLAGS = (
+    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+)  # fmt: skip
+"""No network, no screen; space is drawn by software."""
 _OF_DRIVERS = ("[.WebGL-", "Canvas2D: Multiple readback")
 """How messages begin that a browser which draws by software has for any page with pictures of space."""
 
 _PATIENCE = 120_000
 """ms; other tests may be using all of the machine."""
+
+
+@contextmanager
+def launched(*more: str) -> Generator[Browser, None, None]:
+    """Launch Chromium, with more of its flags; skip the test where there is none."""
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        assert "CI" not in os.environ, "there is no chromium to look at pages with"
+        pytest.skip("there is no chromium to look at pages with")
+    with sync_playwright() as playwright:
+        made = playwright.chromium.launch(executable_path=chromium, args=[*_FLAGS, *more])
+        try:
+            yield made
+        finally:
+            made.close()
 
 
 @contextmanager

@@ -5,9 +5,11 @@
 //     start        {p_WH, q_WH, closed, centre, radius}: where the hand is wanted, and how far it goes, m
 //     onSample     is called with a sample, some sixty times a second, while a device is chosen and the page is seen
 //     onChange     is called when the hand is closed or opened, with whether it is closed
-//   hand.choose(device)     "pointer" (mouse, touch and keys), "gamepad" or "nothing"
+//   hand.choose(device)     "pointer" (mouse, touch and keys), "gamepad"; of any other name, nothing here leads it
 //   hand.grasp(closed)      closes or opens it
 //   hand.pose()             {p_WH, q_WH, closed}
+//   hand.place(pose)        takes in where another device has led it
+//   hand.start              as given
 //   hand.end()              lets go of the element
 // The mouse moves the hand in the plane of the picture, at the hand's depth: it is where the pointer is. The wheel moves
 // it towards the eye and away. A finger on a screen takes it along, two change its depth. With Alt the pointer is the view's.
@@ -21,6 +23,7 @@ const handInput = (() => {
     PageDown: ["move", 2, 1], PageUp: ["move", 2, -1],
     KeyS: ["turn", 0, 1], KeyW: ["turn", 0, -1], KeyD: ["turn", 1, 1], KeyA: ["turn", 1, -1], KeyQ: ["turn", 2, 1], KeyE: ["turn", 2, -1],
   };
+  const HERE = new Set(["pointer", "gamepad"]);
   const live = x => Math.abs(x ?? 0) > DEAD ? x : 0;
 
   return ({element, camera, start, onSample, onChange = () => {}}) => {
@@ -53,7 +56,7 @@ const handInput = (() => {
     }
 
     function send(stamp = performance.now()) {
-      if (device === "nothing" || document.hidden || stamp - sent < PERIOD) return;
+      if (!HERE.has(device) || document.hidden || stamp - sent < PERIOD) return;
       sent = stamp;
       onSample({...api.pose(), stamp: stamp / 1000, device: device === "gamepad" ? "gamepad" : kind});
     }
@@ -158,6 +161,12 @@ const handInput = (() => {
         if (name === "pointer") element.focus({preventScroll: true});
       },
       grasp,
+      place(pose) {
+        p.fromArray(pose.p_WH);
+        q.set(...pose.q_WH.slice(1), pose.q_WH[0]);
+        if (closed !== pose.closed) onChange(closed = pose.closed);
+      },
+      start,
       pose: () => ({p_WH: p.toArray(), q_WH: [q.w, q.x, q.y, q.z], closed}),
       end() {
         clearInterval(timer);

@@ -11,15 +11,22 @@ const leadHandIn = (element, camera) => {
     gamepad: "The left stick moves the hand, the triggers towards you and away, the right stick turns it, the first button closes and opens it.",
     tracker: `A tracker sends texts such as {"p_WH": [-0.4, 0.1, -0.05], "q_WH": [1, 0, 0, 0], "closed": false, "stamp": 12.5} to `
       + `ws://${location.host}/hand: m in the world, a quaternion with its scalar first, s.`,
+    webcam: "Move your hand before the camera as if it were in the scene: palm, fist and depth are taken from its pictures, which stay in this "
+      + "page. Where the hand is first seen, it goes on from where it stands; take it out of the picture for a moment to begin elsewhere.",
     nothing: "Nothing leads the hand: it stops, and keeps what it holds.",
   };
   const lead = {hand: null, close}, closed = new AbortController();
-  let link = null, told = 0;
+  let link = null, told = 0, watched = null, cameraTold = "";
 
+  // Tells for a while what was refused, then again how it is with the camera, where it leads the hand.
   function tell(text) {
     part("told").value = text;
     clearTimeout(told);
-    told = setTimeout(() => { part("told").value = ""; }, 4000);
+    told = setTimeout(() => { part("told").value = cameraTold; }, 4000);
+  }
+  function tellOfCamera(text) {
+    part("told").value = cameraTold = text;
+    clearTimeout(told);
   }
 
   function connect() {
@@ -31,16 +38,43 @@ const leadHandIn = (element, camera) => {
     });
     ours.addEventListener("close", () => {
       lead.hand?.choose("nothing");
-      if (link === ours) part("grasp").disabled = true;
+      if (link !== ours) return;
+      leaveCamera();
+      part("grasp").disabled = true;
     });
   }
 
   function begin(start) {
     lead.hand?.end();
     lead.hand = handInput({element, camera, start, onSample: send, onChange: show});
-    lead.hand.choose(part("device").value);
+    use(part("device").value);
     part("grasp").disabled = false;
     show(start.closed);
+  }
+
+  function use(device) {
+    leaveCamera();
+    lead.hand?.choose(device);
+    if (device === "webcam" && lead.hand) watch();
+  }
+
+  // The webcam's samples go the way of others', and are where the hand is for the device after it.
+  function watch() {
+    const axes = () => {
+      camera.updateMatrixWorld();
+      return [0, 4, 8].map(at => camera.matrixWorld.elements.slice(at, at + 3));
+    };
+    const onSample = sample => {
+      lead.hand.place(sample);
+      send(sample);
+    };
+    const start = {...lead.hand.start, ...lead.hand.pose()}, right = part("side").value === "right";
+    watched = handCamera({video: part("video"), axes, start, right, onSample, onTold: tellOfCamera});
+  }
+  function leaveCamera() {
+    watched?.end();
+    watched = null;
+    if (cameraTold) tellOfCamera("");
   }
 
   const send = sample => link?.readyState === WebSocket.OPEN && link.bufferedAmount < 4000 && link.send(JSON.stringify(sample));
@@ -55,22 +89,26 @@ const leadHandIn = (element, camera) => {
     const device = part("device").value;
     part("help").textContent = HELP[device];
     part("grasp").hidden = device !== "pointer";
+    if (part("which")) part("which").hidden = device !== "webcam";
     element.closest(".replay").classList.toggle("awake", device === "pointer");  // the wheel is the hand's, not the page's
     if (device === "tracker") {
+      leaveCamera();
       const leaves = link;
       link = null;
       leaves?.close();
     } else if (!link || link.readyState > WebSocket.OPEN) connect();
-    else lead.hand?.choose(device);
+    else use(device);
   }
 
   function close() {
     closed.abort();
+    leaveCamera();
     lead.hand?.end();
     link?.close();
   }
 
   part("device").addEventListener("change", choose, {signal: closed.signal});
+  part("side")?.addEventListener("change", choose, {signal: closed.signal});
   part("grasp").addEventListener("click", () => lead.hand?.grasp(!lead.hand.pose().closed), {signal: closed.signal});
   choose();
   return lead;

@@ -1,0 +1,292 @@
+"""A webcam leads the hand: its files, and the way from a camera's pictures to a run, with a stand-in for MediaPipe."""
+
+import hashlib
+import json
+import math
+import threading
+import zipfile
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hand_points import landmarks_of_hand
+from live_runs import LIVE, live_run, shown
+from opened_page import launched, wait_until
+
+from handover.cosim.record.reader import Record
+from handover.plants.free_flyer.hand.hand_kinematics import CLOSED
+from handover.scenarios.cli.command import main
+from handover.scenarios.live.webcam import (
+    BUNDLE,
+    FILES,
+    LOADER,
+    MODEL,
+    MODEL_PARTS,
+    WASM,
+    InvalidWebcamFiles,
+    WebcamFiles,
+)
+
+SCENARIO = "flyer_robot_to_human"
+OUTSIDE = ("-p", "hand=outside")
+WIDTH, HEIGHT, RATE = 320, 240, 20
+FOCAL = 0.5 / math.tan(math.radians(30.0))
+"""Of the camera, widths of its picture."""
+SIDE = 0.12
+"""Of the square that stands for a hand, m."""
+R_CH = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+"""Fingers up in the picture, the back of the hand towards the camera: as of one who reaches towards the screen."""
+TOLD = "document.getElementById('hand-told').value"
+
+
+def write_files(folder: Path, *, model: bytes = b"", makers: str = "http://127.0.0.1:1/") -> Path:
+    """Write a folder of the files with the stand-in; `model` is a part of its model."""
+    (folder / "wasm").mkdir(parents=True)
+
+    def points(angles: tuple[float, ...]) -> list[list[float]]:
+        hand = landmarks_of_hand(angles) @ R_CH.T
+        return (hand - hand[[0, 5, 9, 13, 17]].mean(axis=0)).tolist()
+
+    hands = {"open": points((0.0,) * 14), "fist": points(CLOSED), "focal": FOCAL, "side": SIDE, "makers": makers}
+    stand_in = (Path(__file__).parent / "webcam_stand_in.mjs").read_text(encoding="utf-8")
+    (folder / BUNDLE).write_text(stand_in.replace("HANDS", json.dumps(hands)), encoding="utf-8")
+    (folder / LOADER).write_text("globalThis.ModuleFactory = async () => ({});", encoding="utf-8")
+    (folder / WASM).write_bytes(b"\0asm\1\0\0\0")
+    with zipfile.ZipFile(folder / MODEL, "w") as bundle:
+        for name in MODEL_PARTS:
+            bundle.writestr(name, b"\x1c\0\0\0TFL3" + model)
+    (folder / "package.json").write_text("{}", encoding="utf-8")
+    return folder
+
+
+def test_files_have_their_hashes_and_nothing_else_of_the_folder_is_served(tmp_path: Path):
+    folder = write_files(tmp_path / "vision")
+    files = WebcamFiles.read(folder)
+    assert files.hashes() == {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in FILES}
+    assert {route.path for route in files.routes()} == {
+        "/webcam/worker.js",
+        "/webcam/vision_bundle.mjs",
+        "/webcam/vision_wasm_module_internal.js",
+        "/webcam/vision_wasm_module_internal.wasm",
+        "/webcam/hand_landmarker.task",
+    }
+
+
+def _zip_without_landmarks(path: Path) -> None:
+    with zipfile.ZipFile(path, "w") as bundle:
+        bundle.writestr(MODEL_PARTS[0], b"\x1c\0\0\0TFL3")
+
+
+def _cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:60])
+
+
+def _damage(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[content.index(b"TFL3") + 1] ^= 1
+    path.write_bytes(bytes(content))
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "why"),
+    [
+        (MODEL, Path.unlink, "hand_landmarker.task is missing"),
+        (MODEL, lambda p: p.write_bytes(b""), "hand_landmarker.task is empty"),
+        (MODEL, lambda p: p.write_text("<html>not found</html>"), "hand_landmarker.task is no bundle of models, a zip"),
+        (MODEL, _cut, "hand_landmarker.task is no bundle of models"),
+        (MODEL, _damage, "hand_landmarker.task is no bundle of models"),
+        (MODEL, _zip_without_landmarks, "hand_landmarker.task has no TensorFlow Lite model hand_landmarks_detector"),
+        (WASM, lambda p: p.write_text("<html>"), "vision_wasm_module_internal.wasm is no WebAssembly"),
+        (WASM, lambda p: (p.unlink(), p.mkdir()), "vision_wasm_module_internal.wasm cannot be read: Is a directory"),
+        (LOADER, lambda p: p.write_text("var a;"), "vision_wasm_module_internal.js does not load"),
+        (BUNDLE, lambda p: p.write_text("export class FaceLandmarker {}"), "no module that exports HandLandmarker"),
+    ],
+)
+def test_what_is_not_what_its_name_says_is_refused(
+    tmp_path: Path, name: str, change: Callable[[Path], object], why: str
+):
+    folder = write_files(tmp_path / "vision")
+    change(folder / name)
+    with pytest.raises(InvalidWebcamFiles) as refused:
+        WebcamFiles.read(folder)
+    assert why in str(refused.value)
+    assert "right is the unpacked npm package @mediapipe/tasks-vision" in str(refused.value)
+
+
+def test_all_that_is_missing_is_told_before_anything_runs(tmp_path: Path):
+    (tmp_path / "empty").mkdir()
+    given = ["run", SCENARIO, *OUTSIDE, "--out", str(tmp_path / "run"), "--webcam"]
+    done = CliRunner().invoke(main, [*given, str(tmp_path / "empty"), "--live"])
+    assert done.exit_code == 2
+    for name in FILES:
+        assert f"{name} is missing" in done.output
+    done = CliRunner().invoke(main, [*given, str(tmp_path / "nowhere"), "--live"])
+    assert "nowhere is no folder; right is the unpacked npm package" in done.output
+    done = CliRunner().invoke(main, [*given, str(write_files(tmp_path / "vision"))])
+    assert "--webcam: it is the page of --live in which a webcam leads the hand" in done.output
+    led_by_nobody = ["run", SCENARIO, "--live", "--webcam", str(tmp_path / "vision"), "--out", str(tmp_path / "run")]
+    done = CliRunner().invoke(main, led_by_nobody)
+    assert "--webcam: nobody leads a hand in this run of flyer_robot_to_human" in done.output
+    assert not (tmp_path / "run").exists()
+
+
+@contextmanager
+def makers_of_the_package() -> Generator[tuple[str, list[str]], None, None]:
+    """Yield the address of a server that stands for the makers', and what it was asked for."""
+    asked: list[str] = []
+
+    class Makers(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            asked.append(self.path)
+            self.send_response(200)
+            self.end_headers()
+
+    server = HTTPServer(("127.0.0.1", 0), Makers)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}/report", asked
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+def write_video(path: Path) -> None:
+    """Write what a camera sees: a hand at rest, that goes to its right, makes a fist, and leaves; then it comes back.
+
+    In 0.6 m, 0.12 m to its right (left in the picture).
+    """
+    focal = FOCAL * WIDTH
+    size = round(focal * SIDE / 0.6)
+    places = [
+        *[(0.0, 235)] * 30,
+        *[(-0.12 * k / 20, 235) for k in range(20)],
+        *[(-0.12, 235)] * 20,
+        *[(-0.12, 150)] * 30,
+    ]
+    frames = [b"YUV4MPEG2 W%d H%d F%d:1 Ip A1:1 C420jpeg\n" % (WIDTH, HEIGHT, RATE)]
+    grey = bytes([128]) * (WIDTH * HEIGHT // 2)
+    for at in [*places, *[None] * 40]:
+        picture = np.full((HEIGHT, WIDTH), 16, dtype=np.uint8)
+        if at is not None:
+            left, top = round(0.5 * WIDTH + focal * at[0] / 0.6 - 0.5 * size), (HEIGHT - size) // 2
+            picture[top : top + size, left : left + size] = at[1]
+        frames.append(b"FRAME\n" + picture.tobytes() + grey)
+    path.write_bytes(b"".join(frames))
+
+
+@pytest.mark.slow
+def test_a_hand_in_a_cameras_pictures_leads_the_hand_of_a_run(tmp_path: Path):
+    write_video(tmp_path / "camera.y4m")
+    camera = (
+        "--use-fake-ui-for-media-stream",
+        "--use-fake-device-for-media-stream",
+        f"--use-file-for-fake-video-capture={tmp_path / 'camera.y4m'}",
+    )
+    with makers_of_the_package() as (address_of_makers, asked), launched(*camera) as browser:
+        folder = write_files(tmp_path / "vision", makers=address_of_makers)
+        given = (*OUTSIDE, "--webcam", str(folder), "--pace", "1", "--stop", "20")
+        with live_run(tmp_path / "led", *given, scenario=SCENARIO) as (address, run), shown(browser, address) as page:
+            wait_until(page, "live.hand")
+            page.locator("[data-view=front]").click()
+            page.wait_for_timeout(500)
+            right = page.evaluate("live.scene.camera.matrixWorld.elements.slice(0, 3)")
+            page.locator("#hand-device").select_option("webcam")
+            wait_until(page, f"{TOLD} === 'The camera sees the hand.'")
+            assert page.locator("#hand-video").is_visible()
+            wait_until(page, f"{TOLD}.startsWith('Show your hand')")
+            wait_until(page, f"{TOLD} === 'The camera sees the hand.'")
+            wait_until(page, f"{LIVE}.dataset.ended")
+            run.wait(timeout=120)
+        assert asked == []
+    record = Record(tmp_path / "led" / "signals.parquet")
+    told = json.loads((tmp_path / "led" / "inputs.json").read_text(encoding="utf-8"))
+    assert told["webcam"]["sha256"] == {n: hashlib.sha256((folder / n).read_bytes()).hexdigest() for n in FILES}
+    assert told["samples"]["webcam"] > 60
+    assert not told["refused"]
+
+    age, closed, p = record["person.age"], record["person.closed_track"], record["person.p_WH_track"]
+    used = np.flatnonzero(age < 0.2)
+    along = (p[used] - p[used[0]]) @ right
+    assert along.max() == pytest.approx(0.12, abs=0.015)  # its right is the view's
+    assert set(closed[used].tolist()) == {False, True}
+    bent = record["person.finger_track"][used][:, 2:]
+    assert bent[~closed[used].astype(bool)].min(axis=0).max() < 0.1
+    assert bent[closed[used].astype(bool)].max(axis=0).min() > 0.9
+    q = record["person.q_WH_track"][used]
+    assert np.abs(np.linalg.norm(q, axis=1) - 1.0).max() < 1e-9
+
+    lost = np.flatnonzero((age > 0.3) & (np.arange(len(age)) > used[0]))
+    assert 1.0 < age[lost].max() < 10.0
+    wanted = record["person.p_WH_goal"]
+    assert all((wanted[k] == wanted[k - 1]).all() for k in lost if k - 1 in lost)
+
+
+@pytest.mark.slow
+def test_why_a_camera_cannot_lead_is_told_and_another_device_can(tmp_path: Path):
+    folder = write_files(tmp_path / "vision")
+    given = (*OUTSIDE, "--webcam", str(folder), "--pace", "1", "--stop", "60")
+    with launched() as browser, live_run(tmp_path / "led", *given, scenario=SCENARIO) as (address, _):
+        with shown(browser, address) as page:
+            wait_until(page, "live.hand")
+            page.locator("#hand-device").select_option("webcam")
+            wait_until(page, f"{TOLD}.endsWith('no camera is connected. Another device may be chosen.')")
+            page.evaluate(
+                "navigator.mediaDevices.getUserMedia = async () => { throw new DOMException('', 'NotAllowedError'); }"
+            )
+            page.locator("#hand-side").select_option("left")
+            wait_until(page, f"{TOLD}.includes('the browser was not allowed to use the camera')")
+            page.locator("#hand-device").select_option("pointer")
+            assert page.evaluate(TOLD) == ""
+            box = page.locator(".replay-scene canvas").bounding_box()
+            assert box is not None
+            before = page.evaluate("live.hand.pose().p_WH")
+            page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.4 * box["height"], steps=5)
+            wait_until(page, f"JSON.stringify(live.hand.pose().p_WH) !== '{json.dumps(before, separators=(',', ':'))}'")
+        for path, status in (("webcam/package.json", 404), ("webcam/../package.json", 404), ("webcam/", 404)):
+            with pytest.raises(HTTPError, match=str(status)):
+                urlopen(address + path)
+        with pytest.raises(HTTPError, match="400"):
+            urlopen(Request(f"{address}webcam/{MODEL}", headers={"Host": "elsewhere.example"}))
+        with urlopen(f"{address}webcam/{MODEL}") as answer:
+            assert answer.read() == (folder / MODEL).read_bytes()
+        with urlopen(f"{address}webcam/worker.js") as answer:
+            policy = answer.headers["Content-Security-Policy"]
+            assert policy == "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'"
+        with urlopen(address) as answer:
+            page_text = answer.read().decode()
+        assert "worker-src 'self'" in page_text
+        assert "wasm-unsafe-eval" not in page_text.partition("<title>")[0]
+
+
+@pytest.mark.slow
+def test_a_model_that_does_not_load_is_told(tmp_path: Path):
+    folder = write_files(tmp_path / "vision", model=b"broken")
+    given = (*OUTSIDE, "--webcam", str(folder), "--stop", "60")
+    camera = ("--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream")
+    with (
+        launched(*camera) as browser,
+        live_run(tmp_path / "led", *given, scenario=SCENARIO) as (address, _),
+        shown(browser, address) as page,
+    ):
+        wait_until(page, "live.hand")
+        page.locator("#hand-device").select_option("webcam")
+        wait_until(page, f'{TOLD}.includes("MediaPipe failed: the model\'s graph has no landmarks")')
+        assert not page.locator("#hand-video").is_visible()
+
+
+@pytest.mark.slow
+def test_without_its_files_no_webcam_is_offered(tmp_path: Path):
+    with live_run(tmp_path / "led", *OUTSIDE, scenario=SCENARIO) as (address, _):
+        with urlopen(address) as answer:
+            text = answer.read().decode()
+        with pytest.raises(HTTPError, match="404"):
+            urlopen(f"{address}webcam/worker.js")
+    assert 'value="tracker"' in text
+    for word in ('value="webcam"', "handCamera", "worker-src", "wasm-unsafe-eval"):
+        assert word not in text
