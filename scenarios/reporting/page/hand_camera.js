@@ -32,7 +32,7 @@ const handCamera = ({video, axes, start, right, onSample, onTold}) => {
   }
 
   function take({data}) {
-    if (data.failed) fail(`MediaPipe failed: ${data.failed.slice(0, 300)}`);
+    if (data.failed) fail(`MediaPipe failed: ${data.failed.split("\n")[0].slice(0, 300)}`);
     else if (data.ready) {
       tellSeen(false);
       follow();
