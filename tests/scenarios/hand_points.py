@@ -20,3 +20,8 @@ def landmarks_of_hand(angles: tuple[float, ...] = STRAIGHT, *, right: bool = Tru
     thumb_base = np.array(fingers[0][0]) - 0.03 * np.array(FINGERS[0].ahead)
     points = np.array([wrist, thumb_base, *(p for finger in fingers for p in finger)])
     return points if right else points * [1.0, -1.0, 1.0]
+
+
+def turned(points: Floats, R: Floats) -> Floats:
+    """Return points, rows, turned by a rotation."""
+    return np.einsum("ij,kj->ki", R, points)

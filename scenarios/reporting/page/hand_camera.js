@@ -76,7 +76,7 @@ const handCamera = ({video, axes, start, right, onSample, onTold}) => {
     video.srcObject = stream;
     video.hidden = false;
     onTold("MediaPipe's files are loaded.");
-    worker = new Worker("/webcam/worker.js", {type: "module"});
+    worker = new Worker("webcam/worker.js", {type: "module"});
     worker.addEventListener("message", take);
     worker.addEventListener("error", event => fail(`its program could not be loaded${event.message ? `: ${event.message}` : ""}`));
     try {

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hand_points import landmarks_of_hand
+from hand_points import landmarks_of_hand, turned
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page
 
@@ -41,7 +41,7 @@ def rotation(axis: tuple[float, float, float], angle: float) -> Floats:
 
 def seen(points: Floats, R_CH: Floats, p_CH: Floats, scale: float = 1.0) -> tuple[list[Any], list[Any]]:
     """Return a hand's landmarks in a pinhole camera's picture, and in space about their middle, as MediaPipe does."""
-    in_camera: Floats = points @ R_CH.T + p_CH
+    in_camera = turned(points, R_CH) + p_CH
     focal = 0.5 * WIDTH / math.tan(0.5 * FIELD)
     u, v = (
         focal * in_camera[:, 0] / in_camera[:, 2] / WIDTH + 0.5,

@@ -17,7 +17,7 @@ from urllib.request import Request, urlopen
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from hand_points import landmarks_of_hand
+from hand_points import landmarks_of_hand, turned
 from live_runs import LIVE, live_run, shown
 from opened_page import launched, wait_until
 
@@ -52,8 +52,8 @@ def write_files(folder: Path, *, model: bytes = b"", makers: str = "http://127.0
     (folder / "wasm").mkdir(parents=True)
 
     def points(angles: tuple[float, ...]) -> list[list[float]]:
-        hand = landmarks_of_hand(angles) @ R_CH.T
-        return (hand - hand[[0, 5, 9, 13, 17]].mean(axis=0)).tolist()
+        hand = turned(landmarks_of_hand(angles), R_CH)
+        return (hand - np.mean(hand[[0, 5, 9, 13, 17]], axis=0)).tolist()
 
     hands = {"open": points((0.0,) * 14), "fist": points(CLOSED), "focal": FOCAL, "side": SIDE, "makers": makers}
     stand_in = (Path(__file__).parent / "webcam_stand_in.mjs").read_text(encoding="utf-8")
@@ -85,6 +85,15 @@ def _zip_without_landmarks(path: Path) -> None:
         bundle.writestr(MODEL_PARTS[0], b"\x1c\0\0\0TFL3")
 
 
+def _write(content: bytes) -> Callable[[Path], object]:
+    return lambda path: path.write_bytes(content)
+
+
+def _put_folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
 def _cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:60])
 
@@ -99,15 +108,15 @@ def _damage(path: Path) -> None:
     ("name", "change", "why"),
     [
         (MODEL, Path.unlink, "hand_landmarker.task is missing"),
-        (MODEL, lambda p: p.write_bytes(b""), "hand_landmarker.task is empty"),
-        (MODEL, lambda p: p.write_text("<html>not found</html>"), "hand_landmarker.task is no bundle of models, a zip"),
+        (MODEL, _write(b""), "hand_landmarker.task is empty"),
+        (MODEL, _write(b"<html>not found</html>"), "hand_landmarker.task is no bundle of models, a zip"),
         (MODEL, _cut, "hand_landmarker.task is no bundle of models"),
         (MODEL, _damage, "hand_landmarker.task is no bundle of models"),
         (MODEL, _zip_without_landmarks, "hand_landmarker.task has no TensorFlow Lite model hand_landmarks_detector"),
-        (WASM, lambda p: p.write_text("<html>"), "vision_wasm_module_internal.wasm is no WebAssembly"),
-        (WASM, lambda p: (p.unlink(), p.mkdir()), "vision_wasm_module_internal.wasm cannot be read: Is a directory"),
-        (LOADER, lambda p: p.write_text("var a;"), "vision_wasm_module_internal.js does not load"),
-        (BUNDLE, lambda p: p.write_text("export class FaceLandmarker {}"), "no module that exports HandLandmarker"),
+        (WASM, _write(b"<html>"), "vision_wasm_module_internal.wasm is no WebAssembly"),
+        (WASM, _put_folder, "vision_wasm_module_internal.wasm cannot be read: Is a directory"),
+        (LOADER, _write(b"var a;"), "vision_wasm_module_internal.js does not load"),
+        (BUNDLE, _write(b"export class FaceLandmarker {}"), "no module that exports HandLandmarker"),
     ],
 )
 def test_what_is_not_what_its_name_says_is_refused(
