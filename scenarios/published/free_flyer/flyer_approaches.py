@@ -181,7 +181,7 @@ def _table(runs: _Approaches) -> ComparisonTable:
             found = runs.of(exchange, behaviour, case)
             if found:
                 rest, threshold = exchange.of(found, "rest_speed"), exchange.threshold(behaviour)
-                fastest = f"{1e3 * rest.max():.1f}" if len(rest) else ""
+                fastest = f"{rest.max():.4f}" if len(rest) else ""
                 margin = f"{threshold / rest.max():.1f}" if len(rest) and rest.max() > 0.0 else ""
                 arrived = values_of(found, "arrival_error")
                 rows.append(
@@ -193,7 +193,7 @@ def _table(runs: _Approaches) -> ComparisonTable:
                         str(acted_alone(found)),
                         f"{1e3 * arrived.max():.1f}" if len(arrived) else "",
                         fastest,
-                        f"{1e3 * threshold:.0f}",
+                        f"{threshold:.3f}",
                         margin,
                     ]
                 )
@@ -206,8 +206,8 @@ def _table(runs: _Approaches) -> ComparisonTable:
             "signalled",
             "acted alone",
             "off its place, mm",
-            "at rest, mm/s",
-            "threshold, mm/s",
+            "at rest, m/s",
+            "threshold, m/s",
             "threshold over rest",
         ],
         rows=rows,
@@ -227,15 +227,15 @@ def _draw(runs: _Approaches, folder: Path) -> list[Figure]:
             for behaviour in Behaviour:
                 colour = COLOURS[int(behaviour)]
                 for k, (_, case) in enumerate(cases):
-                    rest = 1e3 * exchange.of(runs.of(exchange, behaviour, case), "rest_speed")
+                    rest = exchange.of(runs.of(exchange, behaviour, case), "rest_speed")
                     axes.plot(rest, np.full(len(rest), k - 0.15 + 0.3 * int(behaviour)), "|", ms=8, color=colour)
-                threshold = 1e3 * exchange.threshold(behaviour)
+                threshold = exchange.threshold(behaviour)
                 axes.axvline(threshold, color=colour, ls=(0, (7, 3)), lw=1.0)
                 axes.plot([], [], "|", ms=8, color=colour, label=behaviour.item)
             axes.plot([], [], color=COLOURS[5], ls=(0, (7, 3)), lw=1.0, label="threshold")
             axes.set_yticks(range(len(cases)), [label for label, _ in cases], fontsize=9)
             axes.set_ylim(len(cases) - 0.4, -0.6)
-            axes.set(title="gives" if exchange.gives else "receives", xlim=(0.0, None), xlabel="speed at rest (mm/s)")
+            axes.set(title="gives" if exchange.gives else "receives", xlim=(0.0, None), xlabel="speed at rest (m/s)")
         panels[1].tick_params(labelleft=False)
         legend_below(panels[0])
     caption = (

@@ -146,6 +146,8 @@ def _share(rows: Sequence[Row]) -> str:
 
 def _medians(by_task: Sequence[Sequence[Row]], metric: str, scale: float, digits: int) -> str:
     found = [scale * values_of(_touched(rows), metric) for rows in by_task]
+    if not any(len(x) for x in found):
+        return "–"
     return " and ".join(f"{np.median(x):.{digits}f}" if len(x) else "none" for x in found)
 
 
@@ -174,7 +176,7 @@ def _draw(runs: NavigationRuns, metric: str, label: str, scale: float, folder: P
             ticks = [error.scale * level for level in error.levels]
             axes.set(xlabel=f"{error.label} ({error.unit})", xscale="log", ylim=(-0.04 * top, 1.08 * top))
             axes.set_xlim(min(ticks) / 1.3, 1.3 * max(ticks))
-            axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+            axes.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
             axes.minorticks_off()
             if error.parameter == "update_rate":
                 axes.invert_xaxis()

@@ -92,7 +92,7 @@ def _velocity_bias(runs: NavigationRuns) -> Claim:
     count = sum(map(signalled, found.values()))
     p = count_probability(count, chances)
     each = ", ".join(
-        f"{signalled(rows)} of {len(rows)} at {1e3 * x:g} mm/s ({format_share(rest_probability(x))})"
+        f"{signalled(rows)} of {len(rows)} at {x:g} m/s ({format_share(rest_probability(x))})"
         for x, rows in found.items()
         if rows
     )
@@ -101,7 +101,7 @@ def _velocity_bias(runs: NavigationRuns) -> Claim:
         measured=f"{count} of {len(chances)}, expected {sum(chances):.1f}",
         verdict=verdict_of(p >= LEVEL, could_be_either=len(chances) >= _MIN_RUNS),
         reason=_needing(_MIN_RUNS, len(chances))
-        + f"At rest it sees the bias as its speed, which must be below {1e3 * gate:g} mm/s. Holds if an exact "
+        + f"At rest it sees the bias as its speed, which must be below {gate:g} m/s. Holds if an exact "
         f"test of the count, of robots that receive, does not reject at {format_share(LEVEL)} that each signals with "
         "the probability that the length of three Gaussian components is: "
         f"p = {format_p_value(p)}. By deviation, with that probability: {each}.",

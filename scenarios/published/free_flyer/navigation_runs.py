@@ -27,7 +27,7 @@ class EstimateError:
         label: what, in words.
         parameter: of the navigation's unit.
         levels: in SI units, from the mildest on.
-        unit: in which levels are shown.
+        unit: in which levels are shown, as elsewhere on the pages: m/s and rad/s, but mm and degrees.
         scale: how many of it one SI unit is.
         others: parameters of the unit that go with it, as texts.
     """
@@ -42,20 +42,21 @@ class EstimateError:
     def variation(self, level: float) -> Variation:
         """Return the navigation with the error at a level."""
         given = {f"navigation.{self.parameter}": f"{level:g}", **self.others}
-        return Variation(f"{self.label} {self.scale * level:g} {self.unit}", given)
+        space = "" if self.unit == "°" else " "
+        return Variation(f"{self.label} {self.scale * level:.3g}{space}{self.unit}", given)
 
 
 _DRIFTS = {"navigation.drift_time": f"{DRIFT_TIME:g}"}
 DELAY = EstimateError("delay", "delay", (0.016, 0.032, 0.064, 0.128), "ms", 1e3)
-VELOCITY_BIAS = EstimateError("bias of velocity", "velocity_bias", (0.002, 0.004, 0.008, 0.016), "mm/s", 1e3)
+VELOCITY_BIAS = EstimateError("bias of velocity", "velocity_bias", (0.002, 0.004, 0.008, 0.016), "m/s")
 POSITION_BIAS = EstimateError("bias of position", "position_bias", (0.005, 0.01, 0.02, 0.04), "mm", 1e3)
 ESTIMATE_ERRORS = (
     POSITION_BIAS,
-    EstimateError("bias of attitude", "attitude_bias", (0.02, 0.05, 0.1), "mrad", 1e3),
+    EstimateError("bias of attitude", "attitude_bias", (0.02, 0.05, 0.1), "°", 180.0 / np.pi),
     VELOCITY_BIAS,
-    EstimateError("bias of rate", "rate_bias", (0.01, 0.03, 0.1), "mrad/s", 1e3),
+    EstimateError("bias of rate", "rate_bias", (0.01, 0.03, 0.1), "rad/s"),
     EstimateError("drift of position", "position_drift", (0.01, 0.03, 0.1), "mm", 1e3, _DRIFTS),
-    EstimateError("drift of velocity", "velocity_drift", (0.003, 0.01, 0.03), "mm/s", 1e3, _DRIFTS),
+    EstimateError("drift of velocity", "velocity_drift", (0.003, 0.01, 0.03), "m/s", others=_DRIFTS),
     EstimateError("updates", "update_rate", (10.0, 5.0, 2.0, 1.0), "Hz"),
     DELAY,
 )
