@@ -189,7 +189,8 @@ class Replay:
         phases: what is shown beside the time: phases as in the plots (`phases_of`), or the signal of an enumeration
             whose value it is; "" for nothing.
         notes: sentences below the scene.
-        window: minimum and maximum corner of what is shown, shape (2, 3), m; None: everything that is drawn.
+        window: what the views just show, m: the minimum and maximum corner of a box, shape (2, 3), or points, shape
+            (n, 3); None: everything that is drawn.
         weightless: whether there is neither up nor down, so that stars are around and no floor is below.
         floor: height of the floor, m; None: below all that is drawn.
         follow: label of what the view can be told to follow; "" for nothing.

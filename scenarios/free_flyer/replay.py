@@ -1,6 +1,6 @@
 """The free-flyer in space: with a person, the object and the hand that takes it, or pushed at its gripper."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.plants.free_flyer.hand.hand_kinematics import PALM_BONES, PALM_RADIUS
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.replay import Body, Line, Mesh, PersonView, Replay, ball, faceted, hull
 from handover.scenarios.free_flyer.parameters import ROBOTS, ImpedanceParameters, TeamParameters, Wrench
@@ -29,8 +30,8 @@ _PER_NEWTON, _PER_NEWTON_METRE = 0.04, 0.08
 """Lengths of arrows, m/N and m/(N m)."""
 _ARROW_HEAD, _CLEAR, _AXIS_LENGTH = 0.7, 0.035, 0.12
 """Share of an arrow before its head, its distance from G, m, and length of the axes of a frame, m."""
-_ROOM = 0.1
-"""Metres around the ways of gripper, object and hand: a hand's length."""
+_ROOM, _CUBE_ROOM = 0.08, 0.55 * EDGE
+"""Metres around the ways of gripper, object and hand, some hand's length, and of the cube."""
 _LAMP, _LIGHT = "#5b6470", "#ffc400"
 _LAMP_RADIUS = 0.028
 _LAMP_PLACE = np.array([-EDGE / 2, 0.0, 0.10])
@@ -49,7 +50,7 @@ def replay_handover(record: Record) -> Replay:
         phases="decision.phase",
         weightless=True,
         follow="object",
-        window=_around_transfer(record),
+        window=_around(record, _WAYS),
         notes=("No up and no down: in microgravity. The person's arm is not shown.",),
         person_view=_SEEN_BY_PERSON,
     )
@@ -63,7 +64,7 @@ def replay_practice(record: Record) -> Replay:
         eye=(-0.9, -1.05, 0.65),
         weightless=True,
         follow="object",
-        window=_around_transfer(record, _WAYS[1:]),
+        window=_around(record, {way: _ROOM for way in _WAYS if way != "robot.p_WB"}),
         notes=("No up and no down: in microgravity. The person's arm is not shown.",),
         person_view=_SEEN_BY_PERSON,
     )
@@ -75,8 +76,10 @@ def replay_team(parameters: TeamParameters, record: Record) -> Replay:
     robots = [body for r in ROBOTS for body in _robot(record, jaw_gap(record, f"_{r}"), f"_{r}")]
     thing, *handles = large_object_at(record, 0, parameters.hands)
     parts = [_body(record, "object", "O", thing), *(_body(record, "handles", "O", handle) for handle in handles)]
-    palms = [_body(record, "hand", f"H{h}", hand_at(record, 0, h)[0]) for h in hands]
-    ways = ("robot_1.p_WG", "robot_2.p_WG", "person.p_WO", *(f"person.p_WH{h}" for h in hands))
+    palms = [_palm(record, h) for h in hands]
+    ways: dict[str, float | Floats] = {f"robot_{r}.p_WB": _CUBE_ROOM for r in ROBOTS}
+    ways |= {f"person.p_WH{h}": _ROOM for h in hands}
+    ways["person.p_WO"] = 0.6 * np.array(paper_values("free_flyer", "large_object")["object_size"])
     return Replay(
         bodies=[*robots, *parts, *palms],
         lines=[
@@ -87,18 +90,23 @@ def replay_team(parameters: TeamParameters, record: Record) -> Replay:
         phases="decision.phase_1",
         weightless=True,
         follow="object",
-        window=_around_transfer(record, ways),
+        window=_around(record, ways),
         notes=("No up and no down: in microgravity. The person's arms are not shown.",),
     )
 
 
-_WAYS = ("robot.p_WG", "person.p_WO", "person.p_WH")
+_WAYS: dict[str, float | Floats] = {
+    "robot.p_WB": _CUBE_ROOM,
+    "robot.p_WG": _ROOM,
+    "person.p_WO": _ROOM,
+    "person.p_WH": _ROOM,
+}
 
 
-def _around_transfer(record: Record, names: Sequence[str] = _WAYS) -> Floats:
-    """Return corners around the ways of grippers, object and hands, shape (2, 3), m; robots stand out of them."""
-    ways = np.vstack([record[name] for name in names])
-    return np.array([ways.min(axis=0) - _ROOM, ways.max(axis=0) + _ROOM])
+def _around(record: Record, ways: Mapping[str, float | Floats]) -> Floats:
+    """Return the corners of boxes around bodies on their ways, shape (n, 3), m, by half their sides along W's axes."""
+    corners = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    return np.vstack([record[name] + room * corner for name, room in ways.items() for corner in corners])
 
 
 def replay_push(parameters: ImpedanceParameters, record: Record) -> Replay:
@@ -181,8 +189,16 @@ def _light(record: Record) -> list[Line]:
 
 def _person(record: Record) -> list[Body]:
     """Return the object and the palm of the hand."""
-    thing, palm = person_at(record, 0)[:2]
-    return [_body(record, "object", "O", thing), _body(record, "hand", "H", palm)]
+    return [_body(record, "object", "O", person_at(record, 0)[0]), _palm(record)]
+
+
+def _palm(record: Record, suffix: str = "") -> Body:
+    """Return the palm of the hand, or of one with a suffix, as round as it is where it touches an object."""
+    ends = np.array([PALM_BONES[0], PALM_BONES[-1]]).reshape(-1, 3)
+    mesh = hull(np.vstack([end + ball(PALM_RADIUS).vertices for end in ends]))
+    colour = hand_at(record, 0, suffix)[0].colour
+    p_WH, q_WH = record[f"person.p_WH{suffix}"], record[f"person.q_WH{suffix}"]
+    return Body(label="hand", colour=colour, mesh=mesh, p_WB=p_WH, q_WB=q_WH)
 
 
 def _body(record: Record, label: str, frame: str, part: Solid) -> Body:

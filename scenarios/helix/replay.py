@@ -23,6 +23,10 @@ _PLATE_THICKNESS, _PLATE_RADIUS = 0.008, 1.15
 
 _PUSH, _PER_NEWTON = "#8357a8", 0.3
 """Colour of a person's push, and its length, m/N."""
+
+_MOUNT_RADIUS = 2.2
+"""Radius of the mount that the arm hangs from, over that of a plate (assumed)."""
+
 _FRUSTUM = 0.09
 """Length at which a camera's frustum is drawn, m."""
 _PICTURE_CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
@@ -63,13 +67,15 @@ def _ball(record: Record) -> Body:
 
 
 def _plates(record: Record) -> list[Body]:
-    """Return the plates at the ends of the arm's segments, placed as on the calibrated arm, normal to the backbone."""
+    """Return the arm's mount, and the plates at its segments' ends as on the calibrated arm, normal to the backbone."""
     backbone, lengths = record["arm.backbone"], ArmParams().tendon_length
     ends = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) / float(np.sum(lengths)) * (backbone.shape[1] - 1)
     radius = _PLATE_RADIUS * CameraParams().arm_radius
     outline = circle(radius)
     mesh = prism(outline, -_PLATE_THICKNESS / 2, _PLATE_THICKNESS / 2)
-    plates: list[Body] = []
+    low, high = _PLATE_THICKNESS / 2, CameraParams().arm_radius * 1.1  # the tube's rounded end lies within
+    mount = prism(circle(_MOUNT_RADIUS * radius), low, high)
+    plates = [Body(label="arm", colour=_PLATE, mesh=mount, p_WB=backbone[:1, 0])]
     for k in np.rint(ends).astype(int):
         along = backbone[:, k + 1] - backbone[:, max(k - 1, 0)]
         plates.append(Body(label="arm", colour=_PLATE, mesh=mesh, p_WB=backbone[:, k], q_WB=_turned_to(along)))

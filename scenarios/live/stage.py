@@ -250,6 +250,6 @@ def _with_room(replay: Replay) -> Replay:
     """Return a scene whose window has room around what is there at first."""
     if replay.window is None:
         return replay
-    low, high = replay.window
-    room = _AROUND * float(np.max(high - low))
-    return replace(replay, window=np.array([low - room, high + room]))
+    low, high = replay.window.min(axis=0), replay.window.max(axis=0)
+    outwards = (replay.window - (low + high) / 2.0) / np.maximum((high - low) / 2.0, 1e-9)  # -1 to 1 along each axis
+    return replace(replay, window=replay.window + _AROUND * float(np.max(high - low)) * outwards)

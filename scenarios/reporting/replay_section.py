@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment.replay import Body, Line, Replay
+from handover.scenarios.experiment.replay import Body, Line, Replay, ball
 from handover.scenarios.experiment.time_plot import Phase, phases_of
 from handover.scenarios.reporting.html import json_html
 from handover.scenarios.reporting.page import Section, asset
@@ -81,8 +81,10 @@ def scene_content(replay: Replay, record: Record, frames: int = MAX_FRAMES) -> d
     """
     rows = frame_rows(record.time, frames)
     drawn = _drawn(replay, record, rows)
-    lowest, highest = _extent(drawn)
-    low, high = (lowest, highest) if replay.window is None else replay.window
+    seen = np.vstack([_outermost(points) for points in map(_points, drawn) if len(points)])
+    lowest, highest = _extent(seen)
+    held = _outermost(seen if replay.window is None else replay.window) if _is_of_points(replay.window) else None
+    low, high = (lowest, highest) if replay.window is None else (replay.window.min(axis=0), replay.window.max(axis=0))
     step = _RESOLUTION * float(np.max(high - low))
     return {
         "time": _packed(record.time[rows]),
@@ -90,6 +92,7 @@ def scene_content(replay: Replay, record: Record, frames: int = MAX_FRAMES) -> d
         "eye": list(replay.eye),
         "low": np.round(low, 4).tolist(),
         "high": np.round(high, 4).tolist(),
+        "held": None if held is None else np.round(held, 3).tolist(),
         "weightless": replay.weightless,
         "floor": round(float(lowest[2]) if replay.floor is None else replay.floor, 4),
         "follow": replay.follow,
@@ -183,27 +186,33 @@ def _packed(values: NDArray[Any], dtype: str = "f4") -> dict[str, Any]:
     return {"dtype": dtype, "bdata": base64.b64encode(data).decode()}
 
 
-def _extent(drawn: Sequence[Drawn]) -> tuple[Floats, Floats]:
-    """Return minimum and maximum corner of all that is drawn at any time, with a margin around it."""
-    with np.errstate(invalid="ignore"):
-        corners = np.array([c for d in drawn for c in _corners(d)])
-    low, high = np.nanmin(corners, axis=0), np.nanmax(corners, axis=0)
+def _is_of_points(window: Floats | None) -> bool:
+    return window is None or len(window) > 2
+
+
+def _extent(points: Floats) -> tuple[Floats, Floats]:
+    """Return minimum and maximum corner of points, shape (n, 3), with a margin around them."""
+    low, high = points.min(axis=0), points.max(axis=0)
     margin = max(_MARGIN * float(np.max(high - low)), 1e-3)
     return low - margin, high + margin
 
 
-def _corners(drawn: Drawn) -> tuple[Floats, Floats]:
+def _outermost(points: Floats) -> Floats:
+    """Return those of points, shape (n, 3), that lie farthest out along the axes and in directions all around."""
+    directions = np.vstack([np.eye(3), -np.eye(3), ball(1.0, finer=1).vertices])
+    return points[np.unique(np.argmax(points @ np.transpose(directions), axis=0))]
+
+
+def _points(drawn: Drawn) -> Floats:
+    """Return points around all that is drawn at any time, shape (n, 3), m; none while it is hidden."""
     if isinstance(drawn, Line):
         radii = np.zeros(1) if drawn.radii is None else drawn.radii
-        points = np.concatenate([drawn.points - radii[:, None], drawn.points + radii[:, None]]).reshape(-1, 3)
+        points = np.concatenate([drawn.points + r * radii[:, None] for r in np.vstack([np.eye(3), -np.eye(3)])])
     else:
         R_WB = np.eye(3)[None] if drawn.q_WB is None else Rotation.from_quat(drawn.q_WB, scalar_first=True).as_matrix()
-        p_BV_W = np.einsum("rij,nj->rni", R_WB, drawn.mesh.vertices)
-        points = np.concatenate([drawn.p_WB + extent for extent in (p_BV_W.min(axis=1), p_BV_W.max(axis=1))])
-    shown = points[np.isfinite(points).all(axis=1)]
-    if not len(shown):
-        return np.full(3, np.nan), np.full(3, np.nan)
-    return shown.min(axis=0), shown.max(axis=0)
+        points = drawn.p_WB[:, None] + np.einsum("rij,nj->rni", R_WB, drawn.mesh.vertices)
+    points = points.reshape(-1, 3)
+    return points[np.isfinite(points).all(axis=1)]
 
 
 def _seen_colour(drawn: Drawn) -> str:
@@ -241,7 +250,7 @@ def views_html(replay: Replay) -> Markup:
 
 STAGE_HTML = Markup(
     '<div class="replay-stage"><div class="replay-scene" role="img" aria-label="the scene in space"></div>'
-    '<button type="button" class="replay-wake">Tap to turn and zoom</button></div>'
+    '<button type="button" class="replay-wake"><span>Tap to turn and zoom</span></button></div>'
 )
 """Where a scene is drawn."""
 FILM_HTML = Markup('<button type="button" class="replay-film" hidden>save as film</button>')

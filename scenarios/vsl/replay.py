@@ -12,10 +12,17 @@ from handover.scenarios.vsl.plots import phases_of_path
 
 _LINK, _SERVO, _GROUND, _LOAD = "#8fb3d9", "#4d5866", "#9aa3af", "#b58a1b"
 _DESIRED, _TIP_PATH, _ESTIMATE = "#3c8d53", "#d1602b", "#8357a8"
+_ELBOW = 13
+"""Of the centre line's points, the one where link 2 ends and link 3 begins; the shoulder is 1."""
 _RADIUS_RATIO = 1.2
 """Radius of servos, base and gripper over that of the links (assumed)."""
 _REACH = ArmParams().L_2 + ArmParams().L_3
 """How far the arm can be from its base along the ground, m."""
+_PLATE, _GROUND_AT = 0.006, -0.06
+"""Thickness of the plate below the arm, and height of its face in W, clear of the load, m (assumed).
+
+The floor is below the plate, for two faces at one height flicker.
+"""
 _DENSITY, _BELOW = 2700.0, 0.03
 """Density of the ball that the load is drawn as, kg/m3, and how far below the gripper it hangs, m (assumed)."""
 
@@ -29,7 +36,7 @@ def replay_path(parameters: Parameters, record: Record, *, hybrid: bool) -> Repl
         fixed=[Line(label="desired path", colour=_DESIRED, points=_desired_path(parameters)[None], width=4.0)],
         eye=(0.45, -1.45, 0.35),
         phases=phases_of_path(record),
-        floor=0.0,
+        floor=_GROUND_AT - _PLATE,
         follow="gripper",
         notes=("The path of the tip is the true one, not that by the tracker.",),
     )
@@ -45,9 +52,9 @@ def _desired_path(parameters: Parameters) -> Floats:
 
 
 def _arm(shape: Floats) -> list[Line]:
-    """Return the links from shoulder to elbow and from elbow to gripper, 12 points each, and the gripper."""
+    """Return the links from shoulder to elbow and from elbow to gripper, and the gripper."""
     radius: float = ArmParams().R_link
-    parts = (("arm", _LINK, shape[:, 1:13], radius), ("arm", _LINK, shape[:, 12:], radius))
+    parts = (("arm", _LINK, shape[:, 1 : _ELBOW + 1], radius), ("arm", _LINK, shape[:, _ELBOW:], radius))
     gripper = ("gripper", _SERVO, shape[:, -2:], _RADIUS_RATIO * radius)
     return [
         Line(label=label, colour=colour, points=points, radii=np.full(len(points[0]), r))
@@ -59,8 +66,8 @@ def _joints(shape: Floats) -> list[Body]:
     """Return the base, and the servos at shoulder and elbow."""
     radius = _RADIUS_RATIO * ArmParams().R_link
     outline = circle(radius)
-    base = prism(outline, 0.0, float(shape[0, 1, 2] - shape[0, 0, 2]))
-    servos = [Body(label="arm", colour=_SERVO, mesh=ball(radius), p_WB=shape[:, k]) for k in (1, 12)]
+    base = prism(outline, _GROUND_AT, float(shape[0, 1, 2] - shape[0, 0, 2]))
+    servos = [Body(label="arm", colour=_SERVO, mesh=ball(radius), p_WB=shape[:, k]) for k in (1, _ELBOW)]
     return [Body(label="arm", colour=_SERVO, mesh=base, p_WB=shape[:1, 0]), *servos]
 
 
@@ -92,4 +99,5 @@ def _ground() -> Body:
     """Return a plate below the arm."""
     reach, side = 0.06 + _REACH, 0.15
     outline = np.array([[-0.1, -side], [reach, -side], [reach, side], [-0.1, side]])
-    return Body(label="ground", colour=_GROUND, mesh=prism(outline, -0.006, 0.0), p_WB=np.zeros((1, 3)), opacity=0.5)
+    plate = prism(outline, _GROUND_AT - _PLATE, _GROUND_AT)
+    return Body(label="ground", colour=_GROUND, mesh=plate, p_WB=np.zeros((1, 3)), opacity=0.5)

@@ -40,6 +40,9 @@ const live = (() => {
     byId("signals").replaceChildren(...run.signals.map(name => Object.assign(document.createElement("option"), {value: name})));
     byId("cameras").replaceChildren();
     byId("cameras").hidden = true;
+    byId("push-help").hidden = !(stage && run.pushes?.length);
+    byId("push-help").textContent = (run.pushes ?? []).map(({bodies, greatest}) =>
+      `Press on ${bodies.join(" or ")} and drag to push, with up to ${greatest} N.`).join(" ");
     byId("verdict").hidden = byId("waiting").hidden = true;
     byId("told").textContent = "";
     for (const id of ["pause", "step", "stop", "pace", "signal"]) byId(id).disabled = false;

@@ -1,11 +1,13 @@
 // Draws bodies, tubes and lines in space, with three.js; what they are comes from replay_section.py.
-//   const scene = sceneIn(element, {traces, low, high, eye, weightless, floor, follow, played, live})
+//   const scene = sceneIn(element, {traces, low, high, held, eye, weightless, floor, follow, played, live})
+//                                 held: [[x, y, z], ...], m, what a view just shows; without it, the box from low to high
 //                                 played: a person acts in it, so that pictures come fast also where no graphics card
 //                                 draws them, and shadows fall straight down
 //                                 live: pictures follow a run under way: those that come late are drawn with fewer pixels,
 //                                 then without shadows (data-coarse of the element counts the steps)
 //   scene.show(u)                 everything u frames after the first; u may lie between two
-//   scene.turn(view)              looks from one of scene.views: "start", "front", "side", "top"
+//   scene.turn(view)              looks from one of scene.views: "start", "front", "side", "top";
+//                                 front and side are those nearer to the eye at the start
 //   scene.follows = true          the view moves with the body of that label from now on
 //   scene.setVisible(label, yes)
 //   scene.recolour()              takes the page's colours anew
@@ -30,7 +32,8 @@ const sceneIn = (() => {
   const FIELD = 36 * Math.PI / 180, ROOM = 0.94;  // of the view from top to bottom, and the share of it for the box
   const LATE = 50, FORGOTTEN = 3000;  // ms from when a picture is wanted until it is drawn: too long; not because of what it costs
   const LONGEST_TRAIL = 4000;  // points of a way that grows
-  const VIEWS = {front: [0, -1, 0.12], side: [1, 0, 0.12], top: [0, -0.001, 1]};
+  const VIEWS = {front: ([, y]) => [0, y > 0 ? 1 : -1, 0.12], side: ([x]) => [x < 0 ? -1 : 1, 0, 0.12], top: () => [0, -0.001, 1]};
+  const SHARP = Math.cos(35 * Math.PI / 180);  // of the angle between two faces from which on their edge is drawn
   const hasWebGl = () => Boolean(document.createElement("canvas").getContext("webgl2"));
   function drawsBySoftware() {
     const gl = document.createElement("canvas").getContext("webgl2"), about = gl?.getExtension("WEBGL_debug_renderer_info");
@@ -61,6 +64,7 @@ const sceneIn = (() => {
     geometry.computeVertexNormals();
     const mesh = new THREE.Mesh(geometry, material);
     mesh.castShadow = mesh.receiveShadow = true;
+    mesh.add(edgesOf(part, material));
     return {
       object: mesh,
       set(u) {
@@ -80,6 +84,29 @@ const sceneIn = (() => {
           new THREE.Vector3(v[3 * i], v[3 * i + 1], v[3 * i + 2]).applyMatrix4(mesh.matrixWorld).toArray());
       },
     };
+  }
+
+  // The sharp edges of a body, a little darker, so that faces of like brightness are told apart. Its triangles may
+  // share no vertices: those at the same place are the same.
+  function edgesOf({vertices: v, triangles}, material) {
+    const named = i => [0, 1, 2].map(k => Math.round(1e6 * v[3 * i + k])).join();
+    const corner = i => new THREE.Vector3(v[3 * i], v[3 * i + 1], v[3 * i + 2]);
+    const sides = new Map(), places = [];
+    for (let k = 0; k < triangles.length; k += 3) {
+      const three = [0, 1, 2].map(i => triangles[k + i]), [a, b, c] = three.map(corner);
+      const normal = b.sub(a).cross(c.sub(a)).normalize();
+      three.forEach((i, n) => {
+        const j = three[(n + 1) % 3], name = [named(i), named(j)].sort().join(" ");
+        const before = sides.get(name);
+        if (!before) sides.set(name, normal);
+        else if (before.dot(normal) < SHARP) places.push(...corner(i).toArray(), ...corner(j).toArray());
+      });
+    }
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(places), 3));
+    const {color, transparent, opacity} = material;
+    return new THREE.LineSegments(geometry,
+      new THREE.LineBasicMaterial({color: color.clone().multiplyScalar(0.45), transparent, opacity}));
   }
 
   // A tube's surface is laid anew along its points.
@@ -119,7 +146,7 @@ const sceneIn = (() => {
       group.add(line);
     }
     if (trace.markers || most === 1) {
-      const size = (trace.markers ? 1.2 : 1.6) * trace.width * Math.min(devicePixelRatio, 2);
+      const size = (trace.markers ? 1.2 : 1.6) * trace.width;  // three.js multiplies by the pixels of a CSS pixel
       const material = new THREE.PointsMaterial({...look, size, sizeAttenuation: false, map: dot, alphaTest: 0.5});
       const geometry = new THREE.BufferGeometry();
       geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * most), 3));
@@ -204,7 +231,7 @@ const sceneIn = (() => {
     return {group, plane, recolour: colour => grid.material.color.set(colour)};
   }
 
-  function stars(far) {
+  function stars(far, dot) {
     let seed = 1;
     const random = () => (seed = seed * 16807 % 2147483647) / 2147483647;
     const corners = [], colours = [];
@@ -217,7 +244,7 @@ const sceneIn = (() => {
     geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(corners), 3));
     geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(colours), 3));
     const points = new THREE.Points(geometry,
-      new THREE.PointsMaterial({vertexColors: true, size: 1.6 * Math.min(devicePixelRatio, 2), sizeAttenuation: false}));
+      new THREE.PointsMaterial({vertexColors: true, size: 2, sizeAttenuation: false, map: dot, alphaTest: 0.3}));
     points.frustumCulled = false;
     return points;
   }
@@ -242,7 +269,7 @@ const sceneIn = (() => {
         for (const [key, value] of Object.entries({x1: 36, y1: 34, x2: x, y2: y})) line.setAttribute(key, value);
         letter.setAttribute("x", 36 + 32 * a.x - 3);
         letter.setAttribute("y", 34 - 32 * a.y + 4);
-        line.style.opacity = letter.style.opacity = 0.65 + 0.35 * a.z;
+        line.style.opacity = letter.style.opacity = 0.85 + 0.15 * a.z;
       });
       const length = round125(130 / perMetre);
       bar.setAttribute("d", `M12 82v6h${(length * perMetre).toFixed(1)}v-6`);
@@ -250,7 +277,7 @@ const sceneIn = (() => {
     };
   }
 
-  const made = (element, {traces, low, high, eye, weightless = false, floor = low[2], follow = "", played = false, live = false}) => {
+  const made = (element, {traces, low, high, held, eye, weightless = false, floor = low[2], follow = "", played = false, live = false}) => {
     if (!hasWebGl()) return null;
     const sides = high.map((x, i) => x - low[i]), centre = high.map((x, i) => (x + low[i]) / 2);
     const reach = Math.hypot(...sides) / 2;
@@ -283,9 +310,9 @@ const sceneIn = (() => {
     Object.assign(sun.shadow.camera, {left: -span, right: span, bottom: -span, top: span, near: 0.2 * reach, far: 7 * reach});
     scene.add(sun, sun.target);
     const ground = weightless ? null : floorOf(floor, centre, reach, round125(Math.max(...sides) / 6));
-    scene.add(ground ? ground.group : stars(50 * reach));
-
     const dot = roundDot();
+    scene.add(ground ? ground.group : stars(50 * reach, dot));
+
     const drawn = traces.flatMap(trace => {
       const shared = {color: trace.colour, transparent: trace.opacity < 1, opacity: trace.opacity};
       const made = trace.parts ? trace.parts.map(part => (part.radii ? tubeOf : bodyOf)(part,
@@ -339,13 +366,13 @@ const sceneIn = (() => {
       wanted = requestAnimationFrame(draw);
     };
 
-    // From the side of `towards`, at a distance from where the whole box is just seen.
+    // From the side of `towards`, at a distance from where all that is held, or the whole box, is just seen.
     function lookFrom(towards) {
       const back = new THREE.Vector3(...towards).normalize();
       const right = new THREE.Vector3().crossVectors(camera.up, back).normalize();
       const over = new THREE.Vector3().crossVectors(back, right);
-      const corners = [0, 1, 2, 3, 4, 5, 6, 7].map(n =>
-        new THREE.Vector3(...sides.map((side, i) => ((n >> i & 1) - 0.5) * side)));
+      const corners = held ? held.map(p => new THREE.Vector3(...p).sub(new THREE.Vector3(...centre)))
+        : [0, 1, 2, 3, 4, 5, 6, 7].map(n => new THREE.Vector3(...sides.map((side, i) => ((n >> i & 1) - 0.5) * side)));
       const fit = (along, slope) => {
         const least = Math.min(...corners.map(c => along.dot(c) - slope * back.dot(c)));
         const most = Math.max(...corners.map(c => along.dot(c) + slope * back.dot(c)));
@@ -394,7 +421,7 @@ const sceneIn = (() => {
         }
         request();
       },
-      turn: view => lookFrom(VIEWS[view] ?? eye),
+      turn: view => lookFrom(VIEWS[view]?.(eye) ?? eye),
       get follows() { return follows; },
       set follows(yes) { follows = Boolean(yes && follow); },
       setVisible(label, yes) {

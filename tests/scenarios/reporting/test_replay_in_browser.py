@@ -101,7 +101,7 @@ def view(page: Page) -> dict[str, float]:
 
 @pytest.mark.parametrize(
     ("name", "azimuth", "elevation"),
-    [("front", -np.pi / 2.0, np.arctan(0.12)), ("side", 0.0, np.arctan(0.12)), ("top", -np.pi / 2.0, np.pi / 2.0)],
+    [("front", -np.pi / 2.0, np.arctan(0.12)), ("side", np.pi, np.arctan(0.12)), ("top", -np.pi / 2.0, np.pi / 2.0)],
 )
 def test_a_view_looks_from_where_it_is_named_after(page: Page, name: str, azimuth: float, elevation: float):
     page.get_by_role("button", name=name).click()
