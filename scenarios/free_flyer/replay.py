@@ -64,7 +64,7 @@ def replay_practice(record: Record) -> Replay:
         eye=(-0.9, -1.05, 0.65),
         weightless=True,
         follow="object",
-        window=_around(record, {way: _ROOM for way in _WAYS if way != "robot.p_WB"}),
+        window=_around(record, {way: _ROOM for way in _WAYS if way.startswith("person.")}),
         notes=("No up and no down: in microgravity. The person's arm is not shown.",),
         person_view=_SEEN_BY_PERSON,
     )

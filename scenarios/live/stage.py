@@ -124,7 +124,7 @@ class Stage:
 
     def scene(self) -> dict[str, Any] | None:
         """Return the scene with everything where it is now; None where the scenario has none."""
-        return None if self._shown is None else scene_content(_with_room(self._shown), self._record)
+        return None if self._shown is None else scene_content(self._shown, self._record, room=_AROUND)
 
     def scene_of_person(self, fixed: Sequence[Line] = ()) -> dict[str, Any] | None:
         """Return the scene as the person in it sees it, above a floor on which shadows tell how near things are.
@@ -244,12 +244,3 @@ def _numbers(drawn: Drawn) -> Sequence[Floats]:
     if isinstance(drawn, Body):
         return (drawn.p_WB[-1],) if drawn.q_WB is None else (drawn.p_WB[-1], drawn.q_WB[-1])
     return (drawn.points[-1].ravel(),)
-
-
-def _with_room(replay: Replay) -> Replay:
-    """Return a scene whose window has room around what is there at first."""
-    if replay.window is None:
-        return replay
-    low, high = replay.window.min(axis=0), replay.window.max(axis=0)
-    outwards = (replay.window - (low + high) / 2.0) / np.maximum((high - low) / 2.0, 1e-9)  # -1 to 1 along each axis
-    return replace(replay, window=replay.window + _AROUND * float(np.max(high - low)) * outwards)

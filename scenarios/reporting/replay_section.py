@@ -73,18 +73,23 @@ def replay_section(replay: Replay, record: Record) -> Section:
     )
 
 
-def scene_content(replay: Replay, record: Record, frames: int = MAX_FRAMES) -> dict[str, Any]:
+def scene_content(replay: Replay, record: Record, frames: int = MAX_FRAMES, *, room: float = 0.0) -> dict[str, Any]:
     """Return a scene and where everything is at some `frames` moments of the record, as `scene.js` takes it.
+
+    Args:
+        replay: the scene.
+        record: the run, or the part of it that is known.
+        frames: of it, about.
+        room: how much the views show around what is there, as a share of its longest side.
 
     Raises:
         ValueError: a line or a body has neither one row nor as many as the record.
     """
     rows = frame_rows(record.time, frames)
     drawn = _drawn(replay, record, rows)
-    seen = np.vstack([_outermost(points) for points in map(_points, drawn) if len(points)])
-    lowest, highest = _extent(seen)
-    held = _outermost(seen if replay.window is None else replay.window) if _is_of_points(replay.window) else None
-    low, high = (lowest, highest) if replay.window is None else (replay.window.min(axis=0), replay.window.max(axis=0))
+    lowest, highest, seen = _extent(drawn)
+    held = _with_room(seen if replay.window is None else replay.window, room)
+    low, high = (lowest, highest) if replay.window is None else (held.min(axis=0), held.max(axis=0))
     step = _RESOLUTION * float(np.max(high - low))
     return {
         "time": _packed(record.time[rows]),
@@ -92,7 +97,7 @@ def scene_content(replay: Replay, record: Record, frames: int = MAX_FRAMES) -> d
         "eye": list(replay.eye),
         "low": np.round(low, 4).tolist(),
         "high": np.round(high, 4).tolist(),
-        "held": None if held is None else np.round(held, 3).tolist(),
+        "held": None if len(held) == 2 else np.round(_outermost(held), 4).tolist(),
         "weightless": replay.weightless,
         "floor": round(float(lowest[2]) if replay.floor is None else replay.floor, 4),
         "follow": replay.follow,
@@ -186,15 +191,19 @@ def _packed(values: NDArray[Any], dtype: str = "f4") -> dict[str, Any]:
     return {"dtype": dtype, "bdata": base64.b64encode(data).decode()}
 
 
-def _is_of_points(window: Floats | None) -> bool:
-    return window is None or len(window) > 2
-
-
-def _extent(points: Floats) -> tuple[Floats, Floats]:
-    """Return minimum and maximum corner of points, shape (n, 3), with a margin around them."""
-    low, high = points.min(axis=0), points.max(axis=0)
+def _extent(drawn: Sequence[Drawn]) -> tuple[Floats, Floats, Floats]:
+    """Return minimum and maximum corner of all that is drawn at any time, with a margin, and its outermost points."""
+    seen = _outermost(np.vstack([_outermost(points) for points in map(_points, drawn) if len(points)]))
+    low, high = seen.min(axis=0), seen.max(axis=0)
     margin = max(_MARGIN * float(np.max(high - low)), 1e-3)
-    return low - margin, high + margin
+    return low - margin, high + margin, seen
+
+
+def _with_room(points: Floats, share: float) -> Floats:
+    """Return points, shape (n, 3), pushed outwards along each axis, the outermost by a share of the longest side."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    outwards = (points - (low + high) / 2.0) / np.maximum((high - low) / 2.0, 1e-9)
+    return points + share * float(np.max(high - low)) * outwards
 
 
 def _outermost(points: Floats) -> Floats:

@@ -16,6 +16,7 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.plots import phases_of_grasp
+from handover.scenarios.reporting.page import asset
 from handover.scenarios.reporting.replay_section import frame_rows, phase_changes
 
 SCENE = "document.querySelector('.replay-scene')"
@@ -106,10 +107,53 @@ def view(page: Page) -> dict[str, float]:
 def test_a_view_looks_from_where_it_is_named_after(page: Page, name: str, azimuth: float, elevation: float):
     page.get_by_role("button", name=name).click()
     seen = view(page)
-    assert seen["azimuth"] == pytest.approx(azimuth, abs=1e-6)
+    assert np.angle(np.exp(1j * (seen["azimuth"] - azimuth))) == pytest.approx(0.0, abs=1e-6)
     assert seen["elevation"] == pytest.approx(elevation, abs=2e-3)
     page.get_by_role("button", name="start").click()
     assert view(page)["azimuth"] == pytest.approx(np.arctan2(-0.7, -0.35))
+
+
+@pytest.mark.parametrize("name", ["start", "front", "side", "top"])
+def test_a_view_just_holds_what_is_drawn_at_any_time(page: Page, record: Record, name: str):
+    shown = IrGrasp().replay(Parameters(), record)
+    labels = {drawn.label for drawn in (*shown.bodies, *shown.lines)}
+    page.get_by_role("button", name=name).click()
+    seen: list[list[float]] = []
+    for frame in range(0, len(frame_rows(record.time)), 20):
+        move(page, frame)
+        for label in labels:
+            script = "name => replays[0].scene.points(name).map(p => replays[0].scene.toPixels(p))"
+            seen += page.evaluate(script, label)
+    size = page.evaluate(f"[{SCENE}.clientWidth, {SCENE}.clientHeight]")
+    low, high = np.min(seen, axis=0) / size, np.max(seen, axis=0) / size
+    assert low.min() >= 0.0
+    assert high.max() <= 1.0
+    assert (high - low).max() > 0.85
+
+
+def test_what_is_drawn_as_dots_is_as_large_on_a_screen_of_small_pixels(browser: Browser):
+    shares: list[float] = []
+    for pixels in (1.0, 2.0):
+        page = browser.new_page(viewport={"width": 400, "height": 300}, device_scale_factor=pixels)
+        page.set_content(
+            "<div id='at' style='width: 200px; height: 200px; background: #fff'></div>"
+            "<style>#at canvas { display: block; width: 100%; height: 100% }</style>"
+        )
+        for script in ("three.min.js", "replay_shapes.js", "scene.js"):
+            page.add_script_tag(content=asset(script))
+        page.evaluate(
+            """() => {
+                const trace = {label: "dot", colour: "#000000", opacity: 1, width: 20, n: 1, points: [0, 0, 0]};
+                window.scene = sceneIn(document.getElementById("at"),
+                  {traces: [trace], low: [-1, -1, -1], high: [1, 1, 1], eye: [1, 1, 1], floor: -5});
+            }"""
+        )
+        wait_until(page, "document.getElementById('at').dataset.pictures > 0")
+        seen = np.asarray(Image.open(BytesIO(page.locator("#at").screenshot())).convert("L"))
+        shares.append(float(np.mean(seen < 60)))
+        page.close()
+    assert shares[0] > 0.005
+    assert shares[1] == pytest.approx(shares[0], rel=0.15)
 
 
 def test_the_view_follows_the_palm_and_keeps_its_distance(page: Page):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.replay import Body, Line, Replay, prism
-from handover.scenarios.reporting.replay_section import frame_rows, replay_section
+from handover.scenarios.reporting.replay_section import frame_rows, replay_section, scene_content
 
 ROWS = 1000
 MOVING: Floats = np.column_stack([np.linspace(0.0, 2.0, ROWS), np.zeros(ROWS), np.zeros(ROWS)])
@@ -107,3 +107,25 @@ def test_a_legends_chip_has_all_colours_of_what_it_names(record: Record):
     html = replay_section(Replay(bodies=[CUBE, CUBE, alone, glass], lines=[tube]), record).html
     chips = re.findall(r'<i style="background: (.*?)">', html)
     assert chips == ["linear-gradient(90deg, #123456 0% 50%, #abcdef 50% 100%)", "#fedcba", "#12345680"]
+
+
+def test_views_hold_what_is_drawn_or_the_window_and_no_more(record: Record):
+    corners = np.array([[x, y, z] for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])
+    drawn = data(Replay(bodies=[CUBE]), record)
+    ends = np.vstack([MOVING[0] + corners, MOVING[-1] + corners])
+    assert {tuple(p) for p in drawn["held"]} <= {tuple(p) for p in np.round(ends, 4).tolist()}
+    np.testing.assert_allclose(np.min(drawn["held"], axis=0), ends.min(axis=0), atol=1e-4)
+    np.testing.assert_allclose(np.max(drawn["held"], axis=0), ends.max(axis=0), atol=1e-4)
+    points = data(Replay(bodies=[CUBE], window=np.vstack([corners, np.zeros((1, 3))])), record)
+    np.testing.assert_allclose(sorted(points["held"]), sorted(corners.tolist()), atol=1e-4)
+    box = data(Replay(bodies=[CUBE], window=corners[[0, -1]]), record)
+    assert box["held"] is None
+    assert (box["low"], box["high"]) == ([-0.1] * 3, [0.1] * 3)
+
+
+@pytest.mark.parametrize("window", [None, np.array([[-0.1, -0.1, -0.1], [2.1, 0.1, 0.1]])])
+def test_a_scene_under_way_has_room_around_it(record: Record, window: Floats | None):
+    near, far = (scene_content(Replay(bodies=[CUBE], window=window), record, room=room) for room in (0.0, 0.25))
+    seen = [np.array(c["held"] or [c["low"], c["high"]]) for c in (near, far)]
+    np.testing.assert_allclose(seen[0].min(axis=0) - seen[1].min(axis=0), 0.25 * 2.2, atol=1e-3)
+    np.testing.assert_allclose(seen[1].max(axis=0) - seen[0].max(axis=0), 0.25 * 2.2, atol=1e-3)

@@ -1,0 +1,47 @@
+"""What scenes of the free-flyer hold in view, and that the hand is as round as where it touches."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flyer_runs import run
+
+from handover.cosim.record.reader import Record
+from handover.plants.free_flyer.hand.hand_kinematics import PALM_BONES, PALM_RADIUS
+from handover.scenarios.free_flyer.hand_practice import HandPractice, PracticeParameters
+from handover.scenarios.free_flyer.handovers import RobotToHuman
+from handover.scenarios.free_flyer.replay import replay_handover
+from handover.scenarios.free_flyer.scene import EDGE
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Record:
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    run(RobotToHuman, folder, "hand=outside", "patience=2")
+    return Record(folder / "signals.parquet")
+
+
+def test_the_cube_is_in_view_wherever_it_flies(record: Record):
+    window = replay_handover(record).window
+    assert window is not None
+    for p_WB in record["robot.p_WB"]:
+        assert (window.min(axis=0) <= p_WB - EDGE / 2.0).all()
+        assert (window.max(axis=0) >= p_WB + EDGE / 2.0).all()
+
+
+def test_the_palm_is_drawn_where_it_touches(record: Record):
+    palm = next(body for body in replay_handover(record).bodies if body.label == "hand")
+    bones = np.array(PALM_BONES).reshape(-1, 3)
+    x, y, z = (palm.mesh.vertices - bones.mean(axis=0)).T
+    half = np.ptp(bones, axis=0) / 2.0
+    away = np.stack([np.abs(x) - half[0], np.abs(y) - half[1], z])
+    np.testing.assert_allclose(np.linalg.norm(np.maximum(away[:2], 0.0), axis=0) ** 2 + away[2] ** 2, PALM_RADIUS**2)
+
+
+def test_a_practice_shows_object_and_hand_without_a_robot(tmp_path: Path):
+    folder = tmp_path / "run"
+    run(HandPractice, folder, "duration=1")
+    scene = HandPractice().replay(PracticeParameters(), Record(folder / "signals.parquet"))
+    assert {body.label for body in scene.bodies} == {"object", "hand"}
+    assert scene.window is not None
+    assert np.isfinite(scene.window).all()
