@@ -7,7 +7,7 @@
 //                                 then without shadows (data-coarse of the element counts the steps)
 //   scene.show(u)                 everything u frames after the first; u may lie between two
 //   scene.turn(view)              looks from one of scene.views: "start", "front", "side", "top";
-//                                 front and side are those nearer to the eye at the start
+//                                 side is from that end of x which the eye is nearer to at the start
 //   scene.follows = true          the view moves with the body of that label from now on
 //   scene.setVisible(label, yes)
 //   scene.recolour()              takes the page's colours anew
@@ -32,7 +32,7 @@ const sceneIn = (() => {
   const FIELD = 36 * Math.PI / 180, ROOM = 0.94;  // of the view from top to bottom, and the share of it for the box
   const LATE = 50, FORGOTTEN = 3000;  // ms from when a picture is wanted until it is drawn: too long; not because of what it costs
   const LONGEST_TRAIL = 4000;  // points of a way that grows
-  const VIEWS = {front: ([, y]) => [0, y > 0 ? 1 : -1, 0.12], side: ([x]) => [x < 0 ? -1 : 1, 0, 0.12], top: () => [0, -0.001, 1]};
+  const VIEWS = {front: () => [0, -1, 0.12], side: ([x]) => [x < 0 ? -1 : 1, 0, 0.12], top: () => [0, -0.001, 1]};
   const SHARP = Math.cos(35 * Math.PI / 180);  // of the angle between two faces from which on their edge is drawn
   const hasWebGl = () => Boolean(document.createElement("canvas").getContext("webgl2"));
   function drawsBySoftware() {
