@@ -174,7 +174,7 @@ COMMANDS = (
     ),
     DeferredCommand(
         "study",
-        "handover.scenarios.cli.study:study",
+        "handover.scenarios.cli.study.group:study",
         short_help="Carry out a user study: its plan, sessions, report.",
     ),
     DeferredCommand(

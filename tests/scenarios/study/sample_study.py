@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from handover.scenarios.study.order import Round
-from handover.scenarios.study.plan import StudyPlan, default_plan, parse_plan
-from handover.scenarios.study.session_folder import RoundRecord, Session, SessionFolder
-from handover.scenarios.study.study_folder import StudyFolder
+from handover.scenarios.study.folder.session_folder import RoundRecord, Session, SessionFolder
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.order import Round
+from handover.scenarios.study.plan.plan import StudyPlan, default_plan, parse_plan
 
 PLAN = parse_plan(default_plan())
 PILOT_PLAN = parse_plan(default_plan().replace("pilot = false", "pilot = true").replace('"mouse"', '"script"'))

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from sample_study import PLAN, play, record, same, session, write_study
 
-from handover.scenarios.study.analysis import FAILURE, StudyAnalysis
-from handover.scenarios.study.order import Round
-from handover.scenarios.study.study_folder import StudyFolder
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.order import Round
+from handover.scenarios.study.statistics.analysis import FAILURE, StudyAnalysis
 
 
 def rigid_is_better(number: int, planned: Round, statement: str) -> int:

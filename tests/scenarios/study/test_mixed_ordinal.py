@@ -7,7 +7,7 @@ from scipy.special import expit
 from scipy.stats import norm
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.study.mixed_ordinal import MixedModel, NotFitted, fit_mixed_ordinal
+from handover.scenarios.study.statistics.mixed_ordinal import MixedModel, NotFitted, fit_mixed_ordinal
 
 WINE = """
 23344455 12132354 23325544 32323253 23433333

@@ -5,8 +5,8 @@ from collections import Counter
 
 import pytest
 
-from handover.scenarios.study.order import balance, order_row, rounds_of, williams_square
-from handover.scenarios.study.plan import default_plan, parse_plan
+from handover.scenarios.study.plan.order import balance, order_row, rounds_of, williams_square
+from handover.scenarios.study.plan.plan import default_plan, parse_plan
 
 PLAN = parse_plan(default_plan())
 

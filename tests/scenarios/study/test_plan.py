@@ -7,7 +7,7 @@ import pytest
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.study.plan import InvalidPlan, default_plan, parse_plan, read_plan
+from handover.scenarios.study.plan.plan import InvalidPlan, default_plan, parse_plan, read_plan
 
 
 def faults_of(*changes: tuple[str, str]) -> tuple[str, ...]:

@@ -9,8 +9,8 @@ from scipy import stats
 
 from handover.scenarios.campaign.statistics import Interval
 from handover.scenarios.cli.command import main
-from handover.scenarios.study.plan import default_plan, parse_plan
-from handover.scenarios.study.power import PowerAssumptions, fewest_participants, simulated_power
+from handover.scenarios.study.plan.plan import default_plan, parse_plan
+from handover.scenarios.study.statistics.power import PowerAssumptions, fewest_participants, simulated_power
 
 PLAN = parse_plan(default_plan())
 

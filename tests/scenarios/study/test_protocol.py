@@ -6,9 +6,9 @@ import pandas as pd
 import pytest
 from sample_study import PLAN, record
 
-from handover.scenarios.study.device_test import DeviceTest
-from handover.scenarios.study.protocol import MOST_ATTEMPTS, SCREENS, InvalidAction, Protocol
-from handover.scenarios.study.study_folder import StudyFolder
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.session.device_test import DeviceTest
+from handover.scenarios.study.session.protocol import MOST_ATTEMPTS, SCREENS, InvalidAction, Protocol
 
 RATINGS = {"S1": 7, "S2": 8, "S3": 9}
 

@@ -16,9 +16,9 @@ from test_session_folder import read_by_codebook
 
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import main
-from handover.scenarios.study.codebook import PILOT
-from handover.scenarios.study.plan import default_plan, parse_plan
-from handover.scenarios.study.study_folder import StudyFolder
+from handover.scenarios.study.folder.codebook import PILOT
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.plan import default_plan, parse_plan
 
 csv_of: Any = pd.read_csv  # pyright: ignore[reportUnknownVariableType, reportUnknownMemberType]
 

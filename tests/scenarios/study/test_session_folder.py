@@ -17,11 +17,11 @@ from sample_study import PILOT_PLAN, PLAN, play, record, same, session, write_st
 
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
-from handover.scenarios.study.codebook import PILOT
-from handover.scenarios.study.order import rounds_of
-from handover.scenarios.study.plan import default_plan, parse_plan
-from handover.scenarios.study.session_folder import SessionFolder, failed_by_rule
-from handover.scenarios.study.study_folder import StudyFolder
+from handover.scenarios.study.folder.codebook import PILOT
+from handover.scenarios.study.folder.session_folder import SessionFolder, failed_by_rule
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.order import rounds_of
+from handover.scenarios.study.plan.plan import default_plan, parse_plan
 
 _TYPES = {"text": "string", "whole number": "Int64", "number": "Float64", "true or false": "boolean"}
 
@@ -117,7 +117,7 @@ _PLAYS = """
 import sys
 from pathlib import Path
 from sample_study import PLAN, record, session
-from handover.scenarios.study.study_folder import StudyFolder
+from handover.scenarios.study.folder.study_folder import StudyFolder
 folder = StudyFolder.opened(Path(sys.argv[1]), PLAN).begin(session(1))
 for planned in folder.rounds:
     folder.record_round(planned.number, record())

@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from handover.scenarios.cli.command import main
-from handover.scenarios.study.order import rounds_of
-from handover.scenarios.study.plan import default_plan, parse_plan
+from handover.scenarios.study.plan.order import rounds_of
+from handover.scenarios.study.plan.plan import default_plan, parse_plan
 
 
 def study(*arguments: str | Path) -> Result:

@@ -15,8 +15,8 @@ import pytest
 from opened_page import overflow, wait_until
 from playwright.sync_api import Browser, Page
 
-from handover.scenarios.study.plan import default_plan, parse_plan
-from handover.scenarios.study.study_folder import StudyFolder
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.plan import default_plan, parse_plan
 
 SEEN_AT = """(() => {
     const scene = study.play.scene, box = document.querySelector("#eye canvas").getBoundingClientRect();

@@ -17,13 +17,13 @@ import uvicorn
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from handover.scenarios.study import seat as seat_module
-from handover.scenarios.study.plan import default_plan, parse_plan
-from handover.scenarios.study.protocol import Protocol
-from handover.scenarios.study.seat import StudySeat
-from handover.scenarios.study.server import StudyServer, uvicorn_config
-from handover.scenarios.study.sessions import NotServed, check_hands
-from handover.scenarios.study.study_folder import StudyFolder
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.plan import default_plan, parse_plan
+from handover.scenarios.study.session import seat as seat_module
+from handover.scenarios.study.session.protocol import Protocol
+from handover.scenarios.study.session.seat import StudySeat
+from handover.scenarios.study.session.served_study import NotServed, check_hands
+from handover.scenarios.study.session.server import StudyServer, uvicorn_config
 
 HOST = "127.0.0.1"
 SHORT = default_plan().replace("practice = 600 ", "practice = 0 ") + "\n[parameters]\npatience = 30\n"

@@ -14,11 +14,11 @@ from handover.scenarios.published.free_flyer.study_runs import STUDIED
 from handover.scenarios.published.verdicts import format_interval, format_p_value, format_share
 from handover.scenarios.reporting.html import plot_html, rows_table
 from handover.scenarios.reporting.page import Section
-from handover.scenarios.study.analysis import FailureCount, StatementModel, StudyAnalysis
-from handover.scenarios.study.codebook import PILOT
-from handover.scenarios.study.mixed_ordinal import Effect
-from handover.scenarios.study.report_plots import ratings_figure, shifts_figure
-from handover.scenarios.study.statistics import MIN_PARTICIPANTS, SignedRankTest
+from handover.scenarios.study.folder.codebook import PILOT
+from handover.scenarios.study.report.report_plots import ratings_figure, shifts_figure
+from handover.scenarios.study.statistics.analysis import FailureCount, StatementModel, StudyAnalysis
+from handover.scenarios.study.statistics.exact_tests import MIN_PARTICIPANTS, SignedRankTest
+from handover.scenarios.study.statistics.mixed_ordinal import Effect
 
 _TOO_FEW = "too few"
 _SCENARIOS = {

@@ -22,7 +22,7 @@ from handover.scenarios.results.run_folder import (
     read_object,
     write_whole,
 )
-from handover.scenarios.study.codebook import (
+from handover.scenarios.study.folder.codebook import (
     PERSON,
     PILOT,
     ROUNDS,
@@ -32,9 +32,9 @@ from handover.scenarios.study.codebook import (
     write_csv,
     write_parquet,
 )
-from handover.scenarios.study.order import Round, order_row, rounds_of
-from handover.scenarios.study.plan import StudyPlan
-from handover.scenarios.study.session_notes import SessionNotes, VoidAttempt
+from handover.scenarios.study.folder.session_notes import SessionNotes, VoidAttempt
+from handover.scenarios.study.plan.order import Round, order_row, rounds_of
+from handover.scenarios.study.plan.plan import StudyPlan
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ from handover.cosim.exceptions import nearest, one_line
 from handover.scenarios.catalog import SCENARIOS, InvalidScenario, installed_scenarios, named_scenario
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
-from handover.scenarios.study.plan_table import PlanTable
+from handover.scenarios.study.plan.plan_table import PlanTable
 
 DEVICES: Mapping[str, str] = {
     "mouse": "mouse and keyboard",
@@ -168,7 +168,7 @@ class StudyPlan:
 
 def default_plan() -> str:
     """Return the plan of the thesis's study, as a text to start from. [Fernandes2020] ch. 5, app. B."""
-    return resources.files("handover.scenarios.study").joinpath("default_plan.toml").read_text(encoding="utf-8")
+    return resources.files("handover.scenarios.study.plan").joinpath("default_plan.toml").read_text(encoding="utf-8")
 
 
 def read_plan(path: Path) -> StudyPlan:

@@ -1,4 +1,4 @@
-"""Runs one trial of a study: `python -m handover.scenarios.study SPEC`, started by `Trial`; SPEC is in JSON."""
+"""Runs one trial of a study: `python -m handover.scenarios.study.session SPEC`, started by `Trial`; SPEC is in JSON."""
 
 import contextlib
 import json

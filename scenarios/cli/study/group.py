@@ -11,7 +11,7 @@ from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.results.run_folder import check_place, disk_errors_reported, write_whole
 
 if TYPE_CHECKING:
-    from handover.scenarios.study.plan import StudyPlan
+    from handover.scenarios.study.plan.plan import StudyPlan
 
 _HELP = """Carry out a user study with people, or with scripted pilots, after [Fernandes2020] ch. 5.
 
@@ -29,27 +29,27 @@ _HELP = """Carry out a user study with people, or with scripted pilots, after [F
 _COMMANDS = (
     DeferredCommand(
         "export",
-        "handover.scenarios.cli.study_report:export",
+        "handover.scenarios.cli.study.report:export",
         short_help="Write the tables of all participants.",
     ),
     DeferredCommand(
         "power",
-        "handover.scenarios.cli.study_power:power",
+        "handover.scenarios.cli.study.power:power",
         short_help="Simulate what a planned study could find.",
     ),
     DeferredCommand(
         "replay",
-        "handover.scenarios.cli.study_report:replay",
+        "handover.scenarios.cli.study.report:replay",
         short_help="Show a round: what happened, and its page.",
     ),
     DeferredCommand(
         "report",
-        "handover.scenarios.cli.study_report:report",
+        "handover.scenarios.cli.study.report:report",
         short_help="Write the page of a study, and all its tables.",
     ),
     DeferredCommand(
         "serve",
-        "handover.scenarios.cli.study_serve:serve",
+        "handover.scenarios.cli.study.serve:serve",
         short_help="Carry out a study: the page that people take part in.",
     ),
 )
@@ -73,7 +73,7 @@ def new(file: Path) -> None:
 
     A file that is there is not overwritten.
     """
-    from handover.scenarios.study.plan import default_plan
+    from handover.scenarios.study.plan.plan import default_plan
 
     with one_line_errors():
         if file.exists():
@@ -103,7 +103,7 @@ def checked_plan(file: Path) -> "StudyPlan":
     Raises:
         UsageError: with all that is wrong with it, a line each.
     """
-    from handover.scenarios.study.plan import InvalidPlan, read_plan
+    from handover.scenarios.study.plan.plan import InvalidPlan, read_plan
 
     try:
         return read_plan(file)
@@ -115,8 +115,8 @@ def checked_plan(file: Path) -> "StudyPlan":
 
 def plan_data(plan: "StudyPlan", participants: int) -> dict[str, Any]:
     """Return what follows from a plan with so many participants, as JSON can hold it; times are in seconds."""
-    from handover.scenarios.study.order import balance, order_row, rounds_of, session_duration
-    from handover.scenarios.study.session_folder import pseudonym_of
+    from handover.scenarios.study.folder.session_folder import pseudonym_of
+    from handover.scenarios.study.plan.order import balance, order_row, rounds_of, session_duration
 
     return {
         "title": plan.title,
@@ -142,8 +142,8 @@ def plan_data(plan: "StudyPlan", participants: int) -> dict[str, Any]:
 
 
 def _print_plan(data: dict[str, Any], plan: "StudyPlan") -> None:
-    from handover.scenarios.study.order import session_duration
-    from handover.scenarios.study.plan import DEVICES
+    from handover.scenarios.study.plan.order import session_duration
+    from handover.scenarios.study.plan.plan import DEVICES
 
     console = open_console()
     console.print(data["title"], markup=False)

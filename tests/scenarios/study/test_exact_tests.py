@@ -11,7 +11,7 @@ from scipy import stats
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.published.free_flyer.study_runs import sign_flip_test as flips_of_simulated_persons
-from handover.scenarios.study.statistics import (
+from handover.scenarios.study.statistics.exact_tests import (
     Counts,
     pair_means,
     permutation_test,

@@ -12,8 +12,8 @@ from scipy import stats
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.statistics import LEVEL, Interval, holm, success_interval
-from handover.scenarios.study.plan import StudyPlan
-from handover.scenarios.study.statistics import MIN_PARTICIPANTS, signed_rank_p
+from handover.scenarios.study.plan.plan import StudyPlan
+from handover.scenarios.study.statistics.exact_tests import MIN_PARTICIPANTS, signed_rank_p
 
 
 @dataclass(frozen=True, kw_only=True)

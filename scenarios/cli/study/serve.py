@@ -45,7 +45,7 @@ def serve(
     file: Path, out: Path, host: str, port: int, participant: int | None, *, pilot: bool, pace: float | None
 ) -> None:
     """Carry out a study."""
-    from handover.scenarios.cli.study import checked_plan
+    from handover.scenarios.cli.study.group import checked_plan
 
     with one_line_errors():
         for extra in ("reports", "live"):
@@ -57,7 +57,10 @@ def serve(
             raise UsageError(f"--pace: {file} is of people, who live at pace 1; of scripted pilots it may be another")
         if participant is not None and participant > plan.participants:
             raise UsageError(f"--participant: the plan has {plan.participants}, not {participant}")
-        from handover.scenarios.study.sessions import NotServed, serve_study  # uvicorn and starlette, of the extra
+        from handover.scenarios.study.session.served_study import (  # uvicorn and starlette, of the extra
+            NotServed,
+            serve_study,
+        )
 
         try:
             with contextlib.suppress(KeyboardInterrupt):

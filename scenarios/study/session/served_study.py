@@ -7,13 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from handover.scenarios.experiment.parameters import InvalidParameter
-from handover.scenarios.study.pilot import play_sessions
-from handover.scenarios.study.plan import StudyPlan
-from handover.scenarios.study.protocol import Protocol
-from handover.scenarios.study.seat import StudySeat
-from handover.scenarios.study.server import StudyServer, listening_socket, uvicorn_server
-from handover.scenarios.study.study_folder import StudyFolder
-from handover.scenarios.study.trial import NoHand, led_hand_of, round_parameters
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.plan import StudyPlan
+from handover.scenarios.study.session.pilot import play_sessions
+from handover.scenarios.study.session.protocol import Protocol
+from handover.scenarios.study.session.seat import StudySeat
+from handover.scenarios.study.session.server import StudyServer, listening_socket, uvicorn_server
+from handover.scenarios.study.session.trial import NoHand, led_hand_of, round_parameters
 
 
 class NotServed(RuntimeError):

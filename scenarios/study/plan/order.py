@@ -9,7 +9,7 @@ import numpy as np
 
 from handover.scenarios.catalog import named_scenario
 from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.study.plan import Condition, StudyPlan
+from handover.scenarios.study.plan.plan import Condition, StudyPlan
 
 _SEEDS = 2**31
 _RATING = 8.0

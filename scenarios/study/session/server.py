@@ -1,4 +1,4 @@
-"""Serves a study's page, one seat at a time, and nothing else.
+"""Serves a study's page, one file with its scripts, style and words inside, one seat at a time, and nothing else.
 
 On loopback, pages of other sites are kept away by the host that is asked for and by the origin of a connection. On
 another address the page is below a token that only its own address holds.
@@ -10,7 +10,10 @@ import secrets
 import signal
 import socket
 from collections.abc import AsyncGenerator, Generator
+from importlib import resources
+from typing import Any
 
+import tomli
 import uvicorn
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
@@ -20,8 +23,12 @@ from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from handover.scenarios.study.seat import LONGEST, StudySeat
-from handover.scenarios.study.study_page import study_html
+from handover.scenarios.reporting.html import json_html
+from handover.scenarios.reporting.page import asset, plain_page_html, template
+from handover.scenarios.reporting.replay_section import SCENE_SCRIPTS
+from handover.scenarios.study.folder.codebook import PILOT
+from handover.scenarios.study.plan.plan import StudyPlan
+from handover.scenarios.study.session.seat import LONGEST, StudySeat
 
 _GRACE = 30
 """Time for a run under way to end when the server does, s."""
@@ -32,6 +39,26 @@ _HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
 }
+_SCRIPTS = ("page.js", *SCENE_SCRIPTS, "hand_input.js", "study_scene.js", "study.js")
+_FALLBACK = "en"
+"""Language of buttons where the page has no words of its own."""
+
+
+def page_words() -> dict[str, dict[str, Any]]:
+    """Return the words of the page's own buttons and lines, by language."""
+    text = resources.files("handover.scenarios.study.session").joinpath("page_words.toml").read_text(encoding="utf-8")
+    return tomli.loads(text)
+
+
+def study_html(plan: StudyPlan) -> str:
+    """Return the page; in a language that it has no words of its own for, buttons are in English."""
+    words = page_words()
+    content = {
+        "words": {name: {**words[_FALLBACK], **words.get(name, {})} for name in plan.texts},
+        "pilot": PILOT if plan.pilot else "",
+    }
+    html = template("study.html").render(data=json_html(content), pilot=PILOT.capitalize() if plan.pilot else "")
+    return plain_page_html(plan.title, html, (asset("page.css"), asset("replay.css"), asset("study.css")), _SCRIPTS)
 
 
 class StudyServer:

@@ -11,8 +11,8 @@ from handover.scenarios.execution.errors import UsageError, one_line_errors, req
 from handover.scenarios.results.run_folder import RunFolder, check_place
 
 if TYPE_CHECKING:
-    from handover.scenarios.study.session_folder import SessionFolder
-    from handover.scenarios.study.study_folder import StudyFolder
+    from handover.scenarios.study.folder.session_folder import SessionFolder
+    from handover.scenarios.study.folder.study_folder import StudyFolder
 
 _FOLDER = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 
@@ -35,7 +35,7 @@ def report(folder: Path, file: Path | None) -> None:
         with _opened(folder) as study:
             check_place(folder)
             check_place(page.parent)
-            from handover.scenarios.study.report_page import write_study_report
+            from handover.scenarios.study.report.report_page import write_study_report
 
             write_study_report(study, page)
     click.echo(f"report: {page}")
@@ -51,7 +51,7 @@ def export(folder: Path) -> None:
     with one_line_errors(), _opened(folder) as study:
         check_place(folder)
         study.write_tables()
-        from handover.scenarios.study.codebook import all_tables
+        from handover.scenarios.study.folder.codebook import all_tables
 
         for name in all_tables(study.plan):
             click.echo(study.path / f"{name}.csv")
@@ -105,7 +105,7 @@ def _opened(folder: Path) -> "Generator[StudyFolder, None, None]":
     Raises:
         UsageError: there is no such folder. InvalidRunFolder: it is none of a study.
     """
-    from handover.scenarios.study.study_folder import StudyFolder
+    from handover.scenarios.study.folder.study_folder import StudyFolder
 
     if not folder.is_dir():
         raise UsageError(f"{folder} is no folder; name that of a study")

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import plotly.graph_objects as go
 
-from handover.scenarios.study.analysis import RatingTest, StudyAnalysis
+from handover.scenarios.study.statistics.analysis import RatingTest, StudyAnalysis
 
 _APART = 2.6
 """Places from a task to the next, whose two behaviours are 1 apart."""

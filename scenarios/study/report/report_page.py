@@ -7,10 +7,10 @@ from markupsafe import Markup
 
 from handover.scenarios.reporting.html import rows_table
 from handover.scenarios.reporting.page import Section, template, write_page
-from handover.scenarios.study.analysis import StudyAnalysis
-from handover.scenarios.study.codebook import PILOT
-from handover.scenarios.study.order import balance, order_row
-from handover.scenarios.study.report_sections import (
+from handover.scenarios.study.folder.codebook import PILOT
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.order import balance, order_row
+from handover.scenarios.study.report.report_sections import (
     Words,
     failures_section,
     model_section,
@@ -20,9 +20,9 @@ from handover.scenarios.study.report_sections import (
     ratings_section,
     tests_section,
 )
-from handover.scenarios.study.result_tables import result_columns, write_results
-from handover.scenarios.study.statistics import MIN_PARTICIPANTS
-from handover.scenarios.study.study_folder import StudyFolder
+from handover.scenarios.study.report.result_tables import result_columns, write_results
+from handover.scenarios.study.statistics.analysis import StudyAnalysis
+from handover.scenarios.study.statistics.exact_tests import MIN_PARTICIPANTS
 
 NO_PERSON = f"{PILOT.capitalize()}: no person took part."
 """On every section of a page whose sessions programs played."""

@@ -17,7 +17,7 @@ from websockets.exceptions import ConnectionClosed
 
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.study.plan import StudyPlan
+from handover.scenarios.study.plan.plan import StudyPlan
 
 _SPEED = 0.35
 """How fast the hand is led, m/s."""

@@ -21,15 +21,16 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.experiment.replay import Line
 from handover.scenarios.live.hand_messages import HandStream, hand_sample
 from handover.scenarios.live.input_board import InputBoard
 from handover.scenarios.live.stage import Stage
 from handover.scenarios.live.watched_run import WatchedRun
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
-from handover.scenarios.study.latency import LatencyLog, median_ms
-from handover.scenarios.study.plan import Condition
-from handover.scenarios.study.protocol import now
-from handover.scenarios.study.session_folder import RoundRecord, failed_by_rule
+from handover.scenarios.study.folder.session_folder import RoundRecord, failed_by_rule
+from handover.scenarios.study.plan.plan import Condition
+from handover.scenarios.study.session.latency import LatencyLog, median_ms
+from handover.scenarios.study.session.protocol import now
 
 _POLL = 0.02
 """How often a run's folder is looked at until it stands at its start, s."""
@@ -38,6 +39,11 @@ _PATIENCE = 60.0
 _GRACE = 5.0
 """How long a run may take to end once it is told to, s."""
 _MOST_STAMPS = 4096
+TARGET, PLUMB = "place to go", "depth"
+"""Labels of what the page moves: the place of the device's test, and lines from hand and object down to the floor."""
+_GHOST, _HAND, _OBJECT = "#009e73", "#8a5a2b", "#d1602b"
+"""Of the palette of Okabe and Ito where it is free: told apart by colour-blind eyes."""
+_RADIUS, _WIDTH = 0.025, 2.0
 
 
 class NoHand(ValueError):
@@ -135,7 +141,7 @@ class Trial:
             "told": {"from": "page", **wanted.told},
         }
         self._told = open(place / "told", "w+b")  # noqa: SIM115 (closed by `close`)
-        command = [sys.executable, "-m", "handover.scenarios.study", json.dumps(spec)]
+        command = [sys.executable, "-m", "handover.scenarios.study.session", json.dumps(spec)]
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=self._told, start_new_session=True
         )
@@ -165,6 +171,18 @@ class Trial:
     def newest(self) -> Record | None:
         """The newest row of the run."""
         return None if self.stage is None else self.stage.newest
+
+    def scene(self) -> dict[str, Any] | None:
+        """Return the scene as the person sees it and `sceneIn` takes it, None where the scenario has none.
+
+        Its last traces are moved by the page, and hidden at first: a ball at `TARGET`, then two `PLUMB` lines, of the
+        hand and of the object, which help to see how far away these are.
+        """
+        assert self.stage is not None
+        hidden = np.full((1, 2, 3), np.nan)
+        ball = Line(label=TARGET, colour=_GHOST, points=hidden, radii=np.full(2, _RADIUS), opacity=0.5)
+        plumbs = [Line(label=PLUMB, colour=colour, points=hidden, width=_WIDTH) for colour in (_HAND, _OBJECT)]
+        return self.stage.scene_of_person([ball, *plumbs])
 
     def go(self) -> None:
         """Let the run go on."""

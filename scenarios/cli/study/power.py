@@ -8,12 +8,12 @@ from rich.table import Table
 
 from handover.scenarios.cli.console import open_console, print_json
 from handover.scenarios.cli.options import FiniteRange
-from handover.scenarios.cli.study import checked_plan
+from handover.scenarios.cli.study.group import checked_plan
 from handover.scenarios.execution.errors import one_line_errors, require_extra
 
 if TYPE_CHECKING:
     from handover.scenarios.campaign.statistics import Interval
-    from handover.scenarios.study.power import Power
+    from handover.scenarios.study.statistics.power import Power
 
 _HELP = """Simulate the ratings of the study in PLAN.toml many times, and print how often its tests find an effect.
 
@@ -91,7 +91,7 @@ def power(
     plan = checked_plan(file)
     with one_line_errors():
         require_extra("study", "the simulation of a study")
-        from handover.scenarios.study.power import PowerAssumptions, fewest_participants, simulated_power
+        from handover.scenarios.study.statistics.power import PowerAssumptions, fewest_participants, simulated_power
 
         assumed = PowerAssumptions(effect=effect, spread=spread, correlation=correlation, repeats=repeat, seed=seed)
         found = [simulated_power(plan, n, assumed) for n in participants or (plan.participants,)]

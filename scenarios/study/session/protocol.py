@@ -12,11 +12,11 @@ from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime, timezone
 from typing import Any, cast
 
-from handover.scenarios.study.order import Round
-from handover.scenarios.study.plan import DEVICES, StudyText
-from handover.scenarios.study.session_folder import RoundRecord, Session, SessionFolder
-from handover.scenarios.study.session_notes import VoidAttempt
-from handover.scenarios.study.study_folder import StudyFolder
+from handover.scenarios.study.folder.session_folder import RoundRecord, Session, SessionFolder
+from handover.scenarios.study.folder.session_notes import VoidAttempt
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.order import Round
+from handover.scenarios.study.plan.plan import DEVICES, StudyText
 
 MOST_ATTEMPTS = 3
 """How often a round is played at most that fails for a reason which is not the participant's (assumed)."""

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from handover.scenarios.campaign.statistics import holm, success_interval
-from handover.scenarios.study.mixed_ordinal import MixedModel, NotFitted, fit_mixed_ordinal
-from handover.scenarios.study.session_folder import SessionFolder
-from handover.scenarios.study.statistics import (
+from handover.scenarios.study.folder.session_folder import SessionFolder
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.statistics.exact_tests import (
     MIN_PARTICIPANTS,
     Counts,
     SignedRankTest,
@@ -23,7 +23,7 @@ from handover.scenarios.study.statistics import (
     signed_rank_test,
     within_condition_slope,
 )
-from handover.scenarios.study.study_folder import StudyFolder
+from handover.scenarios.study.statistics.mixed_ordinal import MixedModel, NotFitted, fit_mixed_ordinal
 
 FAILURE = "failure"
 """As a measure beside the statements: 1 of a round that failed by the rule, 0 of one that did not."""

@@ -26,10 +26,9 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.cosim.exceptions import RecordNotWritten
 from handover.scenarios.results.run_folder import InvalidRunFolder
-from handover.scenarios.study.device_test import DeviceTest
-from handover.scenarios.study.protocol import InvalidAction, Protocol
-from handover.scenarios.study.study_scene import study_scene
-from handover.scenarios.study.trial import Trial, TrialFailed, Wanted, round_parameters
+from handover.scenarios.study.session.device_test import DeviceTest
+from handover.scenarios.study.session.protocol import InvalidAction, Protocol
+from handover.scenarios.study.session.trial import Trial, TrialFailed, Wanted, round_parameters
 
 PERIOD = 1.0 / 60.0
 """Time between two states of the run that the page gets, s."""
@@ -213,7 +212,7 @@ class StudySeat:
         self._page_ready.clear()
         if self._test is None and self.protocol.screen == "practising":
             self._test = DeviceTest()
-        await self._send({"scene": study_scene(stage), "hand": trial.hand})
+        await self._send({"scene": trial.scene(), "hand": trial.hand})
         await self._send_frame(trial, always=True)
         try:
             await asyncio.wait_for(self._page_ready.wait(), _READY)

@@ -6,10 +6,20 @@ from pathlib import Path
 from typing import Any
 
 from handover.scenarios.results.run_folder import disk_errors_reported
-from handover.scenarios.study.analysis import StudyAnalysis
-from handover.scenarios.study.codebook import NUMBER, PERSON, PILOT, TEXT, WHO, WHOLE, Column, write_codebook, write_csv
-from handover.scenarios.study.plan import StudyPlan
-from handover.scenarios.study.statistics import SignedRankTest
+from handover.scenarios.study.folder.codebook import (
+    NUMBER,
+    PERSON,
+    PILOT,
+    TEXT,
+    WHO,
+    WHOLE,
+    Column,
+    write_codebook,
+    write_csv,
+)
+from handover.scenarios.study.plan.plan import StudyPlan
+from handover.scenarios.study.statistics.analysis import StudyAnalysis
+from handover.scenarios.study.statistics.exact_tests import SignedRankTest
 
 _Rows = list[dict[str, Any]]
 

@@ -18,10 +18,10 @@ from handover.scenarios.results.run_folder import (
     versions,
     write_whole,
 )
-from handover.scenarios.study.codebook import PERSON, PILOT, all_tables, write_codebook, write_csv, write_parquet
-from handover.scenarios.study.order import order_row
-from handover.scenarios.study.plan import InvalidPlan, StudyPlan, parse_plan
-from handover.scenarios.study.session_folder import Session, SessionFolder, pseudonym_of
+from handover.scenarios.study.folder.codebook import PERSON, PILOT, all_tables, write_codebook, write_csv, write_parquet
+from handover.scenarios.study.folder.session_folder import Session, SessionFolder, pseudonym_of
+from handover.scenarios.study.plan.order import order_row
+from handover.scenarios.study.plan.plan import InvalidPlan, StudyPlan, parse_plan
 
 
 class StudyFolder:

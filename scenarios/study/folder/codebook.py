@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.scenarios.results.run_folder import disk_errors_reported, write_whole
-from handover.scenarios.study.plan import DEVICES, StudyPlan
+from handover.scenarios.study.plan.plan import DEVICES, StudyPlan
 
 PERSON, PILOT = "person", "scripted pilot"
 """Who played a session, in every table."""

@@ -1,0 +1,1 @@
+"""The commands `handover study ...`, a file for what belongs together; `group.py` names them."""

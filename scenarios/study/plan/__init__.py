@@ -1,0 +1,1 @@
+"""What a study is to be: its plan, checked, and the order of each participant's rounds."""

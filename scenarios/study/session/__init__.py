@@ -1,0 +1,1 @@
+"""How a study is carried out: what a participant goes through, the page, the hand's devices, a run for each round."""
