@@ -13,6 +13,7 @@ from handover.scenarios.results.run_folder import RunFolder, check_place
 if TYPE_CHECKING:
     from handover.scenarios.study.folder.session_folder import SessionFolder
     from handover.scenarios.study.folder.study_folder import StudyFolder
+    from handover.scenarios.study.plan.order import Round
 
 _FOLDER = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 
@@ -61,13 +62,19 @@ def export(folder: Path) -> None:
 @_FOLDER
 @click.argument("participant")
 @click.argument("number", metavar="ROUND", type=click.IntRange(1))
-def replay(folder: Path, participant: str, number: int) -> None:
-    """Show what happened in a ROUND of a PARTICIPANT, such as P01, and write the page of its run, with the replay."""
+@click.option("--check", is_flag=True, help="Carry it out again from its recorded inputs instead, and compare.")
+def replay(folder: Path, participant: str, number: int, *, check: bool) -> None:
+    """Show what happened in a ROUND of a PARTICIPANT, such as P01, and write the page of its run, with the replay.
+
+    With --check the round is run again with the hand's recorded inputs; exit status 1 says that a signal has not the
+    same bytes as in the record, and the first difference is told.
+    """
+    if check:
+        _check(folder, participant, number)
+        return
     with one_line_errors(), _opened(folder) as study:
         session = _session(study, participant)
-        planned = next((r for r in session.rounds if r.number == number), None)
-        if planned is None:
-            raise UsageError(f"the plan has {len(session.rounds)} rounds, none of number {number}")
+        planned = _planned(session, number)
         record = session.records.get(number)
         run = RunFolder.of_run(session.run_folder(number))
         who = f"{session.session.pseudonym} ({session.session.kind}), round {number}"
@@ -96,6 +103,36 @@ def replay(folder: Path, participant: str, number: int) -> None:
             for line in write_run_page(run):
                 click.echo(line, err=True)
     click.echo(f"page: {run.report}")
+
+
+def _check(folder: Path, participant: str, number: int) -> None:
+    """Say whether a round gives the same signals when it is carried out again; exit with 1 if it does not."""
+    with one_line_errors(), _opened(folder) as study:
+        session = _session(study, participant)
+        planned = _planned(session, number)
+        require_extra("live", "the check of a round")
+        from handover.scenarios.study.session.round_check import check_round
+
+        found = check_round(session, planned)
+    who = f"{session.session.pseudonym}, round {number}"
+    if found.other_versions:
+        click.echo(f"{who} was recorded by other versions: {found.other_versions}")
+    if found.difference is not None:
+        click.echo(f"{who} differs when it is carried out again, first in {found.difference}")
+        raise click.exceptions.Exit(1)
+    click.echo(f"{who}: the same byte for byte when carried out again, {found.signals} signals in {found.rows} rows")
+
+
+def _planned(session: "SessionFolder", number: int) -> "Round":
+    """Return a round of a session.
+
+    Raises:
+        UsageError: the plan has none of this number.
+    """
+    planned = next((r for r in session.rounds if r.number == number), None)
+    if planned is None:
+        raise UsageError(f"the plan has {len(session.rounds)} rounds, none of number {number}")
+    return planned
 
 
 @contextmanager
