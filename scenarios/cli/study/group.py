@@ -22,8 +22,9 @@ _HELP = """Carry out a user study with people, or with scripted pilots, after [F
                                          the page that people take part in
   handover study power plan.toml         simulates what so many participants could find
   handover study report DIR              a study's page: failures, ratings, tests, methods
-  handover study replay DIR P01 3        what happened in a round, and its page
+  handover study replay DIR P01 3        what happened in a round, and its page; --check
   handover study export DIR              tables of all participants, for pandas and others
+  handover study withdraw DIR P01        leaves out who has withdrawn; --delete deletes
 """
 
 _COMMANDS = (
@@ -51,6 +52,11 @@ _COMMANDS = (
         "serve",
         "handover.scenarios.cli.study.serve:serve",
         short_help="Carry out a study: the page that people take part in.",
+    ),
+    DeferredCommand(
+        "withdraw",
+        "handover.scenarios.cli.study.report:withdraw",
+        short_help="Leave a participant who has withdrawn out of all results.",
     ),
 )
 

@@ -1,4 +1,4 @@
-"""The commands `handover study report`, `replay` and `export`: what a study's folder shows."""
+"""The commands `handover study report`, `replay`, `export` and `withdraw`: what is made of a study's folder."""
 
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -105,6 +105,38 @@ def replay(folder: Path, participant: str, number: int, *, check: bool) -> None:
     click.echo(f"page: {run.report}")
 
 
+@click.command("withdraw", short_help="Leave a participant who has withdrawn out of all results.")
+@_FOLDER
+@click.argument("participant")
+@click.option("--delete", is_flag=True, help="Delete all that was kept of the participant, too; for good.")
+def withdraw(folder: Path, participant: str, *, delete: bool) -> None:
+    """Leave a PARTICIPANT, such as P01, who has withdrawn from the study in DIR, out of all tables, tests and exports.
+
+    The number stays taken; the report says how many have withdrawn, and when. Tables and a page that are in DIR already
+    are written again.
+    """
+    with one_line_errors(), _opened(folder) as study:
+        from handover.scenarios.study.folder.session_folder import pseudonym_of
+        from handover.scenarios.study.session.protocol import now
+
+        number = _number(study, participant)
+        check_place(folder)
+        page = folder / "report.html"
+        if shown := page.exists() or (folder / "results").exists():
+            require_extra("reports", "the page, which is written again without the participant")
+        with study.held():
+            withdrawal = study.withdraw(number, now(), delete=delete)
+            if shown:
+                from handover.scenarios.study.report.report_page import write_study_report
+
+                write_study_report(study, page)
+    kept = f"deleted on {withdrawal.deleted}" if withdrawal.deleted else "not deleted; --delete does it"
+    click.echo(
+        f"{pseudonym_of(number)} withdrew on {withdrawal.ended}: in no table and no test; what was kept is {kept}"
+    )
+    click.echo("tables and pages that were copied elsewhere still have it", err=True)
+
+
 def _check(folder: Path, participant: str, number: int) -> None:
     """Say whether a round gives the same signals when it is carried out again; exit with 1 if it does not."""
     with one_line_errors(), _opened(folder) as study:
@@ -153,10 +185,24 @@ def _session(study: "StudyFolder", participant: str) -> "SessionFolder":
     """Return the session of a participant by number or pseudonym.
 
     Raises:
-        UsageError: there is none.
+        UsageError: there is none, or the participant has withdrawn.
+    """
+    number = _number(study, participant)
+    if number in study.withdrawals:
+        raise UsageError(
+            f"{participant} withdrew on {study.withdrawals[number].ended}: nothing of theirs is shown"
+        )
+    return study.session(number)
+
+
+def _number(study: "StudyFolder", participant: str) -> int:
+    """Return the number of a participant by number or pseudonym.
+
+    Raises:
+        UsageError: no session of theirs has begun.
     """
     digits = participant.upper().removeprefix("P")
     if not digits.isdecimal() or int(digits) not in study.numbers:
         known = ", ".join(s.session.pseudonym for s in study.sessions) or "none"
         raise UsageError(f"no participant {participant!r}; sessions that have begun: {known}")
-    return study.session(int(digits))
+    return int(digits)

@@ -7,6 +7,7 @@
   const main = byId("screen");
   let shown = null, play = null, input = null, test = null, over = false, drawn = [];
   const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
+  const DEPTH = 0.3;  // of what the wheel moves the hand elsewhere
   const device = () => shown?.device ?? "";
 
   // A word of the page in the language of the study, with values in place of {names}.
@@ -81,7 +82,7 @@
     questions,
     thanks: s => [node("h1", {}, word("thanks")), ...paragraphs(s.thanks),
       actions(button("next_participant", () => act("next")))],
-    withdrawn: () => [node("h1", {}, word("thanks")), node("p", {}, word("withdrawn")),
+    withdrawn: s => [node("h1", {}, word("thanks")), node("p", {}, word("withdrawn", s)),
       actions(button("next_participant", () => act("next")))],
     complete: () => [node("h1", {}, word("thanks")), node("p", {}, word("complete"))],
   };
@@ -174,13 +175,27 @@
     const onChange = closed => { byId("grasp").textContent = word(closed ? "open_hand" : "close_hand"); };
     byId("grasp").hidden = device() !== "touch";
     onChange(start.closed);
-    const onSample = hand => link.bufferedAmount < 4000 && send({hand});
+    let last = -Infinity;
+    const onSample = hand => {
+      last = Math.max(hand.stamp, last + 1e-4);  // a click may be stamped earlier than the move before it
+      if (link.bufferedAmount < 4000) send({hand: {...hand, stamp: last}});
+    };
     input = handInput({element: byId("pad"), camera: play.scene.camera, start, onSample, onChange});
     input.choose(INPUTS[device()] ?? "nothing");
     byId("pad").focus({preventScroll: true});
     keys = event => { if (event.key === "v" || event.key === "V") turnViews(); };
     requestAnimationFrame(() => requestAnimationFrame(() => send({ready: true})));
   }
+
+  // A notch of a wheel, 100 pixels, is 5 cm for the hand: too coarse for an object of 4 cm. Here it goes 1.5 cm.
+  byId("eye").addEventListener("wheel", event => {
+    if (!event.isTrusted || event.altKey || INPUTS[device()] !== "pointer") return;
+    event.preventDefault();
+    event.stopPropagation();
+    const {deltaMode, clientX, clientY} = event;
+    byId("pad").dispatchEvent(new WheelEvent("wheel", {deltaY: DEPTH * event.deltaY, deltaMode, clientX, clientY, bubbles: true, cancelable: true}));
+  }, {capture: true, passive: false});
+
   function endPlay() {
     flush();
     input?.end();

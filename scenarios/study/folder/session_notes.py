@@ -1,12 +1,13 @@
 """What is kept of a session besides its rounds: the practice, attempts at rounds that do not count, a withdrawal."""
 
 import json
+import shutil
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from handover.scenarios.results.run_folder import InvalidRunFolder, read_object, write_whole
+from handover.scenarios.results.run_folder import InvalidRunFolder, disk_errors_reported, read_object, write_whole
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,21 @@ class VoidAttempt:
     ended: str
     reason: str
     folder: str
+
+
+@dataclass(frozen=True)
+class Withdrawal:
+    """A participant's withdrawal: what was kept of them is in no result.
+
+    Attributes:
+        ended: date and time by ISO 8601.
+        during: whether the session was under way, and not over.
+        deleted: when what was kept was deleted, likewise; "" if it was not.
+    """
+
+    ended: str
+    during: bool = True
+    deleted: str = ""
 
 
 class SessionNotes:
@@ -58,21 +74,40 @@ class SessionNotes:
         _write(self._practice, shown)
 
     @property
-    def withdrawn(self) -> str | None:
-        """When the participant ended the session before its end, by ISO 8601; None if that was not so.
+    def withdrawn(self) -> Withdrawal | None:
+        """The participant's withdrawal; None if there was none.
 
         Raises:
             InvalidRunFolder: its file is damaged.
         """
-        return str(read_object(self._withdrawn, "").get("ended", "")) if self._withdrawn.is_file() else None
+        if not self._withdrawn.is_file():
+            return None
+        kept = read_object(self._withdrawn, "")
+        of = {f.name: kept[f.name] for f in fields(Withdrawal) if f.name in kept}
+        if not isinstance(of.get("ended"), str):
+            raise InvalidRunFolder(self._path, f"its {self._withdrawn.name} is damaged: it does not say when")
+        return Withdrawal(**of)
 
-    def keep_withdrawal(self, when: str) -> None:
-        """Note that the participant has ended the session.
+    def keep_withdrawal(self, withdrawal: Withdrawal) -> None:
+        """Note that the participant has withdrawn.
 
         Raises:
             RecordNotWritten: it cannot be written.
         """
-        _write(self._withdrawn, {"ended": when})
+        _write(self._withdrawn, asdict(withdrawal))
+
+    def delete_all_else(self) -> None:
+        """Delete all of the session but the note of its withdrawal.
+
+        Raises:
+            RecordNotWritten: something cannot be deleted.
+        """
+        with disk_errors_reported(self._path):
+            for entry in self._path.iterdir():
+                if entry.is_dir() and not entry.is_symlink():
+                    shutil.rmtree(entry)
+                elif entry != self._withdrawn:
+                    entry.unlink()
 
     @property
     def void_attempts(self) -> list[VoidAttempt]:

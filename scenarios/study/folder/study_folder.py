@@ -7,7 +7,7 @@ tables of all participants, rounds, answers, questionnaire and sessions, are mad
 import contextlib
 import json
 from collections.abc import Generator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from handover.scenarios.results.run_folder import (
@@ -20,6 +20,7 @@ from handover.scenarios.results.run_folder import (
 )
 from handover.scenarios.study.folder.codebook import PERSON, PILOT, all_tables, write_codebook, write_csv, write_parquet
 from handover.scenarios.study.folder.session_folder import Session, SessionFolder, pseudonym_of
+from handover.scenarios.study.folder.session_notes import SessionNotes, Withdrawal
 from handover.scenarios.study.plan.order import order_row
 from handover.scenarios.study.plan.plan import InvalidPlan, StudyPlan, parse_plan
 
@@ -82,9 +83,9 @@ class StudyFolder:
 
     @property
     def numbers(self) -> list[int]:
-        """Numbers of the participants whose sessions have begun."""
-        found = [f.parent.name[1:] for f in self.participants.glob("P*/session.json")]
-        return sorted(int(n) for n in found if n.isdecimal())
+        """Numbers of the participants whose sessions have begun, of those who have withdrawn, too."""
+        files = [*self.participants.glob("P*/session.json"), *self.participants.glob("P*/withdrawn.json")]
+        return sorted({int(f.parent.name[1:]) for f in files if f.parent.name[1:].isdecimal()})
 
     @property
     def next_number(self) -> int:
@@ -93,8 +94,36 @@ class StudyFolder:
 
     @property
     def sessions(self) -> list["SessionFolder"]:
-        """All sessions that have begun."""
-        return [self.session(n) for n in self.numbers]
+        """All sessions that have begun, but those of participants who have withdrawn: they are in no result."""
+        withdrawn = self.withdrawals
+        return [self.session(n) for n in self.numbers if n not in withdrawn]
+
+    @property
+    def withdrawals(self) -> dict[int, Withdrawal]:
+        """Who has withdrawn, by number."""
+        notes = {n: SessionNotes(self.participants / pseudonym_of(n)) for n in self.numbers}
+        return {n: withdrawal for n, of in notes.items() if (withdrawal := of.withdrawn) is not None}
+
+    def withdraw(self, number: int, when: str, *, delete: bool) -> Withdrawal:
+        """Leave a participant out of all results from now on, as they want it, and delete what was kept if they do.
+
+        Their number stays taken. Tables of all participants that are there already are written again.
+
+        Raises:
+            InvalidRunFolder: no session of this number has begun. RecordNotWritten: something cannot be written.
+        """
+        notes = SessionNotes(self.participants / pseudonym_of(number))
+        withdrawal = notes.withdrawn
+        if withdrawal is None:
+            withdrawal = Withdrawal(when, during=not self.session(number).is_complete)
+            notes.keep_withdrawal(withdrawal)
+        if delete and not withdrawal.deleted:
+            notes.delete_all_else()
+            withdrawal = replace(withdrawal, deleted=when)
+            notes.keep_withdrawal(withdrawal)
+        if any((self.path / f"{name}.csv").exists() for name in all_tables(self.plan)):
+            self.write_tables()
+        return withdrawal
 
     def session(self, number: int) -> "SessionFolder":
         """Return a session that has begun.
@@ -102,6 +131,10 @@ class StudyFolder:
         Raises:
             InvalidRunFolder: there is none of that number, or its session.json is damaged.
         """
+        withdrawal = self.withdrawals.get(number)
+        if withdrawal is not None and withdrawal.deleted:
+            fault = f"its participant has withdrawn, and what was kept was deleted on {withdrawal.deleted}"
+            raise InvalidRunFolder(self.participants / pseudonym_of(number), fault)
         return SessionFolder.read(self.participants / pseudonym_of(number), self.plan)
 
     def begin(self, session: Session) -> "SessionFolder":
@@ -159,7 +192,8 @@ class StudyFolder:
 
 def _faults_of(session: Session, plan: StudyPlan, path: Path) -> list[str]:
     """Return why a session cannot begin; a person who may not take part leaves nothing."""
-    faults = ["a session has begun in it"] if (path / "session.json").exists() else []
+    begun = any((path / name).exists() for name in ("session.json", "withdrawn.json"))
+    faults = ["a session has begun in it"] if begun else []
     if not session.pilot:
         faults += _not_confirmed(session, plan)
     if session.device not in plan.devices:

@@ -1,6 +1,7 @@
 """Writes the page of a study: who took part, what did not count, the results, and the methods in words."""
 
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 from markupsafe import Markup
@@ -8,6 +9,7 @@ from markupsafe import Markup
 from handover.scenarios.reporting.html import rows_table
 from handover.scenarios.reporting.page import Section, template, write_page
 from handover.scenarios.study.folder.codebook import PILOT
+from handover.scenarios.study.folder.session_folder import pseudonym_of
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.order import balance, order_row
 from handover.scenarios.study.report.report_sections import (
@@ -79,6 +81,8 @@ def _header(analysis: StudyAnalysis) -> Markup:
     told = f"{plan.participants} are planned; {counted} of {played} rounds that were played count."
     if incomplete:
         told += f" Not complete: {', '.join(incomplete)}."
+    if withdrawn := len(analysis.study.withdrawals):
+        told += f" {_counted(withdrawn, 'participant')} withdrew, and {'is' if withdrawn == 1 else 'are'} in no result."
     lines.append(Markup("<p class='verdict'><b>{}</b>: {}</p>").format(who, told))
     if n:
         lines.append(note(balance(plan, n)))
@@ -154,13 +158,68 @@ def _exclusions_section(analysis: StudyAnalysis, words: Words) -> Section:
     unmeasured = len(analysis.counted) - len(measured)
     if unmeasured:
         html += note(f"{unmeasured} rounds that count have no latency: it was not measured.")
-    broken = [s for s in analysis.sessions if not s.is_complete]
-    for s in broken:
-        html += note(
-            f"{s.session.pseudonym}: the session is not complete; its rounds that were played and rated are in all "
-            "results where both behaviours have one."
-        )
+    html += _withdrawals(analysis) + _entering(analysis, words)
     return Section(anchor="exclusions", title="What does not count", html=html)
+
+
+def _withdrawals(analysis: StudyAnalysis) -> Markup:
+    """Return who withdrew and when; nothing else is told of them."""
+    withdrawals = analysis.study.withdrawals
+    if not withdrawals:
+        return note("Nobody has withdrawn.")
+    rows = [
+        (
+            pseudonym_of(number),
+            w.ended,
+            "during the session" if w.during else "after it",
+            f"deleted {w.deleted}" if w.deleted else "kept, and in no result",
+        )
+        for number, w in withdrawals.items()
+    ]
+    header = ("participant", "withdrew", "", "what was kept of them")
+    return rows_table(header, rows, caption=f"Withdrawn: {_counted(len(rows), 'participant')}, in no table and no test")
+
+
+def _entering(analysis: StudyAnalysis, words: Words) -> Markup:
+    """Return which sessions enter which results, and by which rule; and what incomplete ones give to which tests."""
+    plan, begun = analysis.plan, len(analysis.sessions)
+    failures, ratings = analysis.failure_tests, analysis.rating_tests
+    pairs = "complete pairs: rounds of both behaviours in the same task and period that count"
+    rows = [
+        (
+            "failures by task and behaviour",
+            "every round that counts",
+            str(len({r["participant"] for r in analysis.counted})),
+        ),
+        ("tests of failures", f"{pairs}, and can be judged", _between([t.participants for t in failures])),
+        ("tests of ratings", f"{pairs}, and were rated", _between([t.participants for t in ratings])),
+        (
+            "order effects",
+            "complete sessions alone, as orders are balanced in these",
+            str(len(analysis.complete_sessions)),
+        ),
+        (
+            "mixed ordinal model",
+            "every rating that counts",
+            str(len({a["participant"] for a in analysis.answers if not a["void"]})),
+        ),
+    ]
+    header = ("result", "what enters it", f"participants, of {begun}")
+    html = rows_table(header, rows, numbers=(2,), caption="Which sessions enter which results")
+    for s in analysis.sessions:
+        if not s.is_complete:
+            who = s.session.pseudonym
+            tasks = [
+                words.task(t) for t in plan.tasks if any(m.participant == who and m.task == t for m in analysis.means)
+            ]
+            where = f"by complete pairs the tests of {', '.join(tasks)}" if tasks else "no test, as no pair is complete"
+            html += note(f"{who}: the session is not complete; it enters {where}.")
+    return html
+
+
+def _between(numbers: Sequence[int]) -> str:
+    low, high = min(numbers), max(numbers)
+    return str(low) if low == high else f"{low} to {high}"
 
 
 def _methods_section(analysis: StudyAnalysis) -> Section:

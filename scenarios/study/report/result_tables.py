@@ -60,7 +60,7 @@ def result_columns(plan: StudyPlan) -> Mapping[str, Sequence[Column]]:
         "failure_tests": (
             _KIND,
             _TASK,
-            Column("participants", WHOLE, "1", "participants with judged rounds of both behaviours"),
+            Column("participants", WHOLE, "1", "participants with a complete pair of judged rounds"),
             Column("difference", NUMBER, "1", f"mean difference of their shares of failures, {difference}", True),
             _p("p_rounds", "exact permutation of rounds within participants, two-sided"),
             _p("p_holm", "the same, corrected over tasks by Holm"),
@@ -70,7 +70,7 @@ def result_columns(plan: StudyPlan) -> Mapping[str, Sequence[Column]]:
             *WHO,
             _TASK,
             _STATEMENT,
-            Column("first", NUMBER, "1", f"mean of the participant's ratings, {first}"),
+            Column("first", NUMBER, "1", f"mean of the participant's ratings in complete pairs, {first}"),
             Column("second", NUMBER, "1", f"the same, {second}"),
         ),
         "rating_tests": (

@@ -13,7 +13,7 @@ from datetime import datetime, timezone
 from typing import Any, cast
 
 from handover.scenarios.study.folder.session_folder import RoundRecord, Session, SessionFolder
-from handover.scenarios.study.folder.session_notes import VoidAttempt
+from handover.scenarios.study.folder.session_notes import VoidAttempt, Withdrawal
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.order import Round
 from handover.scenarios.study.plan.plan import DEVICES, StudyText
@@ -247,10 +247,10 @@ class Protocol:
         self.screen = "thanks"
 
     def _withdraw(self) -> None:
-        """End the session, as the participant wants; what was kept until then stays."""
+        """End the session, as the participant wants; what was kept until then is in no result."""
         if self.session is None or self.screen in ("thanks", "withdrawn", "declined"):
             raise InvalidAction("no session is under way")
-        self.session.notes.keep_withdrawal(now())
+        self.session.notes.keep_withdrawal(Withdrawal(now()))
         self.screen = "withdrawn"
 
     def _start_anew(self, _value: Any) -> None:

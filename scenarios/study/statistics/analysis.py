@@ -1,7 +1,10 @@
 """What follows from a study's rounds and ratings: failures, tests of ratings, order effects, a mixed model.
 
-Differences are of the plan's first behaviour minus the second. Void rounds do not count. Means are a participant's own,
-so that a participant counts once in a test, however many rounds there were.
+Differences are of the plan's first behaviour minus the second. Void rounds do not count, and who has withdrawn is not
+there. Means are a participant's own, so that a participant counts once in a test, however many rounds there were.
+
+What is not complete enters a comparison by complete pairs alone: rounds of both behaviours in the same task and period,
+so that neither a broken-off session nor a void round gives one behaviour the later rounds.
 """
 
 from collections.abc import Iterable, Sequence
@@ -58,12 +61,12 @@ class FailureTest:
     """Failures of a task compared within participants; p-values are None with fewer than six participants.
 
     Attributes:
-        participants: with judged rounds of both behaviours.
+        participants: with a complete pair of judged rounds.
         difference: of their shares of failures, mean.
         p_rounds: by permutation of the rounds within participants.
         p_holm: the same, corrected over tasks.
-        p_participants: by flips of whole participants' differences: rounds of one may depend on each other. With void
-            rounds, a participant has the weight of the product of both numbers of rounds.
+        p_participants: by flips of whole participants' differences: rounds of one may depend on each other. A
+            participant has the weight of the square of the number of pairs.
     """
 
     task: str
@@ -90,7 +93,7 @@ class RatingTest:
     """Ratings of a statement in a task compared; `test` is None with fewer than six participants.
 
     Attributes:
-        participants: with ratings of both behaviours.
+        participants: with a complete pair of ratings.
         first, second: means of the participants' means.
         p_holm: corrected over all tests.
     """
@@ -150,6 +153,11 @@ class StudyAnalysis:
         self.rounds: list[_Row] = [row for s in self.sessions for row in s.rounds_rows()]
         self.answers: list[_Row] = [row for s in self.sessions for row in s.answers_rows()]
 
+    @cached_property
+    def complete_sessions(self) -> Sequence[SessionFolder]:
+        """Those of which all rounds were played and rated, and the questions answered."""
+        return [s for s in self.sessions if s.is_complete]
+
     @property
     def counted(self) -> list[_Row]:
         """Rounds that count."""
@@ -198,20 +206,17 @@ class StudyAnalysis:
         )
 
     def _counts(self, participant: str, task: str) -> Counts | None:
-        """Return a participant's failures in a task; None without judged rounds of both behaviours."""
+        """Return a participant's failures in complete pairs of rounds of a task; None without any."""
         rows = [r for r in self.counted if (r["participant"], r["task"]) == (participant, task)]
-        judged = {
-            b: [r["failed_by_rule"] for r in rows if r["behaviour"] == b and r["failed_by_rule"] is not None]
-            for b in self.plan.behaviours
-        }
-        first, second = (judged[b] for b in self.plan.behaviours)
+        paired = self._paired([r for r in rows if r["failed_by_rule"] is not None])
+        first, second = ([r["failed_by_rule"] for r in paired if r["behaviour"] == b] for b in self.plan.behaviours)
         return Counts(sum(first), len(first), sum(second), len(second)) if first and second else None
 
     @cached_property
     def means(self) -> Sequence[PairedMeans]:
-        """Participants' means of each task and statement with ratings of both behaviours."""
+        """Participants' means of each task and statement over complete pairs of ratings."""
         values: dict[tuple[str, str, str, str], list[int]] = {}
-        for a in self._rated:
+        for a in self._paired(self._rated):
             values.setdefault((a["participant"], a["task"], a["statement"], a["behaviour"]), []).append(a["value"])
         found: list[PairedMeans] = []
         for task in self.plan.tasks:
@@ -224,6 +229,14 @@ class StudyAnalysis:
                         of = {"participant": who, "task": task, "statement": statement}
                         found.append(PairedMeans(**of, first=means[0], second=means[1]))
         return found
+
+    def _paired(self, rows: Sequence[_Row]) -> list[_Row]:
+        """Return the rows of complete pairs: the participant has both behaviours in the same task and period."""
+        behaviours: dict[tuple[Any, ...], set[str]] = {}
+        of = [(r["participant"], r["task"], r["period"], r.get("statement")) for r in rows]
+        for key, row in zip(of, rows, strict=True):
+            behaviours.setdefault(key, set()).add(row["behaviour"])
+        return [row for key, row in zip(of, rows, strict=True) if len(behaviours[key]) == len(self.plan.behaviours)]
 
     @property
     def _rated(self) -> list[_Row]:
@@ -249,7 +262,10 @@ class StudyAnalysis:
 
     @cached_property
     def order_effects(self) -> Sequence[OrderEffect]:
-        """How ratings and failures go with the round's number, the period, and the behaviour of the round before."""
+        """How ratings and failures go with the round's number, the period, and the behaviour of the round before.
+
+        Of complete sessions alone: the orders are balanced in these.
+        """
         measured = {name: [a for a in self._rated if a["statement"] == name] for name in self.plan.statements}
         judged = [r for r in self.counted if r["failed_by_rule"] is not None]
         measured[FAILURE] = [{**r, "value": float(r["failed_by_rule"])} for r in judged]
@@ -258,7 +274,7 @@ class StudyAnalysis:
 
     def _order_effect(self, effect: str, measure: str, rows: Sequence[_Row]) -> OrderEffect:
         slopes: list[float] = []
-        for s in self.sessions:
+        for s in self.complete_sessions:
             own = [r for r in rows if r["participant"] == s.session.pseudonym]
             placed = [(x, r) for r in own if (x := self._place(effect, s, r["round"])) is not None]
             if placed:

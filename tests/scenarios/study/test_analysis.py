@@ -137,3 +137,46 @@ def test_a_session_that_was_broken_off_gives_what_it_has(tmp_path: Path):
     analysis = StudyAnalysis(study)
     assert not analysis.sessions[6].is_complete
     assert {t.participants for t in analysis.rating_tests} == {8}
+
+
+def test_comparisons_take_complete_pairs_and_order_effects_complete_sessions(tmp_path: Path):
+    study = write_study(tmp_path / "out", 6, rigid_is_better)
+    folder = study.begin(session(7))
+    played = folder.rounds[:4]
+    void = next(r for r in played if r.condition.task == played[0].condition.task)
+    for planned in played:
+        folder.record_round(planned.number, record(void=planned is void))
+        if planned is not void:
+            folder.record_answers(planned.number, dict.fromkeys(PLAN.statements, 5))
+    counted = [r.condition for r in played if r is not void]
+    both = {t for t in PLAN.tasks if {c.behaviour for c in counted if c.task == t} == set(PLAN.behaviours)}
+    analysis = StudyAnalysis(study)
+    assert {t.task: t.participants for t in analysis.rating_tests} == {t: 6 + (t in both) for t in PLAN.tasks}
+    assert {t.task: t.participants for t in analysis.failure_tests} == {t: 6 + (t in both) for t in PLAN.tasks}
+    assert {e.participants for e in analysis.order_effects} == {6}
+    assert sum(c.rounds for c in analysis.failures) == 6 * 12 + 3
+
+
+def test_a_void_round_takes_its_pair_out_of_the_comparison_and_no_more(tmp_path: Path):
+    study = StudyFolder.opened(tmp_path / "out", PLAN)
+    folder = study.begin(session(1))
+    task = PLAN.tasks[0]
+    void = next(r for r in folder.rounds if (r.condition.task, r.condition.behaviour) == (task, "rigid"))
+    for planned in folder.rounds:
+        folder.record_round(planned.number, record(void=planned is void))
+        if planned is not void:  # the second period is rated higher by 4, whatever the behaviour
+            folder.record_answers(planned.number, dict.fromkeys(PLAN.statements, 1 + 4 * (planned.period - 1)))
+    means = {(m.task, m.statement): (m.first, m.second) for m in StudyAnalysis(study).means}
+    other = 3 - void.period
+    assert means[task, "S1"] == (1.0 + 4 * (other - 1),) * 2
+    assert means[PLAN.tasks[1], "S1"] == (3.0, 3.0)
+
+
+def test_who_has_withdrawn_is_in_no_result(tmp_path: Path):
+    study = write_study(tmp_path / "out", 7, rigid_is_better)
+    study.withdraw(3, "2026-11-24T15:00:00", delete=False)
+    analysis = StudyAnalysis(study)
+    assert {t.participants for t in analysis.rating_tests} == {6}
+    assert {m.participant for m in analysis.means} == {"P01", "P02", "P04", "P05", "P06", "P07"}
+    assert all(row["participant"] != "P03" for row in [*analysis.rounds, *analysis.answers])
+    assert {e.participants for e in analysis.order_effects} == {6}

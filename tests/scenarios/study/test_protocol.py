@@ -101,13 +101,19 @@ def test_a_void_round_is_played_again_with_its_reason_and_at_last_kept_as_void(t
     assert session.answers == {}
 
 
-def test_who_withdraws_is_not_asked_again_and_what_was_kept_stays(tmp_path: Path):
+def test_who_withdraws_is_not_asked_again_and_is_in_no_result(tmp_path: Path):
     protocol = practised(tmp_path / "study")
     protocol.act("begin")
     protocol.end_round(record())
     protocol.act("withdraw")
     assert protocol.screen == "withdrawn"
     assert len(protocol.study.session(1).records) == 1
+    assert protocol.study.sessions == []
+    withdrawal = protocol.study.withdrawals[1]
+    assert withdrawal.during
+    assert not withdrawal.deleted
+    protocol.study.withdraw(1, "2026-11-25T10:00:00", delete=True)
+    assert protocol.study.withdrawals[1].ended == withdrawal.ended
     assert Protocol(StudyFolder.opened(tmp_path / "study", PLAN), PLAN.devices).number == 2
 
 

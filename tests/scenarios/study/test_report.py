@@ -120,6 +120,51 @@ def test_a_session_broken_off_and_void_rounds_are_told(tmp_path: Path):
     assert "tracking lost, hand out of view" in text
     assert "4 of 76 rounds that count are above 100 ms" in text
     assert "76 of 77 rounds that were played count" in text
+    assert "Nobody has withdrawn." in text
+    assert "complete sessions alone, as orders are balanced in these 6" in text
+    tests = csv_of(tmp_path / "out" / "results" / "rating_tests.csv")
+    entered = [t for t in PLAN.tasks if (tests.loc[tests["task"] == t, "participants"] == 7).all()]
+    names = ", ".join(PLAN.texts["en"].task_names[t] for t in entered)
+    told = f"by complete pairs the tests of {names}." if entered else "no test, as no pair is complete."
+    assert f"P07: the session is not complete; it enters {told}" in text
+
+
+def test_who_withdrew_is_told_with_the_time_and_nothing_else(tmp_path: Path):
+    out = tmp_path / "out"
+    write_study(out, 7, rigid_is_better)
+    assert study("export", out).exit_code == 0
+    report_of(out)
+    done = study("withdraw", out, "P03")
+    assert done.exit_code == 0, done.output
+    assert "P03 withdrew on 20" in done.output
+    assert "not deleted" in done.output
+    text = text_of((out / "report.html").read_text(encoding="utf-8"))
+    when = StudyFolder.read(out).withdrawals[3].ended
+    assert "6 participants : 18 are planned; 72 of 72 rounds that were played count. 1 participant withdrew" in text
+    assert f"P03 {when} after it kept, and in no result" in text
+    assert text.count("P03") == 1
+    for file in [*out.glob("*.csv"), *(out / "results").glob("*.csv")]:
+        assert "P03" not in file.read_text(encoding="utf-8")
+    assert "P03" not in set(pq.read_table(out / "rounds.parquet").column("participant").to_pylist())
+    refused = study("replay", out, "P03", "1")
+    assert refused.exit_code == 2
+    assert "nothing of theirs is shown" in refused.output
+
+
+def test_what_was_kept_is_deleted_if_asked_and_the_number_stays_taken(tmp_path: Path):
+    out = tmp_path / "out"
+    write_study(out, 2, rigid_is_better)
+    assert study("withdraw", out, "2").exit_code == 0
+    when = StudyFolder.read(out).withdrawals[2].ended
+    done = study("withdraw", out, "2", "--delete")
+    assert done.exit_code == 0, done.output
+    assert f"P02 withdrew on {when}: in no table and no test; what was kept is deleted on" in done.output
+    assert [f.name for f in (out / "participants" / "P02").iterdir()] == ["withdrawn.json"]
+    again = StudyFolder.read(out)
+    assert again.next_number == 3
+    assert [s.session.number for s in again.sessions] == [1]
+    assert study("withdraw", out, "P09").exit_code == 2
+    assert "P02" in text_of(report_of(out))
 
 
 def test_a_plan_of_other_tasks_has_a_page_without_the_thesis(tmp_path: Path):
