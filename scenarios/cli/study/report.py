@@ -189,9 +189,7 @@ def _session(study: "StudyFolder", participant: str) -> "SessionFolder":
     """
     number = _number(study, participant)
     if number in study.withdrawals:
-        raise UsageError(
-            f"{participant} withdrew on {study.withdrawals[number].ended}: nothing of theirs is shown"
-        )
+        raise UsageError(f"{participant} withdrew on {study.withdrawals[number].ended}: nothing of theirs is shown")
     return study.session(number)
 
 
