@@ -1,6 +1,7 @@
 """Samples of a hand as a page or a tracker sends them, and what is wrong with those that are none.
 
-A device connects to `ws://HOST:PORT/hand` of a live page and sends texts, some sixty a second. Each is a JSON object:
+A device connects to `ws://HOST:PORT/hand` of a live page, or of a study's, and sends texts, some sixty a second. Each
+is a JSON object:
 
 | member | value |
 |---|---|
@@ -14,7 +15,8 @@ A device connects to `ws://HOST:PORT/hand` of a live page and sends texts, some 
 
 The server answers first with `{"hand": {...}}`, where the hand is wanted as it stands, in the same members, and how far
 it goes (`centre`, `radius`, m); afterwards only with `{"refused": "why"}`, and the run goes on with the sample before.
-Whoever connects first leads the hand until the connection ends.
+Whoever connects first leads the hand until the connection ends. A message of thousands of bytes, far above the longest
+sample, ends it with WebSocket's code 1009, whose reason says how long one may be.
 """
 
 import json

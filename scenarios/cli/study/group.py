@@ -149,7 +149,6 @@ def plan_data(plan: "StudyPlan", participants: int) -> dict[str, Any]:
 
 def _print_plan(data: dict[str, Any], plan: "StudyPlan") -> None:
     from handover.scenarios.study.plan.order import session_duration
-    from handover.scenarios.study.plan.plan import DEVICES
 
     console = open_console()
     console.print(data["title"], markup=False)
@@ -167,7 +166,7 @@ def _print_plan(data: dict[str, Any], plan: "StudyPlan") -> None:
         [
             ("session", length),
             ("rounds", f"{plan.rounds}, {rated}"),
-            ("devices", "; ".join(f"{name}, {DEVICES[name]}" for name in plan.devices)),
+            ("devices", "; ".join(_device(name) for name in plan.devices)),
             ("languages", ", ".join(f"{name}, {text.language}" for name, text in plan.texts.items())),
         ],
     )
@@ -182,3 +181,9 @@ def _print_plan(data: dict[str, Any], plan: "StudyPlan") -> None:
     ]
     print_rows(console, orders)
     console.print(f"\n{data['balance']}", markup=False)
+
+
+def _device(name: str) -> str:
+    from handover.scenarios.study.plan.plan import DEVICES, NOT_OFFERED
+
+    return f"{name}, {DEVICES[name]}" + (f" (not offered: {NOT_OFFERED[name]})" if name in NOT_OFFERED else "")

@@ -36,7 +36,8 @@ const leadHandIn = (element, camera) => {
       if (message.refused) tell(`not taken: ${message.refused}`);
       if (message.hand) begin(message.hand);
     });
-    ours.addEventListener("close", () => {
+    ours.addEventListener("close", ({code, reason}) => {
+      if (code === 1009) tell(`the connection has ended: ${reason}`);  // a message that is too long
       lead.hand?.choose("nothing");
       if (link !== ours) return;
       leaveCamera();

@@ -5,7 +5,7 @@
   const root = document.querySelector(".study"), {words} = page.data(root);
   const byId = id => document.getElementById(id);
   const main = byId("screen");
-  let shown = null, play = null, input = null, test = null, over = false, drawn = [];
+  let shown = null, play = null, input = null, test = null, over = false, drawn = [], hasTracker = false;
   const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
   const DEPTH = 0.3;  // of what the wheel moves the hand elsewhere
   const device = () => shown?.device ?? "";
@@ -70,9 +70,9 @@
     practice: s => [node("h1", {}, word("practice")), ...paragraphs(s.practice),
       ...(s.reason ? [node("p", {}, word("practice_again", s))] : []),
       node("p", {}, word(`help_${device()}`)),
-      node("p", {}, word("practice_for", {minutes: Number((s.seconds / 60).toFixed(1))})),
+      node("p", {}, word("practice_for", {minutes: Number((s.seconds / 60).toFixed(1))})), ...trackerLine(),
       actions(button("begin", () => act("begin"), {first: true}))],
-    instruction: s => [node("h1", {}, s.name), ...paragraphs(s.instruction), node("p", {class: "soft"}, word(`help_${device()}`)),
+    instruction: s => [node("h1", {}, s.name), ...paragraphs(s.instruction), node("p", {class: "soft"}, word(`help_${device()}`)), ...trackerLine(),
       actions(button("begin", () => act("begin"), {first: true}))],
     practising: () => waiting(),
     round: () => waiting(),
@@ -86,6 +86,15 @@
       actions(button("next_participant", () => act("next")))],
     complete: () => [node("h1", {}, word("thanks")), node("p", {}, word("complete"))],
   };
+  // A tracker connects by itself: before it is there, nothing begins.
+  const trackerLine = () => device() === "tracker" ? [node("p", {id: "tracker", role: "status"})] : [];
+  function nameTracker() {
+    const line = byId("tracker");
+    if (!line) return;
+    const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${location.pathname}hand`;
+    line.textContent = word(hasTracker ? "tracker_there" : "tracker_missing", {address});
+    main.querySelectorAll("button.first").forEach(b => { b.disabled = !hasTracker; });
+  }
   const waiting = () => [node("p", {class: "study-wait"}, node("span", {}, word("getting_ready")))];
   const settings = () => ({width: innerWidth, height: innerHeight, pixel_ratio: devicePixelRatio});
 
@@ -146,6 +155,7 @@
     byId("withdraw").textContent = word("withdraw");
     main.replaceChildren(...screens[screen.screen](screen));
     main.hidden = false;
+    nameTracker();
     root.dataset.screen = screen.screen;
     main.focus({preventScroll: true});
     scrollTo(0, 0);
@@ -240,7 +250,10 @@
     if (message.screen) show(message.screen);
     else if (message.scene) beginPlay(message.scene, message.hand);
     else if (message.target) ask(message.target);
-    else if (message.refused) tell(message.refused);
+    else if ("tracker" in message) {
+      hasTracker = message.tracker;
+      nameTracker();
+    } else if (message.refused) tell(message.refused);
     else if (message.gone) {
       over = true;
       endPlay();
@@ -249,6 +262,7 @@
       root.dataset.screen = message.gone;
     }
   });
-  link.addEventListener("close", () => { if (!over) tell(word("lost_connection")); });
+  setInterval(() => device() === "tracker" && send({clock: performance.now() / 1000}), 500);
+  link.addEventListener("close", ({reason}) => { if (!over) tell(word("lost_connection") + (reason && ` (${reason})`)); });
   window.study = {send, get play() { return play; }, get screen() { return shown?.screen; }};
 })();

@@ -29,6 +29,11 @@ DEVICES: Mapping[str, str] = {
 }
 """What may move the hand, by the name in a plan."""
 
+TRACKER = "tracker"
+"""The device that sends its samples by a connection of its own."""
+NOT_OFFERED: Mapping[str, str] = {"camera": "it needs a model of hands, which a study's page cannot take yet"}
+"""Devices that a plan may name and the page does not offer, and why."""
+
 _CHOICE, _TEXT = "choice", "text"
 
 
@@ -244,6 +249,10 @@ def _devices(plan: PlanTable, pilot: bool) -> Sequence[str]:
             plan.faults.append(f"devices: no device {name!r}; {nearest(name, DEVICES)}")
     if "script" in devices and not pilot:
         plan.faults.append("devices: 'script' is no person's; pilot = true is of scripted pilots")
+    if devices and all(name in NOT_OFFERED for name in devices):
+        why = "; ".join(f"{name}: {NOT_OFFERED[name]}" for name in dict.fromkeys(devices))
+        offered = ", ".join(name for name in DEVICES if name not in NOT_OFFERED and name != "script")
+        plan.faults.append(f"devices: the page offers none of them ({why}); it offers {offered}")
     return devices
 
 

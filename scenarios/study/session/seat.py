@@ -7,17 +7,20 @@ Texts from the page are JSON objects with one member:
 | `act` | `{"action": NAME, "value": VALUE}` | what the person does on a screen, see `Protocol.act` |
 | `hand` | see `hand_messages` | a sample of the hand, while a run goes on |
 | `ready` | - | the scene is drawn, and the run may begin |
+| `clock` | s | the page's clock, by which pictures of a tracker's samples are timed |
 | `drawn` | list of ms | times from samples of the hand to the pictures that showed them |
 
-Texts to the page are JSON objects with one of `screen`, `scene`, `target`, `refused`, `gone`; a state of the run is a
-message of 64-bit floats, see `Frame`, sixty a second.
+Texts to the page are JSON objects with one of `screen`, `scene`, `target`, `tracker`, `refused`, `gone`; a state of the
+run is a message of 64-bit floats, see `Frame`, sixty a second.
 """
 
 import asyncio
 import contextlib
 import json
+import math
 import time
 import traceback
+from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -25,7 +28,9 @@ import numpy as np
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.cosim.exceptions import RecordNotWritten
+from handover.scenarios.live.hand_messages import DeviceClock, InvalidHandMessage
 from handover.scenarios.results.run_folder import InvalidRunFolder
+from handover.scenarios.study.plan.plan import TRACKER
 from handover.scenarios.study.session.device_test import DeviceTest
 from handover.scenarios.study.session.protocol import InvalidAction, Protocol
 from handover.scenarios.study.session.trial import Trial, TrialFailed, Wanted, round_parameters
@@ -55,6 +60,9 @@ class StudySeat:
     Args:
         protocol: what is shown.
         pace: simulated seconds per second of wall time, which is 1 but for scripted pilots.
+
+    Attributes:
+        on_run: is told where the hand is as a run begins; None without a tracker.
     """
 
     def __init__(self, protocol: Protocol, pace: float = 1.0) -> None:
@@ -67,6 +75,8 @@ class StudySeat:
         self._last_sample = 0.0
         self._test: DeviceTest | None = None
         self._practised = 0.0
+        self._has_tracker, self._page_clock, self._page_offset = False, DeviceClock(), math.nan
+        self.on_run: Callable[[Mapping[str, Any]], Awaitable[None]] | None = None
 
     @property
     def is_taken(self) -> bool:
@@ -79,8 +89,9 @@ class StudySeat:
             await page.send_text(json.dumps({"gone": "seat_taken"}))
             await page.close(code=4001)
             return
-        self._page = page
+        self._page, self._page_clock, self._page_offset = page, DeviceClock(), math.nan
         try:
+            await self._send({"tracker": self._has_tracker})
             await self._show()
             await self._listen(page)
         except (WebSocketDisconnect, RuntimeError):
@@ -128,6 +139,8 @@ class StudySeat:
         elif name == "drawn":
             if self._trial is not None:
                 self._trial.latency.add(value)
+        elif name == "clock":
+            self._set_clock(value)
         elif name == "ready":
             self._page_ready.set()
         else:
@@ -138,12 +151,38 @@ class StudySeat:
             await self._show()
 
     def _lead(self, value: Any) -> None:
-        trial = self._trial
+        trial, session = self._trial, self.protocol.session
+        if session is not None and session.session.device == TRACKER:
+            raise InvalidAction("the tracker leads the hand in this session")
         if trial is None:
             return
         arrival = time.monotonic()
         trial.lead(value, arrival)
         self._last_sample = arrival
+
+    def _set_clock(self, value: Any) -> None:
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        if not is_number:
+            raise InvalidAction("clock takes a finite number of seconds")
+        self._page_offset = self._page_clock.monotonic(float(value), time.monotonic()) - float(value)
+
+    def lead_by_tracker(self, text: str) -> None:
+        """Lead the hand by a tracker's message, if a run goes on.
+
+        Raises:
+            InvalidHandMessage: it is none, cannot be used, or something else leads the hand in this session.
+        """
+        session, trial = self.protocol.session, self._trial
+        if session is not None and session.session.device != TRACKER:
+            raise InvalidHandMessage(f"in this session the hand is led by: {session.session.device}")
+        if session is not None and trial is not None:
+            trial.lead_by_tracker(text, self._page_offset)
+            self._last_sample = time.monotonic()
+
+    async def tracker_came(self, *, there: bool) -> None:
+        """Tell the page whether a tracker is there."""
+        self._has_tracker = there
+        await self._send({"tracker": there})
 
     async def _show(self) -> None:
         """Show the protocol's screen, and see to the trial that it needs."""
@@ -213,6 +252,8 @@ class StudySeat:
         if self._test is None and self.protocol.screen == "practising":
             self._test = DeviceTest()
         await self._send({"scene": trial.scene(), "hand": trial.hand})
+        if self.on_run is not None:
+            await self.on_run(trial.hand)
         await self._send_frame(trial, always=True)
         try:
             await asyncio.wait_for(self._page_ready.wait(), _READY)
@@ -328,7 +369,7 @@ def parse_message(text: str) -> tuple[str, Any]:
     return next(iter(members.items()))
 
 
-_MESSAGES = {"act", "hand", "ready", "drawn"}
+_MESSAGES = {"act", "hand", "ready", "drawn", "clock"}
 
 
 def _free_folder(path: Path) -> Path:

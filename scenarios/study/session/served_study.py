@@ -8,7 +8,7 @@ from pathlib import Path
 
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.study.folder.study_folder import StudyFolder
-from handover.scenarios.study.plan.plan import StudyPlan
+from handover.scenarios.study.plan.plan import NOT_OFFERED, TRACKER, StudyPlan
 from handover.scenarios.study.session.pilot import play_sessions
 from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.seat import StudySeat
@@ -59,6 +59,8 @@ async def serve_study(
         with listening:
             address = address_of(listening, server)
             tell(f"study: {address}  (results in {out}; Ctrl-C ends it)")
+            if TRACKER in plan.devices:
+                tell(f"a hand tracker connects to {address.replace('http', 'ws', 1)}hand")
             if pilot:
                 await _with_pilots(server, listening, address, tell)
             else:
@@ -107,8 +109,5 @@ def address_of(listening: socket.socket, server: StudyServer) -> str:
 
 
 def devices_here(plan: StudyPlan) -> list[str]:
-    """Return the plan's devices that the page can take.
-
-    A camera needs a model of hands, which nobody has given; a tracker leads the hand of `handover run --live` alone.
-    """
-    return [name for name in plan.devices if name not in ("camera", "tracker")]
+    """Return the plan's devices that the page offers."""
+    return [name for name in plan.devices if name not in NOT_OFFERED]

@@ -29,6 +29,7 @@ from handover.scenarios.reporting.replay_section import SCENE_SCRIPTS
 from handover.scenarios.study.folder.codebook import PILOT
 from handover.scenarios.study.plan.plan import StudyPlan
 from handover.scenarios.study.session.seat import LONGEST, StudySeat
+from handover.scenarios.study.session.tracker import TrackerSeat
 
 _GRACE = 30
 """Time for a run under way to end when the server does, s."""
@@ -74,6 +75,7 @@ class StudyServer:
 
     def __init__(self, seat: StudySeat, host: str = LOOPBACK[0]) -> None:
         self.seat, self.host = seat, host
+        self._tracker = TrackerSeat(seat)
         self.token = "" if host in LOOPBACK else secrets.token_urlsafe(16)
 
     @property
@@ -85,7 +87,11 @@ class StudyServer:
         """Return the application."""
         hosts = [*LOOPBACK] if not self.token else ["*"]  # who knows the token knows the address, by whatever name
         return Starlette(
-            routes=[Route(self.path, self._page), WebSocketRoute(f"{self.path}seat", self._connection)],
+            routes=[
+                Route(self.path, self._page),
+                WebSocketRoute(f"{self.path}seat", self._connection),
+                WebSocketRoute(f"{self.path}hand", self._tracker.connection),
+            ],
             middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=hosts)],
             lifespan=self._lifespan,
         )

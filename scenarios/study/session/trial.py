@@ -202,13 +202,24 @@ class Trial:
         number = self._board.set(sample.entries(self.led), at)
         self._stamps.append((number, sample.stamp))
 
+    def lead_by_tracker(self, text: str, page_offset: float) -> None:
+        """Lead the hand by a tracker's message; `page_offset`, s, is the monotonic clock minus the page's, or NaN.
+
+        Raises:
+            InvalidHandMessage: it is none, is wanted beyond reach, older than the one before, or one too many.
+        """
+        sample, at = self._stream.take(text)
+        number = self._board.set(sample.entries(self.led), at)
+        self._stamps.append((number, at - page_offset))
+
     @property
     def hand(self) -> dict[str, Any]:
         """Where the hand is wanted as it stands, and how far it goes, as `handInput` takes it."""
         assert self.stage is not None
         wanted = self.stage.wanted_hand(self.led)
-        pose = {"p_WH": list(wanted.p_WH), "q_WH": list(wanted.q_WH), "closed": wanted.closed}
-        return {**pose, "centre": list(self.led.p_WH_0), "radius": self.led.reach}
+        pose = {"p_WH": list(wanted.p_WH), "q_WH": list(wanted.q_WH), "angles": list(wanted.angles)}
+        reach = {"centre": list(self.led.p_WH_0), "radius": self.led.reach}
+        return {**pose, "closed": wanted.closed, **reach}
 
     def frame(self, *, always: bool = False) -> Frame | None:
         """Return what is there to be seen, None if nothing is new; `always`: also then."""

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import uvicorn
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -20,6 +21,7 @@ from websockets.sync.client import ClientConnection, connect
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
 from handover.scenarios.study.session import seat as seat_module
+from handover.scenarios.study.session.pilot import SeenScene
 from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.seat import StudySeat
 from handover.scenarios.study.session.served_study import NotServed, check_hands
@@ -32,7 +34,7 @@ HAND = {"p_WH": [-0.4, 0.1, -0.05], "q_WH": [1.0, 0.0, 0.0, 0.0], "closed": Fals
 
 
 def server_of(path: Path, host: str = HOST) -> StudyServer:
-    return StudyServer(StudySeat(Protocol(StudyFolder.opened(path, PLAN), ["mouse"])), host)
+    return StudyServer(StudySeat(Protocol(StudyFolder.opened(path, PLAN), ["mouse", "tracker"])), host)
 
 
 @contextmanager
@@ -85,11 +87,11 @@ def act(page: ClientConnection, action: str, value: Any = None) -> None:
     page.send(json.dumps({"act": {"action": action, "value": value}}))
 
 
-def to_instruction(page: ClientConnection) -> None:
+def to_instruction(page: ClientConnection, device: str = "mouse") -> None:
     act(page, "language", "en")
     act(page, "consent", True)
     act(page, "eligibility", [True] * 3)
-    act(page, "device", "mouse")
+    act(page, "device", device)
     while told(page, "screen")["screen"] != "instruction":
         pass
 
@@ -226,6 +228,60 @@ def test_a_page_that_floods_is_refused_and_at_last_put_out(tmp_path: Path, monke
                 page.send('{"drawn": []}')
         assert "more than 20 messages in a second" in told(page, "refused")
         assert told(page, "gone") == "flood"
+
+
+def test_a_tracker_leads_the_hand_and_its_pictures_are_timed_by_the_pages_clock(tmp_path: Path):
+    with served(server_of(tmp_path / "study")) as where, page_at(where) as page:
+        assert told(page, "tracker") is False
+        to_instruction(page, "tracker")
+        with connect(f"ws://{where}/hand") as tracker:
+            rest = told(tracker, "hand")
+            assert told(page, "tracker") is True
+            assert len(rest["angles"]) == 14
+            there = [rest["p_WH"][0] + 0.1, *rest["p_WH"][1:]]
+            act(page, "begin")
+            scene = SeenScene(told(page, "scene"))
+            assert told(tracker, "hand")["p_WH"] == rest["p_WH"]
+            ahead = 1000.0  # the page's clock goes before this computer's
+            page.send(json.dumps({"clock": time.monotonic() + ahead}))
+            page.send(json.dumps({"ready": True}))
+            end = time.monotonic() + 60.0
+            while not (np.linalg.norm(scene.place("hand") - there) < 0.02 and np.isfinite(scene.stamp)):
+                assert time.monotonic() < end
+                tracker.send(json.dumps({**HAND, "p_WH": there, "stamp": time.monotonic() - 500.0, "device": "leap"}))
+                message = page.recv(timeout=60)
+                if isinstance(message, bytes):
+                    scene.take(message)
+            assert 0.0 <= time.monotonic() + ahead - scene.stamp < 30.0
+            page.send(json.dumps({"hand": {**HAND, "stamp": 1.0}}))
+            assert "the tracker leads the hand" in told(page, "refused")
+        assert told(page, "tracker") is False
+
+
+def test_a_tracker_is_told_why_it_is_refused(tmp_path: Path):
+    with served(server_of(tmp_path / "study")) as where, page_at(where) as page:
+        with pytest.raises(InvalidStatus), connect(f"ws://{where}/hand", origin="http://elsewhere.example"):  # pyright: ignore[reportArgumentType]
+            pass
+        with connect(f"ws://{where}/hand") as tracker:
+            told(tracker, "hand")
+            with connect(f"ws://{where}/hand") as second:
+                assert "another tracker" in told(second, "refused")
+            to_instruction(page, "mouse")
+            tracker.send(json.dumps({**HAND, "stamp": 1.0}))
+            assert told(tracker, "refused") == "in this session the hand is led by: mouse"
+
+
+@pytest.mark.parametrize("path", ["seat", "hand"])
+def test_a_message_beyond_all_bounds_ends_the_connection_with_the_reason(path: str, tmp_path: Path):
+    with (
+        served(server_of(tmp_path / "study")) as where,
+        connect(f"ws://{where}/{path}", origin=f"http://{where}") as device,  # pyright: ignore[reportArgumentType]
+    ):
+        device.send("x" * 200_000)
+        with pytest.raises(ConnectionClosed) as closed:
+            told(device, "nothing")
+        assert closed.value.rcvd is not None
+        assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1009, "frame exceeds limit of 80000 bytes")
 
 
 def test_a_plan_in_whose_rounds_nobody_can_lead_a_hand_is_told():
