@@ -7,6 +7,8 @@
   const main = byId("screen");
   let shown = null, play = null, input = null, test = null, over = false, drawn = [], hasTracker = false;
   const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
+  const TURNS = {"+roll": "roll_right", "-roll": "roll_left", "+pitch": "fingers_down", "-pitch": "fingers_up",
+    "+yaw": "fingers_left", "-yaw": "fingers_right"};
   const DEPTH = 0.3;  // of what the wheel moves the hand elsewhere
   const device = () => shown?.device ?? "";
 
@@ -237,7 +239,7 @@
   function ask(asked) {
     test = asked;
     play?.target(test.place);
-    const name = test.place ? "place_to_go" : test.name ? "make_fist" : "free_play";
+    const name = test.place ? "place_to_go" : TURNS[test.name] ?? (test.name ? "make_fist" : "free_play");
     byId("task").textContent = word(name, test);
   }
 
@@ -250,6 +252,7 @@
     if (message.screen) show(message.screen);
     else if (message.scene) beginPlay(message.scene, message.hand);
     else if (message.target) ask(message.target);
+    else if (message.again) byId("task").textContent = word("object_comes_back");
     else if ("tracker" in message) {
       hasTracker = message.tracker;
       nameTracker();

@@ -1,9 +1,9 @@
-"""The test of a device before the first round: places to which the hand is to be moved, and fists.
+"""The test of a device before the first round: places to which the hand is moved, directions it is turned, and fists.
 
 The thesis shows for its own device that the simulated hand follows along and about each axis, and closes, figures 4.21
-to 4.27: a hand was moved twice to the ends of what the device sees. Here a person moves it to the ends along each axis,
-one after the other, and closes it twice; how long each took is kept with the session. Turning is not tested: a mouse
-does not turn the hand.
+to 4.27: a hand was moved and turned twice to the ends of what the device sees, and closed twice. Here a person moves it
+to the ends along each axis, turns it both ways about each, one after the other, and closes it twice; how long each took
+is kept with the session. A finger on a screen does not turn the hand, and a script does not: of them that is not asked.
 """
 
 from dataclasses import dataclass
@@ -17,17 +17,21 @@ from handover.cosim.record.reader import Record
 _AT_REST = np.array([-0.40, 0.10, -0.05])
 """Where the hand rests, in W, m: `p_WH_0` of the person's unit."""
 _ENDS = (("x", (0.18, 0.0, 0.0)), ("y", (0.0, 0.15, 0.0)), ("z", (0.0, 0.0, 0.12)))
-_CLOSE, _STAY = 0.03, 0.3
-"""How near to a place, m, and for how long, s, it counts as reached (assumed)."""
+_TURNS = (("roll", (1.0, 0.0, 0.0)), ("pitch", (0.0, 1.0, 0.0)), ("yaw", (0.0, 0.0, 1.0)))
+"""Axes in W, about which the hand is turned from where it rests: x away from the person, y to the left, z up."""
+_CLOSE, _ANGLE, _STAY = 0.03, 0.4, 0.3
+"""How near to a place, m, how far turned, rad, and for how long, s, it counts as reached (assumed)."""
 _FISTS = 2
+TURNING = ("mouse", "gamepad", "camera", "tracker")
+"""Devices that turn the hand."""
 
 
 @dataclass(frozen=True)
 class Reached:
-    """A place of the test that was reached, or a fist.
+    """A place of the test that was reached, a turn, or a fist.
 
     Attributes:
-        name: such as "+x", or "fist".
+        name: such as "+x", "-roll", or "fist".
         seconds: from when it was asked for.
     """
 
@@ -38,12 +42,16 @@ class Reached:
 class DeviceTest:
     """Asks for one place after the other, by what the run shows of the hand.
 
+    Args:
+        device: by which the hand is led.
+
     Attributes:
         reached: what was done.
     """
 
-    def __init__(self) -> None:
-        self._asked = _places()
+    def __init__(self, device: str) -> None:
+        turns = [(f"{sign}{axis}", None) for axis, _ in _TURNS for sign in "+-"] if device in TURNING else []
+        self._asked = [*_places(), *turns, *(("fist", None) for _ in range(_FISTS))]
         self.reached: list[Reached] = []
         self._since, self._there = 0.0, 0.0
         self._last: float | None = None
@@ -51,7 +59,7 @@ class DeviceTest:
 
     @property
     def target(self) -> dict[str, Any]:
-        """What is asked for: name, place in W, m, None for a fist, and what is done of all."""
+        """What is asked for: name, place in W, m, None for a turn and a fist, and what is done of all."""
         done, of = len(self.reached), len(self._asked)
         if done == of:
             return {"name": "", "place": None, "done": done, "of": of}
@@ -73,10 +81,10 @@ class DeviceTest:
             return first
         name, place = self._asked[len(self.reached)]
         closed = bool(row["person.closed_goal"][0])
-        if place is None:
+        if name == "fist":
             is_done, self._was_closed = closed and not self._was_closed, closed
         else:
-            near = float(np.linalg.norm(row["person.p_WH"][0] - place)) < _CLOSE
+            near = _is_turned(row, name) if place is None else _is_near(row, place)
             self._there = self._there + dt if near else 0.0
             is_done, self._was_closed = self._there >= _STAY, closed
         if not is_done:
@@ -87,8 +95,20 @@ class DeviceTest:
 
 
 def _places() -> list[tuple[str, Floats | None]]:
-    """Return what is asked for, in order: the ends along each axis, and fists."""
-    ends = [
+    """Return the ends along each axis, in W, m."""
+    return [
         (f"{sign}{axis}", _AT_REST + s * np.array(way)) for axis, way in _ENDS for sign, s in (("+", 1.0), ("-", -1.0))
     ]
-    return [*ends, *(("fist", None) for _ in range(_FISTS))]
+
+
+def _is_near(row: Record, place: Floats) -> bool:
+    return float(np.linalg.norm(row["person.p_WH"][0] - place)) < _CLOSE
+
+
+def _is_turned(row: Record, name: str) -> bool:
+    """Return whether the hand is turned from its rest, where its axes are those of W, as far as is asked for."""
+    w, *v = row["person.q_WH"][0].tolist()
+    sine = float(np.linalg.norm(v))
+    angle = 2.0 * float(np.arctan2(sine, abs(w))) * (1.0 if w >= 0.0 else -1.0)
+    turned = float(np.dot(v, dict(_TURNS)[name[1:]])) / sine * angle if sine > 0.0 else 0.0
+    return (turned if name[0] == "+" else -turned) >= _ANGLE

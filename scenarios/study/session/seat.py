@@ -10,8 +10,8 @@ Texts from the page are JSON objects with one member:
 | `clock` | s | the page's clock, by which pictures of a tracker's samples are timed |
 | `drawn` | list of ms | times from samples of the hand to the pictures that showed them |
 
-Texts to the page are JSON objects with one of `screen`, `scene`, `target`, `tracker`, `refused`, `gone`; a state of the
-run is a message of 64-bit floats, see `Frame`, sixty a second.
+Texts to the page are JSON objects with one of `screen`, `scene`, `target`, `again`, `tracker`, `refused`, `gone`; a
+state of the run is a message of 64-bit floats, see `Frame`, sixty a second.
 """
 
 import asyncio
@@ -232,6 +232,7 @@ class StudySeat:
             fault = self._fault or (None if trial is None else await self._watched(trial))
             if is_round or fault or trial is None or not self._goes_on(trial):
                 break
+            await self._send({"again": True})
             await self._drop_trial(keep_playing=True)
             self._preparing = asyncio.create_task(self._prepare())
         await self._conclude(is_round, fault)
@@ -250,7 +251,7 @@ class StudySeat:
         assert stage is not None
         self._page_ready.clear()
         if self._test is None and self.protocol.screen == "practising":
-            self._test = DeviceTest()
+            self._test = self._new_test()
         await self._send({"scene": trial.scene(), "hand": trial.hand})
         if self.on_run is not None:
             await self.on_run(trial.hand)
@@ -259,6 +260,8 @@ class StudySeat:
             await asyncio.wait_for(self._page_ready.wait(), _READY)
         except (TimeoutError, asyncio.TimeoutError):
             return f"the page did not draw the scene within {_READY:.0f} s"
+        if self._test is not None and self.protocol.screen == "practising":
+            await self._send({"target": self._test.target})
         trial.go()
         self._last_sample = time.monotonic()
         while trial.is_running:
@@ -273,6 +276,10 @@ class StudySeat:
                 trial.stop()
             await asyncio.sleep(max(PERIOD - (time.monotonic() - began), 0.001))
         return None
+
+    def _new_test(self) -> DeviceTest:
+        session = self.protocol.session
+        return DeviceTest("" if session is None else session.session.device)
 
     async def _test_device(self, trial: Trial) -> None:
         row = trial.newest
@@ -299,7 +306,7 @@ class StudySeat:
         if fault is not None:
             self._note_fault(is_round, fault)
         elif not is_round:
-            test = self._test or DeviceTest()
+            test = self._test or self._new_test()
             protocol.end_practice({"practised": round(self._practised, 3), **test.shown})
             self._test, self._practised = None, 0.0
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):

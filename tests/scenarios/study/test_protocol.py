@@ -26,7 +26,7 @@ def begun(path: Path) -> Protocol:
 def practised(path: Path) -> Protocol:
     protocol = begun(path)
     protocol.act("begin")
-    protocol.end_practice(DeviceTest().shown)
+    protocol.end_practice(DeviceTest("mouse").shown)
     return protocol
 
 
@@ -35,7 +35,7 @@ def test_a_session_goes_from_consent_to_thanks_and_all_of_it_is_kept(tmp_path: P
     seen = [protocol.screen]
     protocol.act("begin")
     seen.append(protocol.screen)
-    protocol.end_practice(DeviceTest().shown)
+    protocol.end_practice(DeviceTest("mouse").shown)
     for planned in list(protocol.study.session(1).rounds):
         seen.append(protocol.screen)
         assert protocol.content()["task"] == planned.condition.task
