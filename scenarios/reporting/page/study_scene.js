@@ -1,5 +1,5 @@
 // The scene of a round as the person sees it, in one view or two, and how long it takes until a sample is drawn.
-//   const play = studyScene(content, {eye, side, photodiode, onDrawn})   null without WebGL; see study_scene.py
+//   const play = studyScene(content, {eye, side, photodiode, onDrawn})   null without WebGL; see Trial.scene in trial.py
 //   play.take(buffer)       a state of the run: time, stamp of the sample that it shows, s, and the places of all
 //   play.target(place)      where the ball of the device's test is, [x, y, z] in W, m; null hides it
 //   play.sideShown = true   whether there is a second view

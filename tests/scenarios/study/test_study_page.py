@@ -97,6 +97,11 @@ def test_a_round_is_played_with_the_mouse_and_rated_by_keys(browser: Browser, tm
         wait_until(page, "document.querySelector('.study').dataset.drawn > 5")
         assert not page.locator("#side").is_hidden()
         wait_until(page, f"Math.hypot(...{SEEN_AT}.map((x, i) => x - [350, 220][i])) < 15")
+        notch = f"Math.hypot(...study.play.hand().p_WH.map((x, i) => x - {page.evaluate('study.play.hand().p_WH')}[i]))"
+        page.mouse.wheel(0, 100)
+        wait_until(page, f"{notch} > 0.01")
+        page.wait_for_timeout(500)
+        assert page.evaluate(notch) < 0.03  # a notch goes 15 mm
         at(page, "rating")
         for key in "739":
             page.keyboard.press(key)
