@@ -25,7 +25,8 @@ Waiter = Callable[[Page, str], None]
 
 HANDOVER = (sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()")
 FLAGS = ("--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-PACE = "4"
+PACES = {"flyer_robot_to_human": "4", "helix_handover": "1"}
+"""Of runs without cameras' pictures and with."""
 SCENES = ("flyer_robot_to_human", "helix_handover", "ir_grasp", "vsl_model_based")
 """A scenario of each of the four systems."""
 DRAW = """async seconds => {
@@ -71,7 +72,10 @@ def watched(wait_until: Waiter, scenario: str, out: Path, *given: str) -> Genera
     run.communicate(timeout=300)
 
 
-def test_what_a_page_costs_its_run(benchmark: BenchmarkFixture, tmp_path: Path, wait_until: Waiter) -> None:
+@pytest.mark.parametrize("scenario", PACES)
+def test_what_a_page_costs_its_run(
+    benchmark: BenchmarkFixture, tmp_path: Path, wait_until: Waiter, scenario: str
+) -> None:
     """A run with a page, beside the same run without, both paced alike and by turns."""
     ratios: list[float] = []
     missed: dict[str, list[float]] = {"watched": [], "alone": []}
@@ -79,9 +83,10 @@ def test_what_a_page_costs_its_run(benchmark: BenchmarkFixture, tmp_path: Path, 
     def measure() -> None:
         k = len(ratios)
         outs = {name: tmp_path / f"{name}{k}" for name in missed}
-        alone = [*HANDOVER, "run", SCENES[0], "--no-report", "--pace", PACE, "--out", str(outs["alone"])]
-        subprocess.run(alone, check=True, capture_output=True)
-        with watched(wait_until, SCENES[0], outs["watched"], "--pace", PACE):
+        given = ("--pace", PACES[scenario], "--stop", "20")
+        alone = [*HANDOVER, "run", scenario, "--no-report", *given, "--out", str(outs["alone"])]
+        subprocess.run(alone, check=False, capture_output=True)
+        with watched(wait_until, scenario, outs["watched"], *given):
             pass
         found = {name: summary_of(out) for name, out in outs.items()}
         ratios.append(found["watched"]["cpu_seconds"] / found["alone"]["cpu_seconds"])
@@ -91,7 +96,8 @@ def test_what_a_page_costs_its_run(benchmark: BenchmarkFixture, tmp_path: Path, 
     benchmark.pedantic(measure, rounds=3 if benchmark.enabled else 1)
     ratio, late = float(np.median(ratios)), {name: float(np.median(shares)) for name, shares in missed.items()}
     print(f"\nCPU time of a run with a page, over that without: {ratio:.3f} (each: {np.round(ratios, 3).tolist()})")
-    print(f"deadlines missed at pace {PACE}: {late['watched']:.1f} % with a page, {late['alone']:.1f} % without")
+    shares = f"{late['watched']:.1f} % with a page, {late['alone']:.1f} % without"
+    print(f"{scenario}: deadlines missed at pace {PACES[scenario]}: {shares}")
     benchmark.extra_info.update(ratio=ratio, **late)
 
 
