@@ -8,8 +8,8 @@ from flyer_runs import run
 
 from handover.cosim.record.reader import Record
 from handover.plants.free_flyer.hand.hand_kinematics import PALM_BONES, PALM_RADIUS
-from handover.scenarios.free_flyer.hand_practice import HandPractice, PracticeParameters
-from handover.scenarios.free_flyer.handovers import RobotToHuman
+from handover.scenarios.free_flyer.handover.hand_practice import HandPractice, PracticeParameters
+from handover.scenarios.free_flyer.handover.handovers import RobotToHuman
 from handover.scenarios.free_flyer.replay import replay_handover
 from handover.scenarios.free_flyer.scene import EDGE
 
