@@ -16,7 +16,8 @@
 "use strict";
 const handInput = (() => {
   const PERIOD = 12;  // ms between two samples at least
-  const WHEEL = 0.0005, SPEED = 0.4, TURN = 1.2;  // m a pixel of wheel, m/s, rad/s
+  const WHEEL = 0.00015, PINCH = 0.002;  // m a pixel; a notch of a wheel, 100 pixels, is 1.5 cm: less than half an object
+  const SPEED = 0.4, TURN = 1.2;  // m/s, rad/s
   const DEAD = 0.12;  // of a gamepad's stick
   const KEYS = {
     ArrowRight: ["move", 0, 1], ArrowLeft: ["move", 0, -1], ArrowUp: ["move", 1, 1], ArrowDown: ["move", 1, -1],
@@ -31,7 +32,7 @@ const handInput = (() => {
     const Quaternion = camera.quaternion.constructor;  // the page's three.js names only what scenes need
     const [w, x, y, z] = start.q_WH, q = new Quaternion(x, y, z, w);
     const held = new Set(), fingers = new Map();
-    let closed = start.closed, device = "nothing", kind = "mouse", sent = 0, before = performance.now(), pressed = false;
+    let closed = start.closed, device = "nothing", kind = "mouse", sent = 0, stamped = 0, before = performance.now(), pressed = false;
 
     // Directions of the picture in W: to its right, up, and towards the eye.
     function axes() {
@@ -58,7 +59,8 @@ const handInput = (() => {
     function send(stamp = performance.now()) {
       if (!HERE.has(device) || document.hidden || stamp - sent < PERIOD) return;
       sent = stamp;
-      onSample({...api.pose(), stamp: stamp / 1000, device: device === "gamepad" ? "gamepad" : kind});
+      stamped = Math.max(stamp, stamped + 0.1);  // a click may come before a move that was stamped later than it
+      onSample({...api.pose(), stamp: stamped / 1000, device: device === "gamepad" ? "gamepad" : kind});
     }
 
     function grasp(yes) {
@@ -143,7 +145,7 @@ const handInput = (() => {
       const others = [...fingers].filter(([id]) => id !== event.pointerId).map(([, at]) => at);
       if (others.length) {
         const wide = at => Math.hypot(at[0] - others[0][0], at[1] - others[0][1]);
-        goTo(p.clone().addScaledVector(axes()[2], 4 * WHEEL * (wide([event.clientX, event.clientY]) - wide(last))));
+        goTo(p.clone().addScaledVector(axes()[2], PINCH * (wide([event.clientX, event.clientY]) - wide(last))));
       } else goTo(p.clone().add(under(event.clientX, event.clientY)).sub(under(...last)));
       fingers.set(event.pointerId, [event.clientX, event.clientY]);
     }

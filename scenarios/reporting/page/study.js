@@ -9,7 +9,6 @@
   const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
   const TURNS = {"+roll": "roll_right", "-roll": "roll_left", "+pitch": "fingers_down", "-pitch": "fingers_up",
     "+yaw": "fingers_left", "-yaw": "fingers_right"};
-  const DEPTH = 0.3;  // of what the wheel moves the hand elsewhere
   const device = () => shown?.device ?? "";
 
   // A word of the page in the language of the study, with values in place of {names}.
@@ -187,26 +186,13 @@
     const onChange = closed => { byId("grasp").textContent = word(closed ? "open_hand" : "close_hand"); };
     byId("grasp").hidden = device() !== "touch";
     onChange(start.closed);
-    let last = -Infinity;
-    const onSample = hand => {
-      last = Math.max(hand.stamp, last + 1e-4);  // a click may be stamped earlier than the move before it
-      if (link.bufferedAmount < 4000) send({hand: {...hand, stamp: last}});
-    };
+    const onSample = hand => { if (link.bufferedAmount < 4000) send({hand}); };
     input = handInput({element: byId("pad"), camera: play.scene.camera, start, onSample, onChange});
     input.choose(INPUTS[device()] ?? "nothing");
     byId("pad").focus({preventScroll: true});
     keys = event => { if (event.key === "v" || event.key === "V") turnViews(); };
     requestAnimationFrame(() => requestAnimationFrame(() => send({ready: true})));
   }
-
-  // A notch of a wheel, 100 pixels, is 5 cm for the hand: too coarse for an object of 4 cm. Here it goes 1.5 cm.
-  byId("eye").addEventListener("wheel", event => {
-    if (!event.isTrusted || event.altKey || INPUTS[device()] !== "pointer") return;
-    event.preventDefault();
-    event.stopPropagation();
-    const {deltaMode, clientX, clientY} = event;
-    byId("pad").dispatchEvent(new WheelEvent("wheel", {deltaY: DEPTH * event.deltaY, deltaMode, clientX, clientY, bubbles: true, cancelable: true}));
-  }, {capture: true, passive: false});
 
   function endPlay() {
     flush();

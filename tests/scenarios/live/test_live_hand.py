@@ -45,7 +45,7 @@ def take_object(page: Page) -> None:
     page.locator("[data-view=top]").click()
     page.wait_for_timeout(300)
     move_hand(page, [-0.15, 0.07, wanted(page)[2]])
-    page.mouse.wheel(0, -wanted(page)[2] / 0.0005)
+    page.mouse.wheel(0, -wanted(page)[2] / 0.00015)
     page.wait_for_timeout(300)
     move_hand(page, [-0.15, 0.07, 0.0])
     assert wanted(page) == pytest.approx([-0.15, 0.07, 0.0], abs=0.002)
