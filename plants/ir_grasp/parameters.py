@@ -24,6 +24,7 @@ from handover.cosim.blocks.units import (
     Second,
     Tick,
 )
+from handover.plants.ir_grasp.ground import Span, bump
 from handover.plants.ir_grasp.infrared_sensor import InfraredSensor, InvalidSensorParameters
 from handover.plants.ir_grasp.objects import SOLIDS, Solid, Thing, outlines
 
@@ -64,6 +65,16 @@ class Params:
     table_size: Vector2[Metre] = parameter(
         np.array([1.2, 0.9]), "extents of the table, whose middle is the world's origin", minimum=0.1, maximum=4.0
     )
+    carry_velocity: Vector2[MetrePerSecond] = parameter(
+        np.zeros(2), "velocity of the ground under the object, which carries it", minimum=-0.5, maximum=0.5
+    )
+    carry_from: Second = parameter(0.0, "when the ground begins to carry the object", minimum=0.0, maximum=600.0)
+    carry_until: Second = parameter(12.0, "when it stops", minimum=0.0, maximum=600.0)
+    nudge: Vector2[Metre] = parameter(
+        np.zeros(2), "how far a bump takes the object along, if nothing holds it", minimum=-0.2, maximum=0.2
+    )
+    nudge_time: Second = parameter(4.0, "when the bump begins", minimum=0.0, maximum=600.0)
+    nudge_speed: MetrePerSecond = parameter(0.1, "speed of the bump", minimum=1e-3, maximum=0.5)
     mass_O: Kilogram = parameter(0.0, "mass of the object; 0: the thing's own", minimum=0.0, maximum=5.0)
     gravity: MetrePerSecond2 = parameter(9.81, "gravity, which presses on the table", minimum=0.0, maximum=30.0)
     table_friction: Number = parameter(0.3, "friction coefficient of object and table", minimum=0.0, maximum=2.0)
@@ -110,6 +121,13 @@ class Params:
         """What stands on the table."""
         return SOLIDS[self.thing]
 
+    @property
+    def ground_spans(self) -> tuple[Span, ...]:
+        """When the ground under the object moves, and how fast."""
+        x, y = self.nudge.tolist()
+        v_x, v_y = self.carry_velocity.tolist()
+        return (self.carry_from, self.carry_until, (v_x, v_y)), bump((x, y), self.nudge_time, self.nudge_speed)
+
     def sensor(self) -> InfraredSensor:
         """Return one of the sensors.
 
@@ -125,13 +143,21 @@ class Params:
         if not faults:
             if 0.0 < self.mass_O < _MIN_MASS:
                 faults.append(f"mass_O {self.mass_O:g} kg must be 0, for the thing's own, or at least {_MIN_MASS:g} kg")
-            faults.extend(self._table_faults())
+            faults.extend([*self._ground_faults(), *self._table_faults()])
             try:
                 self.sensor()
             except InvalidSensorParameters as error:
                 faults.extend(error.faults)
         if faults:
             raise InvalidSceneParameters(faults)
+
+    def _ground_faults(self) -> list[str]:
+        if np.any(self.carry_velocity) and not self.carry_from < self.carry_until:
+            return [
+                f"carry_until {self.carry_until:g} s must be after carry_from {self.carry_from:g} s; "
+                "with nothing to carry, carry_velocity must be 0 m/s"
+            ]
+        return []
 
     def _table_faults(self) -> list[str]:
         yaw, half = self.solid.yaw + self.yaw_O_0, self.table_size / 2.0

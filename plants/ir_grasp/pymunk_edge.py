@@ -114,9 +114,14 @@ class PymunkEdge:
             DampedRotarySpring(a, b, -rest, stiffness, damping),  # pymunk's spring counts a - b
         )
 
-    def add_ground_friction(self, body: PymunkBody, force: float, torque: float) -> None:
-        """Let the ground resist a body's sliding and turning with at most a force in N and a torque in N m."""
-        ground = self._space.static_body
+    def add_ground_friction(
+        self, body: PymunkBody, force: float, torque: float, ground_body: PymunkBody | None = None
+    ) -> None:
+        """Let the ground resist a body's sliding and turning with at most a force in N and a torque in N m.
+
+        The ground is at rest, or a driven body without shapes.
+        """
+        ground = self._space.static_body if ground_body is None else ground_body.body
         slide = PivotJoint(ground, body.body, (0.0, 0.0), (0.0, 0.0))
         turn = GearJoint(ground, body.body, 0.0, 1.0)
         for joint, limit in ((slide, force), (turn, torque)):

@@ -63,6 +63,7 @@ class Outputs:
     tension: Newton = output("tension of the tendon")
     p_WO: Vector2[Metre] = output("position of the object, in the world")
     yaw_O: Radian = output("orientation of the object, that of its reference pose included")
+    p_WG: Vector2[Metre] = output("how far the ground under the object has carried it, or what stands still on it")
     touching: int = output("number of the hand's bodies, of palm and 8 phalanges, that touch the object")
     range: Vector3[Metre] = output("distance of the object along the middle of each sensor's beam; 0.2 if none is met")
 
@@ -73,7 +74,8 @@ class GraspScene:
     - Hand: a palm that follows the wrist's command with bounded speed and acceleration (`follow`), a thumb
       of 2 phalanges on its right (-y of H), index and ring finger of 3 on its left. One elastic tendon,
       T = k max(0, sigma L - sum r q), turns all joints, so a blocked finger lets the others close further.
-    - Object: rigid, with dry friction on the table and in the hand; `SOLIDS` has the shapes.
+    - Object: rigid, with dry friction on the table and in the hand; `SOLIDS` has the shapes. The ground below it may
+      move, as a belt that carries it (`carry_velocity`) or a bump (`nudge`): then friction acts against that motion.
     - Sensors: on the distal phalanges, one active at a time (sec. V-B), for 5 ms (assumed), in the order of the
       fingers; it is read at the end of its time. A reading is the mean over three rays of the beam of
       `InfraredSensor.ticks`, plus noise, rounded. At the start all three have been read. Only the object returns
@@ -124,6 +126,7 @@ class GraspScene:
             tension=w.tension,
             p_WO=np.array([x_O, y_O]),
             yaw_O=yaw_O,
+            p_WG=np.array(w.ground),
             touching=w.touching,
             range=np.array([self._range(i) for i in range(_SENSORS)]),
         )

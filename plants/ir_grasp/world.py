@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.plants.ir_grasp.ground import MovingGround, Pair
 from handover.plants.ir_grasp.hand import FINGERS, MAX_ANGLE, MIN_ANGLE, PALM, SENSOR_PLACE, Finger, finger_points
 from handover.plants.ir_grasp.objects import Disc
 from handover.plants.ir_grasp.parameters import Params
@@ -85,8 +86,8 @@ DT: Final = 1e-3
 Command = tuple[float, float, float, float]
 """Wrist's position in m, orientation in rad, closure."""
 
-Snapshot = tuple[float, tuple[Motion, ...]]
-"""Closure, then the motions of palm, object and phalanges."""
+Snapshot = tuple[float, tuple[Motion, ...], int]
+"""Closure, then the motions of palm, object and phalanges, then the steps made since the start."""
 
 Ray = tuple[float, float]
 """Cosine and sine of the angle between a ray and the direction that a sensor looks in."""
@@ -95,7 +96,6 @@ _ITERATIONS = 10
 _HAND, _OBJECT = 1, 2  # groups whose own shapes do not collide
 _NAMED_FINGERS = tuple(zip(("thumb", "index", "ring"), FINGERS, strict=True))
 _DISTAL = tuple(int(i) - 1 for i in accumulate(len(f.lengths) for f in FINGERS))  # among the phalanges
-_FIRST_PHALANX = 2  # among the bodies
 _STILL = (0.0, 0.0, 0.0)
 
 
@@ -104,7 +104,7 @@ def initial_snapshot(p: Params) -> Snapshot:
     q = resting_posture(p.sigma_0, p.tendon_stiffness, p.tendon_travel)
     palm = (float(p.p_WH_0[0]), float(p.p_WH_0[1]), p.yaw_H_0, *_STILL)
     thing = (float(p.p_WO_0[0]), float(p.p_WO_0[1]), p.solid.yaw + p.yaw_O_0, *_STILL)
-    return p.sigma_0, (palm, thing, *_phalanges(p, q))
+    return p.sigma_0, (palm, thing, *_phalanges(p, q)), 0
 
 
 def _phalanges(p: Params, q: Floats) -> list[Motion]:
@@ -126,7 +126,8 @@ class GraspWorld:
     the world that it was taken from.
 
     The palm follows the wrist's command whatever pushes (`follow`). The tendon, T = k max(0, sigma L - sum r q), turns
-    each joint with r T against its spring and damper. Object and table: dry friction, isotropic and uniform.
+    each joint with r T against its spring and damper. Object and table: dry friction, isotropic and uniform, against
+    the ground's motion where it has one (`MovingGround`).
 
     Args:
         params: of the scene.
@@ -136,11 +137,14 @@ class GraspWorld:
     def __init__(self, params: Params, snapshot: Snapshot) -> None:
         self._params = params
         self._edge = PymunkEdge(DT, _ITERATIONS)
-        self._sigma, (palm, thing, *phalanges) = snapshot
+        self._sigma, (palm, thing, *phalanges), self._steps = snapshot
+        self._ground = MovingGround(params.ground_spans, DT)
         self._wrist = palm
         self._palm = self._edge.add_driven(palm)
         self._edge.add_polygon(self._palm, PALM, params.grip_friction, _HAND)
+        self._ground_body = self._edge.add_driven((0.0, 0.0, 0.0, *_STILL)) if self._ground.ever_moves else None
         self._thing = self._add_thing(thing)
+        self._first_phalanx = 2 if self._ground_body is None else 3  # among the bodies
         self._phalanges: list[PymunkBody] = []
         for f in FINGERS:
             self._add_finger(f, phalanges[len(self._phalanges) :][: len(f.lengths)])
@@ -148,7 +152,7 @@ class GraspWorld:
     @property
     def snapshot(self) -> Snapshot:
         """Where everything is and how it moves."""
-        return self._sigma, (self._wrist, *(b.motion for b in (self._thing, *self._phalanges)))
+        return self._sigma, (self._wrist, *(b.motion for b in (self._thing, *self._phalanges))), self._steps
 
     @property
     def sigma(self) -> float:
@@ -166,10 +170,15 @@ class GraspWorld:
         return (*self._thing.position, self._thing.angle)
 
     @property
+    def ground(self) -> Pair:
+        """How far the ground under the object has moved since the start, in m."""
+        return self._ground.way(self._steps)
+
+    @property
     def joints(self) -> list[float]:
         """Joint angles, 8, in rad."""
         q: list[float] = []
-        angles = self._edge.angles(_FIRST_PHALANX)
+        angles = self._edge.angles(self._first_phalanx)
         for f in FINGERS:
             before = self._wrist[2] + f.spread
             for angle in angles[len(q) :][: len(f.lengths)]:
@@ -180,7 +189,7 @@ class GraspWorld:
     @property
     def tension(self) -> float:
         """Tension of the tendon, in N."""
-        return self._tension(self._edge.angles(_FIRST_PHALANX))
+        return self._tension(self._edge.angles(self._first_phalanx))
 
     @property
     def touching(self) -> int:
@@ -199,9 +208,12 @@ class GraspWorld:
         x, y, yaw, sigma = command
         travel = p.closure_rate * DT
         self._sigma += min(max(sigma - self._sigma, -travel), travel)
-        T = self._tension(self._edge.angles(_FIRST_PHALANX))
+        T = self._tension(self._edge.angles(self._first_phalanx))
         self._drive(x, y, yaw)
-        self._edge.advance(_FIRST_PHALANX, [T * gear for gear in GEARS])
+        if self._ground_body is not None:
+            self._ground_body.drive(self._ground.velocity(self._steps), 0.0)
+        self._edge.advance(self._first_phalanx, [T * gear for gear in GEARS])
+        self._steps += 1
 
     def cast_rays(self, finger: int, rays: Sequence[Ray], reach: float) -> list[tuple[float, float]]:
         """Return what rays from a finger's sensor meet within reach: distance in m, cosine of the angle of incidence.
@@ -260,7 +272,7 @@ class GraspWorld:
             else:
                 self._edge.add_polygon(thing, part.corners, 1.0, _OBJECT)
         weight = p.table_friction * mass * p.gravity
-        self._edge.add_ground_friction(thing, weight, weight * solid.friction_arm)
+        self._edge.add_ground_friction(thing, weight, weight * solid.friction_arm, self._ground_body)
         return thing
 
     def _add_finger(self, f: Finger, motions: Sequence[Motion]) -> None:

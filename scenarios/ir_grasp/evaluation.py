@@ -67,6 +67,7 @@ class GraspEvaluator(Evaluator):
         self._moves = {"RECOVER": 0, "APPROACH": 0, "PROBE": 0}
         self._command: tuple[float, ...] = ()
         self._p_WO_start: Floats = np.zeros(2)
+        self._p_WG_start: Floats = np.zeros(2)
         self._p_HO: Floats = np.zeros(2)
         self._p_HO_closed: Floats | None = None  # in H, when the pull began
         self._touching = 0
@@ -81,6 +82,7 @@ class GraspEvaluator(Evaluator):
         self._t, phase = t, signals.text("reflex.phase")
         if not self.moments:
             self.moments["start"], self._p_WO_start = t, signals["scene.p_WO"]
+            self._p_WG_start = signals["scene.p_WG"] if "scene.p_WG" in signals else np.zeros(2)
             self._at_start = self._vision_errors(signals)
         if phase != self._phase:
             self._enter(phase, signals)
@@ -133,13 +135,16 @@ class GraspEvaluator(Evaluator):
         true = _where_below(signals["scene.range"], OUT_OF_RANGE)
         cost, blind = float(_given(signals, "reflex.cost")), bool(np.isnan(seen[list(IN_COST)]).any())
         what_of_cost = f"{_COST} (thumb or ring sees nothing)" if blind else _COST
-        displaced = float(np.linalg.norm(signals["scene.p_WO"] - self._p_WO_start))
+        carried = signals["scene.p_WG"] - self._p_WG_start if "scene.p_WG" in signals else np.zeros(2)
+        displaced = float(np.linalg.norm(signals["scene.p_WO"] - self._p_WO_start - carried))
         stop = int(_given(signals, "reflex.stop"))
         metrics = {
             "final_cost": Metric(math.nan if blind else cost, "m2", what_of_cost),
             "steps": Metric(int(_given(signals, "reflex.steps")), "1", "Gauss-Newton steps"),
             "refinement_time": Metric(t - began, "s", "time from the first look at the sensors until the hand closes"),
-            "displacement": Metric(displaced, "m", "how far the object was pushed before the hand closed"),
+            "displacement": Metric(
+                displaced, "m", "how far the object was pushed before the hand closed, less what the ground carried it"
+            ),
             "stop": Metric(stop, "1", f"why the refinement ended, by number: {stop} is {self._stop}"),
         }
         for i, finger in enumerate(("thumb", "index", "ring")):

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.controllers.ir_grasp.parameters import Strategy
-from handover.cosim.blocks.ports import Floats, parameter
-from handover.cosim.blocks.units import Metre, Radian
+from handover.cosim.blocks.ports import Floats, Vector2, parameter
+from handover.cosim.blocks.units import Metre, MetrePerSecond, Radian, Second
 from handover.plants.ir_grasp.hand import PALM
 from handover.plants.ir_grasp.objects import SOLIDS, Thing, outlines
 
@@ -40,6 +40,18 @@ class Parameters:
     turn_most: Radian = parameter(
         0.35, "how far a perturbed object was turned at most, either way", minimum=0.0, maximum=math.pi
     )
+    carried_speed: MetrePerSecond = parameter(
+        0.0, "speed at which the ground under the object carries it", minimum=0.0, maximum=0.2
+    )
+    carried_direction: Radian = parameter(
+        math.pi / 2.0, "where to, counter-clockwise from the approach", minimum=-math.pi, maximum=math.pi
+    )
+    carried_from: Second = parameter(0.0, "when it begins to carry", minimum=0.0, maximum=90.0)
+    carried_until: Second = parameter(12.0, "when it stops", minimum=0.0, maximum=90.0)
+    nudge: Vector2[Metre] = parameter(
+        np.zeros(2), "how far somebody bumps the object meanwhile, in W", minimum=-0.1, maximum=0.1
+    )
+    nudge_time: Second = parameter(4.0, "when the bump begins", minimum=0.0, maximum=90.0)
     vision_position: Metre = parameter(
         0.003, "standard deviation of the pre-grasp position, by axis", minimum=0.0, maximum=0.05
     )
@@ -47,6 +59,11 @@ class Parameters:
     run_up: Metre = parameter(
         0.12, "distance of the wrist from the pre-grasp pose at the start", minimum=0.0, maximum=0.5
     )
+
+    @property
+    def carry_velocity(self) -> Floats:
+        """Velocity of the ground under the object, in W, in m/s."""
+        return self.carried_speed * np.array([math.cos(self.carried_direction), math.sin(self.carried_direction)])
 
 
 _PALM_FRONT = max(x for x, _ in PALM)

@@ -30,7 +30,16 @@ PLACES = {
             "p_WH_0": "in W; drawn from the run's seed",
             "yaw_H_0": "drawn from the run's seed",
         },
-        optional={"tension": "shown as a signal", "seed": "follows from the run's seed"},
+        optional={
+            "p_WG": "what it carried the object is no displacement by the hand",
+            "tension": "shown as a signal",
+            "carry_velocity": "in W; by carried_speed and carried_direction",
+            "carry_from": "the scenario's parameter carried_from",
+            "carry_until": "the scenario's parameter carried_until",
+            "nudge": "the scenario's parameter, in W",
+            "nudge_time": "the scenario's parameter",
+            "seed": "follows from the run's seed",
+        },
         remarks=(_TABLE,),
     ),
     "reflex": Place(

@@ -57,7 +57,7 @@ def test_pictures_show_the_hand_where_the_physics_has_it():
     world = GraspWorld(AROUND, initial_snapshot(AROUND))
     for k in range(1800):
         world.advance((-0.11 - 7e-5 * k, 0.01 * math.sin(0.007 * k), 2e-4 * k, 1.0))
-    _, (_, _, *phalanges) = world.snapshot
+    _, (_, _, *phalanges), _ = world.snapshot
     x, y, yaw = world.wrist
     points = finger_points(np.array([x, y]), yaw, np.array(world.joints))
     middles = [(a + b) / 2.0 for finger in points for a, b in pairwise(finger)]
@@ -192,8 +192,8 @@ def test_joints_keep_to_their_limits():
 @pytest.mark.parametrize("thing", [Thing.CYLINDER, Thing.PAPER_BOX_A])
 def test_a_pushed_object_slides_to_rest(thing: Thing):
     p = replace(AROUND, thing=thing, p_WH_0=np.array([-0.5, 0.0]))
-    sigma, (palm, (x, y, yaw, *_), *phalanges) = initial_snapshot(p)
-    world = GraspWorld(p, (sigma, (palm, (x, y, yaw, 0.3, 0.4, 0.0), *phalanges)))
+    sigma, (palm, (x, y, yaw, *_), *phalanges), _ = initial_snapshot(p)
+    world = GraspWorld(p, (sigma, (palm, (x, y, yaw, 0.3, 0.4, 0.0), *phalanges), 0))
     steps = 0
     while math.hypot(*world.snapshot[1][1][3:5]) > 1e-9:
         world.advance((-0.5, 0.0, 0.0, 0.1))
@@ -205,8 +205,8 @@ def test_a_pushed_object_slides_to_rest(thing: Thing):
 
 def test_a_spun_object_turns_to_rest():
     p = replace(AROUND, p_WH_0=np.array([-0.5, 0.0]))
-    sigma, (palm, (x, y, yaw, *_), *phalanges) = initial_snapshot(p)
-    world = GraspWorld(p, (sigma, (palm, (x, y, yaw, 0.0, 0.0, 10.0), *phalanges)))
+    sigma, (palm, (x, y, yaw, *_), *phalanges), _ = initial_snapshot(p)
+    world = GraspWorld(p, (sigma, (palm, (x, y, yaw, 0.0, 0.0, 10.0), *phalanges), 0))
     steps = 0
     while world.snapshot[1][1][5] > 1e-9:
         world.advance((-0.5, 0.0, 0.0, 0.1))
