@@ -45,6 +45,7 @@ class Sensing:
         self._rng = np.random.default_rng(p.seed)
         self._encoder_rng = np.random.default_rng([p.seed, 0xE2C0DE2])
         self._encoder_noise: Floats = np.array([p.wrist_noise, p.wrist_noise, p.heading_noise, p.closure_noise])
+        self._encoders_err = bool(np.any(self._encoder_noise))
         self._clock = 0  # internal steps into the scan of the sensors
         self.ticks = [0.0] * _SENSORS
         for slot in range(_SENSORS):
@@ -131,7 +132,7 @@ class Sensing:
 
     def _encoder_errors(self) -> list[float]:
         """Return new errors of the encoders; without noise no random numbers are drawn."""
-        if not np.any(self._encoder_noise):
+        if not self._encoders_err:
             return [0.0] * 4
         return (self._encoder_noise * self._encoder_rng.standard_normal(4)).tolist()
 

@@ -132,7 +132,7 @@ class GraspWorld:
     @property
     def ground(self) -> Point:
         """How far the ground under the object has moved since the start, in m."""
-        return self._ground.way(self._steps)
+        return (0.0, 0.0) if self._ground_body is None else self._ground.way(self._steps)
 
     @property
     def joints(self) -> list[float]:
