@@ -13,6 +13,7 @@ import numpy as np
 from handover.controllers.ir_grasp.parameters import Strategy
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
+from handover.plants.ir_grasp.objects import SOLIDS
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.parameters import InvalidParameter
@@ -28,8 +29,11 @@ FINGERS = ("thumb", "index", "ring")
 
 
 def published_values(p: Parameters) -> Sequence[PublishedValue]:
-    """Return table II's distances for the object and the pose; nothing for other strategies than the reflex."""
-    if p.strategy is not Strategy.REFLEX or p.literal:
+    """Return table II's distances for the object and the pose; nothing for what is not in the table.
+
+    It has the five things, unmoved or moved a little, and the reflex.
+    """
+    if p.strategy is not Strategy.REFLEX or p.literal or p.thing not in SOLIDS or p.is_beyond_the_table:
         return ()
     pose = "perturbed" if p.perturbed else "nominal"
     thing = p.thing.name.lower().removesuffix("_a").removesuffix("_b")
