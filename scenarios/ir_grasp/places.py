@@ -6,6 +6,7 @@ _TABLE = (
     "The scene is planar, seen from above: W lies on the table, with its origin where vision saw the object; headings "
     "turn counter-clockwise from x of W, and the hand points along its heading."
 )
+_OWN = "the scenario's parameter"
 _HAND = {"p_WH": "in W", "yaw": "counter-clockwise from x of W", "sigma": ""}
 _COMMAND = {
     "p_WH_cmd": "in W; the hand goes there at its own speed",
@@ -18,6 +19,7 @@ PLACES = {
         required={
             "ticks": "",
             **_HAND,
+            **{f"{name}_meas": text for name, text in _HAND.items()},
             **_COMMAND,
             "q": "shown in space",
             "p_WO": "in W",
@@ -30,7 +32,20 @@ PLACES = {
             "p_WH_0": "in W; drawn from the run's seed",
             "yaw_H_0": "drawn from the run's seed",
         },
-        optional={"tension": "shown as a signal", "seed": "follows from the run's seed"},
+        optional={
+            "p_WG": "what it carried the object is no displacement by the hand",
+            "tension": "shown as a signal",
+            "carry_velocity": "in W; by carried_speed and carried_direction",
+            "carry_from": "the scenario's parameter carried_from",
+            "carry_until": "the scenario's parameter carried_until",
+            "p_WX": "shown in space",
+            **dict.fromkeys(("disc_radius", "bar_size", "corners", "corner_count", "thing_seed"), _OWN),
+            "other_radius": "the scenario's parameter",
+            "p_WX_0": "the scenario's parameter other_place",
+            "nudge": "the scenario's parameter, in W",
+            "nudge_time": "the scenario's parameter",
+            "seed": "follows from the run's seed",
+        },
         remarks=(_TABLE,),
     ),
     "reflex": Place(
