@@ -82,7 +82,7 @@ _ENDINGS = {
     Ending.REACHED: Stop.THRESHOLD,
     Ending.SETTLED: Stop.STALLED,
     Ending.LOST: Stop.OUT_OF_SIGHT,
-    Ending.USED_UP: Stop.OUT_OF_SIGHT,
+    Ending.USED_UP: Stop.PATIENCE,
     Ending.PUSHED: Stop.PUSHED,
     Ending.CENTRED: Stop.CENTRED,
 }
