@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Polygon
+from matplotlib.patches import Circle, Polygon
 
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.ir_grasp.hand import FINGERS, finger_points, palm_outline, sensor_rays
-from handover.plants.ir_grasp.objects import outlines
+from handover.plants.ir_grasp.objects import placed
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import figure
 from handover.scenarios.experiment.time_plot import (
@@ -42,8 +42,6 @@ _PHASE_NAMES = {
     9: "done",
 }
 """Phase names as plotted and in the replay: a check may include approaching and recovering motions."""
-_WRIST = ("reflex.p_WH_cmd", "scene.p_WH")
-"""The wrist's position as commanded and as measured."""
 _MIN_COST = 0.1
 """Smaller costs are drawn as this, mm², since a logarithmic axis has no zero."""
 
@@ -121,11 +119,12 @@ def _cost(parameters: Parameters, record: Record, phases: Sequence[Phase]) -> Ti
 
 
 def _commands(record: Record, phases: Sequence[Phase]) -> list[TimePlot]:
-    wrist = [1000 * record[s] for s in _WRIST]
+    suffix = "_meas" if "scene.p_WH_meas" in record else ""
+    p, yaw, sigma = ((record[f"reflex.{n}_cmd"], record[f"scene.{n}{suffix}"]) for n in ("p_WH", "yaw", "sigma"))
     followed = [
-        *((f"Wrist along {name} of W", name, "mm", *(p[:, i] for p in wrist)) for i, name in enumerate("xy")),
-        ("Heading", "yaw", "°", *(np.degrees(record[s]) for s in ("reflex.yaw_cmd", "scene.yaw"))),
-        ("Closure", "closure, 0 to 1", "", *(record[s] for s in ("reflex.sigma_cmd", "scene.sigma"))),
+        *((f"Wrist along {name} of W", name, "mm", *(1000 * of[:, i] for of in p)) for i, name in enumerate("xy")),
+        ("Heading", "yaw", "°", *(np.degrees(of) for of in yaw)),
+        ("Closure", "closure, 0 to 1", "", *sigma),
     ]
     return [
         TimePlot(
@@ -142,7 +141,7 @@ def _commands(record: Record, phases: Sequence[Phase]) -> list[TimePlot]:
     ]
 
 
-PALM_COLOUR, THING_COLOUR = "#c9d1db", "#ecd9b8"
+PALM_COLOUR, THING_COLOUR, OTHER_COLOUR = "#c9d1db", "#ecd9b8", "#d5dfc6"
 
 
 def draw_scene(parameters: Parameters, moments: Mapping[str, float], record: Record, folder: Path) -> Figure:
@@ -170,6 +169,9 @@ def _draw_moment(axes: Axes, parameters: Parameters, record: Record, k: int) -> 
     p_WH, yaw, q = record["scene.p_WH"][k], float(record["scene.yaw"][k]), record["scene.q"][k]
     for part in _thing(parameters, record, k):
         axes.add_patch(Polygon(part * 1000, facecolor=THING_COLOUR, edgecolor="#8a6d3b", lw=1.0))
+    if parameters.other_radius > 0.0 and "scene.p_WX" in record:
+        middle, radius = 1000 * record["scene.p_WX"][k], 1000 * parameters.other_radius
+        axes.add_patch(Circle(middle.tolist(), radius, facecolor=OTHER_COLOUR, edgecolor="#4d5866", lw=1.0))
     axes.add_patch(Polygon(palm_outline(p_WH, yaw) * 1000, facecolor=PALM_COLOUR, edgecolor="#4d5866", lw=1.0))
     for i, (finger, points) in enumerate(zip(FINGERS, finger_points(p_WH, yaw, q), strict=True)):
         for j, radius in enumerate(finger.radii):
@@ -184,9 +186,7 @@ def _draw_moment(axes: Axes, parameters: Parameters, record: Record, k: int) -> 
 
 
 def _thing(parameters: Parameters, record: Record, k: int) -> list[Floats]:
-    p_WO, yaw = record["scene.p_WO"][k], float(record["scene.yaw_O"][k])
-    R_WO = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    return [p_WO + outline @ R_WO.T for outline in outlines(parameters.thing)]
+    return placed(parameters.solid, record["scene.p_WO"][k], float(record["scene.yaw_O"][k]))
 
 
 def _frame(record: Record, rows: list[int]) -> tuple[Floats, Floats]:

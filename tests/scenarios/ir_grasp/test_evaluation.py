@@ -42,6 +42,7 @@ def signals(
     for name, value in (("p_WH", [p_WH, 0.0]), ("p_WO", [p_WH + p_HO[0], p_HO[1]]), ("yaw", 0.0), ("yaw_O", 0.0)):
         show("scene", name, Kind.REAL, value)
     show("scene", "range", Kind.REAL, [0.01, index[1], 0.01])
+    show("scene", "q", Kind.REAL, np.zeros(8))
     show("scene", "p_WG", Kind.REAL, p_WG)
     show("scene", "touching", Kind.INTEGER, touching)
     for name, value in (("distance", [thumb, index[0], 0.01]), ("cost", 1e-5), ("yaw_cmd", 0.0), ("sigma_cmd", 0.0)):
