@@ -2,6 +2,7 @@
 
 import enum
 import math
+from typing import Any
 
 import numpy as np
 
@@ -61,7 +62,6 @@ class Following:
         self.doing = Doing.SEARCH
         self.rounds = 0
         self._front: X = ()  # nearest point that was seen, in W
-        self._front_side: Floats = np.zeros(2)
         self._off, self._beside, self._before = math.inf, 0.0, Doing.SEARCH
         self._settled, self._lost, self._pushed, self._path = 0.0, 0.0, 0.0, 0.0
         self._saw = [False] * 3
@@ -77,7 +77,9 @@ class Following:
         p = self._params
         distances = [self._calibration.distance(v) for v in ticks]
         # a finger that sees goes on seeing down to fewer ticks: noise at the edge of sight is no news
-        self._saw = [v >= (self._ticks_lost if saw else self._ticks_seen) for v, saw in zip(ticks, self._saw)]
+        self._saw = [
+            v >= (self._ticks_lost if saw else self._ticks_seen) for v, saw in zip(ticks, self._saw, strict=True)
+        ]
         noise = [p.tick_noise * -self._calibration.slope(v) + 2e-4 for v in ticks]
         self._filter.advance(x, distances, self._saw, noise)
         self._remember(x, np.array(distances))
@@ -182,3 +184,18 @@ class Following:
         else:
             self._pushed += self._dt * abs(float(u[1]))
         return self._pushed > p.push_limit or self._path > p.path_limit
+
+    def get_state(self) -> tuple[object, ...]:
+        """Return estimates, search, what was seen, and counters."""
+        did = (int(self.doing), int(self._before), self.rounds)
+        saw = (self._saw, self._front, self._beside)
+        counters = (self._off, self._settled, self._lost, self._pushed, self._path)
+        return self._filter.get_state(), self._search.get_state(), did, saw, counters
+
+    def set_state(self, state: tuple[Any, ...]) -> None:
+        """Restore a state that `get_state` gave."""
+        estimates, searched, (doing, before, self.rounds), (saw, self._front, self._beside), counters = state
+        self._filter.set_state(estimates)
+        self._search.set_state(searched)
+        self.doing, self._before, self._saw = Doing(doing), Doing(before), list(saw)
+        self._off, self._settled, self._lost, self._pushed, self._path = counters

@@ -73,7 +73,7 @@ class InvalidReflexParameters(InvalidParameters):
 class Strategy(enum.IntEnum):
     """What is done between the pre-grasp pose and closing.
 
-    A correction by the sensors, nothing, a given way forward, or forward while slowly closing until the tendon tightens.
+    A correction by the sensors, nothing, a given way forward, or forward and slowly closing until the tendon tightens.
     """
 
     REFLEX = 0
@@ -162,7 +162,7 @@ class Params:
     contact_speed: MetrePerSecond = parameter(0.04, "speed ahead of the strategy CONTACT", minimum=1e-3, maximum=0.3)
     contact_closing: PerSecond = parameter(0.2, "its rate of closing on the way", minimum=0.0, maximum=1.0)
     contact_tension: Newton = parameter(0.5, "tension off that of the free hand that shows contact", minimum=1e-3)
-    free_tension: Newton = parameter(16.4, "tension of the free hand's tendon by closure, of its design", minimum=0.0)
+    free_tension: Newton = parameter(6.51, "tension of the free hand's tendon by closure, of its design", minimum=0.0)
     feed: MetrePerSecond = parameter(0.06, "speed ahead, of FAST", minimum=0.0, maximum=1.0)
     rate: PerSecond = parameter(5.0, "rate at which FAST takes off residuals", minimum=0.0, maximum=50.0)
     speed_limit: Vector4[Number] = parameter(
@@ -177,9 +177,7 @@ class Params:
     settling: Second = parameter(0.5, "time given to the residuals once the object is deep enough", minimum=0.0)
     lost_deep: Second = parameter(0.1, "time out of sight after which a hand that is deep enough closes", minimum=0.0)
     lost_time: Second = parameter(1.0, "time after which an object that was in sight is no longer awaited", minimum=0.0)
-    fast_reach: Vector3[Number] = parameter(
-        np.array([0.15, 0.15, 0.9]), "reach, of FAST", minimum=0.0, maximum=10.0
-    )
+    fast_reach: Vector3[Number] = parameter(np.array([0.15, 0.15, 0.9]), "reach, of FAST", minimum=0.0, maximum=10.0)
     search_width: Metre = parameter(0.060, "how far the search goes to either side", minimum=1e-3, maximum=0.5)
     search_row: Metre = parameter(0.025, "how far ahead one crossing of the search is of the last", minimum=1e-3)
     search_back: Metre = parameter(0.020, "how far the search begins behind the pre-grasp pose", minimum=0.0)

@@ -12,9 +12,9 @@ class Search:
     """A zig-zag about the pre-grasp pose: a step back, then rows across, each farther ahead, then a guess.
 
     The fingers look inwards: an object beside the hand is not seen, and an open hand that goes ahead pushes it. So the
-    rows begin a step behind, where the fingers pass before what was moved to the side. Each row is as wide as an ellipse
-    about the pre-grasp pose. If nothing was seen, the hand goes where the object would be had it not been moved
-    (`search_guess` ahead).
+    rows begin a step behind, where the fingers pass before what was moved to the side. Together they fill half an
+    ellipse before the pre-grasp pose. If nothing was seen, the hand goes where the object would be had it not been
+    moved (`search_guess` ahead).
     """
 
     def __init__(self, params: Params) -> None:
