@@ -59,10 +59,11 @@ class Following:
         self._weight = params.weight[self._in_cost]
         pregrasp = np.array([*params.p_WH_pregrasp, params.yaw_pregrasp])
         self._low, self._high = pregrasp - params.fast_reach, pregrasp + params.fast_reach
-        self.doing = Doing.SEARCH
+        self.doing: Doing = Doing.SEARCH
         self.rounds = 0
         self._front: X = ()  # nearest point that was seen, in W
-        self._off, self._beside, self._before = math.inf, 0.0, Doing.SEARCH
+        self._off, self._beside = math.inf, 0.0
+        self._before: Doing = Doing.SEARCH
         self._settled, self._lost, self._pushed, self._path = 0.0, 0.0, 0.0, 0.0
         self._saw = [False] * 3
         self._ticks_seen, self._ticks_lost = (self._calibration.ticks(y) for y in (params.epsilon, params.distance_max))

@@ -184,12 +184,12 @@ class IrReflex:
     def _follow(self, x: X, ticks: X) -> None:
         """Correct on the move; while closing, go along with the object."""
         following = self._following
-        sees = following.look(x, ticks)
-        if self._phase is Phase.CLOSE:
+        if self._phase is Phase.CLOSE:  # what it last estimated: fingers that touch are not where the model has them
             v = following.velocity * float(_PERIOD)
             goal = self._move.goal
             self._move.goal = (goal[0] + float(v[0]), goal[1] + float(v[1]), *goal[2:])
             return
+        sees = following.look(x, ticks)
         if self._phase is Phase.REACH and not sees and not self._arrived(x):
             return
         start = x if self._phase is Phase.REACH and not self._arrived(x) else self._move.goal

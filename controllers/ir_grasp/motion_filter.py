@@ -48,12 +48,12 @@ class MotionFilter:
     @property
     def distances(self) -> Floats:
         """Estimated distances of thumb, index and ring, (3,), in m; of a finger that sees nothing, NaN."""
-        return np.where(self.seen, self._m[:, 0], math.nan)
+        return np.where(self.seen, np.array(self._m[:, 0]), math.nan)
 
     @property
     def jacobian(self) -> Floats:
         """Estimated d(distance)/d[ahead, left, yaw, sigma], (3, 4)."""
-        return self._m[:, 1:].copy()
+        return np.array(self._m[:, 1:])
 
     @property
     def velocity(self) -> Floats:
@@ -152,10 +152,10 @@ class MotionFilter:
 
     def get_state(self) -> tuple[tuple[Floats, Floats, Floats, Floats], X, tuple[bool, ...], int]:
         """Return means and covariances, the encoders, who sees, and for how long."""
-        arrays = (self._m.copy(), self._cov.copy(), self._middle.copy(), self._spread.copy())
+        arrays = (np.array(self._m), np.array(self._cov), np.array(self._middle), np.array(self._spread))
         return arrays, self._x, self.seen, self._rounds
 
     def set_state(self, state: tuple[tuple[Floats, Floats, Floats, Floats], X, tuple[bool, ...], int]) -> None:
         """Restore a state that `get_state` gave."""
         arrays, self._x, self.seen, self._rounds = state
-        self._m, self._cov, self._middle, self._spread = (a.copy() for a in arrays)
+        self._m, self._cov, self._middle, self._spread = (np.array(a) for a in arrays)

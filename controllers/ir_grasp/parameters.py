@@ -64,6 +64,18 @@ class Calibration:
         return faults + [f"{name} = {x:g} 1/tick must be below 0" for name, x in falling if x >= 0.0]
 
 
+def flight_distance(speed: float, flight_time: float) -> float:
+    """Return the distance d = v t_f / 2, eq. (3), in m, of what returns a wave after a flight time.
+
+    The source's own sensors measure the returned intensity instead (sec. V-B), and so does the reflex.
+
+    Args:
+        speed: v of the wave, in m/s.
+        flight_time: t_f from emission to reception, in s.
+    """
+    return speed * flight_time / 2.0
+
+
 class InvalidReflexParameters(InvalidParameters):
     """Values with which the reflex cannot work; `faults` lists all of them."""
 
@@ -178,7 +190,9 @@ class Params:
     lost_deep: Second = parameter(0.1, "time out of sight after which a hand that is deep enough closes", minimum=0.0)
     lost_time: Second = parameter(1.0, "time after which an object that was in sight is no longer awaited", minimum=0.0)
     fast_reach: Vector3[Number] = parameter(np.array([0.15, 0.15, 0.9]), "reach, of FAST", minimum=0.0, maximum=10.0)
-    search_width: Metre = parameter(0.060, "how far the search goes to either side", minimum=1e-3, maximum=0.5)
+    search_width: Vector2[Metre] = parameter(
+        np.array([0.045, 0.080]), "how far the search goes to the left and to the right", minimum=0.0, maximum=0.5
+    )
     search_row: Metre = parameter(0.025, "how far ahead one crossing of the search is of the last", minimum=1e-3)
     search_back: Metre = parameter(0.020, "how far the search begins behind the pre-grasp pose", minimum=0.0)
     search_ahead: Metre = parameter(0.105, "how far the search goes ahead of it", minimum=0.001, maximum=0.5)
@@ -219,7 +233,7 @@ class Params:
     def _input_faults(self) -> list[str]:
         faults: list[str] = []
         for j, name in enumerate(_INPUTS):
-            vectors = ("scale", "max_step", "probe", "tolerance")
+            vectors = ("scale", "max_step", "probe", "tolerance", "speed_limit")
             faults += [f"{v} of {name} must be above 0" for v in vectors if not getattr(self, v)[j] > 0.0]
             if not self.tolerance[j] < 0.5 * self.probe[j]:
                 faults.append(
@@ -247,6 +261,10 @@ class Params:
             faults.append(f"distance_max {self.distance_max:g} m must not exceed {farthest:.4g} m, eq. (11) at 0 ticks")
         if not self.sigma_pregrasp <= self.sigma_limit:
             faults.append(f"sigma_pregrasp {self.sigma_pregrasp:g} must not exceed sigma_limit {self.sigma_limit:g}")
+        if not self.sigma_before <= self.sigma_limit:
+            faults.append(f"sigma_before {self.sigma_before:g} must not exceed sigma_limit {self.sigma_limit:g}")
+        if not self.one_sided[0] > 0.0:
+            faults.append("one_sided of the thumb must be above 0: the hand goes ahead by its share")
         if not 0.0 < self.recovery_least <= self.recovery_step:
             faults.append(
                 f"recovery_least {self.recovery_least:g} m must be above 0 and at most recovery_step "

@@ -14,7 +14,8 @@ class Search:
     The fingers look inwards: an object beside the hand is not seen, and an open hand that goes ahead pushes it. So the
     rows begin a step behind, where the fingers pass before what was moved to the side. Together they fill half an
     ellipse before the pre-grasp pose. If nothing was seen, the hand goes where the object would be had it not been
-    moved (`search_guess` ahead).
+    moved (`search_guess` ahead). It goes farther to the right: the two fingers on the left look farther ahead than the
+    thumb, and see what the hand has passed.
     """
 
     def __init__(self, params: Params) -> None:
@@ -24,8 +25,10 @@ class Search:
         self._ends = [(-p.search_back, 0.0)]
         side, ahead = 1.0, -p.search_back
         while ahead <= p.search_ahead:
-            wide = p.search_width * math.sqrt(max(0.0, 1.0 - (max(ahead, 0.0) / (1.25 * p.search_ahead)) ** 2))
-            self._ends += [(ahead, side * wide), (ahead, -side * wide)]
+            share = math.sqrt(max(0.0, 1.0 - (max(ahead, 0.0) / (1.25 * p.search_ahead)) ** 2))
+            left, right = float(p.search_width[0]), -float(p.search_width[1])
+            ends = [(ahead, share * left), (ahead, share * right)]
+            self._ends += ends if side > 0.0 else ends[::-1]
             side, ahead = -side, ahead + p.search_row
         self._ends.append((p.search_guess, 0.0))
         self._next = 0
