@@ -213,8 +213,8 @@ class Params:
         np.array([0.05, 0.02, 0.004, 0.006]), "random change of the Jacobian in a round, by input", minimum=0.0
     )
     jacobian_memory: Second = parameter(0.5, "time after which what was learnt of it fades", minimum=0.1)
-    slope_spread: Number = parameter(0.3, "how far the middle moves across by way ahead, one deviation", minimum=0.0)
-    slope_drift: Number = parameter(0.03, "random change of that in a round", minimum=0.0)
+    slope_spread: Number = parameter(0.1, "how far the middle moves across by way ahead, one deviation", minimum=0.0)
+    slope_drift: Number = parameter(0.01, "random change of that in a round", minimum=0.0)
     velocity_spread: MetrePerSecond = parameter(0.012, "speed of an object, one standard deviation", minimum=0.0)
     velocity_drift: MetrePerSecond = parameter(0.0006, "random change of its speed in a round", minimum=0.0)
     velocity_after: Second = parameter(0.2, "time in sight before a velocity is believed", minimum=0.0)

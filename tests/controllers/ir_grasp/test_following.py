@@ -22,7 +22,7 @@ START, PREGRASP = (-0.279, 0.0), (-0.159, 0.0)
 
 
 def reflex(**more: Any) -> IrReflex:
-    given = {"correction": Correction.FAST, "p_WH_pregrasp": np.array(PREGRASP), **more}
+    given: dict[str, Any] = {"correction": Correction.FAST, "p_WH_pregrasp": np.array(PREGRASP), **more}
     return IrReflex(Params(**given))
 
 
@@ -68,7 +68,7 @@ def test_it_comes_to_the_object_in_less_than_half_the_papers_time(p_WO: tuple[fl
 
 
 def test_an_object_that_is_carried_is_followed_and_gone_along_with_while_the_hand_closes():
-    v = 0.015
+    v = 0.030
     controller, plant = reflex(), scene((0.0, -0.01), carry_velocity=np.array([0.0, v]))
     seen = grasp(controller, plant, Phase.PULL)
     assert Phase.TRACK in phases(seen)
@@ -76,7 +76,7 @@ def test_an_object_that_is_carried_is_followed_and_gone_along_with_while_the_han
     assert np.linalg.norm(closing[0][1].p_WO - closing[0][1].p_WG - [0.0, -0.01]) < 2e-3
     gone = closing[-1][0].p_WH_cmd - closing[0][0].p_WH_cmd
     rate = gone[1] / (DT * (len(closing) - 1))
-    assert 0.4 * v < rate < 1.6 * v
+    assert 0.4 * v < rate < 1.5 * v
     assert closing[-1][1].touching >= 2
 
 
@@ -114,6 +114,7 @@ def test_a_hand_whose_ways_change_nothing_pushes_and_stops():
     controller, x = reflex(), (*PREGRASP, 0.0, 0.0)
     ticks = np.array([Params().calibration.ticks(d) for d in (0.012, 0.1, 0.040)])
     ticks[1] = 0.0
+    o = controller.outputs(0.0, Inputs())
     for k in range(400):
         o = controller.step(k * DT, DT, Inputs(ticks=np.round(ticks), p_WH=np.array(x[:2]), yaw=x[2], sigma=x[3]))
         if o.phase is Phase.CLOSE:
@@ -146,6 +147,7 @@ def seeing(case: Visibility) -> Floats:
 def test_each_case_of_figure_9_moves_the_hand_at_once(case: Visibility, signs: tuple[int, int]):
     """To the side that sees the object near, and ahead; between both sides, ahead only, and closing."""
     controller, x, before = reflex(), (*PREGRASP, 0.0, 0.0), np.array(PREGRASP)
+    o = controller.outputs(0.0, Inputs())
     for k in range(3):
         o = controller.step(k * DT, DT, Inputs(ticks=seeing(case), p_WH=np.array(x[:2]), yaw=x[2], sigma=x[3]))
         x = (*o.p_WH_cmd.tolist(), o.yaw_cmd, o.sigma_cmd)
@@ -164,16 +166,15 @@ def test_each_case_of_figure_9_moves_the_hand_at_once(case: Visibility, signs: t
 def test_a_reading_beyond_the_range_is_not_seen_and_weighs_nothing():
     p = Params()
     edge = p.calibration.ticks(p.distance_max)
+    commands: list[list[float]] = []
     for beyond in (0.0, math.floor(edge) - 1.0):
         controller = reflex()
         ticks = np.array([beyond, beyond, round(p.calibration.ticks(0.02))])
         o = [controller.step(k * DT, DT, Inputs(ticks=ticks, p_WH=np.array(PREGRASP))) for k in range(5)][-1]
         assert o.case is Visibility.RING
         assert o.phase is Phase.RECOVER
-        if beyond == 0.0:
-            alone = o.p_WH_cmd
-        else:
-            assert np.array_equal(o.p_WH_cmd, alone)
+        commands.append([*o.p_WH_cmd.tolist(), o.yaw_cmd, o.sigma_cmd])
+    assert commands[0] == commands[1]
 
 
 def test_contact_closes_when_the_tendon_is_not_as_tight_as_that_of_a_free_hand():
