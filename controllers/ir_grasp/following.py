@@ -115,6 +115,7 @@ class Following:
         feed = 0.0 if deep else min(p.feed, p.rate * left + 0.03)
         both = all(self._saw[i] for i in self._in_cost)
         self.doing = Doing.TRACK if both else Doing.ONE_SIDED
+        self.rounds += both
         u = self._centering(feed, deep) if both else self._one_sided(feed, deep)
         over = float(np.max(np.abs(u) / p.speed_limit))
         u = u / over if over > 1.0 else u

@@ -112,11 +112,11 @@ def test_where_nothing_is_it_searches_within_its_reach_and_closes_at_its_guess()
 def test_a_hand_whose_ways_change_nothing_pushes_and_stops():
     """The thumb reads the same wherever the hand goes, as if the object went along."""
     controller, x = reflex(), (*PREGRASP, 0.0, 0.0)
-    ticks = np.array([Params().calibration.ticks(d) for d in (0.012, 0.1, 0.040)])
-    ticks[1] = 0.0
+    near = [float(round(Params().calibration.ticks(d))) for d in (0.012, 0.040)]
+    ticks = np.array([near[0], 0.0, near[1]])
     o = controller.outputs(0.0, Inputs())
     for k in range(400):
-        o = controller.step(k * DT, DT, Inputs(ticks=np.round(ticks), p_WH=np.array(x[:2]), yaw=x[2], sigma=x[3]))
+        o = controller.step(k * DT, DT, Inputs(ticks=ticks, p_WH=np.array(x[:2]), yaw=x[2], sigma=x[3]))
         if o.phase is Phase.CLOSE:
             break
         x = (*o.p_WH_cmd.tolist(), o.yaw_cmd, o.sigma_cmd)
@@ -129,7 +129,7 @@ def test_a_hand_whose_ways_change_nothing_pushes_and_stops():
 def seeing(case: Visibility) -> Floats:
     near = (0.030, 0.050, 0.030)  # the index looks farther ahead
     ticks = [Params().calibration.ticks(near[i]) if case & (1 << i) else 0.0 for i in range(3)]
-    return np.round(ticks)
+    return np.array([float(round(x)) for x in ticks])
 
 
 @pytest.mark.parametrize(
