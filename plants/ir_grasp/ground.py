@@ -3,8 +3,9 @@
 import math
 from dataclasses import dataclass
 
-Pair = tuple[float, float]
-Span = tuple[float, float, Pair]
+from handover.plants.ir_grasp.shapes import Point
+
+Span = tuple[float, float, Point]
 """From when until when, in s, and with which velocity, in m/s."""
 
 
@@ -27,14 +28,14 @@ class MovingGround:
     @property
     def ever_moves(self) -> bool:
         """Whether it moves at any time."""
-        return any(math.hypot(*v) > 0.0 and self._steps(start, end) != (0, 0) for start, end, v in self.spans)
+        return any(math.hypot(*v) > 0.0 and self._first(start) < self._first(end) for start, end, v in self.spans)
 
-    def velocity(self, step: int) -> Pair:
+    def velocity(self, step: int) -> Point:
         """Return its velocity in m/s during a step; 0 is the first."""
         active = [v for start, end, v in self.spans if self._first(start) <= step < self._first(end)]
         return sum(v[0] for v in active), sum(v[1] for v in active)
 
-    def way(self, step: int) -> Pair:
+    def way(self, step: int) -> Point:
         """Return how far it has moved before a step, in m."""
         spent = [
             (self.dt * min(max(step - self._first(start), 0), max(self._first(end) - self._first(start), 0)), v)
@@ -43,14 +44,11 @@ class MovingGround:
         return sum(t * v[0] for t, v in spent), sum(t * v[1] for t, v in spent)
 
     def _first(self, t: float) -> int:
+        """Return the step that begins nearest to a time."""
         return round(t / self.dt)
 
-    def _steps(self, start: float, end: float) -> tuple[int, int]:
-        first, last = self._first(start), self._first(end)
-        return (first, last) if first < last else (0, 0)
 
-
-def bump(way: Pair, start: float, speed: float) -> Span:
+def bump(way: Point, start: float, speed: float) -> Span:
     """Return the span in which the ground goes a way, in m, at a speed in m/s from a time in s on."""
     length = math.hypot(*way)
     if length == 0.0:

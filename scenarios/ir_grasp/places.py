@@ -6,6 +6,7 @@ _TABLE = (
     "The scene is planar, seen from above: W lies on the table, with its origin where vision saw the object; headings "
     "turn counter-clockwise from x of W, and the hand points along its heading."
 )
+_OWN = "the scenario's parameter"
 _HAND = {"p_WH": "in W", "yaw": "counter-clockwise from x of W", "sigma": ""}
 _COMMAND = {
     "p_WH_cmd": "in W; the hand goes there at its own speed",
@@ -25,8 +26,7 @@ PLACES = {
             "yaw_O": "counter-clockwise from x of W",
             "touching": "an object that is held touches at least two",
             "range": "",
-            "thing": "the scenario's parameter, as are the next five",
-            **dict.fromkeys(("disc_radius", "bar_size", "corners", "corner_count", "thing_seed"), ""),
+            "thing": "the scenario's parameter",
             "p_WO_0": "in W; drawn from the run's seed",
             "yaw_O_0": "drawn from the run's seed",
             "p_WH_0": "in W; drawn from the run's seed",
@@ -39,6 +39,7 @@ PLACES = {
             "carry_from": "the scenario's parameter carried_from",
             "carry_until": "the scenario's parameter carried_until",
             "p_WX": "shown in space",
+            **dict.fromkeys(("disc_radius", "bar_size", "corners", "corner_count", "thing_seed"), _OWN),
             "other_radius": "the scenario's parameter",
             "p_WX_0": "the scenario's parameter other_place",
             "nudge": "the scenario's parameter, in W",

@@ -149,7 +149,7 @@ PALM_COLOUR, THING_COLOUR, OTHER_COLOUR = "#c9d1db", "#ecd9b8", "#d5dfc6"
 def draw_scene(parameters: Parameters, moments: Mapping[str, float], record: Record, folder: Path) -> Figure:
     """Draw the table at some moments, given as times by role, into a folder."""
     rows = {role: int(np.searchsorted(record.time, at - 1e-9)) for role, at in moments.items()}
-    low, high = _frame(record, list(rows.values()))
+    low, high = _frame(parameters, record, list(rows.values()))
     wide, tall = high - low
     with figure(folder / "scene", 1, len(rows), size=(11.0, 1.4 + 9.3 / len(rows) * tall / wide)) as panels:
         for axes, (role, k) in zip(panels, rows.items(), strict=True):
@@ -171,7 +171,7 @@ def _draw_moment(axes: Axes, parameters: Parameters, record: Record, k: int) -> 
     p_WH, yaw, q = record["scene.p_WH"][k], float(record["scene.yaw"][k]), record["scene.q"][k]
     for part in _thing(parameters, record, k):
         axes.add_patch(Polygon(part * 1000, facecolor=THING_COLOUR, edgecolor="#8a6d3b", lw=1.0))
-    if parameters.other_radius > 0.0 and "scene.p_WX" in record:
+    if _has_other(parameters, record):
         middle, radius = 1000 * record["scene.p_WX"][k], 1000 * parameters.other_radius
         axes.add_patch(Circle(middle.tolist(), radius, facecolor=OTHER_COLOUR, edgecolor="#4d5866", lw=1.0))
     axes.add_patch(Polygon(palm_outline(p_WH, yaw) * 1000, facecolor=PALM_COLOUR, edgecolor="#4d5866", lw=1.0))
@@ -187,14 +187,19 @@ def _draw_moment(axes: Axes, parameters: Parameters, record: Record, k: int) -> 
         axes.plot(ends[:, 0], ends[:, 1], color=FINGER_COLOURS[i], lw=1.0, ls="-" if met else ":")
 
 
+def _has_other(parameters: Parameters, record: Record) -> bool:
+    return parameters.other_radius > 0.0 and "scene.p_WX" in record
+
+
 def _thing(parameters: Parameters, record: Record, k: int) -> list[Floats]:
     return placed(parameters.solid, record["scene.p_WO"][k], float(record["scene.yaw_O"][k]))
 
 
-def _frame(record: Record, rows: list[int]) -> tuple[Floats, Floats]:
-    """Return the corners, in mm, of a rectangle that holds the hand and the object at the given rows."""
+def _frame(parameters: Parameters, record: Record, rows: list[int]) -> tuple[Floats, Floats]:
+    """Return the corners, in mm, of a rectangle that holds the hand and the objects at the given rows."""
     hands = [finger_points(record["scene.p_WH"][k], float(record["scene.yaw"][k]), record["scene.q"][k]) for k in rows]
-    points = np.vstack([p for hand in hands for p in hand] + [record["scene.p_WH"][rows], record["scene.p_WO"][rows]])
+    bodies = ["scene.p_WH", "scene.p_WO", *(["scene.p_WX"] if _has_other(parameters, record) else [])]
+    points = np.vstack([p for hand in hands for p in hand] + [record[body][rows] for body in bodies])
     return 1000 * points.min(axis=0) - 60.0, 1000 * points.max(axis=0) + 60.0
 
 
