@@ -1,0 +1,211 @@
+"""The correction on the move, before the grasp scene and before readings made for a case."""
+
+import math
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handover.controllers.ir_grasp.ir_reflex import Inputs, IrReflex, Outputs, Params, Phase, Stop, Strategy
+from handover.controllers.ir_grasp.parameters import Correction
+from handover.controllers.ir_grasp.visibility import Visibility
+from handover.cosim.blocks.ports import Floats
+from handover.plants.ir_grasp.objects import Thing
+from handover.plants.ir_grasp.scene import GraspScene
+from handover.plants.ir_grasp.scene import Inputs as Commands
+from handover.plants.ir_grasp.scene import Outputs as Sensed
+from handover.plants.ir_grasp.scene import Params as SceneParams
+
+DT = 0.015
+START, PREGRASP = (-0.279, 0.0), (-0.159, 0.0)
+
+
+def reflex(**more: Any) -> IrReflex:
+    given: dict[str, Any] = {"correction": Correction.FAST, "p_WH_pregrasp": np.array(PREGRASP), **more}
+    return IrReflex(Params(**given))
+
+
+def scene(p_WO: tuple[float, float] = (0.0, 0.0), **more: Any) -> GraspScene:
+    return GraspScene(SceneParams(p_WO_0=np.array(p_WO), p_WH_0=np.array(START), **more))
+
+
+def read(y: Sensed) -> Inputs:
+    return Inputs(ticks=y.ticks, p_WH=y.p_WH_meas, yaw=y.yaw_meas, sigma=y.sigma_meas, tension=y.tension)
+
+
+def grasp(controller: IrReflex, plant: GraspScene, until: Phase = Phase.CLOSE) -> list[tuple[Outputs, Sensed]]:
+    """Run until a phase begins; return what was commanded, and what was there then."""
+    y = plant.outputs(0.0, Commands(p_WH_cmd=np.array(START)))
+    seen: list[tuple[Outputs, Sensed]] = []
+    for k in range(2000):
+        o = controller.step(k * DT, DT, read(y))
+        seen.append((o, y))
+        if o.phase is until:
+            return seen
+        y = plant.step(k * DT, DT, Commands(p_WH_cmd=o.p_WH_cmd, yaw_cmd=o.yaw_cmd, sigma_cmd=o.sigma_cmd))
+    raise AssertionError(f"phase {until.name} was not reached")
+
+
+def phases(seen: list[tuple[Outputs, Sensed]]) -> set[Phase]:
+    return {o.phase for o, _ in seen}
+
+
+def in_hand(y: Sensed) -> Floats:
+    """The object's place in the hand's axes, in m."""
+    c, s = math.cos(y.yaw), math.sin(y.yaw)
+    return np.array([[c, s], [-s, c]]) @ (y.p_WO - y.p_WH)
+
+
+@pytest.mark.parametrize("p_WO", [(0.0, 0.0), (0.03, -0.03)])
+def test_it_comes_to_the_object_in_less_than_half_the_papers_time(p_WO: tuple[float, float]):
+    fast, paper = grasp(reflex(), scene(p_WO)), grasp(reflex(correction=Correction.PAPER), scene(p_WO))
+    assert len(fast) < 0.5 * len(paper)
+    assert DT * len(fast) < 4.0
+    x, y = in_hand(fast[-1][1])
+    assert 0.09 < x < 0.14
+    assert abs(y) < 0.012
+
+
+def test_an_object_that_is_carried_is_followed_and_gone_along_with_while_the_hand_closes():
+    v = 0.030
+    controller, plant = reflex(), scene((0.0, -0.01), carry_velocity=np.array([0.0, v]))
+    seen = grasp(controller, plant, Phase.PULL)
+    assert Phase.TRACK in phases(seen)
+    closing = [(o, y) for o, y in seen if o.phase is Phase.CLOSE]
+    assert np.linalg.norm(closing[0][1].p_WO - closing[0][1].p_WG - [0.0, -0.01]) < 2e-3
+    gone = closing[-1][0].p_WH_cmd - closing[0][0].p_WH_cmd
+    rate = gone[1] / (DT * (len(closing) - 1))
+    assert 0.4 * v < rate < 1.5 * v
+    assert closing[-1][1].touching >= 2
+
+
+def test_a_hand_at_rest_follows_nothing():
+    seen = grasp(reflex(), scene((0.01, 0.0)), Phase.PULL)
+    closing = [o.p_WH_cmd for o, _ in seen if o.phase is Phase.CLOSE]
+    assert np.linalg.norm(closing[-1] - closing[0]) < 5e-3
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_an_object_off_to_the_side_is_found_by_the_search_across(side: float):
+    p_WO = (0.04, side * 0.06)
+    seen = grasp(reflex(), scene(p_WO))
+    assert Phase.SEARCH in phases(seen)
+    x, y = in_hand(seen[-1][1])
+    assert 0.08 < x < 0.14
+    assert abs(y) < 0.02
+    blind = grasp(reflex(strategy=Strategy.FORWARD, forward_distance=0.055), scene(p_WO))
+    assert abs(in_hand(blind[-1][1])[1]) > 0.05
+
+
+def test_where_nothing_is_it_searches_within_its_reach_and_closes_at_its_guess():
+    seen = grasp(reflex(), scene((0.5, 0.35)))
+    p = Params()
+    commands = np.array([o.p_WH_cmd for o, _ in seen if o.phase is Phase.SEARCH]) - PREGRASP
+    assert np.max(commands[:, 1]) == pytest.approx(p.search_width[0], abs=1e-3)
+    assert np.min(commands[:, 1]) == pytest.approx(-p.search_width[1], abs=1e-3)
+    assert np.all(np.abs(commands) <= p.fast_reach[:2] + 1e-9)
+    assert seen[-1][0].stop is Stop.OUT_OF_SIGHT
+    assert seen[-1][0].p_WH_cmd - PREGRASP == pytest.approx([p.search_guess, 0.0])
+
+
+def test_a_hand_whose_ways_change_nothing_pushes_and_stops():
+    """The thumb reads the same wherever the hand goes, as if the object went along."""
+    controller, x = reflex(), (*PREGRASP, 0.0, 0.0)
+    near = [float(round(Params().calibration.ticks(d))) for d in (0.012, 0.040)]
+    ticks = np.array([near[0], 0.0, near[1]])
+    o = controller.outputs(0.0, Inputs())
+    for k in range(400):
+        o = controller.step(k * DT, DT, Inputs(ticks=ticks, p_WH=np.array(x[:2]), yaw=x[2], sigma=x[3]))
+        if o.phase is Phase.CLOSE:
+            break
+        x = (*o.p_WH_cmd.tolist(), o.yaw_cmd, o.sigma_cmd)
+    assert o.stop is Stop.PUSHED
+    p = Params()
+    assert abs(x[1]) < 0.05 + p.push_limit
+    assert x[0] - PREGRASP[0] < p.path_limit
+
+
+def seeing(case: Visibility) -> Floats:
+    near = (0.030, 0.050, 0.030)  # the index looks farther ahead
+    ticks = [Params().calibration.ticks(near[i]) if case & (1 << i) else 0.0 for i in range(3)]
+    return np.array([float(round(x)) for x in ticks])
+
+
+@pytest.mark.parametrize(
+    ("case", "signs"),
+    [
+        (Visibility.NONE, (-1, 0)),  # a search begins a step behind
+        (Visibility.THUMB, (1, -1)),
+        (Visibility.INDEX, (1, 1)),
+        (Visibility.RING, (1, 1)),
+        (Visibility.INDEX_RING, (1, 1)),
+        (Visibility.THUMB_INDEX, (1, 1)),
+        (Visibility.THUMB_RING, (1, 0)),
+    ],
+)
+def test_each_case_of_figure_9_moves_the_hand_at_once(case: Visibility, signs: tuple[int, int]):
+    """To the side that sees the object near, and ahead; between both sides, ahead only, and closing."""
+    controller, x, before = reflex(), (*PREGRASP, 0.0, 0.0), np.array(PREGRASP)
+    o = controller.outputs(0.0, Inputs())
+    for k in range(3):
+        o = controller.step(k * DT, DT, Inputs(ticks=seeing(case), p_WH=np.array(x[:2]), yaw=x[2], sigma=x[3]))
+        x = (*o.p_WH_cmd.tolist(), o.yaw_cmd, o.sigma_cmd)
+    moved = o.p_WH_cmd - before
+    assert o.case is case
+    expected = {
+        Visibility.NONE: Phase.SEARCH,
+        Visibility.THUMB_RING: Phase.TRACK,
+    }
+    assert o.phase is expected.get(case, Phase.RECOVER)
+    assert moved[0] * signs[0] > 1e-5
+    across = 0.0 if abs(moved[1]) < 0.2 * abs(moved[0]) else math.copysign(1.0, moved[1])
+    assert across == signs[1]
+
+
+def test_a_reading_beyond_the_range_is_not_seen_and_weighs_nothing():
+    p = Params()
+    edge = p.calibration.ticks(p.distance_max)
+    commands: list[list[float]] = []
+    for beyond in (0.0, math.floor(edge) - 1.0):
+        controller = reflex()
+        ticks = np.array([beyond, beyond, round(p.calibration.ticks(0.02))])
+        o = [controller.step(k * DT, DT, Inputs(ticks=ticks, p_WH=np.array(PREGRASP))) for k in range(5)][-1]
+        assert o.case is Visibility.RING
+        assert o.phase is Phase.RECOVER
+        commands.append([*o.p_WH_cmd.tolist(), o.yaw_cmd, o.sigma_cmd])
+    assert commands[0] == commands[1]
+
+
+def test_contact_closes_when_the_tendon_is_not_as_tight_as_that_of_a_free_hand():
+    seen = grasp(reflex(strategy=Strategy.CONTACT), scene((0.01, 0.0)))
+    o, y = seen[-1]
+    assert o.stop is Stop.CONTACT
+    assert y.touching >= 1
+    assert not {Phase.TRACK, Phase.SEARCH, Phase.PROBE} & phases(seen)
+    apart = grasp(reflex(strategy=Strategy.CONTACT), scene((0.5, 0.35)))
+    assert apart[-1][0].p_WH_cmd[0] - PREGRASP[0] >= Params().reach[0] - 1e-3
+
+
+@pytest.mark.parametrize("strategy", [Strategy.REFLEX, Strategy.CONTACT])
+def test_it_goes_on_from_any_state_bit_for_bit(strategy: Strategy):
+    one, other, plant = (
+        reflex(strategy=strategy),
+        reflex(strategy=strategy),
+        scene((0.045, 0.075), thing=Thing.CYLINDER),
+    )
+    y, met = plant.outputs(0.0, Commands(p_WH_cmd=np.array(START))), set[Phase]()
+    for k in range(1000):
+        if k % 5 == 0:
+            state, other = other.get_state(), reflex(strategy=strategy)
+            other.set_state(state)
+        u = read(y)
+        o, again = one.step(k * DT, DT, u), other.step(k * DT, DT, u)
+        assert pickle.dumps(o) == pickle.dumps(again)
+        met.add(o.phase)
+        if o.phase is Phase.DONE:
+            break
+        y = plant.step(k * DT, DT, Commands(p_WH_cmd=o.p_WH_cmd, yaw_cmd=o.yaw_cmd, sigma_cmd=o.sigma_cmd))
+    assert {Phase.CLOSE, Phase.PULL, Phase.SHAKE, Phase.DONE} <= met
+    if strategy is Strategy.REFLEX:
+        assert {Phase.SEARCH, Phase.RECOVER, Phase.TRACK} <= met

@@ -1,0 +1,87 @@
+"""The correction on the move in the scenario, on the built FMUs."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handover.controllers.ir_grasp.ir_reflex import Inputs, IrReflex
+from handover.controllers.ir_grasp.parameters import Correction, Strategy
+from handover.controllers.ir_grasp.parameters import Params as ReflexParams
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.master.master import Master
+from handover.cosim.system.signals import Signals
+from handover.fmus.build import cached
+from handover.scenarios.experiment.experiment import Outcome
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.ir_grasp.parameters import Parameters, Situation
+
+_COMMANDS = ("p_WH_cmd", "yaw_cmd", "sigma_cmd", "distance", "cost")
+
+
+def fmu(unit: str) -> Path:
+    return cached(IrGrasp.units[unit], 3)
+
+
+class Shadow:
+    """A block in this process that reads what the FMU reads, and notes both outputs."""
+
+    def __init__(self, p: Parameters, seed: int) -> None:
+        drawn = Situation.draw(p, seed)
+        self._block = IrReflex(
+            ReflexParams(
+                strategy=p.strategy,
+                correction=p.correction,
+                p_WH_pregrasp=drawn.p_WH_pregrasp,
+                yaw_pregrasp=drawn.yaw,
+            )
+        )
+        self.own: list[Floats] = []
+        self.of_fmu: list[Floats] = []
+        self.phases: set[str] = set()
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        u = Inputs(
+            ticks=signals["scene.ticks"],
+            p_WH=signals["scene.p_WH_meas"],
+            yaw=float(signals["scene.yaw_meas"]),
+            sigma=float(signals["scene.sigma_meas"]),
+            tension=float(signals["scene.tension"]),
+        )
+        y = self._block.step(t, 0.015, u)
+        self.own.append(np.concatenate([np.atleast_1d(getattr(y, name)) for name in _COMMANDS]))
+        self.of_fmu.append(np.concatenate([np.atleast_1d(signals[f"reflex.{name}"]) for name in _COMMANDS]))
+        self.phases.add(signals.text("reflex.phase"))
+
+
+def grasp(seed: int, **parameters: Any) -> tuple[Outcome, Shadow]:
+    p, experiment = Parameters(**parameters), IrGrasp()
+    evaluator, shadow = experiment.evaluator(p), Shadow(p, seed)
+    with Master(experiment.build(p, seed, fmu)) as master:
+        master.run(experiment.stop_time(p), [evaluator, shadow], until=lambda: evaluator.over)
+    return evaluator.outcome(), shadow
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"correction": Correction.FAST, "shift": np.array([0.05, 0.04])},
+        {"strategy": Strategy.CONTACT, "perturbed": False},
+    ],
+)
+def test_the_fmu_does_what_the_block_does_bit_for_bit(given: dict[str, Any]):
+    outcome, shadow = grasp(7, **given)
+    assert np.array_equal(np.array(shadow.own), np.array(shadow.of_fmu))
+    assert outcome.success
+    if "correction" in given:
+        assert {"SEARCH", "RECOVER", "TRACK", "CLOSE"} <= shadow.phases
+
+
+def test_an_object_carried_at_15_mm_a_second_is_held():
+    outcome, shadow = grasp(8, correction=Correction.FAST, carried_speed=0.015)
+    assert outcome.success
+    assert outcome.metrics["refinement_time"].value < 3.0
+    assert outcome.metrics["displacement"].value < 5e-3
+    assert outcome.metrics["steps"].value > 0
+    assert "TRACK" in shadow.phases
