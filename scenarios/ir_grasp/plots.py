@@ -49,8 +49,8 @@ _MIN_COST = 0.1
 
 
 def phases_of_grasp(record: Record) -> tuple[Phase, ...]:
-    """Return the reflex's phases by the names that plots and replay show."""
-    return phases_of(record, "reflex.phase", _PHASE_NAMES)
+    """Return the reflex's phases by the names that plots and replay show; none of a scene without a controller."""
+    return phases_of(record, "reflex.phase", _PHASE_NAMES) if "reflex.phase" in record else ()
 
 
 def figures_of_grasp(parameters: Parameters, record: Record) -> list[TimeFigure]:
