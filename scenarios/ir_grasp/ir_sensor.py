@@ -1,7 +1,7 @@
-"""The soft hand brings one of its infrared sensors to the face of a box, as one takes a sensor's curve. [Luberto] fig. 8.
+"""One of the soft hand's infrared sensors comes to the face of a box, as one takes a sensor's curve. [Luberto] fig. 8.
 
 There is no controller: the wrist goes to one place at a constant speed, and what the sensor reads is recorded beside
-the distance along its beam. `readings_of` gives both.
+the distance along its beam.
 """
 
 import enum
@@ -13,7 +13,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats, parameter
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian
 from handover.cosim.record.reader import Record
@@ -28,6 +27,7 @@ from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.ir_grasp.places import PLACE_OF_SENSORS
+from handover.scenarios.ir_grasp.sensor_curve import apparent_distance, fit_curve, in_order_of_scans, rank_correlation
 
 THING = Thing.PAPER_BOX_A
 """What has the face: flat, and wide enough for the whole beam."""
@@ -40,8 +40,6 @@ _AT_REST = 0.2
 
 _ARRIVED = 1e-4
 """Distance of the wrist from its place at which it has come there, m (assumed)."""
-
-_SENSORS = 3
 
 
 class Finger(enum.IntEnum):
@@ -84,22 +82,11 @@ def bench_pose(p: SensorParameters, distance: float) -> tuple[Floats, float]:
     return np.array([box.low[0] / math.cos(p.incidence) - distance, 0.0]) - origins[p.finger], yaw
 
 
-def readings_of(record: Record, finger: Finger) -> tuple[Floats, Floats]:
-    """Return distances along the beam, m, and readings, ticks, of all scans in which the beam met the box.
-
-    A step of the scene has a scan of each sensor, one after the other: the distance is that of its instant, between
-    those at the step's ends.
-    """
-    distance, ticks = record["scene.range"][:, finger], record["scene.ticks"][:, finger]
-    at_scan = distance[:-1] + (finger + 1) / _SENSORS * np.diff(distance)
-    met = np.maximum(distance[:-1], distance[1:]) < OUT_OF_RANGE
-    return at_scan[met], ticks[1:][met]
-
-
 class SensorEvaluator(Evaluator):
     """Follows one approach: whether the hand came to its place and touched nothing.
 
-    Metrics are what the controller's curve makes of readings at the distances of `AT`.
+    Metrics are the fit of eq. (11) to its readings, and what the controller's curve makes of them: where they are at
+    the distances of `AT`, and whether they are in the order of the distances.
     """
 
     records = (Metric,)
@@ -110,15 +97,20 @@ class SensorEvaluator(Evaluator):
         self._distance, self._touched = math.inf, False
         self._first_seen = math.nan
         self._apparent: dict[str, float] = {}
+        self._readings: tuple[list[float], list[float]] = ([], [])
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Take in distance and reading."""
         p, self._t = self.parameters, t
-        self._distance = float(signals["scene.range"][p.finger])
+        before, self._distance = self._distance, float(signals["scene.range"][p.finger])
         self._touched = self._touched or int(signals["scene.touching"]) > 0
-        calibration = ReflexParams().calibration
-        apparent = calibration.distance(float(signals["scene.ticks"][p.finger]))
-        if math.isnan(self._first_seen) and apparent <= ReflexParams().distance_max:
+        ticks = float(signals["scene.ticks"][p.finger])
+        if max(before, self._distance) < OUT_OF_RANGE:
+            at_scan = in_order_of_scans(np.array(before), np.array(self._distance), p.finger)
+            self._readings[0].append(float(at_scan))
+            self._readings[1].append(ticks)
+        apparent = float(apparent_distance(np.array(ticks)))
+        if math.isnan(self._first_seen) and math.isfinite(apparent):
             self._first_seen = self._distance
         for name, at in AT.items():
             if name not in self._apparent and self._distance <= at:
@@ -141,6 +133,7 @@ class SensorEvaluator(Evaluator):
         for name, at in AT.items():
             value = self._apparent.get(name, math.nan)
             metrics[name] = Metric(value, "m", f"distance by [Luberto] eq. (11) where it is {1000 * at:g} mm")
+        metrics.update(_curve_metrics(*self._readings))
         who = self.parameters.finger.name.lower()
         if self._touched:
             reason = "the hand touched the box: choose a larger `last`"
@@ -151,6 +144,22 @@ class SensorEvaluator(Evaluator):
         return Outcome(success=not math.isnan(self._arrived) and not self._touched, reason=reason, metrics=metrics)
 
 
+def _curve_metrics(distance: list[float], ticks: list[float]) -> dict[str, Metric]:
+    """Return the constants of eq. (11) fitted to readings, NaN without a fit, and the order of the distances by it."""
+    fit, of = fit_curve(distance, ticks), "fitted to the readings, [Luberto] eq. (11)"
+    a, b, c, d, residual = (math.nan,) * 5 if fit is None else (fit.a, fit.b, fit.c, fit.d, fit.residual)
+    return {
+        "fit_a": Metric(a, "m", f"a {of}"),
+        "fit_b": Metric(b, "1/tick", f"b {of}"),
+        "fit_c": Metric(c, "m", f"c {of}"),
+        "fit_d": Metric(d, "1/tick", f"d {of}"),
+        "fit_residual": Metric(residual, "m", "root mean square of distances from the fit"),
+        "rank_correlation": Metric(
+            rank_correlation(distance, ticks), "1", "rank correlation of distances by the controller's curve with true"
+        ),
+    }
+
+
 class IrSensor(Experiment[SensorEvaluator]):
     """One sensor of the hand approaches a flat face: the bench of [Luberto] fig. 8."""
 
@@ -159,7 +168,7 @@ class IrSensor(Experiment[SensorEvaluator]):
     parameters_type: ClassVar[type[SensorParameters]] = SensorParameters
     units: ClassVar[Mapping[str, str]] = {"scene": "GraspScene"}
     places: ClassVar[Mapping[str, Place]] = {"scene": PLACE_OF_SENSORS}
-    headline: ClassVar[tuple[str, ...]] = ("first_seen", "last_distance", *AT)
+    headline: ClassVar[tuple[str, ...]] = ("first_seen", *AT, "fit_a", "fit_b", "fit_c", "fit_d", "fit_residual")
 
     def build(self, parameters: SensorParameters, seed: int, fmu: FmuOf) -> System:
         """Put the hand before the box.

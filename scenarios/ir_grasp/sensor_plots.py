@@ -11,14 +11,13 @@ from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import Curve, Level, Phase, TimeFigure, TimePlot
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.replay import replay_grasp
+from handover.scenarios.ir_grasp.sensor_curve import apparent_distance
 
 
 def figures_of_sensor(finger: int, record: Record) -> list[TimeFigure]:
     """Return what a finger's sensor reads, and its distance in truth and by the controller's curve, over time."""
     reflex, phases = ReflexParams(), _phases(finger, record)
     ticks, true = record["scene.ticks"][:, finger], record["scene.range"][:, finger]
-    apparent = np.array([reflex.calibration.distance(float(x)) for x in ticks])
-    seen = np.where(apparent <= reflex.distance_max, 1000 * apparent, np.nan)
     caption = (
         "What the sensor reads as it comes to the face, and its distance: along the beam, and as the controller's "
         "curve, [Luberto] eq. (11), has it, left out where that is beyond the range and so is not seen."
@@ -37,7 +36,7 @@ def figures_of_sensor(finger: int, record: Record) -> list[TimeFigure]:
             quantity="distance",
             unit="mm",
             curves=(
-                Curve(label="by the curve", values=seen, held=True),
+                Curve(label="by the curve", values=1000 * apparent_distance(ticks), held=True),
                 Curve(label="along the beam", values=1000 * true, stroke="dotted"),
             ),
             levels=(Level(label="end of the range", value=1000 * reflex.distance_max),),

@@ -13,7 +13,8 @@ from handover.fmus.build import cached
 from handover.plants.ir_grasp.hand import JOINTS, sensor_rays
 from handover.plants.ir_grasp.objects import SOLIDS
 from handover.scenarios.experiment.parameters import InvalidParameter
-from handover.scenarios.ir_grasp.ir_sensor import THING, Finger, IrSensor, SensorParameters, bench_pose, readings_of
+from handover.scenarios.ir_grasp.ir_sensor import THING, Finger, IrSensor, SensorParameters, bench_pose
+from handover.scenarios.ir_grasp.sensor_curve import readings_of
 
 
 @pytest.mark.parametrize("finger", Finger)
