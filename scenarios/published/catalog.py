@@ -16,6 +16,7 @@ from handover.scenarios.published.helix.helix_disturbances import HelixDisturban
 from handover.scenarios.published.helix.helix_improvements import HelixImprovements
 from handover.scenarios.published.helix.helix_places import HelixPlaces
 from handover.scenarios.published.helix.helix_workspace import HelixWorkspace
+from handover.scenarios.published.ir_grasp.ir_convergence import IrConvergence
 from handover.scenarios.published.ir_grasp.ir_sensor import IrSensorCurve
 from handover.scenarios.published.ir_grasp.ir_table import IrTable
 from handover.scenarios.published.published_experiment import PublishedExperiment
@@ -35,6 +36,7 @@ _ALL: tuple[type[PublishedExperiment], ...] = (
     HelixImprovements,
     HelixPlaces,
     HelixWorkspace,
+    IrConvergence,
     IrSensorCurve,
     IrTable,
 )
