@@ -60,9 +60,10 @@ def descents_of(rows: Sequence[dict[str, Any]], runs: Path) -> list[Descent]:
 def median_of(curves: Sequence[Floats]) -> Floats:
     """Return the median by step, over the curves that go as far and have a value there.
 
-    It ends where fewer than half of the curves go on: a few long ones would stand for all.
+    It ends where fewer than half of the curves go on, and is NaN where fewer than half of those have a value: a few
+    would stand for all.
     """
     length = max((len(c) for c in curves), default=0)
     columns = [np.array([c[k] for c in curves if len(c) > k]) for k in range(length)]
     kept = [column for column in columns if 2 * len(column) >= len(curves)]
-    return np.array([np.median(c[np.isfinite(c)]) if np.isfinite(c).any() else np.nan for c in kept])
+    return np.array([np.median(c[np.isfinite(c)]) if 2 * np.isfinite(c).sum() >= len(c) else np.nan for c in kept])
