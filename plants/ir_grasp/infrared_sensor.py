@@ -53,20 +53,26 @@ class InfraredSensor:
         self._nearest, self._farthest = nearest, farthest
         self._contact, self._exponent = contact, exponent
         self._nearness = [-self.distance(float(x)) for x in range(_TOP + 1)]  # rises with the ticks, for bisection
-        self._check()
+        if faults := [*self._shape_faults(), *self._range_faults()]:
+            raise InvalidSensorParameters(faults)
         self._brightest = self._inverse(nearest)
 
     def distance(self, ticks: float) -> float:
         """Return the distance in m that the characteristic gives for ticks, eq. (11)."""
         return self._a * math.exp(self._b * ticks) + self._c * math.exp(self._d * ticks)
 
-    def ticks(self, distance: float, cosine: float, reflectivity: float) -> float:
+    def ticks(
+        self, distance: float, cosine: float, reflectivity: float, gloss: float = 0.0, lobe: float = 1.0
+    ) -> float:
         """Return the noise-free, unrounded ticks for a ray that meets a surface.
 
         Args:
             distance: of the surface from the sensor's window along the ray, in m.
             cosine: of the angle between ray and surface normal.
             reflectivity: of the surface, over the reference's.
+            gloss: share of the light that the surface reflects like a mirror; emitter and receiver are at one place, so
+                what is met at the angle theta comes back 2 theta off: cos(2 theta)^lobe of it is received.
+            lobe: exponent of the mirror's lobe.
         """
         if distance > self._farthest or cosine <= 0.0:
             return 0.0
@@ -75,7 +81,10 @@ class InfraredSensor:
             x = share * self._brightest
         else:
             x = self._inverse(distance)
-        return reflectivity * cosine**self._exponent * x
+        returned = cosine**self._exponent
+        if gloss > 0.0:
+            returned = (1.0 - gloss) * returned + gloss * max(0.0, 2.0 * cosine * cosine - 1.0) ** lobe
+        return reflectivity * returned * x
 
     def reading(self, ticks: float) -> float:
         """Return what the converter makes of noisy ticks: a whole number from 0 to 4095."""
@@ -86,21 +95,38 @@ class InfraredSensor:
         i = bisect_left(self._nearness, -distance)
         if i == 0:
             return 0.0
+        if i > _TOP:
+            return float(_TOP)
         below, above = self._nearness[i - 1], self._nearness[i]
         return i - 1 + (-distance - below) / (above - below)
 
-    def _check(self) -> None:
+    def _shape_faults(self) -> list[str]:
+        rising = next((x for x in range(_TOP) if not self._nearness[x] < self._nearness[x + 1]), None)
+        if rising is None:
+            return []
+        return [f"the characteristic must fall from 0 to {_TOP} ticks; it does not at {rising} ticks"]
+
+    def _range_faults(self) -> list[str]:
         faults: list[str] = []
         if not 0.0 < self._nearest < self._farthest:
             faults.append(f"nearest {self._nearest:g} m must be positive and less than farthest {self._farthest:g} m")
-        rising = next((x for x in range(_TOP) if not self._nearness[x] < self._nearness[x + 1]), None)
-        if rising is not None:
-            faults.append(f"the characteristic must fall from 0 to {_TOP} ticks; it does not at {rising} ticks")
         first, last = -self._nearness[0], -self._nearness[-1]
         if not (last <= self._nearest and self._farthest <= first):
             faults.append(
                 f"the characteristic goes from {first:.4g} m at 0 ticks to {last:.4g} m at {_TOP} ticks and must cover "
                 f"{self._nearest:g} m to {self._farthest:g} m"
             )
-        if faults:
-            raise InvalidSensorParameters(faults)
+        return faults
+
+
+class ToleratedSensor(InfraredSensor):
+    """A sensor whose constants are off, so that its characteristic need not cover the operating range.
+
+    Nearer than the characteristic goes the converter saturates at 4095 ticks; farther it reads 0.
+
+    Raises:
+        InvalidSensorParameters: the characteristic does not fall strictly.
+    """
+
+    def _range_faults(self) -> list[str]:
+        return []

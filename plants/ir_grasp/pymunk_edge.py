@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import pymunk
 from pymunk import batch
+from pymunk.autogeometry import convex_decomposition
 from pymunk.constraints import DampedRotarySpring, GearJoint, PivotJoint, RotaryLimitJoint
 
 Point = tuple[float, float]
@@ -15,6 +16,12 @@ Motion = tuple[float, float, float, float, float, float]
 
 _TORQUE = batch.BodyFields.TORQUE
 _SLOP = 1e-4  # m; overlap that contacts keep, so that they persist
+
+
+def convex_parts(corners: Sequence[Point]) -> list[list[Point]]:
+    """Return convex polygons whose union is a simple polygon with corners counter-clockwise."""
+    parts = convex_decomposition([*corners, corners[0]], 0.0)
+    return [[(p.x, p.y) for p in part[:-1]] for part in parts]
 
 
 class PymunkBody:
@@ -77,9 +84,9 @@ class PymunkEdge:
         """Add a body of a mass in kg and an inertia in kg m2 about its centre."""
         return self._add(pymunk.Body(mass, inertia), motion)
 
-    def add_circle(self, body: PymunkBody, radius: float, friction: float, group: int) -> None:
-        """Add a circle about the body's centre; shapes of a group other than 0 do not collide with each other."""
-        self._shape(body, pymunk.Circle(body.body, radius), friction, group)
+    def add_circle(self, body: PymunkBody, middle: Point, radius: float, friction: float, group: int) -> None:
+        """Add a circle about a point in the body; shapes of a group other than 0 do not collide with each other."""
+        self._shape(body, pymunk.Circle(body.body, radius, middle), friction, group)
 
     def add_capsule(
         self, body: PymunkBody, ends: tuple[Point, Point], radius: float, friction: float, group: int
@@ -114,9 +121,14 @@ class PymunkEdge:
             DampedRotarySpring(a, b, -rest, stiffness, damping),  # pymunk's spring counts a - b
         )
 
-    def add_ground_friction(self, body: PymunkBody, force: float, torque: float) -> None:
-        """Let the ground resist a body's sliding and turning with at most a force in N and a torque in N m."""
-        ground = self._space.static_body
+    def add_ground_friction(
+        self, body: PymunkBody, force: float, torque: float, ground_body: PymunkBody | None = None
+    ) -> None:
+        """Let the ground resist a body's sliding and turning with at most a force in N and a torque in N m.
+
+        The ground is at rest, or a driven body without shapes.
+        """
+        ground = self._space.static_body if ground_body is None else ground_body.body
         slide = PivotJoint(ground, body.body, (0.0, 0.0), (0.0, 0.0))
         turn = GearJoint(ground, body.body, 0.0, 1.0)
         for joint, limit in ((slide, force), (turn, torque)):
@@ -140,15 +152,15 @@ class PymunkEdge:
         # the sign of a distance depends on which shape pymunk takes first; it gives no contacts of shapes apart
         return max([0.0, *(abs(c.distance) for hit in hits for c in hit.contact_point_set.points)])
 
-    def touching(self, body: PymunkBody) -> int:
-        """Return how many other bodies are in contact with a body."""
+    def touching(self, body: PymunkBody, besides: PymunkBody | None = None) -> int:
+        """Return how many other bodies are in contact with a body, one not counted."""
         others: set[int] = set()
 
         def note(arbiter: pymunk.Arbiter) -> None:
             others.update(b.id for b in arbiter.bodies)
 
         body.body.each_arbiter(note)
-        return len(others - {body.body.id})
+        return len(others - {body.body.id} - (set[int]() if besides is None else {besides.body.id}))
 
     def _add(self, body: pymunk.Body, motion: Motion) -> PymunkBody:
         x, y, angle, v_x, v_y, rate = motion

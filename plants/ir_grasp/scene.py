@@ -12,14 +12,11 @@ from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector2, Vector3, Vector8, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, Newton, Number, Radian, Tick
-from handover.plants.ir_grasp.hand import FINGERS
-from handover.plants.ir_grasp.parameters import OUT_OF_RANGE, InvalidSceneParameters, Params
+from handover.plants.ir_grasp.parameters import InvalidSceneParameters, Params
+from handover.plants.ir_grasp.sensing import Sensing
 from handover.plants.ir_grasp.world import DT, Command, GraspWorld, initial_snapshot
 
-_SLOT = 5  # internal steps for which a sensor is active
 _CHECKPOINT = 500  # internal steps after which the world is rebuilt from its own snapshot
-_SENSORS = len(FINGERS)
-_MIDDLE = ((1.0, 0.0),)
 
 
 class StepSizeError(ValueError):
@@ -58,13 +55,20 @@ class Outputs:
     p_WH: Vector2[Metre] = output("position of the wrist, in the world")
     yaw: Radian = output("orientation of the hand")
     sigma: Number = output("closure that the motor has reached", minimum=0.0, maximum=1.0)
+    p_WH_meas: Vector2[Metre] = output("position of the wrist by the arm's encoders, in the world")
+    yaw_meas: Radian = output("orientation of the hand by the arm's encoders")
+    sigma_meas: Number = output("closure by the motor's encoder")
     ticks: Vector3[Tick] = output("last readings of the sensors")
     q: Vector8[Radian] = output("joint angles: thumb 2, index 3, ring 3")
     tension: Newton = output("tension of the tendon")
     p_WO: Vector2[Metre] = output("position of the object, in the world")
     yaw_O: Radian = output("orientation of the object, that of its reference pose included")
+    p_WG: Vector2[Metre] = output("how far the ground under the object has carried it, or what stands still on it")
+    p_WX: Vector2[Metre] = output("position of the second object, in the world; 0 if there is none")
     touching: int = output("number of the hand's bodies, of palm and 8 phalanges, that touch the object")
-    range: Vector3[Metre] = output("distance of the object along the middle of each sensor's beam; 0.2 if none is met")
+    range: Vector3[Metre] = output(
+        "distance of the object along the middle of each sensor's beam, whatever hides it; 0.2 if none is met"
+    )
 
 
 class GraspScene:
@@ -73,11 +77,13 @@ class GraspScene:
     - Hand: a palm that follows the wrist's command with bounded speed and acceleration (`follow`), a thumb
       of 2 phalanges on its right (-y of H), index and ring finger of 3 on its left. One elastic tendon,
       T = k max(0, sigma L - sum r q), turns all joints, so a blocked finger lets the others close further.
-    - Object: rigid, with dry friction on the table and in the hand; `SOLIDS` has the shapes.
+    - Object: rigid, with dry friction on the table and in the hand; `SOLIDS` has the shapes. The ground below it may
+      move, as a belt that carries it (`carry_velocity`) or a bump (`nudge`): then friction acts against that motion.
+      A second object, a disc that stands at rest, may be pushed by hand and object.
     - Sensors: on the distal phalanges, one active at a time (sec. V-B), for 5 ms (assumed), in the order of the
       fingers; it is read at the end of its time. A reading is the mean over three rays of the beam of
-      `InfraredSensor.ticks`, plus noise, rounded. At the start all three have been read. Only the object returns
-      light, and no finger hides it.
+      `InfraredSensor.ticks`, plus noise, rounded. At the start all three have been read. Only objects return
+      light, and no finger hides them, unless `fingers_seen`. `Sensing` has what else disturbs readings and encoders.
 
     Contacts are solved by pymunk, in steps of 1 ms; a step of the block is a multiple of that. pymunk's solver starts
     from impulses that cannot be read. So that a state is complete, the world is rebuilt from its positions and
@@ -97,35 +103,35 @@ class GraspScene:
     def __init__(self, params: Params) -> None:
         params.check()
         self._params = params
-        self._sensor = params.sensor()
-        self._reflectivity = params.reflectivity or params.solid.reflectivity
-        angles = (0.0, -params.beam, params.beam)
-        self._rays = [(math.cos(a), math.sin(a)) for a in angles]
         self._checkpoint = initial_snapshot(params)
         self._since: list[tuple[int, Command]] = []  # internal steps and their command
         self._replayed = 0  # internal steps since the checkpoint
         self._world = GraspWorld(params, self._checkpoint)
         _check_overlap(self._world)
-        self._rng = np.random.default_rng(params.seed)
-        self._clock = 0  # internal steps into the scan of the sensors
-        self._ticks = [self._read(i) for i in range(_SENSORS)]
+        self._sensing = Sensing(params, self._world)
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return where everything is and what was read last; no time passes."""
         w = self._world
         x, y, yaw = w.wrist
         x_O, y_O, yaw_O = w.thing
+        x_meas, y_meas, yaw_meas, sigma_meas = self._sensing.measured(w)
         return Outputs(
             p_WH=np.array([x, y]),
             yaw=yaw,
             sigma=w.sigma,
-            ticks=np.array(self._ticks),
+            p_WH_meas=np.array([x_meas, y_meas]),
+            yaw_meas=yaw_meas,
+            sigma_meas=sigma_meas,
+            ticks=np.array(self._sensing.ticks),
             q=np.array(w.joints),
             tension=w.tension,
             p_WO=np.array([x_O, y_O]),
             yaw_O=yaw_O,
+            p_WG=np.array(w.ground),
+            p_WX=np.zeros(2) if w.other is None else np.array(w.other),
             touching=w.touching,
-            range=np.array([self._range(i) for i in range(_SENSORS)]),
+            range=np.array(self._sensing.ranges(w)),
         )
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
@@ -137,23 +143,20 @@ class GraspScene:
         while steps > 0:
             if self._replayed == _CHECKPOINT:
                 self._renew()
-            n = min(steps, _SLOT - self._clock % _SLOT, _CHECKPOINT - self._replayed)
+            n = min(steps, self._sensing.until_reading, _CHECKPOINT - self._replayed)
             self._advance(n, command)
-            self._clock = (self._clock + n) % (_SLOT * _SENSORS)
-            if self._clock % _SLOT == 0:
-                active = (self._clock // _SLOT - 1) % _SENSORS
-                self._ticks[active] = self._read(active)
+            self._sensing.advance(n, self._world)
             steps -= n
         return self.outputs(t + dt, u)
 
     def get_state(self) -> bytes:
         """Return the last checkpoint, the commands since, and the sensors."""
-        sensors = (self._clock, self._ticks, self._rng.bit_generator)
-        return pack_state((self._checkpoint, self._since, sensors))
+        return pack_state((self._checkpoint, self._since, self._sensing.get_state()))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this scene or of one with equal parameters."""
-        self._checkpoint, since, (self._clock, self._ticks, self._rng.bit_generator.state) = unpack_state(state)
+        self._checkpoint, since, sensing = unpack_state(state)
+        self._sensing.set_state(sensing)
         self._world, self._since, self._replayed = GraspWorld(self._params, self._checkpoint), [], 0
         for steps, command in since:
             self._advance(steps, command)
@@ -172,16 +175,6 @@ class GraspScene:
         self._checkpoint, self._since, self._replayed = self._world.snapshot, [], 0
         self._world = GraspWorld(self._params, self._checkpoint)
 
-    def _read(self, finger: int) -> float:
-        p = self._params
-        met = self._world.cast_rays(finger, self._rays, p.farthest)
-        x = sum(self._sensor.ticks(d, cosine, self._reflectivity) for d, cosine in met) / len(self._rays)
-        return self._sensor.reading(x + p.noise * float(self._rng.standard_normal()))
-
-    def _range(self, finger: int) -> float:
-        met = self._world.cast_rays(finger, _MIDDLE, OUT_OF_RANGE)
-        return max(met[0][0], 0.0) if met else OUT_OF_RANGE  # contacts overlap a little
-
 
 def _command(u: Inputs) -> Command:
     """Return what is commanded, without negative zeros: equal commands are kept once."""
@@ -194,9 +187,20 @@ def _command(u: Inputs) -> Command:
 
 
 def _check_overlap(world: GraspWorld) -> None:
-    overlaps = world.overlaps()
-    if overlaps:
-        depths = ", ".join(f"{name} by {1e3 * depth:.2g} mm" for name, depth in overlaps)
-        raise InvalidSceneParameters(
-            [f"the hand would start in the object: {depths}; choose p_WH_0, yaw_H_0 or sigma_0 clear of it"]
+    """Refuse a start in which two bodies are in one another."""
+    faults: list[str] = []
+    if overlaps := world.overlaps():
+        faults.append(
+            f"the hand would start in the object: {_depths(overlaps)}; choose p_WH_0, yaw_H_0 or sigma_0 clear of it"
         )
+    if overlaps := world.overlaps_of_other():
+        faults.append(
+            f"the second object would start in what is there: {_depths(overlaps)}; choose p_WX_0 or other_radius clear "
+            "of hand and object"
+        )
+    if faults:
+        raise InvalidSceneParameters(faults)
+
+
+def _depths(overlaps: list[tuple[str, float]]) -> str:
+    return ", ".join(f"{name} by {1e3 * depth:.2g} mm" for name, depth in overlaps)

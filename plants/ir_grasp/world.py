@@ -1,83 +1,17 @@
-"""Hand, object and table of the grasp scene as bodies in contact, advanced by 1 ms at a time.
-
-`follow` is how the arm's wrist follows its command. One elastic tendon with the tension T = k max(0, sigma L - sum r q)
-closes all joints of the soft hand; `resting_posture` gives the joints that it leads to in free space.
-"""
+"""Hand, objects and table of the grasp scene as bodies in contact, advanced by 1 ms at a time."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import accumulate, pairwise
-from operator import mul
 from typing import Final
 
-import numpy as np
-
 from handover.cosim.blocks.ports import Floats
+from handover.plants.ir_grasp.actuation import GEARS, follow, resting_posture, tendon_excursion
+from handover.plants.ir_grasp.ground import MovingGround
 from handover.plants.ir_grasp.hand import FINGERS, MAX_ANGLE, MIN_ANGLE, PALM, SENSOR_PLACE, Finger, finger_points
-from handover.plants.ir_grasp.objects import Disc
 from handover.plants.ir_grasp.parameters import Params
-from handover.plants.ir_grasp.pymunk_edge import Motion, PymunkBody, PymunkEdge
-
-
-def follow(
-    error: tuple[float, float], velocity: tuple[float, float], speed: float, acceleration: float, lag: float, dt: float
-) -> tuple[float, float]:
-    """Return the velocity for the coming dt of a point that is to go by `error`, in m and m/s, or rad and rad/s.
-
-    It heads for its goal with the speed min(v_max, e / lag, sqrt(a e)), e what is left to go: from full speed it brakes
-    with a / 2, then with at most a, and settles exponentially. The velocity changes by at most a dt.
-    """
-    left = math.hypot(*error)
-    wanted = min(speed, left / lag, math.sqrt(acceleration * left)) / left if left > 0.0 else 0.0
-    d_x, d_y = wanted * error[0] - velocity[0], wanted * error[1] - velocity[1]
-    change = math.hypot(d_x, d_y)
-    share = 1.0 if change <= acceleration * dt else acceleration * dt / change
-    return velocity[0] + share * d_x, velocity[1] + share * d_y
-
-
-PULLEYS: Final = np.array([r for f in FINGERS for r in f.pulleys])
-"""Radii r at which the tendon passes the joints, (8,), in m."""
-
-STIFFNESS: Final = np.array([k for f in FINGERS for k in f.stiffness])
-"""Stiffness K of the joints, (8,), in N m/rad."""
-
-GEARS: Final = tuple(
-    f.flexion * (r - after) for f in FINGERS for r, after in zip(f.pulleys, (*f.pulleys[1:], 0.0), strict=True)
-)
-"""Tendon that a phalanx takes up by turning alone, 8, in m/rad; also the torque on it at a tension of 1 N."""
-
-_PALM_GEAR = sum(f.flexion * f.pulleys[0] for f in FINGERS)
-_RELAXED = sum(f.flexion * f.pulleys[0] * f.spread for f in FINGERS)
-
-
-def tendon_excursion(angles: list[float], yaw: float) -> float:
-    """Return sum r q in m, by the orientations of the 8 phalanges and of the hand, in rad."""
-    return sum(map(mul, GEARS, angles)) - _PALM_GEAR * yaw - _RELAXED
-
-
-def resting_posture(sigma: float, stiffness: float, travel: float) -> Floats:
-    """Return the joint angles, (8,), in rad, of the hand at rest in free space.
-
-    There K q = r T at each joint between its limits, and sum r q + T / k = sigma L, whose left side rises with T.
-
-    Args:
-        sigma: closure, 0 to 1.
-        stiffness: k of the tendon, in N/m.
-        travel: L, what the motor takes up at closure 1, in m.
-    """
-
-    def posture(T: float) -> Floats:
-        return np.clip(PULLEYS * T / STIFFNESS, MIN_ANGLE, MAX_ANGLE)
-
-    low, high = 0.0, stiffness * sigma * travel
-    for _ in range(80):
-        middle = (low + high) / 2.0
-        if float(PULLEYS @ posture(middle)) + middle / stiffness < sigma * travel:
-            low = middle
-        else:
-            high = middle
-    return posture(low)
-
+from handover.plants.ir_grasp.pymunk_edge import Motion, PymunkBody, PymunkEdge, convex_parts
+from handover.plants.ir_grasp.shapes import Disc, Point, Polygon
 
 DT: Final = 1e-3
 """Internal time step, in s."""
@@ -85,17 +19,19 @@ DT: Final = 1e-3
 Command = tuple[float, float, float, float]
 """Wrist's position in m, orientation in rad, closure."""
 
-Snapshot = tuple[float, tuple[Motion, ...]]
-"""Closure, then the motions of palm, object and phalanges."""
+Snapshot = tuple[float, tuple[Motion, ...], int]
+"""Closure, then the motions of palm, object, second object if there is one, and phalanges, then the steps made since
+the start. Positions are those of centres of mass."""
 
 Ray = tuple[float, float]
 """Cosine and sine of the angle between a ray and the direction that a sensor looks in."""
 
 _ITERATIONS = 10
-_HAND, _OBJECT = 1, 2  # groups whose own shapes do not collide
+_HAND, _OBJECT, _OTHER = 1, 2, 3  # groups whose own shapes do not collide
 _NAMED_FINGERS = tuple(zip(("thumb", "index", "ring"), FINGERS, strict=True))
+_SIZES = tuple(size for f in FINGERS for size in zip(f.lengths, f.radii, strict=True))
+_OWNER = tuple(i for i, f in enumerate(FINGERS) for _ in f.lengths)
 _DISTAL = tuple(int(i) - 1 for i in accumulate(len(f.lengths) for f in FINGERS))  # among the phalanges
-_FIRST_PHALANX = 2  # among the bodies
 _STILL = (0.0, 0.0, 0.0)
 
 
@@ -103,8 +39,19 @@ def initial_snapshot(p: Params) -> Snapshot:
     """Return the scene at the start: everything at rest, the fingers as the tendon has them in free space."""
     q = resting_posture(p.sigma_0, p.tendon_stiffness, p.tendon_travel)
     palm = (float(p.p_WH_0[0]), float(p.p_WH_0[1]), p.yaw_H_0, *_STILL)
-    thing = (float(p.p_WO_0[0]), float(p.p_WO_0[1]), p.solid.yaw + p.yaw_O_0, *_STILL)
-    return p.sigma_0, (palm, thing, *_phalanges(p, q))
+    solid = p.solid
+    yaw = solid.yaw + p.yaw_O_0
+    x, y = _moved(solid.centre_of_mass, (float(p.p_WO_0[0]), float(p.p_WO_0[1])), yaw)
+    others = [(float(p.p_WX_0[0]), float(p.p_WX_0[1]), 0.0, *_STILL)] if p.other_radius > 0.0 else []
+    return p.sigma_0, (palm, (x, y, yaw, *_STILL), *others, *_phalanges(p, q)), 0
+
+
+def _moved(p: Point, origin: Point, yaw: float) -> Point:
+    """Return origin + R(yaw) p."""
+    if p == (0.0, 0.0):
+        return origin
+    c, s = math.cos(yaw), math.sin(yaw)
+    return origin[0] + c * p[0] - s * p[1], origin[1] + s * p[0] + c * p[1]
 
 
 def _phalanges(p: Params, q: Floats) -> list[Motion]:
@@ -126,7 +73,8 @@ class GraspWorld:
     the world that it was taken from.
 
     The palm follows the wrist's command whatever pushes (`follow`). The tendon, T = k max(0, sigma L - sum r q), turns
-    each joint with r T against its spring and damper. Object and table: dry friction, isotropic and uniform.
+    each joint with r T against its spring and damper. Object and table: dry friction, isotropic and uniform, against
+    the ground's motion where it has one (`MovingGround`). A second object, a disc, stands on the table at rest.
 
     Args:
         params: of the scene.
@@ -136,19 +84,27 @@ class GraspWorld:
     def __init__(self, params: Params, snapshot: Snapshot) -> None:
         self._params = params
         self._edge = PymunkEdge(DT, _ITERATIONS)
-        self._sigma, (palm, thing, *phalanges) = snapshot
+        self._sigma, (palm, thing, *rest), self._steps = snapshot
+        self._solid = params.solid
+        self._centre = self._solid.centre_of_mass
+        self._ground = MovingGround(params.ground_spans, DT)
         self._wrist = palm
         self._palm = self._edge.add_driven(palm)
         self._edge.add_polygon(self._palm, PALM, params.grip_friction, _HAND)
+        self._ground_body = self._edge.add_driven((0.0, 0.0, 0.0, *_STILL)) if self._ground.ever_moves else None
         self._thing = self._add_thing(thing)
+        self._other = self._add_other(rest.pop(0)) if params.other_radius > 0.0 else None
+        self._first_phalanx = sum(b is not None for b in (self._palm, self._ground_body, self._thing, self._other))
         self._phalanges: list[PymunkBody] = []
         for f in FINGERS:
-            self._add_finger(f, phalanges[len(self._phalanges) :][: len(f.lengths)])
+            self._add_finger(f, rest[len(self._phalanges) :][: len(f.lengths)])
 
     @property
     def snapshot(self) -> Snapshot:
         """Where everything is and how it moves."""
-        return self._sigma, (self._wrist, *(b.motion for b in (self._thing, *self._phalanges)))
+        others = () if self._other is None else (self._other,)
+        bodies = (self._thing, *others, *self._phalanges)
+        return self._sigma, (self._wrist, *(b.motion for b in bodies)), self._steps
 
     @property
     def sigma(self) -> float:
@@ -162,14 +118,27 @@ class GraspWorld:
 
     @property
     def thing(self) -> tuple[float, float, float]:
-        """Position in m and orientation in rad of the object."""
-        return (*self._thing.position, self._thing.angle)
+        """Position of O in m and orientation in rad of the object."""
+        if self._centre == (0.0, 0.0):
+            return (*self._thing.position, self._thing.angle)
+        x, y = self._centre
+        return (*_moved((-x, -y), self._thing.position, self._thing.angle), self._thing.angle)
+
+    @property
+    def other(self) -> Point | None:
+        """Position of the second object in m; None if there is none."""
+        return None if self._other is None else self._other.position
+
+    @property
+    def ground(self) -> Point:
+        """How far the ground under the object has moved since the start, in m."""
+        return (0.0, 0.0) if self._ground_body is None else self._ground.way(self._steps)
 
     @property
     def joints(self) -> list[float]:
         """Joint angles, 8, in rad."""
         q: list[float] = []
-        angles = self._edge.angles(_FIRST_PHALANX)
+        angles = self._edge.angles(self._first_phalanx)
         for f in FINGERS:
             before = self._wrist[2] + f.spread
             for angle in angles[len(q) :][: len(f.lengths)]:
@@ -180,17 +149,27 @@ class GraspWorld:
     @property
     def tension(self) -> float:
         """Tension of the tendon, in N."""
-        return self._tension(self._edge.angles(_FIRST_PHALANX))
+        return self._tension(self._edge.angles(self._first_phalanx))
 
     @property
     def touching(self) -> int:
         """Number of the hand's bodies that touch the object."""
-        return self._edge.touching(self._thing)
+        return self._edge.touching(self._thing, self._other)
 
     def overlaps(self) -> list[tuple[str, float]]:
         """Return which of the hand's bodies are in the object, and how deep, in m."""
+        return self._in_hand(self._thing)
+
+    def overlaps_of_other(self) -> list[tuple[str, float]]:
+        """Return what of the hand and the object is in the second object, and how deep, in m."""
+        if self._other is None:
+            return []
+        depth = self._edge.overlap(self._thing, self._other)
+        return [*([("object", depth)] if depth > 0.0 else []), *self._in_hand(self._other)]
+
+    def _in_hand(self, body: PymunkBody) -> list[tuple[str, float]]:
         names = ["palm"] + [f"{n} phalanx {i + 1}" for n, f in _NAMED_FINGERS for i in range(len(f.lengths))]
-        depths = [self._edge.overlap(b, self._thing) for b in (self._palm, *self._phalanges)]
+        depths = [self._edge.overlap(b, body) for b in (self._palm, *self._phalanges)]
         return [(name, depth) for name, depth in zip(names, depths, strict=True) if depth > 0.0]
 
     def advance(self, command: Command) -> None:
@@ -199,37 +178,60 @@ class GraspWorld:
         x, y, yaw, sigma = command
         travel = p.closure_rate * DT
         self._sigma += min(max(sigma - self._sigma, -travel), travel)
-        T = self._tension(self._edge.angles(_FIRST_PHALANX))
+        T = self._tension(self._edge.angles(self._first_phalanx))
         self._drive(x, y, yaw)
-        self._edge.advance(_FIRST_PHALANX, [T * gear for gear in GEARS])
+        if self._ground_body is not None:
+            self._ground_body.drive(self._ground.velocity(self._steps), 0.0)
+        self._edge.advance(self._first_phalanx, [T * gear for gear in GEARS])
+        self._steps += 1
 
-    def cast_rays(self, finger: int, rays: Sequence[Ray], reach: float) -> list[tuple[float, float]]:
-        """Return what rays from a finger's sensor meet within reach: distance in m, cosine of the angle of incidence.
+    def cast_rays(self, finger: int, rays: Sequence[Ray], reach: float) -> list[tuple[float, float, int] | None]:
+        """Return where rays from a finger's sensor meet the object within reach, None for those that do not.
+
+        Each is the distance in m, the cosine of the angle of incidence, and the face (`Hit`).
 
         Args:
             finger: 0 thumb, 1 index, 2 ring.
             rays: cosine and sine of their angles from the sensor's direction.
             reach: in m.
         """
-        f, body, solid = FINGERS[finger], self._phalanges[_DISTAL[finger]], self._params.solid
-        (x, y), (x_O, y_O), yaw_O = body.position, self._thing.position, self._thing.angle
+        f, body, solid = FINGERS[finger], self._phalanges[_DISTAL[finger]], self._solid
+        (x, y), (x_O, y_O, yaw_O) = body.position, self.thing
         x, y = x - x_O, y - y_O
         if math.hypot(x, y) > solid.reach + reach + f.lengths[-1]:
-            return []
+            return [None] * len(rays)
         c, s = math.cos(yaw_O), math.sin(yaw_O)
         x, y = c * x + s * y, c * y - s * x  # the middle of the phalanx, in O
         angle, r, along = body.angle - yaw_O, f.radii[-1], (SENSOR_PLACE - 0.5) * f.lengths[-1]
         c, s = math.cos(angle), math.sin(angle)
         n_x, n_y = -f.flexion * s, f.flexion * c
         x, y = x + along * c + r * n_x, y + along * s + r * n_y  # the sensor's window
-        met: list[tuple[float, float]] = []
+        met: list[tuple[float, float, int] | None] = []
         for d_c, d_s in rays:
             d_x, d_y = d_c * n_x - d_s * n_y, d_s * n_x + d_c * n_y
             # a ray starts r behind the window, in the phalanx: the pad may be in the object by a little
             hit = solid.intersect(x - r * d_x, y - r * d_y, d_x, d_y)
-            if hit is not None and hit[0] - r <= reach:
-                met.append((hit[0] - r, hit[1]))
+            met.append((hit[0] - r, hit[1], hit[2]) if hit is not None and hit[0] - r <= reach else None)
         return met
+
+    def sensor(self, finger: int) -> tuple[Point, Point]:
+        """Return where a finger's sensor sits, in m, and the unit vector in which it looks, in W."""
+        f, body = FINGERS[finger], self._phalanges[_DISTAL[finger]]
+        (x, y), c, s = body.position, math.cos(body.angle), math.sin(body.angle)
+        n_x, n_y = -f.flexion * s, f.flexion * c
+        along, r = (SENSOR_PLACE - 0.5) * f.lengths[-1], f.radii[-1]
+        return (x + along * c + r * n_x, y + along * s + r * n_y), (n_x, n_y)
+
+    def phalanges_before(self, finger: int) -> Iterator[tuple[float, float, tuple[float, float, float]]]:
+        """Return length and radius in m, and middle and orientation of each phalanx that a finger's beam may meet.
+
+        These are those of the other side and its own but the distal one. Index and ring, which are beside each other
+        in space, do not hide each other.
+        """
+        for i, (body, (length, radius)) in enumerate(zip(self._phalanges, _SIZES, strict=True)):
+            owner = _OWNER[i]
+            if i != _DISTAL[finger] and (owner == finger or FINGERS[owner].flexion != FINGERS[finger].flexion):
+                yield length, radius, (*body.position, body.angle)
 
     def _tension(self, angles: list[float]) -> float:
         p = self._params
@@ -251,17 +253,26 @@ class GraspWorld:
         self._wrist = at_x + DT * v_x, at_y + DT * v_y, at_yaw + DT * turning, v_x, v_y, turning
 
     def _add_thing(self, motion: Motion) -> PymunkBody:
-        p, solid = self._params, self._params.solid
-        mass = p.mass_O or solid.mass
+        p, solid, (x, y) = self._params, self._solid, self._centre
+        mass = solid.mass
         thing = self._edge.add_body(mass, mass * solid.gyration, motion)
         for part in solid.parts:
             if isinstance(part, Disc):
-                self._edge.add_circle(thing, part.radius, 1.0, _OBJECT)
-            else:
-                self._edge.add_polygon(thing, part.corners, 1.0, _OBJECT)
+                self._edge.add_circle(thing, (-x, -y), part.radius, 1.0, _OBJECT)
+                continue
+            for corners in convex_parts(part.corners) if isinstance(part, Polygon) else [part.corners]:
+                self._edge.add_polygon(thing, [(c_x - x, c_y - y) for c_x, c_y in corners], 1.0, _OBJECT)
         weight = p.table_friction * mass * p.gravity
-        self._edge.add_ground_friction(thing, weight, weight * solid.friction_arm)
+        self._edge.add_ground_friction(thing, weight, weight * solid.friction_arm, self._ground_body)
         return thing
+
+    def _add_other(self, motion: Motion) -> PymunkBody:
+        p, disc = self._params, Disc(radius=self._params.other_radius)
+        other = self._edge.add_body(p.other_mass, p.other_mass * disc.gyration, motion)
+        self._edge.add_circle(other, disc.centroid, disc.radius, 1.0, _OTHER)
+        weight = p.table_friction * p.other_mass * p.gravity
+        self._edge.add_ground_friction(other, weight, weight * 2.0 * disc.radius / 3.0)
+        return other
 
     def _add_finger(self, f: Finger, motions: Sequence[Motion]) -> None:
         p = self._params

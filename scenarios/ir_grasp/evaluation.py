@@ -7,7 +7,7 @@ import numpy as np
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
-from handover.plants.ir_grasp.objects import SOLIDS
+from handover.plants.ir_grasp.hand import sensor_rays
 from handover.plants.ir_grasp.parameters import OUT_OF_RANGE
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.ir_grasp.parameters import Parameters, pregrasp_position
@@ -67,6 +67,7 @@ class GraspEvaluator(Evaluator):
         self._moves = {"RECOVER": 0, "APPROACH": 0, "PROBE": 0}
         self._command: tuple[float, ...] = ()
         self._p_WO_start: Floats = np.zeros(2)
+        self._p_WG_start: Floats = np.zeros(2)
         self._p_HO: Floats = np.zeros(2)
         self._p_HO_closed: Floats | None = None  # in H, when the pull began
         self._touching = 0
@@ -81,6 +82,7 @@ class GraspEvaluator(Evaluator):
         self._t, phase = t, signals.text("reflex.phase")
         if not self.moments:
             self.moments["start"], self._p_WO_start = t, signals["scene.p_WO"]
+            self._p_WG_start = signals["scene.p_WG"] if "scene.p_WG" in signals else np.zeros(2)
             self._at_start = self._vision_errors(signals)
         if phase != self._phase:
             self._enter(phase, signals)
@@ -98,8 +100,8 @@ class GraspEvaluator(Evaluator):
         """
         p, yaw = self.parameters, float(signals["scene.yaw"])
         pregrasp = signals["scene.p_WH"] + p.run_up * np.array([math.cos(yaw), math.sin(yaw)])
-        turned = float(signals["scene.yaw_O"]) - SOLIDS[p.thing].yaw
-        off = float(np.linalg.norm(pregrasp - pregrasp_position(p.thing, p.standoff)))
+        turned = float(signals["scene.yaw_O"]) - p.solid.yaw
+        off = float(np.linalg.norm(pregrasp - pregrasp_position(p.expected_solid, p.standoff)))
         moved = float(np.linalg.norm(signals["scene.p_WO"]))
         return {
             "moved": Metric(moved, "m", "how far the object was moved after vision saw it"),
@@ -133,13 +135,20 @@ class GraspEvaluator(Evaluator):
         true = _where_below(signals["scene.range"], OUT_OF_RANGE)
         cost, blind = float(_given(signals, "reflex.cost")), bool(np.isnan(seen[list(IN_COST)]).any())
         what_of_cost = f"{_COST} (thumb or ring sees nothing)" if blind else _COST
-        displaced = float(np.linalg.norm(signals["scene.p_WO"] - self._p_WO_start))
+        carried = signals["scene.p_WG"] - self._p_WG_start if "scene.p_WG" in signals else np.zeros(2)
+        displaced = float(np.linalg.norm(signals["scene.p_WO"] - self._p_WO_start - carried))
         stop = int(_given(signals, "reflex.stop"))
+        offset = self._offset(signals)
         metrics = {
             "final_cost": Metric(math.nan if blind else cost, "m2", what_of_cost),
             "steps": Metric(int(_given(signals, "reflex.steps")), "1", "Gauss-Newton steps"),
             "refinement_time": Metric(t - began, "s", "time from the first look at the sensors until the hand closes"),
-            "displacement": Metric(displaced, "m", "how far the object was pushed before the hand closed"),
+            "displacement": Metric(
+                displaced, "m", "how far the object was pushed before the hand closed, less what the ground carried it"
+            ),
+            "offset_at_grasp": Metric(
+                offset, "m", "distance of the object's middle from that of thumb's and ring's pads as the hand closes"
+            ),
             "stop": Metric(stop, "1", f"why the refinement ended, by number: {stop} is {self._stop}"),
         }
         for i, finger in enumerate(("thumb", "index", "ring")):
@@ -149,6 +158,15 @@ class GraspEvaluator(Evaluator):
             metrics[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{what}, by [Luberto] eq. (11){unseen}")
             metrics[f"true_distance_{finger}"] = Metric(float(true[i]), "m", f"{what}, true along the beam{unmet}")
         self._at_closing = {name: m for name, m in metrics.items() if _SIGNALS.get(name, "scene.range") in signals}
+
+    def _offset(self, signals: Signals) -> float:
+        """Return how far the middle of the object is from the middle between the pads of thumb and ring, in m."""
+        p_WH, yaw, yaw_O = signals["scene.p_WH"], float(signals["scene.yaw"]), float(signals["scene.yaw_O"])
+        pads, _ = sensor_rays(p_WH, yaw, signals["scene.q"])
+        x, y = self.parameters.solid.parts[0].centroid
+        c, s = math.cos(yaw_O), math.sin(yaw_O)
+        middle = signals["scene.p_WO"] + np.array([c * x - s * y, s * x + c * y])
+        return float(np.linalg.norm(middle - pads[list(IN_COST)].mean(axis=0)))
 
     def _count(self, phase: str, signals: Signals) -> None:
         command = (

@@ -75,6 +75,7 @@ class IrGrasp(Experiment[GraspEvaluator]):
         "vision_position_error",
         "vision_yaw_error",
         "displacement",
+        "offset_at_grasp",
         "left_behind",
         "cpu_per_cycle",
         "pace_scene",
@@ -84,21 +85,32 @@ class IrGrasp(Experiment[GraspEvaluator]):
         """Wire scene and controller.
 
         Raises:
-            InvalidParameter: the shortest shift of a perturbed object is longer than the longest.
+            InvalidParameter: the shortest shift of a perturbed object is longer than the longest, or a polygon is none.
         """
-        if parameters.shift_least > parameters.shift_most:
-            shift_min, shift_max = parameters.shift_least, parameters.shift_most
-            raise InvalidParameter([f"shift_least {shift_min:g} m must be at most shift_most {shift_max:g} m"])
+        if faults := parameters.faults():
+            raise InvalidParameter(faults)
         p, drawn = parameters, Situation.draw(parameters, seed)
         s = System()
         scene = s.add(
             "scene",
             fmu("scene"),
             thing=p.thing,
+            disc_radius=p.disc_radius,
+            bar_size=p.bar_size,
+            corners=p.corners,
+            corner_count=p.corner_count,
+            thing_seed=p.thing_seed,
             p_WO_0=drawn.p_WO,
             yaw_O_0=drawn.turn,
             p_WH_0=drawn.p_WH_start,
             yaw_H_0=drawn.yaw,
+            carry_velocity=p.carry_velocity,
+            carry_from=p.carried_from,
+            carry_until=p.carried_until,
+            nudge=p.nudge,
+            nudge_time=p.nudge_time,
+            other_radius=p.other_radius,
+            p_WX_0=p.other_place,
             seed=int(np.random.SeedSequence(seed).generate_state(1)[0] >> 1),
             p_WH_cmd=drawn.p_WH_start,
             yaw_cmd=drawn.yaw,
@@ -112,8 +124,9 @@ class IrGrasp(Experiment[GraspEvaluator]):
             p_WH_pregrasp=drawn.p_WH_pregrasp,
             yaw_pregrasp=drawn.yaw,
         )
-        for name in ("ticks", "p_WH", "yaw", "sigma"):
-            s.connect(getattr(scene.y, name), getattr(reflex.u, name))
+        s.connect(scene.y.ticks, reflex.u.ticks)
+        for name in ("p_WH", "yaw", "sigma"):
+            s.connect(getattr(scene.y, f"{name}_meas"), getattr(reflex.u, name))
         for name in ("p_WH_cmd", "yaw_cmd", "sigma_cmd"):
             s.connect(getattr(reflex.y, name), getattr(scene.u, name))
         return s

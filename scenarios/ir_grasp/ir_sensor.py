@@ -19,8 +19,9 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.plants.ir_grasp.hand import JOINTS, sensor_rays
-from handover.plants.ir_grasp.objects import SOLIDS, Slab, Thing
+from handover.plants.ir_grasp.objects import SOLIDS, Thing
 from handover.plants.ir_grasp.parameters import OUT_OF_RANGE
+from handover.plants.ir_grasp.shapes import Slab
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Metric, Outcome
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.places import Place

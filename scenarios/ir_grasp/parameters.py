@@ -3,16 +3,27 @@
 A `Situation` is where object and hand are before the grasp: what vision saw, and how the object was moved since.
 """
 
+import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from handover.controllers.ir_grasp.parameters import Strategy
-from handover.cosim.blocks.ports import Floats, parameter
-from handover.cosim.blocks.units import Metre, Radian
+from handover.cosim.blocks.ports import Corners8, Floats, Vector2, parameter
+from handover.cosim.blocks.units import Metre, MetrePerSecond, Radian, Second
 from handover.plants.ir_grasp.hand import PALM
-from handover.plants.ir_grasp.objects import SOLIDS, Thing, outlines
+from handover.plants.ir_grasp.objects import Solid, Thing, placed, polygon_corners, solid_of
+from handover.plants.ir_grasp.parameters import PENTAGON
+from handover.plants.ir_grasp.shapes import polygon_faults
+
+
+class Expected(enum.IntEnum):
+    """What vision takes an object for, whatever it is: its true shape, a disc or a bar. The middle is the object's."""
+
+    AS_IT_IS = 0
+    DISC = 1
+    BAR = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +31,25 @@ class Parameters:
     """One grasp. The run's seed draws the perturbation and what vision is off by, the same for any strategy."""
 
     thing: Thing = parameter(Thing.CYLINDER, "what is grasped, in which reference pose")
+    disc_radius: Metre = parameter(0.033, "radius of thing=disc", minimum=5e-3, maximum=0.1)
+    bar_size: Vector2[Metre] = parameter(
+        np.array([0.11, 0.03]), "length and width of thing=bar", minimum=5e-3, maximum=0.3
+    )
+    corners: Corners8[Metre] = parameter(
+        PENTAGON, "corners of thing=polygon, counter-clockwise; the first corner_count count", minimum=-0.2, maximum=0.2
+    )
+    corner_count: int = parameter(5, "how many corners thing=polygon has", minimum=3, maximum=8)
+    thing_seed: int = parameter(
+        0, "which object of its family thing=drawn is; odd ones are kept from all tuning", minimum=0
+    )
+    expected: Expected = parameter(Expected.AS_IT_IS, "the shape that vision takes the object for")
+    expected_radius: Metre = parameter(0.033, "its radius, for expected=disc", minimum=5e-3, maximum=0.1)
+    expected_size: Vector2[Metre] = parameter(
+        np.array([0.11, 0.03]), "its length and width, for expected=bar", minimum=5e-3, maximum=0.3
+    )
+    expected_yaw: Radian = parameter(
+        0.0, "how far vision believes it turned from its reference pose", minimum=-math.pi, maximum=math.pi
+    )
     perturbed: bool = parameter(True, "the object was moved after vision saw it")
     strategy: Strategy = parameter(
         Strategy.REFLEX, "correct the pre-grasp pose by the sensors, close there at once, or go forward and close"
@@ -40,6 +70,31 @@ class Parameters:
     turn_most: Radian = parameter(
         0.35, "how far a perturbed object was turned at most, either way", minimum=0.0, maximum=math.pi
     )
+    shift: Vector2[Metre] = parameter(
+        np.zeros(2),
+        "how far the object was moved, in W; this and turn, if not 0, replace what is drawn",
+        minimum=-0.2,
+        maximum=0.2,
+    )
+    turn: Radian = parameter(0.0, "how far the object was turned", minimum=-math.pi, maximum=math.pi)
+    carried_speed: MetrePerSecond = parameter(
+        0.0, "speed at which the ground under the object carries it", minimum=0.0, maximum=0.2
+    )
+    carried_direction: Radian = parameter(
+        math.pi / 2.0, "where to, counter-clockwise from the approach", minimum=-math.pi, maximum=math.pi
+    )
+    carried_from: Second = parameter(0.0, "when it begins to carry", minimum=0.0, maximum=90.0)
+    carried_until: Second = parameter(12.0, "when it stops", minimum=0.0, maximum=90.0)
+    nudge: Vector2[Metre] = parameter(
+        np.zeros(2), "how far somebody bumps the object meanwhile, in W", minimum=-0.1, maximum=0.1
+    )
+    nudge_time: Second = parameter(4.0, "when the bump begins", minimum=0.0, maximum=90.0)
+    other_radius: Metre = parameter(
+        0.0, "radius of a second object on the table, a disc; 0: none", minimum=0.0, maximum=0.1
+    )
+    other_place: Vector2[Metre] = parameter(
+        np.array([0.0, 0.12]), "where the second object stands, in W", minimum=-2.0, maximum=2.0
+    )
     vision_position: Metre = parameter(
         0.003, "standard deviation of the pre-grasp position, by axis", minimum=0.0, maximum=0.05
     )
@@ -47,6 +102,42 @@ class Parameters:
     run_up: Metre = parameter(
         0.12, "distance of the wrist from the pre-grasp pose at the start", minimum=0.0, maximum=0.5
     )
+
+    def faults(self) -> list[str]:
+        """Return how parameters contradict each other."""
+        faults: list[str] = []
+        if self.shift_least > self.shift_most:
+            faults.append(f"shift_least {self.shift_least:g} m must be at most shift_most {self.shift_most:g} m")
+        if self.thing is Thing.POLYGON:
+            faults.extend(polygon_faults(polygon_corners(self.corners, self.corner_count), "corners"))
+        return faults
+
+    @property
+    def solid(self) -> Solid:
+        """What stands on the table, its mass and reflectivity aside, which the scene's own parameters may change."""
+        return solid_of(
+            self.thing,
+            disc_radius=self.disc_radius,
+            bar_size=self.bar_size,
+            corners=self.corners,
+            corner_count=self.corner_count,
+            thing_seed=self.thing_seed,
+        )
+
+    @property
+    def expected_solid(self) -> Solid:
+        """What vision believes to stand there."""
+        believed = self.solid
+        if self.expected is not Expected.AS_IT_IS:
+            shape = Thing.DISC if self.expected is Expected.DISC else Thing.BAR
+            plain = solid_of(shape, disc_radius=self.expected_radius, bar_size=self.expected_size)
+            believed = replace(plain, yaw=self.solid.yaw)
+        return replace(believed, yaw=believed.yaw + self.expected_yaw)
+
+    @property
+    def carry_velocity(self) -> Floats:
+        """Velocity of the ground under the object, in W, in m/s."""
+        return self.carried_speed * np.array([math.cos(self.carried_direction), math.sin(self.carried_direction)])
 
 
 _PALM_FRONT = max(x for x, _ in PALM)
@@ -74,20 +165,24 @@ class Situation:
         shift = p.shift_least + (p.shift_most - p.shift_least) * distance
         angle = p.shift_spread * (2.0 * direction - 1.0)
         yaw = p.vision_yaw * float(error[2])
-        pregrasp = pregrasp_position(p.thing, p.standoff) + p.vision_position * error[:2]
+        pregrasp = pregrasp_position(p.expected_solid, p.standoff) + p.vision_position * error[:2]
+        p_WO, turned = np.zeros(2), 0.0
+        if p.turn != 0.0 or np.any(p.shift):
+            p_WO, turned = np.array(p.shift), p.turn
+        elif p.perturbed:
+            p_WO = shift * np.array([math.cos(angle), math.sin(angle)])
+            turned = p.turn_most * (2.0 * float(turn) - 1.0)
         return cls(
-            p_WO=shift * np.array([math.cos(angle), math.sin(angle)]) if p.perturbed else np.zeros(2),
-            turn=p.turn_most * (2.0 * float(turn) - 1.0) if p.perturbed else 0.0,
+            p_WO=p_WO,
+            turn=turned,
             p_WH_pregrasp=pregrasp,
             yaw=yaw,
             p_WH_start=pregrasp - p.run_up * np.array([math.cos(yaw), math.sin(yaw)]),
         )
 
 
-def pregrasp_position(thing: Thing, standoff: float) -> Floats:
-    """Return the wrist's position before the middle of the object's width, its palm a standoff from the object."""
-    yaw = SOLIDS[thing].yaw
-    R_WO = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
-    points: Floats = np.vstack([outline @ np.transpose(R_WO) for outline in outlines(thing)])
+def pregrasp_position(believed: Solid, standoff: float) -> Floats:
+    """Return the wrist's position before the middle of a believed object's width, its palm a standoff from it."""
+    points: Floats = np.vstack(placed(believed, np.zeros(2), believed.yaw))
     low, high = points.min(axis=0), points.max(axis=0)
     return np.array([low[0] - standoff - _PALM_FRONT, (low[1] + high[1]) / 2.0])

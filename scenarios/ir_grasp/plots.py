@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Polygon
+from matplotlib.patches import Circle, Polygon
 
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.ir_grasp.hand import FINGERS, finger_points, palm_outline, sensor_rays
-from handover.plants.ir_grasp.objects import outlines
+from handover.plants.ir_grasp.objects import placed
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import figure
 from handover.scenarios.experiment.time_plot import (
@@ -142,7 +142,7 @@ def _commands(record: Record, phases: Sequence[Phase]) -> list[TimePlot]:
     ]
 
 
-PALM_COLOUR, THING_COLOUR = "#c9d1db", "#ecd9b8"
+PALM_COLOUR, THING_COLOUR, OTHER_COLOUR = "#c9d1db", "#ecd9b8", "#d5dfc6"
 
 
 def draw_scene(parameters: Parameters, moments: Mapping[str, float], record: Record, folder: Path) -> Figure:
@@ -170,6 +170,9 @@ def draw_moment(axes: Axes, parameters: Parameters, record: Record, k: int) -> N
     """Draw the table at a row of a record, in mm: object, hand and beams."""
     for part in _thing(parameters, record, k):
         axes.add_patch(Polygon(part * 1000, facecolor=THING_COLOUR, edgecolor="#8a6d3b", lw=1.0))
+    if parameters.other_radius > 0.0 and "scene.p_WX" in record:
+        middle, radius = 1000 * record["scene.p_WX"][k], 1000 * parameters.other_radius
+        axes.add_patch(Circle(middle.tolist(), radius, facecolor=OTHER_COLOUR, edgecolor="#4d5866", lw=1.0))
     p_WH, yaw, q = record["scene.p_WH"][k], float(record["scene.yaw"][k]), record["scene.q"][k]
     draw_hand(axes, p_WH, yaw, q, record["scene.range"][k])
 
@@ -190,9 +193,7 @@ def draw_hand(axes: Axes, p_WH: Floats, yaw: float, q: Floats, distances: Floats
 
 
 def _thing(parameters: Parameters, record: Record, k: int) -> list[Floats]:
-    p_WO, yaw = record["scene.p_WO"][k], float(record["scene.yaw_O"][k])
-    R_WO = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    return [p_WO + outline @ R_WO.T for outline in outlines(parameters.thing)]
+    return placed(parameters.solid, record["scene.p_WO"][k], float(record["scene.yaw_O"][k]))
 
 
 def _frame(record: Record, rows: list[int]) -> tuple[Floats, Floats]:

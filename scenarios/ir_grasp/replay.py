@@ -6,12 +6,13 @@ from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.ir_grasp.hand import FINGERS, PALM, finger_points, sensor_rays
-from handover.plants.ir_grasp.objects import outlines
+from handover.plants.ir_grasp.objects import Thing, outlines, solid_of
 from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, merged, prism
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.ir_grasp.plots import (
     FINGER_COLOURS,
     FINGER_NAMES,
+    OTHER_COLOUR,
     PALM_COLOUR,
     THING_COLOUR,
     phases_of_grasp,
@@ -24,12 +25,13 @@ _HEIGHT, _PALM_LOW, _PALM_HIGH, _THING_HIGH = 0.025, 0.012, 0.038, 0.055
 
 def replay_grasp(parameters: Parameters, record: Record) -> Replay:
     """Return hand, object and beams over a run's time."""
-    parts = [prism(outline, 0.0, _THING_HIGH) for outline in outlines(parameters.thing)]
+    parts = [prism(outline, 0.0, _THING_HIGH) for outline in outlines(parameters.solid)]
     fingers, beams = _fingers_and_beams(record)
     return Replay(
         bodies=[
             _turning("palm", PALM_COLOUR, prism(np.array(PALM), _PALM_LOW, _PALM_HIGH), record, "p_WH", "yaw"),
             _turning("object", THING_COLOUR, merged(parts), record, "p_WO", "yaw_O"),
+            *_other(parameters, record),
         ],
         lines=[*fingers, *beams],
         eye=(-0.35, -0.7, 1.35),
@@ -38,6 +40,16 @@ def replay_grasp(parameters: Parameters, record: Record) -> Replay:
         follow="palm",
         notes=("The scene is planar; heights above the table are for display only. Beams end at what they meet.",),
     )
+
+
+def _other(parameters: Parameters, record: Record) -> list[Body]:
+    if parameters.other_radius == 0.0 or "scene.p_WX" not in record:
+        return []
+    disc = solid_of(Thing.DISC, disc_radius=parameters.other_radius)
+    mesh = prism(outlines(disc)[0], 0.0, _THING_HIGH)
+    p = record["scene.p_WX"]
+    p_WB, q_WB = np.column_stack([p, np.zeros(len(p))]), np.tile([1.0, 0.0, 0.0, 0.0], (len(p), 1))
+    return [Body(label="second object", colour=OTHER_COLOUR, mesh=mesh, p_WB=p_WB, q_WB=q_WB)]
 
 
 def _turning(label: str, colour: str, mesh: Mesh, record: Record, place: str, yaw: str) -> Body:

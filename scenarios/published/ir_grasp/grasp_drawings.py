@@ -15,7 +15,7 @@ from handover.controllers.ir_grasp.visibility import RECOVERY, Action, Visibilit
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.ir_grasp.hand import finger_points
-from handover.plants.ir_grasp.objects import Thing, outlines
+from handover.plants.ir_grasp.objects import SOLIDS, Thing, placed
 from handover.plants.ir_grasp.parameters import Params as SceneParams
 from handover.plants.ir_grasp.scene import GraspScene
 from handover.plants.ir_grasp.scene import Inputs as SceneInputs
@@ -143,7 +143,7 @@ def _case(axes: Axes, case: Visibility, scene: SeenScene) -> None:
 
 def draw_poses(rows: Sequence[Row], runs: Path, folder: Path) -> Figure | None:
     """Draw figure 5: each thing in nominal and perturbed pose, of the runs of rows; None without a run."""
-    things = [thing for thing in Thing if any(row["thing"] == thing.name.lower() for row in rows)]
+    things = [thing for thing in SOLIDS if any(row["thing"] == thing.name.lower() for row in rows)]
     if not things:
         return None
     with figure(folder / "poses", 2, len(things), size=(2.1 * len(things) + 0.8, 4.6)) as panels:
@@ -229,8 +229,7 @@ def _extent(records: Sequence[Record], rows: Sequence[Sequence[int]]) -> tuple[A
     return points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
 
 
-def _draw_thing(axes: Axes, thing: Thing, p_WO: Any, yaw: float, filled: bool = True) -> None:
-    R_WO: Floats = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+def _draw_thing(axes: Axes, thing: Thing, p_WO: Floats, yaw: float, filled: bool = True) -> None:
     style: dict[str, Any] = {"facecolor": THING_COLOUR, "lw": 1.0} if filled else {"fill": False, "lw": 0.5}
-    for part in outlines(thing):
-        axes.add_patch(Polygon(1000 * (p_WO + part @ np.transpose(R_WO)), edgecolor=_EDGE, **style))
+    for part in placed(SOLIDS[thing], p_WO, yaw):
+        axes.add_patch(Polygon(1000 * part, edgecolor=_EDGE, **style))

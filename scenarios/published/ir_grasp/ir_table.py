@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from handover.plants.ir_grasp.objects import Thing
+from handover.plants.ir_grasp.objects import SOLIDS
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
@@ -49,7 +49,7 @@ class IrTable(PublishedExperiment):
         points = [
             {"thing": thing.name.lower(), "perturbed": perturbed, **arm.parameters}
             for perturbed in ("false", "true")
-            for thing in Thing
+            for thing in SOLIDS
             for arm in ARMS
         ]
         return CampaignPlan(

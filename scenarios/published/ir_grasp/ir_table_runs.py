@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.controllers.ir_grasp.parameters import Strategy
-from handover.plants.ir_grasp.objects import Thing
+from handover.plants.ir_grasp.objects import SOLIDS, Thing
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
@@ -79,7 +79,7 @@ class IrTableRuns:
         if arm.column is None:
             return None
         k = self._published["total" if thing is None else thing.name.lower()][arm.column[perturbed]]
-        return int(k), self._published["trials"] * (len(Thing) if thing is None else 1)
+        return int(k), self._published["trials"] * (len(SOLIDS) if thing is None else 1)
 
     def published_distances(self, name: str, perturbed: bool) -> dict[str, float]:
         """Return a row of table II, in m by finger."""
@@ -88,7 +88,7 @@ class IrTableRuns:
 
     def count(self, arm: Arm, perturbed: bool, thing: Thing | None = None) -> Count:
         """Return successes and trials of an arm in a pose, of one thing or of all."""
-        rows = self.rows(arm, perturbed, tuple(Thing) if thing is None else (thing,))
+        rows = self.rows(arm, perturbed, tuple(SOLIDS) if thing is None else (thing,))
         return sum(bool(row["success"]) for row in rows), len(rows)
 
     def pairs(self, first: tuple[Arm, bool], second: tuple[Arm, bool]) -> tuple[list[bool], list[bool]]:
@@ -100,7 +100,7 @@ class IrTableRuns:
         return [a[scene] for scene in scenes], [b[scene] for scene in scenes]
 
     def metric(
-        self, name: str, arm: Arm, perturbed: bool, things: Sequence[Thing] = tuple(Thing)
+        self, name: str, arm: Arm, perturbed: bool, things: Sequence[Thing] = tuple(SOLIDS)
     ) -> NDArray[np.float64]:
         """Return a metric of an arm's runs in a pose, without those that have none."""
         values = [row[name] for row in self.rows(arm, perturbed, things)]
@@ -111,7 +111,7 @@ class IrTableRuns:
         rows = self.rows(arm, perturbed)
         return np.array([[math.nan if row[n] is None else row[n] for row in rows] for n in names], dtype=np.float64)
 
-    def rows(self, arm: Arm, perturbed: bool, things: Sequence[Thing] = tuple(Thing)) -> list[dict[str, Any]]:
+    def rows(self, arm: Arm, perturbed: bool, things: Sequence[Thing] = tuple(SOLIDS)) -> list[dict[str, Any]]:
         """Return the rows of runs of an arm in a pose that came to their end."""
         names = [thing.name.lower() for thing in things]
         return [

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.ports import Floats
+from handover.plants.ir_grasp.actuation import GEARS, PULLEYS, STIFFNESS, resting_posture, tendon_excursion
 from handover.plants.ir_grasp.hand import (
     FINGERS,
     JOINTS,
@@ -13,7 +14,6 @@ from handover.plants.ir_grasp.hand import (
     palm_outline,
     sensor_rays,
 )
-from handover.plants.ir_grasp.world import GEARS, PULLEYS, STIFFNESS, resting_posture, tendon_excursion
 
 BENT = np.array([0.3, 0.5, 0.2, 0.4, 0.1, 0.6, 0.2, 0.3])
 ORIGIN = np.zeros(2)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.ir_grasp.world import follow
+from handover.plants.ir_grasp.actuation import follow
 
 SPEED, ACCELERATION, LAG, DT = 0.3, 10.0, 0.02, 1e-3
 

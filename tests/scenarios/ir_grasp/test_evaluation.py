@@ -22,6 +22,7 @@ def signals(
     p_WH: float = -0.1,
     index: tuple[float, float] = (0.05, 0.05),
     thumb: float = 0.01,
+    p_WG: tuple[float, float] = (0.0, 0.0),
 ) -> Signals:
     """Return what a hand along x, and an object at a place in its frame, would show.
 
@@ -41,6 +42,8 @@ def signals(
     for name, value in (("p_WH", [p_WH, 0.0]), ("p_WO", [p_WH + p_HO[0], p_HO[1]]), ("yaw", 0.0), ("yaw_O", 0.0)):
         show("scene", name, Kind.REAL, value)
     show("scene", "range", Kind.REAL, [0.01, index[1], 0.01])
+    show("scene", "q", Kind.REAL, np.zeros(8))
+    show("scene", "p_WG", Kind.REAL, p_WG)
     show("scene", "touching", Kind.INTEGER, touching)
     for name, value in (("distance", [thumb, index[0], 0.01]), ("cost", 1e-5), ("yaw_cmd", 0.0), ("sigma_cmd", 0.0)):
         show("reflex", name, Kind.REAL, value)
@@ -146,3 +149,13 @@ def test_a_run_that_ends_early_says_in_which_phase():
     evaluator = follow((0.0, signals(Phase.REACH)), (0.5, signals(Phase.PROBE)))
     assert not evaluator.over
     assert "stopped at 0.5 s in phase PROBE" in evaluator.outcome().reason
+
+
+def test_what_the_ground_carried_the_object_is_no_displacement_by_the_hand():
+    def displacement(p_WG: tuple[float, float]) -> float:
+        closing = signals(Phase.CLOSE, p_HO=(0.13, 0.04), p_WG=p_WG)
+        return follow((0.0, signals(Phase.REACH)), (1.0, closing)).outcome().metrics["displacement"].value
+
+    assert displacement((0.0, 0.0)) == pytest.approx(0.05)
+    assert displacement((0.03, 0.04)) == pytest.approx(0.0, abs=1e-12)
+    assert displacement((0.03, 0.0)) == pytest.approx(0.04)

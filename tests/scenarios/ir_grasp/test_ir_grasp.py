@@ -14,7 +14,7 @@ from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
 from handover.fmus.build import cached
-from handover.plants.ir_grasp.objects import Thing
+from handover.plants.ir_grasp.objects import SOLIDS, Thing
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.experiment.experiment import Outcome
@@ -85,7 +85,7 @@ def test_the_summary_says_what_the_record_shows(run: tuple[Path, dict[str, Any]]
     drawn = Situation.draw(Parameters(), 0)
     assert metrics["moved"]["value"] == pytest.approx(np.linalg.norm(drawn.p_WO))
     assert metrics["turned"]["value"] == pytest.approx(drawn.turn)
-    off = drawn.p_WH_pregrasp - pregrasp_position(Parameters().thing, Parameters().standoff)
+    off = drawn.p_WH_pregrasp - pregrasp_position(Parameters().expected_solid, Parameters().standoff)
     assert metrics["vision_position_error"]["value"] == pytest.approx(np.linalg.norm(off))
     assert metrics["vision_yaw_error"]["value"] == pytest.approx(drawn.yaw)
     stop = Stop(int(record["reflex.stop"][-1]))
@@ -127,7 +127,7 @@ def test_the_reflex_beats_closing_blind_on_the_moved_cylinder():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("thing", Thing)
+@pytest.mark.parametrize("thing", SOLIDS)
 @pytest.mark.parametrize("perturbed", [False, True])
 def test_every_thing_can_be_grasped(thing: Thing, perturbed: bool):
     held = [grasp(seed, thing=thing, perturbed=perturbed).success for seed in range(3)]

@@ -26,7 +26,8 @@ def test_the_beam_meets_the_face_at_the_distance_and_the_angle(finger: Finger, i
     (x, y), (d_x, d_y) = origins[finger], directions[finger]
     c, s = math.cos(incidence), math.sin(incidence)
     hit = SOLIDS[THING].intersect(c * x + s * y, c * y - s * x, c * d_x + s * d_y, c * d_y - s * d_x)
-    assert hit == pytest.approx((0.04, math.cos(incidence)))
+    assert hit is not None
+    assert (hit.distance, hit.cosine) == pytest.approx((0.04, math.cos(incidence)))
 
 
 def test_readings_are_those_of_the_curve_at_the_distance_of_their_scan(tmp_path: Path):

@@ -10,7 +10,7 @@ from parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.ir_grasp
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
-from handover.plants.ir_grasp.objects import Thing
+from handover.plants.ir_grasp.objects import SOLIDS
 from handover.plants.ir_grasp.parameters import Params as SceneParams
 from handover.scenarios.ir_grasp.ir_sensor import SensorParameters
 from handover.scenarios.ir_grasp.parameters import Parameters
@@ -33,5 +33,5 @@ def test_every_default_has_its_origin(paper: Paper, group: str):
 
 def test_the_published_totals_are_the_sums_over_the_things(paper: Paper):
     published = paper["published"]
-    rows = [published[thing.name.lower()]["value"] for thing in Thing]
+    rows = [published[thing.name.lower()]["value"] for thing in SOLIDS]
     assert np.sum(rows, axis=0).tolist() == published["total"]["value"]

@@ -6,7 +6,7 @@ import pytest
 
 from handover.controllers.ir_grasp.parameters import Strategy
 from handover.plants.ir_grasp.hand import PALM
-from handover.plants.ir_grasp.objects import Thing, outlines
+from handover.plants.ir_grasp.objects import SOLIDS, Thing, outlines
 from handover.scenarios.ir_grasp.parameters import Parameters, Situation
 
 EXACT: dict[str, Any] = {"vision_position": 0.0, "vision_yaw": 0.0}
@@ -29,7 +29,7 @@ def test_a_nominal_object_is_where_vision_saw_it_and_the_palm_a_standoff_before_
 
 def test_the_hand_comes_before_the_middle_of_what_is_seen():
     p = Parameters(thing=Thing.BABY_CUP_A, perturbed=False, **EXACT)  # its handle points to the side
-    body, handle = outlines(Thing.BABY_CUP_A)
+    body, handle = outlines(SOLIDS[Thing.BABY_CUP_A])
     middle = (handle[:, 0].max() + body[:, 0].min()) / 2.0
     assert middle > 0.005
     assert Situation.draw(p, 0).p_WH_pregrasp[1] == pytest.approx(middle)

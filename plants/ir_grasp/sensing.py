@@ -1,0 +1,153 @@
+"""What the hand measures: infrared readings of the fingers in turn, and the encoders of wrist and closure."""
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from handover.cosim.blocks.ports import Floats
+from handover.plants.ir_grasp.hand import FINGERS, PALM
+from handover.plants.ir_grasp.parameters import OUT_OF_RANGE, Params
+from handover.plants.ir_grasp.shapes import Disc, Point, Slab, capsule_hit
+from handover.plants.ir_grasp.world import GraspWorld
+
+_SLOT: Final = 5  # internal steps for which a sensor is active
+_SENSORS: Final = len(FINGERS)
+_MIDDLE = ((1.0, 0.0),)
+_PALM = Slab(low=PALM[0], high=PALM[2])
+_HAND_REACH = max(max(f.lengths) for f in FINGERS)
+
+Kept = tuple[int, list[float], list[float], tuple[Any, Any]]
+"""Time into the scan, readings, the encoders' errors, and two states of random numbers."""
+
+
+class Sensing:
+    """Sensors and encoders of the hand.
+
+    Sensors are active in turn for 5 ms each, thumb, index, ring, `active` of them at once; each is read at the end of
+    its time. A reading is the mean over three rays of the beam of `InfraredSensor.ticks`, and `crosstalk` of what
+    each other active sensor reads of its own light, plus ambient light and noise, rounded. The encoders are read every
+    5 ms.
+
+    Args:
+        params: of the scene.
+        world: at the start, when all have been read.
+    """
+
+    def __init__(self, params: Params, world: GraspWorld) -> None:
+        self._params = p = params
+        self._sensors = p.finger_sensors()
+        self._solid = p.solid
+        angles = (0.0, -p.beam, p.beam)
+        self._rays = [(math.cos(a), math.sin(a)) for a in angles]
+        self._disc = Disc(radius=p.other_radius)
+        self._noise = math.hypot(p.noise, p.ambient_noise)
+        self._rng = np.random.default_rng(p.seed)
+        self._encoder_rng = np.random.default_rng([p.seed, 0xE2C0DE2])
+        self._encoder_noise: Floats = np.array([p.wrist_noise, p.wrist_noise, p.heading_noise, p.closure_noise])
+        self._encoders_err = bool(np.any(self._encoder_noise))
+        self._clock = 0  # internal steps into the scan of the sensors
+        self.ticks = [0.0] * _SENSORS
+        for slot in range(_SENSORS):
+            self._read(slot, world)
+        self._errors = self._encoder_errors()
+
+    @property
+    def until_reading(self) -> int:
+        """Internal steps until the next reading."""
+        return _SLOT - self._clock % _SLOT
+
+    def advance(self, steps: int, world: GraspWorld) -> None:
+        """Let steps pass, not beyond the next reading, after which the world is as given."""
+        self._clock = (self._clock + steps) % (_SLOT * _SENSORS)
+        if self._clock % _SLOT == 0:
+            self._read((self._clock // _SLOT - 1) % _SENSORS, world)
+            self._errors = self._encoder_errors()
+
+    def measured(self, world: GraspWorld) -> tuple[float, float, float, float]:
+        """Return what the encoders say of the wrist's position (m) and orientation (rad), and of the closure."""
+        (x, y, yaw), (e_x, e_y, e_yaw, e_sigma) = world.wrist, self._errors
+        return x + e_x, y + e_y, yaw + e_yaw, world.sigma + e_sigma
+
+    def ranges(self, world: GraspWorld) -> list[float]:
+        """Return how far the object is along the middle of each beam, whatever hides it, in m."""
+        hits = [world.cast_rays(finger, _MIDDLE, OUT_OF_RANGE)[0] for finger in range(_SENSORS)]
+        return [OUT_OF_RANGE if hit is None else max(hit[0], 0.0) for hit in hits]  # contacts overlap a little
+
+    def get_state(self) -> Kept:
+        """Return the time into the scan, readings, errors and the random numbers' states."""
+        return self._clock, self.ticks, self._errors, (self._rng.bit_generator, self._encoder_rng.bit_generator)
+
+    def set_state(self, state: Kept) -> None:
+        """Restore a state that `get_state` gave, once packed and unpacked."""
+        self._clock, self.ticks, self._errors, (rng, encoder_rng) = state
+        self._rng.bit_generator.state, self._encoder_rng.bit_generator.state = rng, encoder_rng
+
+    def _read(self, slot: int, world: GraspWorld) -> None:
+        p = self._params
+        active = [(slot * p.active + k) % _SENSORS for k in range(p.active)]
+        own = [self._own_light(finger, world) for finger in active]
+        for k, finger in enumerate(active):
+            others = sum(own[:k]) + sum(own[k + 1 :])
+            x = own[k] + p.crosstalk * others + p.ambient
+            x += self._noise * float(self._rng.standard_normal())
+            self.ticks[finger] = self._sensors[finger].reading(x)
+
+    def _own_light(self, finger: int, world: GraspWorld) -> float:
+        """Return the ticks that a sensor's own light makes, before rounding."""
+        p, solid, sensor = self._params, self._solid, self._sensors[finger]
+        met = world.cast_rays(finger, self._rays, p.farthest)
+        if p.other_radius == 0.0 and not p.fingers_seen:
+            return sum(
+                sensor.ticks(h[0], h[1], solid.reflectivity * solid.faces[h[2]], p.gloss, p.gloss_exponent)
+                for h in met
+                if h is not None
+            ) / len(self._rays)
+        window, looks = world.sensor(finger)
+        total = 0.0
+        for (c, s), hit in zip(self._rays, met, strict=True):
+            ray = c * looks[0] - s * looks[1], s * looks[0] + c * looks[1]
+            nearer = self._hidden_by(finger, world, window, ray, p.farthest if hit is None else hit[0])
+            if nearer is not None:
+                total += sensor.ticks(*nearer)
+            elif hit is not None:
+                rho = solid.reflectivity * solid.faces[hit[2]]
+                total += sensor.ticks(hit[0], hit[1], rho, p.gloss, p.gloss_exponent)
+        return total / len(self._rays)
+
+    def _hidden_by(
+        self, finger: int, world: GraspWorld, window: Point, ray: Point, reach: float
+    ) -> tuple[float, float, float] | None:
+        """Return what a ray meets before `reach` of second object and hand: distance, cosine, reflectivity."""
+        p = self._params
+        met: list[tuple[float, float, float]] = []
+        if world.other is not None:
+            x, y = window[0] - world.other[0], window[1] - world.other[1]
+            hit = self._disc.intersect(x, y, *ray)
+            if hit is not None:
+                met.append((hit.distance, hit.cosine, p.other_reflectivity))
+        if p.fingers_seen:
+            met.extend((*hit, p.finger_reflectivity) for hit in _hand_hits(finger, world, window, ray, reach))
+        return min((m for m in met if m[0] < reach), default=None)
+
+    def _encoder_errors(self) -> list[float]:
+        """Return new errors of the encoders; without noise no random numbers are drawn."""
+        if not self._encoders_err:
+            return [0.0] * 4
+        return (self._encoder_noise * self._encoder_rng.standard_normal(4)).tolist()
+
+
+def _hand_hits(finger: int, world: GraspWorld, window: Point, ray: Point, reach: float) -> list[tuple[float, float]]:
+    """Return distances and cosines at which a sensor's ray meets palm and phalanges."""
+    hits: list[tuple[float, float]] = []
+    for length, radius, (x, y, angle) in world.phalanges_before(finger):
+        if math.hypot(x - window[0], y - window[1]) < reach + _HAND_REACH:
+            e_x, e_y = length / 2.0 * math.cos(angle), length / 2.0 * math.sin(angle)
+            hit = capsule_hit((x - e_x, y - e_y), (x + e_x, y + e_y), radius, window, ray)
+            if hit is not None:
+                hits.append(hit)
+    x, y, yaw = world.wrist
+    c, s = math.cos(yaw), math.sin(yaw)
+    r_x, r_y = window[0] - x, window[1] - y
+    palm = _PALM.intersect(c * r_x + s * r_y, c * r_y - s * r_x, c * ray[0] + s * ray[1], c * ray[1] - s * ray[0])
+    return hits if palm is None else [*hits, (palm.distance, palm.cosine)]

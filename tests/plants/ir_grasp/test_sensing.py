@@ -1,0 +1,188 @@
+"""What disturbs readings and encoders: tolerances, ambient light, cross-talk, gloss, faces, fingers, other objects."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handover.cosim.blocks.ports import Floats
+from handover.plants.ir_grasp.hand import sensor_rays
+from handover.plants.ir_grasp.objects import Thing
+from handover.plants.ir_grasp.parameters import InvalidSceneParameters, Params
+from handover.plants.ir_grasp.scene import GraspScene, Inputs, Outputs
+
+STEP = 0.015
+QUIET = Params(p_WH_0=np.array([-0.13, 0.0]), sigma_0=0.12, noise=0.0)
+SQUARE = replace(QUIET, beam=0.0, thing=Thing.PAPER_BOX_A, sigma_0=0.15)
+"""The box's sides lie along x; each beam is one ray."""
+
+TENTH = (0.1, -0.1, 0.1, -0.1)
+"""Changes of a, b, c, d that make a reading rise."""
+
+
+def first(p: Params) -> Outputs:
+    return GraspScene(p).outputs(0.0, Inputs())
+
+
+def ticks(p: Params, **changes: Any) -> Floats:
+    return first(replace(p, **changes)).ticks
+
+
+def course(p: Params, seconds: float) -> list[Outputs]:
+    scene = GraspScene(p)
+    u = Inputs(p_WH_cmd=p.p_WH_0, sigma_cmd=p.sigma_0)
+    return [scene.step(k * STEP, STEP, u) for k in range(round(seconds / STEP))]
+
+
+def test_each_finger_has_its_own_constants():
+    p = replace(QUIET, a_scale=np.array([1.2, 1.0, 1.0]), d_scale=np.array([1.0, 1.0, 0.8]))
+    usual, off = first(QUIET), first(p)
+    assert off.ticks[1] == usual.ticks[1]
+    assert off.ticks[0] > usual.ticks[0] + 10
+    assert off.ticks[2] > usual.ticks[2] + 10
+    np.testing.assert_array_equal(off.range, usual.range)
+
+
+def test_tolerances_are_drawn_by_the_seed_within_their_size():
+    p = replace(QUIET, sensor_tolerance=0.1)
+    usual, off = ticks(QUIET), np.array([ticks(p, seed=s) for s in range(12)])
+    assert np.all(off[0] == ticks(p, seed=0))
+    assert len({tuple(row) for row in off.tolist()}) == 12
+    assert np.all(np.std(off, axis=0) > 5.0)
+    # a reading is off at most as if all constants were off by a tenth the same way
+    low, high = (
+        ticks(QUIET, **{f"{name}_scale": np.full(3, 1.0 + sign * by) for name, by in zip("abcd", TENTH, strict=True)})
+        for sign in (-1.0, 1.0)
+    )
+    assert np.all((low - 1.0 <= off) & (off <= high + 1.0))
+    assert np.all(low < usual)
+    assert np.all(usual < high)
+
+
+def test_a_sensor_whose_curve_does_not_reach_so_near_saturates():
+    p = replace(QUIET, c_scale=np.full(3, 5.0), reflectivity=1.0, beam=0.0)
+    assert np.max(ticks(p)) > 3000
+    assert np.max(ticks(p, p_WH_0=np.array([-0.11, 0.0]), reflectivity=2.0)) == 4095
+
+
+def test_constants_that_are_not_monotonic_are_refused_by_finger():
+    with pytest.raises(InvalidSceneParameters, match="must fall from 0 to 4095 ticks"):
+        GraspScene(replace(QUIET, d=0.00043))
+    with pytest.raises(InvalidSceneParameters, match=r"must fall from 0 to 4095 ticks; it does not at 0 ticks"):
+        GraspScene(replace(QUIET, a=-0.02, c=0.1))
+    falling = replace(QUIET, a=-0.001, c=0.0665, d=-0.00069)
+    GraspScene(falling)  # one that falls although a is below 0
+    index = np.array([1.0, 5.0, 1.0])
+    with pytest.raises(InvalidSceneParameters, match=r"index, with its scales and tolerance: .* must fall"):
+        GraspScene(replace(falling, a_scale=index, b_scale=index))
+
+
+def test_ambient_light_adds_to_readings_with_its_noise():
+    np.testing.assert_array_equal(ticks(QUIET, ambient=120.0), ticks(QUIET) + 120.0)
+    x = np.array([y.ticks for y in course(replace(QUIET, noise=3.0, ambient_noise=4.0, mass_O=5.0), 12.0)])
+    np.testing.assert_allclose(np.std(x, axis=0), 5.0, rtol=0.1)
+
+
+def test_one_sensor_at_a_time_has_no_crosstalk_and_more_have():
+    own = ticks(SQUARE)
+    np.testing.assert_array_equal(ticks(SQUARE, crosstalk=0.5), own)
+    all_active = ticks(SQUARE, active=3, crosstalk=0.2)
+    np.testing.assert_allclose(all_active, own + 0.2 * (own.sum() - own), atol=0.8)
+    np.testing.assert_array_equal(ticks(SQUARE, active=3, crosstalk=0.0), own)
+
+
+def test_sensors_that_are_active_together_are_read_together():
+    def changed(active: int) -> list[tuple[int, ...]]:
+        scene = GraspScene(replace(QUIET, noise=200.0, active=active))
+        last, found = scene.outputs(0.0, Inputs()).ticks, list[tuple[int, ...]]()
+        for k in range(9):
+            y = scene.step(k * 5e-3, 5e-3, Inputs(p_WH_cmd=QUIET.p_WH_0, sigma_cmd=QUIET.sigma_0))
+            found.append(tuple(np.flatnonzero(y.ticks != last).tolist()))
+            last = y.ticks
+        return found
+
+    assert changed(2)[:3] == [(0, 1), (0, 2), (1, 2)]
+    assert changed(3) == [(0, 1, 2)] * 9
+
+
+def test_a_glossy_object_is_brighter_where_it_is_met_squarely_and_darker_aslant():
+    y = first(SQUARE)
+    _, directions = sensor_rays(y.p_WH, y.yaw, y.q)
+    cosines = np.abs(directions[:, 1])
+    assert np.min(cosines) < 0.98
+    brightness = np.array([SQUARE.sensor().ticks(d, 1.0, 1.0) for d in y.range])
+    wanted = brightness * (0.1 * cosines + 0.9 * (2.0 * cosines**2 - 1.0) ** 40.0)
+    np.testing.assert_allclose(ticks(SQUARE, gloss=0.9, gloss_exponent=40.0), wanted, atol=0.51)
+    assert SQUARE.sensor().ticks(0.02, 1.0, 1.0, 0.9, 40.0) == pytest.approx(SQUARE.sensor().ticks(0.02, 1.0, 1.0))
+    assert SQUARE.sensor().ticks(0.02, 0.3, 1.0, 1.0, 40.0) == 0.0
+
+
+def test_a_face_has_its_own_reflectivity():
+    faces = np.array([0.5, 1.0, 0.25, 1.0, 1.0, 1.0, 1.0, 1.0])  # at -y, where the thumb looks, and at y
+    np.testing.assert_allclose(ticks(SQUARE, face_reflectivity=faces), ticks(SQUARE) * [0.5, 0.25, 0.25], atol=0.8)
+
+
+def test_fingers_that_are_seen_stand_in_each_others_light():
+    away = replace(QUIET, p_WO_0=np.array([0.3, 0.0]), sigma_0=0.45)  # the closing fingers look at each other
+    assert np.all(ticks(away) == 0.0)
+    seen = ticks(away, fingers_seen=True)
+    assert np.max(seen) > 100
+    np.testing.assert_allclose(ticks(away, fingers_seen=True, finger_reflectivity=1.0), 2.0 * seen, atol=1.5)
+    np.testing.assert_array_equal(ticks(away, fingers_seen=True, finger_reflectivity=0.0), np.zeros(3))
+    np.testing.assert_array_equal(ticks(QUIET, fingers_seen=True), ticks(QUIET))  # nothing between pads and object
+
+
+def test_a_second_object_is_seen_and_hides_the_first():
+    alone = replace(QUIET, p_WO_0=np.array([0.3, 0.0]), other_radius=0.033, other_reflectivity=0.9)
+    np.testing.assert_array_equal(ticks(alone, p_WX_0=np.zeros(2)), ticks(QUIET))
+    usual = first(SQUARE)
+    origins, directions = sensor_rays(usual.p_WH, usual.yaw, usual.q)
+    between = origins[0] + 0.5 * usual.range[0] * directions[0]
+    before = replace(SQUARE, other_radius=0.3 * float(usual.range[0]), other_reflectivity=0.0, p_WX_0=between)
+    hidden = first(before)
+    assert usual.ticks[0] > 100
+    assert hidden.ticks[0] == 0.0
+    bright = replace(before, other_reflectivity=1.0)
+    assert first(bright).ticks[0] == round(SQUARE.sensor().ticks(0.2 * float(usual.range[0]), 1.0, 1.0))
+    np.testing.assert_array_equal(hidden.ticks[1:], usual.ticks[1:])
+    np.testing.assert_array_equal(hidden.range, usual.range)  # of the object, whatever hides it
+
+
+def test_encoders_have_noise_and_the_truth_has_none():
+    p = replace(QUIET, wrist_noise=1e-3, heading_noise=0.02, closure_noise=0.01, mass_O=5.0)
+    ys = course(p, 9.0)
+    errors = np.array([[*(y.p_WH_meas - y.p_WH), y.yaw_meas - y.yaw, y.sigma_meas - y.sigma] for y in ys])
+    np.testing.assert_allclose(np.std(errors, axis=0), [1e-3, 1e-3, 0.02, 0.01], rtol=0.12)
+    np.testing.assert_allclose(np.mean(errors, axis=0), 0.0, atol=3e-3)
+    plain = course(replace(QUIET, mass_O=5.0), 9.0)
+    for y, z in zip(ys, plain, strict=True):
+        np.testing.assert_array_equal(y.ticks, z.ticks)
+        np.testing.assert_array_equal(y.p_WH, z.p_WH)
+        np.testing.assert_array_equal(z.p_WH_meas, z.p_WH)
+        assert (z.yaw_meas, z.sigma_meas) == (z.yaw, z.sigma)
+
+
+def test_a_state_with_all_that_moves_and_disturbs_is_complete():
+    p = replace(
+        QUIET, thing=Thing.BAR, bar_size=np.array([0.03, 0.11]), noise=5.0, ambient_noise=3.0, ambient=40.0, active=2
+    )
+    p = replace(p, p_WH_0=np.array([-0.27, 0.0]), other_radius=0.02, p_WX_0=np.array([0.0, 0.085]))
+    p = replace(p, carry_velocity=np.array([-0.01, 0.02]), carry_until=1.5, nudge=np.array([0.0, 0.02]), nudge_time=0.9)
+    p = replace(p, wrist_noise=1e-3, heading_noise=0.01, closure_noise=0.01, fingers_seen=True, sensor_tolerance=0.1)
+    scene, other = GraspScene(p), GraspScene(p)
+
+    def command(k: int) -> Inputs:
+        return Inputs(p_WH_cmd=np.array([-0.27 + 0.002 * min(k, 70), 0.0]), sigma_cmd=min(1.0, 0.01 * k))
+
+    for k in range(77):
+        scene.step(k * STEP, STEP, command(k))
+    other.set_state(scene.get_state())
+    assert other.get_state() == scene.get_state()
+    moved = False
+    for k in range(77, 160):
+        y, z = (s.step(k * STEP, STEP, command(k)) for s in (scene, other))
+        for name in vars(y):
+            np.testing.assert_array_equal(getattr(y, name), getattr(z, name), err_msg=name)
+        moved = moved or bool(np.linalg.norm(y.p_WX - p.p_WX_0) > 1e-3)
+    assert moved
