@@ -17,6 +17,7 @@ from handover.scenarios.published.helix.helix_improvements import HelixImproveme
 from handover.scenarios.published.helix.helix_places import HelixPlaces
 from handover.scenarios.published.helix.helix_workspace import HelixWorkspace
 from handover.scenarios.published.ir_grasp.ir_convergence import IrConvergence
+from handover.scenarios.published.ir_grasp.ir_limits import IrLimits
 from handover.scenarios.published.ir_grasp.ir_sensor import IrSensorCurve
 from handover.scenarios.published.ir_grasp.ir_table import IrTable
 from handover.scenarios.published.published_experiment import PublishedExperiment
@@ -37,6 +38,7 @@ _ALL: tuple[type[PublishedExperiment], ...] = (
     HelixPlaces,
     HelixWorkspace,
     IrConvergence,
+    IrLimits,
     IrSensorCurve,
     IrTable,
 )

@@ -22,7 +22,7 @@ from handover.scenarios.published.ir_grasp.ir_sensor_cases import (
 )
 from handover.scenarios.published.ir_grasp.ir_sensor_figures import draw_sensor
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment, Verdict
-from handover.scenarios.published.verdicts import nothing_measured, verdict_of
+from handover.scenarios.published.verdicts import format_share, nothing_measured, verdict_of
 
 _LAST = {Finger.THUMB: "0.003", Finger.INDEX: "0.010", Finger.RING: "0.003"}
 """Ends of the approaches, m: below the range, but for the index, before which the ring finger would touch the box."""
@@ -105,7 +105,11 @@ def _form(runs: SensorRuns) -> Claim:
 
 def _alike(runs: SensorRuns) -> Claim:
     sentence, where = "a, b, c, d vary only slightly from one sensor to another.", "sec. V-B"
-    parts = [f"{tolerance:.0%}: {spread}" for tolerance in (0.0, *TOLERANCES) if (spread := _spread(runs, tolerance))]
+    parts = [
+        f"off by {format_share(tolerance)}: {spread}"
+        for tolerance in (0.0, *TOLERANCES)
+        if (spread := _spread(runs, tolerance))
+    ]
     if not parts:
         return nothing_measured(sentence, where, "only slightly")
     return Claim(
