@@ -10,8 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from handover.controllers.ir_grasp.descent import Descent, Verdict
+from handover.controllers.ir_grasp.following import Doing, Ending, Following
 from handover.controllers.ir_grasp.moves import Move, Probing, Reading, X
-from handover.controllers.ir_grasp.parameters import InvalidReflexParameters, Params, Strategy
+from handover.controllers.ir_grasp.parameters import Correction, InvalidReflexParameters, Params, Strategy
 from handover.controllers.ir_grasp.visibility import Recovery, Visibility, displaced
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, port
@@ -53,6 +54,8 @@ class Phase(enum.IntEnum):
     PULL = 7
     SHAKE = 8
     DONE = 9
+    SEARCH = 10
+    TRACK = 11
 
 
 class Stop(enum.IntEnum):
@@ -69,9 +72,21 @@ class Stop(enum.IntEnum):
     OUT_OF_SIGHT = 4
     BLIND = 5
     FORWARD = 6
+    PUSHED = 7
+    CONTACT = 8
+    CENTRED = 9
 
 
 _STOPS = {Verdict.REACHED: Stop.THRESHOLD, Verdict.STALLED: Stop.STALLED, Verdict.USED_UP: Stop.PATIENCE}
+_ENDINGS = {
+    Ending.REACHED: Stop.THRESHOLD,
+    Ending.SETTLED: Stop.STALLED,
+    Ending.LOST: Stop.OUT_OF_SIGHT,
+    Ending.USED_UP: Stop.OUT_OF_SIGHT,
+    Ending.PUSHED: Stop.PUSHED,
+    Ending.CENTRED: Stop.CENTRED,
+}
+_DOING = {Doing.SEARCH: Phase.SEARCH, Doing.ONE_SIDED: Phase.RECOVER, Doing.TRACK: Phase.TRACK}
 
 
 @dataclass(kw_only=True)
@@ -141,6 +156,8 @@ class IrReflex:
         self._recovery = Recovery(p.recovery_step, p.recovery_closing, p.recovery_least)
         self._probing = Probing(tuple(p.probe.tolist()))
         self._descent = Descent(p)
+        self._following = Following(p, float(_PERIOD))
+        self._fast = p.strategy is Strategy.REFLEX and p.correction is Correction.FAST
         self._stop = Stop.RUNNING
         self._recoveries, self._closings, self._shaken = 0, 0, 0
         pregrasp = (*p.p_WH_pregrasp.tolist(), p.yaw_pregrasp, p.sigma_pregrasp)
@@ -166,9 +183,13 @@ class IrReflex:
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Continue the current move; when it is over, decide on the next one by its reading."""
         _check_inputs(u)
+        if self._fast and self._phase not in (Phase.PULL, Phase.SHAKE, Phase.DONE):
+            self._follow((*u.p_WH.tolist(), u.yaw, u.sigma), tuple(u.ticks.tolist()))
         if self._phase is Phase.SHAKE:
             self._shake()
-        elif self._phase is not Phase.DONE:
+        elif self._phase not in (Phase.DONE, Phase.SEARCH, Phase.TRACK) and not (
+            self._fast and self._phase is Phase.RECOVER
+        ):
             reading = self._move.advance((*u.p_WH.tolist(), u.yaw, u.sigma), tuple(u.ticks.tolist()))
             if reading is not None:
                 self._decide(reading)
@@ -186,6 +207,27 @@ class IrReflex:
         self._phase, self._stop = Phase(phase), Stop(stop)
         for part, saved in zip((self._move, self._recovery, self._probing, self._descent), parts, strict=True):
             part.set_state(saved)
+
+    def _follow(self, x: X, ticks: X) -> None:
+        """Correct on the move; while closing, go along with the object."""
+        following = self._following
+        sees = following.look(x, ticks)
+        if self._phase is Phase.CLOSE:
+            v = following.velocity * float(_PERIOD)
+            goal = self._move.goal
+            self._move.goal = (goal[0] + float(v[0]), goal[1] + float(v[1]), *goal[2:])
+            return
+        if self._phase is Phase.REACH and not sees and not self._arrived(x):
+            return
+        start = x if self._phase is Phase.REACH and not self._arrived(x) else self._move.goal
+        goal, ending = following.advance(x, start)
+        self._phase = _DOING[following.doing]
+        self._move.goal = goal
+        if ending is not Ending.NONE:
+            self._close(_ENDINGS[ending])
+
+    def _arrived(self, x: X) -> bool:
+        return all(abs(a - b) <= tol for a, b, tol in zip(x, self._move.goal, self.params.tolerance.tolist(), strict=True))
 
     def _decide(self, reading: Reading) -> None:
         p = self.params

@@ -9,7 +9,18 @@ import numpy as np
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector2, Vector3, Vector4, parameter
 from handover.cosim.blocks.start_values import parameter_faults
-from handover.cosim.blocks.units import Hertz, Metre, Number, PerTick, Radian, Second, SquareMetre
+from handover.cosim.blocks.units import (
+    Hertz,
+    Metre,
+    MetrePerSecond,
+    Number,
+    PerSecond,
+    PerTick,
+    Radian,
+    Second,
+    SquareMetre,
+    Tick,
+)
 
 _INPUTS = ("p_x", "p_y", "yaw", "sigma")
 
@@ -29,6 +40,10 @@ class Calibration:
     def distance(self, ticks: float) -> float:
         """Return the distance y, in m, that stands for an ADC output, by eq. (11)."""
         return self.a * math.exp(self.b * ticks) + self.c * math.exp(self.d * ticks)
+
+    def slope(self, ticks: float) -> float:
+        """Return dy/dx, in m/tick."""
+        return self.a * self.b * math.exp(self.b * ticks) + self.c * self.d * math.exp(self.d * ticks)
 
     def ticks(self, distance: float) -> float:
         """Return the ADC output x, in ticks, that stands for a distance in m, by halving; 0 or 4095 beyond the curve.
@@ -55,11 +70,22 @@ class InvalidReflexParameters(InvalidParameters):
 
 
 class Strategy(enum.IntEnum):
-    """What is done between the pre-grasp pose and closing: algorithm 1, nothing, or a given way forward."""
+    """What is done between the pre-grasp pose and closing.
+
+    A correction by the sensors, nothing, a given way forward, or forward while slowly closing until the tendon tightens.
+    """
 
     REFLEX = 0
     BLIND = 1
     FORWARD = 2
+    CONTACT = 3
+
+
+class Correction(enum.IntEnum):
+    """How REFLEX corrects: algorithm 1 as it stands, by moves and readings at rest, or continuously on the move."""
+
+    PAPER = 0
+    FAST = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +98,7 @@ class Params:
     """
 
     strategy: Strategy = parameter(Strategy.REFLEX, "correct by the sensors, close as is, or go forward and close")
+    correction: Correction = parameter(Correction.PAPER, "algorithm 1 at rest, or continuously on the move")
     literal: bool = parameter(False, "eqs. (4) and (9) as printed: no target distance, no scaling, no damping")
     p_WH_pregrasp: Vector2[Metre] = parameter(
         np.array([-0.20, 0.0]), "wrist at the pre-grasp pose, in the world", minimum=-2.0, maximum=2.0
@@ -131,6 +158,43 @@ class Params:
     shake_amplitude: Metre = parameter(0.015, "amplitude of the shake, across the hand", minimum=0.0, maximum=0.2)
     shake_frequency: Hertz = parameter(1.5, "frequency of the shake", minimum=0.01, maximum=10.0)
     shake_cycles: int = parameter(3, "cycles of the shake", minimum=0, maximum=1000)
+    feed: MetrePerSecond = parameter(0.06, "speed ahead, of FAST", minimum=0.0, maximum=1.0)
+    rate: PerSecond = parameter(5.0, "rate at which FAST takes off residuals", minimum=0.0, maximum=50.0)
+    speed_limit: Vector4[Number] = parameter(
+        np.array([0.10, 0.10, 0.6, 0.5]), "largest rate of each input, of FAST", minimum=0.0
+    )
+    depth: Metre = parameter(0.092, "how far ahead of the wrist the object's front may be", minimum=0.0, maximum=0.3)
+    sigma_before: Number = parameter(0.12, "largest closure until it is there", minimum=0.0, maximum=1.0)
+    one_sided: Vector3[Metre] = parameter(
+        np.array([0.035, 0.060, 0.035]), "distance below which an object that one side sees is beside it", minimum=0.0
+    )
+    balance: Metre = parameter(0.006, "half the difference of the sides at which the object is centred", minimum=0.0)
+    settling: Second = parameter(0.5, "time given to the residuals once the object is deep enough", minimum=0.0)
+    lost_time: Second = parameter(1.0, "time after which an object that was in sight is no longer awaited", minimum=0.0)
+    search_width: Metre = parameter(0.055, "how far the search goes to either side", minimum=0.0, maximum=0.5)
+    search_row: Metre = parameter(0.025, "how far ahead one crossing of the search is of the last", minimum=1e-3)
+    search_back: Metre = parameter(0.020, "how far the search begins behind the pre-grasp pose", minimum=0.0)
+    search_speed: MetrePerSecond = parameter(0.28, "speed of the search", minimum=1e-3, maximum=1.0)
+    contact: Metre = parameter(0.006, "distance at which a finger counts as touching", minimum=0.0, maximum=0.06)
+    push_limit: Metre = parameter(0.010, "way that the hand may make while a finger touches", minimum=0.0)
+    path_limit: Metre = parameter(0.15, "way ahead that it may make once it has seen the object", minimum=0.0)
+    follow_speed: MetrePerSecond = parameter(0.06, "largest speed at which an object is followed", minimum=0.0)
+    rest_speed: MetrePerSecond = parameter(0.003, "estimated speed that is as good as rest", minimum=0.0)
+    tick_noise: Tick = parameter(4.0, "standard deviation of a reading", minimum=0.0)
+    jump: Metre = parameter(0.006, "change of a distance that no smooth surface explains", minimum=0.0)
+    distance_drift: Metre = parameter(3e-4, "random change of a distance in a round", minimum=0.0)
+    jacobian_spread: Vector4[Number] = parameter(
+        np.array([0.6, 0.2, 0.05, 0.06]), "how far off the Jacobian to begin with may be, by input", minimum=0.0
+    )
+    jacobian_drift: Vector4[Number] = parameter(
+        np.array([0.05, 0.02, 0.004, 0.006]), "random change of the Jacobian in a round, by input", minimum=0.0
+    )
+    jacobian_memory: Second = parameter(0.5, "time after which what was learnt of it fades", minimum=0.1)
+    slope_spread: Number = parameter(0.3, "how far the middle moves across by way ahead, one deviation", minimum=0.0)
+    slope_drift: Number = parameter(0.03, "random change of that in a round", minimum=0.0)
+    velocity_spread: MetrePerSecond = parameter(0.012, "speed of an object, one standard deviation", minimum=0.0)
+    velocity_drift: MetrePerSecond = parameter(0.0006, "random change of its speed in a round", minimum=0.0)
+    velocity_after: Second = parameter(0.2, "time in sight before a velocity is believed", minimum=0.0)
 
     @property
     def calibration(self) -> Calibration:

@@ -1,0 +1,176 @@
+"""The correction on the move: center on the object while the hand goes ahead, and follow the object if it moves."""
+
+import enum
+import math
+
+import numpy as np
+
+from handover.controllers.ir_grasp.descent import cost, minimum_norm_step
+from handover.controllers.ir_grasp.motion_filter import MotionFilter
+from handover.controllers.ir_grasp.moves import X
+from handover.controllers.ir_grasp.parameters import Params
+from handover.controllers.ir_grasp.searching import Search
+from handover.controllers.ir_grasp.sensor_geometry import surface_points
+from handover.cosim.blocks.ports import Floats
+
+
+class Doing(enum.IntEnum):
+    """What the hand does on the move."""
+
+    SEARCH = 0
+    ONE_SIDED = 1
+    TRACK = 2
+
+
+class Ending(enum.IntEnum):
+    """What ends the correction."""
+
+    NONE = 0
+    REACHED = 1
+    SETTLED = 2
+    LOST = 3
+    PUSHED = 4
+    USED_UP = 5
+    CENTRED = 6
+
+
+class Following:
+    """u = v + u_ahead - S J_z^T (J_z J_z^T + lambda^2)^-1 (rate r + J u_ahead): eq. (9) as a rate, with feedforward.
+
+    The residuals r = d - target of the fingers in the cost go to 0 with a rate, whatever the hand does besides: it goes
+    ahead by u_ahead until the nearest point of the object that was seen, moved on with the object's velocity v, is no
+    farther ahead than `depth`. J and v are estimated (`MotionFilter`).
+
+    A finger of the cost that sees alone is kept at the distance `one_sided`, which moves the hand to its side if the
+    object is near it (fig. 9). An object that is lost is awaited where it was seen, then searched.
+
+    Attributes:
+        doing: what the last round did.
+        rounds: control periods with both fingers of the cost in sight.
+    """
+
+    def __init__(self, params: Params, period: float) -> None:
+        self._params, self._dt = params, period
+        self._calibration = params.calibration
+        self._filter = MotionFilter(params, period)
+        self._search = Search(params)
+        self._in_cost = [i for i in range(3) if params.weight[i] > 0.0]
+        self._weight = params.weight[self._in_cost]
+        pregrasp = np.array([*params.p_WH_pregrasp, params.yaw_pregrasp])
+        self._low, self._high = pregrasp - params.reach, pregrasp + params.reach
+        self.doing = Doing.SEARCH
+        self.rounds = 0
+        self._front: X = ()  # nearest point that was seen, in W
+        self._front_side: Floats = np.zeros(2)
+        self._off = math.inf
+        self._settled, self._lost, self._pushed, self._path = 0.0, 0.0, 0.0, 0.0
+        self._saw = [False] * 3
+        self._ticks_seen, self._ticks_lost = (self._calibration.ticks(y) for y in (params.epsilon, params.distance_max))
+
+    @property
+    def velocity(self) -> Floats:
+        """Estimated velocity of the object, (2,) in W, in m/s."""
+        return self._filter.velocity if self._front else np.zeros(2)
+
+    def look(self, x: X, ticks: X) -> bool:
+        """Take a round's readings; return whether any finger sees the object."""
+        p = self._params
+        distances = [self._calibration.distance(v) for v in ticks]
+        # a finger that sees goes on seeing down to fewer ticks: noise at the edge of sight is no news
+        self._saw = [v >= (self._ticks_lost if saw else self._ticks_seen) for v, saw in zip(ticks, self._saw)]
+        noise = [p.tick_noise * -self._calibration.slope(v) + 2e-4 for v in ticks]
+        self._filter.advance(x, distances, self._saw, noise)
+        self._remember(x, np.array(distances))
+        return any(self._saw)
+
+    def _remember(self, x: X, distances: Floats) -> None:
+        """Keep the seen point that is least far ahead, and let it move on with the object."""
+        c, s = math.cos(x[2]), math.sin(x[2])
+        if self._front:
+            v = self._filter.velocity
+            self._front = (self._front[0] + self._dt * float(v[0]), self._front[1] + self._dt * float(v[1]))
+        points = surface_points(x[3], distances)
+        for i in range(3):
+            if self._saw[i] and (not self._front or points[i, 0] < self.ahead(x)):
+                q = points[i]
+                self._front = (x[0] + c * float(q[0]) - s * float(q[1]), x[1] + s * float(q[0]) + c * float(q[1]))
+
+    def ahead(self, x: X) -> float:
+        """Return how far ahead of the wrist the nearest point is, in m."""
+        return math.cos(x[2]) * (self._front[0] - x[0]) + math.sin(x[2]) * (self._front[1] - x[1])
+
+    def advance(self, x: X, command: X) -> tuple[X, Ending]:
+        """Return the command of the coming period, and whether the correction ends here."""
+        p = self._params
+        if not any(self._saw) and (not self._front or self._lost > p.lost_time):
+            self.doing = Doing.SEARCH
+            goal = self._search.advance(command, self._dt)
+            return goal, Ending.USED_UP if self._search.over else Ending.NONE
+        left = self.ahead(x) - p.depth
+        deep = left <= 0.0
+        self._lost = 0.0 if any(self._saw) else self._lost + self._dt
+        feed = 0.0 if deep else min(p.feed, p.rate * left + 0.01)
+        both = all(self._saw[i] for i in self._in_cost)
+        self.doing = Doing.TRACK if both else Doing.ONE_SIDED
+        u = self._centering(feed, deep) if both else self._one_sided(feed, deep)
+        over = float(np.max(np.abs(u) / p.speed_limit))
+        u = u / over if over > 1.0 else u
+        top = max(p.sigma_limit if deep else p.sigma_before, command[3])
+        sigma = min(max(command[3] + self._dt * float(u[3]), 0.0), top)
+        v, c, s = self.velocity, math.cos(x[2]), math.sin(x[2])
+        rates = np.array([c * u[0] - s * u[1] + v[0], s * u[0] + c * u[1] + v[1], u[2]])
+        goal = np.clip(np.array(command[:3]) + self._dt * rates, self._low, self._high)
+        return (*goal.tolist(), sigma), self._ending(u, deep)
+
+    def _centering(self, feed: float, deep: bool) -> Floats:
+        """Return rates of [ahead, left, yaw, sigma] that bring both fingers of the cost to one distance.
+
+        It is the target's once the object is deep enough; before, their mean, if that is more: who closes so early
+        meets the object with the fingertips.
+        """
+        p, d = self._params, self._filter.distances[self._in_cost]
+        target = p.target if deep else max(p.target, float(np.mean(d)) - 0.01)
+        r = self._weight * (d - target)
+        ahead = np.array([feed * max(0.0, 1.0 - abs(self.offset) / p.one_sided[0]), 0.0, 0.0, 0.0])
+        rows = self._filter.jacobian[self._in_cost] * self._weight[:, None]
+        scale = p.scale * [0.1, 1.0, 0.2, 1.0]
+        return ahead + minimum_norm_step(rows, p.rate * r + rows @ ahead, scale, p.damping)
+
+    def _one_sided(self, feed: float, deep: bool) -> Floats:
+        """Return rates that bring the hand to the side of the finger that sees the object near it (fig. 9)."""
+        p, d = self._params, self._filter.distances
+        near = p.one_sided - np.nan_to_num(d, nan=1.0)
+        to_fingers, to_thumb = max(0.0, float(near[1]), float(near[2])), max(0.0, float(near[0]))
+        across = p.rate * (to_fingers - to_thumb)
+        ahead = feed * max(0.0, 1.0 - abs(across) / 0.1)
+        return np.array([ahead, across, 0.0, 0.3 if deep and any(self._saw) else 0.0])
+
+    @property
+    def offset(self) -> float:
+        """Half the difference of thumb's and ring's distance, in m; NaN unless both see."""
+        d = self._filter.distances
+        return 0.5 * float(d[0] - d[2])
+
+    def _ending(self, u: Floats, deep: bool) -> Ending:
+        p = self._params
+        self._path += self._dt * max(0.0, float(u[0]))
+        off = abs(self.offset)
+        if off > p.balance:
+            # a hand that centers brings the sides together; if that makes no difference, the object goes along
+            self._pushed = self._pushed + self._dt * abs(float(u[1])) if off > self._off - 1e-3 else 0.0
+            self._off = off if self._pushed == 0.0 else self._off
+        else:
+            self._pushed, self._off = 0.0, math.inf
+        if self._pushed > p.push_limit or self._path > p.path_limit:
+            return Ending.PUSHED
+        if not deep:
+            return Ending.NONE
+        d = self._filter.distances[self._in_cost]
+        if cost(self._weight * (d - p.target)) <= p.threshold:
+            return Ending.REACHED
+        if off <= p.balance:
+            return Ending.CENTRED
+        self._settled += self._dt
+        if self._settled < p.settling:
+            return Ending.NONE
+        return Ending.SETTLED if any(self._saw) else Ending.LOST

@@ -1,0 +1,55 @@
+"""A search across, row by row, for an object that no finger sees at the pre-grasp pose."""
+
+import math
+
+from handover.controllers.ir_grasp.moves import X
+from handover.controllers.ir_grasp.parameters import Params
+
+
+class Search:
+    """Corners of a zig-zag in the heading of the pre-grasp pose: a step back, then rows across, each farther ahead.
+
+    The fingers look inwards: an object beside the hand is not seen, and an open hand that goes ahead pushes it. So the
+    rows begin a step behind, where the fingers pass before what was moved to the side, and are no farther apart than
+    the sensors look ahead of the fingertips.
+    """
+
+    def __init__(self, params: Params) -> None:
+        self._params = p = params
+        rows = int((float(p.reach[0]) + p.search_back) / p.search_row)
+        ends = [(-p.search_back, 0.0)]
+        for row in range(rows + 1):
+            ahead = row * p.search_row - p.search_back
+            sides = (1.0, -1.0) if row % 2 == 0 else (-1.0, 1.0)
+            ends += [(ahead, side * p.search_width) for side in sides]
+        self._ends = ends
+        self._next = 0
+
+    @property
+    def over(self) -> bool:
+        """Whether the last row has been searched."""
+        return self._next == len(self._ends)
+
+    def advance(self, command: X, dt: float) -> X:
+        """Return the command after dt at the search's speed."""
+        p = self._params
+        c, s = math.cos(p.yaw_pregrasp), math.sin(p.yaw_pregrasp)
+        x, y, way = command[0], command[1], p.search_speed * dt
+        while way > 0.0 and not self.over:
+            ahead, left = self._ends[self._next]
+            goal_x = float(p.p_WH_pregrasp[0]) + c * ahead - s * left
+            goal_y = float(p.p_WH_pregrasp[1]) + s * ahead + c * left
+            away = math.hypot(goal_x - x, goal_y - y)
+            if away <= way:
+                x, y, way, self._next = goal_x, goal_y, way - away, self._next + 1
+            else:
+                x, y, way = x + way * (goal_x - x) / away, y + way * (goal_y - y) / away, 0.0
+        return (x, y, command[2], command[3])
+
+    def get_state(self) -> int:
+        """Return which corner comes next."""
+        return self._next
+
+    def set_state(self, state: int) -> None:
+        """Restore a state that `get_state` gave."""
+        self._next = state
