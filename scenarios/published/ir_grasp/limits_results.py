@@ -32,7 +32,7 @@ _BOOLEANS = {"true": 1.0, "false": 0.0}
 
 
 def _is_unset(value: Any) -> bool:
-    return value is None or (isinstance(value, float) and value != value)
+    return value is None or value == "" or (isinstance(value, float) and value != value)
 
 
 def _canonical(name: str, value: Any) -> object:
@@ -110,11 +110,9 @@ class LimitRuns:
         rows = self.rows(arm, axis, levels)
         return sum(_held(row) for row in rows), len(rows)
 
-    def pairs(
-        self, first: LimitArm, second: LimitArm, axis: Axis, levels: Sequence[float]
-    ) -> tuple[list[bool], list[bool]]:
-        """Return successes of two arms in the same scenes and the same order."""
-        a, b = ({**self._by_scene(arm, axis, levels)} for arm in (first, second))
+    def pairs(self, first: LimitArm, second: LimitArm, axis: Axis) -> tuple[list[bool], list[bool]]:
+        """Return successes of two arms at all levels beyond the start, in the same scenes and the same order."""
+        a, b = (self._by_scene(arm, axis, axis.levels) for arm in (first, second))
         scenes = [scene for scene in a if scene in b]
         return [a[s] for s in scenes], [b[s] for s in scenes]
 
@@ -124,9 +122,7 @@ class LimitRuns:
         kept = [(held, started[0, n]) for (_, n), held in found.items() if (0, n) in started]
         return [x for x, _ in kept], [x for _, x in kept]
 
-    def _by_scene(
-        self, arm: LimitArm, axis: Axis, levels: Sequence[float]
-    ) -> dict[tuple[int, tuple[object, ...]], bool]:
+    def _by_scene(self, arm: LimitArm, axis: Axis, levels: Sequence[float]) -> dict[tuple[int, Scene], bool]:
         """Return successes by number of the level and scene: object, its mass and the seed."""
         return {
             (k, (row["thing"], row.get("scene.mass_O"), row["seed"])): _held(row)
