@@ -54,7 +54,7 @@ class IrConvergence(PublishedExperiment):
                 for perturbed in ("false", "true")
                 for thing in _THINGS
             ],
-            fixed=REFLEX.parameters,
+            fixed={**REFLEX.parameters, "reflex.correction": "paper"},
             repetitions=1 if quick else _REPETITIONS,
             seed=1312,
             paired=True,
@@ -68,7 +68,7 @@ class IrConvergence(PublishedExperiment):
 
     def record_claims(self, table: CampaignTable, runs: Path) -> Sequence[Claim]:
         """Judge that the residual's norm falls."""
-        return [_falls(descents_of(IrTableRuns(table).rows(REFLEX, p), runs), p) for p in POSES]
+        return [judge_descents(descents_of(IrTableRuns(table).rows(REFLEX, p), runs), p) for p in POSES]
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return steps and distances at the last step beside the published."""
@@ -82,7 +82,8 @@ class IrConvergence(PublishedExperiment):
         return [*draw_convergence(found, runs, folder), *(f for f in others if f is not None)]
 
 
-def _falls(descents: Sequence[Descent], perturbed: bool) -> Claim:
+def judge_descents(descents: Sequence[Descent], perturbed: bool) -> Claim:
+    """Judge that the residual's norm falls, by descents in a pose."""
     sentence = f"In {POSES[perturbed]} poses the algorithm reduces the norm of the residual."
     where = f"{_FIGURES[perturbed]}, sec. V-D"
     ends = [d.ends for d in descents if d.ends is not None]
