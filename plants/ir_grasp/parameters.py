@@ -272,9 +272,10 @@ class Params:
         solid = self.solid
         outline: Floats = np.vstack(placed(solid, self.p_WO_0, solid.yaw + self.yaw_O_0))
         named = [(f"p_WO_0 {self.p_WO_0.tolist()} m: the {self.thing.name.lower()}", outline)]
-        if np.any(self.carry_velocity):
+        if np.any(self.carry_velocity) or np.any(self.nudge):
             way = (self.carry_until - self.carry_from) * self.carry_velocity + self.nudge
-            named.append((f"carried to {(self.p_WO_0 + way).tolist()} m: the {self.thing.name.lower()}", outline + way))
+            x, y = self.p_WO_0 + way
+            named.append((f"carried to [{x:.3f}, {y:.3f}] m: the {self.thing.name.lower()}", outline + way))
         if self.other_radius > 0.0:
             edge = self.other_radius * np.array([[1.0, 1.0], [-1.0, -1.0]])
             named.append((f"p_WX_0 {self.p_WX_0.tolist()} m: the second object", self.p_WX_0 + edge))

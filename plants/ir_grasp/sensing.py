@@ -1,6 +1,7 @@
 """What the hand measures: infrared readings of the fingers in turn, and the encoders of wrist and closure."""
 
 import math
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -15,7 +16,9 @@ _SLOT: Final = 5  # internal steps for which a sensor is active
 _SENSORS: Final = len(FINGERS)
 _MIDDLE = ((1.0, 0.0),)
 _PALM = Slab(low=PALM[0], high=PALM[2])
-_HAND_REACH = max(max(f.lengths) for f in FINGERS)
+
+Capsule = tuple[Point, Point, float]
+"""Middles of its ends and radius, in m."""
 
 Kept = tuple[int, list[float], list[float], tuple[Any, Any]]
 """Time into the scan, readings, the encoders' errors, and two states of random numbers."""
@@ -104,10 +107,11 @@ class Sensing:
                 if h is not None
             ) / len(self._rays)
         window, looks = world.sensor(finger)
+        before = _hand_before(finger, world, window, looks, p.beam, p.farthest) if p.fingers_seen else []
         total = 0.0
         for (c, s), hit in zip(self._rays, met, strict=True):
             ray = c * looks[0] - s * looks[1], s * looks[0] + c * looks[1]
-            nearer = self._hidden_by(finger, world, window, ray, p.farthest if hit is None else hit[0])
+            nearer = self._hidden_by(world, before, window, ray, p.farthest if hit is None else hit[0])
             if nearer is not None:
                 total += sensor.ticks(*nearer)
             elif hit is not None:
@@ -116,7 +120,7 @@ class Sensing:
         return total / len(self._rays)
 
     def _hidden_by(
-        self, finger: int, world: GraspWorld, window: Point, ray: Point, reach: float
+        self, world: GraspWorld, before: Sequence[Capsule], window: Point, ray: Point, reach: float
     ) -> tuple[float, float, float] | None:
         """Return what a ray meets before `reach` of second object and hand: distance, cosine, reflectivity."""
         p = self._params
@@ -126,8 +130,14 @@ class Sensing:
             hit = self._disc.intersect(x, y, *ray)
             if hit is not None:
                 met.append((hit.distance, hit.cosine, p.other_reflectivity))
+        for a, b, radius in before:
+            on_finger = capsule_hit(a, b, radius, window, ray)
+            if on_finger is not None:
+                met.append((*on_finger, p.finger_reflectivity))
         if p.fingers_seen:
-            met.extend((*hit, p.finger_reflectivity) for hit in _hand_hits(finger, world, window, ray, reach))
+            on_palm = _palm_hit(world, window, ray, reach)
+            if on_palm is not None:
+                met.append((*on_palm, p.finger_reflectivity))
         return min((m for m in met if m[0] < reach), default=None)
 
     def _encoder_errors(self) -> list[float]:
@@ -137,17 +147,27 @@ class Sensing:
         return (self._encoder_noise * self._encoder_rng.standard_normal(4)).tolist()
 
 
-def _hand_hits(finger: int, world: GraspWorld, window: Point, ray: Point, reach: float) -> list[tuple[float, float]]:
-    """Return distances and cosines at which a sensor's ray meets palm and phalanges."""
-    hits: list[tuple[float, float]] = []
+def _hand_before(
+    finger: int, world: GraspWorld, window: Point, looks: Point, beam: float, reach: float
+) -> list[Capsule]:
+    """Return the phalanges that a sensor's beam may meet within reach."""
+    found: list[Capsule] = []
+    widening = math.tan(beam)
     for length, radius, (x, y, angle) in world.phalanges_before(finger):
-        if math.hypot(x - window[0], y - window[1]) < reach + _HAND_REACH:
+        v_x, v_y, size = x - window[0], y - window[1], length / 2.0 + radius
+        ahead, aside = v_x * looks[0] + v_y * looks[1], abs(v_x * looks[1] - v_y * looks[0])
+        if -size < ahead < reach + size and aside < 1.5 * size + widening * (ahead + size):
             e_x, e_y = length / 2.0 * math.cos(angle), length / 2.0 * math.sin(angle)
-            hit = capsule_hit((x - e_x, y - e_y), (x + e_x, y + e_y), radius, window, ray)
-            if hit is not None:
-                hits.append(hit)
+            found.append(((x - e_x, y - e_y), (x + e_x, y + e_y), radius))
+    return found
+
+
+def _palm_hit(world: GraspWorld, window: Point, ray: Point, reach: float) -> tuple[float, float] | None:
+    """Return the distance and the cosine at which a ray meets the palm, None if it does not within reach."""
     x, y, yaw = world.wrist
-    c, s = math.cos(yaw), math.sin(yaw)
     r_x, r_y = window[0] - x, window[1] - y
-    palm = _PALM.intersect(c * r_x + s * r_y, c * r_y - s * r_x, c * ray[0] + s * ray[1], c * ray[1] - s * ray[0])
-    return hits if palm is None else [*hits, (palm.distance, palm.cosine)]
+    if r_x * ray[0] + r_y * ray[1] > _PALM.reach or math.hypot(r_x, r_y) > reach + _PALM.reach:
+        return None
+    c, s = math.cos(yaw), math.sin(yaw)
+    hit = _PALM.intersect(c * r_x + s * r_y, c * r_y - s * r_x, c * ray[0] + s * ray[1], c * ray[1] - s * ray[0])
+    return None if hit is None else (hit.distance, hit.cosine)

@@ -135,6 +135,14 @@ class Parameters:
         return replace(believed, yaw=believed.yaw + self.expected_yaw)
 
     @property
+    def is_beyond_the_table(self) -> bool:
+        """Whether something disturbs the grasp that [Luberto]'s tables do not have."""
+        placed_by_hand = self.turn != 0.0 or bool(np.any(self.shift))
+        moved = self.carried_speed > 0.0 or bool(np.any(self.nudge))
+        misjudged = self.expected is not Expected.AS_IT_IS or self.expected_yaw != 0.0
+        return placed_by_hand or moved or misjudged or self.other_radius > 0.0
+
+    @property
     def carry_velocity(self) -> Floats:
         """Velocity of the ground under the object, in W, in m/s."""
         return self.carried_speed * np.array([math.cos(self.carried_direction), math.sin(self.carried_direction)])

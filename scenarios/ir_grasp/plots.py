@@ -42,8 +42,6 @@ _PHASE_NAMES = {
     9: "done",
 }
 """Phase names as plotted and in the replay: a check may include approaching and recovering motions."""
-_WRIST = ("reflex.p_WH_cmd", "scene.p_WH")
-"""The wrist's position as commanded and as measured."""
 _MIN_COST = 0.1
 """Smaller costs are drawn as this, mm², since a logarithmic axis has no zero."""
 
@@ -121,11 +119,12 @@ def _cost(parameters: Parameters, record: Record, phases: Sequence[Phase]) -> Ti
 
 
 def _commands(record: Record, phases: Sequence[Phase]) -> list[TimePlot]:
-    wrist = [1000 * record[s] for s in _WRIST]
+    suffix = "_meas" if "scene.p_WH_meas" in record else ""
+    p, yaw, sigma = ((record[f"reflex.{n}_cmd"], record[f"scene.{n}{suffix}"]) for n in ("p_WH", "yaw", "sigma"))
     followed = [
-        *((f"Wrist along {name} of W", name, "mm", *(p[:, i] for p in wrist)) for i, name in enumerate("xy")),
-        ("Heading", "yaw", "°", *(np.degrees(record[s]) for s in ("reflex.yaw_cmd", "scene.yaw"))),
-        ("Closure", "closure, 0 to 1", "", *(record[s] for s in ("reflex.sigma_cmd", "scene.sigma"))),
+        *((f"Wrist along {name} of W", name, "mm", *(1000 * of[:, i] for of in p)) for i, name in enumerate("xy")),
+        ("Heading", "yaw", "°", *(np.degrees(of) for of in yaw)),
+        ("Closure", "closure, 0 to 1", "", *sigma),
     ]
     return [
         TimePlot(

@@ -186,3 +186,23 @@ def test_a_state_with_all_that_moves_and_disturbs_is_complete():
             np.testing.assert_array_equal(getattr(y, name), getattr(z, name), err_msg=name)
         moved = moved or bool(np.linalg.norm(y.p_WX - p.p_WX_0) > 1e-3)
     assert moved
+
+
+def test_by_default_a_reading_is_the_sensors_law_and_one_random_number():
+    p = replace(QUIET, noise=4.0, seed=9, mass_O=5.0)
+    y = first(replace(p, noise=0.0))
+    origins, directions = sensor_rays(y.p_WH, y.yaw, y.q)
+    x = np.zeros(3)
+    for i, (o, looks) in enumerate(zip(origins, directions, strict=True)):
+        for angle in (0.0, -p.beam, p.beam):
+            c, s = np.cos(angle), np.sin(angle)
+            d = (float(c * looks[0] - s * looks[1]), float(s * looks[0] + c * looks[1]))
+            hit = p.solid.intersect(float(o[0]), float(o[1]), *d)  # O is W here
+            if hit is not None:
+                x[i] += p.sensor().ticks(hit.distance, hit.cosine, 0.9) / 3.0
+    rng = np.random.default_rng(9)
+    wanted = [x + 4.0 * rng.standard_normal(3) for _ in range(201)]  # three at the start, three a step of 15 ms
+    found = [first(p).ticks, *(z.ticks for z in course(p, 3.0))]
+    off = np.abs(np.array(found) - np.array(wanted))
+    assert np.max(off) < 0.6  # rounding, and joints that give by some micrometres
+    assert np.min(x) > 50.0

@@ -36,7 +36,7 @@ def course(scene: GraspScene, first: int, last: int = STEPS) -> list[bytes]:
     return [packed(scene.step(k * STEP, STEP, command(k))) for k in range(first, last)]
 
 
-@pytest.mark.parametrize(("thing", "steps"), [(0, 0), (0, 55), (1, 90), (2, 101), (3, 67), (4, 120)])
+@pytest.mark.parametrize(("thing", "steps"), [(0, 0), (0, 55), (1, 90), (2, 101), (3, 67), (4, 120), (7, 90), (8, 101)])
 def test_continues_bit_for_bit_here_and_in_another_scene(thing: int, steps: int):
     params = PARAMS[Thing(thing)]
     scene, other, bent = GraspScene(params), GraspScene(params), GraspScene(params)

@@ -145,7 +145,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"other_radius": 0.03, "p_WX_0": np.array([0.0, 0.44])}, "the second object stands out 20 mm beyond"),
     ({"other_radius": 0.03, "p_WX_0": np.array([0.05, 0.0])}, "second object would start in .*: object by 13 mm"),
     ({"other_radius": 0.03, "p_WX_0": np.array([-0.11, 0.0])}, "second object would start in .*: palm by"),
-    ({"carry_velocity": np.array([0.0, 0.03]), "carry_until": 20.0}, r"carried to \[0.0, 0.6\] m: the cylinder"),
+    ({"carry_velocity": np.array([0.0, 0.03]), "carry_until": 20.0}, r"carried to \[0.000, 0.600\] m: the cylinder"),
     ({"p_WH_0": np.array([-0.07, 0.0])}, "the hand would start in the object: palm by 19 mm"),
 ]
 

@@ -7,7 +7,7 @@ import pytest
 from handover.controllers.ir_grasp.parameters import Strategy
 from handover.plants.ir_grasp.hand import PALM
 from handover.plants.ir_grasp.objects import SOLIDS, Thing, outlines
-from handover.scenarios.ir_grasp.parameters import Parameters, Situation
+from handover.scenarios.ir_grasp.parameters import Expected, Parameters, Situation
 
 EXACT: dict[str, Any] = {"vision_position": 0.0, "vision_yaw": 0.0}
 
@@ -52,3 +52,41 @@ def test_vision_is_off_by_its_deviations():
     drawn = [Situation.draw(p, seed) for seed in range(1000)]
     off = np.array([[*s.p_WH_pregrasp, s.yaw] for s in drawn])
     assert np.std(off, axis=0) == pytest.approx([p.vision_position, p.vision_position, p.vision_yaw], rel=0.1)
+
+
+def test_vision_places_the_hand_by_what_it_believes():
+    p = Parameters(thing=Thing.DISC, disc_radius=0.047, perturbed=False, **EXACT)
+    believed = dataclasses.replace(p, expected=Expected.DISC, expected_radius=0.033)
+    cylinder = Situation.draw(Parameters(perturbed=False, **EXACT), 0).p_WH_pregrasp
+    assert Situation.draw(believed, 0).p_WH_pregrasp == pytest.approx(cylinder)
+    assert Situation.draw(p, 0).p_WH_pregrasp == pytest.approx(cylinder - [0.014, 0.0])
+    bar = dataclasses.replace(p, expected=Expected.BAR, expected_size=np.array([0.11, 0.03]))
+    assert Situation.draw(bar, 0).p_WH_pregrasp == pytest.approx(cylinder - [0.055 - 0.033, 0.0])
+    across = dataclasses.replace(bar, expected_yaw=np.pi / 2.0)
+    assert Situation.draw(across, 0).p_WH_pregrasp == pytest.approx(cylinder - [0.015 - 0.033, 0.0])
+
+
+def test_the_belief_of_a_turned_bar_keeps_the_truth():
+    p = Parameters(thing=Thing.PAPER_BOX_B, expected_yaw=0.4)
+    assert p.expected_solid.parts == p.solid.parts == SOLIDS[Thing.PAPER_BOX_B].parts
+    assert p.expected_solid.yaw == pytest.approx(SOLIDS[Thing.PAPER_BOX_B].yaw + 0.4)
+    assert Situation.draw(p, 3).turn == Situation.draw(Parameters(), 3).turn
+
+
+@pytest.mark.parametrize("perturbed", [False, True])
+def test_a_shift_or_a_turn_replaces_what_is_drawn(perturbed: bool):
+    s = Situation.draw(Parameters(perturbed=perturbed, shift=np.array([0.0, -0.07])), 5)
+    assert (s.p_WO.tolist(), s.turn) == ([0.0, -0.07], 0.0)
+    s = Situation.draw(Parameters(perturbed=perturbed, turn=1.1), 5)
+    assert (s.p_WO.tolist(), s.turn) == ([0.0, 0.0], 1.1)
+    same = Situation.draw(Parameters(perturbed=perturbed), 5)
+    assert (same.p_WH_start == s.p_WH_start).all()  # what vision is off by is the same
+
+
+def test_contradictions_are_told_together():
+    corners = np.zeros((8, 2))
+    corners[:4] = 1e-3 * np.array([[0, 0], [40, 40], [40, 0], [0, 40]])
+    p = Parameters(thing=Thing.POLYGON, corners=corners, corner_count=4, shift_least=0.06, shift_most=0.05)
+    shift, crossing = p.faults()
+    assert shift == "shift_least 0.06 m must be at most shift_most 0.05 m"
+    assert crossing.startswith("corners: edge 0 from (0, 0) mm to (40, 40) mm and edge 2")
