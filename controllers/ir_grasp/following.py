@@ -2,6 +2,7 @@
 
 import enum
 import math
+from typing import Any
 
 import numpy as np
 
@@ -57,12 +58,11 @@ class Following:
         self._in_cost = [i for i in range(3) if params.weight[i] > 0.0]
         self._weight = params.weight[self._in_cost]
         pregrasp = np.array([*params.p_WH_pregrasp, params.yaw_pregrasp])
-        self._low, self._high = pregrasp - params.reach, pregrasp + params.reach
+        self._low, self._high = pregrasp - params.fast_reach, pregrasp + params.fast_reach
         self.doing = Doing.SEARCH
         self.rounds = 0
         self._front: X = ()  # nearest point that was seen, in W
-        self._front_side: Floats = np.zeros(2)
-        self._off = math.inf
+        self._off, self._beside, self._before = math.inf, 0.0, Doing.SEARCH
         self._settled, self._lost, self._pushed, self._path = 0.0, 0.0, 0.0, 0.0
         self._saw = [False] * 3
         self._ticks_seen, self._ticks_lost = (self._calibration.ticks(y) for y in (params.epsilon, params.distance_max))
@@ -77,7 +77,9 @@ class Following:
         p = self._params
         distances = [self._calibration.distance(v) for v in ticks]
         # a finger that sees goes on seeing down to fewer ticks: noise at the edge of sight is no news
-        self._saw = [v >= (self._ticks_lost if saw else self._ticks_seen) for v, saw in zip(ticks, self._saw)]
+        self._saw = [
+            v >= (self._ticks_lost if saw else self._ticks_seen) for v, saw in zip(ticks, self._saw, strict=True)
+        ]
         noise = [p.tick_noise * -self._calibration.slope(v) + 2e-4 for v in ticks]
         self._filter.advance(x, distances, self._saw, noise)
         self._remember(x, np.array(distances))
@@ -105,11 +107,11 @@ class Following:
         if not any(self._saw) and (not self._front or self._lost > p.lost_time):
             self.doing = Doing.SEARCH
             goal = self._search.advance(command, self._dt)
-            return goal, Ending.USED_UP if self._search.over else Ending.NONE
+            return goal, Ending.LOST if self._search.over else Ending.NONE
         left = self.ahead(x) - p.depth
         deep = left <= 0.0
         self._lost = 0.0 if any(self._saw) else self._lost + self._dt
-        feed = 0.0 if deep else min(p.feed, p.rate * left + 0.01)
+        feed = 0.0 if deep else min(p.feed, p.rate * left + 0.03)
         both = all(self._saw[i] for i in self._in_cost)
         self.doing = Doing.TRACK if both else Doing.ONE_SIDED
         u = self._centering(feed, deep) if both else self._one_sided(feed, deep)
@@ -120,7 +122,9 @@ class Following:
         v, c, s = self.velocity, math.cos(x[2]), math.sin(x[2])
         rates = np.array([c * u[0] - s * u[1] + v[0], s * u[0] + c * u[1] + v[1], u[2]])
         goal = np.clip(np.array(command[:3]) + self._dt * rates, self._low, self._high)
-        return (*goal.tolist(), sigma), self._ending(u, deep)
+        made = c * (goal[0] - command[0]) + s * (goal[1] - command[1])
+        stuck = float(u[0]) > 0.02 and made < 0.1 * self._dt * float(u[0])
+        return (*goal.tolist(), sigma), self._ending(u, left, stuck)
 
     def _centering(self, feed: float, deep: bool) -> Floats:
         """Return rates of [ahead, left, yaw, sigma] that bring both fingers of the cost to one distance.
@@ -141,6 +145,7 @@ class Following:
         p, d = self._params, self._filter.distances
         near = p.one_sided - np.nan_to_num(d, nan=1.0)
         to_fingers, to_thumb = max(0.0, float(near[1]), float(near[2])), max(0.0, float(near[0]))
+        self._beside = max(to_fingers, to_thumb)
         across = p.rate * (to_fingers - to_thumb)
         ahead = feed * max(0.0, 1.0 - abs(across) / 0.1)
         return np.array([ahead, across, 0.0, 0.3 if deep and any(self._saw) else 0.0])
@@ -151,26 +156,46 @@ class Following:
         d = self._filter.distances
         return 0.5 * float(d[0] - d[2])
 
-    def _ending(self, u: Floats, deep: bool) -> Ending:
+    def _ending(self, u: Floats, left: float, stuck: bool) -> Ending:
         p = self._params
-        self._path += self._dt * max(0.0, float(u[0]))
-        off = abs(self.offset)
-        if off > p.balance:
-            # a hand that centers brings the sides together; if that makes no difference, the object goes along
-            self._pushed = self._pushed + self._dt * abs(float(u[1])) if off > self._off - 1e-3 else 0.0
-            self._off = off if self._pushed == 0.0 else self._off
-        else:
-            self._pushed, self._off = 0.0, math.inf
-        if self._pushed > p.push_limit or self._path > p.path_limit:
+        if self._is_pushing(u, left):
             return Ending.PUSHED
-        if not deep:
-            return Ending.NONE
+        if left > 0.0:
+            return Ending.USED_UP if stuck else Ending.NONE
         d = self._filter.distances[self._in_cost]
         if cost(self._weight * (d - p.target)) <= p.threshold:
             return Ending.REACHED
-        if off <= p.balance:
+        if abs(self.offset) <= p.balance:
             return Ending.CENTRED
+        if self._lost >= p.lost_deep:
+            return Ending.LOST
         self._settled += self._dt
         if self._settled < p.settling:
             return Ending.NONE
         return Ending.SETTLED if any(self._saw) else Ending.LOST
+
+    def _is_pushing(self, u: Floats, left: float) -> bool:
+        """Whether ways across no longer change what is seen, or the way ahead is used up: the object goes along."""
+        p = self._params
+        self._path += self._dt * max(0.0, float(u[0]))
+        off = abs(self.offset) if self.doing is Doing.TRACK else self._beside
+        if left > p.push_depth or off < self._off - 1e-3 or off < 2e-3 or self.doing is not self._before:
+            self._pushed, self._off, self._before = 0.0, off, self.doing
+        else:
+            self._pushed += self._dt * abs(float(u[1]))
+        return self._pushed > p.push_limit or self._path > p.path_limit
+
+    def get_state(self) -> tuple[object, ...]:
+        """Return estimates, search, what was seen, and counters."""
+        did = (int(self.doing), int(self._before), self.rounds)
+        saw = (self._saw, self._front, self._beside)
+        counters = (self._off, self._settled, self._lost, self._pushed, self._path)
+        return self._filter.get_state(), self._search.get_state(), did, saw, counters
+
+    def set_state(self, state: tuple[Any, ...]) -> None:
+        """Restore a state that `get_state` gave."""
+        estimates, searched, (doing, before, self.rounds), (saw, self._front, self._beside), counters = state
+        self._filter.set_state(estimates)
+        self._search.set_state(searched)
+        self.doing, self._before, self._saw = Doing(doing), Doing(before), list(saw)
+        self._off, self._settled, self._lost, self._pushed, self._path = counters

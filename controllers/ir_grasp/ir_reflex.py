@@ -1,6 +1,5 @@
 """Grasp refinement by infrared reflexes: center the hand on an object, close, pull and shake. [Luberto] algorithm 1."""
 
-import enum
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,14 +9,15 @@ from typing import ClassVar
 import numpy as np
 
 from handover.controllers.ir_grasp.descent import Descent, Verdict
-from handover.controllers.ir_grasp.following import Doing, Ending, Following
+from handover.controllers.ir_grasp.following import Ending, Following
 from handover.controllers.ir_grasp.moves import Move, Probing, Reading, X
 from handover.controllers.ir_grasp.parameters import Correction, InvalidReflexParameters, Params, Strategy
+from handover.controllers.ir_grasp.phases import DOING, ENDINGS, STOPS, Phase, Stop
 from handover.controllers.ir_grasp.visibility import Recovery, Visibility, displaced
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.cosim.blocks.units import Metre, Number, Radian, SquareMetre, Tick
+from handover.cosim.blocks.units import Metre, Newton, Number, Radian, SquareMetre, Tick
 
 __all__ = [
     "Inputs",
@@ -41,54 +41,6 @@ class InvalidReading(InvalidParameters):
     block = "IrReflex"
 
 
-class Phase(enum.IntEnum):
-    """What the hand is doing; CHECK to STEP are the steps 3 to 9 of algorithm 1."""
-
-    REACH = 0
-    CHECK = 1
-    APPROACH = 2
-    RECOVER = 3
-    PROBE = 4
-    STEP = 5
-    CLOSE = 6
-    PULL = 7
-    SHAKE = 8
-    DONE = 9
-    SEARCH = 10
-    TRACK = 11
-
-
-class Stop(enum.IntEnum):
-    """Why the refinement ended.
-
-    The cost is small, steps or recoveries are used up, there is no progress, no finger sees the object, or the strategy
-    has no refinement.
-    """
-
-    RUNNING = 0
-    THRESHOLD = 1
-    PATIENCE = 2
-    STALLED = 3
-    OUT_OF_SIGHT = 4
-    BLIND = 5
-    FORWARD = 6
-    PUSHED = 7
-    CONTACT = 8
-    CENTRED = 9
-
-
-_STOPS = {Verdict.REACHED: Stop.THRESHOLD, Verdict.STALLED: Stop.STALLED, Verdict.USED_UP: Stop.PATIENCE}
-_ENDINGS = {
-    Ending.REACHED: Stop.THRESHOLD,
-    Ending.SETTLED: Stop.STALLED,
-    Ending.LOST: Stop.OUT_OF_SIGHT,
-    Ending.USED_UP: Stop.OUT_OF_SIGHT,
-    Ending.PUSHED: Stop.PUSHED,
-    Ending.CENTRED: Stop.CENTRED,
-}
-_DOING = {Doing.SEARCH: Phase.SEARCH, Doing.ONE_SIDED: Phase.RECOVER, Doing.TRACK: Phase.TRACK}
-
-
 @dataclass(kw_only=True)
 class Inputs:
     """What the hand's sensors and the encoders of arm and motor measure."""
@@ -97,6 +49,7 @@ class Inputs:
     p_WH: Vector2[Metre] = port(np.zeros(2), "wrist, in the world")
     yaw: Radian = port(0.0, "heading of the hand")
     sigma: Number = port(0.0, "closure of the hand: 0 open, 1 closed")
+    tension: Newton = port(0.0, "tension of the tendon, by the motor's current; only the strategy CONTACT reads it")
 
 
 @dataclass(kw_only=True)
@@ -130,6 +83,10 @@ class IrReflex:
       hand whose recoveries end with the object out of sight closes where it is: it may have pushed the object along.
     - PULL, SHAKE, DONE: pull_distance back, then a sine across.
 
+    That is the correction PAPER; FAST corrects on the move instead (`Following`): SEARCH, RECOVER and TRACK follow each
+    other by what is seen, CLOSE goes along with the object, and `steps` are control periods in TRACK. The strategies
+    BLIND, FORWARD and CONTACT (ahead and slowly closing until the tendon tightens) do not look.
+
     The residuals are r_i = weight_i (d_i - target) over fingers with a weight: with the printed r_i = d_i the least
     cost is at contact, where the fingers push the object away.
 
@@ -141,7 +98,7 @@ class IrReflex:
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
         ("p_WH_cmd", "yaw_cmd", "sigma_cmd", "phase", "case", "cost", "distance", "steps", "stop"),
-        ("ticks", "p_WH", "yaw", "sigma"),
+        ("ticks", "p_WH", "yaw", "sigma", "tension"),
     )
     period: ClassVar[Fraction | None] = _PERIOD
 
@@ -176,7 +133,7 @@ class IrReflex:
             case=self._case(ticks),
             cost=0.5 * sum((w * (d - self._target)) ** 2 for w, d in zip(self._weight, distances, strict=True)),
             distance=np.array(distances),
-            steps=self._descent.steps,
+            steps=self._following.rounds if self._fast else self._descent.steps,
             stop=self._stop,
         )
 
@@ -187,9 +144,9 @@ class IrReflex:
             self._follow((*u.p_WH.tolist(), u.yaw, u.sigma), tuple(u.ticks.tolist()))
         if self._phase is Phase.SHAKE:
             self._shake()
-        elif self._phase not in (Phase.DONE, Phase.SEARCH, Phase.TRACK) and not (
-            self._fast and self._phase is Phase.RECOVER
-        ):
+        elif self._phase is Phase.APPROACH and self.params.strategy is Strategy.CONTACT:
+            self._feel(u.sigma, u.tension)
+        elif self._phase is not Phase.DONE and not self._on_the_move:
             reading = self._move.advance((*u.p_WH.tolist(), u.yaw, u.sigma), tuple(u.ticks.tolist()))
             if reading is not None:
                 self._decide(reading)
@@ -199,14 +156,30 @@ class IrReflex:
         """Return phase, move, recovery, probing, descent and counters."""
         parts = [part.get_state() for part in (self._move, self._recovery, self._probing, self._descent)]
         counters = (self._recoveries, self._closings, self._shaken)
-        return pack_state((int(self._phase), int(self._stop), parts, counters))
+        following = self._following.get_state() if self._fast else None
+        return pack_state((int(self._phase), int(self._stop), parts, counters, following))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state that `get_state` gave."""
-        phase, stop, parts, (self._recoveries, self._closings, self._shaken) = unpack_state(state)
+        phase, stop, parts, (self._recoveries, self._closings, self._shaken), following = unpack_state(state)
+        if self._fast:
+            self._following.set_state(following)
         self._phase, self._stop = Phase(phase), Stop(stop)
         for part, saved in zip((self._move, self._recovery, self._probing, self._descent), parts, strict=True):
             part.set_state(saved)
+
+    @property
+    def _on_the_move(self) -> bool:
+        return self._fast and self._phase in (Phase.SEARCH, Phase.TRACK, Phase.RECOVER)
+
+    def _feel(self, sigma: float, tension: float) -> None:
+        """Go ahead while slowly closing, until the tendon is not as tight as that of a free hand, or the reach ends."""
+        p = self.params
+        x, step = self._ahead(p.contact_speed * float(_PERIOD)), p.contact_closing * float(_PERIOD)
+        self._move.goal = (*x[:3], min(x[3] + step, p.sigma_limit))
+        way = math.dist(x[:2], p.p_WH_pregrasp.tolist())
+        if abs(tension - p.free_tension * sigma) > p.contact_tension or way >= float(p.reach[0]):
+            self._close(Stop.CONTACT)
 
     def _follow(self, x: X, ticks: X) -> None:
         """Correct on the move; while closing, go along with the object."""
@@ -221,18 +194,22 @@ class IrReflex:
             return
         start = x if self._phase is Phase.REACH and not self._arrived(x) else self._move.goal
         goal, ending = following.advance(x, start)
-        self._phase = _DOING[following.doing]
+        self._phase = DOING[following.doing]
         self._move.goal = goal
         if ending is not Ending.NONE:
-            self._close(_ENDINGS[ending])
+            self._close(ENDINGS[ending])
 
     def _arrived(self, x: X) -> bool:
-        return all(abs(a - b) <= tol for a, b, tol in zip(x, self._move.goal, self.params.tolerance.tolist(), strict=True))
+        return all(
+            abs(a - b) <= tol for a, b, tol in zip(x, self._move.goal, self.params.tolerance.tolist(), strict=True)
+        )
 
     def _decide(self, reading: Reading) -> None:
         p = self.params
         if self._phase is Phase.REACH and p.strategy is Strategy.FORWARD:
             self._start(Phase.APPROACH, self._ahead(p.forward_distance), 0, p.travel_time)
+        elif self._phase is Phase.REACH and p.strategy is Strategy.CONTACT:
+            self._start(Phase.APPROACH, self._move.goal, 0)
         elif self._phase is Phase.REACH and p.strategy is Strategy.BLIND:
             self._close(Stop.BLIND)
         elif self._phase is Phase.APPROACH and p.strategy is Strategy.FORWARD:
@@ -304,8 +281,8 @@ class IrReflex:
             return
         r = self._residuals(self._distances(reading.ticks))
         verdict = self._descent.judge(reading.x, r, self._move.goal)
-        if verdict in _STOPS:
-            self._close(_STOPS[verdict])
+        if verdict in STOPS:
+            self._close(STOPS[verdict])
         elif verdict is Verdict.BACK:
             self._start(Phase.CHECK, self._descent.best, self.params.scans)
         elif verdict is Verdict.PROBE:
@@ -365,7 +342,13 @@ class IrReflex:
 
 def _check_inputs(u: Inputs) -> None:
     """Raise InvalidReading for what is no number: no move would ever arrive, and no finger would ever see."""
-    inputs = {"ticks": u.ticks.tolist(), "p_WH": u.p_WH.tolist(), "yaw": [u.yaw], "sigma": [u.sigma]}
+    inputs = {
+        "ticks": u.ticks.tolist(),
+        "p_WH": u.p_WH.tolist(),
+        "yaw": [u.yaw],
+        "sigma": [u.sigma],
+        "tension": [u.tension],
+    }
     wrong = [name for name, values in inputs.items() if not all(map(math.isfinite, values))]
     if wrong:
         raise InvalidReading([f"{name} must be finite, not {inputs[name]}" for name in wrong])

@@ -26,7 +26,7 @@ _AGES: Final = (2.0 / 3.0, 1.0 / 3.0, 0.0)
 
 
 class MotionFilter:
-    """Estimates distances (m), their Jacobian by [ahead, left, yaw, sigma] in the hand's axes, and the object's velocity.
+    """Estimates distances (m), their Jacobian by [ahead, left, yaw, sigma] of the hand, and the object's velocity.
 
     Args:
         params: of the reflex.
@@ -36,7 +36,7 @@ class MotionFilter:
     def __init__(self, params: Params, period: float) -> None:
         self._params, self._dt = params, period
         self._m: Floats = np.zeros((_FINGERS, _ROW))
-        self._P: Floats = np.zeros((_FINGERS, _ROW, _ROW))
+        self._cov: Floats = np.zeros((_FINGERS, _ROW, _ROW))
         self._x: X = ()
         self.seen: tuple[bool, ...] = (False,) * _FINGERS
         yaw = params.yaw_pregrasp
@@ -101,34 +101,35 @@ class MotionFilter:
         p, nominal = self._params, nominal_jacobian(sigma)
         keep = 1.0 - self._dt / p.jacobian_memory
         self._m[:, 1:] = nominal + keep * (self._m[:, 1:] - nominal)
-        F = np.diag([1.0, keep, keep, keep, keep])
+        F: Floats = np.diag([1.0, keep, keep, keep, keep])
         F[0, 1:] = keep * moved
         self._m[:, 0] += self._m[:, 1:] @ moved
-        self._P = F @ self._P @ F.T
-        self._P[:, _DIAGONAL, _DIAGONAL] += np.concatenate([[p.distance_drift], p.jacobian_drift]) ** 2
+        self._cov = np.matmul(np.matmul(F, self._cov), np.transpose(F))
+        self._cov[:, _DIAGONAL, _DIAGONAL] += np.concatenate([[p.distance_drift], p.jacobian_drift]) ** 2
 
     def _correct(self, i: int, moved: Floats, distance: float, noise: float) -> bool:
         """Take a finger's reading; return False if it does not fit, as when a beam leaves an edge."""
         h = np.concatenate([[1.0], -_AGES[i] * moved])  # the reading is that old
         innovation = distance - float(h @ self._m[i])
-        Ph = self._P[i] @ h
+        Ph = self._cov[i] @ h
         variance = float(h @ Ph) + noise**2
         if innovation**2 > self._params.jump**2 + 25.0 * variance:
             return False
         self._m[i] += Ph * (innovation / variance)
-        self._P[i] -= np.outer(Ph, Ph) / variance
+        self._cov[i] -= np.outer(Ph, Ph) / variance
         return True
 
     def _begin(self, i: int, sigma: float, distance: float, noise: float) -> None:
         """Begin a finger's row by what is known without a move: the Jacobian of the hand's design."""
         self._m[i] = np.concatenate([[distance], nominal_jacobian(sigma)[i]])
-        self._P[i] = np.diag(np.concatenate([[noise], self._params.jacobian_spread]) ** 2)
+        self._cov[i] = np.diag(np.concatenate([[noise], self._params.jacobian_spread]) ** 2)
 
     def _follow_middle(self, x: X, ahead: float, distances: Floats, seen: Sequence[bool]) -> None:
         """Take the middle between thumb's and ring's surface as a place across, y' = slope (way ahead)' + v."""
         p = self._params
-        F = np.array([[1.0, ahead, self._dt], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-        self._middle, self._spread = F @ self._middle, F @ self._spread @ F.T
+        F: Floats = np.array([[1.0, ahead, self._dt], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        self._middle = np.dot(F, self._middle)
+        self._spread = np.dot(np.dot(F, self._spread), np.transpose(F))
         self._spread[[0, 1, 2], [0, 1, 2]] += np.array([p.distance_drift, p.slope_drift, p.velocity_drift]) ** 2
         if not (seen[0] and seen[2]):
             return
@@ -146,15 +147,15 @@ class MotionFilter:
                 self._spread[0, 0] = spread[0] ** 2
         self._rounds += 1
         gain = self._spread[:, 0] / (self._spread[0, 0] + 5e-4**2)
-        self._middle = self._middle + gain * (y - self._middle[0])
-        self._spread = self._spread - np.outer(gain, self._spread[0, :])
+        self._middle += gain * (y - self._middle[0])
+        self._spread -= np.outer(gain, self._spread[0, :])
 
     def get_state(self) -> tuple[tuple[Floats, Floats, Floats, Floats], X, tuple[bool, ...], int]:
         """Return means and covariances, the encoders, who sees, and for how long."""
-        arrays = (self._m.copy(), self._P.copy(), self._middle.copy(), self._spread.copy())
+        arrays = (self._m.copy(), self._cov.copy(), self._middle.copy(), self._spread.copy())
         return arrays, self._x, self.seen, self._rounds
 
     def set_state(self, state: tuple[tuple[Floats, Floats, Floats, Floats], X, tuple[bool, ...], int]) -> None:
         """Restore a state that `get_state` gave."""
         arrays, self._x, self.seen, self._rounds = state
-        self._m, self._P, self._middle, self._spread = (a.copy() for a in arrays)
+        self._m, self._cov, self._middle, self._spread = (a.copy() for a in arrays)

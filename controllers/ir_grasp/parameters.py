@@ -13,6 +13,7 @@ from handover.cosim.blocks.units import (
     Hertz,
     Metre,
     MetrePerSecond,
+    Newton,
     Number,
     PerSecond,
     PerTick,
@@ -72,7 +73,7 @@ class InvalidReflexParameters(InvalidParameters):
 class Strategy(enum.IntEnum):
     """What is done between the pre-grasp pose and closing.
 
-    A correction by the sensors, nothing, a given way forward, or forward while slowly closing until the tendon tightens.
+    A correction by the sensors, nothing, a given way forward, or forward and slowly closing until the tendon tightens.
     """
 
     REFLEX = 0
@@ -158,6 +159,10 @@ class Params:
     shake_amplitude: Metre = parameter(0.015, "amplitude of the shake, across the hand", minimum=0.0, maximum=0.2)
     shake_frequency: Hertz = parameter(1.5, "frequency of the shake", minimum=0.01, maximum=10.0)
     shake_cycles: int = parameter(3, "cycles of the shake", minimum=0, maximum=1000)
+    contact_speed: MetrePerSecond = parameter(0.04, "speed ahead of the strategy CONTACT", minimum=1e-3, maximum=0.3)
+    contact_closing: PerSecond = parameter(0.2, "its rate of closing on the way", minimum=0.0, maximum=1.0)
+    contact_tension: Newton = parameter(0.5, "tension off that of the free hand that shows contact", minimum=1e-3)
+    free_tension: Newton = parameter(6.51, "tension of the free hand's tendon by closure, of its design", minimum=0.0)
     feed: MetrePerSecond = parameter(0.06, "speed ahead, of FAST", minimum=0.0, maximum=1.0)
     rate: PerSecond = parameter(5.0, "rate at which FAST takes off residuals", minimum=0.0, maximum=50.0)
     speed_limit: Vector4[Number] = parameter(
@@ -170,13 +175,17 @@ class Params:
     )
     balance: Metre = parameter(0.006, "half the difference of the sides at which the object is centred", minimum=0.0)
     settling: Second = parameter(0.5, "time given to the residuals once the object is deep enough", minimum=0.0)
+    lost_deep: Second = parameter(0.1, "time out of sight after which a hand that is deep enough closes", minimum=0.0)
     lost_time: Second = parameter(1.0, "time after which an object that was in sight is no longer awaited", minimum=0.0)
-    search_width: Metre = parameter(0.055, "how far the search goes to either side", minimum=0.0, maximum=0.5)
+    fast_reach: Vector3[Number] = parameter(np.array([0.15, 0.15, 0.9]), "reach, of FAST", minimum=0.0, maximum=10.0)
+    search_width: Metre = parameter(0.060, "how far the search goes to either side", minimum=1e-3, maximum=0.5)
     search_row: Metre = parameter(0.025, "how far ahead one crossing of the search is of the last", minimum=1e-3)
     search_back: Metre = parameter(0.020, "how far the search begins behind the pre-grasp pose", minimum=0.0)
+    search_ahead: Metre = parameter(0.105, "how far the search goes ahead of it", minimum=0.001, maximum=0.5)
+    search_guess: Metre = parameter(0.055, "where the hand closes if nothing was found, ahead of it", minimum=0.0)
     search_speed: MetrePerSecond = parameter(0.28, "speed of the search", minimum=1e-3, maximum=1.0)
-    contact: Metre = parameter(0.006, "distance at which a finger counts as touching", minimum=0.0, maximum=0.06)
-    push_limit: Metre = parameter(0.010, "way that the hand may make while a finger touches", minimum=0.0)
+    push_depth: Metre = parameter(0.020, "how much too far ahead the front is when that counts", minimum=0.0)
+    push_limit: Metre = parameter(0.010, "way across that the hand may make without any effect", minimum=0.0)
     path_limit: Metre = parameter(0.15, "way ahead that it may make once it has seen the object", minimum=0.0)
     follow_speed: MetrePerSecond = parameter(0.06, "largest speed at which an object is followed", minimum=0.0)
     rest_speed: MetrePerSecond = parameter(0.003, "estimated speed that is as good as rest", minimum=0.0)

@@ -2,27 +2,32 @@
 
 import math
 
+import numpy as np
+
 from handover.controllers.ir_grasp.moves import X
 from handover.controllers.ir_grasp.parameters import Params
 
 
 class Search:
-    """Corners of a zig-zag in the heading of the pre-grasp pose: a step back, then rows across, each farther ahead.
+    """A zig-zag about the pre-grasp pose: a step back, then rows across, each farther ahead, then a guess.
 
     The fingers look inwards: an object beside the hand is not seen, and an open hand that goes ahead pushes it. So the
-    rows begin a step behind, where the fingers pass before what was moved to the side, and are no farther apart than
-    the sensors look ahead of the fingertips.
+    rows begin a step behind, where the fingers pass before what was moved to the side. Together they fill half an
+    ellipse before the pre-grasp pose. If nothing was seen, the hand goes where the object would be had it not been
+    moved (`search_guess` ahead).
     """
 
     def __init__(self, params: Params) -> None:
         self._params = p = params
-        rows = int((float(p.reach[0]) + p.search_back) / p.search_row)
-        ends = [(-p.search_back, 0.0)]
-        for row in range(rows + 1):
-            ahead = row * p.search_row - p.search_back
-            sides = (1.0, -1.0) if row % 2 == 0 else (-1.0, 1.0)
-            ends += [(ahead, side * p.search_width) for side in sides]
-        self._ends = ends
+        self._low = np.append(p.p_WH_pregrasp, p.yaw_pregrasp) - p.fast_reach
+        self._high = np.append(p.p_WH_pregrasp, p.yaw_pregrasp) + p.fast_reach
+        self._ends = [(-p.search_back, 0.0)]
+        side, ahead = 1.0, -p.search_back
+        while ahead <= p.search_ahead:
+            wide = p.search_width * math.sqrt(max(0.0, 1.0 - (max(ahead, 0.0) / (1.25 * p.search_ahead)) ** 2))
+            self._ends += [(ahead, side * wide), (ahead, -side * wide)]
+            side, ahead = -side, ahead + p.search_row
+        self._ends.append((p.search_guess, 0.0))
         self._next = 0
 
     @property
@@ -44,7 +49,7 @@ class Search:
                 x, y, way, self._next = goal_x, goal_y, way - away, self._next + 1
             else:
                 x, y, way = x + way * (goal_x - x) / away, y + way * (goal_y - y) / away, 0.0
-        return (x, y, command[2], command[3])
+        return (*np.clip([x, y, command[2]], self._low, self._high).tolist(), command[3])
 
     def get_state(self) -> int:
         """Return which corner comes next."""

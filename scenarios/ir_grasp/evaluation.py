@@ -36,7 +36,7 @@ _SIGNALS = {
 """By metric, the output of the controller that it takes; without it, it is left out."""
 
 _AFTER_CLOSING = ("PULL", "SHAKE", "DONE")
-_REFINING = ("CHECK", "APPROACH", "RECOVER", "PROBE", "STEP")
+_REFINING = ("CHECK", "APPROACH", "RECOVER", "PROBE", "STEP", "SEARCH", "TRACK")
 
 
 def _where_below(values: Floats, ceiling: float) -> Floats:

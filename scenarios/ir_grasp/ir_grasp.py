@@ -130,10 +130,12 @@ class IrGrasp(Experiment[GraspEvaluator]):
             strategy=p.strategy,
             forward_distance=p.forward,
             literal=p.literal,
+            correction=p.correction,
             p_WH_pregrasp=drawn.p_WH_pregrasp,
             yaw_pregrasp=drawn.yaw,
         )
         s.connect(scene.y.ticks, reflex.u.ticks)
+        s.connect(scene.y.tension, reflex.u.tension)
         for name in ("p_WH", "yaw", "sigma"):
             s.connect(getattr(scene.y, f"{name}_meas"), getattr(reflex.u, name))
         for name in ("p_WH_cmd", "yaw_cmd", "sigma_cmd"):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from handover.controllers.ir_grasp.parameters import Strategy
+from handover.controllers.ir_grasp.parameters import Correction, Strategy
 from handover.cosim.blocks.ports import Corners8, Floats, Vector2, parameter
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Radian, Second
 from handover.plants.ir_grasp.hand import PALM
@@ -55,6 +55,9 @@ class Parameters:
         Strategy.REFLEX, "correct the pre-grasp pose by the sensors, close there at once, or go forward and close"
     )
     forward: Metre = parameter(0.035, "how far forward, for that strategy", minimum=0.0, maximum=0.3)
+    correction: Correction = parameter(
+        Correction.PAPER, "correct by algorithm 1, moves and readings at rest, or continuously, on the move"
+    )
     literal: bool = parameter(False, "the correction's equations as printed: [Luberto] eqs. (4) and (9)")
     standoff: Metre = parameter(
         0.07, "gap between palm and object at the pre-grasp pose that vision asks for", minimum=0.0, maximum=0.3

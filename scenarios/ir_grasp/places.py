@@ -58,7 +58,7 @@ PLACES = {
         },
         optional={
             "p_WG": "what it carried the object is no displacement by the hand",
-            "tension": "shown as a signal",
+            "tension": "shown as a signal, and felt by strategy=contact",
             "carry_velocity": "in W; by carried_speed and carried_direction",
             "carry_from": "the scenario's parameter carried_from",
             "carry_until": "the scenario's parameter carried_until",
@@ -79,6 +79,7 @@ PLACES = {
         optional={
             "ticks": "",
             **_HAND,
+            "tension": "by the motor's current",
             "case": "shown as a signal",
             "cost": "a metric as the hand begins to close",
             "distance": "metrics as the hand begins to close",
@@ -87,6 +88,7 @@ PLACES = {
             "strategy": "the scenario's parameter",
             "forward_distance": "the scenario's parameter forward",
             "literal": "the scenario's parameter",
+            "correction": "the scenario's parameter",
             "p_WH_pregrasp": "in W; by vision",
             "yaw_pregrasp": "counter-clockwise from x of W; by vision",
         },

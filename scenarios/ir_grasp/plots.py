@@ -40,6 +40,8 @@ _PHASE_NAMES = {
     7: "pull",
     8: "shake",
     9: "done",
+    10: "check",
+    11: "track",
 }
 """Phase names as plotted and in the replay: a check may include approaching and recovering motions."""
 _MIN_COST = 0.1

@@ -1,0 +1,55 @@
+"""What the hand does in a grasp, and why its refinement ended."""
+
+import enum
+
+from handover.controllers.ir_grasp.descent import Verdict
+from handover.controllers.ir_grasp.following import Doing, Ending
+
+
+class Phase(enum.IntEnum):
+    """What the hand is doing; CHECK to STEP are the steps 3 to 9 of algorithm 1, SEARCH and TRACK are on the move."""
+
+    REACH = 0
+    CHECK = 1
+    APPROACH = 2
+    RECOVER = 3
+    PROBE = 4
+    STEP = 5
+    CLOSE = 6
+    PULL = 7
+    SHAKE = 8
+    DONE = 9
+    SEARCH = 10
+    TRACK = 11
+
+
+class Stop(enum.IntEnum):
+    """Why the refinement ended.
+
+    The cost is small, steps, recoveries or reach are used up, there is no progress, no finger sees the object, or the
+    strategy has no refinement. Of the correction on the move: the object goes along with the hand, or is deep between
+    two fingers that are equally far from it. Of the strategy CONTACT: the tendon tightened.
+    """
+
+    RUNNING = 0
+    THRESHOLD = 1
+    PATIENCE = 2
+    STALLED = 3
+    OUT_OF_SIGHT = 4
+    BLIND = 5
+    FORWARD = 6
+    PUSHED = 7
+    CONTACT = 8
+    CENTRED = 9
+
+
+STOPS = {Verdict.REACHED: Stop.THRESHOLD, Verdict.STALLED: Stop.STALLED, Verdict.USED_UP: Stop.PATIENCE}
+ENDINGS = {
+    Ending.REACHED: Stop.THRESHOLD,
+    Ending.SETTLED: Stop.STALLED,
+    Ending.LOST: Stop.OUT_OF_SIGHT,
+    Ending.USED_UP: Stop.PATIENCE,
+    Ending.PUSHED: Stop.PUSHED,
+    Ending.CENTRED: Stop.CENTRED,
+}
+DOING = {Doing.SEARCH: Phase.SEARCH, Doing.ONE_SIDED: Phase.RECOVER, Doing.TRACK: Phase.TRACK}
