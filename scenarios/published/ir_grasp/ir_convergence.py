@@ -54,7 +54,7 @@ class IrConvergence(PublishedExperiment):
                 for perturbed in ("false", "true")
                 for thing in _THINGS
             ],
-            fixed={**REFLEX.parameters, "reflex.correction": "paper"},
+            fixed={**REFLEX.parameters, "correction": "paper"},
             repetitions=1 if quick else _REPETITIONS,
             seed=1312,
             paired=True,

@@ -30,8 +30,8 @@ class LimitArm:
     looks: bool
 
 
-REFLEX = LimitArm("reflex", {"strategy": "reflex", "reflex.correction": "fast"}, True)
-PAPER = LimitArm("paper's algorithm", {"strategy": "reflex", "reflex.correction": "paper"}, True)
+REFLEX = LimitArm("reflex", {"strategy": "reflex", "correction": "fast"}, True)
+PAPER = LimitArm("paper's algorithm", {"strategy": "reflex", "correction": "paper"}, True)
 BLIND = LimitArm("blind", {"strategy": "blind"}, False)
 FORWARD_35 = LimitArm("forward 35 mm", {"strategy": "forward", "forward": "0.035"}, False)
 FORWARD_55 = LimitArm("forward 55 mm", {"strategy": "forward", "forward": "0.055"}, False)

@@ -49,7 +49,7 @@ def test_that_the_norm_falls_is_refuted_by_runs_in_which_it_does_not():
 def test_the_plan_takes_the_tables_things_in_both_poses_by_the_papers_algorithm():
     plan = IrConvergence().plan(quick=False)
     assert len({(p["thing"], p["perturbed"]) for p in plan.points}) == len(plan.points) == 10
-    assert plan.fixed == {"strategy": "reflex", "reflex.correction": "paper"}
+    assert plan.fixed == {"strategy": "reflex", "correction": "paper"}
 
 
 def test_each_case_of_figure_9_has_a_scene_in_which_the_sensors_read_so():
