@@ -83,7 +83,7 @@ def _one_curve(runs: LimitRuns, arm: LimitArm) -> Claim:
 def _alike(runs: LimitRuns, arm: LimitArm) -> Claim:
     mild = [level for level in _CURVE.levels if level <= 0.1]
     sentence = (
-        "One curve is enough for all sensors: with constants off by 5 and 10 % at most the paper's algorithm holds "
+        "One curve is enough for all sensors: with constants off by 2 to 10 % at most the paper's algorithm holds "
         "no fewer moved objects than with exact ones."
     )
     return _of_paper(sentence, "sec. V-B", "they vary only slightly", [runs.from_start(arm, _CURVE, mild)])

@@ -156,7 +156,7 @@ AXES = (
         None,
         scenes=_BARS,
     ),
-    Axis("near", "stand-off shorter", "mm", 1e3, (0.05, 0.03), {"standoff": "{}"}, 0.07),
+    Axis("near", "stand-off shorter", "mm", 1e3, (0.06, 0.05, 0.03), {"standoff": "{}"}, 0.07),
     Axis("far", "stand-off longer", "mm", 1e3, (0.09, 0.105, 0.12), {"standoff": "{}"}, 0.07),
     Axis("speed", "carried across", "mm/s", 1e3, (0.005, 0.01, 0.015, 0.02, 0.03), {"carried_speed": "{}"}),
     Axis(
@@ -186,7 +186,7 @@ AXES = (
         "sensors off their curve, moved",
         "%",
         1e2,
-        (0.05, 0.1, 0.2, 0.3),
+        (0.02, 0.05, 0.1, 0.2, 0.3),
         {"scene.sensor_tolerance": "{}"},
         base=MOVED,
         blind_alike=True,

@@ -3,7 +3,8 @@
 import enum
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import lru_cache
+from typing import Any, cast
 
 import numpy as np
 
@@ -35,6 +36,7 @@ def _is_unset(value: Any) -> bool:
     return value is None or value == "" or (isinstance(value, float) and value != value)
 
 
+@lru_cache(maxsize=4096)
 def _canonical(name: str, value: Any) -> object:
     """Return a parameter's value, a text of a point or of a column, in one form; None stands for the default."""
     unit, _, parameter = name.rpartition(".")
@@ -52,7 +54,12 @@ def _canonical(name: str, value: Any) -> object:
 
 
 def _key(values: Point | Row) -> tuple[object, ...]:
-    return tuple(_canonical(name, values.get(name)) for name in PARAMETERS)
+    return tuple(_of(values, name) for name in PARAMETERS)
+
+
+def _of(values: Point | Row, name: str) -> object:
+    value: Any = values.get(name)
+    return _canonical(name, tuple(cast(list[float], value)) if isinstance(value, list) else value)
 
 
 @dataclass(frozen=True)
@@ -125,7 +132,7 @@ class LimitRuns:
     def _by_scene(self, arm: LimitArm, axis: Axis, levels: Sequence[float]) -> dict[tuple[int, Scene], bool]:
         """Return successes by number of the level and scene: object, its mass and the seed."""
         return {
-            (k, (row["thing"], row.get("scene.mass_O"), row["seed"])): _held(row)
+            (k, (row["thing"], _of(row, "scene.mass_O"), row["seed"])): _held(row)
             for k, level in enumerate(levels)
             for row in self.rows(arm, axis, (level,))
         }
