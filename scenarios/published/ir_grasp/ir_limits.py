@@ -236,7 +236,8 @@ def _halves(runs: LimitRuns) -> ComparisonTable:
         title="Where a way falls below one half",
         header=["axis", "range", *(arm.title for arm in ARMS)],
         rows=rows,
-        note="Interpolated between levels. From the start: less than half is held where nothing is amiss yet.",
+        note="Interpolated between levels. From the start: less than half is held where nothing is amiss yet, though "
+        "it may be more farther on, as where the object comes nearer.",
     )
 
 

@@ -33,7 +33,7 @@ def _rates(runs: LimitRuns, shown: Sequence[Axis], folder: Path) -> Figure:
     rows = ceil(len(shown) / _COLUMNS)
     with figure(folder / "limits", rows, _COLUMNS, size=(11.0, 0.7 + 2.25 * rows)) as panels:
         for axes, axis in zip(panels, shown, strict=False):
-            for k, arm in enumerate(ARMS):
+            for k, arm in reversed(list(enumerate(ARMS))):
                 _rate(axes, runs, arm, axis, _APART * (k - 0.5 * (len(ARMS) - 1)))
             axes.axhline(50.0, color="#4d5866", lw=0.7, ls=(0, (4, 3)))
             axes.set(ylim=(-4, 104))

@@ -143,9 +143,12 @@ class LimitRuns:
         return np.array([v for v in found if v is not None and v == v], dtype=np.float64)
 
     def half(self, arm: LimitArm, axis: Axis) -> str:
-        """Return where an arm's rate falls below one half along an axis, interpolated between levels."""
+        """Return where an arm's rate first is below one half along an axis, interpolated between levels.
+
+        It is "" if the arm was not tried to the axis's end.
+        """
         rates = [(level, k / n) for level in axis.all_levels for k, n in [self.count(arm, axis, (level,))] if n]
-        if not rates:
+        if not self.count(arm, axis, axis.levels[-1:])[1]:
             return ""
         below = next((i for i, (_, rate) in enumerate(rates) if rate < _HALF), None)
         if below is None:
