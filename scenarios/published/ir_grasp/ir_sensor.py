@@ -67,7 +67,7 @@ class IrSensorCurve(PublishedExperiment):
         cases += [Case(finger, tolerance=t) for t in tolerances for finger in Finger]
         return CampaignPlan(
             scenario=self.scenario,
-            points=[{**case.parameters, "last": _LAST[Finger[case.values["finger"].upper()]]} for case in cases],
+            points=[{**case.parameters, "last": _last(case)} for case in cases],
             repetitions=1 if quick else _REPETITIONS,
             seed=8,
             experiment=self.name,
@@ -86,6 +86,11 @@ class IrSensorCurve(PublishedExperiment):
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:
         """Draw figure 8, what one curve makes of materials, and the time of flight of eq. (3)."""
         return draw_sensor(SensorRuns(table), runs, folder)
+
+
+def _last(case: Case) -> str:
+    """Return where an approach ends, m: before an oblique face the finger's own end would touch it."""
+    return _LAST[Finger[case.values["finger"].upper()]] if case.incidence == 0.0 else "0.010"
 
 
 def _form(runs: SensorRuns) -> Claim:
