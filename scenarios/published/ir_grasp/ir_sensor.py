@@ -219,7 +219,15 @@ def _fits(runs: SensorRuns) -> ComparisonTable:
     )
     if runs.unusable:
         note += f" {runs.unusable} runs failed, or touched the box, and do not count."
-    header = ["sensor and face", "a (mm)", "b (1/1000)", "c (mm)", "d (1/1000)", "residual (mm)", "curves apart (mm)"]
+    header = [
+        "sensor and face",
+        "a (mm)",
+        "b (1/1000 ticks)",
+        "c (mm)",
+        "d (1/1000 ticks)",
+        "residual (mm)",
+        "curves apart (mm)",
+    ]
     return ComparisonTable(title="Fits of eq. (11), as in fig. 8", header=header, rows=rows, note=note)
 
 
