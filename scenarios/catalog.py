@@ -142,6 +142,10 @@ SYSTEMS = (
                 "handover.scenarios.ir_grasp.ir_grasp:IrGrasp",
                 "a soft hand grasps an object whose place is known roughly, by infrared reflexes",
             ),
+            "ir_sensor": ScenarioEntry(
+                "handover.scenarios.ir_grasp.ir_sensor:IrSensor",
+                "an infrared sensor on a soft hand approaches a face, as its curve is taken",
+            ),
         },
     ),
 )

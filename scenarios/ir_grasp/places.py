@@ -14,6 +14,30 @@ _COMMAND = {
     "sigma_cmd": "0 open, 1 closed",
 }
 
+PLACE_OF_SENSORS = Place(
+    required={
+        "ticks": "",
+        "range": "",
+        "p_WH": "in W",
+        "yaw": "counter-clockwise from x of W",
+        "q": "shown in space",
+        "p_WO": "in W",
+        "yaw_O": "counter-clockwise from x of W",
+        "touching": "nothing may touch the face",
+        "p_WH_cmd": "in W; the hand goes there at wrist_speed",
+        "yaw_cmd": "counter-clockwise from x of W",
+        "thing": "what has the face",
+        "yaw_O_0": "the scenario's parameter incidence",
+        "p_WH_0": "in W; before the face",
+        "yaw_H_0": "such that the sensor looks along x of W",
+        "wrist_speed": "the scenario's parameter speed",
+        "reflectivity": "the scenario's parameter",
+    },
+    optional={"seed": "follows from the run's seed"},
+    remarks=(_TABLE,),
+)
+"""Of a scene in which a sensor approaches a face, without a controller."""
+
 PLACES = {
     "scene": Place(
         required={

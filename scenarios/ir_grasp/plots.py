@@ -49,8 +49,8 @@ _MIN_COST = 0.1
 
 
 def phases_of_grasp(record: Record) -> tuple[Phase, ...]:
-    """Return the reflex's phases by the names that plots and replay show."""
-    return phases_of(record, "reflex.phase", _PHASE_NAMES)
+    """Return the reflex's phases by the names that plots and replay show; none of a scene without a controller."""
+    return phases_of(record, "reflex.phase", _PHASE_NAMES) if "reflex.phase" in record else ()
 
 
 def figures_of_grasp(parameters: Parameters, record: Record) -> list[TimeFigure]:
@@ -153,7 +153,7 @@ def draw_scene(parameters: Parameters, moments: Mapping[str, float], record: Rec
     wide, tall = high - low
     with figure(folder / "scene", 1, len(rows), size=(11.0, 1.4 + 9.3 / len(rows) * tall / wide)) as panels:
         for axes, (role, k) in zip(panels, rows.items(), strict=True):
-            _draw_moment(axes, parameters, record, k)
+            draw_moment(axes, parameters, record, k)
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x (mm)")
             axes.set_title(f"{record.time[k]:.1f} s, {role}")
         panels[0].set(ylabel="y (mm)")
@@ -167,13 +167,19 @@ def draw_scene(parameters: Parameters, moments: Mapping[str, float], record: Rec
     return Figure("scene", caption)
 
 
-def _draw_moment(axes: Axes, parameters: Parameters, record: Record, k: int) -> None:
-    p_WH, yaw, q = record["scene.p_WH"][k], float(record["scene.yaw"][k]), record["scene.q"][k]
+def draw_moment(axes: Axes, parameters: Parameters, record: Record, k: int) -> None:
+    """Draw the table at a row of a record, in mm: object, hand and beams."""
     for part in _thing(parameters, record, k):
         axes.add_patch(Polygon(part * 1000, facecolor=THING_COLOUR, edgecolor="#8a6d3b", lw=1.0))
     if _has_other(parameters, record):
         middle, radius = 1000 * record["scene.p_WX"][k], 1000 * parameters.other_radius
         axes.add_patch(Circle(middle.tolist(), radius, facecolor=OTHER_COLOUR, edgecolor="#4d5866", lw=1.0))
+    p_WH, yaw, q = record["scene.p_WH"][k], float(record["scene.yaw"][k]), record["scene.q"][k]
+    draw_hand(axes, p_WH, yaw, q, record["scene.range"][k])
+
+
+def draw_hand(axes: Axes, p_WH: Floats, yaw: float, q: Floats, distances: Floats) -> None:
+    """Draw palm and fingers, in mm, and the beams as far as they meet something at these distances, m, else dotted."""
     axes.add_patch(Polygon(palm_outline(p_WH, yaw) * 1000, facecolor=PALM_COLOUR, edgecolor="#4d5866", lw=1.0))
     for i, (finger, points) in enumerate(zip(FINGERS, finger_points(p_WH, yaw, q), strict=True)):
         for j, radius in enumerate(finger.radii):
@@ -181,7 +187,7 @@ def _draw_moment(axes: Axes, parameters: Parameters, record: Record, k: int) -> 
                 Polygon(_capsule(points[j], points[j + 1], radius) * 1000, fc=FINGER_COLOURS[i], ec="w", lw=0.5)
             )
     origins, directions = sensor_rays(p_WH, yaw, q)
-    for i, distance in enumerate(record["scene.range"][k]):
+    for i, distance in enumerate(distances):
         met = distance < ReflexParams().distance_max
         ends = np.array([origins[i], origins[i] + min(distance, ReflexParams().distance_max) * directions[i]]) * 1000
         axes.plot(ends[:, 0], ends[:, 1], color=FINGER_COLOURS[i], lw=1.0, ls="-" if met else ":")

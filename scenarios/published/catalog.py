@@ -16,6 +16,9 @@ from handover.scenarios.published.helix.helix_disturbances import HelixDisturban
 from handover.scenarios.published.helix.helix_improvements import HelixImprovements
 from handover.scenarios.published.helix.helix_places import HelixPlaces
 from handover.scenarios.published.helix.helix_workspace import HelixWorkspace
+from handover.scenarios.published.ir_grasp.ir_convergence import IrConvergence
+from handover.scenarios.published.ir_grasp.ir_limits import IrLimits
+from handover.scenarios.published.ir_grasp.ir_sensor import IrSensorCurve
 from handover.scenarios.published.ir_grasp.ir_table import IrTable
 from handover.scenarios.published.published_experiment import PublishedExperiment
 
@@ -34,6 +37,9 @@ _ALL: tuple[type[PublishedExperiment], ...] = (
     HelixImprovements,
     HelixPlaces,
     HelixWorkspace,
+    IrConvergence,
+    IrLimits,
+    IrSensorCurve,
     IrTable,
 )
 

@@ -27,6 +27,7 @@ MUST_SHOW: dict[str, set[str]] = {
     "flyer_two_robots": {f"{part} {r}" for part in ("robot", "arm", "gripper") for r in (1, 2)}
     | {"object", "handles", "hand"},
     "ir_grasp": {"palm", "thumb", "index", "ring", "object", "beams"},
+    "ir_sensor": {"palm", "thumb", "index", "ring", "object", "beams"},
 }
 FIRST = ("helix_handover", "vsl_hybrid", "flyer_human_to_robot")
 SHORT = {"helix_handover": ("patience=1",)}

@@ -3,6 +3,8 @@
 Each verdict follows from a rule that was laid down before the runs.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from handover.scenarios.campaign.statistics import success_interval, time_interval, two_proportions
@@ -15,6 +17,7 @@ from handover.scenarios.published.ir_grasp.ir_table_runs import (
     POSES,
     REFLEX,
     Arm,
+    Count,
     IrTableRuns,
 )
 from handover.scenarios.published.published_experiment import Claim, Verdict
@@ -38,6 +41,17 @@ _BLIND_SELECTED = (
     "both were chosen so that the blind hand fails about as often as in table I, so agreement is no evidence."
 )
 
+_FAILURE_SELECTED = (
+    "The blind hand fails by choice: the gap before it closes and how far objects were moved were chosen so that it "
+    "does. To do better than a hand that cannot succeed is no evidence that sensing is needed; `handover paper "
+    "ir-limits` asks where it is."
+)
+
+_EASIER = (
+    "More successes than published tell of an easier task, not of a better hand: here it is planar, five simple shapes "
+    "slide on a table of even friction, nothing tips over, and the sensors follow the controller's own curve."
+)
+
 Way = tuple[Arm, bool]
 """An arm, and whether poses are perturbed."""
 
@@ -51,16 +65,26 @@ def rate_claims(runs: IrTableRuns) -> list[Claim]:
             if published is not None:
                 sentence = f"The {arm.title} hand holds {published[0]} of {published[1]} objects in {pose} poses."
                 claim = rate_claim(sentence, "table I, total", published, runs.count(arm, perturbed))
-                claims.append(claim if arm is not BLIND else without_verdict(claim, _BLIND_SELECTED))
+                claims.append(_easier(claim, published, runs.count(arm, perturbed)))
+                if arm is BLIND:
+                    claims[-1] = without_verdict(claim, _BLIND_SELECTED)
     return claims
 
 
+def _easier(claim: Claim, published: Count, measured: Count) -> Claim:
+    """Tell what a higher rate than the published one is due to."""
+    if not measured[1] or measured[0] * published[1] <= published[0] * measured[1]:
+        return claim
+    return replace(claim, reason=f"{claim.reason} {_EASIER}")
+
+
 def order_claims(runs: IrTableRuns) -> list[Claim]:
-    """Return the claims that one way does better than another."""
+    """Return the claims that one way does better than another; those against the blind hand have no verdict."""
     claims: list[Claim] = []
     for perturbed, pose in POSES.items():
         sentence = f"In {pose} poses the IR-guided hand succeeds more often than the blind one."
-        claims.append(_order(runs, sentence, (REFLEX, perturbed), (BLIND, perturbed)))
+        claim = _order(runs, sentence, (REFLEX, perturbed), (BLIND, perturbed))
+        claims.append(without_verdict(claim, _FAILURE_SELECTED))
     fewer = "The {} hand succeeds less often in perturbed poses than in nominal ones."
     claims.append(_order(runs, fewer.format(REFLEX.title), (REFLEX, False), (REFLEX, True)))
     blind = _order(runs, fewer.format(BLIND.title), (BLIND, False), (BLIND, True))
@@ -135,6 +159,10 @@ _TARGET_TAKEN = (
     "The distance to which thumb and ring are brought, 10 mm, was taken from these figures: agreement would only show "
     "that the correction reaches its target."
 )
+_ONE_TARGET = (
+    "Both fingers have one target distance by construction, so that they are alike shows that the correction ends, and "
+    "no more."
+)
 _TOO_FEW = f"There are fewer than {_MIN_RUNS} runs of an object that came to their end."
 _IN_SPACE = (
     "The index lags behind as the hand's synergy has it in space. The plane hand's index is stiffer by assumption, so "
@@ -200,7 +228,7 @@ def _within_runs(runs: IrTableRuns) -> Claim:
 
 
 def _centred(runs: IrTableRuns) -> Claim:
-    """Judge that thumb and ring end about as far from the object."""
+    """Return that thumb and ring end about as far from the object, as the controller has them do."""
     printed = [abs(thumb - ring) for p in POSES for thumb, ring in _by_object(runs, p)]
     names = [f"final_distance_{finger}" for finger in _IN_COST]
     unlike = np.concatenate([np.abs(np.subtract(*runs.together(names, REFLEX, p))) for p in POSES])
@@ -215,9 +243,9 @@ def _centred(runs: IrTableRuns) -> Claim:
         measured=f"{1000 * float(np.median(unlike)):.1f} mm apart (median)",
         interval=(interval.low, interval.high),
         unit="m",
-        verdict=Verdict.REPRODUCED if interval.high <= max(printed) else Verdict.NOT_REPRODUCED,
-        reason=f"Reproduced if the interval of the median of our runs ({interval.method}) lies below the largest "
-        f"difference in the table, {1000 * max(printed):.0f} mm.",
+        verdict=Verdict.NOT_COMPARABLE,
+        reason=f"{_ONE_TARGET} The interval is that of the median of our runs ({interval.method}); the largest "
+        f"difference in the table is {1000 * max(printed):.0f} mm.",
         where=where,
     )
 

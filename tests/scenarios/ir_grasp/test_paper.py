@@ -12,11 +12,12 @@ import handover.scenarios.ir_grasp
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.plants.ir_grasp.objects import SOLIDS
 from handover.plants.ir_grasp.parameters import Params as SceneParams
+from handover.scenarios.ir_grasp.ir_sensor import SensorParameters
 from handover.scenarios.ir_grasp.parameters import Parameters
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 
-CODE = {"scene": SceneParams, "reflex": ReflexParams, "scenario": Parameters}
+CODE = {"scene": SceneParams, "reflex": ReflexParams, "scenario": Parameters, "sensor_scenario": SensorParameters}
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,231 @@
+"""What `ir-limits` varies: the ways to grasp, and the axes along which one thing at a time goes amiss.
+
+All but three axes start from the nominal pose. What returns more or less light, and sensors that are off their curve,
+harm a hand that looks only where it must look: there, objects are moved as in the paper's perturbed poses.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+
+Point = Mapping[str, str]
+"""Parameters and their values, as texts."""
+
+
+@dataclass(frozen=True)
+class LimitArm:
+    """A way to grasp.
+
+    Attributes:
+        title: what it is called.
+        parameters: the scenario's and the controller's that make it.
+        looks: whether it uses the infrared sensors.
+    """
+
+    title: str
+    parameters: Point = field(hash=False)
+    looks: bool
+
+
+REFLEX = LimitArm("reflex", {"strategy": "reflex", "correction": "fast"}, True)
+PAPER = LimitArm("paper's algorithm", {"strategy": "reflex", "correction": "paper"}, True)
+BLIND = LimitArm("blind", {"strategy": "blind"}, False)
+FORWARD_35 = LimitArm("forward 35 mm", {"strategy": "forward", "forward": "0.035"}, False)
+FORWARD_55 = LimitArm("forward 55 mm", {"strategy": "forward", "forward": "0.055"}, False)
+CONTACT = LimitArm("until contact", {"strategy": "contact"}, False)
+ARMS = (REFLEX, PAPER, BLIND, FORWARD_35, FORWARD_55, CONTACT)
+
+_TABLE = ("cylinder", "baby_cup_a", "baby_cup_b", "paper_box_a", "paper_box_b")
+_THINGS: tuple[Point, ...] = tuple({"thing": name} for name in _TABLE)
+_TURNED: tuple[Point, ...] = tuple(_THINGS[k] for k in (1, 2, 3, 4))
+_MASSES = ("0.05", "0.1", "0.15", "0.2", "0.25")
+_DISCS: tuple[Point, ...] = tuple({"thing": "disc", "expected": "disc", "scene.mass_O": m} for m in _MASSES)
+_BARS: tuple[Point, ...] = tuple({"thing": "bar", "expected": "disc", "scene.mass_O": m} for m in _MASSES)
+NOMINAL: Point = {"perturbed": "false"}
+MOVED: Point = {"perturbed": "true"}
+"""As in the paper's perturbed poses: by 30 to 50 mm, never towards the hand, and up to 20 degrees."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Something that goes amiss, by levels.
+
+    Attributes:
+        key: a word for it.
+        title: what, in words.
+        unit: of the levels as they are told.
+        scale: how many of it one SI unit is.
+        levels: in SI units, from the mildest on.
+        parameter: what a level sets; {} stands for the level in the values.
+        start: its level where nothing is amiss, for reflectivity about what the objects have; None if that is another
+            object.
+        base: parameters of all its runs.
+        scenes: objects.
+        blind_alike: whether it makes no difference to a hand that does not look, which is then run at its start alone.
+    """
+
+    key: str
+    title: str
+    unit: str
+    scale: float
+    levels: tuple[float, ...]
+    parameter: Point = field(hash=False)
+    start: float | None = 0.0
+    base: Point = field(default_factory=lambda: NOMINAL, hash=False)
+    scenes: tuple[Point, ...] = field(default=_THINGS, hash=False)
+    blind_alike: bool = False
+
+    def settings(self, level: float) -> list[Point]:
+        """Return the parameters of a level, by object; at the start only those of the base."""
+        given = {} if level == self.start else {n: v.format(f"{level:g}") for n, v in self.parameter.items()}
+        return [{**scene, **self.base, **given} for scene in self.scenes]
+
+    @property
+    def all_levels(self) -> tuple[float, ...]:
+        """The start, if there is one, and the levels."""
+        return self.levels if self.start is None else (self.start, *self.levels)
+
+    def told(self, level: float) -> str:
+        """Return a level with its unit."""
+        return f"{self.scale * level:.3g} {self.unit}".strip()
+
+
+_SHIFTS = (0.02, 0.04, 0.06, 0.08)
+
+
+def _degrees(*angles: float) -> tuple[float, ...]:
+    return tuple(round(math.radians(a), 4) for a in angles)
+
+
+AXES = (
+    Axis("away", "moved away from the hand", "mm", 1e3, _SHIFTS, {"shift": "{},0"}),
+    Axis("towards", "moved towards the hand", "mm", 1e3, _SHIFTS, {"shift": "-{},0"}),
+    Axis("thumb", "moved to the thumb's side", "mm", 1e3, _SHIFTS, {"shift": "0,-{}"}),
+    Axis("fingers", "moved to the fingers' side", "mm", 1e3, _SHIFTS, {"shift": "0,{}"}),
+    Axis(
+        "any",
+        "moved any way, and turned by up to 20°",
+        "mm",
+        1e3,
+        _SHIFTS,
+        {"shift_least": "{0}", "shift_most": "{0}", "shift_spread": "3.14159", "perturbed": "true"},
+    ),
+    Axis("turn", "turned", "°", 180.0 / math.pi, _degrees(15, 30, 60, 90), {"turn": "{}"}, scenes=_TURNED),
+    Axis(
+        "position",
+        "vision's position off (1 sigma)",
+        "mm",
+        1e3,
+        (0.01, 0.02, 0.03, 0.05),
+        {"vision_position": "{}"},
+        0.003,
+    ),
+    Axis(
+        "yaw", "vision's heading off (1 sigma)", "°", 180.0 / math.pi, (0.1, 0.2, 0.3, 0.5), {"vision_yaw": "{}"}, 0.03
+    ),
+    Axis(
+        "small",
+        "a disc, expected with 33 mm, smaller: radius",
+        "mm",
+        1e3,
+        (0.024, 0.015, 0.010),
+        {"disc_radius": "{}"},
+        0.033,
+        scenes=_DISCS,
+    ),
+    Axis(
+        "large",
+        "a disc, expected with 33 mm, larger: radius",
+        "mm",
+        1e3,
+        (0.040, 0.047, 0.055),
+        {"disc_radius": "{}"},
+        0.033,
+        scenes=_DISCS,
+    ),
+    Axis(
+        "bar",
+        "a slanted bar for a disc of 33 mm: length",
+        "mm",
+        1e3,
+        (0.06, 0.09, 0.11, 0.13),
+        {"bar_size": "{},0.03", "turn": "0.7854"},
+        None,
+        scenes=_BARS,
+    ),
+    Axis("near", "stand-off shorter", "mm", 1e3, (0.06, 0.05, 0.03), {"standoff": "{}"}, 0.07),
+    Axis("far", "stand-off longer", "mm", 1e3, (0.09, 0.105, 0.12), {"standoff": "{}"}, 0.07),
+    Axis("speed", "carried across", "mm/s", 1e3, (0.005, 0.01, 0.015, 0.02, 0.03), {"carried_speed": "{}"}),
+    Axis(
+        "dark",
+        "returns less light, moved: reflectivity",
+        "",
+        1.0,
+        (0.5, 0.3, 0.2),
+        {"scene.reflectivity": "{}"},
+        0.9,
+        MOVED,
+        blind_alike=True,
+    ),
+    Axis(
+        "bright",
+        "returns more light, moved: reflectivity",
+        "",
+        1.0,
+        (1.2, 1.5, 2.0),
+        {"scene.reflectivity": "{}"},
+        0.9,
+        MOVED,
+        blind_alike=True,
+    ),
+    Axis(
+        "curve",
+        "sensors off their curve, moved",
+        "%",
+        1e2,
+        (0.02, 0.05, 0.1, 0.2, 0.3),
+        {"scene.sensor_tolerance": "{}"},
+        base=MOVED,
+        blind_alike=True,
+    ),
+)
+
+
+def settings_of(arm: LimitArm, axis: Axis, level: float) -> list[Point]:
+    """Return the points in which an arm meets a level of an axis, by object, shared with other axes where alike."""
+    met = axis.start if axis.blind_alike and not arm.looks and axis.start is not None else level
+    return [{**scene, **arm.parameters} for scene in axis.settings(met)]
+
+
+def plan_of_limits(name: str, quick: bool) -> CampaignPlan:
+    """Return arms x axes x levels x objects, each point once; if quick, the hardest levels with one object each."""
+    points: dict[frozenset[tuple[str, str]], Point] = {}
+    for axis in AXES:
+        for level in axis.levels[-1:] if quick else axis.all_levels:
+            for arm in ARMS:
+                settings = settings_of(arm, axis, level)
+                points.update((frozenset(point.items()), point) for point in (settings[:1] if quick else settings))
+    return CampaignPlan(
+        scenario=IrGrasp.name,
+        points=list(points.values()),
+        repetitions=1 if quick else _REPETITIONS,
+        seed=_SEED,
+        paired=True,
+        scenes=("thing", "scene.mass_O"),
+        experiment=name,
+    )
+
+
+_REPETITIONS = 3
+"""Runs of a point: with five objects 15 of an arm at a level, and 45 to 75 along an axis."""
+
+_SEED = 5000
+"""Of the campaign, and of no other: nothing is tuned on the scenes that follow from it."""
+
+PARAMETERS = tuple(
+    dict.fromkeys(n for axis in AXES for arm in ARMS for n in (*settings_of(arm, axis, axis.levels[0])[0],))
+)
+"""Names of all parameters that points set."""

@@ -1,0 +1,75 @@
+"""Small campaigns of real runs of the infrared grasp's experiments."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from in_process_pool import InProcessPool
+
+from handover.scenarios.campaign.campaign import run_campaign
+from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.campaign.plan_check import prepared
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.ir_grasp.ir_sensor import Finger
+from handover.scenarios.published.ir_grasp.convergence_curves import descents_of
+from handover.scenarios.published.ir_grasp.ir_convergence import IrConvergence
+from handover.scenarios.published.ir_grasp.ir_limits import IrLimits
+from handover.scenarios.published.ir_grasp.ir_sensor import IrSensorCurve
+from handover.scenarios.published.ir_grasp.ir_sensor_cases import Case, SensorRuns, readings_of_rows
+from handover.scenarios.published.ir_grasp.ir_table_runs import REFLEX, IrTableRuns
+from handover.scenarios.published.ir_grasp.limits_axes import ARMS, AXES
+from handover.scenarios.published.ir_grasp.limits_results import LimitRuns
+from handover.scenarios.published.published_experiment import PaperResults, PublishedExperiment, draw_figures
+
+pytestmark = pytest.mark.slow
+
+
+def run(experiment: PublishedExperiment, path: Path, wanted: Mapping[str, str]) -> tuple[CampaignFolder, CampaignTable]:
+    """Run those points of the quick plan that have the wanted values, once."""
+    plan = experiment.plan(quick=True)
+    points = [p for p in plan.points if all(p.get(n) == v for n, v in wanted.items())]
+    folder = CampaignFolder(path)
+    return folder, run_campaign(prepared(replace(plan, points=points)), folder, InProcessPool(), lambda _tally: None)
+
+
+def test_a_sensors_fit_is_the_curve_that_the_controller_has(tmp_path: Path):
+    folder, table = run(IrSensorCurve(), tmp_path / "c", {"finger": "ring", "scene.sensor_tolerance": "0"})
+    runs = SensorRuns(table)
+    (fit,) = runs.fits(Case(Finger.RING))
+    assert (fit.a, fit.b, fit.c, fit.d) == pytest.approx((0.062, -0.003, 0.022, -0.00043), rel=0.05)
+    assert fit.residual < 4e-4
+    distance, ticks = readings_of_rows(runs.rows(Case(Finger.RING, 0.5)), folder.runs)
+    assert ticks[np.argmin(np.abs(distance - 0.010))] == pytest.approx(1850 / 2, rel=0.03)
+    figures = draw_figures(IrSensorCurve(), table, folder.runs, folder.figures)
+    assert {f.name for f in figures} == {"characteristic", "one_curve", "time_of_flight"}
+    assert PaperResults.of(IrSensorCurve(), table, folder.runs).claims
+
+
+def test_descents_begin_at_the_first_step_and_end_where_the_hand_closed(tmp_path: Path):
+    folder, table = run(IrConvergence(), tmp_path / "c", {"thing": "baby_cup_a"})
+    rows = IrTableRuns(table).rows(REFLEX, True)
+    (descent,), (row,) = descents_of(rows, folder.runs), rows
+    assert len(descent.norm) == row["steps"] + 1
+    assert descent.ends is not None
+    assert descent.ends[1] < descent.ends[0]
+    ends = [row["final_distance_thumb"], row["final_distance_ring"]]
+    assert descent.distance[-1, [0, 2]] == pytest.approx(ends, abs=2e-3)
+    figures = {f.name for f in draw_figures(IrConvergence(), table, folder.runs, folder.figures)}
+    assert figures == {"convergence_nominal", "convergence_perturbed", "poses", "sequences", "recoveries"}
+    assert len(PaperResults.of(IrConvergence(), table, folder.runs).claims) == 8
+
+
+def test_runs_of_the_limits_are_found_by_what_they_are_of(tmp_path: Path):
+    wanted = {"thing": "disc", "disc_radius": "0.055"}
+    folder, table = run(IrLimits(), tmp_path / "c", wanted)
+    runs = LimitRuns(table)
+    large = next(axis for axis in AXES if axis.key == "large")
+    assert [runs.count(arm, large, large.levels[-1:])[1] for arm in ARMS] == [1] * len(ARMS)
+    assert sum(runs.count(arm, axis, axis.all_levels)[1] for axis in AXES for arm in ARMS) == len(ARMS)
+    assert {f.name for f in draw_figures(IrLimits(), table, folder.runs, folder.figures)} == {
+        "limits",
+        "limits_displacement",
+    }
+    assert [len(t.rows) for t in IrLimits().tables(table)] == [1, 1, 1, 1]

@@ -1,0 +1,172 @@
+"""The experiment `ir-limits`: what it runs, and what it makes of made-up results."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from limits_table import limits_table
+
+from handover.scenarios.campaign.plan import PlannedRun
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.published.ir_grasp.ir_limits import IrLimits
+from handover.scenarios.published.ir_grasp.limits_axes import (
+    ARMS,
+    AXES,
+    BLIND,
+    CONTACT,
+    FORWARD_35,
+    FORWARD_55,
+    PAPER,
+    REFLEX,
+    Axis,
+)
+from handover.scenarios.published.ir_grasp.limits_results import LimitRuns, sentence_of_worth
+from handover.scenarios.published.published_experiment import Claim, Verdict
+
+WITHOUT = tuple(arm for arm in ARMS if not arm.looks)
+
+
+def axis(key: str) -> Axis:
+    return next(axis for axis in AXES if axis.key == key)
+
+
+def has_summary(run: PlannedRun) -> bool:
+    """The reflex holds all; hands that do not look hold what is nominal, or moved away by less than 60 mm.
+
+    The paper's algorithm fails in the dark.
+    """
+    p = run.parameters
+    if p.get("scene.reflectivity") == "0.2" and p.get("correction") == "paper":
+        return False
+    return p["strategy"] == "reflex" or p.get("shift") in (None, "0.02,0", "0.04,0")
+
+
+@pytest.fixture(scope="module")
+def table() -> CampaignTable:
+    return limits_table(has_summary)
+
+
+@pytest.fixture(scope="module")
+def runs(table: CampaignTable) -> LimitRuns:
+    return LimitRuns(table)
+
+
+@pytest.fixture(scope="module")
+def claims(table: CampaignTable) -> Sequence[Claim]:
+    return IrLimits().claims(table)
+
+
+def one(claims: Sequence[Claim], begin: str) -> Claim:
+    (found,) = (claim for claim in claims if claim.claim.startswith(begin))
+    return found
+
+
+def test_no_point_is_run_twice():
+    points = IrLimits().plan(quick=False).points
+    assert len({frozenset(p.items()) for p in points}) == len(points)
+
+
+def test_every_point_is_one_that_the_scenario_takes():
+    points = [point for axis in AXES for level in axis.all_levels for point in axis.settings(level)]
+    texts = {tuple(f"{name}={value}" for name, value in point.items() if "." not in name) for point in points}
+    assert all(not parse_parameters(IrGrasp, given).faults() for given in texts)
+    assert all(not parse_parameters(IrGrasp, [f"{n}={v}" for n, v in arm.parameters.items()]).faults() for arm in ARMS)
+
+
+def test_ways_share_their_scenes_and_objects_do_not():
+    plan = IrLimits().plan(quick=False)
+    seeds: dict[tuple[str, str | None], set[int]] = {}
+    for run in plan.runs():
+        seeds.setdefault((run.parameters["thing"], run.parameters.get("scene.mass_O")), set()).add(run.seed)
+    assert {len(of_object) for of_object in seeds.values()} == {plan.repetitions}
+    assert len({seed for of_object in seeds.values() for seed in of_object}) == len(seeds) * plan.repetitions
+
+
+def test_every_arm_has_runs_at_every_level(runs: LimitRuns):
+    for along in AXES:
+        for level in along.all_levels:
+            counts = {runs.count(arm, along, (level,))[1] for arm in ARMS}
+            assert counts == {3 * len(along.scenes)}, (along.key, level)
+
+
+def test_light_makes_no_difference_to_hands_that_do_not_look(runs: LimitRuns):
+    dark = axis("dark")
+    assert runs.rows(BLIND, dark, dark.levels[:1]) == runs.rows(BLIND, dark, dark.all_levels[:1])
+    assert runs.rows(PAPER, dark, dark.levels[:1]) != runs.rows(PAPER, dark, dark.all_levels[:1])
+
+
+def test_the_quick_plan_tries_every_arm_at_the_hardest_level_of_every_axis():
+    found = LimitRuns(limits_table(has_summary, quick=True))
+    assert all(found.count(arm, along, along.levels[-1:])[1] == 1 for arm in ARMS for along in AXES)
+
+
+def test_where_an_arm_falls_below_one_half_lies_between_levels(runs: LimitRuns):
+    assert runs.half(REFLEX, axis("away")) == "not within the range"
+    assert runs.half(FORWARD_55, axis("away")) == "50 mm"  # all at 40, none at 60
+    assert runs.half(FORWARD_55, axis("towards")) == "10 mm"
+    never = LimitRuns(limits_table(lambda run: run.parameters["strategy"] == "reflex"))
+    assert never.half(BLIND, axis("away")) == "from the start"
+    assert never.half(BLIND, axis("bar")) == "at 60 mm or before"
+
+
+def test_the_best_way_without_looking_is_that_which_held_most():
+    def held(run: PlannedRun) -> bool:
+        return run.parameters["strategy"] == "contact" and run.repetition == 0
+
+    best = {c.axis.key: c.best for c in LimitRuns(limits_table(held)).compared(REFLEX, WITHOUT)}
+    assert best["away"] is CONTACT
+    assert best["turn"] is CONTACT
+
+
+def test_looking_is_worth_it_where_pairs_differ_by_enough_and_costs_where_they_do_in_reverse(runs: LimitRuns):
+    worth = {c.axis.key: c for c in runs.compared(REFLEX, WITHOUT)}
+    assert (worth["towards"].verdict, worth["towards"].gain) == ("worth it", 1.0)
+    assert (worth["towards"].only_first, worth["towards"].only_second) == (60, 0)
+    assert worth["turn"].verdict == "no difference shown"
+    worse = LimitRuns(limits_table(lambda run: run.parameters["strategy"] == "forward"))
+    found = worse.compared(REFLEX, (FORWARD_35, FORWARD_55))
+    assert {c.verdict for c in found} == {"costs"}
+    assert sentence_of_worth(found).startswith("Looking nowhere holds 15 points more")
+
+
+def test_the_sentence_names_the_axes_from_the_greatest_gain_on(runs: LimitRuns):
+    sentence = sentence_of_worth(runs.compared(REFLEX, WITHOUT))
+    begin = "Looking holds more than the best way without, by 15 points or more, where the object is moved towards"
+    assert sentence.startswith(begin)
+    assert "moved away from the hand (+50)" in sentence
+    assert "neither is shown: " in sentence
+    assert sentence_of_worth([]) == "No axis was tried both with and without looking."
+
+
+def test_that_looking_is_worth_it_takes_four_axes(claims: Sequence[Claim]):
+    assert one(claims, "On at least 4 axes").verdict is Verdict.REPRODUCED
+    alike = IrLimits().claims(limits_table(lambda _run: True))
+    assert one(alike, "On at least 4 axes").verdict is Verdict.NOT_REPRODUCED
+
+
+def test_one_curve_for_all_materials_is_refuted_by_grasps_that_fail_in_the_dark(claims: Sequence[Claim]):
+    dark = one(claims, "One calibration curve")
+    assert (dark.verdict, dark.beyond, dark.where) == (Verdict.NOT_REPRODUCED, False, "sec. V-B")
+    assert one(claims, "One curve is enough for all sensors").verdict is Verdict.REPRODUCED
+
+
+@pytest.mark.parametrize(("pushed", "holds"), [(0.004, True), (0.016, False)])
+def test_pushing_is_judged_by_median_and_most(pushed: float, holds: bool):
+    claim = one(IrLimits().claims(limits_table(has_summary, displacement=pushed)), "Before it closes")
+    assert (claim.verdict is Verdict.REPRODUCED) is holds
+
+
+@pytest.mark.slow
+def test_figures_are_left_as_png_and_svg(table: CampaignTable, tmp_path: Path):
+    names = {figure.name for figure in IrLimits().draw(table, tmp_path, tmp_path)}
+    assert names == {"limits", "limits_displacement"}
+    assert {p.name for p in tmp_path.iterdir()} == {f"{n}.{s}" for n in names for s in ("png", "svg")}
+
+
+def test_without_runs_there_are_neither_verdicts_nor_figures(table: CampaignTable, tmp_path: Path):
+    empty = CampaignTable(table.table.slice(0, 0))
+    assert {c.verdict for c in IrLimits().claims(empty)} == {Verdict.NOT_COMPARABLE}
+    assert [len(t.rows) for t in IrLimits().tables(empty)] == [0, 0, 0, 0]
+    assert IrLimits().draw(empty, tmp_path, tmp_path) == []
