@@ -189,7 +189,7 @@ def sentence_of_worth(compared: Sequence[Comparison]) -> str:
         f"Looking holds more than the best way without, by {round(100 * WORTH)} points or more, where the object is "
         f"{_listed(worth)}"
         if worth
-        else f"Looking nowhere holds {round(100 * WORTH)} points more than the best way without",
+        else f"Looking is nowhere shown to hold {round(100 * WORTH)} points more than the best way without",
         *([f"less, by as much, where it is {_listed(costs)}"] if costs else []),
     ]
     rest = f" On {len(other)} of {len(compared)} axes neither is shown: {_listed(other)}." if other else ""

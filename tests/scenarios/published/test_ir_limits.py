@@ -128,7 +128,7 @@ def test_looking_is_worth_it_where_pairs_differ_by_enough_and_costs_where_they_d
     worse = LimitRuns(limits_table(lambda run: run.parameters["strategy"] == "forward"))
     found = worse.compared(REFLEX, (FORWARD_35, FORWARD_55))
     assert {c.verdict for c in found} == {"costs"}
-    assert sentence_of_worth(found).startswith("Looking nowhere holds 15 points more")
+    assert sentence_of_worth(found).startswith("Looking is nowhere shown to hold 15 points more")
 
 
 def test_the_sentence_names_the_axes_from_the_greatest_gain_on(runs: LimitRuns):
