@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -109,8 +109,8 @@ class HelixHandover(Experiment[HandoverEvaluator]):
             s.connect(getattr(s.units["vision"].y, name), getattr(s.units["servo"].u, name))
         return s
 
-    def without_measurements(self, p: Parameters, seed: int, fmu: FmuOf) -> System:
-        """Wire all but what the controller gets of vision."""
+    def without_measurements(self, p: Parameters, seed: int, fmu: FmuOf, **of_cameras: Any) -> System:
+        """Wire all but what the controller gets of vision; the cameras may have more values set."""
         hand_seed, camera_seed, click_seed, servo_seed = (
             int(n) for n in np.random.SeedSequence(seed).generate_state(4) >> 1
         )
@@ -141,6 +141,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
             rings=p.rings,
             **camera_parameters(p.camera_turn, p.cameras),
             **p.camera_values(),
+            **of_cameras,
         )
         vision = s.add(
             "vision",

@@ -62,8 +62,7 @@ class HelixReflexGrasp(HelixHandover):
         p: ReflexGraspParameters = parameters
         place_seed, sensor_seed = (int(n) for n in np.random.SeedSequence((seed, 19)).generate_state(2) >> 1)
         handover = offered(p, place_seed)
-        s = self.without_measurements(handover, seed, fmu)
-        s.units["camera"].start.update(p.covers)
+        s = self.without_measurements(handover, seed, fmu, **p.covers)
         fingers = s.add(
             "fingers",
             fmu("fingers"),
@@ -101,6 +100,10 @@ class HelixReflexGrasp(HelixHandover):
         """Return an evaluator with the pictures that the run's folder keeps."""
         p: ReflexGraspParameters = parameters
         return ReflexGraspEvaluator(p.handover, pictures)
+
+    def cycle(self) -> tuple[str, ...]:
+        """Return the units that run on the robot's computer: vision, reflex and control."""
+        return ("vision", "reflex", "servo")
 
     def published(self, parameters: Any) -> Sequence[PublishedValue]:  # noqa: ARG002
         """Return nothing: nobody has published such a grasp."""

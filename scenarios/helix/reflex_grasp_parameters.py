@@ -50,7 +50,8 @@ class ReflexGraspParameters:
         0.0, "angle by which the right camera was turned after calibration", minimum=-0.2, maximum=0.2
     )
     reflectivity: Number = parameter(
-        1.0, "reflectivity of the ball over that of the surface the sensors were characterised with",
+        1.0,
+        "reflectivity of the ball over that of the surface the sensors were characterised with",
         minimum=0.05,
         maximum=2.0,
     )

@@ -20,8 +20,12 @@ def figure_of_reflex(parameters: ReflexGraspParameters, record: Record) -> TimeF
     true, believed = _in_gripper(record), record["reflex.p_GO_est"]
     is_near = np.linalg.norm(true, axis=1) < _NEAR
     ways = (
-        ("Ball beside the gripper's axis", lambda p: np.hypot(p[:, 0], p[:, 1])),
-        ("Ball along the gripper's axis", lambda p: p[:, 2]),
+        (
+            "Ball beside the gripper's axis",
+            np.linalg.norm(true[:, :2], axis=1),
+            np.linalg.norm(believed[:, :2], axis=1),
+        ),
+        ("Ball along the gripper's axis", true[:, 2], believed[:, 2]),
     )
     places = [
         TimePlot(
@@ -30,17 +34,17 @@ def figure_of_reflex(parameters: ReflexGraspParameters, record: Record) -> TimeF
             unit="mm",
             phases=phases,
             curves=[
-                Curve(label="true", values=np.where(is_near, 1e3 * part(true), np.nan)),
+                Curve(label="true", values=np.where(is_near, 1e3 * of_true, np.nan)),
                 Curve(
                     label="as the controller has it",
-                    values=np.where(is_near, 1e3 * part(believed), np.nan),
+                    values=np.where(is_near, 1e3 * of_belief, np.nan),
                     held=True,
                     stroke="dashed",
                 ),
             ],
             levels=() if k else (Level(label="near", value=1e3 * parameters.near),),
         )
-        for k, (title, part) in enumerate(ways)
+        for k, (title, of_true, of_belief) in enumerate(ways)
     ]
     readings = [
         TimePlot(

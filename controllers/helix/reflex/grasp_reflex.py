@@ -1,4 +1,4 @@
-"""Infrared reflex of the Helix's gripper: fingers correct where the visual servo takes the ball to be. [Luberto]"""
+"""Infrared reflex of the Helix's gripper: fingers correct where the servo takes the ball to be, after [Luberto]."""
 
 import enum
 import math
@@ -75,7 +75,10 @@ class Params:
         0.12, "distance of ball and gripper within which it is reckoned on where cameras fail", minimum=0.0, maximum=1.0
     )
     lost: Metre = parameter(
-        0.04, "standard deviation of the offset at which a ball that cameras do not see is lost", minimum=0.0, maximum=1.0
+        0.04,
+        "standard deviation of the offset at which a ball that cameras do not see is lost",
+        minimum=0.0,
+        maximum=1.0,
     )
     slip: Number = parameter(
         0.3, "doubt of the gripper's motion, as a part of the commanded one", minimum=0.0, maximum=2.0
@@ -117,7 +120,7 @@ class Params:
     @property
     def doubts(self) -> Doubts:
         """What is believed of errors."""
-        names = ("slip", "wander", "bias", "brightness", "reading", "noise", "memory")
+        names = ("wander", "bias", "brightness", "reading", "noise", "memory")
         return Doubts(**{name: getattr(self, name) for name in names})
 
 
@@ -136,7 +139,9 @@ class Inputs:
     ticks: Vector6[Tick] = port(np.zeros(6), "readings: of the sensors that look across, then of those that look ahead")
     grip: Number = port(0.0, "closure of the gripper by its encoder: 0 open, 1 closed")
     dl_t: Vector9[Metre] = port(np.zeros(9), "tendon length change from calibration that is in force")
-    q_est: Vector9[Number] = port(_Q_CALIB, "state that explains the measured pose: Dx, Dy (rad), l (m) of each segment")
+    q_est: Vector9[Number] = port(
+        _Q_CALIB, "state that explains the measured pose: Dx, Dy (rad), l (m) of each segment"
+    )
 
 
 @dataclass(kw_only=True)
@@ -162,8 +167,9 @@ class GraspReflex:
     """Stands between vision and servo, and corrects the goal that the servo's Jacobian control goes to.
 
     `OffsetFilter` has where the ball is from the gripper. The cameras tell it while they see ball and ring; the fingers
-    do, once `sensors_min` of them read something; and the motors do: the tendons' lengths give the commanded state,
-    whose change moves the gripper by J dq, times the part of such motion that it made of late (`Response`).
+    do, once `sensors_min` of them read something; and the gripper's motion does, as the ring shows it, or else as the
+    motors make it: the tendons' lengths give the commanded state, whose change moves the gripper by J dq, times what
+    it made of such motion of late (`Response`).
 
     - While the cameras see both, their measurements go on to the servo, the ball's less what the fingers find the
       cameras to have wrong, beta.
@@ -202,29 +208,29 @@ class GraspReflex:
         self._q: Floats | None = None  # commanded state at the last step
         self._t = -math.inf  # of that step
         self._t_felt = -math.inf  # of the last readings that were taken in
-        self._R_WG: Floats = np.diag([1.0, -1.0, -1.0])
-        self._X: Floats | None = None  # wrist and gripper in W, shape (6,), m, as measured or reckoned
+        self._orientation: Floats = np.diag([1.0, -1.0, -1.0])  # R_WG
+        self._pose: Floats | None = None  # wrist and gripper in W, shape (6,), m, as measured or reckoned
+        self._is_measured = False  # that pose
         self._source = Source.NONE
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return what follows from the present measurements and what is believed; no time passes."""
-        f, sees = self._filter, u.seen_O and u.seen_R
-        reckons = not sees and self._is_near
-        known = self._X is not None and reckons and not u.seen_R
-        p_WR, p_WG = (u.p_WR_meas, u.p_WG_meas) if self._X is None or not known else (self._X[:3], self._X[3:])
+        f, sees, pose = self._filter, u.seen_O and u.seen_R, self._pose
+        reckons = not sees and pose is not None and self._is_near
+        p_WR, p_WG = (u.p_WR_meas, u.p_WG_meas) if pose is None or u.seen_R or not reckons else (pose[:3], pose[3:])
         p_WO = p_WG + f.offset if reckons else u.p_WO_meas - (f.bias if sees else 0.0)
         reckoned = _RECKONED * np.eye(3)
         return Outputs(
             p_WO=np.array(p_WO),
             p_WR=np.array(p_WR),
             p_WG=np.array(p_WG),
-            P_O=np.array(f.covariance if reckons else u.cov_O),
-            P_R=np.array(reckoned if known else u.cov_R),
-            P_G=np.array(reckoned if known else u.cov_G),
+            P_O=np.array(f.offset_covariance if reckons else u.cov_O),
+            P_R=np.array(u.cov_R if u.seen_R or not reckons else reckoned),
+            P_G=np.array(u.cov_G if u.seen_R or not reckons else reckoned),
             known_O=u.seen_O or reckons,
             known_R=u.seen_R or reckons,
             source=self._source,
-            p_GO_est=np.transpose(self._R_WG) @ f.offset,
+            p_GO_est=np.transpose(self._orientation) @ f.offset,
             deviation=f.deviation,
             reflectivity=f.reflectivity,
             sensors=int(np.count_nonzero(u.ticks >= self._params.ticks_min)),
@@ -233,15 +239,12 @@ class GraspReflex:
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Reckon on, then take in what cameras and fingers measure."""
         _check_inputs(u)
-        self._reckon(t, u)
-        if u.seen_R:
-            self._X = np.concatenate([u.p_WR_meas, u.p_WG_meas])
-            self._response.observe(u.p_WG_meas, t)
+        self._follow_gripper(t, u)
         if u.seen_O and u.seen_R:
             self._filter.see(u.p_WO_meas - u.p_WG_meas, u.cov_O + u.cov_G)
         feels = self._feels(u)
         if feels:
-            self._filter.feel(u.ticks, self._R_WG, u.grip, t - self._t_felt)
+            self._filter.feel(u.ticks, self._orientation, u.grip, t - self._t_felt)
             self._t_felt = t
         self._source = self._source_of(u.seen_O and u.seen_R, feels)
         return self.outputs(t + dt, u)
@@ -249,12 +252,14 @@ class GraspReflex:
     def get_state(self) -> bytes:
         """Return the complete state."""
         parts = (self._filter.get_state(), self._lag.pending, self._response.get_state())
-        return pack_state((parts, self._q, (self._t, self._t_felt), self._R_WG, self._X, int(self._source)))
+        gripper = (self._orientation, self._pose, self._is_measured)
+        return pack_state((parts, self._q, (self._t, self._t_felt), gripper, int(self._source)))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state that `get_state` gave."""
         saved: Any = unpack_state(state)
-        (found, pending, response), self._q, (self._t, self._t_felt), self._R_WG, self._X, source = saved
+        (found, pending, response), self._q, (self._t, self._t_felt), gripper, source = saved
+        self._orientation, self._pose, self._is_measured = gripper
         self._filter.set_state(found)
         self._lag.pending = pending
         self._response.set_state(response)
@@ -266,25 +271,38 @@ class GraspReflex:
         p, f = self._params, self._filter
         return f.known and float(np.linalg.norm(f.offset)) < p.near and f.deviation < p.lost
 
-    def _reckon(self, t: float, u: Inputs) -> None:
-        """Let the gripper move as the motors have moved it since the last step."""
+    def _follow_gripper(self, t: float, u: Inputs) -> None:
+        """Let the offset change as the gripper has moved since the last step: as measured, or else as commanded."""
         elapsed = t - self._t if self._q is not None else 0.0
+        commanded, before = self._commanded_motion(elapsed, u), self._pose
+        if u.seen_R:
+            self._pose = np.concatenate([u.p_WR_meas, u.p_WG_meas])
+            self._response.observe(u.p_WG_meas, t)
+        elif before is not None:
+            self._pose = before + commanded
+        if u.seen_R and self._is_measured and before is not None:
+            self._filter.move(u.p_WG_meas - before[3:], elapsed, slip=0.0)
+        else:
+            self._filter.move(commanded[3:], elapsed, self._params.slip)
+        self._is_measured = u.seen_R
+        self._orientation = np.diag(W_FROM_B[:3]) @ orientation(u.q_est)
+        self._t = t
+
+    def _commanded_motion(self, elapsed: float, u: Inputs) -> Floats:
+        """Return how the motors have moved wrist and gripper since the last step, in W, shape (6,), m."""
         q = state_of(self._l_t_calib + u.dl_t, self._params.d_tendon)
         if self._q is not None and not np.array_equal(q, self._q):
             motion = W_FROM_B * (linearise(u.q_est, self._params.d_gripper)[1] @ (q - self._q))
             self._response.command(motion[3:])
-            self._lag.add(self._response.part * motion)
-        moved = self._lag.advance(elapsed)
-        self._filter.move(moved[3:], elapsed)
-        if self._X is not None:
-            self._X = self._X + moved
-        self._R_WG = np.diag(W_FROM_B[:3]) @ orientation(u.q_est)
-        self._q, self._t = q, t
+            self._lag.add(self._response.gain * motion)
+        self._q = q
+        return self._lag.advance(elapsed)
 
     def _feels(self, u: Inputs) -> bool:
         """Return whether enough fingers read something of a ball that is near."""
         p = self._params
-        return p.feels and self._is_near and np.count_nonzero(u.ticks >= p.ticks_min) >= p.sensors_min
+        sees = int(np.count_nonzero(u.ticks >= p.ticks_min))
+        return p.feels and self._is_near and sees >= p.sensors_min
 
     def _source_of(self, sees: bool, feels: bool) -> Source:
         if sees:

@@ -1,8 +1,8 @@
 """Where the ball is from the gripper: an extended Kalman filter of what cameras, fingers and motors say.
 
-Its state is x = [b, beta, s], shape (7,): b = p_WO - p_WG in W, m; beta, by how much the cameras have b wrong, m; and s,
-the logarithm of the ball's reflectivity over the reference's. Cameras measure b + beta, fingers exp(s) h(R_GW b), and
-as the gripper is moved by m, b becomes b - m.
+Its state is x = [b, beta, s], shape (7,): b = p_WO - p_WG in W, m; beta, by how much the cameras have b wrong, m; and
+s, the logarithm of the ball's reflectivity over the reference's. Cameras measure b + beta, fingers exp(s) h(R_GW b),
+and as the gripper is moved by m, b becomes b - m.
 """
 
 import math
@@ -28,8 +28,7 @@ class Doubts:
     """Standard deviations of what the filter believes.
 
     Attributes:
-        slip: of the gripper's motion, as a part of the commanded one.
-        wander: of b after a second in which nothing is commanded, m.
+        wander: of b after a second, m: ball and arm move by themselves.
         bias: of beta, m.
         brightness: of s.
         reading: of a reading, as a part of the expected one; it stays alike for `memory`.
@@ -37,7 +36,6 @@ class Doubts:
         memory: time for which errors of readings stay alike, s.
     """
 
-    slip: float
     wander: float
     bias: float
     brightness: float
@@ -59,14 +57,14 @@ class OffsetFilter:
 
     Attributes:
         x: the state, shape (7,).
-        P: its covariance, shape (7, 7).
+        cov: its covariance, shape (7, 7).
         known: whether cameras have given b.
     """
 
     def __init__(self, model: FingerModel, doubts: Doubts) -> None:
         self._model, self._doubts = model, doubts
         self.x: Floats = np.zeros(7)
-        self.P: Floats = np.diag([1.0] * 3 + [doubts.bias**2] * 3 + [doubts.brightness**2])
+        self.cov: Floats = np.diag([1.0] * 3 + [doubts.bias**2] * 3 + [doubts.brightness**2])
         self.known = False
 
     @property
@@ -80,31 +78,31 @@ class OffsetFilter:
         return self.x[_BETA]
 
     @property
-    def covariance(self) -> Floats:
+    def offset_covariance(self) -> Floats:
         """Covariance of b, shape (3, 3), m2."""
-        return self.P[_B, _B]
+        return self.cov[_B, _B]
 
     @property
     def deviation(self) -> float:
         """Standard deviation of b: the root of its covariance's trace, m."""
-        return math.sqrt(float(np.trace(self.covariance)))
+        return math.sqrt(float(np.trace(self.offset_covariance)))
 
     @property
     def reflectivity(self) -> float:
         """Reflectivity of the ball over the reference's, as estimated."""
         return math.exp(self.x[_S])
 
-    def move(self, motion: Floats, dt: float) -> None:
-        """Let the gripper move by `motion`, shape (3,), in W, m, in a time dt, s."""
+    def move(self, motion: Floats, dt: float, slip: float) -> None:
+        """Let the gripper move by `motion`, shape (3,), in W, m, in a time dt, s, give or take a part `slip` of it."""
         self.x[_B] -= motion
-        doubt = self._doubts.slip**2 * float(motion @ motion) + self._doubts.wander**2 * dt
-        self.P[_B, _B] += doubt * np.eye(3)
+        doubt = slip**2 * float(motion @ motion) + self._doubts.wander**2 * dt
+        self.cov[_B, _B] += doubt * np.eye(3)
 
     def see(self, b: Floats, R: Floats) -> None:
         """Take the cameras' measurement of b, shape (3,), m, with its covariance R, shape (3, 3)."""
         if not self.known:
-            self.x[_B], self.P[_B, _B], self.known = b, R + self.P[_BETA, _BETA], True
-            self.P[_B, _BETA] = self.P[_BETA, _B] = -self.P[_BETA, _BETA]
+            self.x[_B], self.cov[_B, _B], self.known = b, R + self.cov[_BETA, _BETA], True
+            self.cov[_B, _BETA] = self.cov[_BETA, _B] = -self.cov[_BETA, _BETA]
             return
         H = np.zeros((3, 7))
         H[:, _B], H[:, _BETA] = np.eye(3), np.eye(3)
@@ -123,24 +121,24 @@ class OffsetFilter:
         x, doubts = before, self._doubts
         weight = max(doubts.memory / dt, 1.0) if dt > 0.0 else 1.0
         H = np.zeros((len(ticks), 7))
-        K = np.zeros((7, len(ticks)))
+        gain = np.zeros((7, len(ticks)))
         for _ in range(_ITERATIONS):
             h, dh = self._expected(beams, x, R_WG)
             H[:, _B], H[:, _S] = dh, h
             palm = self._model.of_palm(beams, np.transpose(R_WG) @ x[_B], -R_WG[2])
             variance = doubts.noise**2 + (doubts.reading * np.maximum(h, ticks)) ** 2 + palm**2
-            K = self._gain(H, weight * np.diag(variance))
-            following = before + K @ (ticks - h - H @ (before - x))
+            gain = self._gain(H, weight * np.diag(variance))
+            following = before + gain @ (ticks - h - H @ (before - x))
             change = np.abs(following - x).max()
             x = following
             if change < _SETTLED:
                 break
         self.x = x
-        self.P = self._reduced(K, H)
+        self.cov = self._reduced(gain, H)
 
     def get_state(self) -> tuple[Any, ...]:
         """Return the complete state."""
-        return np.array(self.x), np.array(self.P), self.known
+        return np.array(self.x), np.array(self.cov), self.known
 
     def set_state(self, state: tuple[Any, ...]) -> None:
         """Restore what `get_state` gave."""
@@ -156,12 +154,13 @@ class OffsetFilter:
     def _update(self, H: Floats, innovation: Floats, R: Floats) -> None:
         K = self._gain(H, R)
         self.x = self.x + K @ innovation
-        self.P = self._reduced(K, H)
+        self.cov = self._reduced(K, H)
 
     def _gain(self, H: Floats, R: Floats) -> Floats:
-        PH = self.P @ np.transpose(H)
-        return np.transpose(np.linalg.solve(H @ PH + R, np.transpose(PH)))
+        PH = self.cov @ np.transpose(H)
+        K_transposed: Floats = np.linalg.solve(H @ PH + R, np.transpose(PH)).astype(np.float64)
+        return np.transpose(K_transposed)
 
     def _reduced(self, K: Floats, H: Floats) -> Floats:
-        P = (np.eye(7) - K @ H) @ self.P
+        P = (np.eye(7) - K @ H) @ self.cov
         return 0.5 * (P + np.transpose(P))

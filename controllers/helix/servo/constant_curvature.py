@@ -69,12 +69,11 @@ def linearise(q: Floats, d_gripper: float) -> tuple[Floats, Floats]:
 
 def orientation(q: Floats) -> Floats:
     """Return R_BG of eq. (5), shape (3, 3): of the arm's end, and so of wrist and gripper, without twist."""
-    R = np.eye(3)
+    segments: list[Floats] = []
     for i in (0, 3, 6):
         Dx, Dy, _ = q[i : i + 3].tolist()
-        A, S, C, _, _ = _curvature_functions(Dx, Dy)
-        R = R @ _rotation(Dx, Dy, A, S, C)
-    return R
+        segments.append(_rotation(Dx, Dy, *_curvature_functions(Dx, Dy)[:3]))
+    return segments[0] @ segments[1] @ segments[2]
 
 
 def tendon_lengths(q: Floats, d: float) -> Floats:

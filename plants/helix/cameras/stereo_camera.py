@@ -227,7 +227,8 @@ class StereoCamera:
     is seen any more, `cover_within`.
 
     The state is that of the noise, how near gripper and ball came, and the scene of the last pictures: they are painted
-    again from these, unless they are those that were painted last. Pictures cannot be written to, since they may be handed out again.
+    again from these, unless they are those that were painted last. Pictures cannot be written to, since they may be
+    handed out again.
 
     Raises:
         InvalidCalibration: a quaternion is not of unit length or a focal length not positive.
@@ -305,7 +306,7 @@ class StereoCamera:
         self._is_current = False
 
     def _shown(self) -> tuple[Any, ...]:
-        """Return on what the last pictures depend: noise, which are lost, how near gripper and ball were, time, scene."""
+        """Return on what the last pictures depend: noise, which are lost, how near the gripper was, time and scene."""
         taken = None if self._taken is None else (self._taken[0], tuple(vars(self._taken[1]).values()))
         return self._offsets, self._lost, self._nearest, taken
 
