@@ -27,7 +27,8 @@ class FingerModel:
     """Sensors of one characteristic y = a e^(bx) + c e^(dx), eq. (11), whose beams are bundles of rays.
 
     A reading is the mean over the rays of the ticks x(y) cos(theta), y being the way to the ball along the ray and
-    theta the angle from the ball's normal. Lengths are in m, angles in rad, ticks of a 12-bit converter.
+    theta the angle from the ball's normal. Nearer than `nearest` it falls evenly to the share `contact` at contact, by
+    the data sheet. Lengths are in m, angles in rad, ticks of a 12-bit converter.
     """
 
     a: float
@@ -36,6 +37,7 @@ class FingerModel:
     d: float
     nearest: float
     farthest: float
+    contact: float
     beam: float
     across: float
     ahead: float
@@ -103,5 +105,6 @@ class FingerModel:
 
     def _ticks(self, distance: Floats) -> Floats:
         """Return the inverted characteristic; nothing is seen beyond `farthest`."""
-        seen = distance <= self.farthest
-        return np.where(seen, np.interp(np.maximum(distance, self.nearest), *self._curve), 0.0)
+        far, nearness = np.maximum(distance, self.nearest), np.clip(distance / self.nearest, 0.0, 1.0)
+        share = self.contact + (1.0 - self.contact) * nearness
+        return np.where(distance <= self.farthest, share * np.interp(far, *self._curve), 0.0)

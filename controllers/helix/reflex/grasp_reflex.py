@@ -60,6 +60,7 @@ class Params:
     d: PerTick = parameter(-0.00043, "d of the characteristic", minimum=-0.1, maximum=-1e-9)
     nearest: Metre = parameter(0.004, "distance of the largest reading", minimum=1e-4, maximum=0.1)
     farthest: Metre = parameter(0.065, "distance beyond which nothing is seen", minimum=1e-3, maximum=0.15)
+    contact: Number = parameter(0.4, "share of the largest reading that is left at contact", minimum=0.0, maximum=1.0)
     beam: Radian = parameter(0.35, "half the opening angle of a sensor's beam", minimum=0.0, maximum=0.7)
     across: Radian = parameter(
         -0.23,
@@ -114,7 +115,7 @@ class Params:
     @property
     def model(self) -> FingerModel:
         """The fingers as they are expected to be."""
-        names = ("a", "b", "c", "d", "nearest", "farthest", "beam", "across", "ahead", "ball_radius")
+        names = ("a", "b", "c", "d", "nearest", "farthest", "contact", "beam", "across", "ahead", "ball_radius")
         return FingerModel(**{name: getattr(self, name) for name in names})
 
     @property

@@ -142,7 +142,7 @@ class OffsetFilter:
 
     def set_state(self, state: tuple[Any, ...]) -> None:
         """Restore what `get_state` gave."""
-        self.x, self.P, self.known = state
+        self.x, self.cov, self.known = state
 
     def _expected(self, beams: tuple[Floats, Floats], x: Floats, R_WG: Floats) -> tuple[Floats, Floats]:
         """Return expected readings, shape (6,), and their derivatives by b, shape (6, 3), 1/m."""
