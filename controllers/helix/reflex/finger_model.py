@@ -18,8 +18,6 @@ _AZIMUTHS = np.radians([60.0, 180.0, 300.0])
 _WINDOW = 0.0042  # from the middle of the fingertip, m
 _FULL_SCALE = 4095
 _RINGS = ((0.0, 1), (0.5, 6), (0.9, 12))  # rays of a beam: part of its half angle, how many
-_PALM = 0.06
-"""How far from the ball's axis a palm may reach, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +40,7 @@ class FingerModel:
     across: float
     ahead: float
     ball_radius: float
+    palm_radius: float
 
     @cached_property
     def _curve(self) -> tuple[Floats, Floats]:
@@ -77,21 +76,24 @@ class FingerModel:
         return (self._ticks(distance) * cosine).mean(axis=-1)
 
     def of_palm(self, beams: tuple[Floats, Floats], p_GO: Floats, down: Floats) -> Floats:
-        """Return the ticks that a palm under the ball may add, shape (6,): of the rays that pass the ball.
+        """Return the ticks that a palm as bright as the reference adds, on which the ball lies: shape (..., 6).
+
+        It is a flat disc about the ball's lowest point, and rays that meet the ball do not get there.
 
         Args:
             beams: as `beams` gives them.
-            p_GO: the ball, shape (3,), m.
+            p_GO: places of the ball, shape (..., 3), m.
             down: unit vector down, in G.
         """
         window, rays = beams
-        passes = ~np.isfinite(self._ball(beams, p_GO)[0])
-        height, fall = (p_GO - window) @ down + self.ball_radius, rays @ down
-        falls = passes & (fall > 1e-9) & (height > 0.0)
-        distance = np.where(falls, height / np.where(falls, fall, 1.0), np.inf)
-        beside = window + np.where(falls, distance, 0.0)[..., None] * rays - p_GO
-        square = np.sum(beside**2, axis=-1) - (beside @ down) ** 2
-        return (self._ticks(np.where(square < _PALM**2, distance, np.inf)) * np.where(falls, fall, 0.0)).mean(axis=-1)
+        from_ball = window - p_GO[..., None, None, :]
+        height, fall = self.ball_radius - from_ball @ down, rays @ down
+        falls = (fall > 1e-9) & (height > 0.0) & ~np.isfinite(self._ball(beams, p_GO)[0])
+        distance = np.where(falls, height / np.where(fall > 1e-9, fall, 1.0), 1.0)
+        at = from_ball + distance[..., None] * rays
+        beside = np.sum(at**2, axis=-1) - (at @ down) ** 2
+        is_met = falls & (beside < self.palm_radius**2)
+        return (self._ticks(np.where(is_met, distance, np.inf)) * np.where(is_met, fall, 0.0)).mean(axis=-1)
 
     def _ball(self, beams: tuple[Floats, Floats], p_GO: Floats) -> tuple[Floats, Floats]:
         """Return where rays meet a ball, m (inf: nowhere), and the cosines of incidence: shapes (..., 6, rays)."""

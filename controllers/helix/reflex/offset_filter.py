@@ -1,8 +1,8 @@
 """Where the ball is from the gripper: an extended Kalman filter of what cameras, fingers and motors say.
 
 Its state is x = [b, beta, s], shape (7,): b = p_WO - p_WG in W, m; beta, by how much the cameras have b wrong, m; and
-s, the logarithm of the ball's reflectivity over the reference's. Cameras measure b + beta, fingers exp(s) h(R_GW b),
-and as the gripper is moved by m, b becomes b - m.
+s, the logarithm of the ball's reflectivity over the reference's. Cameras measure b + beta, fingers the ball's
+exp(s) h_O(R_GW b) and the palm's h_H(R_GW b), and as the gripper is moved by m, b becomes b - m.
 """
 
 import math
@@ -18,9 +18,11 @@ _B, _BETA = slice(0, 3), slice(3, 6)
 _S = 6
 _STEP = 0.0005
 """Displacement of the ball for differences of expected readings, m."""
-_ITERATIONS = 8
-_SETTLED = 1e-5
-"""Change of the state below which the iteration ends."""
+_ITERATIONS = 6
+_SETTLED = 1e-3
+"""Gain of the cost, which is a sum of squared standard deviations, below which the iteration ends."""
+_STARTS = (0.0, -0.02, -0.01, 0.01, 0.02)
+"""How far along the gripper's axis the ball is tried at, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +33,8 @@ class Doubts:
         wander: of b after a second, m: ball and arm move by themselves.
         bias: of beta, m.
         brightness: of s.
-        reading: of a reading, as a part of the expected one; it stays alike for `memory`.
+        reading: of what the ball adds to a reading, as a part of it; it stays alike for `memory`.
+        palm_doubt: of what the palm adds, likewise.
         noise: of a reading, ticks.
         memory: time for which errors of readings stay alike, s.
     """
@@ -40,6 +43,7 @@ class Doubts:
     bias: float
     brightness: float
     reading: float
+    palm_doubt: float
     noise: float
     memory: float
 
@@ -47,13 +51,14 @@ class Doubts:
 class OffsetFilter:
     """Follows x; an update by the fingers is Gauss-Newton's iteration on the residuals of readings and of the belief.
 
-    Minimising |z - exp(s) h|^2_R + |x - x_0|^2_P by Gauss-Newton ([Luberto] eqs. (4)-(10), with a model's derivatives
+    Minimising |z - h|^2_R + |x - x_0|^2_P by Gauss-Newton ([Luberto] eqs. (4)-(10), with a model's derivatives
     in the place of probing moves) is the iterated extended Kalman filter (B. M. Bell, F. W. Cathey, IEEE Trans. Autom.
     Control 38 (1993)).
 
     Args:
         model: of the fingers.
         doubts: what is believed of errors.
+        palm: reflectivity of the palm under the ball over the reference's; 0: there is none.
 
     Attributes:
         x: the state, shape (7,).
@@ -61,8 +66,8 @@ class OffsetFilter:
         known: whether cameras have given b.
     """
 
-    def __init__(self, model: FingerModel, doubts: Doubts) -> None:
-        self._model, self._doubts = model, doubts
+    def __init__(self, model: FingerModel, doubts: Doubts, palm: float = 0.0) -> None:
+        self._model, self._doubts, self._palm = model, doubts, palm
         self.x: Floats = np.zeros(7)
         self.cov: Floats = np.diag([1.0] * 3 + [doubts.bias**2] * 3 + [doubts.brightness**2])
         self.known = False
@@ -118,23 +123,44 @@ class OffsetFilter:
             dt: time since the last readings, s: what stays alike for `memory` is not taken for new in each.
         """
         beams, before = self._model.beams(grip), self.x
-        x, doubts = before, self._doubts
-        weight = max(doubts.memory / dt, 1.0) if dt > 0.0 else 1.0
-        H = np.zeros((len(ticks), 7))
-        gain = np.zeros((7, len(ticks)))
+        weight = max(self._doubts.memory / dt, 1.0) if dt > 0.0 else 1.0
+        information: Floats = np.linalg.inv(self.cov).astype(np.float64)
+        x = self._start(beams, ticks, R_WG, weight, information)
+        best, least = before, math.inf
+        posterior = self.cov
         for _ in range(_ITERATIONS):
-            h, dh = self._expected(beams, x, R_WG)
-            H[:, _B], H[:, _S] = dh, h
-            palm = self._model.of_palm(beams, np.transpose(R_WG) @ x[_B], -R_WG[2])
-            variance = doubts.noise**2 + (doubts.reading * np.maximum(h, ticks)) ** 2 + palm**2
-            gain = self._gain(H, weight * np.diag(variance))
-            following = before + gain @ (ticks - h - H @ (before - x))
-            change = np.abs(following - x).max()
-            x = following
-            if change < _SETTLED:
+            ball, palm, dh = self._expected(beams, x, R_WG)
+            R, off = weight * self._variance(ball, palm, ticks), x - before
+            cost = float(_cost(ticks - ball - palm, R) + off @ information @ off)
+            if cost > least - _SETTLED:
                 break
-        self.x = x
-        self.cov = self._reduced(gain, H)
+            best, least = x, cost
+            H = np.column_stack([dh, np.zeros((len(ticks), 3)), ball])
+            gain = self._gain(H, np.diag(R))
+            posterior = self._reduced(gain, H)
+            x = before + gain @ (ticks - ball - palm + H @ off)
+        self.x, self.cov = best, posterior
+
+    def _start(
+        self, beams: tuple[Floats, Floats], ticks: Floats, R_WG: Floats, weight: float, information: Floats
+    ) -> Floats:
+        """Return the state from which to iterate: the belief, or one moved along the gripper's axis that is likelier.
+
+        What a beam reads is the same of a ball before its axis and beyond, so that the cost has more than one minimum.
+        """
+        moved = self.x[_B] + np.array(_STARTS)[:, None] * R_WG[:, 2]
+        ball, palm = self._readings(beams, moved @ R_WG, R_WG, self.x[_S])
+        R = weight * self._variance(ball, palm, ticks)
+        prior = np.array(_STARTS) ** 2 * float(R_WG[:, 2] @ information[_B, _B] @ R_WG[:, 2])
+        x = np.array(self.x)
+        x[_B] = moved[int(np.argmin(_cost(ticks - ball - palm, R) + prior))]
+        return x
+
+    def _variance(self, ball: Floats, palm: Floats, ticks: Floats) -> Floats:
+        """Return the variance of readings of which ball and palm make these parts, shapes (..., 6)."""
+        d = self._doubts
+        of_ball = d.reading * np.maximum(ball, ticks - palm)
+        return d.noise**2 + of_ball**2 + (d.palm_doubt * palm) ** 2
 
     def get_state(self) -> tuple[Any, ...]:
         """Return the complete state."""
@@ -144,12 +170,18 @@ class OffsetFilter:
         """Restore what `get_state` gave."""
         self.x, self.cov, self.known = state
 
-    def _expected(self, beams: tuple[Floats, Floats], x: Floats, R_WG: Floats) -> tuple[Floats, Floats]:
-        """Return expected readings, shape (6,), and their derivatives by b, shape (6, 3), 1/m."""
+    def _expected(self, beams: tuple[Floats, Floats], x: Floats, R_WG: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return what ball and palm add to readings, shapes (6,), and derivatives of both by b, shape (6, 3), 1/m."""
         p_GO = np.transpose(R_WG) @ x[_B]
         moved = np.concatenate([p_GO + _STEP * np.eye(3), p_GO - _STEP * np.eye(3), p_GO[None]])
-        h = math.exp(x[_S]) * self._model.readings(beams, moved)
-        return h[6], np.transpose(R_WG @ (h[:3] - h[3:6]) / (2.0 * _STEP))
+        ball, palm = self._readings(beams, moved, R_WG, x[_S])
+        h = ball + palm
+        return ball[6], palm[6], np.transpose(R_WG @ (h[:3] - h[3:6]) / (2.0 * _STEP))
+
+    def _readings(self, beams: tuple[Floats, Floats], p_GO: Floats, R_WG: Floats, s: float) -> tuple[Floats, Floats]:
+        """Return what ball and palm add to readings, shapes (n, 6), with the ball at places p_GO, shape (n, 3)."""
+        ball = math.exp(s) * self._model.readings(beams, p_GO)
+        return ball, self._palm * self._model.of_palm(beams, p_GO, -R_WG[2])
 
     def _update(self, H: Floats, innovation: Floats, R: Floats) -> None:
         K = self._gain(H, R)
@@ -164,3 +196,11 @@ class OffsetFilter:
     def _reduced(self, K: Floats, H: Floats) -> Floats:
         P = (np.eye(7) - K @ H) @ self.cov
         return 0.5 * (P + np.transpose(P))
+
+
+def _cost(off: Floats, R: Floats) -> Floats:
+    """Return twice the negative logarithm of the density of residuals of variances R, but for a constant: over axis -1.
+
+    The variances depend on the state, too: without their logarithm a place of which nothing is expected would win.
+    """
+    return np.sum(off**2 / R + np.log(R), axis=-1)

@@ -13,7 +13,6 @@ from handover.cosim.blocks.ports import Floats
 
 _LEAST_MOTION = 0.0015
 """Commanded motion, m, from which on the part is measured: shorter ones drown in the ball's tremor and the noise."""
-_LARGEST_GAIN = 2.0
 
 
 class Shaper:
@@ -102,8 +101,6 @@ class Response:
         self._t = 0.0  # of that position
         self.part = 1.0
         """Part of the commanded motion that is made, along its direction: from `least` to 1."""
-        self.gain = 1.0
-        """Likewise, from `least` to 2: where an arm sags the farther it bends, it moves more than it is commanded."""
 
     def command(self, motion: Floats) -> None:
         """Note a commanded motion of the gripper, shape (3,), m."""
@@ -120,13 +117,12 @@ class Response:
         self._p_WG = np.array(p_WG)
         square = float(self._commanded @ self._commanded)
         if square > _LEAST_MOTION**2:
-            self.gain = min(max(float(self._made @ self._commanded) / square, self._least), _LARGEST_GAIN)
-            self.part = min(self.gain, 1.0)
+            self.part = min(max(float(self._made @ self._commanded) / square, self._least), 1.0)
 
     def get_state(self) -> tuple[Any, ...]:
         """Return the complete state."""
-        return self._commanded, self._made, self._lag.pending, self._p_WG, self._t, self.part, self.gain
+        return self._commanded, self._made, self._lag.pending, self._p_WG, self._t, self.part
 
     def set_state(self, state: tuple[Any, ...]) -> None:
         """Restore what `get_state` gave."""
-        self._commanded, self._made, self._lag.pending, self._p_WG, self._t, self.part, self.gain = state
+        self._commanded, self._made, self._lag.pending, self._p_WG, self._t, self.part = state

@@ -33,7 +33,8 @@ KNOWN = 1e-8 * np.eye(3)
 
 def ticks_of(p_GO: Any, grip: float = 0.0, palm: bool = False, **values: Any) -> Floats:
     """Return what the plant's sensors read of a ball in a gripper that points down."""
-    unit = FingerInfrared(FingerParams(**{"noise": 0.0, "tolerance": 0.0, **values}))
+    settings: dict[str, Any] = {"noise": 0.0, "tolerance": 0.0, **values}
+    unit = FingerInfrared(FingerParams(**settings))
     ball = P_WG + R_DOWN @ np.asarray(p_GO, dtype=np.float64)
     u = FingerInputs(p_WG=P_WG, q_WG=DOWN, grip=grip, p_WO=ball, p_WH=ball - (0.04 if palm else 5.0) * UP)
     return unit.outputs(0.0, u).ticks
@@ -46,8 +47,9 @@ def model() -> FingerModel:
 def seen(p_GO: Any, **values: Any) -> Inputs:
     """Return exact measurements of a hanging arm's gripper and a ball at a place in its frame."""
     p_WO = P_WG + R_DOWN @ np.asarray(p_GO, dtype=np.float64)
-    exact = {"p_WO_meas": p_WO, "p_WR_meas": P_WG + 0.1 * UP, "p_WG_meas": P_WG}
-    return Inputs(**{**exact, "cov_O": KNOWN, "cov_R": KNOWN, "cov_G": KNOWN, "seen_O": True, "seen_R": True, **values})
+    exact: dict[str, Any] = {"p_WO_meas": p_WO, "p_WR_meas": P_WG + 0.1 * UP, "p_WG_meas": P_WG}
+    exact |= {"cov_O": KNOWN, "cov_R": KNOWN, "cov_G": KNOWN, "seen_O": True, "seen_R": True}
+    return Inputs(**{**exact, **values})
 
 
 def unseen(**values: Any) -> Inputs:
@@ -62,7 +64,7 @@ def test_the_controller_expects_what_the_plant_s_sensors_read(p_GO: Any, grip: f
     np.testing.assert_allclose(expected, ticks_of(p_GO, grip), atol=1.0)
 
 
-def test_a_palm_adds_to_the_doubt_of_those_that_look_ahead_alone():
+def test_a_palm_is_expected_by_those_that_look_ahead_alone_as_they_come_near():
     m = model()
     down = np.array([0.0, 0.0, 1.0])
     near, far = (m.of_palm(m.beams(0.0), np.array([0.0, 0.0, z]), down) for z in (0.0, 0.06))

@@ -17,7 +17,8 @@ P = Params()
 
 def read(p_GO: Any, p_GH: Any = FAR, grip: float = 0.0, **values: Any) -> Floats:
     """Return ideal sensors' readings of a ball and a palm at places in a gripper's frame that points down."""
-    unit = FingerInfrared(Params(**{"noise": 0.0, "tolerance": 0.0, **values}))
+    settings: dict[str, Any] = {"noise": 0.0, "tolerance": 0.0, **values}
+    unit = FingerInfrared(Params(**settings))
     ball, palm = (P_WG + R_DOWN @ np.asarray(p, dtype=np.float64) for p in (p_GO, p_GH))
     return unit.outputs(0.0, Inputs(p_WG=P_WG, q_WG=DOWN, grip=grip, p_WO=ball, p_WH=palm)).ticks
 
