@@ -79,9 +79,6 @@ class Params:
     palm_reflectivity: Number = parameter(
         0.6, "expected reflectivity of the palm over the reference's; 0: there is none", minimum=0.0, maximum=2.0
     )
-    palm_doubt: Number = parameter(
-        0.4, "doubt of what the palm adds to a reading, as a part of it", minimum=0.0, maximum=2.0
-    )
     ticks_min: Tick = parameter(20.0, "reading from which on a sensor sees", minimum=1.0, maximum=4095.0)
     sensors_min: int = parameter(2, "sensors that must see before readings are taken in", minimum=1, maximum=6)
     near: Metre = parameter(
@@ -101,7 +98,7 @@ class Params:
     )
     bias: Metre = parameter(0.002, "doubt of the cameras' offset of ball and gripper", minimum=1e-6, maximum=0.1)
     brightness: Number = parameter(
-        0.3, "doubt of the logarithm of the ball's reflectivity over the reference's", minimum=1e-6, maximum=3.0
+        0.3, "doubt of the logarithms of the reflectivities of ball and palm", minimum=1e-6, maximum=3.0
     )
     reading: Number = parameter(0.1, "doubt of a reading, as a part of it", minimum=0.0, maximum=2.0)
     noise: Tick = parameter(4.0, "standard deviation of a reading", minimum=0.1, maximum=1000.0)
@@ -146,7 +143,7 @@ class Params:
     @property
     def doubts(self) -> Doubts:
         """What is believed of errors."""
-        names = ("wander", "bias", "brightness", "reading", "palm_doubt", "noise", "memory")
+        names = ("wander", "bias", "brightness", "reading", "noise", "memory")
         return Doubts(**{name: getattr(self, name) for name in names})
 
 

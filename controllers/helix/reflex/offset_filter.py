@@ -1,8 +1,8 @@
 """Where the ball is from the gripper: an extended Kalman filter of what cameras, fingers and motors say.
 
-Its state is x = [b, beta, s], shape (7,): b = p_WO - p_WG in W, m; beta, by how much the cameras have b wrong, m; and
-s, the logarithm of the ball's reflectivity over the reference's. Cameras measure b + beta, fingers the ball's
-exp(s) h_O(R_GW b) and the palm's h_H(R_GW b), and as the gripper is moved by m, b becomes b - m.
+Its state is x = [b, beta, s], shape (8,): b = p_WO - p_WG in W, m; beta, by how much the cameras have b wrong, m; and
+s = (s_O, s_H), the logarithms of the reflectivities of ball and palm over the expected ones. Cameras measure b + beta,
+fingers exp(s_O) h_O(R_GW b) + exp(s_H) h_H(R_GW b), and as the gripper is moved by m, b becomes b - m.
 """
 
 import math
@@ -14,8 +14,8 @@ import numpy as np
 from handover.controllers.helix.reflex.finger_model import FingerModel
 from handover.cosim.blocks.ports import Floats
 
-_B, _BETA = slice(0, 3), slice(3, 6)
-_S = 6
+_B, _BETA, _S = slice(0, 3), slice(3, 6), slice(6, 8)
+_SIZE = 8
 _STEP = 0.0005
 """Displacement of the ball for differences of expected readings, m."""
 _ITERATIONS = 6
@@ -32,9 +32,8 @@ class Doubts:
     Attributes:
         wander: of b after a second, m: ball and arm move by themselves.
         bias: of beta, m.
-        brightness: of s.
-        reading: of what the ball adds to a reading, as a part of it; it stays alike for `memory`.
-        palm_doubt: of what the palm adds, likewise.
+        brightness: of s_O and s_H.
+        reading: of a reading, as a part of it; it stays alike for `memory`.
         noise: of a reading, ticks.
         memory: time for which errors of readings stay alike, s.
     """
@@ -43,7 +42,6 @@ class Doubts:
     bias: float
     brightness: float
     reading: float
-    palm_doubt: float
     noise: float
     memory: float
 
@@ -58,18 +56,18 @@ class OffsetFilter:
     Args:
         model: of the fingers.
         doubts: what is believed of errors.
-        palm: reflectivity of the palm under the ball over the reference's; 0: there is none.
+        palm: expected reflectivity of the palm under the ball over the reference's; 0: there is none.
 
     Attributes:
-        x: the state, shape (7,).
-        cov: its covariance, shape (7, 7).
+        x: the state, shape (8,).
+        cov: its covariance, shape (8, 8).
         known: whether cameras have given b.
     """
 
     def __init__(self, model: FingerModel, doubts: Doubts, palm: float = 0.0) -> None:
         self._model, self._doubts, self._palm = model, doubts, palm
-        self.x: Floats = np.zeros(7)
-        self.cov: Floats = np.diag([1.0] * 3 + [doubts.bias**2] * 3 + [doubts.brightness**2])
+        self.x: Floats = np.zeros(_SIZE)
+        self.cov: Floats = np.diag([1.0] * 3 + [doubts.bias**2] * 3 + [doubts.brightness**2] * 2)
         self.known = False
 
     @property
@@ -95,7 +93,7 @@ class OffsetFilter:
     @property
     def reflectivity(self) -> float:
         """Reflectivity of the ball over the reference's, as estimated."""
-        return math.exp(self.x[_S])
+        return math.exp(self.x[_S][0])
 
     def move(self, motion: Floats, dt: float, slip: float) -> None:
         """Let the gripper move by `motion`, shape (3,), in W, m, in a time dt, s, give or take a part `slip` of it."""
@@ -109,7 +107,7 @@ class OffsetFilter:
             self.x[_B], self.cov[_B, _B], self.known = b, R + self.cov[_BETA, _BETA], True
             self.cov[_B, _BETA] = self.cov[_BETA, _B] = -self.cov[_BETA, _BETA]
             return
-        H = np.zeros((3, 7))
+        H = np.zeros((3, _SIZE))
         H[:, _B], H[:, _BETA] = np.eye(3), np.eye(3)
         self._update(H, b - self.x[_B] - self.x[_BETA], R)
 
@@ -135,7 +133,7 @@ class OffsetFilter:
             if cost > least - _SETTLED:
                 break
             best, least = x, cost
-            H = np.column_stack([dh, np.zeros((len(ticks), 3)), ball])
+            H = np.column_stack([dh, np.zeros((len(ticks), 3)), ball, palm])
             gain = self._gain(H, np.diag(R))
             posterior = self._reduced(gain, H)
             x = before + gain @ (ticks - ball - palm + H @ off)
@@ -158,9 +156,7 @@ class OffsetFilter:
 
     def _variance(self, ball: Floats, palm: Floats, ticks: Floats) -> Floats:
         """Return the variance of readings of which ball and palm make these parts, shapes (..., 6)."""
-        d = self._doubts
-        of_ball = d.reading * np.maximum(ball, ticks - palm)
-        return d.noise**2 + of_ball**2 + (d.palm_doubt * palm) ** 2
+        return self._doubts.noise**2 + (self._doubts.reading * np.maximum(ball + palm, ticks)) ** 2
 
     def get_state(self) -> tuple[Any, ...]:
         """Return the complete state."""
@@ -178,10 +174,10 @@ class OffsetFilter:
         h = ball + palm
         return ball[6], palm[6], np.transpose(R_WG @ (h[:3] - h[3:6]) / (2.0 * _STEP))
 
-    def _readings(self, beams: tuple[Floats, Floats], p_GO: Floats, R_WG: Floats, s: float) -> tuple[Floats, Floats]:
+    def _readings(self, beams: tuple[Floats, Floats], p_GO: Floats, R_WG: Floats, s: Floats) -> tuple[Floats, Floats]:
         """Return what ball and palm add to readings, shapes (n, 6), with the ball at places p_GO, shape (n, 3)."""
-        ball = math.exp(s) * self._model.readings(beams, p_GO)
-        return ball, self._palm * self._model.of_palm(beams, p_GO, -R_WG[2])
+        ball = math.exp(s[0]) * self._model.readings(beams, p_GO)
+        return ball, math.exp(s[1]) * self._palm * self._model.of_palm(beams, p_GO, -R_WG[2])
 
     def _update(self, H: Floats, innovation: Floats, R: Floats) -> None:
         K = self._gain(H, R)
@@ -194,7 +190,7 @@ class OffsetFilter:
         return np.transpose(K_transposed)
 
     def _reduced(self, K: Floats, H: Floats) -> Floats:
-        P = (np.eye(7) - K @ H) @ self.cov
+        P = (np.eye(_SIZE) - K @ H) @ self.cov
         return 0.5 * (P + np.transpose(P))
 
 
