@@ -302,7 +302,7 @@ class GraspReflex:
             self._pose = np.concatenate([u.p_WR_meas, u.p_WG_meas])
             self._response.observe(_LEVEL * u.p_WG_meas, t)
         elif before is not None:
-            self._pose = before + commanded
+            self._pose = self._rigid(before + commanded)
         if u.seen_R and self._is_measured and before is not None:
             self._filter.move(u.p_WG_meas - before[3:], elapsed, slip=0.0)
         else:
@@ -310,6 +310,12 @@ class GraspReflex:
         self._is_measured = u.seen_R
         self._orientation = np.diag(W_FROM_B[:3]) @ orientation(u.q_est)
         self._t = t
+
+    def _rigid(self, pose: Floats) -> Floats:
+        """Return wrist and gripper at their distance, with the gripper where it is: eq. (13), which the servo keeps."""
+        p_WR, p_WG = pose[:3], pose[3:]
+        away = p_WR - p_WG
+        return np.concatenate([p_WG + self._params.d_gripper * away / float(np.linalg.norm(away)), p_WG])
 
     def _commanded_motion(self, elapsed: float, u: Inputs) -> Floats:
         """Return how the motors have moved wrist and gripper since the last step, in W, shape (6,), m."""

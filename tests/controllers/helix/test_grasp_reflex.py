@@ -152,6 +152,16 @@ def test_covered_cameras_are_bridged_by_what_the_motors_do():
     np.testing.assert_allclose(y.p_WR - y.p_WG, 0.1 * UP, atol=1e-6)
 
 
+def test_a_reckoned_gripper_keeps_its_distance_from_the_wrist():
+    """Else the servo, which keeps it, takes the gripper to be elsewhere than the ball is told from."""
+    reflex, q = GraspReflex(Params(feels=False)), np.array([0.1, 0.0, 0.12, 0.3, 0.1, 0.24, 0.4, -0.2, 0.24])
+    reflex.step(0.0, 0.1, seen([0.0, 0.0, 0.03], q_est=q))
+    for k in range(1, 20):
+        dl_t = tendon_lengths(q - 0.01 * k, P.d_tendon) - tendon_lengths(q, P.d_tendon)
+        y = reflex.step(0.1 * k, 0.1, unseen(dl_t=dl_t, q_est=q))
+        assert np.linalg.norm(y.p_WG - y.p_WR) == pytest.approx(P.d_gripper, abs=1e-12)
+
+
 def test_a_hidden_ball_is_left_in_its_place_by_a_gripper_that_is_seen_to_move():
     """What the motors were told counts for nothing where the ring is in view."""
     reflex, p_WO = GraspReflex(Params(feels=False)), P_WG - 0.03 * UP
