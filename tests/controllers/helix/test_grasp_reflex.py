@@ -157,7 +157,7 @@ def test_a_reckoned_gripper_keeps_its_distance_from_the_wrist():
     reflex, q = GraspReflex(Params(feels=False)), np.array([0.1, 0.0, 0.12, 0.3, 0.1, 0.24, 0.4, -0.2, 0.24])
     reflex.step(0.0, 0.1, seen([0.0, 0.0, 0.03], q_est=q))
     for k in range(1, 20):
-        dl_t = tendon_lengths(q - 0.01 * k, P.d_tendon) - tendon_lengths(q, P.d_tendon)
+        dl_t = tendon_lengths(q - 0.001 * k, P.d_tendon) - tendon_lengths(q, P.d_tendon)
         y = reflex.step(0.1 * k, 0.1, unseen(dl_t=dl_t, q_est=q))
         assert np.linalg.norm(y.p_WG - y.p_WR) == pytest.approx(P.d_gripper, abs=1e-12)
 
