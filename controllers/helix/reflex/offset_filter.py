@@ -18,11 +18,16 @@ _B, _BETA, _S = slice(0, 3), slice(3, 6), slice(6, 8)
 _SIZE = 8
 _STEP = 0.0005
 """Displacement of the ball for differences of expected readings, m."""
-_ITERATIONS = 6
+_ITERATIONS = 8
 _SETTLED = 1e-3
 """Gain of the cost, which is a sum of squared standard deviations, below which the iteration ends."""
 _STARTS = (0.0, -0.02, -0.01, 0.01, 0.02)
 """How far along the gripper's axis the ball is tried at, m."""
+_FAR_STARTS = (*_STARTS, -0.04, 0.04)
+"""Likewise, where the belief fits no reading."""
+_MISFIT, _REOPENED = 4.0, 0.01
+"""Mean square of residuals, in their deviations, at which the belief counts as wrong, and the deviation that b gets
+then, m: else a filter that has settled on the wrong one of two places stays there, however badly it fits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,36 +125,55 @@ class OffsetFilter:
             grip: its closure.
             dt: time since the last readings, s: what stays alike for `memory` is not taken for new in each.
         """
-        beams, before = self._model.beams(grip), self.x
+        beams = self._model.beams(grip)
         weight = max(self._doubts.memory / dt, 1.0) if dt > 0.0 else 1.0
+        x, cov, misfit = self._fitted(beams, ticks, R_WG, weight, _STARTS)
+        if misfit > _MISFIT:
+            self.cov[_B, _B] += _REOPENED**2 * np.eye(3)
+            x, cov, _ = self._fitted(beams, ticks, R_WG, weight, _FAR_STARTS)
+        self.x, self.cov = x, cov
+
+    def _fitted(
+        self, beams: tuple[Floats, Floats], ticks: Floats, R_WG: Floats, weight: float, starts: tuple[float, ...]
+    ) -> tuple[Floats, Floats, float]:
+        """Return the likeliest state, its covariance, and the mean square of its residuals in their deviations."""
         information: Floats = np.linalg.inv(self.cov).astype(np.float64)
-        x = self._start(beams, ticks, R_WG, weight, information)
-        best, least = before, math.inf
-        posterior = self.cov
+        before, x = self.x, self._start(beams, ticks, R_WG, weight, information, np.array(starts))
+        best, posterior, least, misfit = before, self.cov, math.inf, 0.0
         for _ in range(_ITERATIONS):
             ball, palm, dh = self._expected(beams, x, R_WG)
-            R, off = weight * self._variance(ball, palm, ticks), x - before
-            cost = float(_cost(ticks - ball - palm, R) + off @ information @ off)
-            if cost > least - _SETTLED:
-                break
-            best, least = x, cost
+            R, off = self._variance(ball, palm, ticks), x - before
+            cost = float(_cost(ticks - ball - palm, weight * R) + off @ information @ off)
+            if cost >= least:
+                x = 0.5 * (best + x)  # the step was too long
+                continue
+            is_settled = cost > least - _SETTLED
+            best, least, misfit = x, cost, float(np.mean((ticks - ball - palm) ** 2 / R))
             H = np.column_stack([dh, np.zeros((len(ticks), 3)), ball, palm])
-            gain = self._gain(H, np.diag(R))
+            gain = self._gain(H, np.diag(weight * R))
             posterior = self._reduced(gain, H)
+            if is_settled:
+                break
             x = before + gain @ (ticks - ball - palm + H @ off)
-        self.x, self.cov = best, posterior
+        return best, posterior, misfit
 
     def _start(
-        self, beams: tuple[Floats, Floats], ticks: Floats, R_WG: Floats, weight: float, information: Floats
+        self,
+        beams: tuple[Floats, Floats],
+        ticks: Floats,
+        R_WG: Floats,
+        weight: float,
+        information: Floats,
+        along: Floats,
     ) -> Floats:
         """Return the state from which to iterate: the belief, or one moved along the gripper's axis that is likelier.
 
         What a beam reads is the same of a ball before its axis and beyond, so that the cost has more than one minimum.
         """
-        moved = self.x[_B] + np.array(_STARTS)[:, None] * R_WG[:, 2]
+        moved = self.x[_B] + along[:, None] * R_WG[:, 2]
         ball, palm = self._readings(beams, moved @ R_WG, R_WG, self.x[_S])
         R = weight * self._variance(ball, palm, ticks)
-        prior = np.array(_STARTS) ** 2 * float(R_WG[:, 2] @ information[_B, _B] @ R_WG[:, 2])
+        prior = along**2 * float(R_WG[:, 2] @ information[_B, _B] @ R_WG[:, 2])
         x = np.array(self.x)
         x[_B] = moved[int(np.argmin(_cost(ticks - ball - palm, R) + prior))]
         return x

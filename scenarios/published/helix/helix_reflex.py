@@ -27,7 +27,7 @@ from handover.scenarios.published.verdicts import (
 _COUNT, _QUICK_COUNT = 40, 2
 _SEED = 1904
 """Draws places, hands, noise and gains; nothing was tuned on them."""
-CAMERAS = {"free": "free", "covered": "covered within 50 mm"}
+CAMERAS = {"covered": "covered within 50 mm", "free": "free"}
 """What the cameras see of the last stretch, by the parameter's value."""
 OFFSET = "closing_offset_lateral"
 _MIN_PAIRS = next(n for n in range(1, 64) if 2.0 ** (1 - n) < LEVEL)

@@ -237,3 +237,12 @@ def test_an_input_that_is_no_number_is_refused_by_its_name(name: str):
         GraspReflex(P).step(0.0, 0.1, replace(u, **{name: getattr(u, name) * np.nan}))
     if name == "p_WO_meas":  # of a ball that is not seen it means nothing
         GraspReflex(P).step(0.0, 0.1, replace(u, seen_O=False, p_WO_meas=np.full(3, np.nan)))
+
+
+def test_a_belief_that_fits_no_reading_is_given_up():
+    """Settled 40 mm off on the axis, of which 2 mm are believed, it finds the ball that the fingers see."""
+    f, true = OffsetFilter(model(), P.doubts), np.array([0.003, 0.002, 0.04])
+    f.see(np.zeros(3), 0.002**2 * np.eye(3))
+    for _ in range(20):
+        f.feel(ticks_of(true), R_DOWN, 0.0, 0.1)
+    assert np.linalg.norm(R_DOWN @ f.offset - true) < 0.005
