@@ -16,6 +16,8 @@ from handover.cosim.blocks.ports import Floats
 
 _B, _BETA, _S = slice(0, 3), slice(3, 6), slice(6, 8)
 _SIZE = 8
+_LEAST = 1e-4
+"""Least deviation of a measurement by the cameras, m."""
 _STEP = 0.0005
 """Displacement of the ball for differences of expected readings, m."""
 _ITERATIONS = 8
@@ -107,14 +109,19 @@ class OffsetFilter:
         self.cov[_B, _B] += doubt * np.eye(3)
 
     def see(self, b: Floats, R: Floats) -> None:
-        """Take the cameras' measurement of b, shape (3,), m, with its covariance R, shape (3, 3)."""
+        """Take the cameras' measurement of b, shape (3,), m, with its covariance R, shape (3, 3).
+
+        What is negative in R, or below 0.1 mm, is taken for 0.1 mm: a unit in vision's place may give no covariances.
+        """
+        spread, axes = np.linalg.eigh(0.5 * (R + np.transpose(R)))
+        measured = (axes * np.maximum(spread, _LEAST**2)) @ np.transpose(axes)
         if not self.known:
-            self.x[_B], self.cov[_B, _B], self.known = b, R + self.cov[_BETA, _BETA], True
+            self.x[_B], self.cov[_B, _B], self.known = b, measured + self.cov[_BETA, _BETA], True
             self.cov[_B, _BETA] = self.cov[_BETA, _B] = -self.cov[_BETA, _BETA]
             return
         H = np.zeros((3, _SIZE))
         H[:, _B], H[:, _BETA] = np.eye(3), np.eye(3)
-        self._update(H, b - self.x[_B] - self.x[_BETA], R)
+        self._update(H, b - self.x[_B] - self.x[_BETA], measured)
 
     def feel(self, ticks: Floats, R_WG: Floats, grip: float, dt: float) -> None:
         """Take the fingers' readings, shape (6,).

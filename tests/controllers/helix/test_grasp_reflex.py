@@ -246,3 +246,12 @@ def test_a_belief_that_fits_no_reading_is_given_up():
     for _ in range(20):
         f.feel(ticks_of(true), R_DOWN, 0.0, 0.1)
     assert np.linalg.norm(R_DOWN @ f.offset - true) < 0.005
+
+
+def test_measurements_without_covariances_are_taken_for_exact_ones():
+    reflex, none = GraspReflex(P), np.zeros((3, 3))
+    for k in range(10):
+        u = seen([0.0, 0.0, 0.04], cov_O=none, cov_G=-1e-6 * np.eye(3), ticks=ticks_of([0.0, 0.0, 0.04]))
+        y = reflex.step(0.1 * k, 0.1, u)
+        assert np.linalg.norm(y.p_GO_est - [0.0, 0.0, 0.04]) < 0.002
+        assert np.isfinite(y.deviation)
