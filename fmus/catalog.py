@@ -85,6 +85,12 @@ _ENTRIES = (
         "pictures of two cameras",
     ),
     Entry(
+        "FingerInfrared",
+        "handover.plants.helix.finger_infrared:FingerInfrared",
+        Fraction(3, 100),
+        "infrared sensors in the gripper's fingertips",
+    ),
+    Entry(
         "HandoverVision",
         "handover.controllers.helix.vision.handover_vision:HandoverVision",
         Fraction(1, 30),
@@ -95,6 +101,12 @@ _ENTRIES = (
         "handover.controllers.helix.servo.visual_servo:VisualServo",
         Fraction(1, 10),
         "moves the arm by what vision sees",
+    ),
+    Entry(
+        "GraspReflex",
+        "handover.controllers.helix.reflex.grasp_reflex:GraspReflex",
+        Fraction(1, 10),
+        "corrects by fingers and motors what vision sees",
     ),
     Entry(
         "VslArm",

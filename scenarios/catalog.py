@@ -76,6 +76,10 @@ SYSTEMS = (
                 "handover.scenarios.helix.helix_reach:HelixReach",
                 "how far the Helix reaches, with exact measurements instead of cameras",
             ),
+            "helix_reflex_grasp": ScenarioEntry(
+                "handover.scenarios.helix.helix_reflex_grasp:HelixReflexGrasp",
+                "the Helix comes to a ball by its cameras and centres its gripper by infrared fingers",
+            ),
             "helix_use_case": ScenarioEntry(
                 "handover.scenarios.helix.helix_use_case:HelixUseCase",
                 "the Helix takes a ball from a hand and drops it into a bowl",

@@ -271,7 +271,7 @@ class HandoverEvaluator(Evaluator):
         if self._mismatch is not None:
             metrics |= _mismatch_metrics(self._mismatch)
         if self._offset is not None:
-            lateral, axial = _beside_and_along(self._offset)
+            lateral, axial = beside_and_along(self._offset)
             metrics["grasp_offset_lateral"] = Metric(
                 lateral, "m", "ball beside the gripper's axis when it left the hand, ground truth"
             )
@@ -303,7 +303,7 @@ class HandoverEvaluator(Evaluator):
         if self._holder == "FREE":
             return f"the ball was pushed out of the hand at {self._t:.1f} s; {where}"
         if "HOLD" in self.phases:
-            lateral, axial = _beside_and_along(self._p_GO_closed)
+            lateral, axial = beside_and_along(self._p_GO_closed)
             return (
                 f"the gripper closed with the ball {lateral:.3f} m beside its axis and {axial:+.3f} m along it, and "
                 f"its fingers did not keep it; the hand kept the ball, {self.distance:.3f} m away at the end"
@@ -338,7 +338,8 @@ def _mismatch_metrics(m: ModelMismatch) -> dict[str, Metric]:
     }
 
 
-def _beside_and_along(p_GO: Floats) -> tuple[float, float]:
+def beside_and_along(p_GO: Floats) -> tuple[float, float]:
+    """Return how far a point in the gripper's frame, shape (3,), is from its axis, and along it to the tip, m."""
     return float(np.hypot(p_GO[0], p_GO[1])), float(p_GO[2])
 
 

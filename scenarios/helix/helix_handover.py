@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -68,6 +68,9 @@ def published_values(p: Parameters) -> Sequence[PublishedValue]:
     return values
 
 
+MEASUREMENTS = ("p_WO_meas", "p_WR_meas", "p_WG_meas", "cov_O", "cov_R", "cov_G", "seen_O", "seen_R")
+"""What vision tells the controller."""
+
 _CLOSING = 15
 """Time after the approach, s: 10 to close, 3 for person and ball (`HandoverEvaluator`), and 2 to spare."""
 
@@ -102,7 +105,13 @@ class HelixHandover(Experiment[HandoverEvaluator]):
 
     def build(self, parameters: Parameters, seed: int, fmu: FmuOf) -> System:
         """Wire arm, hand, cameras, vision and controller."""
-        p = parameters
+        s = self.without_measurements(parameters, seed, fmu)
+        for name in MEASUREMENTS:
+            s.connect(getattr(s.units["vision"].y, name), getattr(s.units["servo"].u, name))
+        return s
+
+    def without_measurements(self, p: Parameters, seed: int, fmu: FmuOf, **of_cameras: Any) -> System:
+        """Wire all but what the controller gets of vision; the cameras may have more values set."""
         hand_seed, camera_seed, click_seed, servo_seed = (
             int(n) for n in np.random.SeedSequence(seed).generate_state(4) >> 1
         )
@@ -133,6 +142,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
             rings=p.rings,
             **camera_parameters(p.camera_turn, p.cameras),
             **p.camera_values(),
+            **of_cameras,
         )
         vision = s.add(
             "vision",
@@ -166,8 +176,6 @@ class HelixHandover(Experiment[HandoverEvaluator]):
             s.connect(getattr(hand.y, name), getattr(camera.u, name))
         for side in p.cameras.sides:
             s.connect(getattr(camera.y, side), getattr(vision.u, side))
-        for name in ("p_WO_meas", "p_WR_meas", "p_WG_meas", "cov_O", "cov_R", "cov_G", "seen_O", "seen_R"):
-            s.connect(getattr(vision.y, name), getattr(servo.u, name))
         s.connect(servo.y.dl_t, arm.u.dl_t)
         s.connect(servo.y.closure, arm.u.closure)
         s.connect(hand.y.f_G, arm.u.f_G)

@@ -1,5 +1,7 @@
 """What a unit needs to take a place in the Helix handover, and what its author has to know of frames and signs."""
 
+from dataclasses import replace
+
 from handover.scenarios.experiment.places import Place
 
 _BASE = (
@@ -174,3 +176,60 @@ PLACES = {
     ),
 }
 """By the units' names in the system."""
+
+_FINGERS = {
+    "p_WG": "in W",
+    "q_WG": "of W's frame, scalar first; z of the gripper points to its tip",
+    "grip": "",
+    "p_WO": "in W",
+    "p_WH": "in W",
+    "ball_reflectivity": "the scenario's reflectivity",
+    "tolerance": "the scenario's sensor_tolerance",
+    "seed": "follows from the run's seed",
+}
+_CORRECTED = {
+    "p_WO": "in W; where the servo is to take the ball to be",
+    "p_WR": "in W; likewise the wrist",
+    "p_WG": "in W; likewise the gripper",
+    "known_O": "whether the servo is to take p_WO",
+    "known_R": "whether the servo is to take p_WR and p_WG",
+}
+_NEAR = {
+    "cover_within": "the scenario's near, with cameras=covered",
+    "hide_ball_within": "the scenario's near, with cameras=ball_hidden",
+}
+
+REFLEX_PLACES = {
+    **PLACES,
+    "camera": replace(PLACES["camera"], optional={**PLACES["camera"].optional, **_NEAR}),
+    "fingers": Place(
+        required={
+            "ticks": "of 12-bit converters; the sensors that look across to the gripper's axis, of the fingers at 60, "
+            "180 and 300 degrees from x of G towards y, then those that look ahead"
+        },
+        optional=_FINGERS,
+        remarks=(_BASE,),
+    ),
+    "reflex": Place(
+        required=_CORRECTED,
+        optional={
+            **_SEEN,
+            **_COVARIANCES,
+            "P_O": "in W; covariance of p_WO",
+            "P_R": "in W; covariance of p_WR",
+            "P_G": "in W; covariance of p_WG",
+            "ticks": "of the fingers' sensors; see the place fingers",
+            "grip": "",
+            "dl_t": "see the place servo",
+            "q_est": "of the servo: Dx, Dy (rad) and l (m) of each segment, base segment first",
+            "p_GO_est": "in the gripper's frame; compared with the ball's true place, and shown",
+            "source": "shown over time",
+            "deviation": "shown over time",
+            "reflectivity": "shown as a signal",
+            "sensors": "shown as a signal",
+            "feels": "the scenario's reflex",
+        },
+        remarks=(_BASE,),
+    ),
+}
+"""By the units' names in the grasp by infrared reflex."""

@@ -3,6 +3,7 @@
 [Vervloet2025] sec. 5.4.1 and fig. 14: the workspace was limited by what both cameras see.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -63,6 +64,20 @@ def reach(height: float) -> float:
     found = paper_values("helix", "reach")
     heights, radii = (np.array(found[name], dtype=np.float64) for name in ("height", "radius"))
     return float(np.interp(height, heights, radii, left=0.0, right=0.0))
+
+
+def random_place(rng: np.random.Generator) -> tuple[float, float, float]:
+    """Return azimuth, rad, radius and height, m, of a place within reach that both cameras see.
+
+    It is drawn evenly over the height, and at each height over the area.
+    """
+    known: list[float] = paper_values("helix", "reach")["height"]
+    heights = [h for h in known if reach(h) > 0.0]
+    while True:
+        height, azimuth = float(rng.uniform(min(heights), max(heights))), float(rng.uniform(-np.pi, np.pi))
+        radius = reach(height) * math.sqrt(rng.uniform())
+        if cameras_that_see(np.array([radius * np.cos(azimuth), radius * np.sin(azimuth), height])) == 2:
+            return azimuth, radius, height
 
 
 def notes_on_place(

@@ -15,6 +15,7 @@ from handover.scenarios.published.helix.helix_3 import Helix3
 from handover.scenarios.published.helix.helix_disturbances import HelixDisturbances
 from handover.scenarios.published.helix.helix_improvements import HelixImprovements
 from handover.scenarios.published.helix.helix_places import HelixPlaces
+from handover.scenarios.published.helix.helix_reflex import HelixReflex
 from handover.scenarios.published.helix.helix_workspace import HelixWorkspace
 from handover.scenarios.published.ir_grasp.ir_convergence import IrConvergence
 from handover.scenarios.published.ir_grasp.ir_limits import IrLimits
@@ -36,6 +37,7 @@ _ALL: tuple[type[PublishedExperiment], ...] = (
     HelixDisturbances,
     HelixImprovements,
     HelixPlaces,
+    HelixReflex,
     HelixWorkspace,
     IrConvergence,
     IrLimits,

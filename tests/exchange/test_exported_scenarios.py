@@ -34,7 +34,7 @@ in_ecos = pytest.mark.skipif(
 )
 
 SEED = 3
-WITH_PICTURES = ("helix_handover", "helix_use_case")
+WITH_PICTURES = ("helix_handover", "helix_reflex_grasp", "helix_use_case")
 """No form of their units that exchange pictures is one that libcosim or Ecos loads, see the last tests."""
 EXCHANGED = sorted(set(SCENARIOS) - set(WITH_PICTURES))
 

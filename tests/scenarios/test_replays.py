@@ -16,6 +16,7 @@ from handover.scenarios.reporting.replay_section import phase_changes, replay_se
 
 MUST_SHOW: dict[str, set[str]] = {
     "helix_handover": {"arm", "gripper", "hand", "ball", "cameras"},
+    "helix_reflex_grasp": {"arm", "gripper", "hand", "ball", "cameras"},
     "vsl_model_based": {"arm", "gripper", "load", "desired path", "path of the tip"},
     "vsl_hybrid": {"arm", "gripper", "load", "desired path", "path of the tip", "tip, by the hybrid model"},
     "flyer_impedance": {"robot", "gripper", "push", "place of rest"},

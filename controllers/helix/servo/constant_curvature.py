@@ -67,10 +67,29 @@ def linearise(q: Floats, d_gripper: float) -> tuple[Floats, Floats]:
     return np.array(points[0] + points[1]), J.reshape(6, 9)
 
 
+def orientation(q: Floats) -> Floats:
+    """Return R_BG of eq. (5), shape (3, 3): of the arm's end, and so of wrist and gripper, without twist."""
+    segments: list[Floats] = []
+    for i in (0, 3, 6):
+        Dx, Dy, _ = q[i : i + 3].tolist()
+        segments.append(_rotation(Dx, Dy, *_curvature_functions(Dx, Dy)[:3]))
+    return segments[0] @ segments[1] @ segments[2]
+
+
 def tendon_lengths(q: Floats, d: float) -> Floats:
     """Return l_t = g(q), shape (9,), in m: tendons at d from the axis, at 0, 120 and 240 degrees in each segment."""
     segments = q.reshape(3, 3)
     return (segments[:, 2:] - d * segments[:, :2] @ _TENDON_DIRECTIONS).reshape(9)
+
+
+def state_of(l_t: Floats, d: float) -> Floats:
+    """Return the state q, shape (9,), of which `tendon_lengths` gives l_t, shape (9,), m: its inverse.
+
+    Three tendons have two rotations and a length, so that each l_t is that of one state.
+    """
+    tendons = l_t.reshape(3, 3)
+    rotations = -2.0 / (3.0 * d) * tendons @ np.transpose(_TENDON_DIRECTIONS)
+    return np.column_stack([rotations, tendons.mean(axis=1)]).reshape(9)
 
 
 def _curvature_functions(Dx: float, Dy: float) -> tuple[float, float, float, float, float]:

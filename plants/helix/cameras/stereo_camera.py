@@ -1,6 +1,7 @@
 """Two cameras or three and the pictures that they take, after [Vervloet2025] sec. 3.2.1, figs. 3, 4 and 14."""
 
 import copy
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from fractions import Fraction
@@ -152,6 +153,15 @@ class Params:
         0.0, "time at which a card is held between the ball and the cameras", minimum=0.0
     )
     hide_ball_until: Second = parameter(0.0, "time at which the card is taken away", minimum=0.0)
+    cover_within: Metre = parameter(
+        0.0,
+        "distance of gripper and ball from which on, once it came so near, cloths cover all lenses; 0: never",
+        minimum=0.0,
+        maximum=1.0,
+    )
+    hide_ball_within: Metre = parameter(
+        0.0, "distance likewise from which on a card hides the ball; 0: never", minimum=0.0, maximum=1.0
+    )
     p_WD: Vector3[Metre] = parameter(
         np.array([0.0, -0.16, -0.78]), "middle of the bowl's rim in the world, where there is a bowl"
     )
@@ -212,10 +222,13 @@ class StereoCamera:
     takes no pictures (decimation) repeats the last ones.
 
     What may be amiss: the left or the right lens is covered for a while, light is poor, pictures get lost (each by
-    itself), tape covers markers, a card hides the ball from the left and the right camera.
+    itself), tape covers markers, a card hides the ball from the left and the right camera. A gripper that hides the
+    ball as it comes near, as a bulkier one than is painted here would, is `hide_ball_within`; one behind which nothing
+    is seen any more, `cover_within`.
 
-    The state is that of the noise, and the scene of the last pictures: they are painted again from both, unless
-    they are those that were painted last. Pictures cannot be written to, since they may be handed out again.
+    The state is that of the noise, how near gripper and ball came, and the scene of the last pictures: they are painted
+    again from these, unless they are those that were painted last. Pictures cannot be written to, since they may be
+    handed out again.
 
     Raises:
         InvalidCalibration: a quaternion is not of unit length or a focal length not positive.
@@ -248,17 +261,20 @@ class StereoCamera:
         self._offsets = self._draw()
         self._lost = self._lose()
         self._ticks = 0
+        self._nearest = math.inf  # distance of gripper and ball in pictures that were taken, m
         self._taken: tuple[float, Inputs] | None = None  # when the last pictures were taken, and of what
         self._pictures, self._picture_shows = Outputs(left=self._black, right=self._black, third=self._black), b""
         self._is_current = False  # whether the pictures are the last ones that were taken
 
     def outputs(self, t: float, u: Inputs) -> Outputs:
         """Return the pictures at the start."""
-        left_is_covered, right_is_covered, hidden = (start <= t < end for start, end in self.params.covers.values())
+        p = self.params
+        left_is_covered, right_is_covered, hidden = (start <= t < end for start, end in p.covers.values())
+        all_are_covered, hidden = self._nearest < p.cover_within, hidden or self._nearest < p.hide_ball_within
         views = self._scene.project(u, self._between if hidden else None)
-        covered = (left_is_covered, right_is_covered, False)
+        covered = (left_is_covered or all_are_covered, right_is_covered or all_are_covered, all_are_covered)
         taken = [self._take(i, *view, covered[i]) for i, view in enumerate(views)]
-        return Outputs(left=taken[0], right=taken[1], third=taken[2] if self.params.has_third else self._black)
+        return Outputs(left=taken[0], right=taken[1], third=taken[2] if p.has_third else self._black)
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the pictures taken at t, or the last ones."""
@@ -266,6 +282,7 @@ class StereoCamera:
         self._ticks += 1
         if is_due or self._taken is None:
             self._offsets, self._lost = self._draw(), self._lose()
+            self._nearest = min(self._nearest, float(np.linalg.norm(u.p_WG - u.p_WO)))
             self._taken = t, Inputs(**{name: copy.copy(value) for name, value in vars(u).items()})
             self._is_current = False
         if not self._is_current:
@@ -276,21 +293,22 @@ class StereoCamera:
         return self._pictures
 
     def get_state(self) -> bytes:
-        """Return the noise generator's state, and of the last pictures their noise, their time and what they show."""
-        offsets, lost, taken = self._shown()
-        return pack_state((self._rng.bit_generator, offsets, lost, self._ticks, taken))
+        """Return the noise generator's state, how near gripper and ball came, and what the last pictures depend on."""
+        offsets, lost, nearest, taken = self._shown()
+        return pack_state((self._rng.bit_generator, offsets, lost, self._ticks, nearest, taken))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state that `get_state` gave."""
-        self._rng.bit_generator.state, self._offsets, self._lost, self._ticks, taken = unpack_state(state)
+        drawn, self._offsets, self._lost, self._ticks, self._nearest, taken = unpack_state(state)
+        self._rng.bit_generator.state = drawn
         names = [f.name for f in fields(Inputs)]
         self._taken = None if taken is None else (taken[0], Inputs(**dict(zip(names, taken[1], strict=True))))
         self._is_current = False
 
     def _shown(self) -> tuple[Any, ...]:
-        """Return on what the last pictures depend: noise, which of them are lost, their time and what they show."""
+        """Return on what the last pictures depend: noise, which are lost, how near the gripper was, time and scene."""
         taken = None if self._taken is None else (self._taken[0], tuple(vars(self._taken[1]).values()))
-        return self._offsets, self._lost, taken
+        return self._offsets, self._lost, self._nearest, taken
 
     def _draw(self) -> tuple[int, ...]:
         return tuple(self._noise.draw(self._rng) for _ in self._canvases)

@@ -1,6 +1,5 @@
 """How often and how exactly the Helix takes a ball anywhere within its reach: places drawn at random."""
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -13,7 +12,7 @@ from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure
-from handover.scenarios.helix.workspace import cameras_that_see, reach
+from handover.scenarios.helix.workspace import random_place, reach
 from handover.scenarios.published.helix.helix_cases import distances, reasons_of
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment, Verdict
 from handover.scenarios.published.verdicts import format_rate, nothing_measured
@@ -31,17 +30,8 @@ _MEDIAN, _MOST = 0.002, 0.005
 def random_places(count: int, seed: int = _SEED) -> list[dict[str, str]]:
     """Return places within reach that both cameras see: evenly over the height, and at each height over the area."""
     rng = np.random.default_rng(seed)
-    kept: list[float] = paper_values("helix", "reach")["height"]
-    heights = [h for h in kept if reach(h) > 0.0]
-    found: list[dict[str, str]] = []
-    while len(found) < count:
-        height, azimuth = float(rng.uniform(min(heights), max(heights))), float(rng.uniform(-np.pi, np.pi))
-        radius = reach(height) * math.sqrt(rng.uniform())
-        point = np.array([radius * np.cos(azimuth), radius * np.sin(azimuth), height])
-        if cameras_that_see(point) == 2:
-            place = {"azimuth": azimuth, "radius": radius, "height": height}
-            found.append({name: f"{value:.3f}" for name, value in place.items()})
-    return found
+    drawn = [dict(zip(("azimuth", "radius", "height"), random_place(rng), strict=True)) for _ in range(count)]
+    return [{name: f"{value:.3f}" for name, value in place.items()} for place in drawn]
 
 
 class HelixPlaces(PublishedExperiment):

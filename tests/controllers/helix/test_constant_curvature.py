@@ -7,6 +7,8 @@ from scipy.spatial.transform import Rotation
 from handover.controllers.helix.servo.constant_curvature import (
     forward_kinematics,
     linearise,
+    orientation,
+    state_of,
     tendon_lengths,
 )
 from handover.cosim.blocks.ports import Floats
@@ -97,3 +99,15 @@ def test_a_tendon_is_as_long_as_its_curve_beside_the_axis(bend: tuple[float, flo
         curve = [R @ beside + t for R, t in (segment_transform(Dx * s, Dy * s, l * s) for s in np.linspace(0, 1, 2001))]
         length = np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()
         np.testing.assert_allclose(computed[:, k], length, atol=1e-7)
+
+
+@given(states)
+def test_tendon_lengths_are_those_of_one_state(q: Floats):
+    np.testing.assert_allclose(state_of(tendon_lengths(q, D_TENDON), D_TENDON), q, rtol=0, atol=1e-13)
+
+
+@given(states)
+def test_the_arm_s_end_points_to_its_gripper(q: Floats):
+    X, R = forward_kinematics(q, D_GRIPPER), orientation(q)
+    np.testing.assert_allclose(R[:, 2], (X[3:] - X[:3]) / D_GRIPPER, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(R @ np.transpose(R), np.eye(3), rtol=0, atol=1e-13)

@@ -283,3 +283,24 @@ def test_a_step_that_is_repeated_from_its_state_is_painted_once_unless_something
     fresh.set_state(state)
     assert np.any(other.left != once.left)
     np.testing.assert_array_equal(other.left, fresh.step(1 / 30, 1 / 30, Inputs(grip=1.0)).left)
+
+
+def test_cloths_cover_all_lenses_from_when_the_gripper_first_is_near():
+    camera, other = (StereoCamera(Params(cover_within=0.05, has_third=True, noise=0.0)) for _ in range(2))
+    above = [Inputs(p_WG=Inputs().p_WO + np.array([0.0, 0.0, h])) for h in (0.1, 0.06, 0.04, 0.1)]
+    dark: list[list[bool]] = []
+    for k, u in enumerate(above):
+        y = camera.step(k / 30, 1 / 30, u)
+        dark.append([p.max() < 20 for p in (y.left, y.right, y.third)])
+    assert dark == [[False] * 3, [False] * 3, [True] * 3, [True] * 3]
+    other.set_state(camera.get_state())
+    assert other.step(4 / 30, 1 / 30, above[0]).left.max() < 20
+
+
+def test_a_gripper_that_is_near_hides_the_ball_and_leaves_the_ring():
+    camera = StereoCamera(Params(hide_ball_within=0.05))
+    seen: list[tuple[bool, bool]] = []
+    for k, h in enumerate((0.06, 0.04, 0.06)):
+        y = camera.step(k / 30, 1 / 30, Inputs(p_WG=Inputs().p_WO + np.array([0.0, 0.0, h])))
+        seen.append((green(y.left) > 500, bool(y.left.max() > 100)))
+    assert seen == [(True, True), (False, True), (False, True)]

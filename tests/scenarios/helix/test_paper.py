@@ -9,11 +9,13 @@ import tomli
 from parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.helix
+from handover.controllers.helix.reflex.grasp_reflex import Params as ReflexParams
 from handover.controllers.helix.servo.jacobian_control import STIFFENING
 from handover.controllers.helix.servo.servo_parameters import Params as ServoParams
 from handover.controllers.helix.vision.handover_vision import Params as VisionParams
 from handover.plants.helix.arm.tendon_parameters import Params as ArmParams
 from handover.plants.helix.cameras.stereo_camera import Params as CameraParams
+from handover.plants.helix.finger_infrared import Params as InfraredParams
 from handover.plants.helix.hand.partner_parameters import Params as HandParams
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.helix.calibrate_detector import calibrated_detector
@@ -21,6 +23,7 @@ from handover.scenarios.helix.cameras import CameraPlaces, camera_parameters
 from handover.scenarios.helix.disturbances import Disturbances
 from handover.scenarios.helix.helix_reach import ReachParameters
 from handover.scenarios.helix.parameters import HandPlace, Parameters, Task, Tuning
+from handover.scenarios.helix.reflex_grasp_parameters import ReflexGraspParameters
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 
@@ -33,6 +36,9 @@ CODE = {
     "task": Task,
     "disturbances": Disturbances,
     "reach": ReachParameters,
+    "infrared": InfraredParams,
+    "reflex": ReflexParams,
+    "reflex_grasp": ReflexGraspParameters,
 }
 
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -44,6 +50,9 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "task": ("task",),
     "disturbances": ("disturbances",),
     "reach": (),
+    "infrared": ("infrared",),
+    "reflex": ("reflex",),
+    "reflex_grasp": ("reflex_grasp",),
 }
 """Groups that have a class's parameters alone."""
 
@@ -105,6 +114,9 @@ SHARED: dict[str, dict[str, tuple[Any, ...]]] = {
         "covered_markers": ("pictures", "covered_markers"),
         "jitter": ("servo", "jitter"),
     },
+    "infrared": {},
+    "reflex": {},
+    "reflex_grasp": {},
     "reach": _PLACE | {"azimuth": ("task", "azimuth"), "patience": ("task", "patience")},
 }
 """Parameters whose origin is that of another one: its group, its name there, and where it is a list, which element."""
