@@ -24,7 +24,7 @@ from handover.cosim.blocks.units import (
     Second,
     Tick,
 )
-from handover.plants.ir_grasp.infrared_sensor import InfraredSensor, InvalidSensorParameters
+from handover.plants.infrared_sensor import InfraredSensor, InvalidSensorParameters
 from handover.plants.ir_grasp.objects import SOLIDS, Solid, Thing, outlines
 
 OUT_OF_RANGE = 0.2
