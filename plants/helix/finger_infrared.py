@@ -17,7 +17,7 @@ from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, Number, PerTick, Radian, Tick
 from handover.plants.helix.gripper_fingers import FINGERS, finger_joints
-from handover.plants.ir_grasp.infrared_sensor import InfraredSensor, InvalidSensorParameters
+from handover.plants.infrared_sensor import InfraredSensor, InvalidSensorParameters
 
 _RINGS = ((0.0, 1), (0.5, 6), (0.9, 12))
 """Rays of a beam: part of its half angle, and how many rays lie there around its axis."""

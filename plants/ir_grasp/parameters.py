@@ -25,8 +25,8 @@ from handover.cosim.blocks.units import (
     Second,
     Tick,
 )
+from handover.plants.infrared_sensor import InfraredSensor, InvalidSensorParameters, ToleratedSensor
 from handover.plants.ir_grasp.ground import Span, bump
-from handover.plants.ir_grasp.infrared_sensor import InfraredSensor, InvalidSensorParameters, ToleratedSensor
 from handover.plants.ir_grasp.objects import Solid, Thing, placed, polygon_corners, solid_of, with_own
 from handover.plants.ir_grasp.shapes import Disc, polygon_faults
 

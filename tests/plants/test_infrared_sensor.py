@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.plants.ir_grasp.infrared_sensor import InfraredSensor, InvalidSensorParameters
+from handover.plants.infrared_sensor import InfraredSensor, InvalidSensorParameters
 
 USUAL = {
     "a": 0.062,
