@@ -44,7 +44,7 @@ def test_the_page_has_all_results_with_their_origin(tmp_path: Path):
     page = report_of(tmp_path / "out")
     text = text_of(page)
     assert "12 participants : 18 are planned; 144 of 144 rounds that were played count." in text
-    assert "orders of 12 participants are balanced" in text
+    assert "The orders of 12 complete sessions are balanced: each of the square's 6 rows was played twice." in text
     assert "Human to robot compliant 12 24 50 % (29 to 71 %) 12" in text
     assert "Human to robot compliant 2 of 20, 10 % 12 of 24, 50 %" in text
     assert "Human to robot 12 -50 % 4.3e-05 0.00013 0.031" in text
@@ -149,6 +149,13 @@ def test_who_withdrew_is_told_with_the_time_and_nothing_else(tmp_path: Path):
     refused = study("replay", out, "P03", "1")
     assert refused.exit_code == 2
     assert "nothing of theirs is shown" in refused.output
+
+
+def test_twelve_sessions_with_a_gap_in_their_rows_are_not_called_balanced(tmp_path: Path):
+    write_study(tmp_path / "out", 13, rigid_is_better).withdraw(2, "2026-11-24T15:00:00", delete=False)
+    text = text_of(report_of(tmp_path / "out"))
+    assert "The orders of 12 complete sessions are not balanced" in text
+    assert "(row 1: 3, row 2: 1, row 3: 2, row 4: 2, row 5: 2, row 6: 2)" in text
 
 
 def test_what_was_kept_is_deleted_if_asked_and_the_number_stays_taken(tmp_path: Path):
