@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.stats import hypergeom, rankdata
+from scipy.stats import rankdata
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.statistics import LEVEL
@@ -91,7 +91,10 @@ def pair_means(d: Floats) -> Floats:
 
 
 def shift_interval(d: Floats) -> tuple[float, float]:
-    """Return the closed interval of a shift, at 95 % at least, of six differences [Hodges1963], [Noether1967]."""
+    """Return the closed interval of a shift, at 95 % at least, of at least six differences.
+
+    [Hodges1963], [Noether1967]
+    """
     below = np.cumsum(_sum_of_chosen(tuple(range(1, len(d) + 1))))
     k = int(np.searchsorted(below, LEVEL / 2, side="right")) - 1  # the largest sum that is too improbable to keep
     means = pair_means(d)
@@ -99,37 +102,14 @@ def shift_interval(d: Floats) -> tuple[float, float]:
 
 
 def sign_flip_test(differences: Sequence[int]) -> float:
-    """Return the exact p-value, two-sided, that whole differences of participants are as likely with the other sign.
+    """Return the exact p-value, two-sided, that whole differences are as likely with the other sign.
 
-    What a participant does in one round may depend on the others as it likes: participants are what is drawn.
-    [Edgington2007]
+    Of participants' differences: what a participant does in one round may depend on the others as it likes. Of matched
+    pairs, differences -1, 0 and 1: the behaviours could as well have been the other way round in each pair, and never
+    across pairs, which differ by participant, task and period; that is McNemar's exact test. [Edgington2007]
     """
     weights = sorted(abs(x) for x in differences if x)
     return _two_sided(_sum_of_chosen(tuple(weights)), sum(x for x in differences if x > 0))
-
-
-@dataclass(frozen=True)
-class Counts:
-    """Failures of a participant in a task: of the first behaviour's rounds, and of the second's."""
-
-    first: int
-    of_first: int
-    second: int
-    of_second: int
-
-
-def permutation_test(counts: Sequence[Counts]) -> float:
-    """Return the exact p-value, two-sided, that failures do not depend on behaviour, given how many each person had.
-
-    If the behaviour makes no difference to any round, a participant's rounds of a task might have had the two
-    behaviours in any arrangement: failures of the first are hypergeometric within each participant, and independent
-    between them. Pooling all rounds would take people for alike. [Edgington2007]
-    """
-    total: Floats = np.ones(1)
-    for c in counts:
-        failed, n = c.first + c.second, c.of_first + c.of_second
-        total = np.convolve(total, hypergeom.pmf(np.arange(failed + 1), n, failed, c.of_first))
-    return _two_sided(total, sum(c.first for c in counts))
 
 
 def within_condition_slope(x: Sequence[float], y: Sequence[float], condition: Sequence[object]) -> float | None:

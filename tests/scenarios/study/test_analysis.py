@@ -46,8 +46,8 @@ def test_failures_are_compared_within_persons(tmp_path: Path):
     assert counts["human_to_robot", "rigid"].failures == counts["collaborative", "compliant"].failures == 0
     assert counts["human_to_robot", "compliant"].low == pytest.approx(0.2912, abs=1e-4)  # Clopper-Pearson of 12 of 24
     test = {t.task: t for t in analysis.failure_tests}["human_to_robot"]
-    assert test.p_rounds == pytest.approx(2 / 6**6)  # each of six: both failures in the same two of four rounds
-    assert test.p_holm == pytest.approx(3 * 2 / 6**6)
+    assert test.p_pairs == pytest.approx(2 / 2**12)  # each of six: two pairs in which compliant alone failed
+    assert test.p_holm == pytest.approx(3 * 2 / 2**12)
     assert test.p_participants == pytest.approx(2 / 2**6)
     assert test.difference == pytest.approx(-0.5)
 
@@ -71,7 +71,7 @@ def test_void_rounds_and_rounds_that_nobody_can_judge_do_not_count(tmp_path: Pat
 def test_too_few_are_not_tested(people: int, tmp_path: Path):
     analysis = StudyAnalysis(write_study(tmp_path / "out", people, rigid_is_better, compliant_fails))
     assert all(t.test is None and t.p_holm is None for t in analysis.rating_tests)
-    assert all(t.p_rounds is None and t.p_participants is None for t in analysis.failure_tests)
+    assert all(t.p_pairs is None and t.p_participants is None for t in analysis.failure_tests)
     assert all(e.test is None for e in analysis.order_effects)
     assert all(m.model is None and "fewer than 6" in m.reason for m in analysis.models)
 

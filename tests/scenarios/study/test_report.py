@@ -47,7 +47,7 @@ def test_the_page_has_all_results_with_their_origin(tmp_path: Path):
     assert "The orders of 12 complete sessions are balanced: each of the square's 6 rows was played twice." in text
     assert "Human to robot compliant 12 24 50 % (29 to 71 %) 12" in text
     assert "Human to robot compliant 2 of 20, 10 % 12 of 24, 50 %" in text
-    assert "Human to robot 12 -50 % 4.3e-05 0.00013 0.031" in text
+    assert "Human to robot 12 -50 % 0.00049 0.0015 0.031" in text
     assert "S1 Collaborative task 12 6.50 4.50 +2.00 (+2.00 to +2.00) 0.00049 0.0044" in text
     assert "S1 Human to robot 0.0132 0.00049" in text
     assert "[Pratt1959]" in text
