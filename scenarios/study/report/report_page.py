@@ -195,7 +195,7 @@ def _entering(analysis: StudyAnalysis, words: Words) -> Markup:
         ("tests of ratings", f"{pairs}, and were rated", _between([t.participants for t in ratings])),
         (
             "order effects",
-            "complete sessions alone, as orders are balanced in these",
+            "complete sessions, without void rounds and the first",
             str(len(analysis.complete_sessions)),
         ),
         (
@@ -223,7 +223,7 @@ def _between(numbers: Sequence[int]) -> str:
 
 
 def _methods_section(analysis: StudyAnalysis) -> Section:
-    html = template("study_methods.html").render(plan=analysis.plan)
+    html = template("study_methods.html").render(plan=analysis.plan, tested=analysis.tested)
     return Section(anchor="methods", title="Methods", html=Markup(html))
 
 

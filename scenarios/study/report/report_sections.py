@@ -201,7 +201,8 @@ def tests_section(analysis: StudyAnalysis, words: Words) -> Section:
     table = rows_table(header, rows, numbers=range(2, 8), caption=caption)
     told = (
         "Means of the participants' means; shift of Hodges and Lehmann with its exact interval; p: exact Wilcoxon "
-        f"signed-rank test, two-sided; Holm: corrected over all {len(rows)}."
+        f"signed-rank test, two-sided; Holm: corrected over the {analysis.tested} tests that "
+        f"were made, of {len(rows)}."
     )
     tested = [t for t in analysis.rating_tests if t.test is not None]
     plot = Markup()
@@ -238,8 +239,9 @@ def order_section(analysis: StudyAnalysis, words: Words) -> Section:
     header = ("order", "measure", "participants", "shift, 95 %", "p")
     table = rows_table(header, rows, numbers=(2, 3, 4), caption=f"Order effects: {words.whose}")
     told = (
-        "Slopes within a participant's conditions by least squares, so that no effect of behaviour or task is in them; "
-        "over participants by the exact signed-rank test, not corrected. Ratings in points, failures as 0 or 1."
+        "Slopes within a participant's conditions by least squares, so that no effect of behaviour or task is in them. "
+        "The round's number, or the period, is fitted together with the behaviour before, so that void "
+        "rounds or unbalanced orders leave neither in the other; the first round, after nothing, is left out. Over participants by the exact signed-rank test, not corrected. Ratings in points, failures as 0 or 1."
     )
     few = _too_few_note([e.participants for e in analysis.order_effects])
     return Section(anchor="order", title="Order effects", html=table + note(told + few))

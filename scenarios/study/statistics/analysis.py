@@ -22,7 +22,7 @@ from handover.scenarios.study.statistics.exact_tests import (
     SignedRankTest,
     sign_flip_test,
     signed_rank_test,
-    within_condition_slope,
+    within_condition_slopes,
 )
 from handover.scenarios.study.statistics.mixed_ordinal import MixedModel, NotFitted, Slopes, fit_mixed_ordinal
 
@@ -249,6 +249,11 @@ class StudyAnalysis:
         corrected = _holm(None if t.test is None else t.test.p for t in tests)
         return [replace(t, p_holm=p) for t, p in zip(tests, corrected, strict=True)]
 
+    @property
+    def tested(self) -> int:
+        """How many tests of ratings were made: over so many they are corrected."""
+        return sum(t.test is not None for t in self.rating_tests)
+
     def _rating_test(self, task: str, statement: str) -> RatingTest:
         pairs = [m for m in self.means if (m.task, m.statement) == (task, statement)]
         return RatingTest(
@@ -264,7 +269,9 @@ class StudyAnalysis:
     def order_effects(self) -> Sequence[OrderEffect]:
         """How ratings and failures go with the round's number, the period, and the behaviour of the round before.
 
-        Of complete sessions alone: the orders are balanced in these.
+        Of complete sessions, without their void rounds and the first, which comes after nothing. The number, or the
+        period, and carry-over are fitted together: void rounds, and a number of sessions that is no multiple of the
+        conditions, would leave the one in the other's slope.
         """
         measured = {name: [a for a in self._rated if a["statement"] == name] for name in self.plan.statements}
         judged = [r for r in self.counted if r["failed_by_rule"] is not None]
@@ -275,23 +282,21 @@ class StudyAnalysis:
     def _order_effect(self, effect: str, measure: str, rows: Sequence[_Row]) -> OrderEffect:
         slopes: list[float] = []
         for s in self.complete_sessions:
-            own = [r for r in rows if r["participant"] == s.session.pseudonym]
-            placed = [(x, r) for r in own if (x := self._place(effect, s, r["round"])) is not None]
-            if placed:
-                conditions = [(r["task"], r["behaviour"]) for _, r in placed]
-                slope = within_condition_slope([x for x, _ in placed], [r["value"] for _, r in placed], conditions)
-                slopes += [] if slope is None else [slope]
+            own = [r for r in rows if r["participant"] == s.session.pseudonym and r["round"] > 1]
+            x = [self._places(effect, s, r["round"]) for r in own]
+            found = within_condition_slopes(x, [r["value"] for r in own], [(r["task"], r["behaviour"]) for r in own])
+            if own and found is not None:
+                slopes.append(found[1 if effect == "carry-over" else 0])
         return OrderEffect(effect=effect, measure=measure, participants=len(slopes), test=signed_rank_test(slopes))
 
-    def _place(self, effect: str, session: SessionFolder, number: int) -> float | None:
-        """Return what a round has of an effect; None of the first round, which comes after nothing.
+    def _places(self, effect: str, session: SessionFolder, number: int) -> tuple[float, float]:
+        """Return what a round has of practice, and of carry-over: 1 after the first behaviour, 0 after the second.
 
-        It is its number, its period, or 1 after a round of the first behaviour and 0 after one of the second.
+        Practice is the period where that is the effect, and the round's number beside the others.
         """
-        if effect == "carry-over":
-            before = session.rounds[number - 2].condition.behaviour if number > 1 else None
-            return None if before is None else float(before == self.plan.behaviours[0])
-        return float(number if effect == "round" else session.rounds[number - 1].period)
+        before = session.rounds[number - 2].condition.behaviour
+        practice = session.rounds[number - 1].period if effect == "period" else number
+        return float(practice), float(before == self.plan.behaviours[0])
 
     @cached_property
     def models(self) -> Sequence[StatementModel]:

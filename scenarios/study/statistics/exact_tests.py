@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.stats import rankdata
 
 from handover.cosim.blocks.ports import Floats
@@ -112,19 +113,26 @@ def sign_flip_test(differences: Sequence[int]) -> float:
     return _two_sided(_sum_of_chosen(tuple(weights)), sum(x for x in differences if x > 0))
 
 
-def within_condition_slope(x: Sequence[float], y: Sequence[float], condition: Sequence[object]) -> float | None:
-    """Return by how much y grows with x in one participant, by least squares with a mean of its own each condition.
+def within_condition_slopes(x: ArrayLike, y: Sequence[float], condition: Sequence[object]) -> list[float] | None:
+    """Return by how much y grows with each column of x in one participant, all columns together.
 
-    None where x does not vary within any condition.
+    By least squares with a mean of its own each condition, so that no column's slope has another column's effect in it,
+    whichever rounds are there. None where the columns cannot be told apart within conditions.
+
+    Args:
+        x: shape (rounds, columns).
+        y: one a round.
+        condition: of each round.
     """
-    xs: Floats = np.asarray(x, dtype=np.float64)
-    ys: Floats = np.asarray(y, dtype=np.float64)
+    xs: Floats = np.array(x, dtype=np.float64).reshape(len(y), -1)
+    ys: Floats = np.array(y, dtype=np.float64)
     for kind in dict.fromkeys(condition):
         same = np.array([c == kind for c in condition])
-        xs = np.where(same, xs - xs[same].mean(), xs)
-        ys = np.where(same, ys - ys[same].mean(), ys)
-    square = float(xs @ xs)
-    return float(xs @ ys) / square if square > 1e-9 else None
+        xs[same] -= xs[same].mean(axis=0)
+        ys[same] -= ys[same].mean()
+    if np.linalg.matrix_rank(xs, tol=1e-6) < xs.shape[1]:
+        return None
+    return [float(slope) for slope in np.linalg.lstsq(xs, ys, rcond=None)[0]]
 
 
 @lru_cache(maxsize=4096)

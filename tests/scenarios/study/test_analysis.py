@@ -111,6 +111,27 @@ def test_what_a_rigid_round_leaves_behind_is_carry_over(tmp_path: Path):
     assert none.p == 1.0
 
 
+def test_practice_is_not_taken_for_carry_over_where_rounds_are_void_and_orders_unbalanced(tmp_path: Path):
+    study = StudyFolder.opened(tmp_path / "out", PLAN)
+    for number in range(1, 8):
+        folder = study.begin(session(number))
+        for planned in folder.rounds:
+            is_void = (planned.number + number) % 5 == 0
+            folder.record_round(planned.number, record(void=is_void))
+            if not is_void:  # the second period is rated higher by 4, whatever came before
+                ratings = {"S1": 1 + 4 * (planned.period - 1), "S2": min(9, planned.number), "S3": 5}
+                folder.record_answers(planned.number, ratings)
+        folder.record_questionnaire({"age_group": "21-30", "background": "engineering", "comments": ""})
+    analysis = StudyAnalysis(study)
+    assert len(analysis.complete_sessions) == 7
+    effects = {(e.effect, e.measure): e.test for e in analysis.order_effects}
+    period, carry = effects["period", "S1"], effects["carry-over", "S1"]
+    assert period is not None
+    assert carry is not None
+    assert (period.estimate, period.low, period.high) == pytest.approx((4.0, 4.0, 4.0))
+    assert carry.p > 0.05
+
+
 def test_the_model_has_the_behaviours_effect_in_each_task(tmp_path: Path):
     def rates(number: int, planned: Round, statement: str) -> int:
         noise = (7 * number + 3 * planned.number + 5 * int(statement[1])) % 5 - 2

@@ -16,7 +16,7 @@ from handover.scenarios.study.statistics.exact_tests import (
     shift_interval,
     sign_flip_test,
     signed_rank_test,
-    within_condition_slope,
+    within_condition_slopes,
 )
 
 BEFORE = (1.83, 0.50, 1.62, 2.48, 1.68, 1.88, 1.55, 3.06, 1.30)
@@ -150,12 +150,13 @@ def test_flips_within_pairs_keep_their_level_where_periods_differ_and_use_it():
     assert 0.02 < rejected / 2000 < 0.05
 
 
-def test_a_slope_is_that_of_least_squares_with_means_of_conditions():
+def test_slopes_are_those_of_least_squares_with_means_of_conditions():
     rng = np.random.default_rng(2)
     condition = [0, 1, 2, 0, 1, 2, 0, 1]
-    x, y = rng.normal(size=8), rng.normal(size=8)
+    x, y = rng.normal(size=(8, 2)), rng.normal(size=8)
     design = np.column_stack([[c == k for c in condition] for k in range(3)] + [x]).astype(float)
-    assert within_condition_slope(x.tolist(), y.tolist(), condition) == pytest.approx(
-        np.linalg.lstsq(design, y, rcond=None)[0][3]
+    assert within_condition_slopes(x, y.tolist(), condition) == pytest.approx(
+        np.linalg.lstsq(design, y, rcond=None)[0][3:].tolist()
     )
-    assert within_condition_slope([0.0, 1.0, 2.0], [1.0, 2.0, 3.0], ["a", "b", "c"]) is None
+    assert within_condition_slopes([0.0, 1.0, 2.0], [1.0, 2.0, 3.0], ["a", "b", "c"]) is None
+    assert within_condition_slopes([[k, 2 * k] for k in range(8)], y.tolist(), condition) is None

@@ -50,6 +50,7 @@ def test_the_page_has_all_results_with_their_origin(tmp_path: Path):
     assert "Human to robot 12 -50 % 0.00049 0.0015 0.031" in text
     assert "S1 Collaborative task 12 6.50 4.50 +2.00 (+2.00 to +2.00) 0.00049 0.0044" in text
     assert "S1 Human to robot 0.0132 0.00049" in text
+    assert "corrected over the 9 tests that were made, of 9" in text
     assert "[Pratt1959]" in text
     assert page.count('class="plot"') == 4
     assert "default-src 'none'" in unescape(page)
@@ -104,6 +105,7 @@ def test_too_few_are_told_and_nothing_is_computed(people: int, tmp_path: Path):
     assert list(tests["participants"]) == [people] * 9
     assert "no exact test of signs can reject at 5 %, so that none is made" in text
     assert "no model, as fewer than 6 participants" in text
+    assert "corrected over the 0 tests that were made, of 9" in text
     assert ("Fewer than 6 are too few for a test" in text) == (people == 3)
 
 
@@ -121,7 +123,7 @@ def test_a_session_broken_off_and_void_rounds_are_told(tmp_path: Path):
     assert "4 of 76 rounds that count are above 100 ms" in text
     assert "76 of 77 rounds that were played count" in text
     assert "Nobody has withdrawn." in text
-    assert "complete sessions alone, as orders are balanced in these 6" in text
+    assert "complete sessions, without void rounds and the first 6" in text
     tests = csv_of(tmp_path / "out" / "results" / "rating_tests.csv")
     entered = [t for t in PLAN.tasks if (tests.loc[tests["task"] == t, "participants"] == 7).all()]
     names = ", ".join(PLAN.texts["en"].task_names[t] for t in entered)
