@@ -241,7 +241,8 @@ def order_section(analysis: StudyAnalysis, words: Words) -> Section:
     told = (
         "Slopes within a participant's conditions by least squares, so that no effect of behaviour or task is in them. "
         "The round's number, or the period, is fitted together with the behaviour before, so that void "
-        "rounds or unbalanced orders leave neither in the other; the first round, after nothing, is left out. Over participants by the exact signed-rank test, not corrected. Ratings in points, failures as 0 or 1."
+        "rounds or unbalanced orders leave neither in the other; the first round, after nothing, is left out. Over "
+        "participants by the exact signed-rank test, not corrected. Ratings in points, failures as 0 or 1."
     )
     few = _too_few_note([e.participants for e in analysis.order_effects])
     return Section(anchor="order", title="Order effects", html=table + note(told + few))
