@@ -276,9 +276,8 @@ def _model_rows(m: StatementModel, analysis: StudyAnalysis, words: Words) -> lis
         label = f"participants' {words.first} − {words.second}, standard deviation"
         rows.append((m.statement, label, f"{m.model.slope_deviation:.2f}", ""))
     for k, (name, e) in enumerate(zip(names, m.model.effects, strict=True)):
-        is_tested = k < m.tested
-        shown = (_shift(e), format_p_value(e.p)) if is_tested else (_signed(e.estimate), "not tested")
-        rows.append((m.statement, name, *shown))
+        shift, p = (_shift(e), format_p_value(e.p)) if k < m.tested else (_signed(e.estimate), "not tested")
+        rows.append((m.statement, name, shift, p))
     return rows
 
 

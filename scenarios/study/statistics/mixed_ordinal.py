@@ -156,7 +156,8 @@ class _Likelihood:
         blocks = list(zip(group, [None] * len(of) if slopes is None else slopes.block, strict=True))
         places = {block: k for k, block in enumerate(dict.fromkeys(blocks))}
         self._counts: Floats = np.zeros((len(places), len(kinds)))
-        np.add.at(self._counts, ([places[b] for b in blocks], kind.reshape(-1)), 1.0)
+        for block, k in zip(blocks, kind.reshape(-1), strict=True):
+            self._counts[places[block], k] += 1.0
         names = list(dict.fromkeys(group))
         self._members: Floats = np.array([[float(g == name) for g, _ in places] for name in names])
         self._nodes, self._weights = _normal(_COARSE if slopes is not None else _NODES)

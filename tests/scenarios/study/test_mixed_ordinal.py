@@ -94,11 +94,12 @@ def test_the_likelihood_with_slopes_is_that_of_integration_in_two_dimensions():
     used = sorted(set(y))
     total = 0.0
     for who in range(8):
-        product = np.ones_like(u)
+        product: Floats = np.ones_like(u)
         for k in range(12 * who, 12 * who + 12):
             eta = model.effects[0].estimate * x[k][0] + u + v * x[k][0]
             place = used.index(y[k])
-            product = product * (expit(bounds[place + 1] - eta) - expit(bounds[place] - eta))
+            each: Floats = expit(bounds[place + 1] - eta) - expit(bounds[place] - eta)
+            product = product * each
         total += float(np.log(weights @ product @ weights))
     assert model.log_likelihood == pytest.approx(total, abs=1e-3)
 

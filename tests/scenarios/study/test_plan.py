@@ -77,7 +77,7 @@ def test_all_faults_are_told_at_once():
     told = "\n".join(faults)
     for part in (
         "sed: no such key; did you mean seed",
-        "seed: it is missing; a whole number from 0",
+        "seed: it is missing; expected a whole number from 0",
         "practice: it is 'long'; expected a number from 0 to 7200",
         "scale: its highest, 1, is not above its lowest, 1",
         "tasks.robot_to_human, rigid: behaviour: 'rigd' is none of rigid, compliant",
