@@ -89,16 +89,17 @@ def test_the_likelihood_with_slopes_is_that_of_integration_in_two_dimensions():
     assert model.slope_deviation is not None
     node: Floats = np.linspace(-8.0, 8.0, 401)
     weights = norm.pdf(node) * (node[1] - node[0])
-    u, v = np.meshgrid(model.deviation * node, model.slope_deviation * node, indexing="ij")
+    u: Floats = model.deviation * node[:, None]
+    v: Floats = model.slope_deviation * node[None, :]
     bounds = np.concatenate([[-np.inf], model.thresholds, [np.inf]])
     used = sorted(set(y))
     total = 0.0
     for who in range(8):
-        product: Floats = np.ones_like(u)
+        product: Floats = np.ones((len(node), len(node)))
         for k in range(12 * who, 12 * who + 12):
             eta = model.effects[0].estimate * x[k][0] + u + v * x[k][0]
             place = used.index(y[k])
-            each: Floats = expit(bounds[place + 1] - eta) - expit(bounds[place] - eta)
+            each = 1.0 / (1.0 + np.exp(eta - bounds[place + 1])) - 1.0 / (1.0 + np.exp(eta - bounds[place]))
             product = product * each
         total += float(np.log(weights @ product @ weights))
     assert model.log_likelihood == pytest.approx(total, abs=1e-3)
