@@ -1,5 +1,6 @@
 """The command `handover study power`: what a planned study could find, by simulation, before the first person comes."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,22 +13,21 @@ from handover.scenarios.cli.study.group import checked_plan
 from handover.scenarios.execution.errors import one_line_errors, require_extra
 
 if TYPE_CHECKING:
-    from handover.scenarios.campaign.statistics import Interval
-    from handover.scenarios.study.statistics.power import Power
+    from handover.scenarios.study.statistics.power import Power, Share
 
 _HELP = """Simulate the ratings of the study in PLAN.toml many times, and print how often its tests find an effect.
 
 An effect is in standard deviations of the participants' differences between the two behaviours, each of means of the
-rounds of a task. Ratings come in whole steps. Tests are exact, of signed ranks, at 5 %, two-sided, with Holm's
-correction over all statements and tasks.
+rounds of a task. Ratings come in whole steps; the ends of the scale are not simulated. Tests are exact, of signed
+ranks, at 5 %, two-sided, with Holm's correction over all statements and tasks.
 """
 _COLUMNS = (
-    ("alone", "one rating, uncorrected"),
-    ("first", "corrected, no other has it"),
-    ("all_have", "corrected, all have it"),
-    ("any_of_all", "any of all that have it"),
-    ("none", "anything, none has it"),
-    ("t_test", "t-test, uncorrected"),
+    ("single_uncorrected", "one test alone, uncorrected"),
+    ("one_effect_holm", "one rating has it, Holm"),
+    ("each_of_all_holm", "all have it: each, Holm"),
+    ("any_of_all_holm", "all have it: any, Holm"),
+    ("familywise_error", "none has it: any, Holm (error)"),
+    ("t_test", "t-test alone, uncorrected"),
 )
 
 
@@ -40,7 +40,7 @@ class People(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (ge
         """Return the numbers."""
         parts = str(value).split(",")
         if not all(p.strip().isdecimal() and 2 <= int(p) <= _MOST for p in parts):
-            self.fail(f"{value!r}: whole numbers from 2 to {_MOST} are right, such as 10,12,18", param, ctx)
+            self.fail(f"{value!r}: expected whole numbers from 2 to {_MOST}, such as 10,12,18", param, ctx)
         return tuple(int(p) for p in parts)
 
 
@@ -109,20 +109,20 @@ def power(
     for heading in ("participants", *(words for _, words in _COLUMNS)):
         table.add_column(heading, justify="right", min_width=9, overflow="fold")
     for p in found:
-        table.add_row(str(p.participants), *(_text(getattr(p, name), repeat) for name, _ in _COLUMNS))
+        table.add_row(str(p.participants), *(_text(getattr(p, name)) for name, _ in _COLUMNS))
     console.print(table)
+    console.print("In parentheses: intervals of the simulation at 95 %, Clopper and Pearson.")
+    console.print("Differences are not clipped to the scale: where most ratings are near its end, the power is lower.")
     console.print(f"Corrected over {tests}, nothing can be found with fewer than {least} participants.")
 
 
-def _text(share: "Interval", repeats: int) -> str:
-    half = (share.high - share.low) / 2
-    return f"{_middle(share):.0%}" if half < 0.005 or repeats >= 1000 else f"{_middle(share):.0%} ± {half:.0%}"
-
-
-def _middle(share: "Interval") -> float:
-    return (share.low + share.high) / 2
+def _text(share: "Share") -> str:
+    return f"{share.estimate:.0%} ({100 * share.low:.0f}-{100 * share.high:.0f})"
 
 
 def _data(p: "Power") -> dict[str, Any]:
-    shares = {name: [getattr(p, name).low, getattr(p, name).high] for name, _ in _COLUMNS}
-    return {"participants": p.participants, **shares}
+    return {"participants": p.participants, **{name: _share_data(getattr(p, name)) for name, _ in _COLUMNS}}
+
+
+def _share_data(share: "Share") -> dict[str, float]:
+    return {"estimate": share.estimate, **asdict(share)}

@@ -3,6 +3,8 @@
 [Williams1949] Williams, Experimental designs balanced for the estimation of residual effects of treatments, 1949.
 """
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,3 +103,28 @@ def balance(plan: StudyPlan, participants: int | None = None) -> str:
         f"The orders of {n} participants are not balanced: {of} conditions need {multiples} participants, so that each "
         f"condition has each place, and follows each other, equally often."
     )
+
+
+def balance_of_complete(plan: StudyPlan, numbers: Sequence[int]) -> str:
+    """Return whether the orders of complete sessions are balanced, in a sentence, by the participants' numbers.
+
+    They are if each row of the square was played equally often. A number of sessions says nothing of it: who withdrew,
+    or broke off, leaves a gap in a row that the next participants' rows do not fill.
+    """
+    if not numbers:
+        return "No session is complete yet, so that no orders can be balanced."
+    rows = Counter(order_row(plan, n) for n in numbers)
+    played = [rows[row] for row in range(1, len(plan.conditions) + 1)]
+    whose = (
+        "The orders of the one complete session"
+        if len(numbers) == 1
+        else f"The orders of {len(numbers)} complete sessions"
+    )
+    if len(set(played)) == 1:
+        return f"{whose} are balanced: each of the square's {len(played)} rows was played {_times(played[0])}."
+    each = ", ".join(f"row {row}: {n}" for row, n in enumerate(played, 1))
+    return f"{whose} are not balanced, as the square's rows were not played equally often ({each})."
+
+
+def _times(n: int) -> str:
+    return {1: "once", 2: "twice"}.get(n, f"{n} times")

@@ -33,7 +33,7 @@ class PlanTable:
         value = self._take(name)
         if isinstance(value, str) and value.strip():
             return value.strip()
-        return self._wrong(name, value, "a text is right", "")
+        return self._wrong(name, value, "expected a non-empty string", "")
 
     def texts(self, name: str, *, empty: bool = False) -> list[str]:
         """Return a list of texts, which may have no entry only if `empty`."""
@@ -41,39 +41,39 @@ class PlanTable:
         texts: list[Any] = cast(list[Any], value) if isinstance(value, list) else []
         if isinstance(value, list) and (texts or empty) and all(isinstance(t, str) and t.strip() for t in texts):
             return [str(t).strip() for t in texts]
-        return self._wrong(name, value, 'a list of texts is right, such as ["a", "b"]', [])
+        return self._wrong(name, value, 'expected a list of non-empty strings, such as ["a", "b"]', [])
 
     def choice(self, name: str, valid: Sequence[str]) -> str:
         """Return one of some texts."""
         value = self._take(name)
         if isinstance(value, str) and value in valid:
             return value
-        return self._wrong(name, value, f"{' or '.join(map(repr, valid))} is right", valid[0])
+        return self._wrong(name, value, f"expected {' or '.join(map(repr, valid))}", valid[0])
 
     def whole(self, name: str, low: int, high: int) -> int:
         """Return a whole number of a range."""
         value = self._take(name)
         if isinstance(value, int) and not isinstance(value, bool) and low <= value <= high:
             return value
-        return self._wrong(name, value, f"a whole number from {low} to {high} is right", low)
+        return self._wrong(name, value, f"expected a whole number from {low} to {high}", low)
 
     def number(self, name: str, low: float, high: float) -> float:
         """Return a number of a range."""
         value = self._take(name)
         if isinstance(value, (int, float)) and not isinstance(value, bool) and low <= value <= high:
             return float(value)
-        return self._wrong(name, value, f"a number from {low:g} to {high:g} is right", low)
+        return self._wrong(name, value, f"expected a number from {low:g} to {high:g}", low)
 
     def flag(self, name: str, *, default: bool) -> bool:
         """Return true or false."""
         value = self._take(name, default)
-        return value if isinstance(value, bool) else self._wrong(name, value, "true or false is right", default)
+        return value if isinstance(value, bool) else self._wrong(name, value, "expected true or false", default)
 
     def table(self, name: str, *, needed: bool = True) -> "PlanTable":
         """Return a table in it; an empty one where there is none, which is a fault if it is `needed`."""
         value = self._take(name, None if needed else {})
         if not isinstance(value, dict):
-            value = self._wrong(name, value, f"a table is right: [{self._path(name)}]", dict[str, Any]())
+            value = self._wrong(name, value, f"expected a table: [{self._path(name)}]", dict[str, Any]())
         if name not in self._tables:
             self._tables[name] = PlanTable(self._path(name), cast(dict[str, Any], value), self.faults)
         return self._tables[name]
@@ -90,7 +90,7 @@ class PlanTable:
         value = self._take(name, [])
         entries: list[Any] = cast(list[Any], value) if isinstance(value, list) else []
         if not isinstance(value, list) or any(not isinstance(entry, dict) for entry in entries):
-            entries = self._wrong(name, value, f"tables are right: [[{self._path(name)}]]", list[Any]())
+            entries = self._wrong(name, value, f"expected tables: [[{self._path(name)}]]", list[Any]())
         made = [PlanTable(f"{self._path(name)}[{k}]", entry, self.faults) for k, entry in enumerate(entries, 1)]
         self._tables |= {f"{name}[{k}]": table for k, table in enumerate(made, 1)}
         return made
@@ -128,7 +128,7 @@ class PlanTable:
     def _parameter(self, name: str, value: Any) -> str:
         entries: list[Any] = cast(list[Any], value) if isinstance(value, list) else [value]
         if any(not isinstance(v, (str, int, float)) or (isinstance(v, float) and math.isnan(v)) for v in entries):
-            return self._wrong(name, value, "a text, a number, true, false or a list of them is right", "")
+            return self._wrong(name, value, "expected a string, a number, true, false or a list of them", "")
         return ",".join(_text_of(v) for v in entries)
 
 

@@ -11,7 +11,7 @@ from handover.scenarios.reporting.page import Section, template, write_page
 from handover.scenarios.study.folder.codebook import PILOT
 from handover.scenarios.study.folder.session_folder import pseudonym_of
 from handover.scenarios.study.folder.study_folder import StudyFolder
-from handover.scenarios.study.plan.order import balance, order_row
+from handover.scenarios.study.plan.order import balance_of_complete, order_row
 from handover.scenarios.study.report.report_sections import (
     Words,
     failures_section,
@@ -85,7 +85,7 @@ def _header(analysis: StudyAnalysis) -> Markup:
         told += f" {_counted(withdrawn, 'participant')} withdrew, and {'is' if withdrawn == 1 else 'are'} in no result."
     lines.append(Markup("<p class='verdict'><b>{}</b>: {}</p>").format(who, told))
     if n:
-        lines.append(note(balance(plan, n)))
+        lines.append(note(balance_of_complete(plan, [s.session.number for s in analysis.complete_sessions])))
     if 0 < n < MIN_PARTICIPANTS:
         lines.append(note(f"Fewer than {MIN_PARTICIPANTS} are too few for a test: none is made."))
     return Markup("\n").join(lines)
@@ -195,7 +195,7 @@ def _entering(analysis: StudyAnalysis, words: Words) -> Markup:
         ("tests of ratings", f"{pairs}, and were rated", _between([t.participants for t in ratings])),
         (
             "order effects",
-            "complete sessions alone, as orders are balanced in these",
+            "complete sessions, without void rounds and the first",
             str(len(analysis.complete_sessions)),
         ),
         (
@@ -223,7 +223,7 @@ def _between(numbers: Sequence[int]) -> str:
 
 
 def _methods_section(analysis: StudyAnalysis) -> Section:
-    html = template("study_methods.html").render(plan=analysis.plan)
+    html = template("study_methods.html").render(plan=analysis.plan, tested=analysis.tested)
     return Section(anchor="methods", title="Methods", html=Markup(html))
 
 

@@ -87,14 +87,14 @@ def _failure_tests(analysis: StudyAnalysis, words: Words) -> Markup:
     rows: list[tuple[str, ...]] = []
     for t in analysis.failure_tests:
         difference = "–" if t.difference is None else f"{_signed(100 * t.difference, 0)} %"
-        p = [_TOO_FEW if p is None else format_p_value(p) for p in (t.p_rounds, t.p_holm, t.p_participants)]
+        p = [_TOO_FEW if p is None else format_p_value(p) for p in (t.p_pairs, t.p_holm, t.p_participants)]
         rows.append((words.task(t.task), str(t.participants), difference, *p))
-    header = ("task", "participants", f"{words.first} − {words.second}", "p, rounds", "p, Holm", "p, participants")
+    header = ("task", "participants", f"{words.first} − {words.second}", "p, pairs", "p, Holm", "p, participants")
     caption = f"Failures compared within participants: {words.whose}"
     return rows_table(header, rows, numbers=range(1, 6), caption=caption) + note(
-        "p, rounds: exact permutation of the rounds of a task within each participant; Holm: the same, corrected over "
-        "tasks; p, participants: exact flips of whole participants, which lets rounds of one depend on each other."
-        + _too_few_note([t.participants for t in analysis.failure_tests])
+        "p, pairs: exact flips within pairs, a participant's rounds of both behaviours in the same task and period; "
+        "Holm: the same, corrected over tasks; p, participants: exact flips of whole participants, which lets rounds "
+        "of one depend on each other." + _too_few_note([t.participants for t in analysis.failure_tests])
     )
 
 
@@ -201,7 +201,8 @@ def tests_section(analysis: StudyAnalysis, words: Words) -> Section:
     table = rows_table(header, rows, numbers=range(2, 8), caption=caption)
     told = (
         "Means of the participants' means; shift of Hodges and Lehmann with its exact interval; p: exact Wilcoxon "
-        f"signed-rank test, two-sided; Holm: corrected over all {len(rows)}."
+        f"signed-rank test, two-sided; Holm: corrected over the {analysis.tested} tests that "
+        f"were made, of {len(rows)}."
     )
     tested = [t for t in analysis.rating_tests if t.test is not None]
     plot = Markup()
@@ -238,8 +239,10 @@ def order_section(analysis: StudyAnalysis, words: Words) -> Section:
     header = ("order", "measure", "participants", "shift, 95 %", "p")
     table = rows_table(header, rows, numbers=(2, 3, 4), caption=f"Order effects: {words.whose}")
     told = (
-        "Slopes within a participant's conditions by least squares, so that no effect of behaviour or task is in them; "
-        "over participants by the exact signed-rank test, not corrected. Ratings in points, failures as 0 or 1."
+        "Slopes within a participant's conditions by least squares, so that no effect of behaviour or task is in them. "
+        "The round's number, or the period, is fitted together with the behaviour before, so that void "
+        "rounds or unbalanced orders leave neither in the other; the first round, after nothing, is left out. Over "
+        "participants by the exact signed-rank test, not corrected. Ratings in points, failures as 0 or 1."
     )
     few = _too_few_note([e.participants for e in analysis.order_effects])
     return Section(anchor="order", title="Order effects", html=table + note(told + few))
@@ -252,9 +255,11 @@ def model_section(analysis: StudyAnalysis, words: Words) -> Section:
     html = rows_table(header, rows, numbers=(2, 3), caption=f"Mixed ordinal model: {words.whose}")
     html += Markup().join(note(f"{m.statement}: no model, as {m.reason}.") for m in analysis.models if m.model is None)
     told = (
-        "A supplement: a cumulative logit model with an intercept of each participant, whose standard deviation is in "
-        "the first line of each statement, by maximum likelihood. Wald intervals rest on many ratings, the tests above "
-        f"do not. A positive effect of the behaviour: {words.first} is rated higher."
+        "A supplement: a cumulative logit model by maximum likelihood, in which each participant has an intercept and, "
+        "in each task, a slope of the behaviour, as participants differ in how much it matters to them; their standard "
+        "deviations are in the first lines of each statement. Wald intervals are approximate, the tests above are "
+        "exact. Tasks and period have no slopes in the model, so that their intervals would be too narrow: estimates "
+        f"alone are given. A positive effect of the behaviour: {words.first} is rated higher."
     )
     return Section(anchor="model", title="Mixed ordinal model", html=html + note(told))
 
@@ -266,9 +271,13 @@ def _model_rows(m: StatementModel, analysis: StudyAnalysis, words: Words) -> lis
     names = [f"{words.first} − {words.second}: {words.task(t)}" for t in tasks]
     names += [f"{words.task(t)}, not {words.task(tasks[0]).lower()}" for t in tasks[1:]]
     names += ["a period later"] if "period" in m.names else []
-    rows = [(m.statement, "participants, standard deviation", f"{m.model.deviation:.2f}", "")]
-    for name, e in zip(names, m.model.effects, strict=True):
-        rows.append((m.statement, name, _shift(e), format_p_value(e.p)))
+    rows = [(m.statement, "participants' intercepts, standard deviation", f"{m.model.deviation:.2f}", "")]
+    if m.model.slope_deviation is not None:
+        label = f"participants' {words.first} − {words.second}, standard deviation"
+        rows.append((m.statement, label, f"{m.model.slope_deviation:.2f}", ""))
+    for k, (name, e) in enumerate(zip(names, m.model.effects, strict=True)):
+        shift, p = (_shift(e), format_p_value(e.p)) if k < m.tested else (_signed(e.estimate), "not tested")
+        rows.append((m.statement, name, shift, p))
     return rows
 
 

@@ -62,7 +62,7 @@ def result_columns(plan: StudyPlan) -> Mapping[str, Sequence[Column]]:
             _TASK,
             Column("participants", WHOLE, "1", "participants with a complete pair of judged rounds"),
             Column("difference", NUMBER, "1", f"mean difference of their shares of failures, {difference}", True),
-            _p("p_rounds", "exact permutation of rounds within participants, two-sided"),
+            _p("p_pairs", "exact flips within pairs of both behaviours in the same task and period, two-sided"),
             _p("p_holm", "the same, corrected over tasks by Holm"),
             _p("p_participants", "exact flips of whole participants' differences, two-sided"),
         ),
@@ -93,10 +93,13 @@ def result_columns(plan: StudyPlan) -> Mapping[str, Sequence[Column]]:
             _STATEMENT,
             Column("effect", TEXT, "", f"behaviour: {difference}, in a task; task: against the first; period"),
             Column("estimate", NUMBER, "1", "log-odds of a higher rating; empty where it is not determined", True),
-            Column("low", NUMBER, "1", "lower end of its Wald interval, 95 %", optional=True),
+            Column("low", NUMBER, "1", "lower end of its Wald interval, 95 %; of behaviour alone", optional=True),
             Column("high", NUMBER, "1", "upper end of it", optional=True),
-            Column("p", NUMBER, "1", "of Wald's test, two-sided", optional=True),
+            Column(
+                "p", NUMBER, "1", "of Wald's test, two-sided; of behaviour alone, which has slopes in the model", True
+            ),
             Column("deviation", NUMBER, "1", "standard deviation of the participants' intercepts, log-odds", True),
+            Column("slope_deviation", NUMBER, "1", "the same of their slopes of behaviour, each task its own", True),
             Column("reason", TEXT, "", "why there is no model", optional=True),
         ),
     }
@@ -145,12 +148,11 @@ def _mixed_model(analysis: StudyAnalysis) -> _Rows:
     rows: _Rows = []
     for m in analysis.models:
         effects = [None] * len(m.names) if m.model is None else m.model.effects
-        for name, effect in zip(m.names, effects, strict=True):
-            numbers = {} if effect is None else asdict(effect)
-            deviation = None if m.model is None else m.model.deviation
-            rows.append(
-                {"statement": m.statement, "effect": name, **numbers, "deviation": deviation, "reason": m.reason}
-            )
+        deviations = {} if m.model is None else {n: getattr(m.model, n) for n in ("deviation", "slope_deviation")}
+        for k, (name, effect) in enumerate(zip(m.names, effects, strict=True)):
+            shown = ("estimate", "low", "high", "p") if k < m.tested else ("estimate",)
+            numbers = {} if effect is None else {n: getattr(effect, n) for n in shown}
+            rows.append({"statement": m.statement, "effect": name, **numbers, **deviations, "reason": m.reason})
     return rows
 
 

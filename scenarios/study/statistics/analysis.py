@@ -19,14 +19,12 @@ from handover.scenarios.study.folder.session_folder import SessionFolder
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.statistics.exact_tests import (
     MIN_PARTICIPANTS,
-    Counts,
     SignedRankTest,
-    permutation_test,
     sign_flip_test,
     signed_rank_test,
-    within_condition_slope,
+    within_condition_slopes,
 )
-from handover.scenarios.study.statistics.mixed_ordinal import MixedModel, NotFitted, fit_mixed_ordinal
+from handover.scenarios.study.statistics.mixed_ordinal import MixedModel, NotFitted, Slopes, fit_mixed_ordinal
 
 FAILURE = "failure"
 """As a measure beside the statements: 1 of a round that failed by the rule, 0 of one that did not."""
@@ -63,16 +61,16 @@ class FailureTest:
     Attributes:
         participants: with a complete pair of judged rounds.
         difference: of their shares of failures, mean.
-        p_rounds: by permutation of the rounds within participants.
+        p_pairs: by flips within complete pairs: rounds of one participant are taken for independent.
         p_holm: the same, corrected over tasks.
         p_participants: by flips of whole participants' differences: rounds of one may depend on each other. A
-            participant has the weight of the square of the number of pairs.
+            participant has the weight of the number of pairs.
     """
 
     task: str
     participants: int
     difference: float | None
-    p_rounds: float | None
+    p_pairs: float | None
     p_holm: float | None
     p_participants: float | None
 
@@ -129,10 +127,12 @@ class StatementModel:
 
     Attributes:
         names: of the effects, in order: of the behaviour in each task, of tasks, and of the period.
+        tested: how many of these, from the first, have random slopes, and so an interval and a p-value that hold.
     """
 
     statement: str
     names: Sequence[str]
+    tested: int
     model: MixedModel | None
     reason: str
 
@@ -188,29 +188,29 @@ class StudyAnalysis:
     def failure_tests(self) -> Sequence[FailureTest]:
         """Failures of each task compared within participants, corrected over tasks."""
         tests = [self._failure_test(task) for task in self.plan.tasks]
-        corrected = _holm(t.p_rounds for t in tests)
+        corrected = _holm(t.p_pairs for t in tests)
         return [replace(t, p_holm=p) for t, p in zip(tests, corrected, strict=True)]
 
     def _failure_test(self, task: str) -> FailureTest:
-        counts = [c for s in self.sessions if (c := self._counts(s.session.pseudonym, task)) is not None]
-        shares = [c.first / c.of_first - c.second / c.of_second for c in counts]
-        enough = len(counts) >= MIN_PARTICIPANTS
-        crossed = [c.first * c.of_second - c.second * c.of_first for c in counts]
+        of_participants = [d for s in self.sessions if (d := self._pair_differences(s.session.pseudonym, task))]
+        enough = len(of_participants) >= MIN_PARTICIPANTS
         return FailureTest(
             task=task,
-            participants=len(counts),
-            difference=float(np.mean(shares)) if shares else None,
-            p_rounds=permutation_test(counts) if enough else None,
+            participants=len(of_participants),
+            difference=float(np.mean([np.mean(d) for d in of_participants])) if of_participants else None,
+            p_pairs=sign_flip_test([x for d in of_participants for x in d]) if enough else None,
             p_holm=None,
-            p_participants=sign_flip_test(crossed) if enough else None,
+            p_participants=sign_flip_test([sum(d) for d in of_participants]) if enough else None,
         )
 
-    def _counts(self, participant: str, task: str) -> Counts | None:
-        """Return a participant's failures in complete pairs of rounds of a task; None without any."""
+    def _pair_differences(self, participant: str, task: str) -> list[int]:
+        """Return a participant's differences of failures in the complete pairs of a task, one a period."""
         rows = [r for r in self.counted if (r["participant"], r["task"]) == (participant, task)]
-        paired = self._paired([r for r in rows if r["failed_by_rule"] is not None])
-        first, second = ([r["failed_by_rule"] for r in paired if r["behaviour"] == b] for b in self.plan.behaviours)
-        return Counts(sum(first), len(first), sum(second), len(second)) if first and second else None
+        pairs: dict[int, int] = {}
+        for r in self._paired([r for r in rows if r["failed_by_rule"] is not None]):
+            side = 1 if r["behaviour"] == self.plan.behaviours[0] else -1
+            pairs[r["period"]] = pairs.get(r["period"], 0) + side * int(r["failed_by_rule"])
+        return list(pairs.values())
 
     @cached_property
     def means(self) -> Sequence[PairedMeans]:
@@ -249,6 +249,11 @@ class StudyAnalysis:
         corrected = _holm(None if t.test is None else t.test.p for t in tests)
         return [replace(t, p_holm=p) for t, p in zip(tests, corrected, strict=True)]
 
+    @property
+    def tested(self) -> int:
+        """How many tests of ratings were made: over so many they are corrected."""
+        return sum(t.test is not None for t in self.rating_tests)
+
     def _rating_test(self, task: str, statement: str) -> RatingTest:
         pairs = [m for m in self.means if (m.task, m.statement) == (task, statement)]
         return RatingTest(
@@ -264,7 +269,9 @@ class StudyAnalysis:
     def order_effects(self) -> Sequence[OrderEffect]:
         """How ratings and failures go with the round's number, the period, and the behaviour of the round before.
 
-        Of complete sessions alone: the orders are balanced in these.
+        Of complete sessions, without their void rounds and the first, which comes after nothing. The number, or the
+        period, and carry-over are fitted together: void rounds, and a number of sessions that is no multiple of the
+        conditions, would leave the one in the other's slope.
         """
         measured = {name: [a for a in self._rated if a["statement"] == name] for name in self.plan.statements}
         judged = [r for r in self.counted if r["failed_by_rule"] is not None]
@@ -275,23 +282,21 @@ class StudyAnalysis:
     def _order_effect(self, effect: str, measure: str, rows: Sequence[_Row]) -> OrderEffect:
         slopes: list[float] = []
         for s in self.complete_sessions:
-            own = [r for r in rows if r["participant"] == s.session.pseudonym]
-            placed = [(x, r) for r in own if (x := self._place(effect, s, r["round"])) is not None]
-            if placed:
-                conditions = [(r["task"], r["behaviour"]) for _, r in placed]
-                slope = within_condition_slope([x for x, _ in placed], [r["value"] for _, r in placed], conditions)
-                slopes += [] if slope is None else [slope]
+            own = [r for r in rows if r["participant"] == s.session.pseudonym and r["round"] > 1]
+            x = [self._places(effect, s, r["round"]) for r in own]
+            found = within_condition_slopes(x, [r["value"] for r in own], [(r["task"], r["behaviour"]) for r in own])
+            if own and found is not None:
+                slopes.append(found[1 if effect == "carry-over" else 0])
         return OrderEffect(effect=effect, measure=measure, participants=len(slopes), test=signed_rank_test(slopes))
 
-    def _place(self, effect: str, session: SessionFolder, number: int) -> float | None:
-        """Return what a round has of an effect; None of the first round, which comes after nothing.
+    def _places(self, effect: str, session: SessionFolder, number: int) -> tuple[float, float]:
+        """Return what a round has of practice, and of carry-over: 1 after the first behaviour, 0 after the second.
 
-        It is its number, its period, or 1 after a round of the first behaviour and 0 after one of the second.
+        Practice is the period where that is the effect, and the round's number beside the others.
         """
-        if effect == "carry-over":
-            before = session.rounds[number - 2].condition.behaviour if number > 1 else None
-            return None if before is None else float(before == self.plan.behaviours[0])
-        return float(number if effect == "round" else session.rounds[number - 1].period)
+        before = session.rounds[number - 2].condition.behaviour
+        practice = session.rounds[number - 1].period if effect == "period" else number
+        return float(practice), float(before == self.plan.behaviours[0])
 
     @cached_property
     def models(self) -> Sequence[StatementModel]:
@@ -306,17 +311,18 @@ class StudyAnalysis:
         names += ["period"] if self.plan.repetitions > 1 else []
         if len({a["participant"] for a in rows}) < MIN_PARTICIPANTS:
             reason = f"fewer than {MIN_PARTICIPANTS} participants"
-            return StatementModel(statement=statement, names=names, model=None, reason=reason)
+            return StatementModel(statement=statement, names=names, tested=len(tasks), model=None, reason=reason)
         x: list[list[float]] = []
-        for a in rows:
-            side = 0.5 if a["behaviour"] == first else -0.5
+        sides = [0.5 if a["behaviour"] == first else -0.5 for a in rows]
+        slopes = Slopes(sides, [a["task"] for a in rows])
+        for a, side in zip(rows, sides, strict=True):
             line = [side * (a["task"] == t) for t in tasks] + [float(a["task"] == t) for t in tasks[1:]]
             x.append([*line, *([float(period[a["participant"], a["round"]])] if "period" in names else [])])
         try:
-            model = fit_mixed_ordinal([a["value"] for a in rows], x, [a["participant"] for a in rows])
+            model = fit_mixed_ordinal([a["value"] for a in rows], x, [a["participant"] for a in rows], slopes)
         except NotFitted as e:
-            return StatementModel(statement=statement, names=names, model=None, reason=str(e))
-        return StatementModel(statement=statement, names=names, model=model, reason="")
+            return StatementModel(statement=statement, names=names, tested=len(tasks), model=None, reason=str(e))
+        return StatementModel(statement=statement, names=names, tested=len(tasks), model=model, reason="")
 
 
 def _holm(p: Iterable[float | None]) -> list[float | None]:

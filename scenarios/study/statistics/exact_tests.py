@@ -17,7 +17,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.stats import hypergeom, rankdata
+from numpy.typing import ArrayLike
+from scipy.stats import rankdata
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.statistics import LEVEL
@@ -91,7 +92,10 @@ def pair_means(d: Floats) -> Floats:
 
 
 def shift_interval(d: Floats) -> tuple[float, float]:
-    """Return the closed interval of a shift, at 95 % at least, of six differences [Hodges1963], [Noether1967]."""
+    """Return the closed interval of a shift, at 95 % at least, of at least six differences.
+
+    [Hodges1963], [Noether1967]
+    """
     below = np.cumsum(_sum_of_chosen(tuple(range(1, len(d) + 1))))
     k = int(np.searchsorted(below, LEVEL / 2, side="right")) - 1  # the largest sum that is too improbable to keep
     means = pair_means(d)
@@ -99,52 +103,36 @@ def shift_interval(d: Floats) -> tuple[float, float]:
 
 
 def sign_flip_test(differences: Sequence[int]) -> float:
-    """Return the exact p-value, two-sided, that whole differences of participants are as likely with the other sign.
+    """Return the exact p-value, two-sided, that whole differences are as likely with the other sign.
 
-    What a participant does in one round may depend on the others as it likes: participants are what is drawn.
-    [Edgington2007]
+    Of participants' differences: what a participant does in one round may depend on the others as it likes. Of matched
+    pairs, differences -1, 0 and 1: the behaviours could as well have been the other way round in each pair, and never
+    across pairs, which differ by participant, task and period; that is McNemar's exact test. [Edgington2007]
     """
     weights = sorted(abs(x) for x in differences if x)
     return _two_sided(_sum_of_chosen(tuple(weights)), sum(x for x in differences if x > 0))
 
 
-@dataclass(frozen=True)
-class Counts:
-    """Failures of a participant in a task: of the first behaviour's rounds, and of the second's."""
+def within_condition_slopes(x: ArrayLike, y: Sequence[float], condition: Sequence[object]) -> list[float] | None:
+    """Return by how much y grows with each column of x in one participant, all columns together.
 
-    first: int
-    of_first: int
-    second: int
-    of_second: int
+    By least squares with a mean of its own each condition, so that no column's slope has another column's effect in it,
+    whichever rounds are there. None where the columns cannot be told apart within conditions.
 
-
-def permutation_test(counts: Sequence[Counts]) -> float:
-    """Return the exact p-value, two-sided, that failures do not depend on behaviour, given how many each person had.
-
-    If the behaviour makes no difference to any round, a participant's rounds of a task might have had the two
-    behaviours in any arrangement: failures of the first are hypergeometric within each participant, and independent
-    between them. Pooling all rounds would take people for alike. [Edgington2007]
+    Args:
+        x: shape (rounds, columns).
+        y: one a round.
+        condition: of each round.
     """
-    total: Floats = np.ones(1)
-    for c in counts:
-        failed, n = c.first + c.second, c.of_first + c.of_second
-        total = np.convolve(total, hypergeom.pmf(np.arange(failed + 1), n, failed, c.of_first))
-    return _two_sided(total, sum(c.first for c in counts))
-
-
-def within_condition_slope(x: Sequence[float], y: Sequence[float], condition: Sequence[object]) -> float | None:
-    """Return by how much y grows with x in one participant, by least squares with a mean of its own each condition.
-
-    None where x does not vary within any condition.
-    """
-    xs: Floats = np.asarray(x, dtype=np.float64)
-    ys: Floats = np.asarray(y, dtype=np.float64)
+    xs: Floats = np.array(x, dtype=np.float64).reshape(len(y), -1)
+    ys: Floats = np.array(y, dtype=np.float64)
     for kind in dict.fromkeys(condition):
         same = np.array([c == kind for c in condition])
-        xs = np.where(same, xs - xs[same].mean(), xs)
-        ys = np.where(same, ys - ys[same].mean(), ys)
-    square = float(xs @ xs)
-    return float(xs @ ys) / square if square > 1e-9 else None
+        xs[same] -= xs[same].mean(axis=0)
+        ys[same] -= ys[same].mean()
+    if np.linalg.matrix_rank(xs, tol=1e-6) < xs.shape[1]:
+        return None
+    return [float(slope) for slope in np.linalg.lstsq(xs, ys, rcond=None)[0]]
 
 
 @lru_cache(maxsize=4096)

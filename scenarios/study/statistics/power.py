@@ -1,8 +1,9 @@
-"""What a study could find, before the first person comes: its own tests on simulated ratings.
+"""Power analysis by simulation: the study's own tests on simulated ratings.
 
 Effects are in standard deviations of the participants' differences between the two behaviours, each of means of the
-rounds of a task. Ratings come in whole steps, so differences are rounded to them: ties and zeros are as frequent as in
-a study.
+rounds of a task. Ratings come in whole steps, so differences are rounded to them, and there are ties and zeros. They
+are not clipped to the ends of the scale: where most ratings are near an end, differences are smaller, ties more
+frequent, and the power is below what is simulated.
 """
 
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import numpy as np
 from scipy import stats
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.campaign.statistics import LEVEL, Interval, holm, success_interval
+from handover.scenarios.campaign.statistics import LEVEL, holm, success_interval
 from handover.scenarios.study.plan.plan import StudyPlan
 from handover.scenarios.study.statistics.exact_tests import MIN_PARTICIPANTS, signed_rank_p
 
@@ -35,29 +36,48 @@ class PowerAssumptions:
     seed: int = 0
 
 
+@dataclass(frozen=True)
+class Share:
+    """Simulated studies that reject, with the interval of Clopper and Pearson at 95 % of the simulation.
+
+    Attributes:
+        estimate: successes / repeats.
+    """
+
+    successes: int
+    repeats: int
+    low: float
+    high: float
+
+    @property
+    def estimate(self) -> float:
+        """The share of studies that reject."""
+        return self.successes / self.repeats
+
+
 @dataclass(frozen=True, kw_only=True)
 class Power:
-    """In how many of all simulated studies the tests find effects: intervals at 95 % of what was simulated.
+    """In how many of all simulated studies the tests find effects.
 
     Attributes:
         participants: of each study.
         tests: how many ratings are tested: statements x tasks.
-        alone: of one test that nobody corrects.
-        first: of one effect where all tests are corrected by Holm and no other has an effect.
-        all_have: of each effect where all tests are corrected by Holm and all have the same.
-        any_of_all: that any is found there.
-        none: that anything is found after Holm where nothing has an effect: the error.
+        single_uncorrected: of one test that nobody corrects.
+        one_effect_holm: of one effect where all tests are corrected by Holm and no other has an effect.
+        each_of_all_holm: of each effect where all tests are corrected by Holm and all have the same.
+        any_of_all_holm: that any is found there.
+        familywise_error: that anything is found after Holm where nothing has an effect.
         t_test: of the paired t-test on the same differences, which nobody corrects: for comparison.
     """
 
     participants: int
     tests: int
-    alone: Interval
-    first: Interval
-    all_have: Interval
-    any_of_all: Interval
-    none: Interval
-    t_test: Interval
+    single_uncorrected: Share
+    one_effect_holm: Share
+    each_of_all_holm: Share
+    any_of_all_holm: Share
+    familywise_error: Share
+    t_test: Share
 
 
 def simulated_power(plan: StudyPlan, participants: int, assumed: PowerAssumptions) -> Power:
@@ -78,11 +98,11 @@ def simulated_power(plan: StudyPlan, participants: int, assumed: PowerAssumption
     return Power(
         participants=participants,
         tests=tests,
-        alone=_share(p_effect[:, 0]),
-        first=_share(_corrected(p_first)[:, 0]),
-        all_have=_share(all_corrected[:, 0]),
-        any_of_all=_share(all_corrected.min(axis=1)),
-        none=_share(_corrected(p_null).min(axis=1)),
+        single_uncorrected=_share(p_effect[:, 0]),
+        one_effect_holm=_share(_corrected(p_first)[:, 0]),
+        each_of_all_holm=_share(all_corrected[:, 0]),
+        any_of_all_holm=_share(all_corrected.min(axis=1)),
+        familywise_error=_share(_corrected(p_null).min(axis=1)),
         t_test=_share(_t_test(with_effect[:, 0])),
     )
 
@@ -118,6 +138,8 @@ def _corrected(p: Floats) -> Floats:
     return np.array([holm(row.tolist()) for row in p])
 
 
-def _share(p: Floats) -> Interval:
-    """Return the interval of the share of p-values that reject."""
-    return success_interval(int(np.count_nonzero(p < LEVEL)), len(p))
+def _share(p: Floats) -> Share:
+    """Return the share of p-values that reject."""
+    successes = int(np.count_nonzero(p < LEVEL))
+    interval = success_interval(successes, len(p))
+    return Share(successes, len(p), interval.low, interval.high)

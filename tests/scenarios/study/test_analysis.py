@@ -46,8 +46,8 @@ def test_failures_are_compared_within_persons(tmp_path: Path):
     assert counts["human_to_robot", "rigid"].failures == counts["collaborative", "compliant"].failures == 0
     assert counts["human_to_robot", "compliant"].low == pytest.approx(0.2912, abs=1e-4)  # Clopper-Pearson of 12 of 24
     test = {t.task: t for t in analysis.failure_tests}["human_to_robot"]
-    assert test.p_rounds == pytest.approx(2 / 6**6)  # each of six: both failures in the same two of four rounds
-    assert test.p_holm == pytest.approx(3 * 2 / 6**6)
+    assert test.p_pairs == pytest.approx(2 / 2**12)  # each of six: two pairs in which compliant alone failed
+    assert test.p_holm == pytest.approx(3 * 2 / 2**12)
     assert test.p_participants == pytest.approx(2 / 2**6)
     assert test.difference == pytest.approx(-0.5)
 
@@ -71,7 +71,7 @@ def test_void_rounds_and_rounds_that_nobody_can_judge_do_not_count(tmp_path: Pat
 def test_too_few_are_not_tested(people: int, tmp_path: Path):
     analysis = StudyAnalysis(write_study(tmp_path / "out", people, rigid_is_better, compliant_fails))
     assert all(t.test is None and t.p_holm is None for t in analysis.rating_tests)
-    assert all(t.p_rounds is None and t.p_participants is None for t in analysis.failure_tests)
+    assert all(t.p_pairs is None and t.p_participants is None for t in analysis.failure_tests)
     assert all(e.test is None for e in analysis.order_effects)
     assert all(m.model is None and "fewer than 6" in m.reason for m in analysis.models)
 
@@ -109,6 +109,27 @@ def test_what_a_rigid_round_leaves_behind_is_carry_over(tmp_path: Path):
     assert carry.estimate == pytest.approx(1.0)
     assert carry.p < 0.001
     assert none.p == 1.0
+
+
+def test_practice_is_not_taken_for_carry_over_where_rounds_are_void_and_orders_unbalanced(tmp_path: Path):
+    study = StudyFolder.opened(tmp_path / "out", PLAN)
+    for number in range(1, 8):
+        folder = study.begin(session(number))
+        for planned in folder.rounds:
+            is_void = (planned.number + number) % 5 == 0
+            folder.record_round(planned.number, record(void=is_void))
+            if not is_void:  # the second period is rated higher by 4, whatever came before
+                ratings = {"S1": 1 + 4 * (planned.period - 1), "S2": min(9, planned.number), "S3": 5}
+                folder.record_answers(planned.number, ratings)
+        folder.record_questionnaire({"age_group": "21-30", "background": "engineering", "comments": ""})
+    analysis = StudyAnalysis(study)
+    assert len(analysis.complete_sessions) == 7
+    effects = {(e.effect, e.measure): e.test for e in analysis.order_effects}
+    period, carry = effects["period", "S1"], effects["carry-over", "S1"]
+    assert period is not None
+    assert carry is not None
+    assert (period.estimate, period.low, period.high) == pytest.approx((4.0, 4.0, 4.0))
+    assert carry.p > 0.05
 
 
 def test_the_model_has_the_behaviours_effect_in_each_task(tmp_path: Path):

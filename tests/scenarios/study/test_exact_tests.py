@@ -12,13 +12,11 @@ from scipy import stats
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.published.free_flyer.study_runs import sign_flip_test as flips_of_simulated_persons
 from handover.scenarios.study.statistics.exact_tests import (
-    Counts,
     pair_means,
-    permutation_test,
     shift_interval,
     sign_flip_test,
     signed_rank_test,
-    within_condition_slope,
+    within_condition_slopes,
 )
 
 BEFORE = (1.83, 0.50, 1.62, 2.48, 1.68, 1.88, 1.55, 3.06, 1.30)
@@ -118,60 +116,47 @@ def test_flips_of_persons_agree_with_all_signs(differences: list[int]):
     assert sign_flip_test(differences) == pytest.approx(flips_of_simulated_persons(differences))
 
 
-def by_all_arrangements(counts: Sequence[Counts]) -> float:
-    """Return the p-value by giving each person's rounds the behaviours in all ways."""
-    of_persons: list[list[int]] = []
-    for c in counts:
-        n, failed = c.of_first + c.of_second, c.first + c.second
-        rounds = [1] * failed + [0] * (n - failed)
-        of_persons.append([sum(chosen) for chosen in itertools.combinations(rounds, c.of_first)])
-    sums: Floats = np.array([sum(way) for way in itertools.product(*of_persons)], dtype=np.float64)
-    found = abs(sum(c.first for c in counts) - float(sums.mean()))
-    return sum(abs(s - sums.mean()) >= found - 1e-9 for s in sums.tolist()) / len(sums)
+def by_all_flips(pairs: Sequence[tuple[int, int]]) -> float:
+    """Return the p-value by giving the rounds of each pair the behaviours both ways round."""
+    ways: Floats = np.array([sum(way) for way in itertools.product(*((a - b, b - a) for a, b in pairs))], dtype=float)
+    return float(np.mean(np.abs(ways) >= abs(sum(a - b for a, b in pairs))))
 
 
-@pytest.mark.parametrize(
-    "counts",
-    [
-        [Counts(0, 2, 2, 2), Counts(0, 2, 1, 2), Counts(1, 2, 1, 2)],
-        [Counts(2, 2, 0, 1), Counts(1, 1, 1, 2), Counts(0, 2, 0, 2), Counts(2, 2, 0, 2)],
-        [Counts(0, 2, 0, 2)] * 3,
-    ],
-)
-def test_permutation_within_persons_agrees_with_all_arrangements(counts: list[Counts]):
-    assert permutation_test(counts) == pytest.approx(by_all_arrangements(counts))
+@pytest.mark.parametrize("seed", range(3))
+def test_flips_within_matched_pairs_agree_with_all_flips_and_with_mcnemars_test(seed: int):
+    pairs = [(int(a), int(b)) for a, b in np.random.default_rng(seed).binomial(1, (0.2, 0.7), size=(11, 2))]
+    discordant = [a - b for a, b in pairs if a != b]
+    found = sign_flip_test([a - b for a, b in pairs])
+    assert found == pytest.approx(by_all_flips(pairs))
+    assert found == pytest.approx(stats.binomtest(discordant.count(1), len(discordant)).pvalue)
 
 
 def test_people_who_differ_are_not_pooled():
-    skilled, clumsy = Counts(0, 2, 0, 2), Counts(1, 2, 2, 2)
-    within = permutation_test([skilled] * 5 + [clumsy] * 5)
+    skilled, clumsy = [0, 0], [-1, 0]  # of each clumsy person's two pairs, one has a success with the first alone
+    within = sign_flip_test((skilled + clumsy) * 5)
     pooled = stats.fisher_exact(np.array([[5, 15], [10, 10]])).pvalue
-    assert within == pytest.approx(0.0625)  # each clumsy person's one success is the first behaviour's: 2 / 2^5
+    assert within == pytest.approx(0.0625)
     assert pooled == pytest.approx(0.19, abs=0.01)
 
 
-def test_one_person_alone_is_fishers_table():
-    assert permutation_test([Counts(1, 8, 6, 8)]) == pytest.approx(
-        stats.fisher_exact(np.array([[1, 7], [6, 2]])).pvalue
-    )
-
-
-def test_the_test_keeps_its_level_where_people_differ():
+def test_flips_within_pairs_keep_their_level_where_periods_differ_and_use_it():
+    """Most fail in the first period and few in the second: arrangements over periods would be conservative."""
     rng = np.random.default_rng(5)
     rejected = 0
     for _ in range(2000):
-        p = rng.beta(0.5, 1.5, 18)
-        first, second = rng.binomial(2, p), rng.binomial(2, p)
-        rejected += permutation_test([Counts(int(a), 2, int(b), 2) for a, b in zip(first, second, strict=True)]) < 0.05
-    assert rejected / 2000 < 0.05
+        p = np.stack([rng.beta(6.0, 4.0, 40), rng.beta(1.0, 8.0, 40)])
+        first, second = rng.binomial(1, p), rng.binomial(1, p)
+        rejected += sign_flip_test((first - second).reshape(-1).tolist()) < 0.05
+    assert 0.02 < rejected / 2000 < 0.05
 
 
-def test_a_slope_is_that_of_least_squares_with_means_of_conditions():
+def test_slopes_are_those_of_least_squares_with_means_of_conditions():
     rng = np.random.default_rng(2)
     condition = [0, 1, 2, 0, 1, 2, 0, 1]
-    x, y = rng.normal(size=8), rng.normal(size=8)
+    x, y = rng.normal(size=(8, 2)), rng.normal(size=8)
     design = np.column_stack([[c == k for c in condition] for k in range(3)] + [x]).astype(float)
-    assert within_condition_slope(x.tolist(), y.tolist(), condition) == pytest.approx(
-        np.linalg.lstsq(design, y, rcond=None)[0][3]
+    assert within_condition_slopes(x, y.tolist(), condition) == pytest.approx(
+        np.linalg.lstsq(design, y, rcond=None)[0][3:].tolist()
     )
-    assert within_condition_slope([0.0, 1.0, 2.0], [1.0, 2.0, 3.0], ["a", "b", "c"]) is None
+    assert within_condition_slopes([0.0, 1.0, 2.0], [1.0, 2.0, 3.0], ["a", "b", "c"]) is None
+    assert within_condition_slopes([[k, 2 * k] for k in range(8)], y.tolist(), condition) is None

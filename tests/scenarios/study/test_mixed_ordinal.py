@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.special import expit
-from scipy.stats import norm
+from scipy.stats import binom, norm
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.study.statistics.mixed_ordinal import MixedModel, NotFitted, fit_mixed_ordinal
+from handover.scenarios.study.statistics.mixed_ordinal import MixedModel, NotFitted, Slopes, fit_mixed_ordinal
 
 WINE = """
 23344455 12132354 23325544 32323253 23433333
@@ -50,16 +50,17 @@ def test_the_marginal_likelihood_is_that_of_adaptive_integration():
 
 
 def drawn(
-    rng: np.random.Generator, people: int, effect: float, deviation: float
+    rng: np.random.Generator, people: int, effect: float, deviation: float, slope_deviation: float = 0.0
 ) -> tuple[list[int], list[list[float]]]:
     y: list[int] = []
     x: list[list[float]] = []
     bounds = np.array([-2.5, -1.5, -0.5, 0.5, 1.5, 2.5, 3.5, 4.5])
     for _ in range(people):
         u = rng.normal(0.0, deviation)
+        own = effect + (rng.normal(0.0, slope_deviation) if slope_deviation else 0.0)
         for k in range(12):
             behaviour = 0.5 - k % 2
-            y.append(1 + int((bounds < effect * behaviour + u + rng.logistic()).sum()))
+            y.append(1 + int((bounds < own * behaviour + u + rng.logistic()).sum()))
             x.append([behaviour])
     return y, x
 
@@ -75,6 +76,58 @@ def test_known_parameters_are_found_and_intervals_cover_them():
     assert np.mean([m.deviation for m in found]) == pytest.approx(1.5, abs=0.15)
     assert np.mean([e.low < 1.0 < e.high for e in effects]) >= 0.88
     assert np.std([e.estimate for e in effects]) == pytest.approx(np.mean([e.error for e in effects]), rel=0.25)
+
+
+def with_slopes(y: list[int], x: list[list[float]]) -> MixedModel:
+    who = [k // 12 for k in range(len(y))]
+    return fit_mixed_ordinal(y, x, who, Slopes([line[0] for line in x], ["task"] * len(y)))
+
+
+def test_the_likelihood_with_slopes_is_that_of_integration_in_two_dimensions():
+    y, x = drawn(np.random.default_rng(4), 8, 1.0, 1.5, 2.0)
+    model = with_slopes(y, x)
+    assert model.slope_deviation is not None
+    node: Floats = np.linspace(-8.0, 8.0, 401)
+    weights = norm.pdf(node) * (node[1] - node[0])
+    u: Floats = model.deviation * node[:, None]
+    v: Floats = model.slope_deviation * node[None, :]
+    bounds = np.concatenate([[-np.inf], model.thresholds, [np.inf]])
+    used = sorted(set(y))
+    total = 0.0
+    for who in range(8):
+        product: Floats = np.ones((len(node), len(node)))
+        for k in range(12 * who, 12 * who + 12):
+            eta = model.effects[0].estimate * x[k][0] + u + v * x[k][0]
+            place = used.index(y[k])
+            each = 1.0 / (1.0 + np.exp(eta - bounds[place + 1])) - 1.0 / (1.0 + np.exp(eta - bounds[place]))
+            product = product * each
+        total += float(np.log(weights @ product @ weights))
+    assert model.log_likelihood == pytest.approx(total, abs=1e-3)
+
+
+def test_slopes_of_people_are_found_and_widen_the_interval():
+    studies = [drawn(np.random.default_rng(seed), 60, 1.0, 1.5, 2.0) for seed in range(4)]
+    found = [with_slopes(y, x).slope_deviation for y, x in studies]
+    assert np.mean([d for d in found if d is not None]) == pytest.approx(2.0, abs=0.3)
+    y, x = studies[0]
+    model, intercepts = with_slopes(y, x), fit_mixed_ordinal(y, x, [k // 12 for k in range(len(y))])
+    assert intercepts.slope_deviation is None
+    assert model.log_likelihood > intercepts.log_likelihood + 5.0
+    assert model.effects[0].error > 1.3 * intercepts.effects[0].error
+
+
+@pytest.mark.slow
+def test_the_test_of_behaviour_keeps_its_size_where_people_differ_in_it():
+    """Without an effect, with slopes of 2 log-odds; intercepts alone take ratings of one for independent evidence."""
+    rng, studies = np.random.default_rng(21), 300
+    rejected = by_intercepts = 0
+    for _ in range(studies):
+        y, x = drawn(rng, 18, 0.0, 1.5, 2.0)
+        rejected += with_slopes(y, x).effects[0].p < 0.05
+        by_intercepts += fit_mixed_ordinal(y, x, [k // 12 for k in range(len(y))]).effects[0].p < 0.05
+    low, high = binom.interval(0.99, studies, 0.05)
+    assert low <= rejected <= high
+    assert by_intercepts > 2 * high
 
 
 def test_without_differences_of_people_the_intercepts_do_not_vary():

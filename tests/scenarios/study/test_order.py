@@ -5,7 +5,7 @@ from collections import Counter
 
 import pytest
 
-from handover.scenarios.study.plan.order import balance, order_row, rounds_of, williams_square
+from handover.scenarios.study.plan.order import balance, balance_of_complete, order_row, rounds_of, williams_square
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
 
 PLAN = parse_plan(default_plan())
@@ -60,3 +60,13 @@ def test_seeds_differ_by_round_and_person_and_come_again_with_the_plan():
 def test_balance_is_told():
     assert "18 participants are balanced" in balance(PLAN)
     assert "10 participants are not balanced: 6 conditions need 6, 12, 18 ... participants" in balance(PLAN, 10)
+
+
+def test_balance_of_complete_sessions_is_by_their_rows():
+    assert "12 complete sessions are balanced: each of the square's 6 rows was played twice" in balance_of_complete(
+        PLAN, range(1, 13)
+    )
+    gap = balance_of_complete(PLAN, [1, *range(3, 14)])
+    assert "12 complete sessions are not balanced" in gap
+    assert "(row 1: 3, row 2: 1, row 3: 2, row 4: 2, row 5: 2, row 6: 2)" in gap
+    assert "No session is complete yet" in balance_of_complete(PLAN, [])

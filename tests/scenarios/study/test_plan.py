@@ -77,14 +77,14 @@ def test_all_faults_are_told_at_once():
     told = "\n".join(faults)
     for part in (
         "sed: no such key; did you mean seed",
-        "seed: it is missing; a whole number from 0",
-        "practice: it is 'long'; a number from 0 to 7200 is right",
+        "seed: it is missing; expected a whole number from 0",
+        "practice: it is 'long'; expected a number from 0 to 7200",
         "scale: its highest, 1, is not above its lowest, 1",
         "tasks.robot_to_human, rigid: behaviour: 'rigd' is none of rigid, compliant",
         "text.en.statements.S2: it is missing",
         "text.en.statements.S22: no such key; did you mean S2",
         "devices: no device 'mose'; did you mean mouse?",
-        "questions[3].kind: it is 'txt'; 'choice' or 'text' is right",
+        "questions[3].kind: it is 'txt'; expected 'choice' or 'text'",
     ):
         assert part in told
 
@@ -92,9 +92,9 @@ def test_all_faults_are_told_at_once():
 @pytest.mark.parametrize(
     ("change", "fault"),
     [
-        (("title = ", "title = 3 #"), "title: it is 3; a text is right"),
-        (("pilot = false", "pilot = 0"), "pilot: it is 0; true or false is right"),
-        (('["S1", "S2", "S3"]', "[]"), "statements: it is []; a list of texts is right"),
+        (("title = ", "title = 3 #"), "title: it is 3; expected a non-empty string"),
+        (("pilot = false", "pilot = 0"), "pilot: it is 0; expected true or false"),
+        (('["S1", "S2", "S3"]', "[]"), "statements: it is []; expected a list of non-empty strings"),
         (('["S1", "S2", "S3"]', '["S1", "S1"]'), "statements: a name is given twice"),
         (('"gamepad", ', '"script", '), "devices: 'script' is no person's; pilot = true is of scripted pilots"),
         (("[behaviours.compliant]", "[behaviours.rigid.compliant]"), "behaviours: two are compared"),
@@ -104,8 +104,8 @@ def test_all_faults_are_told_at_once():
         ),
         (("[tasks.human_to_robot]", '[tasks."a b"]'), "tasks.a b: a name has letters, digits and underscores"),
         (('"not_said"]\n\n[[', '"not_said", "mars"]\n\n[['), "text.en.choices.age_group: 7 texts for 8 choices"),
-        (("participants = 18", "participants = nan"), "participants: it is nan; a whole number from 1 to 999 is right"),
-        (("practice = 600", "practice = inf"), "practice: it is inf; a number from 0 to 7200 is right"),
+        (("participants = 18", "participants = nan"), "participants: it is nan; expected a whole number from 1 to 999"),
+        (("practice = 600", "practice = inf"), "practice: it is inf; expected a number from 0 to 7200"),
         (('behaviour = "compliant"', 'bahaviour = "compliant"'), "has no parameter 'bahaviour'; did you mean behav"),
         (('S3"]', 'S3"'), "it is not TOML"),
     ],

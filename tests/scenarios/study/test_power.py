@@ -1,5 +1,6 @@
 """Power by simulation beside what is known: the noncentral t distribution, the tests' level, studies too small."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -7,16 +8,11 @@ import pytest
 from click.testing import CliRunner
 from scipy import stats
 
-from handover.scenarios.campaign.statistics import Interval
 from handover.scenarios.cli.command import main
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
 from handover.scenarios.study.statistics.power import PowerAssumptions, fewest_participants, simulated_power
 
 PLAN = parse_plan(default_plan())
-
-
-def middle(share: Interval) -> float:
-    return (share.low + share.high) / 2
 
 
 @pytest.mark.parametrize(("people", "exact"), [(10, 0.616), (18, 0.892)])
@@ -25,38 +21,54 @@ def test_the_t_test_agrees_with_the_noncentral_distribution(people: int, exact: 
     assert float(stats.nct.sf(c, people - 1, 0.8 * people**0.5)) == pytest.approx(exact, abs=1e-3)
     found = simulated_power(PLAN, people, PowerAssumptions(effect=0.8, spread=30.0, repeats=1000))
     assert found.t_test.low < exact < found.t_test.high
-    assert middle(found.alone) == pytest.approx(exact - 0.018, abs=0.03)  # ranks lose some 5 % of the efficiency
+    assert found.single_uncorrected.estimate == pytest.approx(
+        exact - 0.018, abs=0.03
+    )  # ranks lose some 5 % of the efficiency
 
 
 def test_ten_find_an_effect_of_08_in_one_half_and_eighteen_in_nine_tenths():
     """Any of nine ratings, all of which have the effect, after Holm: for correlated ratings that hardly tie."""
     assumed = PowerAssumptions(effect=0.8, spread=30.0, correlation=0.7, repeats=1000)
-    ten, eighteen = (simulated_power(PLAN, n, assumed).any_of_all for n in (10, 18))
-    assert middle(ten) == pytest.approx(0.48, abs=0.05)
-    assert middle(eighteen) == pytest.approx(0.89, abs=0.03)
+    ten, eighteen = (simulated_power(PLAN, n, assumed).any_of_all_holm for n in (10, 18))
+    assert ten.estimate == pytest.approx(0.48, abs=0.05)
+    assert eighteen.estimate == pytest.approx(0.89, abs=0.03)
 
 
 def test_without_an_effect_something_is_found_in_five_of_hundred_at_most():
     found = simulated_power(PLAN, 12, PowerAssumptions(effect=0.0, repeats=1000))
-    assert found.none.low < 0.05
-    assert middle(found.alone) < 0.06
-    assert middle(found.any_of_all) == pytest.approx(middle(found.none))
+    assert found.familywise_error.low < 0.05
+    assert found.single_uncorrected.estimate < 0.06
+    assert found.any_of_all_holm.estimate == pytest.approx(found.familywise_error.estimate)
 
 
 def test_more_people_and_larger_effects_find_more():
     by_people = [simulated_power(PLAN, n, PowerAssumptions(effect=0.8, repeats=300)) for n in (10, 14, 18)]
-    assert np.all(np.diff([middle(p.first) for p in by_people]) > 0.0)
+    assert np.all(np.diff([p.one_effect_holm.estimate for p in by_people]) > 0.0)
     larger = simulated_power(PLAN, 10, PowerAssumptions(effect=1.5, repeats=300))
-    assert middle(larger.first) > 2 * middle(by_people[0].first)
+    assert larger.one_effect_holm.estimate > 2 * by_people[0].one_effect_holm.estimate
 
 
 def test_too_few_find_nothing_after_holm():
     assert fewest_participants(9) == 9
     assert fewest_participants(1) == 6
     eight = simulated_power(PLAN, 8, PowerAssumptions(effect=5.0, repeats=100))
-    assert eight.first.low == eight.any_of_all.low == 0.0
-    assert simulated_power(PLAN, 5, PowerAssumptions(effect=5.0, repeats=100)).alone.low == 0.0
-    assert simulated_power(PLAN, 9, PowerAssumptions(effect=9.0, repeats=100)).first.low > 0.9
+    assert eight.one_effect_holm.low == eight.any_of_all_holm.low == 0.0
+    assert simulated_power(PLAN, 5, PowerAssumptions(effect=5.0, repeats=100)).single_uncorrected.low == 0.0
+    assert simulated_power(PLAN, 9, PowerAssumptions(effect=9.0, repeats=100)).one_effect_holm.low > 0.9
+
+
+def test_what_all_studies_find_is_100_percent_with_its_interval(tmp_path: Path):
+    (tmp_path / "plan.toml").write_text(default_plan(), encoding="utf-8")
+    arguments = ["study", "power", str(tmp_path / "plan.toml"), "--participants", "12", "--repeat", "100"]
+    shown = CliRunner().invoke(main, [*arguments, "--effect", "9"])
+    assert "100% (96-100)" in shown.output
+    data = json.loads(CliRunner().invoke(main, [*arguments, "--effect", "9", "--json"]).output)["power"][0]
+    assert set(data) >= {"single_uncorrected", "one_effect_holm", "each_of_all_holm", "any_of_all_holm"}
+    found = data["single_uncorrected"]
+    assert (found["estimate"], found["successes"], found["repeats"], found["high"]) == (1.0, 100, 100, 1.0)
+    assert found["low"] == pytest.approx(0.0250 ** (1 / 100), abs=1e-6)
+    error = data["familywise_error"]
+    assert error["estimate"] == error["successes"] / 100
 
 
 def test_the_command_says_what_was_assumed(tmp_path: Path):
@@ -67,7 +79,8 @@ def test_the_command_says_what_was_assumed(tmp_path: Path):
     assert (
         "Effect 0.8 SD of the participants' differences, 1.5 points, correlated by 0.6 over 9 ratings" in shown.output
     )
+    assert "Differences are not clipped to the scale" in shown.output
     assert "nothing can be found with fewer than 9 participants" in shown.output
     refused = CliRunner().invoke(main, [*arguments[:3], "--participants", "ten"])
     assert refused.exit_code == 2
-    assert "'ten': whole numbers from 2 to 200 are right" in refused.output
+    assert "'ten': expected whole numbers from 2 to 200" in refused.output

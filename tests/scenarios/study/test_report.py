@@ -44,12 +44,13 @@ def test_the_page_has_all_results_with_their_origin(tmp_path: Path):
     page = report_of(tmp_path / "out")
     text = text_of(page)
     assert "12 participants : 18 are planned; 144 of 144 rounds that were played count." in text
-    assert "orders of 12 participants are balanced" in text
+    assert "The orders of 12 complete sessions are balanced: each of the square's 6 rows was played twice." in text
     assert "Human to robot compliant 12 24 50 % (29 to 71 %) 12" in text
     assert "Human to robot compliant 2 of 20, 10 % 12 of 24, 50 %" in text
-    assert "Human to robot 12 -50 % 4.3e-05 0.00013 0.031" in text
+    assert "Human to robot 12 -50 % 0.00049 0.0015 0.031" in text
     assert "S1 Collaborative task 12 6.50 4.50 +2.00 (+2.00 to +2.00) 0.00049 0.0044" in text
     assert "S1 Human to robot 0.0132 0.00049" in text
+    assert "corrected over the 9 tests that were made, of 9" in text
     assert "[Pratt1959]" in text
     assert page.count('class="plot"') == 4
     assert "default-src 'none'" in unescape(page)
@@ -104,6 +105,7 @@ def test_too_few_are_told_and_nothing_is_computed(people: int, tmp_path: Path):
     assert list(tests["participants"]) == [people] * 9
     assert "no exact test of signs can reject at 5 %, so that none is made" in text
     assert "no model, as fewer than 6 participants" in text
+    assert "corrected over the 0 tests that were made, of 9" in text
     assert ("Fewer than 6 are too few for a test" in text) == (people == 3)
 
 
@@ -121,7 +123,7 @@ def test_a_session_broken_off_and_void_rounds_are_told(tmp_path: Path):
     assert "4 of 76 rounds that count are above 100 ms" in text
     assert "76 of 77 rounds that were played count" in text
     assert "Nobody has withdrawn." in text
-    assert "complete sessions alone, as orders are balanced in these 6" in text
+    assert "complete sessions, without void rounds and the first 6" in text
     tests = csv_of(tmp_path / "out" / "results" / "rating_tests.csv")
     entered = [t for t in PLAN.tasks if (tests.loc[tests["task"] == t, "participants"] == 7).all()]
     names = ", ".join(PLAN.texts["en"].task_names[t] for t in entered)
@@ -149,6 +151,13 @@ def test_who_withdrew_is_told_with_the_time_and_nothing_else(tmp_path: Path):
     refused = study("replay", out, "P03", "1")
     assert refused.exit_code == 2
     assert "nothing of theirs is shown" in refused.output
+
+
+def test_twelve_sessions_with_a_gap_in_their_rows_are_not_called_balanced(tmp_path: Path):
+    write_study(tmp_path / "out", 13, rigid_is_better).withdraw(2, "2026-11-24T15:00:00", delete=False)
+    text = text_of(report_of(tmp_path / "out"))
+    assert "The orders of 12 complete sessions are not balanced" in text
+    assert "(row 1: 3, row 2: 1, row 3: 2, row 4: 2, row 5: 2, row 6: 2)" in text
 
 
 def test_what_was_kept_is_deleted_if_asked_and_the_number_stays_taken(tmp_path: Path):
