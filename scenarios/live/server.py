@@ -25,6 +25,9 @@ from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.watched_run import WatchedRun
 from handover.scenarios.live.webcam import WebcamFiles
 
+_GRACE = 3
+"""Time for pages to take in that the server ends, s; a browser that is frozen never does."""
+
 
 class _Server(uvicorn.Server):
     """A server that leaves signals to the run, or to the session: Ctrl-C ends that, and this with it."""
@@ -54,7 +57,12 @@ async def serve(page: LivePage, work: Coroutine[Any, Any, None], listening: sock
         middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])],
     )
     config = uvicorn.Config(
-        application, log_level="error", ws="websockets-sansio", ws_max_size=4 * page.longest, lifespan="off"
+        application,
+        log_level="error",
+        ws="websockets-sansio",
+        ws_max_size=4 * page.longest,
+        lifespan="off",
+        timeout_graceful_shutdown=_GRACE,
     )
     server = _Server(config)
     serving = asyncio.create_task(server.serve(sockets=[listening]))
