@@ -58,10 +58,17 @@ async def next_text(socket: WebSocket) -> str:
     return str(text)
 
 
-async def close(socket: WebSocket, code: int, reason: str) -> None:
-    """Close a connection with a reason of at most 123 bytes; one that has ended already stays so."""
+async def close(socket: WebSocket, code: int, reason: str, patience: float = _SLOWEST) -> None:
+    """Close a connection with a reason of at most 123 bytes; one that has ended already stays so.
+
+    Args:
+        socket: the connection.
+        code: of WebSocket.
+        reason: as the other end is told.
+        patience: how long the other end may take to receive what was sent before, s.
+    """
     with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError, asyncio.TimeoutError):
-        await asyncio.wait_for(socket.close(code, reason), _SLOWEST)
+        await asyncio.wait_for(socket.close(code, reason), patience)
 
 
 class FloodGuard:

@@ -13,6 +13,9 @@ from handover.scenarios.live.connections import TRY_AGAIN_LATER, close
 _SLOWEST = 2.0
 """How long a page may take to receive a message, s."""
 
+_THAWED = 60.0
+"""How long a page that was too slow may take until it hears that, s; by then the server's pings have ended it."""
+
 
 @dataclass
 class Viewer:
@@ -76,6 +79,6 @@ class Viewers:
         except (TimeoutError, asyncio.TimeoutError):
             self.remove(page)
             reason = f"the page took more than {self._slowest:g} s to receive a message"
-            closing = asyncio.create_task(close(page, TRY_AGAIN_LATER, reason))  # which may take as long again
+            closing = asyncio.create_task(close(page, TRY_AGAIN_LATER, reason, _THAWED))
             self._closing.add(closing)
             closing.add_done_callback(self._closing.discard)
