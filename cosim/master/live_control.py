@@ -26,8 +26,12 @@ _SLICE = 0.02
 class LiveControl:
     """The controls of a run, in a file of both processes. Each number has one process that writes it.
 
+    Args:
+        path: a file that `create` has made; None for memory of this process alone.
+
     Attributes, written by who controls the run:
-        pace: simulated seconds per second of wall time; infinite: as fast as it goes.
+        pace: simulated seconds per second of wall time, positive; infinite: as fast as it goes. Another one raises
+            ValueError: a run that is to wait is paused.
         paused: whether the run waits at the communication point that it has reached.
         steps_asked: how many points it was told to go on to nonetheless, in all.
         stop: whether it is to end after its step.
@@ -36,9 +40,12 @@ class LiveControl:
         steps_taken: how many of these points it has gone on to, or will not as it is no longer paused.
     """
 
-    def __init__(self, path: Path) -> None:
-        with open(path, "r+b") as file:
-            self._map = mmap.mmap(file.fileno(), _FIELDS.itemsize)
+    def __init__(self, path: Path | None) -> None:
+        if path is None:
+            self._map = mmap.mmap(-1, _FIELDS.itemsize)
+        else:
+            with open(path, "r+b") as file:
+                self._map = mmap.mmap(file.fileno(), _FIELDS.itemsize)
         self._fields: Any = np.frombuffer(self._map, dtype=_FIELDS, count=1)[0]
 
     @classmethod
@@ -47,9 +54,21 @@ class LiveControl:
 
         Raises:
             OSError: it cannot be made.
+            ValueError: the pace is not positive.
         """
-        path.write_bytes(np.array([(pace, int(paused), 0, 0, 0)], dtype=_FIELDS).tobytes())
+        path.write_bytes(np.array([(_positive(pace), int(paused), 0, 0, 0)], dtype=_FIELDS).tobytes())
         return cls(path)
+
+    @classmethod
+    def in_memory(cls, pace: float) -> "LiveControl":
+        """Return controls of this process alone, as of what is replayed in it; not paused.
+
+        Raises:
+            ValueError: the pace is not positive.
+        """
+        control = cls(None)
+        control.pace = pace
+        return control
 
     @property
     def pace(self) -> float:  # noqa: D102 (see the class, also below)
@@ -57,7 +76,7 @@ class LiveControl:
 
     @pace.setter
     def pace(self, value: float) -> None:
-        self._fields["pace"] = value
+        self._fields["pace"] = _positive(value)
 
     @property
     def paused(self) -> bool:  # noqa: D102
@@ -91,8 +110,8 @@ class LiveControl:
         self._fields["steps_taken"] = self._fields["steps_asked"]
 
     def close(self) -> None:
-        """Release the file."""
-        self._fields = np.zeros(1, dtype=_FIELDS)[0]
+        """Release the file; what the controls say, and are set to, stays with this object."""
+        self._fields = self._fields.copy()
         with contextlib.suppress(BufferError):
             self._map.close()
 
@@ -140,6 +159,12 @@ class ControlledPacer(Pacer):
 
         super().wait(t, changed)
         return not changed()
+
+
+def _positive(pace: float) -> float:
+    if not pace > 0.0:
+        raise ValueError(f"the pace must be positive, not {pace}: simulated seconds per second of wall time")
+    return pace
 
 
 def _finite(pace: float) -> float:

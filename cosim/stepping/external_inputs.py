@@ -3,12 +3,14 @@
 Values are written to where the unit's inputs are set from, so that couplings pass them on like all others.
 """
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.declarations import short_repr
 from handover.cosim.blocks.start_values import fault_of
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import UnitFailure
@@ -17,6 +19,8 @@ from handover.cosim.fmu.instance import Instance
 from handover.cosim.fmu.start_values import entries_of
 from handover.cosim.system.system import System
 from handover.cosim.system.time_series import ExternalSource
+
+_NO_ENTRIES: NDArray[Any] = np.zeros(0)
 
 
 class InvalidExternalValue(UnitFailure):
@@ -49,13 +53,16 @@ class ExternalInput:
         """Take the source's value for the communication point at t, s.
 
         Raises:
-            InvalidExternalValue: it is of another size, not finite, or out of the input's range.
+            InvalidExternalValue: it is no number, of another size, not finite, no whole number where the input takes
+                just those, or out of the input's range.
         """
         given = self._source.at(t)
         if given is None:
             return
-        entries = np.asarray(given).ravel()
-        fault = self._fault(entries)
+        entries, fault = _NO_ENTRIES, f"got {short_repr(given)}, which is no array of numbers"
+        with contextlib.suppress(ValueError):  # rows of different lengths are no array
+            entries = np.asarray(given).ravel()
+            fault = self._fault(entries)
         if fault is not None:
             raise InvalidExternalValue(self._unit, f"setting {self._port.name} from outside", t, fault)
         self._values[...] = entries
@@ -72,16 +79,30 @@ class ExternalInput:
         if len(entries) != self._port.size:
             right = "is" if self._port.size == 1 else "are"
             return f"got {len(entries)} values where {self._port.size} {right} right"
-        if self._port.kind is Kind.REAL and not np.isfinite(entries.astype(np.float64)).all():
+        if entries.dtype.kind not in "biuf":
+            return f"got {short_repr(entries.tolist())}, which is no array of numbers"
+        if self._port.kind is not Kind.BOOLEAN and not np.isfinite(entries.astype(np.float64)).all():
             return f"got {entries.tolist()}, which is not finite"
         if self._port.items:
             known = [value for _, value in self._port.items]
             wrong = [n for n in entries.tolist() if n not in known]
             return f"got {wrong[0]}, which is none of its items {known}" if wrong else None
+        if self._port.kind is Kind.INTEGER and (fault := _fault_of_integers(entries, self._values.dtype)):
+            return fault
         typed = entries.astype(np.bool_ if self._port.kind is Kind.BOOLEAN else self._values.dtype)
         value: Any = typed.reshape(self._port.shape).tolist()
         fault = fault_of(self._port, value)
         return None if fault is None else f"got what it cannot take: {fault}"
+
+
+def _fault_of_integers(entries: NDArray[Any], dtype: np.dtype[Any]) -> str | None:
+    """Return what is wrong with finite entries for an integer input, before they are cast to its type."""
+    if (entries != np.round(entries)).any():
+        return f"got {entries.tolist()} where whole numbers are right"
+    limits = np.iinfo(dtype)
+    if any(not limits.min <= n <= limits.max for n in entries.tolist()):
+        return f"got {entries.tolist()}, which is out of range: from {limits.min} to {limits.max}"
+    return None
 
 
 class ExternalInputs:

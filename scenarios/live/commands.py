@@ -33,7 +33,7 @@ LONGEST = 1000
 _MOST_CHOSEN, _MOST_PLOTS = 6, 200
 _HIGHEST_PACE = 1000.0
 _FAR = 5.0
-"""Of a point from its body's frame, m."""
+"""Of a point from its body's frame along each axis, m."""
 
 
 class InvalidCommand(ValueError):
@@ -57,7 +57,7 @@ def parse_command(text: str, longest: int = LONGEST) -> Command:
         raise InvalidCommand(f"a command has {longest} bytes at most, this one {len(text)}")
     try:
         content: Any = json.loads(text)
-    except ValueError as e:
+    except (ValueError, RecursionError) as e:  # the latter of brackets within brackets
         raise InvalidCommand("it is not JSON") from e
     if not isinstance(content, dict):
         raise InvalidCommand('it is not of the form {"command": NAME, "value": VALUE}')
@@ -145,17 +145,18 @@ def push_of(value: Any, known: Sequence[Pushable]) -> Push | None:
     if not bodies:
         labels = ", ".join(label for push in known for label in push.labels)
         raise InvalidCommand(f"push takes a body that can be pushed: {labels}")
-    force, point = _three(members.get("force")), _three(members.get("point"))
-    if force is None or point is None or math.hypot(*force) > bodies[0].greatest * (1.0 + 1e-9):
+    greatest = bodies[0].greatest * (1.0 + 1e-9)
+    force, point = _three(members.get("force"), greatest), _three(members.get("point"), _FAR)
+    if force is None or point is None or math.hypot(*force) > greatest:
         most = f"{bodies[0].greatest:g} N at most"
         raise InvalidCommand(f"push takes three finite numbers each of force, {most}, and of point, {_FAR:g} m at most")
     return Push(bodies[0], force, point)
 
 
-def _three(value: Any) -> tuple[float, ...] | None:
-    """Return three finite numbers, None if it is something else or one is far too large."""
+def _three(value: Any, most: float) -> tuple[float, ...] | None:
+    """Return three finite numbers of at most `most` each, None if it is something else."""
     numbers: list[Any] = cast(list[Any], value) if isinstance(value, list) else []
-    fit = all(isinstance(n, (int, float)) and not isinstance(n, bool) and abs(n) <= _FAR for n in numbers)
+    fit = all(isinstance(n, (int, float)) and not isinstance(n, bool) and abs(n) <= most for n in numbers)
     return tuple(map(float, numbers)) if fit and len(numbers) == 3 else None
 
 

@@ -15,8 +15,10 @@ is a JSON object:
 
 The server answers first with `{"hand": {...}}`, where the hand is wanted as it stands, in the same members, and how far
 it goes (`centre`, `radius`, m); afterwards only with `{"refused": "why"}`, and the run goes on with the sample before.
-Whoever connects first leads the hand until the connection ends. A message of thousands of bytes, far above the longest
-sample, ends it with WebSocket's code 1009, whose reason says how long one may be.
+Whoever connects first leads the hand until the connection ends. A sample has 2000 characters at most. A message above
+the server's limit, 4 kB of `handover run --live`, 400 kB of `handover play` and 80 kB of a study, ends the connection
+with WebSocket's code 1009, whose reason says that limit; on live pages more than 2000 messages in a second end it with
+1008.
 """
 
 import json

@@ -14,6 +14,15 @@ import numpy as np
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.scenarios.experiment.live_inputs import LedHand
+from handover.scenarios.live.connections import (
+    POLICY_VIOLATION,
+    TRY_AGAIN_LATER,
+    FloodGuard,
+    NoText,
+    close,
+    next_text,
+    same_origin,
+)
 from handover.scenarios.live.hand_messages import HandSample, HandStream, InvalidHandMessage
 from handover.scenarios.live.input_board import InputBoard
 from handover.scenarios.results.run_folder import write_whole
@@ -22,6 +31,8 @@ INPUTS_FILE = "inputs.json"
 """Name of the file in a run's folder that says which devices led a hand, and how old samples were at their use."""
 _SLOWEST = 2.0
 """How long a device may take to receive a message, s."""
+_MOST_MESSAGES = 2000
+"""Messages of a device within a second; many more are far from any tracker, and keep the server from the page."""
 _BETWEEN = 0.5
 """Time between two refusals for one reason that a device is told, s: who floods is not flooded."""
 
@@ -50,14 +61,13 @@ class HandSeat:
 
     async def connection(self, device: WebSocket) -> None:
         """Serve one device until its connection ends."""
-        origin = device.headers.get("origin")  # a tracker that is no browser gives none
-        if origin is not None and origin.partition("://")[2] != device.headers.get("host"):
-            await device.close(code=1008)
+        if not same_origin(device, browsers_only=False):
+            await device.close(POLICY_VIOLATION)
             return
         await device.accept()
         if self._device is not None:
             await _tell(device, {"refused": "another page or tracker leads the hand; it is free when that one goes"})
-            await device.close(code=1013)
+            await device.close(TRY_AGAIN_LATER)
             return
         self._device = device
         try:
@@ -70,9 +80,19 @@ class HandSeat:
 
     async def _follow(self, device: WebSocket) -> None:
         stream, name, told = HandStream(self._led), "", dict[str, float]()
+        guard = FloodGuard(_MOST_MESSAGES)
         while True:
-            text = await device.receive_text()
             try:
+                text: str | NoText = await next_text(device)
+            except NoText as e:
+                text = e
+            if guard.floods():
+                self._refused[guard.reason] += 1
+                await close(device, POLICY_VIOLATION, guard.reason)
+                return
+            try:
+                if isinstance(text, NoText):
+                    raise InvalidHandMessage(str(text))
                 sample, stamp = stream.take(text)
             except InvalidHandMessage as e:
                 reason, now = str(e), time.monotonic()

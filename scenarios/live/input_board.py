@@ -48,8 +48,8 @@ class InputBoard:
     processes of a machine share, at which the device saw what it says. Inputs that were not set hold on; those that
     never were keep the start values of their units.
 
-    A counter that is written before and after the sample tells a reader that it was written meanwhile, and a checksum
-    so where a processor stores in another order than it is told.
+    A sequence lock: the counter is written before and after each sample, so a reader detects a torn read. The CRC
+    catches reordered stores on weakly ordered CPUs.
 
     Args:
         path: a file that `create` has made.

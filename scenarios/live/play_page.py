@@ -17,11 +17,15 @@ from starlette.responses import HTMLResponse, Response
 from starlette.routing import BaseRoute, Route
 from starlette.websockets import WebSocket
 
+from handover.cosim.master.live_control import LiveControl
 from handover.scenarios.execution.request import RunRequest
-from handover.scenarios.live.commands import COMMANDS, Command, choice_of, run_number
-from handover.scenarios.live.live_page import LivePage, ShownRun, live_html
+from handover.scenarios.live.commands import COMMANDS, Command, choice_of, pace_of, run_number
+from handover.scenarios.live.connections import HEADERS
+from handover.scenarios.live.live_html import live_html
+from handover.scenarios.live.live_page import LivePage
 from handover.scenarios.live.parameter_fields import FieldGroup, faults_by_name, named_in
 from handover.scenarios.live.played_run import Choice, PlayedRun
+from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.waiting_command import WaitingCommand
 from handover.scenarios.reporting.page import template
 
@@ -84,7 +88,10 @@ class PlayPage(LivePage):
         self._runs: list[PlayedRun] = []
         self._waiting = WaitingCommand(str(session.request.subject))
         self._faults: dict[str, str] = {}
+        self._pace = session.pace  # which the next run begins with
         self._task: asyncio.Task[None] | None = None  # shows a run
+        self._changing = asyncio.Lock()  # held from the end of what is shown until something else is
+        self._closing: set[asyncio.Task[None]] = set()  # of runs that have ended
         self.over = False
         """Whether the session is to end."""
 
@@ -113,6 +120,8 @@ class PlayPage(LivePage):
     async def execute(self, page: WebSocket, command: Command) -> None:
         """Carry out a command."""
         name, value = command
+        if name == "pace":
+            self._pace = pace_of(value)
         if name == "set":
             self._wanted = choice_of(value, self._session.names, seeded=self._session.seeded)
             self._changed.set()
@@ -140,7 +149,9 @@ class PlayPage(LivePage):
             await self.tell(self._about_choice())
             if not faults:
                 await self._begin(wanted)
-        await self._end_last()
+        async with self._changing:
+            await self._end_last()
+        await asyncio.gather(*self._closing)
         for opened in (self._waiting, *self._runs):
             await asyncio.to_thread(opened.close)
 
@@ -157,14 +168,15 @@ class PlayPage(LivePage):
         self._changed.set()
 
     async def _begin(self, wanted: Choice) -> None:
-        pace = self.shown.control.pace if self.shown is not None else self._session.pace
-        session, number = self._session, max((run.number for run in self._runs), default=0) + 1
-        folder = session.folder / f"{number:03d}"
-        run = PlayedRun(number, wanted, str(session.request.subject), session.options, folder, pace, self._waiting)
-        self._waiting = WaitingCommand(str(session.request.subject))
-        await self._end_last()
-        self._runs.append(run)
-        self._task = asyncio.create_task(self._show_run(run))
+        async with self._changing:
+            session, number = self._session, max((run.number for run in self._runs), default=0) + 1
+            folder, subject = session.folder / f"{number:03d}", str(session.request.subject)
+            run = PlayedRun(number, wanted, subject, session.options, folder, self._pace, self._waiting)
+            self._waiting = WaitingCommand(subject)
+            await self._end_last()
+            run.control.pace = self._pace  # which may have been set meanwhile
+            self._runs.append(run)
+            self._task = asyncio.create_task(self._show_run(run))
 
     async def _end_last(self) -> None:
         """End the run under way, and cease to show it or another one."""
@@ -178,7 +190,15 @@ class PlayPage(LivePage):
                     run.kill()
                 await asyncio.sleep(_POLL)
         await self._cease()
+        if self._runs:
+            self._release(self._runs[-1])
         await self._tell_runs()
+
+    def _release(self, run: PlayedRun) -> None:
+        """Release what a run that has ended holds besides its folder, once its process has gone."""
+        closing = asyncio.create_task(asyncio.to_thread(run.close))
+        self._closing.add(closing)
+        closing.add_done_callback(self._closing.discard)
 
     async def _cease(self) -> None:
         if self._task is not None:
@@ -196,16 +216,19 @@ class PlayPage(LivePage):
             self._faults = {named_in(run.told, self._session.names): run.told}
             self._runs.remove(run)
             await self.tell(self._about_choice())
-            await asyncio.to_thread(run.close)
+        self._release(run)
         await self._tell_runs()
 
     async def _show_again(self, run: PlayedRun) -> None:
         """Show a run that is over once more, at the pace that the page sets; the one under way is ended."""
-        await self._end_last()
-        self._task = asyncio.create_task(self._replay(run))
+        async with self._changing:
+            await self._end_last()
+            if not self.over:
+                self._task = asyncio.create_task(self._replay(run))
 
     async def _replay(self, run: PlayedRun) -> None:
-        await self.show_past(ShownRun(run.watched, run.control, run.controls))
+        control = LiveControl.in_memory(self._pace)
+        await self.show_past(ShownRun(run.watched, control, run.controls))
 
     async def _write_report(self, page: WebSocket, run: PlayedRun) -> None:
         if not run.has_report:
@@ -219,7 +242,7 @@ class PlayPage(LivePage):
         runs = [run for run in self._runs if run.number == number and run.has_report]
         if not runs:
             return Response("There is no such report.", status_code=404)
-        return HTMLResponse(runs[0].watched.folder.report.read_text(encoding="utf-8"))
+        return HTMLResponse(runs[0].watched.folder.report.read_text(encoding="utf-8"), headers=HEADERS)
 
     def _about_choice(self) -> dict[str, Any]:
         wanted = self._wanted

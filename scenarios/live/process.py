@@ -114,7 +114,9 @@ def live_page(
         number = listening.fileno()
         command = [sys.executable, "-m", "handover.scenarios.live", str(folder), str(scratch), str(number)]
         command += [] if webcam is None else [str(webcam)]
-        server = subprocess.Popen(command, pass_fds=(number,), stdin=subprocess.DEVNULL)
+        server = subprocess.Popen(command, pass_fds=(number,), stdin=subprocess.PIPE)  # by its end it sees this one's
+        assert server.stdin is not None
+        opened.callback(server.stdin.close)
         over = threading.Event()
         threading.Thread(target=_let_go_without, args=(server, control, inputs, over), daemon=True).start()
         try:
@@ -131,7 +133,7 @@ def live_page(
 def _let_go_without(
     server: "subprocess.Popen[bytes]", control: LiveControl, inputs: PageInputs, over: threading.Event
 ) -> None:
-    """Let a run go on, and nobody push any more, whose page's server has ended before it."""
+    """If the page's server exits before the run, release all pushes and resume a paused run."""
     server.wait()
     if not over.is_set():
         inputs.let_go()
@@ -149,15 +151,20 @@ def controlled_from(
     The run ends after its step where that process ends: then the standard input, a pipe from it, is closed.
     """
     control = LiveControl(folder / CONTROL_FILE)
-    threading.Thread(target=_end_with_standard_input, args=(control,), daemon=True).start()
+    threading.Thread(target=_stop_with_standard_input, args=(control,), daemon=True).start()
     inputs = PageInputs.create(folder, pushes, hand)
     yield control, inputs
     inputs.close()
     control.close()
 
 
-def _end_with_standard_input(control: LiveControl) -> None:
+def _stop_with_standard_input(control: LiveControl) -> None:
+    wait_for_end_of_input()
+    control.stop, control.paused = True, False
+
+
+def wait_for_end_of_input() -> None:
+    """Return once the standard input is closed, a pipe from the process that began this one: so that has ended."""
     with contextlib.suppress(OSError):
         while os.read(0, 64):
             pass
-    control.stop, control.paused = True, False

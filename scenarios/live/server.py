@@ -1,12 +1,13 @@
 """Serves live pages on loopback: of one run beside it, or of a session of runs.
 
-Who is not the page is refused: by the host that is asked for, which keeps pages of other sites away, and by the origin
-of a connection.
+Requests need a loopback Host header; WebSockets also need an Origin equal to Host.
 """
 
 import asyncio
 import contextlib
+import shutil
 import socket
+import threading
 from collections.abc import Coroutine, Generator
 from pathlib import Path
 from typing import Any
@@ -19,10 +20,13 @@ from starlette.routing import Route, WebSocketRoute
 
 from handover.cosim.master.live_control import LiveControl
 from handover.scenarios.live.live_page import LivePage
-from handover.scenarios.live.process import CONTROL_FILE, HOST
+from handover.scenarios.live.process import CONTROL_FILE, HOST, wait_for_end_of_input
 from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.watched_run import WatchedRun
 from handover.scenarios.live.webcam import WebcamFiles
+
+_GRACE = 3
+"""Time for pages to take in that the server ends, s; a browser that is frozen never does."""
 
 
 class _Server(uvicorn.Server):
@@ -53,7 +57,12 @@ async def serve(page: LivePage, work: Coroutine[Any, Any, None], listening: sock
         middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])],
     )
     config = uvicorn.Config(
-        application, log_level="error", ws="websockets-sansio", ws_max_size=4 * page.longest, lifespan="off"
+        application,
+        log_level="error",
+        ws="websockets-sansio",
+        ws_max_size=4 * page.longest,
+        lifespan="off",
+        timeout_graceful_shutdown=_GRACE,
     )
     server = _Server(config)
     serving = asyncio.create_task(server.serve(sockets=[listening]))
@@ -63,13 +72,18 @@ async def serve(page: LivePage, work: Coroutine[Any, Any, None], listening: sock
     await job
 
 
-async def _watch(shown: ShownRun, listening: socket.socket, webcam: WebcamFiles | None) -> None:
+async def _watch(
+    shown: ShownRun, listening: socket.socket, webcam: WebcamFiles | None, orphaned: threading.Event
+) -> None:
     page = LivePage(webcam)
-    await serve(page, page.show(shown), listening)
+    await serve(page, page.show(shown, orphaned.is_set), listening)
 
 
 def watch(folder: Path, controls: Path, listening: socket.socket, webcam: Path | None = None) -> None:
     """Serve the page of a run's folder; returns when the run has ended.
+
+    Where the run's process ends without a verdict, as when it is killed, the standard input, a pipe from it, is closed:
+    pages are told so, and the folder of the controls, which that process would have removed, is removed.
 
     Args:
         folder: the run's.
@@ -80,4 +94,13 @@ def watch(folder: Path, controls: Path, listening: socket.socket, webcam: Path |
     files = None if webcam is None else WebcamFiles.read(webcam)
     control = LiveControl(controls / CONTROL_FILE)
     shown = ShownRun(WatchedRun(folder), control, controls, webcam={} if files is None else files.hashes())
-    asyncio.run(_watch(shown, listening, files))
+    orphaned = threading.Event()
+
+    def wait() -> None:
+        wait_for_end_of_input()
+        orphaned.set()
+
+    threading.Thread(target=wait, daemon=True).start()
+    asyncio.run(_watch(shown, listening, files, orphaned))
+    if orphaned.is_set():
+        shutil.rmtree(controls, ignore_errors=True)

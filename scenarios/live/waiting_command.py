@@ -1,4 +1,4 @@
-"""The command `handover` in a process that has loaded what runs need, and waits for its arguments.
+"""A preloaded `handover` process that waits for its arguments on stdin.
 
 So a run begins within some tenths of a second of when it is asked for. The arguments are a line of JSON on its standard
 input, which then stays open: that it is closed tells a run that the process which began it has ended.

@@ -11,7 +11,9 @@ nothing but this computer's server: what the package would report about its use 
 
 import hashlib
 import io
+import lzma
 import zipfile
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +33,11 @@ MODEL_PARTS = ("hand_detector.tflite", "hand_landmarks_detector.tflite")
 _LARGEST = 100_000_000
 """Bytes; the largest of the files has 13 million."""
 _POLICY = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'"
+_DAMAGES = (
+    *(zipfile.BadZipFile, zlib.error, lzma.LZMAError),
+    *(NotImplementedError, RuntimeError, EOFError, OSError, ValueError),
+)
+"""What the reading of a damaged zip file raises: each of its compressions has its own."""
 _TYPES = {".js": "text/javascript", ".mjs": "text/javascript", ".wasm": "application/wasm"}
 
 
@@ -125,7 +132,7 @@ def _fault_of_model(content: bytes) -> str:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as bundle:
             parts = {name: bundle.read(name)[4:8] for name in MODEL_PARTS if name in bundle.namelist()}
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as e:
+    except _DAMAGES as e:
         return f"is no bundle of models, a zip file: {e}"
     wrong = [name for name in MODEL_PARTS if parts.get(name) != b"TFL3"]
     return f"has no TensorFlow Lite model {' and '.join(wrong)}" if wrong else ""

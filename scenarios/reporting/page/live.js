@@ -4,6 +4,7 @@
 //   live.send(command, value)   sends a command
 //   live.on(name, act)          calls act(value) when an object comes that has the name; "shown" when a run's scene is there
 //   live.scene, live.run        of the run that is shown: its scene, and what was told as it began
+//   live.session                set by the page of a session of runs, whose connection outlasts them
 //   live.hand                   the hand that is led in it, see handInput; null or undefined where none is
 "use strict";
 const live = (() => {
@@ -12,7 +13,7 @@ const live = (() => {
   const told = root.querySelector(".replay-told"), plots = byId("plots");
   const chosen = [], listeners = {};
   const api = {
-    scene: null, run: null, send, on(name, act) { (listeners[name] ??= []).push(act); }, get hand() { return lead?.hand; },
+    scene: null, run: null, session: false, send, on(name, act) { (listeners[name] ??= []).push(act); }, get hand() { return lead?.hand; },
   };
   let stage = null, slots = [], size = 0, paused = true, link = null, over = false, lead = null;
 
@@ -188,8 +189,10 @@ const live = (() => {
       root.dataset.frames = Number(root.dataset.frames ?? 0) + 1;
     }
   });
-  link.addEventListener("close", () => {
-    if (!over) byId("told").textContent = "The connection to the run is lost.";
+  // The server of a single run ends with it; that of a session goes on until somebody ends it.
+  link.addEventListener("close", ({code, reason}) => {
+    if (over && !api.session && code !== 1013) return;
+    byId("told").textContent = `The connection to the ${api.session ? "session" : "run"} is lost${reason ? ": " + reason : ""}.`;
   });
   return api;
 })();

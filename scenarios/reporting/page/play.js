@@ -114,6 +114,7 @@
     ask();
   }
 
+  live.session = true;
   live.on("fields", ({groups, seeded, pushable}) => {
     if (fields.size) return;
     const host = byId("groups");

@@ -23,6 +23,7 @@ from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
+from handover.scenarios.live.connections import HEADERS
 from handover.scenarios.reporting.html import json_html
 from handover.scenarios.reporting.page import asset, plain_page_html, template
 from handover.scenarios.reporting.replay_section import SCENE_SCRIPTS
@@ -34,12 +35,6 @@ from handover.scenarios.study.session.tracker import TrackerSeat
 _GRACE = 30
 """Time for a run under way to end when the server does, s."""
 LOOPBACK = ("127.0.0.1", "localhost")
-_HEADERS = {
-    "Cache-Control": "no-store",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
-}
 _SCRIPTS = ("page.js", *SCENE_SCRIPTS, "hand_input.js", "study_scene.js", "study.js")
 _FALLBACK = "en"
 """Language of buttons where the page has no words of its own."""
@@ -102,7 +97,7 @@ class StudyServer:
         await self.seat.close()
 
     async def _page(self, _request: Request) -> Response:
-        return HTMLResponse(study_html(self.seat.protocol.study.plan), headers=_HEADERS)
+        return HTMLResponse(study_html(self.seat.protocol.study.plan), headers=HEADERS)
 
     async def _connection(self, page: WebSocket) -> None:
         origin = page.headers.get("origin", "")

@@ -138,3 +138,29 @@ def test_a_paused_run_ends_when_it_is_told_to(tmp_path: Path, pace: float):
     time.sleep(0.05)
     points.close()
     assert points.passed == 0
+
+
+@pytest.mark.parametrize("pace", [0.0, -1.0, math.nan])
+def test_a_pace_that_is_none_is_refused_and_the_one_before_holds(tmp_path: Path, pace: float):
+    with pytest.raises(ValueError, match="the pace must be positive"):
+        LiveControl.create(tmp_path / "none", pace, paused=False)
+    assert not (tmp_path / "none").exists()
+    control = LiveControl.create(tmp_path / "control", 2.0, paused=False)
+    with pytest.raises(ValueError, match="the pace must be positive"):
+        control.pace = pace
+    assert control.pace == 2.0
+
+
+def test_closed_controls_say_what_they_said_and_take_what_they_are_told(tmp_path: Path):
+    control, other = LiveControl.create(tmp_path / "control", 3.0, paused=True), LiveControl(tmp_path / "control")
+    control.close()
+    assert (control.pace, control.paused) == (3.0, True)
+    control.pace = 4.0
+    assert (control.pace, other.pace) == (4.0, 3.0)
+    other.close()
+
+
+def test_controls_in_memory_are_not_paused():
+    control = LiveControl.in_memory(2.0)
+    control.ask_for_step()
+    assert (control.pace, control.paused, control.stop, control.take_step()) == (2.0, True, False, True)

@@ -118,9 +118,14 @@ class Given:
 
 @pytest.mark.parametrize(
     ("value", "told"),
-    [([np.nan], r"got \[nan\], which is not finite"), ([1.0, 2.0], "got 2 values where 1 is right")],
+    [
+        ([np.nan], r"got \[nan\], which is not finite"),
+        ([1.0, 2.0], "got 2 values where 1 is right"),
+        (["2.7"], r"got \['2\.7'\], which is no array of numbers"),
+        ([[1.0], [2.0, 3.0]], r"got \[\[1\.0\], \[2\.0, 3\.0\]\], which is no array of numbers"),
+    ],
 )
-def test_a_value_that_is_none_ends_the_run_with_its_reason(value: list[float], told: str, tmp_path: Path):
+def test_a_value_that_is_none_ends_the_run_with_its_reason(value: Any, told: str, tmp_path: Path):
     system = pushed_mass(Given(value))
     with (
         Master(system) as master,
@@ -129,6 +134,23 @@ def test_a_value_that_is_none_ends_the_run_with_its_reason(value: list[float], t
     ):
         master.run(Fraction(1), [recorder])
     assert Record(tmp_path / "a.parquet").time[-1] == pytest.approx(0.24)
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        ([2.7], r"got \[2\.7\] where whole numbers are right"),
+        ([np.inf], r"got \[inf\], which is not finite"),
+        ([2**40], r"got \[1099511627776\], which is out of range: from -2147483648 to 2147483647"),
+        (["4"], r"got \['4'\], which is no array of numbers"),
+    ],
+)
+def test_what_is_no_whole_number_is_not_rounded_for_an_integer_input(value: Any, told: str):
+    system = System()
+    watch = system.add("watch", native_fmu("watch"))
+    system.external(watch.u.count_in, Given(value))
+    with Master(system) as master, pytest.raises(InvalidExternalValue, match=told):
+        master.run(Fraction(1))
 
 
 def test_what_cannot_come_from_outside_is_refused_with_its_name():

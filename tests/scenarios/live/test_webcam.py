@@ -98,6 +98,15 @@ def _cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:60])
 
 
+def _damage_stream(path: Path) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as bundle:
+        for name in MODEL_PARTS:
+            bundle.writestr(name, b"\x1c\0\0\0TFL3" + bytes(range(256)))
+    content = bytearray(path.read_bytes())
+    content[30 + len(MODEL_PARTS[0])] |= 0b110  # a kind of block that there is none of
+    path.write_bytes(bytes(content))
+
+
 def _damage(path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[content.index(b"TFL3") + 1] ^= 1
@@ -112,6 +121,7 @@ def _damage(path: Path) -> None:
         (MODEL, _write(b"<html>not found</html>"), "hand_landmarker.task is no bundle of models, a zip"),
         (MODEL, _cut, "hand_landmarker.task is no bundle of models"),
         (MODEL, _damage, "hand_landmarker.task is no bundle of models"),
+        (MODEL, _damage_stream, "no bundle of models, a zip file: Error -3 while decompressing data"),
         (MODEL, _zip_without_landmarks, "hand_landmarker.task has no TensorFlow Lite model hand_landmarks_detector"),
         (WASM, _write(b"<html>"), "vision_wasm_module_internal.wasm is no WebAssembly"),
         (WASM, _put_folder, "vision_wasm_module_internal.wasm cannot be read: Is a directory"),

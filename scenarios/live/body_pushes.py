@@ -1,0 +1,65 @@
+"""Pushes that pages hold: whose force acts on a body, until the page lets go or is silent."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from handover.scenarios.live.commands import Push
+
+SILENCE = 0.5
+"""How long a page may be silent before its push is released, s; it tells a push anew every 33 ms."""
+
+
+@dataclass(frozen=True)
+class _Held:
+    push: Push
+    apply: Callable[[Push], None]
+    timer: asyncio.TimerHandle
+
+
+class BodyPushes:
+    """The pushes of all pages, one each; of two on one body the one that was told last acts.
+
+    Args:
+        silence: how long a page may be silent before its push is released, s.
+    """
+
+    def __init__(self, silence: float = SILENCE) -> None:
+        self._silence = silence
+        self._held: dict[object, _Held] = {}  # in the order in which they were told
+
+    def __contains__(self, page: object) -> bool:
+        """Return whether a page pushes."""
+        return page in self._held
+
+    def hold(self, page: object, push: Push, apply: Callable[[Push], None]) -> None:
+        """Let a page push, in place of what it has pushed.
+
+        Args:
+            page: whose push it is.
+            push: the body, the force and its point.
+            apply: gives a push, also of no force, to the run.
+        """
+        before = self._held.get(page)
+        if before is not None and before.push.body != push.body:
+            self.release(page)
+        elif before is not None:
+            before.timer.cancel()
+            del self._held[page]
+        timer = asyncio.get_running_loop().call_later(self._silence, self.release, page)
+        self._held[page] = _Held(push, apply, timer)
+        apply(push)
+
+    def release(self, page: object) -> None:
+        """Release what a page pushes; a push of another page on that body acts again."""
+        held = self._held.pop(page, None)
+        if held is None:
+            return
+        held.timer.cancel()
+        left = [other.push for other in self._held.values() if other.push.body == held.push.body]
+        held.apply(left[-1] if left else Push(held.push.body, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+
+    def release_all(self) -> None:
+        """Release what all pages push, as when another run is shown."""
+        for page in list(self._held):
+            self.release(page)

@@ -1,0 +1,63 @@
+"""The live page as HTML, and what it is told of a run that begins."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from markupsafe import Markup
+
+from handover.cosim.blocks.ports import Floats
+from handover.scenarios.experiment.time_plot import TimePlot
+from handover.scenarios.live.shown_run import ShownRun
+from handover.scenarios.live.webcam import WEBCAM_SCRIPTS
+from handover.scenarios.reporting.html import packed_json
+from handover.scenarios.reporting.page import Section, asset, page_html, template
+from handover.scenarios.reporting.replay_section import FILM_HTML, SCENE_SCRIPTS, STAGE_HTML
+from handover.scenarios.reporting.time_plots import time_figure
+
+
+def figure_json(plot: TimePlot, time: Floats) -> str:
+    """Return a plot over time, s, as the page draws it, in JSON."""
+    return packed_json(time_figure(plot, time).to_dict())
+
+
+def stage_content(shown: ShownRun) -> dict[str, Any]:
+    """Return what a page is told when a run begins."""
+    stage = shown.stage
+    assert stage is not None
+    surroundings = {name: str(html) for name, html in stage.surroundings().items()}
+    pushes = [{"bodies": push.labels, "greatest": push.greatest} for push in shown.pushes]
+    told = {"title": shown.run.title, "scene": stage.scene(), "signals": list(stage.signals), "pushes": pushes}
+    return {**told, **surroundings, "hand": shown.seat is not None}
+
+
+def live_html(
+    title: str,
+    beside: Markup | None = None,
+    scripts: Sequence[str] = (),
+    styles: Sequence[str] = (),
+    *,
+    webcam: bool = False,
+) -> str:
+    """Return the page of runs under way, which draws what its connection tells.
+
+    Args:
+        title: the heading.
+        beside: what stands beside the scene.
+        scripts: names of further scripts.
+        styles: names of further styles.
+        webcam: whether one is offered to lead a hand.
+    """
+    hand = Markup(template("live_hand.html").render(webcam=webcam))
+    html = template("live.html").render(stage=STAGE_HTML, film=FILM_HTML, hand=hand, beside=beside or Markup())
+    style = Markup("<style>{}</style>").format(Markup("\n".join(map(asset, ("replay.css", "live.css", *styles)))))
+    section = Section(
+        anchor="live",
+        title="Live",
+        html=style + Markup(html),
+        scripts=(
+            *(*SCENE_SCRIPTS, "phases.js", "hand_input.js"),
+            *(WEBCAM_SCRIPTS if webcam else ()),
+            *("live_hand.js", "live.js", "push.js", *scripts),
+        ),
+    )
+    return page_html(title, Markup(""), [section], connects=True, works=webcam)

@@ -1,0 +1,154 @@
+"""What comes over the connections of a live page, and what is refused of it, on a real socket."""
+
+import asyncio
+import contextlib
+import json
+import socket
+import urllib.request
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.websockets import WebSocket
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
+from handover.scenarios.experiment.live_inputs import LedHand
+from handover.scenarios.live.commands import InvalidCommand, parse_command
+from handover.scenarios.live.connections import HEADERS, FloodGuard
+from handover.scenarios.live.hand_messages import HandSample
+from handover.scenarios.live.hand_seat import HandSeat
+from handover.scenarios.live.input_board import InputBoard
+from handover.scenarios.live.live_page import LivePage
+from handover.scenarios.live.server import serve
+
+LED = LedHand("person", (-0.4, 0.1, -0.05), 0.9)
+AT_REST = HandSample(LED.p_WH_0, (1.0, 0.0, 0.0, 0.0), STRAIGHT, closed=False, stamp=0.0)
+
+
+class PageWithHand(LivePage):
+    """A page whose hand can be led before there is a run."""
+
+    longest = 100_000
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__()
+        self.board = InputBoard.create(folder / "hand", LED.inputs, [LED.age])
+        self.seat = HandSeat(LED, self.board, lambda: AT_REST)
+
+    async def hand(self, device: WebSocket) -> None:
+        await self.seat.connection(device)
+
+
+def with_page(folder: Path, act: Callable[[PageWithHand, str], Awaitable[None]]) -> None:
+    """Serve a page on a free port while something is done with it, by its `host:port`."""
+
+    async def work() -> None:
+        page = PageWithHand(folder)
+        with socket.create_server(("127.0.0.1", 0)) as listening:
+            host = f"127.0.0.1:{listening.getsockname()[1]}"
+
+            async def acting() -> None:
+                await act(page, host)
+
+            await serve(page, acting(), listening)
+
+    asyncio.run(work())
+
+
+def opened(host: str, path: str, **options: Any) -> connect:
+    return connect(f"ws://{host}/{path}", origin=f"http://{host}", **options)  # pyright: ignore[reportArgumentType]
+
+
+async def answer(to: ClientConnection) -> dict[str, Any]:
+    return json.loads(await asyncio.wait_for(to.recv(), 30.0))
+
+
+def test_a_page_is_not_framed_not_kept_and_taken_for_html_alone(tmp_path: Path):
+    async def act(_page: PageWithHand, host: str) -> None:
+        got = await asyncio.to_thread(urllib.request.urlopen, f"http://{host}/")
+        assert {name: got.headers[name] for name in HEADERS} == HEADERS
+        assert HEADERS["X-Frame-Options"] == "DENY"
+
+    with_page(tmp_path, act)
+
+
+def test_a_connection_of_another_sites_page_is_refused_and_a_tracker_without_a_site_is_not(tmp_path: Path):
+    async def act(_page: PageWithHand, host: str) -> None:
+        for path in ("run", "hand"):
+            with pytest.raises(InvalidStatus, match="403"):
+                await connect(f"ws://{host}/{path}", origin="http://elsewhere.example")  # pyright: ignore[reportArgumentType]
+        with pytest.raises(InvalidStatus, match="403"):
+            await connect(f"ws://{host}/run")
+        async with connect(f"ws://{host}/hand") as tracker:
+            assert "hand" in await answer(tracker)
+
+    with_page(tmp_path, act)
+
+
+def test_a_binary_message_and_deep_json_are_refused_and_the_connection_goes_on(tmp_path: Path):
+    async def act(page: PageWithHand, host: str) -> None:
+        page.longest = 100_000
+        async with opened(host, "run") as browser, opened(host, "hand") as tracker:
+            await browser.send(b"\x00")
+            assert "binary" in (await answer(browser))["refused"]
+            await browser.send("[" * 50_000)
+            assert "not JSON" in (await answer(browser))["refused"]
+            await browser.send('{"command": "fly"}')
+            assert "no command 'fly'" in (await answer(browser))["refused"]
+            await answer(tracker)
+            await tracker.send(b"\x00")
+            assert "binary" in (await answer(tracker))["refused"]
+            sample = {"p_WH": LED.p_WH_0, "q_WH": [1, 0, 0, 0], "closed": False, "stamp": 1.0}
+            await tracker.send(json.dumps(sample))
+            while page.board.read() is None:
+                await asyncio.sleep(0.01)
+
+    with_page(tmp_path, act)
+
+
+def test_who_floods_is_disconnected_with_the_reason(tmp_path: Path):
+    async def act(page: PageWithHand, host: str) -> None:
+        for path in ("run", "hand"):
+            async with opened(host, path, max_queue=None) as flooding:
+                with contextlib.suppress(ConnectionClosed):
+                    for _ in range(20_000):
+                        await flooding.send("{")
+                await flooding.wait_closed()
+                assert flooding.close_code == 1008
+                assert "messages in a second" in str(flooding.close_reason)
+        assert page.seat.report()["refused"]["more than 2000 messages in a second"] == 1
+
+    with_page(tmp_path, act)
+
+
+def test_a_page_that_is_too_slow_is_closed_with_the_reason(tmp_path: Path):
+    async def act(page: PageWithHand, host: str) -> None:
+        async with opened(host, "run", max_size=None, max_queue=1, compression=None) as slow:
+            while True:  # until neither side's memory takes more, and 2 s more
+                before = asyncio.get_running_loop().time()
+                await page.tell({"much": "x" * 1_000_000})
+                if asyncio.get_running_loop().time() - before > 1.9:
+                    break
+            with contextlib.suppress(ConnectionClosed):
+                while True:
+                    await asyncio.wait_for(slow.recv(), 30.0)
+            assert slow.close_code == 1013
+            assert "more than 2 s to receive a message" in str(slow.close_reason)
+
+    with_page(tmp_path, act)
+
+
+def test_messages_are_counted_over_a_second():
+    now = [0.0]
+    guard = FloodGuard(3, lambda: now[0])
+    assert [guard.floods() for _ in range(4)] == [False, False, False, True]
+    now[0] = 1.0
+    assert not guard.floods()
+
+
+def test_deep_json_is_no_command():
+    with pytest.raises(InvalidCommand, match="not JSON"):
+        parse_command('{"command":' + "[" * 90_000, 100_000)

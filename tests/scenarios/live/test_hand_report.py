@@ -1,0 +1,81 @@
+"""What led a hand is written beside its run, also where the page ceases to show the run, or the disk is full."""
+
+import asyncio
+import contextlib
+import json
+import time
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from native_units import native_fmu
+
+from handover.cosim.master.live_control import LiveControl
+from handover.cosim.master.master import Master
+from handover.cosim.record.reader import Record
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.system.system import System
+from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
+from handover.scenarios.experiment.live_inputs import LedHand
+from handover.scenarios.live.hand_messages import HandSample
+from handover.scenarios.live.hand_seat import HandSeat
+from handover.scenarios.live.input_board import InputBoard
+from handover.scenarios.live.live_page import LivePage
+from handover.scenarios.live.shown_run import ShownRun
+from handover.scenarios.live.stage import PastStage
+from handover.scenarios.live.watched_run import WatchedRun
+
+LED = LedHand("person", (-0.4, 0.1, -0.05), 0.9)
+AT_REST = HandSample(LED.p_WH_0, (1.0, 0.0, 0.0, 0.0), STRAIGHT, closed=False, stamp=0.0)
+
+
+class LedSeat(HandSeat):
+    """A seat whose device has sent a sample."""
+
+    def __init__(self, folder: Path) -> None:
+        board = InputBoard.create(folder / "hand", LED.inputs, [LED.age])
+        board.set(AT_REST.entries(LED), time.monotonic())
+        super().__init__(LED, board, lambda: AT_REST)
+        self._samples["test"] += 1
+
+
+class Told(LivePage):
+    """A page that notes what it tells."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.told: list[object] = []
+
+    async def tell(self, content: object) -> None:
+        self.told.append(content)
+
+
+def shown_run(folder: Path) -> ShownRun:
+    system = System()
+    system.add("mass", native_fmu("mass", 3))
+    with Master(system) as master, Recorder(folder / "signals.parquet") as recorder:
+        master.run(Fraction(1, 10), [recorder])
+    stage = PastStage(None, None, Record(folder / "signals.parquet"))
+    return ShownRun(WatchedRun(folder / "run"), LiveControl.in_memory(1.0), folder, stage, seat=LedSeat(folder))
+
+
+async def cancelled(page: LivePage, shown: ShownRun) -> None:
+    showing = asyncio.create_task(page.show(shown))
+    await asyncio.sleep(0.1)
+    showing.cancel()
+    with contextlib.suppress(asyncio.CancelledError):
+        await showing
+
+
+def test_the_report_is_written_where_showing_the_run_is_cancelled(tmp_path: Path):
+    shown = shown_run(tmp_path)
+    (tmp_path / "run").mkdir()
+    asyncio.run(cancelled(LivePage(), shown))
+    assert json.loads((tmp_path / "run" / "inputs.json").read_text(encoding="utf-8"))["samples"] == {"test": 1}
+
+
+def test_the_end_is_told_where_the_report_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    shown, page = shown_run(tmp_path), Told()
+    asyncio.run(page.show(shown, lambda: True))  # whose folder is not there
+    assert "ended" in str(page.told[-1])
+    assert "inputs.json" in capsys.readouterr().err

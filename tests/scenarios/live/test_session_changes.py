@@ -1,0 +1,55 @@
+"""What a session shows changes one after the other, by however many pages it is asked at once."""
+
+import asyncio
+from pathlib import Path
+
+from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.live.play_page import PlayPage, Session
+from handover.scenarios.live.played_run import Choice, PlayedRun
+from handover.scenarios.live.waiting_command import WaitingCommand
+
+SCENARIO = "ir_grasp"
+
+
+class Counted(PlayPage):
+    """A session that counts what it shows at a time."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.shows, self.most, self.begun_in_all = 0, 0, 0
+
+    async def _replay(self, run: PlayedRun) -> None:
+        assert run.number == 1
+        self.shows += 1
+        self.begun_in_all += 1
+        self.most = max(self.most, self.shows)
+        try:
+            await asyncio.sleep(60.0)
+        finally:
+            self.shows -= 1
+
+    async def _end_last(self) -> None:
+        await asyncio.sleep(0.05)  # as a run takes time to end
+        await super()._end_last()
+
+    async def ask_at_once(self, run: PlayedRun) -> None:
+        await asyncio.gather(*(self._show_again(run) for _ in range(3)))
+        await asyncio.sleep(0.05)
+
+
+def test_of_several_runs_that_are_shown_again_at_once_the_last_one_is_shown_alone(tmp_path: Path):
+    session = Session("", RunRequest(subject=SCENARIO), [], [], False, False, [], tmp_path, 2.0)
+
+    async def work() -> None:
+        page = Counted(session)
+        run = PlayedRun(1, Choice(), SCENARIO, [], tmp_path / "001", 1.0, WaitingCommand(SCENARIO))
+        run.kill()
+        await page.ask_at_once(run)
+        page.end()
+        await page.work()
+        run.close()
+        assert (page.most, page.shows) == (1, 0)
+        assert page.begun_in_all >= 1
+        assert not run.controls.exists()
+
+    asyncio.run(work())
