@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime, timezone
 from typing import Any, cast
 
+from handover.cosim.exceptions import RecordNotWritten
 from handover.scenarios.study.folder.session_folder import RoundRecord, Session, SessionFolder
 from handover.scenarios.study.folder.session_notes import VoidAttempt, Withdrawal
 from handover.scenarios.study.folder.study_folder import StudyFolder
@@ -123,6 +124,13 @@ class Protocol:
         """Let the practice begin again, as it could not go on."""
         self.screen, self.void_reason = "practice", reason
 
+    def break_off(self, reason: str) -> None:
+        """Show that what was played could not be kept, and why; it can be played again, or goes on if it was kept."""
+        if self.screen == "practising":
+            self.break_off_practice(reason)
+        elif self.screen == "round":
+            self.screen, self.void_reason = "void", reason
+
     def end_round(self, record: RoundRecord) -> None:
         """Keep the round that was played; its statements are rated next.
 
@@ -130,7 +138,12 @@ class Protocol:
             RecordNotWritten: it cannot be kept.
         """
         planned = self._planned
-        self._begun.record_round(planned.number, record)
+        try:
+            self._begun.record_round(planned.number, record)
+        except RecordNotWritten:
+            if self.round == planned:
+                raise
+            # the round is kept, and tables alone are not: they are written again with its ratings
         self.screen = self._next_of_session()
 
     def void_round(self, reason: str) -> None:
@@ -178,7 +191,7 @@ class Protocol:
         return planned
 
     def _choose_language(self, value: Any) -> None:
-        if value not in self.study.plan.texts:
+        if not isinstance(value, str) or value not in self.study.plan.texts:
             raise InvalidAction(f"no language {value!r}: {', '.join(self.study.plan.texts)} are")
         self._language, self.screen = value, "consent"
 
@@ -226,7 +239,11 @@ class Protocol:
 
     def _rate(self, value: Any) -> None:
         unrated = self._begun.unrated_round
-        if unrated is None or not isinstance(value, dict):
+        if unrated is None:  # its ratings are kept, but tables could not be written
+            self._begun.write_tables()
+            self.screen = self._next_of_session()
+            return
+        if not isinstance(value, dict):
             raise InvalidAction("rate takes a number for each statement, by its name")
         try:
             self._begun.record_answers(unrated.number, cast(dict[str, int], value))

@@ -28,7 +28,8 @@ from handover.scenarios.reporting.page import asset, plain_page_html, template
 from handover.scenarios.reporting.replay_section import SCENE_SCRIPTS
 from handover.scenarios.study.folder.codebook import PILOT
 from handover.scenarios.study.plan.plan import StudyPlan
-from handover.scenarios.study.session.seat import LONGEST, StudySeat
+from handover.scenarios.study.session.page_messages import LONGEST
+from handover.scenarios.study.session.seat import StudySeat
 from handover.scenarios.study.session.tracker import TrackerSeat
 
 _GRACE = 30
