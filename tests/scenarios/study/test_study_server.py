@@ -1,5 +1,6 @@
 """Who is not a study's page is refused, and what a page sends that it should not; a round is void, never wrong."""
 
+import asyncio
 import contextlib
 import json
 import socket
@@ -19,6 +20,7 @@ import uvicorn
 from sample_study import record
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
+from websockets.sync.server import ServerConnection, serve
 
 from handover.cosim.exceptions import RecordNotWritten
 from handover.scenarios.study.folder.study_folder import StudyFolder
@@ -26,7 +28,7 @@ from handover.scenarios.study.plan.plan import default_plan, parse_plan
 from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session import seat as seat_module
 from handover.scenarios.study.session.device_test import Reached
-from handover.scenarios.study.session.pilot import SeenScene
+from handover.scenarios.study.session.pilot import PilotRefused, SeenScene, play_sessions
 from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.seat import StudySeat
 from handover.scenarios.study.session.served_study import NotServed, check_hands
@@ -350,6 +352,23 @@ def test_a_message_beyond_all_bounds_ends_the_connection_with_the_reason(path: s
             told(device, "nothing")
         assert closed.value.rcvd is not None
         assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1009, "frame exceeds limit of 80000 bytes")
+
+
+@pytest.mark.parametrize("code", [1000, 1012])
+def test_a_server_that_has_gone_is_no_end_of_scripted_pilots(code: int):
+    def close(connection: ServerConnection) -> None:
+        connection.close(code=code)
+
+    with serve(close, HOST, 0) as server:  # pyright: ignore[reportUnknownVariableType]
+        thread = threading.Thread(target=server.serve_forever)  # pyright: ignore[reportUnknownArgumentType]
+        thread.start()
+        address = f"http://{HOST}:{server.socket.getsockname()[1]}/"
+        try:
+            with pytest.raises((PilotRefused, ConnectionClosed)):
+                asyncio.run(play_sessions(address, PLAN, print))
+        finally:
+            server.shutdown()
+            thread.join()
 
 
 def test_a_plan_in_whose_rounds_nobody_can_lead_a_hand_is_told():

@@ -31,12 +31,13 @@ def test_a_trial_that_cannot_begin_leaves_no_files(tmp_path: Path, monkeypatch: 
 
 
 @pytest.mark.slow
-def test_a_scene_that_fails_is_told_with_the_reason(tmp_path: Path):
-    (tmp_path / "dark.py").write_text(DARK, encoding="utf-8")
-    trial = Trial(Wanted(f"{tmp_path / 'dark.py'}:Dark", [], 0, tmp_path / "out", {}))
+def test_a_scene_that_fails_is_told_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dark_scene.py").write_text(DARK, encoding="utf-8")
+    trial = Trial(Wanted("dark_scene:Dark", [], 0, tmp_path / "out", {}))
     try:
         trial.begin()
-        with pytest.raises(TrialFailed, match=r"ValueError: the lamp is broken \(dark.py, line 9\)"):
+        with pytest.raises(TrialFailed, match=r"ValueError: the lamp is broken \(dark_scene.py, line 9\)"):
             trial.scene()
     finally:
         trial.close()
