@@ -195,6 +195,17 @@ def test_a_scripted_pilot_plays_twelve_rounds_that_survive_a_kill_and_are_played
     assert pq.read_table(tmp_path / "again" / "signals.parquet").equals(pq.read_table(played / "signals.parquet"))
 
 
+def test_a_scripted_pilot_that_is_refused_ends_the_command_with_the_reason(tmp_path: Path):
+    plan = pilot_plan(tmp_path / "plan.toml", devices='["script"]', patience=15, practice=0, repetitions=1)
+    study = StudyFolder.opened(tmp_path / "study", parse_plan(plan.read_text(encoding="utf-8")))
+    (study.participants / "P01").write_text("", encoding="utf-8")  # in the way of the session's folder
+    command = [*HANDOVER, "study", "serve", str(plan), "--out", str(study.path), "--pilot"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 1
+    assert "the scripted pilot was broken off: it could not be kept" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
 def test_what_a_plan_does_not_allow_is_told_in_one_line(tmp_path: Path):
     plan = tmp_path / "plan.toml"
     plan.write_text(default_plan(), encoding="utf-8")
