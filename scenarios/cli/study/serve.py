@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import sys
 from pathlib import Path
 
 import click
@@ -11,8 +12,9 @@ from handover.scenarios.execution.errors import UsageError, one_line_errors, req
 
 _HELP = """Carry out the study of PLAN.toml on this computer: a page, one participant after the other.
 
-The page goes from consent to thanks; what comes of it is in DIR, a folder a participant. The same command goes on
-with a session that was broken off: no finished round is lost. Ctrl-C ends it.
+The page goes from consent to thanks; what comes of it is in DIR, a folder a participant. Ctrl-C ends it. The
+same command goes on: where a session was broken off, the page first asks whether that participant goes on, or a new
+one begins. No finished round is lost. `handover study withdraw` takes a session that was given up out of the choice.
 
 The page is for this computer alone, unless --host names an address of it: then the page's address holds a token,
 and who knows it may take part.
@@ -31,7 +33,7 @@ the hand by what the page shows.
     "--participant",
     type=click.IntRange(1, 999),
     metavar="N",
-    help="Number of the participant.  [default: whose session is not complete, or else the next]",
+    help="Number of the first participant.  [default: the next; the page asks, if a session is not complete]",
 )
 @click.option("--pilot", is_flag=True, help="Let a script take part in the place of people, until all have.")
 @click.option(
@@ -47,6 +49,8 @@ def serve(
     """Carry out a study."""
     from handover.scenarios.cli.study.group import checked_plan
 
+    if sys.platform == "win32":
+        raise UsageError("handover study serve: not on Windows yet; `handover study plan` and `report` are")
     with one_line_errors():
         for extra in ("reports", "live"):
             require_extra(extra, "handover study serve")
@@ -59,6 +63,7 @@ def serve(
             raise UsageError(f"--participant: the plan has {plan.participants}, not {participant}")
         from handover.scenarios.study.session.served_study import (  # uvicorn and starlette, of the extra
             NotServed,
+            PilotsBrokenOff,
             serve_study,
         )
 
@@ -78,3 +83,5 @@ def serve(
                 )
         except NotServed as e:
             raise UsageError(str(e)) from e
+        except PilotsBrokenOff as e:
+            raise click.ClickException(str(e)) from e

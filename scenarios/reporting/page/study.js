@@ -5,7 +5,7 @@
   const root = document.querySelector(".study"), {words} = page.data(root);
   const byId = id => document.getElementById(id);
   const main = byId("screen");
-  let shown = null, play = null, input = null, test = null, over = false, drawn = [], hasTracker = false;
+  let shown = null, play = null, input = null, test = null, over = false, drawn = [], hasTracker = false, held = [];
   const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
   const TURNS = {"+roll": "roll_right", "-roll": "roll_left", "+pitch": "fingers_down", "-pitch": "fingers_up",
     "+yaw": "fingers_left", "-yaw": "fingers_right"};
@@ -34,20 +34,30 @@
   const send = message => link.readyState === WebSocket.OPEN && link.send(JSON.stringify(message));
   const act = (action, value = null) => send({act: {action, value}});
 
-  function button(name, action, {first = false} = {}) {
-    const made = node("button", {type: "button", ...(first ? {class: "first"} : {})}, word(name));
-    made.addEventListener("click", () => {
-      main.querySelectorAll("button").forEach(b => { b.disabled = true; });
-      action();
-    });
+  function button(name, action, {first = false, values = {}} = {}) {
+    const made = node("button", {type: "button", ...(first ? {class: "first"} : {})}, word(name, values));
+    made.addEventListener("click", once(action));
     return made;
+  }
+  // What a screen asks for is done once: its buttons wait for the next screen, or for the refusal.
+  const once = action => () => {
+    held = [...main.querySelectorAll("button:enabled")];
+    held.forEach(b => { b.disabled = true; });
+    action();
+  };
+  function release() {
+    held.forEach(b => { b.disabled = false; });
+    held = [];
   }
   const actions = (...buttons) => node("div", {class: "actions"}, ...buttons);
 
   const screens = {
+    who: s => [node("h1", {}, word("who")), node("p", {}, word("who_help")), actions(
+      ...s.unfinished.map(of => button("continue_session", () => act("continue", of.number), {values: of})),
+      ...(s.new ? [button("new_participant", () => act("new"), {values: {participant: s.new}})] : []))],
     language: s => [node("h1", {}, word("choose_language")), node("div", {class: "study-choices"},
       ...Object.entries(s.languages).map(([name, text]) => node("button",
-        {type: "button", class: "study-choice", lang: name, onclick: () => act("language", name)}, text)))],
+        {type: "button", class: "study-choice", lang: name, onclick: once(() => act("language", name))}, text)))],
     consent: s => [node("h1", {}, word("welcome")), ...paragraphs(s.welcome), node("h2", {}, word("consent")),
       ...paragraphs(s.consent),
       actions(button("agree", () => act("consent", true), {first: true}), button("disagree", () => act("consent", false)))],
@@ -66,7 +76,7 @@
       actions(button("next_participant", () => act("next")))],
     device: s => [node("h1", {}, word("device")), node("div", {class: "study-choices"},
       ...Object.keys(s.devices).map(name => node("button", {type: "button", class: "study-choice", "data-device": name,
-        onclick: () => act("device", {device: name, settings: settings()})},
+        onclick: once(() => act("device", {device: name, settings: settings()}))},
         node("b", {}, word(`device_${name}`)), node("span", {}, word(`help_${name}`)))))],
     practice: s => [node("h1", {}, word("practice")), ...paragraphs(s.practice),
       ...(s.reason ? [node("p", {}, word("practice_again", s))] : []),
@@ -144,6 +154,7 @@
   function show(screen) {
     shown = screen;
     keys = null;
+    held = [];
     document.documentElement.lang = screen.language;
     document.title = screen.title;
     tell("");
@@ -242,7 +253,12 @@
     else if ("tracker" in message) {
       hasTracker = message.tracker;
       nameTracker();
-    } else if (message.refused) tell(message.refused);
+    } else if (message.wait) tell(word(message.wait));
+    else if (message.refused) {
+      tell(message.refused);
+      release();
+      nameTracker();
+    }
     else if (message.gone) {
       over = true;
       endPlay();

@@ -156,9 +156,9 @@ class StudyFolder:
         }
         with disk_errors_reported(path):
             (path / "rounds").mkdir(parents=True, exist_ok=True)
-        write_whole(path / "session.json", json.dumps(data, indent=2, allow_nan=False) + "\n")
         begun = SessionFolder(path, self.plan, session)
         begun.write_tables()
+        write_whole(path / "session.json", json.dumps(data, indent=2, allow_nan=False) + "\n")  # with it, it has begun
         return begun
 
     def write_tables(self) -> None:

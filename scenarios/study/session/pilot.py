@@ -5,7 +5,6 @@ the object or puts it into the gripper, and answers what is asked. What it rates
 """
 
 import asyncio
-import contextlib
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import ConnectionClosed
 
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
@@ -238,9 +236,12 @@ class ScriptedPilot:
                 answer = self._answer(self.screen)
                 if answer is not None:
                     await self._send({"act": {"action": answer[0], "value": answer[1]}})
+        raise PilotRefused("the server has ended the connection before the session was over")
 
     def _answer(self, shown: Mapping[str, Any]) -> tuple[str, Any] | None:
         match shown["screen"]:
+            case "who":
+                return "continue", shown["unfinished"][0]["number"]
             case "language":
                 return "language", next(iter(shown["languages"]))
             case "consent":
@@ -309,19 +310,19 @@ async def play_sessions(address: str, plan: StudyPlan, tell: Callable[[str], Non
 
     Raises:
         PilotRefused: something that they did was refused.
+        ConnectionClosed, OSError: the server has ended, or cannot be reached.
     """
     origin = "http://" + address.split("//", 1)[1].split("/", 1)[0]
     seat = address.replace("http://", "ws://", 1) + "seat"
-    with contextlib.suppress(ConnectionClosed):
-        async with connect(seat, origin=origin, max_size=None) as connection:  # pyright: ignore[reportArgumentType]
-            for number in range(1, plan.participants + 1):
-                pilot = ScriptedPilot(connection, plan.seed + number)
-                await pilot.take_part()
-                if pilot.screen["screen"] == "complete":
-                    return
-                tell(f"{pilot.screen['participant']}: a scripted pilot has taken part")
-                await connection.send(json.dumps({"act": {"action": "next"}}))
-                await asyncio.sleep(0)
+    async with connect(seat, origin=origin, max_size=None) as connection:  # pyright: ignore[reportArgumentType]
+        for number in range(1, plan.participants + 1):
+            pilot = ScriptedPilot(connection, plan.seed + number)
+            await pilot.take_part()
+            if pilot.screen["screen"] == "complete":
+                return
+            tell(f"{pilot.screen['participant']}: a scripted pilot has taken part")
+            await connection.send(json.dumps({"act": {"action": "next"}}))
+            await asyncio.sleep(0)
 
 
 def _unpacked(packed: Mapping[str, Any]) -> Floats:

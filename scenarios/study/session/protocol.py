@@ -1,10 +1,11 @@
 """What a participant goes through, as a state machine: what the page shows next, and what may be done there.
 
-    language -> consent -> eligibility -> device -> practice -> 12 x (instruction -> round -> rating)
+    (who ->) language -> consent -> eligibility -> device -> practice -> 12 x (instruction -> round -> rating)
       -> questions -> thanks
 
 after [Fernandes2020] sec. 5.7. All that is to be kept is written as it comes; a session that was broken off goes on at
-what was not finished. Nothing is written of who does not agree, or may not take part.
+what was not finished, when whoever carries out the study says that it is the same person. Nothing is written of who
+does not agree, or may not take part.
 """
 
 import math
@@ -12,11 +13,13 @@ from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime, timezone
 from typing import Any, cast
 
+from handover.cosim.exceptions import RecordNotWritten
 from handover.scenarios.study.folder.session_folder import RoundRecord, Session, SessionFolder
 from handover.scenarios.study.folder.session_notes import VoidAttempt, Withdrawal
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.order import Round
 from handover.scenarios.study.plan.plan import DEVICES, StudyText
+from handover.scenarios.study.session.screen_content import questions, rating, round_to_play, who
 
 MOST_ATTEMPTS = 3
 """How often a round is played at most that fails for a reason which is not the participant's (assumed)."""
@@ -29,12 +32,12 @@ class InvalidAction(ValueError):
 
 
 class Protocol:
-    """What one seat shows: the session that was begun and is not complete, or else the next participant's.
+    """What one seat shows: a participant's session, or, where sessions were begun and not ended, who it is to be.
 
     Args:
         study: where all is kept.
         devices: those of the plan that this computer has, by their names in the plan.
-        number: the participant's; None for the first whose session is not complete, or else the next.
+        number: the first participant's; None: it is asked whether an unfinished session goes on, or the next begins.
 
     Attributes:
         screen: what is shown, one of `SCREENS`.
@@ -51,18 +54,27 @@ class Protocol:
 
     def _begin(self) -> None:
         """Show the session that goes on, or the beginning of the next."""
-        plan = self.study.plan
-        self.session, self._eligibility, self._language = None, list[bool](), next(iter(plan.texts))
+        self.session, self._eligibility, self._language = None, list[bool](), next(iter(self.study.plan.texts))
         number, self._asked_for = self._asked_for, None
-        if number is None:
-            number = next((s.session.number for s in self.study.sessions if not s.has_ended), self.study.next_number)
+        self.number = self.study.next_number if number is None else number
+        if number is None and self._unfinished:
+            self.screen = "who"
+        else:
+            self._sit_down(self.number)
+
+    @property
+    def _unfinished(self) -> list[SessionFolder]:
+        """Sessions that have begun and not ended."""
+        return [s for s in self.study.sessions if not s.has_ended]
+
+    def _sit_down(self, number: int) -> None:
         self.number = number
         if number in self.study.numbers:
             self.session = self.study.session(number)
             self._language = self.session.session.language
             self.screen = self._next_of_session()
         else:
-            self.screen = "language" if number <= plan.participants else "complete"
+            self.screen = "language" if number <= self.study.plan.participants else "complete"
 
     @property
     def text(self) -> StudyText:
@@ -98,6 +110,7 @@ class Protocol:
     @property
     def _acts(self) -> Mapping[str, Mapping[str, Callable[[Any], None]]]:
         return {
+            "who": {"continue": self._continue, "new": lambda _value: self._sit_down(self.study.next_number)},
             "language": {"language": self._choose_language},
             "consent": {"consent": self._consent},
             "eligibility": {"eligibility": self._confirm},
@@ -123,6 +136,13 @@ class Protocol:
         """Let the practice begin again, as it could not go on."""
         self.screen, self.void_reason = "practice", reason
 
+    def break_off(self, reason: str) -> None:
+        """Show that what was played could not be kept, and why; it can be played again, or goes on if it was kept."""
+        if self.screen == "practising":
+            self.break_off_practice(reason)
+        elif self.screen == "round":
+            self.screen, self.void_reason = "void", reason
+
     def end_round(self, record: RoundRecord) -> None:
         """Keep the round that was played; its statements are rated next.
 
@@ -130,7 +150,12 @@ class Protocol:
             RecordNotWritten: it cannot be kept.
         """
         planned = self._planned
-        self._begun.record_round(planned.number, record)
+        try:
+            self._begun.record_round(planned.number, record)
+        except RecordNotWritten:
+            if self.round == planned:
+                raise
+            # the round is kept, and tables alone are not: they are written again with its ratings
         self.screen = self._next_of_session()
 
     def void_round(self, reason: str) -> None:
@@ -177,8 +202,15 @@ class Protocol:
             raise InvalidAction("all rounds have been played")
         return planned
 
+    def _continue(self, value: Any) -> None:
+        unfinished = {s.session.number: s.session.pseudonym for s in self._unfinished}
+        if isinstance(value, bool) or not isinstance(value, int) or value not in unfinished:
+            right = ", ".join(f"{number} ({name})" for number, name in unfinished.items()) or "none"
+            raise InvalidAction(f"no unfinished session of number {value!r}: {right} are")
+        self._sit_down(value)
+
     def _choose_language(self, value: Any) -> None:
-        if value not in self.study.plan.texts:
+        if not isinstance(value, str) or value not in self.study.plan.texts:
             raise InvalidAction(f"no language {value!r}: {', '.join(self.study.plan.texts)} are")
         self._language, self.screen = value, "consent"
 
@@ -226,7 +258,11 @@ class Protocol:
 
     def _rate(self, value: Any) -> None:
         unrated = self._begun.unrated_round
-        if unrated is None or not isinstance(value, dict):
+        if unrated is None:  # its ratings are kept, but tables could not be written
+            self._begun.write_tables()
+            self.screen = self._next_of_session()
+            return
+        if not isinstance(value, dict):
             raise InvalidAction("rate takes a number for each statement, by its name")
         try:
             self._begun.record_answers(unrated.number, cast(dict[str, int], value))
@@ -273,6 +309,8 @@ class Protocol:
     def _details(self, text: StudyText) -> dict[str, Any]:
         plan, planned = self.study.plan, self.round
         match self.screen:
+            case "who":
+                return who(self.study, self._unfinished)
             case "language":
                 return {"languages": {name: t.language for name, t in plan.texts.items()}}
             case "consent":
@@ -284,48 +322,21 @@ class Protocol:
             case "practice" | "practising":
                 return {"practice": text.practice, "seconds": plan.practice, "reason": self.void_reason}
             case "instruction" | "round":
-                return {} if planned is None else self._of_round(planned, text)
+                return {} if planned is None else round_to_play(plan, planned, text)
             case "void":
                 return {"reason": self.void_reason, "again": planned is not None}
             case "rating":
-                return self._rating(text)
+                return rating(plan, self._begun.unrated_round, text)
             case "questions":
-                return {"questions": self._questions(text)}
+                return {"questions": questions(plan, text)}
             case "thanks":
                 return {"thanks": text.thanks}
             case _:
                 return {}
 
-    def _of_round(self, planned: Round, text: StudyText) -> dict[str, Any]:
-        """Return what is told of a round: its task, and not the robot's behaviour."""
-        task = planned.condition.task
-        told = {"name": text.task_names[task], "instruction": text.instructions[task]}
-        return {**told, "task": task, "round": planned.number, "rounds": self.study.plan.rounds}
-
-    def _rating(self, text: StudyText) -> dict[str, Any]:
-        plan, unrated = self.study.plan, self._begun.unrated_round
-        low, high = plan.scale
-        return {
-            "round": None if unrated is None else unrated.number,
-            "rounds": plan.rounds,
-            "statements": {name: text.statements[name] for name in plan.statements},
-            "scale": {"lowest": low, "highest": high, "low": text.lowest, "high": text.highest},
-        }
-
-    def _questions(self, text: StudyText) -> list[dict[str, Any]]:
-        return [
-            {
-                "name": q.name,
-                "text": text.questions[q.name],
-                "choices": [
-                    {"value": c, "text": w} for c, w in zip(q.choices, text.choices.get(q.name, ()), strict=True)
-                ],
-            }
-            for q in self.study.plan.questions
-        ]
-
 
 SCREENS = (
+    "who",
     "language",
     "consent",
     "eligibility",

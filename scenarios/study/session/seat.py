@@ -10,8 +10,8 @@ Texts from the page are JSON objects with one member:
 | `clock` | s | the page's clock, by which pictures of a tracker's samples are timed |
 | `drawn` | list of ms | times from samples of the hand to the pictures that showed them |
 
-Texts to the page are JSON objects with one of `screen`, `scene`, `target`, `again`, `tracker`, `refused`, `gone`; a
-state of the run is a message of 64-bit floats, see `Frame`, sixty a second.
+Texts to the page are JSON objects with one of `screen`, `scene`, `target`, `again`, `tracker`, `wait`, `refused`,
+`gone`; a state of the run is a message of 64-bit floats, see `Frame`, sixty a second.
 """
 
 import asyncio
@@ -24,34 +24,27 @@ from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.cosim.exceptions import RecordNotWritten
 from handover.scenarios.live.hand_messages import DeviceClock, InvalidHandMessage
 from handover.scenarios.results.run_folder import InvalidRunFolder
+from handover.scenarios.study.folder.session_folder import RoundRecord
 from handover.scenarios.study.plan.plan import TRACKER
-from handover.scenarios.study.session.device_test import DeviceTest
+from handover.scenarios.study.session import page_messages
+from handover.scenarios.study.session.page_messages import MessageRate, parse_message, received_text
+from handover.scenarios.study.session.practice import PRACTICE, Practice, is_lost
 from handover.scenarios.study.session.protocol import InvalidAction, Protocol
 from handover.scenarios.study.session.trial import Trial, TrialFailed, Wanted, round_parameters
 
 PERIOD = 1.0 / 60.0
 """Time between two states of the run that the page gets, s."""
-LONGEST = 20_000
-"""Characters of a message from the page at most."""
-MOST_A_SECOND = 300
-"""Messages a second that are taken from a page; further ones are refused."""
-FLOOD = 3000
-"""Messages a second at which a page is put out of its seat."""
 SILENCE = 3.0
 """Time without a sample of the hand after which a device is lost, and the round void, s (assumed)."""
 _READY = 60.0
 """How long a page may take to draw the scene for the first time, s."""
 _SLOWEST = 2.0
 """How long a page may take to receive a message, s."""
-PRACTICE = "handover.scenarios.free_flyer.handover.hand_practice:HandPractice"
-_LOST_FROM = 0.7
-"""How far from its first place the object of the practice is lost, m; the practice then begins anew (assumed)."""
 
 
 class StudySeat:
@@ -68,13 +61,14 @@ class StudySeat:
     def __init__(self, protocol: Protocol, pace: float = 1.0) -> None:
         self.protocol, self._pace = protocol, pace
         self._page: WebSocket | None = None
+        self._leaving = asyncio.Lock()  # held until the trial of a page that has gone is over
         self._trial: Trial | None = None
+        self._closing: asyncio.Future[None] | None = None
         self._preparing: asyncio.Task[None] | None = None
         self._playing: asyncio.Task[None] | None = None
         self._page_ready, self._fault = asyncio.Event(), ""
         self._last_sample = 0.0
-        self._test: DeviceTest | None = None
-        self._practised = 0.0
+        self._practice: Practice | None = None
         self._has_tracker, self._page_clock, self._page_offset = False, DeviceClock(), math.nan
         self.on_run: Callable[[Mapping[str, Any]], Awaitable[None]] | None = None
 
@@ -83,13 +77,28 @@ class StudySeat:
         """Whether a page has the seat."""
         return self._page is not None
 
+    @property
+    def practice(self) -> Practice:
+        """What was practised in the session under way; another participant's begins at nothing."""
+        session = self.protocol.session
+        assert session is not None
+        if self._practice is None or self._practice.session is not session:
+            self._practice = Practice(session)
+        return self._practice
+
     async def sit(self, page: WebSocket) -> None:
         """Let a page that was accepted have the seat until it goes; another one is told that it is taken."""
-        if self._page is not None:
-            await page.send_text(json.dumps({"gone": "seat_taken"}))
-            await page.close(code=4001)
+        if self._leaving.locked():
+            await self._within_time(page.send_text(json.dumps({"wait": "one_moment"})))
+        async with self._leaving:
+            is_free = self._page is None
+            if is_free:
+                self._page, self._page_clock, self._page_offset = page, DeviceClock(), math.nan
+        if not is_free:
+            await self._within_time(page.send_text(json.dumps({"gone": "seat_taken"})))
+            with contextlib.suppress(RuntimeError):
+                await page.close(code=4001)
             return
-        self._page, self._page_clock, self._page_offset = page, DeviceClock(), math.nan
         try:
             await self._send({"tracker": self._has_tracker})
             await self._show()
@@ -97,37 +106,37 @@ class StudySeat:
         except (WebSocketDisconnect, RuntimeError):
             pass
         finally:
-            self._page = None
-            await self._leave("the page was closed, or its connection was lost")
+            async with self._leaving:
+                self._page = None
+                await self._leave("the page was closed, or its connection was lost")
 
     async def close(self) -> None:
         """End what is under way; a round that is not finished is played again."""
-        await self._leave("the server was ended")
+        async with self._leaving:
+            await self._leave("the server was ended")
 
     async def _listen(self, page: WebSocket) -> None:
-        second, count, told = 0, 0, False
+        rate, told = MessageRate(), -1.0
         while True:
-            text = await page.receive_text()
-            if int(time.monotonic()) != second:
-                second, count, told = int(time.monotonic()), 0, False
-            count += 1
-            if count > FLOOD:
+            text = await received_text(page)
+            rate.add()
+            if rate.is_flood:
                 await self._send({"gone": "flood"})
                 await page.close(code=4002)
                 return
-            if count > MOST_A_SECOND:
-                if not told:
-                    await self._send({"refused": f"more than {MOST_A_SECOND} messages in a second"})
-                told = True
+            if rate.count > page_messages.MOST_A_SECOND:
+                if time.monotonic() - told >= 1.0:
+                    told = time.monotonic()
+                    await self._send({"refused": f"more than {page_messages.MOST_A_SECOND} messages in a second"})
                 continue
             try:
                 await self._take(text)
             except (InvalidAction, ValueError) as e:
                 await self._send({"refused": str(e)})
-            except (RecordNotWritten, InvalidRunFolder) as e:
+            except (RecordNotWritten, InvalidRunFolder, OSError) as e:
                 await self._send({"refused": f"it could not be kept: {e}"})
 
-    async def _take(self, text: str) -> None:
+    async def _take(self, text: str | None) -> None:
         """Do what a message asks for.
 
         Raises:
@@ -197,9 +206,9 @@ class StudySeat:
         """Let the next run stand at its start, while the person reads what is to be done."""
         self._fault = ""
         try:
-            self._trial = trial = Trial(self._next_wanted())
-            await asyncio.get_running_loop().run_in_executor(None, trial.begin)
-        except TrialFailed as e:
+            self._trial = trial = await _opened(self._next_wanted())
+            await asyncio.to_thread(trial.begin)
+        except (TrialFailed, RecordNotWritten, InvalidRunFolder) as e:
             self._fault = str(e)
         except Exception as e:
             traceback.print_exc()
@@ -210,10 +219,8 @@ class StudySeat:
         assert session is not None
         told = {"kind": session.session.kind, "device": session.session.device}
         if protocol.screen in ("practice", "practising"):
-            left = max(1.0, protocol.study.plan.practice - self._practised)
-            return Wanted(
-                PRACTICE, [f"duration={left!r}"], 0, _free_folder(session.path / "practice"), told, self._pace
-            )
+            out = _free_folder(session.path / "practice")
+            return Wanted(PRACTICE, self.practice.parameters, 0, out, told, self._pace)
         planned = protocol.round
         assert planned is not None
         session.clear_unfinished(planned.number)
@@ -241,6 +248,8 @@ class StudySeat:
         """Show a run to its end; return why it is void, None if it is not. Faults of ours make it void, too."""
         try:
             return await self._run(trial)
+        except TrialFailed as e:
+            return str(e)
         except Exception as e:
             traceback.print_exc()
             return f"the server failed: {type(e).__name__}: {e}"
@@ -250,8 +259,6 @@ class StudySeat:
         stage = trial.stage
         assert stage is not None
         self._page_ready.clear()
-        if self._test is None and self.protocol.screen == "practising":
-            self._test = self._new_test()
         await self._send({"scene": trial.scene(), "hand": trial.hand})
         if self.on_run is not None:
             await self.on_run(trial.hand)
@@ -260,8 +267,8 @@ class StudySeat:
             await asyncio.wait_for(self._page_ready.wait(), _READY)
         except (TimeoutError, asyncio.TimeoutError):
             return f"the page did not draw the scene within {_READY:.0f} s"
-        if self._test is not None and self.protocol.screen == "practising":
-            await self._send({"target": self._test.target})
+        if self.protocol.screen == "practising":
+            await self._send({"target": self.practice.test.target})
         trial.go()
         self._last_sample = time.monotonic()
         while trial.is_running:
@@ -272,59 +279,65 @@ class StudySeat:
                 return f"no sample of the hand came for {SILENCE:.0f} s: the device or the page was lost"
             await self._send_frame(trial)
             await self._test_device(trial)
-            if self.protocol.screen == "practising" and _is_lost(trial):
+            if self.protocol.screen == "practising" and is_lost(trial):
                 trial.stop()
             await asyncio.sleep(max(PERIOD - (time.monotonic() - began), 0.001))
         return None
 
-    def _new_test(self) -> DeviceTest:
-        session = self.protocol.session
-        return DeviceTest("" if session is None else session.session.device)
-
     async def _test_device(self, trial: Trial) -> None:
         row = trial.newest
-        if self._test is None or row is None or self.protocol.screen != "practising":
-            return
-        if self._test.observe(self._practised + float(row.time[0]), row):
-            await self._send({"target": self._test.target})
+        if row is not None and self.protocol.screen == "practising" and self.practice.observe(row):
+            await self._send({"target": self.practice.test.target})
 
     def _goes_on(self, trial: Trial) -> bool:
         """Count the practice that has ended; return whether there is time left for more."""
-        self._practised += 0.0 if trial.newest is None else float(trial.newest.time[0])
-        return self.protocol.study.plan.practice - self._practised > 1.0
+        self.practice.count(trial.newest)
+        return self.practice.goes_on
 
     async def _conclude(self, is_round: bool, fault: str | None) -> None:
         """Keep what was played, and show what comes next."""
-        trial, protocol = self._trial, self.protocol
-        try:
-            if fault is None and is_round and trial is not None:
-                protocol.end_round(await asyncio.get_running_loop().run_in_executor(None, trial.record))
-        except TrialFailed as e:
-            fault = str(e)
+        trial, record = self._trial, None
+        if fault is None and is_round and trial is not None:
+            try:
+                record = await asyncio.to_thread(trial.record)
+            except TrialFailed as e:
+                fault = str(e)
+            except Exception as e:
+                traceback.print_exc()
+                fault = f"the server failed: {type(e).__name__}: {e}"
         await self._drop_trial(keep_playing=True)
         self._playing = None
-        if fault is not None:
-            self._note_fault(is_round, fault)
-        elif not is_round:
-            test = self._test or self._new_test()
-            protocol.end_practice({"practised": round(self._practised, 3), **test.shown})
-            self._test, self._practised = None, 0.0
+        self.keep(fault, record, is_round=is_round)
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
             await self._show()
 
-    def _note_fault(self, is_round: bool, fault: str) -> None:
-        if is_round:
-            self.protocol.void_round(fault)
-        else:
-            self.protocol.break_off_practice(fault)
+    def keep(self, fault: str | None, record: RoundRecord | None = None, *, is_round: bool) -> None:
+        """Keep a round's record, or what was practised, or why it does not count, and go on to what comes next.
+
+        Where the disk is full or a file is damaged, the page says so, and it can be tried again.
+        """
+        protocol = self.protocol
+        try:
+            if not is_round:
+                if fault is None:
+                    protocol.end_practice(self.practice.shown)
+                else:
+                    protocol.break_off_practice(fault)
+            elif fault is None and record is not None:
+                protocol.end_round(record)
+            else:
+                protocol.void_round(fault or "the run has no record")
+        except Exception as e:
+            if not isinstance(e, (RecordNotWritten, InvalidRunFolder)):
+                traceback.print_exc()
+            protocol.break_off(f"it could not be kept: {e}" + (f" ({fault})" if fault else ""))
 
     async def _leave(self, reason: str) -> None:
         """End the trial under way, if any, since nobody sits there; its round is void."""
         under_way = self._playing is not None
         await self._drop_trial()
         if under_way and self.protocol.screen in ("round", "practising"):
-            with contextlib.suppress(RecordNotWritten):
-                self._note_fault(self.protocol.screen == "round", reason)
+            self.keep(reason, is_round=self.protocol.screen == "round")
 
     async def _drop_trial(self, *, keep_playing: bool = False) -> None:
         """End what plays or prepares a run, and then the run, which nobody may look at any more."""
@@ -339,7 +352,10 @@ class StudySeat:
                 with contextlib.suppress(asyncio.CancelledError):
                     await task
         if trial is not None:
-            await asyncio.get_running_loop().run_in_executor(None, trial.close)
+            self._closing = asyncio.ensure_future(asyncio.to_thread(trial.close))
+        if self._closing is not None:  # of a task that was ended meanwhile, too: a folder is put aside after its run
+            await asyncio.wait([self._closing])
+            self._closing = None
 
     async def _send_frame(self, trial: Trial, *, always: bool = False) -> None:
         frame = trial.frame(always=always)
@@ -358,25 +374,15 @@ class StudySeat:
             await asyncio.wait_for(sending, _SLOWEST)
 
 
-def parse_message(text: str) -> tuple[str, Any]:
-    """Return the name and the value of a message from the page.
-
-    Raises:
-        InvalidAction: it is none.
-    """
-    if len(text) > LONGEST:
-        raise InvalidAction(f"a message has {LONGEST} characters at most, this one {len(text)}")
+async def _opened(wanted: Wanted) -> Trial:
+    """Return a trial that was opened in a thread; where nobody waits for it any more, it is closed again."""
+    opening = asyncio.ensure_future(asyncio.to_thread(Trial, wanted))
     try:
-        content: Any = json.loads(text)
-    except (ValueError, RecursionError) as e:
-        raise InvalidAction("it is not JSON") from e
-    members = cast(dict[str, Any], content) if isinstance(content, dict) else {}
-    if len(members) != 1 or not members.keys() <= _MESSAGES:
-        raise InvalidAction(f"it is not an object with one of {', '.join(sorted(_MESSAGES))}")
-    return next(iter(members.items()))
-
-
-_MESSAGES = {"act", "hand", "ready", "drawn", "clock"}
+        return await asyncio.shield(opening)
+    except asyncio.CancelledError:
+        with contextlib.suppress(Exception):
+            await asyncio.to_thread((await opening).close)
+        raise
 
 
 def _free_folder(path: Path) -> Path:
@@ -385,11 +391,3 @@ def _free_folder(path: Path) -> Path:
     while (free := path / f"{k:02d}").exists():
         k += 1
     return free
-
-
-def _is_lost(trial: Trial) -> bool:
-    """Return whether the object of the practice is where no hand can get it."""
-    row = trial.newest
-    if row is None or trial.first_place is None:
-        return False
-    return float(np.linalg.norm(row["person.p_WO"][0] - trial.first_place)) > _LOST_FROM

@@ -6,10 +6,12 @@ import socket
 from collections.abc import Callable
 from pathlib import Path
 
+from websockets.exceptions import ConnectionClosed
+
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.plan import NOT_OFFERED, TRACKER, StudyPlan
-from handover.scenarios.study.session.pilot import play_sessions
+from handover.scenarios.study.session.pilot import PilotRefused, play_sessions
 from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.seat import StudySeat
 from handover.scenarios.study.session.server import StudyServer, listening_socket, uvicorn_server
@@ -18,6 +20,10 @@ from handover.scenarios.study.session.trial import NoHand, led_hand_of, round_pa
 
 class NotServed(RuntimeError):
     """A study that cannot be served as it was asked for."""
+
+
+class PilotsBrokenOff(RuntimeError):
+    """Scripted pilots that have not all taken part, since the server was lost or has refused one."""
 
 
 async def serve_study(
@@ -38,13 +44,14 @@ async def serve_study(
         out: its folder, new, or one that goes on.
         host: the address on which it listens.
         port: likewise; 0: any that is free.
-        number: the first participant's; None: whose session is not complete, or else the next.
+        number: the first participant's; None: the next, or, where a session is not complete, whom the page is told.
         pace: simulated seconds per second of wall time.
         pilot: whether scripts take part.
         tell: is given lines for who carries it out.
 
     Raises:
         NotServed: the address cannot be used, or in a scenario nobody outside can lead a hand.
+        PilotsBrokenOff: scripted pilots did not get to their end.
         InvalidRunFolder, RecordNotWritten: see `StudyFolder.opened`.
     """
     check_hands(plan)
@@ -91,14 +98,30 @@ async def _with_pilots(
     playing = asyncio.create_task(play_sessions(address, server.seat.protocol.study.plan, tell))
     try:
         await asyncio.wait({job, playing}, return_when=asyncio.FIRST_COMPLETED)
+        was_ended = serving.should_exit  # by Ctrl-C
         if playing.done():
-            await playing
+            await _ended(playing, was_ended=was_ended)
+        elif not was_ended:
+            raise PilotsBrokenOff("the server has ended before all scripted pilots have taken part")
     finally:
         playing.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
+        with contextlib.suppress(asyncio.CancelledError, Exception):
             await playing
         serving.should_exit = True
         await job
+
+
+async def _ended(playing: "asyncio.Task[None]", *, was_ended: bool) -> None:
+    """Take the end of scripted pilots.
+
+    Raises:
+        PilotsBrokenOff: they did not get to theirs, and nobody has ended the server.
+    """
+    try:
+        await playing
+    except (ConnectionClosed, OSError, PilotRefused) as e:
+        if not was_ended:
+            raise PilotsBrokenOff(f"the scripted pilot was broken off: {e}") from e
 
 
 def address_of(listening: socket.socket, server: StudyServer) -> str:

@@ -27,15 +27,17 @@ from handover.scenarios.live.connections import HEADERS
 from handover.scenarios.reporting.html import json_html
 from handover.scenarios.reporting.page import asset, plain_page_html, template
 from handover.scenarios.reporting.replay_section import SCENE_SCRIPTS
-from handover.scenarios.study.folder.codebook import PILOT
 from handover.scenarios.study.plan.plan import StudyPlan
-from handover.scenarios.study.session.seat import LONGEST, StudySeat
+from handover.scenarios.study.session.page_messages import LONGEST
+from handover.scenarios.study.session.seat import StudySeat
 from handover.scenarios.study.session.tracker import TrackerSeat
 
 _GRACE = 30
 """Time for a run under way to end when the server does, s."""
 LOOPBACK = ("127.0.0.1", "localhost")
 _SCRIPTS = ("page.js", *SCENE_SCRIPTS, "hand_input.js", "study_scene.js", "study.js")
+_PILOT = "Pilot"
+"""What heads the page in a plan of pilots: a script opens no page, so that whoever sees it is a person."""
 _FALLBACK = "en"
 """Language of buttons where the page has no words of its own."""
 
@@ -51,9 +53,8 @@ def study_html(plan: StudyPlan) -> str:
     words = page_words()
     content = {
         "words": {name: {**words[_FALLBACK], **words.get(name, {})} for name in plan.texts},
-        "pilot": PILOT if plan.pilot else "",
     }
-    html = template("study.html").render(data=json_html(content), pilot=PILOT.capitalize() if plan.pilot else "")
+    html = template("study.html").render(data=json_html(content), pilot=_PILOT if plan.pilot else "")
     return plain_page_html(plan.title, html, (asset("page.css"), asset("replay.css"), asset("study.css")), _SCRIPTS)
 
 

@@ -15,6 +15,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
 from handover.scenarios.live.hand_messages import InvalidHandMessage
+from handover.scenarios.study.session import page_messages
+from handover.scenarios.study.session.page_messages import MessageRate, received_text
 from handover.scenarios.study.session.seat import StudySeat
 from handover.scenarios.study.session.trial import led_hand_of, round_parameters
 
@@ -59,10 +61,18 @@ class TrackerSeat:
             await self._seat.tracker_came(there=False)
 
     async def _follow(self, tracker: WebSocket) -> None:
-        told = 0.0
+        rate, told = MessageRate(), 0.0
         while True:
-            text = await tracker.receive_text()
+            text = await received_text(tracker)
+            rate.add()
+            if rate.is_flood:
+                fault = f"more than {page_messages.FLOOD} messages in a second"
+                await self._tell(tracker, {"refused": fault})
+                await tracker.close(code=1008, reason=fault)
+                return
             try:
+                if text is None:
+                    raise InvalidHandMessage("a message is a text, and not bytes")
                 self._seat.lead_by_tracker(text)
             except InvalidHandMessage as e:
                 if time.monotonic() - told >= _BETWEEN:

@@ -27,6 +27,7 @@ from handover.scenarios.live.input_board import InputBoard
 from handover.scenarios.live.stage import Stage
 from handover.scenarios.live.watched_run import WatchedRun
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.results.tolerated_faults import ToleratedFaults
 from handover.scenarios.study.folder.session_folder import RoundRecord, failed_by_rule
 from handover.scenarios.study.plan.plan import Condition
 from handover.scenarios.study.session.latency import LatencyLog, median_ms
@@ -113,6 +114,13 @@ class Frame:
 class Trial:
     """A run that waits at its start until `go`; it is killed at `close` at the latest.
 
+    Args:
+        wanted: what is to be run.
+
+    Raises:
+        NoHand, InvalidParameter: nobody outside can lead its hand, or a parameter is invalid.
+        OSError: its process cannot be started, or its files not be made, as on a full disk.
+
     Attributes:
         latency: times that the page has measured.
         stage: what is seen of the run; None until `begin` has returned.
@@ -124,13 +132,23 @@ class Trial:
         self.latency = LatencyLog()
         self.stage: Stage | None = None
         self.first_place: Floats | None = None
-        self._scratch = tempfile.TemporaryDirectory(prefix="handover-study-")
-        place = Path(self._scratch.name)
-        self._control = LiveControl.create(place / "control", wanted.pace, paused=True)
         self.led = led_hand_of(wanted.scenario, wanted.parameters)
-        self._board = InputBoard.create(place / "board", self.led.inputs, [self.led.age])
-        self._stream = HandStream(self.led)
-        self._stamps: deque[tuple[int, float]] = deque(maxlen=_MOST_STAMPS)
+        with contextlib.ExitStack() as opened:  # what fails here leaves nothing behind
+            place = Path(opened.enter_context(tempfile.TemporaryDirectory(prefix="handover-study-")))
+            self._control = LiveControl.create(place / "control", wanted.pace, paused=True)
+            opened.callback(self._control.close)
+            self._board = InputBoard.create(place / "board", self.led.inputs, [self.led.age])
+            opened.callback(self._board.close)
+            self._told = opened.enter_context(open(place / "told", "w+b"))
+            self._stream = HandStream(self.led)
+            self._stamps: deque[tuple[int, float]] = deque(maxlen=_MOST_STAMPS)
+            self._process = self._started(place)
+            self._run = WatchedRun(wanted.out)
+            self._opened = opened.pop_all()
+
+    def _started(self, place: Path) -> "subprocess.Popen[bytes]":
+        """Return the process of the run."""
+        wanted = self.wanted
         spec = {
             "scenario": wanted.scenario,
             "parameters": list(wanted.parameters),
@@ -140,12 +158,10 @@ class Trial:
             "board": str(place / "board"),
             "told": {"from": "page", **wanted.told},
         }
-        self._told = open(place / "told", "w+b")  # noqa: SIM115 (closed by `close`)
         command = [sys.executable, "-m", "handover.scenarios.study.session", json.dumps(spec)]
-        self._process = subprocess.Popen(
+        return subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=self._told, start_new_session=True
         )
-        self._run = WatchedRun(wanted.out)
 
     def begin(self) -> None:
         """Wait until the run stands at its start.
@@ -172,17 +188,32 @@ class Trial:
         """The newest row of the run."""
         return None if self.stage is None else self.stage.newest
 
-    def scene(self) -> dict[str, Any] | None:
-        """Return the scene as the person sees it and `sceneIn` takes it, None where the scenario has none.
+    def scene(self) -> dict[str, Any]:
+        """Return the scene as the person sees it and `sceneIn` takes it.
 
         Its last traces are moved by the page, and hidden at first: a ball at `TARGET`, then two `PLUMB` lines, of the
         hand and of the object, which help to see how far away these are.
+
+        Raises:
+            TrialFailed: the scenario has no scene, or fails as it is drawn; the message says where.
         """
         assert self.stage is not None
         hidden = np.full((1, 2, 3), np.nan)
         ball = Line(label=TARGET, colour=_GHOST, points=hidden, radii=np.full(2, _RADIUS), opacity=0.5)
         plumbs = [Line(label=PLUMB, colour=colour, points=hidden, width=_WIDTH) for colour in (_HAND, _OBJECT)]
-        return self.stage.scene_of_person([ball, *plumbs])
+        scene = self.stage.scene_of_person([ball, *plumbs])
+        if scene is None:
+            raise TrialFailed(f"nothing can be seen of {self.wanted.scenario}: {self._no_scene()}")
+        return scene
+
+    def _no_scene(self) -> str:
+        """Return why the stage has no scene."""
+        assert self.stage is not None
+        kind = find_scenario(self.wanted.scenario)
+        faults = ToleratedFaults()
+        with faults.tolerated("the scene"):
+            kind().replay(parse_parameters(kind, self.wanted.parameters), self.stage.newest)
+        return "; ".join(faults.lines) or "the scenario has no scene"
 
     def go(self) -> None:
         """Let the run go on."""
@@ -287,7 +318,4 @@ class Trial:
         self._process.wait()
         if self._process.stdin is not None:
             self._process.stdin.close()
-        self._told.close()
-        self._board.close()
-        self._control.close()
-        self._scratch.cleanup()
+        self._opened.close()

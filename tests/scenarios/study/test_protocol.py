@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from sample_study import PLAN, record
+from sample_study import PLAN, play, record, same, session
 
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.session.device_test import DeviceTest
@@ -76,10 +76,45 @@ def test_a_session_that_was_broken_off_goes_on_at_what_was_not_finished(tmp_path
     protocol.act("begin")
     protocol.end_round(record())
     again = Protocol(StudyFolder.opened(tmp_path / "study", PLAN), PLAN.devices)
+    again.act("continue", 1)
     assert (again.number, again.screen, again.content()["round"]) == (1, "rating", 1)
     again.act("rate", RATINGS)
-    third = Protocol(StudyFolder.opened(tmp_path / "study", PLAN), PLAN.devices)
+    third = Protocol(StudyFolder.opened(tmp_path / "study", PLAN), PLAN.devices, number=1)
     assert (third.screen, third.content()["round"]) == ("instruction", 2)
+
+
+def test_an_unfinished_session_is_not_another_persons(tmp_path: Path):
+    practised(tmp_path / "study")
+    protocol = Protocol(StudyFolder.opened(tmp_path / "study", PLAN), PLAN.devices)
+    assert (protocol.screen, protocol.session) == ("who", None)
+    shown = protocol.content()
+    assert [of["participant"] for of in shown["unfinished"]] == ["P01"]
+    assert (shown["participant"], shown["new"]) == (None, "P02")
+    refused: list[object] = [2, True, "1", {}, None]
+    for wrong in refused:
+        with pytest.raises(InvalidAction, match=r"1 \(P01\) are"):
+            protocol.act("continue", wrong)
+    protocol.act("new")
+    assert (protocol.number, protocol.screen) == (2, "language")
+    protocol.act("language", "en")
+    protocol.act("consent", False)
+    protocol.act("next")
+    assert protocol.screen == "who"
+
+
+def test_after_a_participant_who_was_named_it_is_asked_who_comes_next(tmp_path: Path):
+    practised(tmp_path / "study")
+    study = StudyFolder.opened(tmp_path / "study", PLAN)
+    begun = study.begin(session(5))
+    begun.notes.keep_practice(DeviceTest("mouse").shown)
+    play(begun, same)
+    protocol = Protocol(study, PLAN.devices, number=5)
+    assert protocol.screen == "thanks"
+    protocol.act("next")
+    assert (protocol.screen, protocol.content()["new"]) == ("who", "P06")
+    study.withdraw(1, "2026-11-25T10:00:00", delete=False)
+    protocol.act("new")
+    assert (protocol.number, protocol.screen) == (6, "language")
 
 
 def test_a_void_round_is_played_again_with_its_reason_and_at_last_kept_as_void(tmp_path: Path):

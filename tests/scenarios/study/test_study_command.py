@@ -1,6 +1,7 @@
 """`handover study new` and `plan`: a plan to start from, and what follows from it."""
 
 import json
+import sys
 from collections import Counter
 from pathlib import Path
 
@@ -56,6 +57,16 @@ def test_the_duration_goes_by_the_scenarios_parameters(tmp_path: Path):
     assert before["practice"] - after["practice"] == 300.0
     assert after["rounds"] == pytest.approx(before["rounds"] / 2)
     assert before["together"] == sum(before[part] for part in ("practice", "rounds", "ratings"))
+
+
+def test_on_windows_serving_is_refused_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    study("new", tmp_path / "plan.toml")
+    monkeypatch.setattr(sys, "platform", "win32")
+    refused = study("serve", tmp_path / "plan.toml", "--out", tmp_path / "study")
+    monkeypatch.undo()
+    assert refused.exit_code == 2
+    assert "handover study serve: not on Windows yet" in refused.output
+    assert not (tmp_path / "study").exists()
 
 
 def test_every_fault_of_a_plan_has_its_line(tmp_path: Path):

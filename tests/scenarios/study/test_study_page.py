@@ -86,7 +86,7 @@ def test_a_round_is_played_with_the_mouse_and_rated_by_keys(browser: Browser, tm
         page.goto(address)
         to_round(page)
         assert overflow(page) == 0
-        assert page.locator(".study-pilot").inner_text() == "Scripted pilot"
+        assert page.locator(".study-pilot").inner_text() == "Pilot"
         page.get_by_role("button", name="Begin").click()
         wait_until(page, "study.play?.time > 0.5")
         before = page.evaluate("study.play.hand().p_WH")
@@ -117,6 +117,48 @@ def test_a_round_is_played_with_the_mouse_and_rated_by_keys(browser: Browser, tm
     assert record.latency_median_ms is not None
     assert record.age_at_use_ms is not None
     assert record.missed_deadlines is not None
+
+
+@pytest.mark.slow
+def test_a_double_click_does_one_thing_a_refusal_frees_the_buttons_and_who_goes_on_is_asked(
+    browser: Browser, tmp_path: Path
+):
+    plan = pilot_plan(tmp_path / "plan.toml", devices='["mouse"]', patience=15, practice=0, repetitions=1)
+    plan.write_text(plan.read_text().replace("participants = 1", "participants = 2"), encoding="utf-8")
+    with served(plan, tmp_path / "study") as (address, _):
+        page = browser.new_page()
+        page.goto(address)
+        at(page, "language")
+        in_the_way = tmp_path / "study" / "participants" / "P01"
+        in_the_way.write_text("", encoding="utf-8")
+        page.get_by_role("button", name="English").dblclick()
+        at(page, "consent")
+        page.get_by_role("button", name="I agree").click()
+        at(page, "eligibility")
+        for box in page.get_by_role("checkbox").all():
+            box.check()
+        page.get_by_role("button", name="All of this applies to me").click()
+        at(page, "device")
+        mouse = page.get_by_role("button", name="Mouse and keyboard")
+        mouse.click()
+        wait_until(page, "!document.getElementById('told').hidden")
+        assert "P01" in page.locator("#told").inner_text()
+        assert mouse.is_enabled()
+        in_the_way.unlink()
+        mouse.dblclick()
+        at(page, "instruction")
+        page.wait_for_timeout(300)
+        assert page.locator("#told").is_hidden()
+        page.close()
+    with served(plan, tmp_path / "study") as (address, _):
+        page = browser.new_page()
+        page.goto(address)
+        at(page, "who")
+        assert page.get_by_role("button", name="New participant, P02").is_enabled()
+        page.get_by_role("button", name="Go on with P01").click()
+        at(page, "instruction")
+        assert page.locator("#who").inner_text() == "Participant P01"
+        page.close()
 
 
 @pytest.mark.slow
@@ -151,6 +193,17 @@ def test_a_scripted_pilot_plays_twelve_rounds_that_survive_a_kill_and_are_played
     played = session_folder / "rounds" / "01"
     subprocess.run([*again, "--inputs-from", str(played), "--out", str(tmp_path / "again")], check=False)
     assert pq.read_table(tmp_path / "again" / "signals.parquet").equals(pq.read_table(played / "signals.parquet"))
+
+
+def test_a_scripted_pilot_that_is_refused_ends_the_command_with_the_reason(tmp_path: Path):
+    plan = pilot_plan(tmp_path / "plan.toml", devices='["script"]', patience=15, practice=0, repetitions=1)
+    study = StudyFolder.opened(tmp_path / "study", parse_plan(plan.read_text(encoding="utf-8")))
+    (study.participants / "P01").write_text("", encoding="utf-8")  # in the way of the session's folder
+    command = [*HANDOVER, "study", "serve", str(plan), "--out", str(study.path), "--pilot"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 1
+    assert "the scripted pilot was broken off: it could not be kept" in ended.stderr
+    assert "Traceback" not in ended.stderr
 
 
 def test_what_a_plan_does_not_allow_is_told_in_one_line(tmp_path: Path):

@@ -1,5 +1,6 @@
 """Who is not a study's page is refused, and what a page sends that it should not; a round is void, never wrong."""
 
+import asyncio
 import contextlib
 import json
 import socket
@@ -13,15 +14,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import uvicorn
+from sample_study import record
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
+from websockets.sync.server import ServerConnection, serve
 
+from handover.cosim.exceptions import RecordNotWritten
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
+from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session import seat as seat_module
-from handover.scenarios.study.session.pilot import SeenScene
+from handover.scenarios.study.session.device_test import Reached
+from handover.scenarios.study.session.pilot import PilotRefused, SeenScene, play_sessions
 from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.seat import StudySeat
 from handover.scenarios.study.session.served_study import NotServed, check_hands
@@ -163,10 +170,12 @@ def test_a_second_page_is_told_that_the_seat_is_taken_and_the_first_stays(tmp_pa
         ('{"act": 3}', "'None' is not for"),
         ('{"act": {"action": "consent", "value": true}}', "'consent' is not for the screen 'language'"),
         ('{"act": {"action": "language", "value": "../.."}}', "no language"),
+        ('{"act": {"action": "language", "value": []}}', "no language []"),
+        (b"\x00\xff", "a text, and not bytes"),
         (" " * 30_000, "characters at most"),
     ],
 )
-def test_what_is_no_message_of_the_page_is_refused_with_the_reason(text: str, why: str, tmp_path: Path):
+def test_what_is_no_message_of_the_page_is_refused_with_the_reason(text: str | bytes, why: str, tmp_path: Path):
     with page_of(server_of(tmp_path / "study")) as page:
         page.send(text)
         assert why in told(page, "refused")
@@ -199,9 +208,8 @@ def test_a_page_that_is_closed_makes_its_round_void_and_it_is_played_again(tmp_p
         with page_at(where) as page:
             to_round(page)
             page.send(json.dumps({"hand": {**HAND, "stamp": 1.0}}))
-        late = time.monotonic() + 60.0
-        while server.seat.protocol.screen == "round" and time.monotonic() < late:
-            time.sleep(0.05)
+        with page_at(where) as reloaded:  # while the run of the page that has gone is ended
+            assert told(reloaded, "screen")["screen"] == "void"
     attempts = StudyFolder.opened(tmp_path / "study", PLAN).session(1).notes.void_attempts
     assert [(a.number, a.attempt) for a in attempts] == [(1, 1)], attempts
     assert "the page was closed" in attempts[0].reason
@@ -220,8 +228,8 @@ def test_a_device_that_falls_silent_makes_the_round_void(tmp_path: Path, monkeyp
 
 
 def test_a_page_that_floods_is_refused_and_at_last_put_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(seat_module, "MOST_A_SECOND", 20)
-    monkeypatch.setattr(seat_module, "FLOOD", 200)
+    monkeypatch.setattr(page_messages, "MOST_A_SECOND", 20)
+    monkeypatch.setattr(page_messages, "FLOOD", 200)
     with page_of(server_of(tmp_path / "study")) as page:
         with contextlib.suppress(ConnectionClosed):
             for _ in range(1000):
@@ -271,6 +279,68 @@ def test_a_tracker_is_told_why_it_is_refused(tmp_path: Path):
             assert told(tracker, "refused") == "in this session the hand is led by: mouse"
 
 
+def test_what_is_no_sample_is_refused_and_a_tracker_that_floods_is_put_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(page_messages, "FLOOD", 20)
+    with served(server_of(tmp_path / "study")) as where, connect(f"ws://{where}/hand") as tracker:
+        tracker.send(b"\x00\xff")
+        assert "a text, and not bytes" in told(tracker, "refused")
+        with contextlib.suppress(ConnectionClosed):
+            for _ in range(1000):
+                tracker.send("{}")
+        with pytest.raises(ConnectionClosed) as closed:
+            told(tracker, "nothing")
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.reason == "more than 20 messages in a second"
+
+
+def test_who_sits_down_after_a_withdrawal_has_practised_nothing(tmp_path: Path):
+    seat = server_of(tmp_path / "study").seat
+    for _ in range(2):
+        for action, value in (("language", "en"), ("consent", True), ("eligibility", [True] * 3), ("device", "mouse")):
+            seat.protocol.act(action, value)
+        assert seat.practice.done == 0.0
+        assert seat.practice.test.reached == []
+        seat.practice.done = 100.0
+        seat.practice.test.reached.append(Reached("+x", 1.0))
+        assert seat.practice.done == 100.0
+        seat.protocol.act("withdraw")
+        seat.protocol.act("next")
+
+
+def test_a_round_that_cannot_be_kept_is_told_and_can_be_played_again(tmp_path: Path):
+    seat = server_of(tmp_path / "study").seat
+    protocol = seat.protocol
+    for action, value in (("language", "en"), ("consent", True), ("eligibility", [True] * 3), ("device", "mouse")):
+        protocol.act(action, value)
+    protocol.act("begin")
+    in_the_way = protocol.study.session(1).path / "rounds" / "01.json"
+    in_the_way.mkdir()
+    seat.keep(None, record(), is_round=True)
+    assert protocol.screen == "void"
+    assert "it could not be kept" in protocol.void_reason
+    protocol.act("next")
+    protocol.act("begin")
+    seat.keep("the page was closed", is_round=True)
+    assert protocol.screen == "void"
+    in_the_way.rmdir()
+    protocol.act("next")
+    protocol.act("begin")
+    tables = protocol.study.session(1).path / "rounds.csv"
+    tables.unlink()
+    tables.mkdir()
+    seat.keep(None, record(), is_round=True)
+    assert protocol.screen == "rating"
+    ratings = {"S1": 7, "S2": 8, "S3": 9}
+    with pytest.raises(RecordNotWritten):
+        protocol.act("rate", ratings)
+    tables.rmdir()
+    protocol.act("rate", ratings)
+    assert (protocol.screen, protocol.content()["round"]) == ("instruction", 2)
+    assert len(pd.read_csv(tables)) == 1
+
+
 @pytest.mark.parametrize("path", ["seat", "hand"])
 def test_a_message_beyond_all_bounds_ends_the_connection_with_the_reason(path: str, tmp_path: Path):
     with (
@@ -282,6 +352,23 @@ def test_a_message_beyond_all_bounds_ends_the_connection_with_the_reason(path: s
             told(device, "nothing")
         assert closed.value.rcvd is not None
         assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1009, "frame exceeds limit of 80000 bytes")
+
+
+@pytest.mark.parametrize("code", [1000, 1012])
+def test_a_server_that_has_gone_is_no_end_of_scripted_pilots(code: int):
+    def close(connection: ServerConnection) -> None:
+        connection.close(code=code)
+
+    with serve(close, HOST, 0) as server:  # pyright: ignore[reportUnknownVariableType]
+        thread = threading.Thread(target=server.serve_forever)  # pyright: ignore[reportUnknownArgumentType]
+        thread.start()
+        address = f"http://{HOST}:{server.socket.getsockname()[1]}/"
+        try:
+            with pytest.raises((PilotRefused, ConnectionClosed)):
+                asyncio.run(play_sessions(address, PLAN, print))
+        finally:
+            server.shutdown()
+            thread.join()
 
 
 def test_a_plan_in_whose_rounds_nobody_can_lead_a_hand_is_told():
