@@ -1,5 +1,6 @@
 """The commands `handover study ...`: a user study, from its plan to its report. Here: the group, `new` and `plan`."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,7 +99,11 @@ def new(file: Path) -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON, with the seed of every round.")
 def plan(file: Path, participants: int | None, *, as_json: bool) -> None:
     """Check PLAN.toml and print what follows from it: orders, whether they are balanced, devices, how long it takes."""
+    from handover.scenarios.study.plan.led_hands import hand_faults
+
     found = checked_plan(file)
+    if faults := hand_faults(found):
+        raise _refused(file, faults)
     data = plan_data(found, found.participants if participants is None else participants)
     print_json(data) if as_json else _print_plan(data, found)
 
@@ -114,9 +119,13 @@ def checked_plan(file: Path) -> "StudyPlan":
     try:
         return read_plan(file)
     except InvalidPlan as e:
-        number = f"{len(e.faults)} fault{'s' if len(e.faults) > 1 else ''}"
-        lines = "".join(f"\n  {fault}" for fault in e.faults)
-        raise UsageError(f"{file}: {number} in the plan{lines}") from e
+        raise _refused(file, e.faults) from e
+
+
+def _refused(file: Path, faults: Sequence[str]) -> UsageError:
+    number = f"{len(faults)} fault{'s' if len(faults) > 1 else ''}"
+    lines = "".join(f"\n  {fault}" for fault in faults)
+    return UsageError(f"{file}: {number} in the plan{lines}")
 
 
 def plan_data(plan: "StudyPlan", participants: int) -> dict[str, Any]:

@@ -21,8 +21,8 @@ from handover.scenarios.execution.runner import run_task
 from handover.scenarios.results.run_facts import elements_of, whole_record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, version_differences, versions
 from handover.scenarios.study.folder.session_folder import SessionFolder
+from handover.scenarios.study.plan.led_hands import round_parameters
 from handover.scenarios.study.plan.order import Round
-from handover.scenarios.study.session.trial import round_parameters
 
 
 @dataclass(frozen=True)

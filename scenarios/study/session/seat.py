@@ -30,12 +30,13 @@ from handover.cosim.exceptions import RecordNotWritten
 from handover.scenarios.live.hand_messages import DeviceClock, InvalidHandMessage
 from handover.scenarios.results.run_folder import InvalidRunFolder
 from handover.scenarios.study.folder.session_folder import RoundRecord
+from handover.scenarios.study.plan.led_hands import round_parameters
 from handover.scenarios.study.plan.plan import TRACKER
 from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session.page_messages import MessageRate, parse_message, received_text
 from handover.scenarios.study.session.practice import PRACTICE, Practice, is_lost
 from handover.scenarios.study.session.protocol import InvalidAction, Protocol
-from handover.scenarios.study.session.trial import Trial, TrialFailed, Wanted, round_parameters
+from handover.scenarios.study.session.trial import Trial, TrialFailed, Wanted
 
 PERIOD = 1.0 / 60.0
 """Time between two states of the run that the page gets, s."""

@@ -8,14 +8,13 @@ from pathlib import Path
 
 from websockets.exceptions import ConnectionClosed
 
-from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.led_hands import hand_faults
 from handover.scenarios.study.plan.plan import NOT_OFFERED, TRACKER, StudyPlan
 from handover.scenarios.study.session.pilot import PilotRefused, play_sessions
 from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.seat import StudySeat
 from handover.scenarios.study.session.server import StudyServer, listening_socket, uvicorn_server
-from handover.scenarios.study.session.trial import NoHand, led_hand_of, round_parameters
 
 
 class NotServed(RuntimeError):
@@ -54,7 +53,8 @@ async def serve_study(
         PilotsBrokenOff: scripted pilots did not get to their end.
         InvalidRunFolder, RecordNotWritten: see `StudyFolder.opened`.
     """
-    check_hands(plan)
+    if faults := hand_faults(plan):
+        raise NotServed("; ".join(faults))
     study = StudyFolder.opened(out, plan)
     with study.held():
         seat = StudySeat(Protocol(study, devices_here(plan), number), pace)
@@ -72,22 +72,6 @@ async def serve_study(
                 await _with_pilots(server, listening, address, tell)
             else:
                 await uvicorn_server(server).serve(sockets=[listening])
-
-
-def check_hands(plan: StudyPlan) -> None:
-    """Check that in each round of a plan somebody outside leads a hand.
-
-    Raises:
-        NotServed: with all rounds in which that is not so.
-    """
-    faults: list[str] = []
-    for c in plan.conditions:
-        try:
-            led_hand_of(c.scenario, round_parameters(c))
-        except (NoHand, InvalidParameter) as e:
-            faults.append(f"tasks.{c.task}, {c.behaviour}: {e}")
-    if faults:
-        raise NotServed("; ".join(dict.fromkeys(faults)))
 
 
 async def _with_pilots(

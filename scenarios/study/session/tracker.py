@@ -15,10 +15,10 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
 from handover.scenarios.live.hand_messages import InvalidHandMessage
+from handover.scenarios.study.plan.led_hands import led_hand_of, round_parameters
 from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session.page_messages import MessageRate, received_text
 from handover.scenarios.study.session.seat import StudySeat
-from handover.scenarios.study.session.trial import led_hand_of, round_parameters
 
 _SLOWEST = 2.0
 """How long a tracker may take to receive a message, s."""

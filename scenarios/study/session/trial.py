@@ -19,7 +19,6 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.record.reader import Record
 from handover.scenarios.execution.selection import find_scenario
-from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.replay import Line
 from handover.scenarios.live.hand_messages import HandStream, hand_sample
@@ -29,7 +28,7 @@ from handover.scenarios.live.watched_run import WatchedRun
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 from handover.scenarios.study.folder.session_folder import RoundRecord, failed_by_rule
-from handover.scenarios.study.plan.plan import Condition
+from handover.scenarios.study.plan.led_hands import led_hand_of
 from handover.scenarios.study.session.latency import LatencyLog, median_ms
 from handover.scenarios.study.session.protocol import now
 
@@ -45,28 +44,6 @@ TARGET, PLUMB = "place to go", "depth"
 _GHOST, _HAND, _OBJECT = "#009e73", "#8a5a2b", "#d1602b"
 """Of the palette of Okabe and Ito where it is free: told apart by colour-blind eyes."""
 _RADIUS, _WIDTH = 0.025, 2.0
-
-
-class NoHand(ValueError):
-    """A scenario in which nobody outside can lead a hand."""
-
-
-def round_parameters(condition: Condition) -> list[str]:
-    """Return the parameters of a round: those of the plan, and that its hand is led from outside."""
-    return [*condition.given, "hand=outside"]
-
-
-def led_hand_of(scenario: str, parameters: Sequence[str]) -> LedHand:
-    """Return the hand that somebody outside leads in a scenario with parameters, texts `NAME=VALUE`.
-
-    Raises:
-        NoHand: there is none. InvalidParameter: a value is invalid.
-    """
-    kind = find_scenario(scenario)
-    led = kind().led_hand(parse_parameters(kind, parameters))
-    if led is None:
-        raise NoHand(f"in {scenario} nobody outside can lead a hand")
-    return led
 
 
 class TrialFailed(RuntimeError):

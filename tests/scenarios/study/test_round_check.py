@@ -21,9 +21,9 @@ from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.results.task import InputSources
 from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.led_hands import led_hand_of, round_parameters
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
 from handover.scenarios.study.session.round_check import first_difference
-from handover.scenarios.study.session.trial import led_hand_of, round_parameters
 
 pa: Any = pyarrow
 PLAN = parse_plan(f"{default_plan()}\n[parameters]\npatience = 1.0\n")

@@ -17,6 +17,15 @@ def study(*arguments: str | Path) -> Result:
     return CliRunner().invoke(main, ["study", *map(str, arguments)])
 
 
+def test_a_plan_in_whose_rounds_nobody_can_lead_a_hand_is_refused(tmp_path: Path):
+    file = tmp_path / "plan.toml"
+    file.write_text(default_plan().replace('"flyer_robot_to_human"', '"flyer_impedance"'), encoding="utf-8")
+    refused = study("plan", file)
+    assert refused.exit_code == 2
+    assert "2 faults in the plan" in refused.output
+    assert "tasks.robot_to_human, rigid: in flyer_impedance nobody outside can lead a hand" in refused.output
+
+
 def test_a_new_plan_can_be_followed_as_it_is(tmp_path: Path):
     file = tmp_path / "mine" / "plan.toml"
     assert study("new", file).exit_code == 0

@@ -24,6 +24,7 @@ from websockets.sync.server import ServerConnection, serve
 
 from handover.cosim.exceptions import RecordNotWritten
 from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.led_hands import hand_faults
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
 from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session import seat as seat_module
@@ -31,7 +32,6 @@ from handover.scenarios.study.session.device_test import Reached
 from handover.scenarios.study.session.pilot import PilotRefused, SeenScene, play_sessions
 from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.seat import StudySeat
-from handover.scenarios.study.session.served_study import NotServed, check_hands
 from handover.scenarios.study.session.server import StudyServer, uvicorn_config
 
 HOST = "127.0.0.1"
@@ -373,5 +373,6 @@ def test_a_server_that_has_gone_is_no_end_of_scripted_pilots(code: int):
 
 def test_a_plan_in_whose_rounds_nobody_can_lead_a_hand_is_told():
     plan = parse_plan(SHORT.replace('"flyer_robot_to_human"', '"flyer_two_robots"'))
-    with pytest.raises(NotServed, match=r"tasks\.robot_to_human, rigid"):
-        check_hands(plan)
+    (rigid, compliant) = hand_faults(plan)
+    assert rigid.startswith("tasks.robot_to_human, rigid: in flyer_two_robots nobody outside can lead a hand")
+    assert compliant.startswith("tasks.robot_to_human, compliant: ")

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from handover.scenarios.study.session.trial import NoHand, Trial, TrialFailed, Wanted
+from handover.scenarios.study.plan.led_hands import NoHand
+from handover.scenarios.study.session.trial import Trial, TrialFailed, Wanted
 
 DARK = """
 from handover.scenarios.free_flyer.handover.hand_practice import HandPractice
