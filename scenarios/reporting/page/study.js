@@ -5,7 +5,7 @@
   const root = document.querySelector(".study"), {words} = page.data(root);
   const byId = id => document.getElementById(id);
   const main = byId("screen");
-  let shown = null, play = null, input = null, test = null, over = false, drawn = [], hasTracker = false, held = [];
+  let shown = null, play = null, input = null, test = null, named = 0, over = false, drawn = [], hasTracker = false, held = [];
   const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
   const TURNS = {"+roll": "roll_right", "-roll": "roll_left", "+pitch": "fingers_down", "-pitch": "fingers_up",
     "+yaw": "fingers_left", "-yaw": "fingers_right"};
@@ -132,7 +132,8 @@
       allow();
       if (!done.disabled) done.focus();
     };
-    return [node("h1", {}, word("rating")), node("p", {}, word("rate_all", s.scale)), ...sets, actions(done)];
+    return [node("h1", {}, word("rating")),
+      node("p", {}, `${word("round_over")} ${word("rate_all", s.scale)}`), ...sets, actions(done)];
   }
 
   function questions(s) {
@@ -236,13 +237,23 @@
   function ask(asked) {
     test = asked;
     play?.target(test.place);
+    nameTask();
+  }
+
+  // What is asked for; of a place also how far the hand still is from it, since one hides the other.
+  function nameTask() {
+    named = performance.now();
     const name = test.place ? "place_to_go" : TURNS[test.name] ?? (test.name ? "make_fist" : "free_play");
-    byId("task").textContent = word(name, test);
+    const at = play?.hand().p_WH ?? [];
+    const far = test.place && at.length ? Math.hypot(...at.map((x, i) => x - test.place[i])) : NaN;
+    const told = Number.isFinite(far) ? [word(name, test), word("still_away", {distance: Math.round(100 * far)})] : [word(name, test)];
+    byId("task").textContent = told.join(" ");
   }
 
   link.addEventListener("message", ({data}) => {
     if (typeof data !== "string") {
       play?.take(data);
+      if (test?.place && shown.screen === "practising" && performance.now() - named > 200) nameTask();
       return;
     }
     const message = JSON.parse(data);

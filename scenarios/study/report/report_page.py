@@ -147,6 +147,7 @@ def _exclusions_section(analysis: StudyAnalysis, words: Words) -> Section:
         html += rows_table(header, rows, numbers=(1,))
     else:
         html += Markup("<p>No round is void.</p>")
+    html += _repeated_attempts(analysis, words)
     limit = analysis.plan.latency_limit
     measured = [r["latency_p95_ms"] for r in analysis.counted if r["latency_p95_ms"] is not None]
     marked = sum(bool(r["marked_over_limit"]) for r in analysis.counted)
@@ -160,6 +161,20 @@ def _exclusions_section(analysis: StudyAnalysis, words: Words) -> Section:
         html += note(f"{unmeasured} rounds that count have no latency: it was not measured.")
     html += _withdrawals(analysis) + _entering(analysis, words)
     return Section(anchor="exclusions", title="What does not count", html=html)
+
+
+def _repeated_attempts(analysis: StudyAnalysis, words: Words) -> Markup:
+    """Return which rounds were begun and played again, and why: a crash of the simulation is told, too."""
+    rows = [
+        (a["participant"], str(a["round"]), words.task(a["task"]), a["behaviour"], a["reason"])
+        for s in analysis.sessions
+        for a in s.void_attempts_rows()
+    ]
+    if not rows:
+        return note("No round was broken off.")
+    header = ("participant", "round", "task", "behaviour", "why it was broken off")
+    caption = f"Attempts that were broken off, and whose rounds were played again: {len(rows)}"
+    return rows_table(header, rows, numbers=(1,), caption=caption)
 
 
 def _withdrawals(analysis: StudyAnalysis) -> Markup:

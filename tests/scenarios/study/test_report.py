@@ -17,6 +17,7 @@ from test_session_folder import read_by_codebook
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import main
 from handover.scenarios.study.folder.codebook import PILOT
+from handover.scenarios.study.folder.session_notes import VoidAttempt
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
 
@@ -116,7 +117,11 @@ def test_a_session_broken_off_and_void_rounds_are_told(tmp_path: Path):
         folder.record_round(planned.number, record(void=planned.number == 2, latency=140.0))
         if planned.number != 2:
             folder.record_answers(planned.number, dict.fromkeys(PLAN.statements, 5))
+    crashed = "the simulation's process ended (killed by signal 6)"
+    folder.record_void_attempt(VoidAttempt(3, 1, "2026-11-24T09:30:00", crashed, "03_unfinished_1"))
     text = text_of(report_of(tmp_path / "out"))
+    assert "Attempts that were broken off, and whose rounds were played again: 1" in text
+    assert crashed in text
     assert "Not complete: P07." in text
     assert "incomplete: 5 of 12 rounds" in text
     assert "tracking lost, hand out of view" in text
