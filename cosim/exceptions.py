@@ -15,6 +15,8 @@ _STATUS_AND_CALL = re.compile(r"^\[\w+\] fmi[23]\w+: ")
 _SYNTAX = re.compile(r"(?:SyntaxError|IndentationError|TabError): ")
 _LOCATION = re.compile(r'File "(?:.*?/resources/sources/)?([^"]+)", line (\d+)')
 
+_LIKE, _AS_LIKELY = 0.5, 0.2
+"""How like a name, of 1, one that is suggested is at least, and how much less than the one most like it."""
 
 _RAISED = re.compile(r'\A[\s\S]*^  File "[^\n]*\n(?:[ \t][^\n]*\n)*(\S[\s\S]*)', re.MULTILINE)
 """A traceback, as far as to what was raised, whose message may have several lines."""
@@ -27,10 +29,9 @@ def did_you_mean(names: Sequence[str]) -> str:
 
 def suggestion(name: str, valid: Iterable[str]) -> str:
     """Return "did you mean ...?" with the valid names that are nearest, "" where none is near."""
-    names = sorted(set(valid))
-    near = difflib.get_close_matches(name, names, n=len(names) or 1, cutoff=0.5)
-    near.sort(key=lambda n: (-difflib.SequenceMatcher(None, n, name).ratio(), n))
-    return did_you_mean(near)
+    likeness = {n: difflib.SequenceMatcher(None, n, name).ratio() for n in sorted(set(valid))}
+    least = max(_LIKE, max(likeness.values(), default=0.0) - _AS_LIKELY)
+    return did_you_mean(sorted((n for n, x in likeness.items() if x >= least), key=lambda n: (-likeness[n], n)))
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:

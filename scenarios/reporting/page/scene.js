@@ -459,6 +459,7 @@ const sceneIn = (() => {
         return object.localToWorld(new THREE.Vector3(...point)).toArray();
       },
       toPixels(point) {
+        camera.updateMatrixWorld();  // it may have been turned since the last picture
         const {x, y} = new THREE.Vector3(...point).project(camera), {clientWidth: wide, clientHeight: high} = element;
         return [(x + 1) / 2 * wide, (1 - y) / 2 * high];
       },

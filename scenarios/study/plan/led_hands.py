@@ -28,8 +28,9 @@ def led_hand_of(scenario: str, parameters: Sequence[str]) -> LedHand:
         NoHand: there is none. InvalidParameter: a value is invalid.
     """
     kind = find_scenario(scenario)
+    chooses = any(f.name == _CHOICE for f in fields(kind.parameters_type))
     led = None
-    if any(f.name == _CHOICE for f in fields(kind.parameters_type)):
+    if chooses or not any(p.startswith(f"{_CHOICE}=") for p in parameters):  # in some a hand is always led
         led = kind().led_hand(parse_parameters(kind, parameters))
     if led is None:
         raise NoHand(

@@ -41,7 +41,7 @@ def test_gymnasium_accepts_it(scenario: str, place: str):
 def test_its_spaces_are_what_the_unit_declares():
     env = handover.environment("ir_grasp", place="reflex", actions=["sigma_cmd", "phase"])
     assert env.action_space == spaces.Dict(
-        {"phase": spaces.Discrete(10), "sigma_cmd": spaces.Box(0.0, 1.0, (), np.float64)}
+        {"phase": spaces.Discrete(12), "sigma_cmd": spaces.Box(0.0, 1.0, (), np.float64)}
     )
     inputs = describe_fmu(handover.unit("IrReflex")).inputs
     assert env.observation_space == spaces.Dict({name: space_of(inputs[name]) for name in inputs})

@@ -86,7 +86,7 @@ def test_list_as_data():
     scenario = data_of("list", "ir_grasp")
     assert scenario["units"] == {"scene": "GraspScene", "reflex": "IrReflex"}
     strategy = next(p for p in scenario["parameters"] if p["name"] == "strategy")
-    assert (strategy["start"], strategy["items"]) == ("REFLEX", ["REFLEX", "BLIND", "FORWARD"])
+    assert (strategy["start"], strategy["items"]) == ("REFLEX", ["REFLEX", "BLIND", "FORWARD", "CONTACT"])
     unit = data_of("list", "Thrusters")
     assert unit["step"] == 0.016
     assert [p["name"] for p in unit["outputs"]] == ["f_B", "tau_B", "saturated", "flapper_angles", "impeller_speeds"]

@@ -152,7 +152,7 @@ def test_a_run_without_a_scene_is_filmed_by_its_plots(tmp_path: Path):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--plot", "scene.p_WX"], "--plot scene.p_WX: no plot or signal of that name; did you mean scene.p_W"),
+        (["--plot", "scene.p_WZ"], "--plot scene.p_WZ: no plot or signal of that name; did you mean scene.p_W"),
         (["--plot", "cost", "--plot", "scene.q[9]"], "--plot scene.q[9]: no plot or signal"),
         (["--plot", "scene.q", "--no-plots"], "--plot and --no-plots contradict each other"),
         (["--size", "320x240", *(f"--plot=scene.q[{k}]" for k in (1, 2, 3))], "3 plots do not fit into 320x240"),

@@ -60,7 +60,7 @@ def at(page: Page, screen: str) -> None:
     wait_until(page, f"document.querySelector('.study').dataset.screen === '{screen}'")
 
 
-def to_round(page: Page) -> None:
+def to_round(page: Page, first: str = "instruction") -> None:
     at(page, "language")
     page.get_by_role("button", name="English").click()
     at(page, "consent")
@@ -72,7 +72,7 @@ def to_round(page: Page) -> None:
     page.get_by_role("button", name="All of this applies to me").click()
     at(page, "device")
     page.get_by_role("button", name="Mouse and keyboard").click()
-    at(page, "instruction")
+    at(page, first)
 
 
 @pytest.mark.slow
@@ -159,6 +159,24 @@ def test_a_double_click_does_one_thing_a_refusal_frees_the_buttons_and_who_goes_
         at(page, "instruction")
         assert page.locator("#who").inner_text() == "Participant P01"
         page.close()
+
+
+@pytest.mark.slow
+def test_the_practice_tells_how_far_the_hand_is_from_the_ball(browser: Browser, tmp_path: Path):
+    plan = pilot_plan(tmp_path / "plan.toml", devices='["mouse"]', patience=15, practice=60, repetitions=1)
+    far = "Number(document.querySelector('#task').textContent.match(/It is (\\d+) cm away/)?.[1])"
+    with served(plan, tmp_path / "out") as (address, _), browser.new_page() as page:
+        page.goto(address)
+        to_round(page, "practice")
+        assert "1 min." in page.locator("main").inner_text()
+        page.get_by_role("button", name="Begin").click()
+        wait_until(page, "study.play?.time > 0.5")
+        page.mouse.move(250, 200)
+        page.mouse.wheel(0, -1000)  # away, to where the first ball is
+        wait_until(page, f"{far} < 15")
+        near = page.evaluate(far)
+        page.mouse.wheel(0, 1000)
+        wait_until(page, f"{far} > {near} + 5")
 
 
 @pytest.mark.slow
