@@ -15,7 +15,7 @@ _STATUS_AND_CALL = re.compile(r"^\[\w+\] fmi[23]\w+: ")
 _SYNTAX = re.compile(r"(?:SyntaxError|IndentationError|TabError): ")
 _LOCATION = re.compile(r'File "(?:.*?/resources/sources/)?([^"]+)", line (\d+)')
 
-_LIKE, _AS_LIKELY = 0.5, 0.2
+_LIKE, _AS_LIKELY = 0.5, 0.3
 """How like a name, of 1, one that is suggested is at least, and how much less than the one most like it."""
 
 _RAISED = re.compile(r'\A[\s\S]*^  File "[^\n]*\n(?:[ \t][^\n]*\n)*(\S[\s\S]*)', re.MULTILINE)

@@ -190,7 +190,7 @@ def test_what_is_wrong_with_parameters_is_told_in_one_line(spring: Path, tmp_pat
     given = ("-p", "left.tear=1", "-p", "tears=1")
     result = run(file, *given, "--out", tmp_path / "out")
     assert result.exit_code == 2, result.output
-    assert "no parameter 'left.tear'; did you mean left.tears or right.tears?; no parameter 'tears'; " in result.output
+    assert "no parameter 'left.tear'; did you mean left.tears?; no parameter 'tears'; " in result.output
     result = run(file, "-p", "left.tears=soon", "--out", tmp_path / "out")
     assert (result.exit_code, "left.tears: 'soon' is not a number" in result.output) == (2, True), result.output
     result = run(file, "-p", "left.tears", "--out", tmp_path / "out")
