@@ -171,12 +171,9 @@ def test_the_practice_tells_how_far_the_hand_is_from_the_ball(browser: Browser, 
         assert "1 min." in page.locator("main").inner_text()
         page.get_by_role("button", name="Begin").click()
         wait_until(page, "study.play?.time > 0.5")
-        page.mouse.move(250, 200)
-        page.mouse.wheel(0, -1000)  # away, to where the first ball is
-        wait_until(page, f"{far} < 15")
-        near = page.evaluate(far)
-        page.mouse.wheel(0, 1000)
-        wait_until(page, f"{far} > {near} + 5")
+        wait_until(page, f"{far} === 18")  # from where it rests, along x
+        page.mouse.move(500, 300)
+        wait_until(page, f"{far} > 25")
 
 
 @pytest.mark.slow
