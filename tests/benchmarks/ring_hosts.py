@@ -8,6 +8,7 @@ of all threads; the best of several repeats. A process of its own: a host's libr
 import contextlib
 import ctypes
 import json
+import os
 import sys
 import tempfile
 import time
@@ -235,4 +236,5 @@ def measured(host: Host, n: int, fmu: Path) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(measured(HOSTS[sys.argv[1]], int(sys.argv[2]), Path(sys.argv[3]))))
+    print(json.dumps(measured(HOSTS[sys.argv[1]], int(sys.argv[2]), Path(sys.argv[3]))), flush=True)
+    os._exit(0)  # all is measured; Ecos' library crashes now and then as Python unloads it

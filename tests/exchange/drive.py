@@ -27,8 +27,11 @@ CHOSEN: Mapping[str, Mapping[str, Any]] = {
 }
 """Parameters whose values are not near those that they start with, most so that inputs act within the short run."""
 
-CENTRES: Mapping[str, Mapping[str, float]] = {"IrReflex": {"ticks": 400.0}}
-"""Where inputs lie whose start values say nothing: sensors that see nothing."""
+CENTRES: Mapping[str, Mapping[str, Any]] = {
+    "IrReflex": {"ticks": 400.0},
+    "FingerInfrared": {"p_WO": np.array([-0.18, 0.0, -0.12]), "p_WH": np.array([-0.18, 0.0, -0.12])},
+}
+"""How far inputs lie from start values that say nothing: sensors that see nothing."""
 
 Values = dict[str, Any]
 
