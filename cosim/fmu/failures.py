@@ -237,7 +237,21 @@ class UnitHung(UnitFailure):
         return self.what
 
 
-class UnitCrashed(UnitFailure):
+class EndOfProcess(UnitFailure):
+    """What ended a unit's process, told by what is known of the process alone; `status` says how."""
+
+    @property
+    def message(self) -> str:
+        """The status; the unit's log is from before and says nothing of it."""
+        return self.status
+
+    @property
+    def cause(self) -> str:
+        """The headline: the log cannot add to it."""
+        return self.headline
+
+
+class UnitCrashed(EndOfProcess):
     """The process ended within a unit's call; `status` says how, as in "segmentation fault"."""
 
     kind = "crash"
@@ -247,18 +261,8 @@ class UnitCrashed(UnitFailure):
         """One line: unit, call, time, and how the process ended."""
         return f"unit {self.unit} crashed in {self.call} at t = {self.t:.6g} s: {self.status}"
 
-    @property
-    def message(self) -> str:
-        """How the process ended."""
-        return self.status
 
-    @property
-    def cause(self) -> str:
-        """The headline: the log cannot add to it."""
-        return self.headline
-
-
-class LimitsLowered(UnitFailure):
+class LimitsLowered(EndOfProcess):
     """A unit lowered hard limits of the process, which could not go on with what it may have; `status` says which.
 
     Where it is not known which unit it was, `unit` names all in the process.
@@ -273,16 +277,6 @@ class LimitsLowered(UnitFailure):
             f"unit {self.unit} lowered hard limits in {self.call}: {self.status}; the run could not go on with that at "
             f"t = {self.t:.6g} s, and such limits cannot be put back"
         )
-
-    @property
-    def message(self) -> str:
-        """Which limits."""
-        return self.status
-
-    @property
-    def cause(self) -> str:
-        """The headline: the log cannot add to it."""
-        return self.headline
 
 
 class UnsettledEvents(UnitFailure):

@@ -108,10 +108,7 @@ class Ensemble:
         self, system: System, heartbeat: Heartbeat | None = None, cleanups: CleanupStack | None = None,
         isolated: Collection[str] = (),
     ) -> None:  # fmt: skip
-        """Load the units, those `isolated` in processes of their own.
-
-        Where `cleanups` is given, the caller closes it, also if this fails.
-        """
+        """Load the units, those `isolated` in own processes. Who gives `cleanups` closes it, also if this fails."""
         self.system = system
         self._isolated = isolated
         self.heartbeat = heartbeat or Heartbeat()
@@ -121,7 +118,7 @@ class Ensemble:
         self.cpu: dict[str, array.array[float]] = {name: array.array("d") for name in system.units}
         """CPU seconds of every step, by unit; with Gauss-Seidel, setting inputs and getting outputs included."""
         self.measures_cpu = False
-        """Whether CPU time is taken of steps; see `measure_cpu`."""
+        """Whether CPU time is taken of steps."""
         self.extrapolation: LinearExtrapolation | None = None
         """Sets the inputs that are extrapolated; None where all are held."""
         self._feedings: dict[str, Feeding] = {}

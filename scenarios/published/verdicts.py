@@ -84,7 +84,7 @@ def every_claim(claim: str, where: str, published: tuple[int, int], measured: tu
         measured=format_rate(*measured),
         interval=(interval.low, interval.high),
         verdict=verdict_of(all_do, could_be_either=measured[1] >= _MIN_FOR_EVERY),
-        reason=_with_shortfall(f"{rule} {note}", measured[1], _MIN_FOR_EVERY),
+        reason=with_shortfall(f"{rule} {note}", measured[1], _MIN_FOR_EVERY),
         where=where,
         beyond=not published[1],
     )
@@ -117,7 +117,7 @@ def order_claim(
         published=published,
         measured=f"{format_rate(sum(first), n)} against {format_rate(sum(second), n)}",
         verdict=verdict_of(test.first_is_better, could_be_either=n >= _MIN_DIFFERING),
-        reason=_with_shortfall(reason, n, _MIN_DIFFERING),
+        reason=with_shortfall(reason, n, _MIN_DIFFERING),
         where=where,
         beyond=beyond,
     )
@@ -145,7 +145,7 @@ def no_worse_claim(claim: str, first: Sequence[bool], second: Sequence[bool]) ->
         measured=f"{format_rate(sum(first), n)} against {format_rate(sum(second), n)}",
         interval=(interval.low, interval.high),
         verdict=verdict_of(interval.high < FEW, could_be_either=n >= min_trials_for(FEW)),
-        reason=_with_shortfall(reason, n, min_trials_for(FEW)),
+        reason=with_shortfall(reason, n, min_trials_for(FEW)),
         beyond=True,
     )
 
@@ -213,7 +213,7 @@ def _of_rate(
         measured=format_rate(*measured),
         interval=(interval.low, interval.high),
         verdict=verdict_of(met, could_be_either=measured[1] >= min_trials),
-        reason=_with_shortfall(rule, measured[1], min_trials),
+        reason=with_shortfall(rule, measured[1], min_trials),
         where=where,
     )
 
@@ -233,7 +233,7 @@ def min_trials_for(share: float) -> int:
     return math.floor(math.log(LEVEL / 2) / math.log1p(-share)) + 1
 
 
-def _with_shortfall(reason: str, n: int, min_trials: int) -> str:
+def with_shortfall(reason: str, n: int, min_trials: int) -> str:
     """Add to a reason that the trials are too few for its rule to be met, if they are."""
     shortfall = (
         f"With {n} runs nothing could have met this rule: it takes at least {min_trials}." if n < min_trials else ""

@@ -21,7 +21,6 @@ _GATE = ("gate_error", "tolerance", "gate_speed")
 and below which speed it is at rest, m/s."""
 _SETTLING = 1.0
 """How long the receiver must keep the object when the robot is done, s (assumed)."""
-
 _LINGERING = 3.0
 """Seconds after the end of a hand's track in which it may still come to rest, and the robot be touched (assumed)."""
 _CLOSING = ("GRASP_OBJECT", "CLOSE_GRIPPER")
@@ -69,7 +68,7 @@ class HandoverEvaluator(Evaluator):
     had one. Where it closes on an object that it had released and that floats, before the object is lost for good, the
     delivery has failed, not yet the handover. A failure has a `Cause`, the metric `decided_by`, which is told apart by
     what the person did (`PersonsDeeds`). A robot that gives up after the last transfer, on its way back, has handed the
-    object over, but not ended the handover: the metric `handed_over` tells the two apart.
+    object over, but not ended the handover: see the metric `handed_over`.
 
     Attributes:
         phases: phases of the robot and when they began, s, in chronological order; a phase may recur.

@@ -35,6 +35,7 @@ from handover.scenarios.published.verdicts import (
     format_share,
     nothing_measured,
     verdict_of,
+    with_shortfall,
 )
 
 _MIN_RUNS, _MIN_LATE = 20, 4
@@ -100,11 +101,14 @@ def _velocity_bias(runs: NavigationRuns) -> Claim:
         **facts,
         measured=f"{count} of {len(chances)}, expected {sum(chances):.1f}",
         verdict=verdict_of(p >= LEVEL, could_be_either=len(chances) >= _MIN_RUNS),
-        reason=_needing(_MIN_RUNS, len(chances))
-        + f"At rest it sees the bias as its speed, which must be below {gate:g} m/s. Holds if an exact "
-        f"test of the count, of robots that receive, does not reject at {format_share(LEVEL)} that each signals with "
-        "the probability that the length of three Gaussian components is: "
-        f"p = {format_p_value(p)}. By deviation, with that probability: {each}.",
+        reason=with_shortfall(
+            f"At rest it sees the bias as its speed, which must be below {gate:g} m/s. Holds if an exact "
+            f"test of the count, of robots that receive, does not reject at {format_share(LEVEL)} that each signals "
+            "with the probability that the length of three Gaussian components is: "
+            f"p = {format_p_value(p)}. By deviation, with that probability: {each}.",
+            len(chances),
+            _MIN_RUNS,
+        ),
     )
 
 
@@ -144,9 +148,12 @@ def _delay(runs: NavigationRuns, behaviour: Behaviour, stable: bool) -> Claim | 
         **facts,
         measured=f"{format_rate(failed, len(rows))} failed",
         verdict=verdict_of(2 * failed > len(rows), could_be_either=len(rows) >= _MIN_LATE),
-        reason=_needing(_MIN_LATE, len(rows))
-        + f"Holds if more than half of the runs fail. {note}{share} Limits of thrust turn a growing oscillation "
-        f"into a lasting one, which may be small. {unfinished_note(rows)}".strip(),
+        reason=with_shortfall(
+            f"Holds if more than half of the runs fail. {note}{share} Limits of thrust turn a growing oscillation "
+            f"into a lasting one, which may be small. {unfinished_note(rows)}".strip(),
+            len(rows),
+            _MIN_LATE,
+        ),
     )
 
 
@@ -168,10 +175,13 @@ def _fetching(runs: NavigationRuns) -> Claim:
         **facts,
         measured=f"{format_rate(k, n)} against {format_rate(j, m)} succeeded",
         verdict=verdict_of(p < LEVEL and k / n < j / m, could_be_either=min(n, m) >= _MIN_RUNS),
-        reason=_needing(_MIN_RUNS, min(n, m))
-        + "The gripper's place in the world is off by the bias, which a person sees and a free object does not "
-        f"heed. Holds if Fisher's exact test rejects at {format_share(LEVEL)} that both succeed equally often, and "
-        f"those that fetch succeed less often: p = {format_p_value(p)}. {unfinished_note([*gives, *receives])}".strip(),
+        reason=with_shortfall(
+            "The gripper's place in the world is off by the bias, which a person sees and a free object does not "
+            f"heed. Holds if Fisher's exact test rejects at {format_share(LEVEL)} that both succeed equally often, and "
+            f"those that fetch succeed less often: p = {format_p_value(p)}. " + unfinished_note([*gives, *receives]),
+            min(n, m),
+            _MIN_RUNS,
+        ),
     )
 
 
@@ -192,13 +202,11 @@ def _alone(runs: NavigationRuns) -> Claim:
         **facts,
         measured=f"{count} of {len(rows)} did, and {signalled(rows)} came to signal",
         verdict=verdict_of(count == 0, could_be_either=signalled(rows) >= _MIN_RUNS),
-        reason=_needing(_MIN_RUNS, signalled(rows))
-        + "Holds if none did. A robot that never finds rest never signals, and says nothing of it. "
-        + (f"It did: {where}. " if where else "")
-        + unfinished_note(rows),
+        reason=with_shortfall(
+            "Holds if none did. A robot that never finds rest never signals, and says nothing of it. "
+            + (f"It did: {where}. " if where else "")
+            + unfinished_note(rows),
+            signalled(rows),
+            _MIN_RUNS,
+        ),
     )
-
-
-def _needing(least: int, n: int) -> str:
-    """Return, if there are fewer runs than it takes, how many that is, as a sentence before others."""
-    return f"Judged from {least} runs on; here are {n}. " if n < least else ""
