@@ -171,11 +171,11 @@ def _write(
     sections: list[Section | None] = [claims_section(claims)]
     if experiment is not None and results.points:
         sections += _published(experiment, tables, results, folder.runs, figures)
-    if results.points:
-        layout = layout_of(results)
+    layout = layout_of(results) if results.points else None
+    if layout is not None and layout.fits_a_page:
         sections += [success_section(results, layout), spread_section(results, layout)]
     sections += [
-        points_section(results),
+        points_section(results, layout),
         pairs_section(results),
         failures_section(results, folder.path),
         runs_section(results, folder.path),

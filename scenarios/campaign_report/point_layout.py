@@ -14,7 +14,8 @@ _MAX_COLOURS = 6
 _MAX_NAMES = 10
 _MAX_LABEL_LENGTH = 80
 """Letters of all names along a horizontal axis."""
-
+_MAX_LISTED = 200
+"""Points of a list that a page draws: a plot of so many is seven screens high."""
 _UNEVEN = 8.0
 """Ratio of the widest to the narrowest step of positive values above which their axis is logarithmic."""
 
@@ -46,6 +47,11 @@ class PointLayout:
         """Where the axis begins and ends."""
         edge = 0.75 * self.room
         return float(self.places.min()) - edge, float(self.places.max()) + edge
+
+    @property
+    def fits_a_page(self) -> bool:
+        """Whether a page has room for plots of the points; of more, it has the table, which can be sorted."""
+        return not self.listed or len(self.places) <= _MAX_LISTED
 
     def beside(self, k: int, n: int) -> Floats:
         """Return the places of n runs of a point: spread over about half its room, reproducibly.

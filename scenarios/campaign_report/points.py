@@ -15,10 +15,10 @@ from handover.scenarios.reporting.html import Cell, plot_html, rows_table
 from handover.scenarios.reporting.page import Section
 
 
-def points_section(results: CampaignResults) -> Section | None:
-    """Return the table of points; None if no run has ended."""
+def points_section(results: CampaignResults, layout: PointLayout | None) -> Section | None:
+    """Return the table of points; None if no run has ended. It says so where the layout has no room for plots."""
     points = results.points
-    if not points:
+    if not points or layout is None:
         return None
     metrics = results.shown_metrics
     units = {m: display_unit(results.table.unit(m), results.table.column(m)) for m in metrics}
@@ -45,6 +45,8 @@ def points_section(results: CampaignResults) -> Section | None:
     line += "; of medians: bootstrap, from three values on." if results.has_intervals and metrics else "."
     if any(results.number_measured(p, m) < len(p.done) for p in points for m in metrics):
         line += " “Of 2”: so many of the runs done have a value."
+    if not layout.fits_a_page:
+        line += f" {len(points)} points are too many for plots: click on a column's name to sort by it."
     table = rows_table(header, rows, numbers=range(first, len(header)), sortable=True)
     note = Markup("<p class='soft'>{}</p>").format(line)
     return Section(anchor="points", title="Points", html=table + note, scripts=("campaign.js",))

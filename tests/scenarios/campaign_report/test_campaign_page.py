@@ -95,6 +95,16 @@ def test_a_parameter_that_some_points_leave_alone_is_reported_as_a_gap(tmp_path:
     assert "<td>reflex</td><td>cylinder</td><td>baby cup a</td>" in html
 
 
+@pytest.mark.parametrize("n", [200, 201])
+def test_more_points_than_a_list_has_room_for_are_in_the_table_alone(tmp_path: Path, n: int):
+    points = [{"strategy": "forward", "thing": "cylinder", "forward": f"{k:d}e-4"} for k in range(n - 1)]
+    points.append({"strategy": "reflex", "thing": "baby_cup_a"})
+    html = page_of(tmp_path, campaign_metadata("ir_grasp", points), table_of(points))
+    assert 'id="points"' in html
+    assert ('id="success"' in html) == (n == 200)
+    assert (f"{n} points are too many for plots" in html) == (n > 200)
+
+
 def test_points_of_a_paired_campaign_are_compared(tmp_path: Path):
     table = replaced(table_of(POINTS, repetitions=6), "success", [True] * 6 + [False] * 6)
     html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS, repetitions=6, paired=True), table)
