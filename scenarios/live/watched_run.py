@@ -80,6 +80,9 @@ class WatchedRun:
             summary = self.folder.read_summary()
         except InvalidRunFolder as e:
             return {"success": False, "reason": str(e), "report": ""}
+        if not summary:
+            reason = f"its process ended without a verdict; `handover resume {self.folder.path}` goes on with it"
+            return {"success": False, "reason": reason, "report": ""}
         return {
             "success": bool(summary.get("success")),
             "reason": str(summary.get("reason", "")),

@@ -192,7 +192,12 @@ const live = (() => {
   // The server of a single run ends with it; that of a session goes on until somebody ends it.
   link.addEventListener("close", ({code, reason}) => {
     if (over && !api.session && code !== 1013) return;
-    byId("told").textContent = `The connection to the ${api.session ? "session" : "run"} is lost${reason ? ": " + reason : ""}.`;
+    const what = `The connection to the ${api.session ? "session" : "run"} is lost${reason ? ": " + reason : ""}.`;
+    const verdict = byId("verdict");
+    verdict.hidden = false;
+    verdict.className = "verdict bad";
+    verdict.textContent = byId("told").textContent = what;
+    for (const id of ["pause", "step", "stop"]) byId(id).disabled = true;
   });
   return api;
 })();

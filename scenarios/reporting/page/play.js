@@ -28,6 +28,7 @@
 
   function again() {
     clearTimeout(waiting);
+    if (seed && (!seed.validity.valid || seed.value === "")) return;
     busy = false;
     const set = [...fields.values()].filter(f => !f.isDefault()).map(f => [f.field.name, f.text()]);
     live.send("set", {parameters: Object.fromEntries(set), seed: seed ? Number(seed.value) || 0 : null,
@@ -129,11 +130,19 @@
     }
     if (seeded) {
       seed = made("input", {type: "number", min: 0, step: 1, id: "seed", value: 0});
-      seed.addEventListener("input", ask);
+      const fault = made("p", {className: "fault", hidden: true, textContent: "a whole number from 0 is right"});
+      seed.addEventListener("input", () => {
+        fault.hidden = seed.validity.valid && seed.value !== "";
+        if (fault.hidden) ask();
+      });
       const next = made("button", {type: "button", textContent: "another"});
-      next.addEventListener("click", () => { seed.value = Number(seed.value) + 1; ask(); });
+      next.addEventListener("click", () => {
+        seed.value = Math.max(0, Math.floor(Number(seed.value))) + 1;
+        fault.hidden = true;
+        ask();
+      });
       host.prepend(made("div", {className: "field"}, made("div", {className: "field-head"},
-        made("label", {textContent: "seed of all random numbers", htmlFor: "seed"}), seed, next)));
+        made("label", {textContent: "seed of all random numbers", htmlFor: "seed"}), seed, next), fault));
     }
     if (pushable) {
       push = made("input", {type: "checkbox", id: "push"});

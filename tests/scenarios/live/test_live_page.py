@@ -144,6 +144,17 @@ def test_ctrl_c_ends_the_run_and_the_page_is_told_how(browser: Browser, tmp_path
         run.wait(timeout=120)
 
 
+@pytest.mark.slow
+def test_the_page_of_a_killed_run_says_how_to_go_on(browser: Browser, tmp_path: Path):
+    with live_run(tmp_path / "live", "--pace", "0.5") as (address, run), shown(browser, address) as page:
+        wait_until(page, f"{LIVE}.dataset.frames > 3")
+        run.kill()
+        wait_until(page, f"{LIVE}.dataset.ended")
+        assert page.locator(".verdict").inner_text() == (
+            f"Failed: its process ended without a verdict; `handover resume {tmp_path / 'live'}` goes on with it."
+        )
+
+
 def test_a_run_goes_on_without_its_page_if_the_pages_server_ends(tmp_path: Path):
     with live_run(tmp_path / "live", "--pace", "100") as (_, run):
         servers = subprocess.run(

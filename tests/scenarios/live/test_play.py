@@ -159,6 +159,11 @@ def test_what_is_refused_is_told_beside_its_parameter_and_the_run_goes_on(browse
         assert "out of the person's reach" in out_of_reach.inner_text()
         assert fault.is_hidden()
         assert page.evaluate(f"{LIVE}.dataset.begun") == "1"
+        page.locator("#seed").fill("-5")
+        assert page.get_by_text("a whole number from 0 is right").is_visible()
+        page.get_by_role("button", name="another").click()
+        assert page.get_by_text("a whole number from 0 is right").is_hidden()
+        assert page.locator("#seed").input_value() == "1"
         page.locator("#search").fill("nozzle stuck")
         found = page.locator(".field[data-name]:visible").evaluate_all("all => all.map(f => f.dataset.name)")
         assert found == ["stuck_nozzle", "thrusters.flapper_range"]
