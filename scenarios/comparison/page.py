@@ -71,7 +71,9 @@ class CampaignComparison:
         shown: list[Section | None] = []
         if results.points:
             layout = results.layout
-            shown = [success_section(results, layout), spread_section(results, layout), points_section(results)]
+            if layout.fits_a_page:
+                shown += [success_section(results, layout), spread_section(results, layout)]
+            shown.append(points_section(results, layout))
         return [
             entries_section(self.entries, page),
             differences_section(self.entries, self.differences),
