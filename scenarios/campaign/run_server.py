@@ -7,6 +7,7 @@ its files while it runs; the result is a `JobResult`. It ends when its input is 
 Where processes cannot be forked (Windows) it runs jobs itself, and a unit that crashes crashes the server.
 """
 
+import contextlib
 import gc
 import importlib
 import os
@@ -78,7 +79,8 @@ class RunServer:
         if job.modules or job.scenario in self._loaded:
             return
         self._loaded.add(job.scenario)
-        importlib.import_module("pandas")  # pyarrow does as a record is looked through: a tenth of a short run
+        with contextlib.suppress(ImportError):  # without it pyarrow goes by itself
+            importlib.import_module("pandas")  # pyarrow does as a record is looked through: a tenth of a short run
         load_units(job.scenario)
         gc.collect()
         gc.freeze()  # else the collector of each child touches, and so copies, all that is loaded

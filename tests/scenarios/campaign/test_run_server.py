@@ -202,3 +202,15 @@ def test_a_run_that_is_stopped_for_a_while_does_not_hang(server: ServerProcess, 
     assert len(stopped) == 1
     summary = json.loads((tmp_path / "runs" / "run" / "summary.json").read_text())
     assert (summary["complete"], summary["failure"]) == (True, None)
+
+
+def test_runs_are_served_where_pandas_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    absent = tmp_path / "absent"
+    absent.mkdir()
+    (absent / "pandas.py").write_text("raise ModuleNotFoundError(\"No module named 'pandas'\")\n")
+    monkeypatch.setenv("PYTHONPATH", str(absent))
+    server = ServerProcess()
+    try:
+        assert server.run_job(job(tmp_path / "runs", "run", scenario="ir_grasp"), yes).lost == ""
+    finally:
+        server.end()
