@@ -263,7 +263,8 @@ class PropulsionModules:
 def lost_directions(stuck: Sequence[int]) -> list[str]:
     """Return the forces and torques that the nozzles cannot give without some of them, by their places from 0.
 
-    Nozzles only push: what is left must reach each direction by thrusts that are not negative.
+    Nozzles only push: what is left must reach each direction by thrusts that are not negative. SciPy's solver crashes
+    where nothing is left.
     """
     from scipy.optimize import nnls  # only stuck nozzles need it
 
@@ -274,6 +275,6 @@ def lost_directions(stuck: Sequence[int]) -> list[str]:
         for sign in (1.0, -1.0):
             direction = np.zeros(6)
             direction[row] = sign
-            if float(nnls(left, direction)[1]) > 1e-6:
+            if not left.size or float(nnls(left, direction)[1]) > 1e-6:
                 lost.append(f"{name[:-1]}{'+' if sign > 0 else '-'}{name[-1]}")
     return lost

@@ -186,6 +186,8 @@ def test_nozzles_whose_loss_takes_a_direction_away_are_refused_with_that_directi
     with pytest.raises(InvalidThrusterParameters, match="nozzles 1, 8 stuck closed there is no force along -x"):
         thrusters(flapper_range=share)
     assert Thrusters(Params(flapper_range=share))
+    with pytest.raises(InvalidThrusterParameters, match=r"12 stuck closed .* along \+x.* about -z"):
+        thrusters(flapper_range=np.zeros(12))
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.025])
