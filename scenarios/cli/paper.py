@@ -77,14 +77,15 @@ def paper(
 
     from handover.scenarios.cli.summaries.claims import print_results
 
-    print_results(published, finish.results, outcome.folder)
+    print_results(published, finish.results, finish.table, outcome.folder)
     sys.exit(outcome.status)
 
 
 class _Finish:
-    """Writes claims, figures and, unless --no-report, the page of a campaign, and keeps its `results`."""
+    """Writes claims, figures and, unless --no-report, the page of a campaign, and keeps its `results` and `table`."""
 
     results: PaperResults
+    table: CampaignTable
 
     def __init__(self, experiment: PublishedExperiment, report: bool) -> None:
         self._experiment, self._report = experiment, report
@@ -93,6 +94,7 @@ class _Finish:
         from handover.scenarios.campaign_report.campaign_page import write_campaign_report
         from handover.scenarios.published.published_experiment import PaperResults, draw_figures, write_claims
 
+        self.table = table
         try:
             self.results = PaperResults.of(self._experiment, table, folder.runs)
         except KeyError as e:

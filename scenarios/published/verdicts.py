@@ -177,7 +177,7 @@ def nothing_measured(
     where: str = "",
     published: str = "",
     beyond: bool = False,
-    reason: str = "No run that it is judged by is in the plan, or came to its end.",
+    reason: str = "None of the runs that it is judged by has come to its end, or a quick plan leaves them out.",
 ) -> Claim:
     """Return a claim on which there is no run, or there are too few."""
     return Claim(

@@ -52,7 +52,7 @@ def print_campaign(results: CampaignResults, counts: RunCounts, folder: Campaign
     left = len(results.points) - _MAX_POINTS
     if left > 0:
         console.print(f"  and {left} points more")
-    _print_reasons(console, results.table)
+    print_reasons(console, results.table)
     console.print(f"table: {folder.table}", markup=False, soft_wrap=True)
     if folder.is_reported:
         console.print(f"report: {folder.report}", markup=False, soft_wrap=True)
@@ -84,7 +84,8 @@ def _median(results: CampaignResults, point: PointResults, metric: str) -> str:
     return "" if math.isnan(median) else display_unit(results.table.unit(metric), median).text(median)
 
 
-def _print_reasons(console: Console, table: CampaignTable) -> None:
+def print_reasons(console: Console, table: CampaignTable) -> None:
+    """Print why runs failed or were lost, and how many for each reason."""
     ended = zip(table.column("status").tolist(), table.column("reason").tolist(), strict=True)
     reasons = Counter((status, reason) for status, reason in ended if status != "done")
     for (status, reason), number in reasons.most_common(_MAX_REASONS):

@@ -6,7 +6,9 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.cli.console import open_console
+from handover.scenarios.cli.summaries.campaign import print_reasons
 from handover.scenarios.published.published_experiment import (
     Claim,
     ComparisonTable,
@@ -19,8 +21,10 @@ from handover.scenarios.published.published_experiment import (
 _STYLES = {Verdict.REPRODUCED: "bold green", Verdict.NOT_REPRODUCED: "bold red", Verdict.NOT_COMPARABLE: "bold"}
 
 
-def print_results(experiment: PublishedExperiment, results: PaperResults, folder: CampaignFolder) -> None:
-    """Print tables, claims, and where claims, table and report are."""
+def print_results(
+    experiment: PublishedExperiment, results: PaperResults, table: CampaignTable, folder: CampaignFolder
+) -> None:
+    """Print tables, claims, why runs failed or were lost, and where claims, table and report are."""
     console = open_console()
     console.print(f"{experiment.name}: {experiment.title}", style="bold", markup=False)
     for compared in results.tables:
@@ -36,6 +40,7 @@ def print_results(experiment: PublishedExperiment, results: PaperResults, folder
         counts = verdict_counts(results.claims, beyond)
         if counts:
             console.print(f"{heading}: " + ", ".join(f"{n} {words}" for n, _, words in counts))
+    print_reasons(console, table)
     console.print(f"claims: {folder.path / 'claims.json'}", markup=False, soft_wrap=True)
     console.print(f"table: {folder.table}", markup=False, soft_wrap=True)
     if folder.is_reported:

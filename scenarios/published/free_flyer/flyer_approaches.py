@@ -21,6 +21,7 @@ from handover.scenarios.published.free_flyer.variations import (
     Variation,
     acted_alone,
     has,
+    known_rows,
     names_of,
     noise_times,
     unfinished_note,
@@ -114,7 +115,7 @@ class _Approaches:
     """Rows of the runs by what they are of, also of those that did not come to their end: they never signalled."""
 
     def __init__(self, table: CampaignTable) -> None:
-        self._rows: Sequence[Row] = table.rows
+        self._rows: Sequence[Row] = known_rows(table)
 
     def of(self, exchange: Exchange, behaviour: Behaviour, case: Variation = USUAL) -> list[Row]:
         wanted = {"task": exchange.task.item, "behaviour": behaviour.item, **case.parameters}

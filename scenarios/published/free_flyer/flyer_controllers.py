@@ -22,6 +22,7 @@ from handover.scenarios.published.free_flyer.variations import (
     Variation,
     has,
     is_done,
+    known_rows,
     names_of,
     noise_times,
     succeeded,
@@ -132,7 +133,7 @@ class ControllerRows:
     """Rows of the campaign's table by what they are for, those of runs that did not come to their end as well."""
 
     def __init__(self, table: CampaignTable) -> None:
-        self._rows: Sequence[Row] = table.rows
+        self._rows: Sequence[Row] = known_rows(table)
 
     def of(
         self, controller: str, task: Task, behaviour: Behaviour, propulsion: Propulsion, what: Variation = USUAL

@@ -132,9 +132,9 @@ def _transfers(runs: HandoverRuns) -> ComparisonTable:
         "succeeded, or in parentheses, where none did, of what they reached: how far the gripper went at most from its "
         "place along the axes of W from the signal for as long as the robot yielded, which is on after the object has "
         "left; the times from the last signal to release or closing, and from the first signal until the receiver had "
-        "the object alone; and the share of the run for which the thrusters were at their limits. Published: 40 mm "
-        "(rigid) and 140 mm (compliant) along z where the robot gives, and twice as much of the compliant robot along "
-        "x where it receives.",
+        "the object alone; and the share of the run for which more was commanded than the thrusters give. Published: "
+        "40 mm (rigid) and 140 mm (compliant) along z where the robot gives, and twice as much of the compliant robot "
+        "along x where it receives.",
     )
 
 

@@ -140,7 +140,7 @@ def _delay(runs: NavigationRuns, behaviour: Behaviour, stable: bool) -> Claim | 
     failed = len(rows) - succeeded_touched(rows)
     limited = values_of(rows, "saturated_share")
     share = (
-        f" Thrusters were at their limits for {format_share(float(limited.mean()))} of the time."
+        f" More was commanded than the thrusters give for {format_share(float(limited.mean()))} of the time."
         if len(limited)
         else ""
     )

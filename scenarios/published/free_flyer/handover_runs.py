@@ -14,6 +14,7 @@ from handover.scenarios.published.free_flyer.variations import (
     Row,
     Variation,
     has,
+    known_rows,
     names_of,
     values_of,
 )
@@ -121,7 +122,7 @@ class HandoverRuns:
     """
 
     def __init__(self, table: CampaignTable) -> None:
-        self._rows: Sequence[Row] = table.rows
+        self._rows: Sequence[Row] = known_rows(table)
 
     def of(
         self,

@@ -10,7 +10,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Task, TaskParameters
-from handover.scenarios.published.free_flyer.variations import USUAL, Row, Variation, has, names_of
+from handover.scenarios.published.free_flyer.variations import USUAL, Row, Variation, has, known_rows, names_of
 
 DRIFT_TIME = 10.0
 """Correlation time of drifts, s: of the order of a transfer (assumed)."""
@@ -75,7 +75,7 @@ class NavigationRuns:
     """Rows of the campaign's table by what is wrong, those of runs that did not come to their end as well."""
 
     def __init__(self, table: CampaignTable) -> None:
-        self._rows: Sequence[Row] = table.rows
+        self._rows: Sequence[Row] = known_rows(table)
 
     def of(self, task: Task, behaviour: Behaviour, variation: Variation = USUAL) -> list[Row]:
         """Return the runs of a task with a behaviour and a navigation."""

@@ -15,7 +15,7 @@ from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Propulsion, Wrench
-from handover.scenarios.published.free_flyer.variations import EXACT, Row, has, is_done
+from handover.scenarios.published.free_flyer.variations import EXACT, Row, has, is_done, known_rows
 
 _DEFAULT = ImpedanceParameters()
 _AFTER = 30.0
@@ -92,7 +92,7 @@ class PushRuns:
     """Rows of the campaign's table by what they are for."""
 
     def __init__(self, table: CampaignTable) -> None:
-        self._rows: Sequence[Row] = table.rows
+        self._rows: Sequence[Row] = known_rows(table)
 
     def of(self, push: Push, behaviour: Behaviour, **which: Any) -> Row | None:
         """Return the run of a push that came to its end, None where there is none; see `tried`."""

@@ -13,7 +13,7 @@ from handover.scenarios.campaign.statistics import LEVEL, RESAMPLES
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.free_flyer.parameters import Behaviour, Task, TaskParameters
-from handover.scenarios.published.free_flyer.variations import Row, has, is_done, succeeded
+from handover.scenarios.published.free_flyer.variations import Row, has, is_done, known_rows, succeeded
 
 _DEFAULT = TaskParameters()
 
@@ -83,7 +83,7 @@ class StudyRuns:
 
     def __init__(self, table: CampaignTable) -> None:
         self._trials: dict[tuple[Any, ...], list[Row]] = {}
-        for row in table.rows:
+        for row in known_rows(table):
             key = (_who(row), row.get("task"), row.get("behaviour"))
             self._trials.setdefault(key, []).append(row)
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Task
 
@@ -116,6 +117,11 @@ def succeeded_touched(rows: Sequence[Row]) -> int:
 def changed_hands(rows: Sequence[Row]) -> int:
     """Return in how many the object went where it should, even if the robot gave up on its way back."""
     return int((values_of(rows, "handed_over") > 0).sum())
+
+
+def known_rows(table: CampaignTable) -> Sequence[Row]:
+    """Return the runs of which something is known: one that was lost says nothing, and the same call tries it again."""
+    return [row for row in table.rows if row["status"] != "lost"]
 
 
 def is_done(row: Row) -> bool:

@@ -84,6 +84,13 @@ def test_every_claim_is_judged_both_ways():
     }
 
 
+def test_runs_that_were_lost_decide_nothing():
+    rows = [{**row, "status": "lost"} for row in table_of().rows]
+    claims = FlyerImpedanceTable().claims(CampaignTable(pa.Table.from_pylist(rows)))
+    assert {claim.verdict for claim in claims} == {Verdict.NOT_COMPARABLE}
+    assert {claim.measured for claim in claims} == {""}
+
+
 def test_a_quick_plan_decides_nothing_on_durations_and_has_no_table_of_them():
     claims, tables = verdicts(table_of(quick=True)), FlyerImpedanceTable().tables(table_of(quick=True))
     ratio = claims["A force takes the compliant robot ten times as far as the rigid one"]
