@@ -47,6 +47,8 @@ PUSHES_OF_TEAM = tuple(
     for r in ROBOTS
 )
 """Each of two robots anywhere."""
+SATURATED_SHARE = "share of the time for which more was commanded than the thrusters give"
+"""What the metric `saturated_share` is; controllers that clip their own commands never command more."""
 _TRUE = ("p_WB", "q_WB", "v_WB", "w_WB")
 _MEASURED = ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")
 _ROBOT = "FreeFlyer"
@@ -99,8 +101,14 @@ def check_reach(p_WG: Floats, person: Mapping[str, Any]) -> None:
 
 
 def undriven_joints(system: System) -> list[str]:
-    """Return what is wrong with robots whose arms have joints that are free to move, and that nothing drives."""
-    return [
+    """Return what is wrong with joints that are free to move and that nothing drives, and with drives of no joints."""
+    jointless = [
+        f"{name} ({unit.description.name}) drives an arm's joints, and the robot here has none; flyer_arm_impedance "
+        "has a robot with joints"
+        for name, unit in system.units.items()
+        if "q_J" in unit.description.inputs and "q_J" not in system.fed_inputs(name)
+    ]
+    return jointless + [
         f"{name}.joints: nothing drives an arm's joints here; {name}.joints=0 is right, or {name}.tolerance_J=0, which "
         "fixes them; the controller of flyer_arm_impedance drives joints"
         for name, unit in system.units.items()
@@ -128,6 +136,16 @@ def decision_settings(p: HandoverParameters) -> dict[str, Any]:
     return {"behaviour": p.behaviour.item, "p_BG": p.model.p_BG, **{name: getattr(p, name) for name in names}}
 
 
+def note_own_limits(s: System, controller: PlacedUnit, propulsion: Propulsion) -> None:
+    """Note that a controller clips its own commands where the thrusters have no limits."""
+    name = controller.name
+    if propulsion is Propulsion.IDEAL and "f_max" in controller.description.parameters:
+        s.notes.append(
+            f"{name} ({controller.description.name}) clips its own commands at {name}.f_max and {name}.tau_max, which "
+            f"propulsion=ideal does not lift; -p {name}.f_max=1000,1000,1000 -p {name}.tau_max=1000,1000,1000 does"
+        )
+
+
 def add_controllers(s: System, fmu: FmuOf, p: HandoverParameters, suffix: str = "") -> None:
     """Add a robot's impedance and pose control, under names that end in its suffix."""
     known: dict[str, Any] = {
@@ -135,7 +153,8 @@ def add_controllers(s: System, fmu: FmuOf, p: HandoverParameters, suffix: str = 
         "delay": p.delay + p.navigation_delay,
         "lag": expected_lag(p.propulsion),
     }
-    s.add(f"impedance{suffix}", fmu(f"impedance{suffix}"), behaviour=p.behaviour.item, **known)
+    impedance = s.add(f"impedance{suffix}", fmu(f"impedance{suffix}"), behaviour=p.behaviour.item, **known)
+    note_own_limits(s, impedance, p.propulsion)
     s.add(f"pose{suffix}", fmu(f"pose{suffix}"), **known)
 
 
@@ -211,6 +230,7 @@ def wired_push(
     thrusters = s.add("thrusters", fmu("thrusters"), **thruster_settings(p.propulsion, p.delay, p.stuck_nozzle))
     is_force = p.kind is Wrench.FORCE
     pushed: dict[str, Any] = {"force": p.force if is_force else 0.0, "torque": 0.0 if is_force else p.torque}
+    note_own_limits(s, impedance, p.propulsion)
     push = s.add("push", fmu("push"), axis=p.axis.name.lower(), **pushed, start=p.begin, duration=p.duration)
     body = s.add("robot", fmu("robot"), **robot)
     navigation = s.add("navigation", fmu("navigation"), seed=seed, delay=p.navigation_delay)

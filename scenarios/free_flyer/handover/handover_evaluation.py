@@ -14,7 +14,7 @@ from handover.scenarios.free_flyer.handover.led_hand import end_of_track
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause, Miss, PersonsDeeds
 from handover.scenarios.free_flyer.handover.transfer import Approach, Transfer
 from handover.scenarios.free_flyer.parameters import HandoverParameters
-from handover.scenarios.free_flyer.robot_wiring import stability_metrics
+from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
 
 _GATE = ("gate_error", "tolerance", "gate_speed")
 """Parameters of the unit that decides: how near its place the gripper is there, m, when it is to yield, and otherwise;
@@ -282,9 +282,7 @@ class HandoverEvaluator(Evaluator):
             if state in self._angles:
                 metrics[f"angle_{state}"] = Metric(self._angles[state], "rad", words)
         share = self._saturated / max(self._steps, 1)
-        metrics["saturated_share"] = Metric(
-            share, "1", "share of the time for which the thrusters were at their limits"
-        )
+        metrics["saturated_share"] = Metric(share, "1", SATURATED_SHARE)
         metrics |= self._stability
         for phase, t in self.phases:
             words = phase.replace("_", " ").lower()

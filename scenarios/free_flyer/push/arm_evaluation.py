@@ -24,8 +24,13 @@ from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.push.arm_parameters import ArmPushParameters, ArmTarget
-from handover.scenarios.free_flyer.push.impedance_evaluation import Errors, mean_between, steps_of_period
-from handover.scenarios.free_flyer.robot_wiring import stability_metrics
+from handover.scenarios.free_flyer.push.impedance_evaluation import (
+    Errors,
+    agreement_bound,
+    mean_between,
+    steps_of_period,
+)
+from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
 
 SIGNALS = (
     *(f"robot.{name}" for name in ("p_WG", "q_WG", "v_WG", "w_WG", "p_WB", "q_WB", "v_WB", "w_WB", "q_J", "v_J")),
@@ -37,6 +42,8 @@ SIGNALS = (
 
 _REST_POSITION, _REST_ANGLE, _RESTING, _SPINNING = 0.010, 0.030, 5.0, 60.0
 """As in `impedance_evaluation`: errors at rest, m and rad, for how long, s, and speed out of control, rad/s."""
+_TURNED = 1e-9
+"""Radians by which a joint has turned."""
 
 
 Columns = dict[str, Floats]
@@ -151,9 +158,22 @@ class ArmImpedanceEvaluator(Evaluator):
         )
         verb = "agreed with" if agrees else "departed from"
         joined = "and" if agrees is self._at_rest else "but"
-        extent = f"{'within' if agrees else 'by'} {1000 * by[0]:.1f} mm and {by[1]:.3f} rad"
-        reason = f"{back}, {joined} {verb} the impedance model {extent}"
+        extent = f"{'within' if agrees else 'by'} {1000 * by[0]:.1f} mm and {math.degrees(by[1]):.2f}°"
+        bound = "" if agrees else f", {agreement_bound()}"
+        reason = f"{back}, {joined} {verb} the impedance model {extent}{bound}{self._stopped_joints(motion)}"
         return Outcome(success=self._at_rest and agrees, reason=reason + self.parameters.stuck, metrics=metrics)
+
+    def _stopped_joints(self, motion: Columns) -> str:
+        """Return which free joints were held away from where they began, as a clause; one that turns is never at 0."""
+        stopped = list[str]()
+        for j in range(0 if self.parameters.target().fixed else self.parameters.target().model.joints):
+            q, v = motion["robot.q_J"][:, j], motion["robot.v_J"][:, j]
+            held = np.flatnonzero((v == 0.0) & (np.abs(q - q[0]) > _TURNED))
+            if len(held):
+                k = int(held[0])
+                where = f"{math.degrees(q[k]):.0f}° at {motion['t'][k]:.1f} s"
+                stopped.append(f"joint {j + 1} was held at {where}, by its end stop or its lock")
+        return "".join(f"; {text}" for text in stopped)
 
     def _metrics(self, motion: Columns, by: tuple[float, float]) -> dict[str, Metric]:
         base = np.linalg.norm(motion["robot.p_WB"] - motion["robot.p_WB"][0], axis=1)
@@ -172,9 +192,7 @@ class ArmImpedanceEvaluator(Evaluator):
             "disagreement_orientation": Metric(
                 by[1], "rad", f"actual against calculated orientation error at most, {model}"
             ),
-            "saturated_share": Metric(
-                self._saturated / len(self._rows), "1", "share of the time for which the thrusters were at their limits"
-            ),
+            "saturated_share": Metric(self._saturated / len(self._rows), "1", SATURATED_SHARE),
             **self._stability,
         }
         if self._at_rest:

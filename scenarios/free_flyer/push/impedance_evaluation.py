@@ -18,7 +18,7 @@ from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Body, ImpedanceParameters
-from handover.scenarios.free_flyer.robot_wiring import stability_metrics
+from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
 
 MOTION_SIGNALS = ("robot.p_WG", "robot.v_WG", "robot.q_WB", "robot.w_WB", "push.f_G", "push.tau_G")
 """Signals of a push that make up a `Motion`, in the order of its fields after time."""
@@ -191,6 +191,12 @@ _SPINNING = 60.0
 """Angular speed at which control counts as lost, rad/s: more than the strongest push can cause (assumed)."""
 
 
+def agreement_bound() -> str:
+    """Return how far errors may be from those by eq. (4.4) at most to agree with them, as a clause."""
+    by = paper_values("free_flyer", "published")["model_agreement"]
+    return f"by its residual in eq. (4.4), of which {1000 * by[0]:.0f} mm and {math.degrees(by[1]):.1f}° at most agree"
+
+
 class ImpedanceEvaluator(Evaluator):
     """Follows one push and decides whether the robot came back to rest and moved as by the impedance model.
 
@@ -261,7 +267,7 @@ class ImpedanceEvaluator(Evaluator):
             "disagreement_orientation": Metric(
                 by[1], "rad", f"actual against calculated orientation error at most, {_MODEL}"
             ),
-            "saturated_share": Metric(share, "1", "share of the time for which the thrusters were at their limits"),
+            "saturated_share": Metric(share, "1", SATURATED_SHARE),
             **self._stability,
         }
         if self._at_rest:
@@ -275,10 +281,10 @@ class ImpedanceEvaluator(Evaluator):
         model = (
             f"agreed with the impedance model within {apart}"
             if agrees
-            else f"departed from the impedance model by {apart}"
+            else f"departed from the impedance model by {apart}, {agreement_bound()}"
         )
         joined = "and" if agrees is self._at_rest else "but"
-        thrust = f"; thrusters at their limits for {100 * share:.0f} % of the time" if share else ""
+        thrust = f"; more was commanded than the thrusters give for {100 * share:.0f} % of the time" if share else ""
         stuck = self.parameters.stuck
         return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}{stuck}"
 
@@ -292,6 +298,6 @@ class ImpedanceEvaluator(Evaluator):
         if self._t < float(p.stop) - 0.02:
             return f"stopped at {self._t:.1f} s, before the robot could come to rest"
         return (
-            f"the gripper did not come back to rest, within {_BAND}, in {p.patience:.0f} s: {self._last[0]:.2f} m and "
-            f"{math.degrees(self._last[1]):.1f}° away at the end"
+            f"the gripper did not come back to rest, within {_BAND} for {_RESTING:g} s, in {p.patience:g} s: "
+            f"{1000 * self._last[0]:.0f} mm and {math.degrees(self._last[1]):.1f}° away at the end"
         )

@@ -212,20 +212,22 @@ class TeamEvaluator(Evaluator):
                 "N",
                 "internal force in the object at most: part of both grippers' forces that cancels along their line",
             ),
-            "turn": Metric(
-                self._turn, "rad", "object from its orientation at the signal at most, until it is received"
-            ),
-            "force": Metric(self._force, "N", "force on either hand at most, from the signal until it is received"),
             "saturated_share": Metric(
                 self._saturated / max(self._steps, 1),
                 "1",
-                "share of the time for which thrusters of either robot were at their limits",
+                "share of the time for which more was commanded than the thrusters of either robot give",
             ),
         }
+        if self._signalled:
+            text = "object from its orientation at the signal at most, until it is received"
+            metrics["turn"] = Metric(self._turn, "rad", text)
+            text = "force on either hand at most, from the signal until it is received"
+            metrics["force"] = Metric(self._force, "N", text)
         for i, robot in enumerate(self.robots, 1):
-            metrics[f"displacement_{i}"] = Metric(
-                robot.farthest, "m", f"gripper {i} from its handover place at most, from the signal while it yields"
-            )
+            if robot.signalled is not None:
+                metrics[f"displacement_{i}"] = Metric(
+                    robot.farthest, "m", f"gripper {i} from its handover place at most, from the signal while it yields"
+                )
             metrics[f"fastest_{i}"] = Metric(
                 robot.fastest, "m/s", f"speed at most by which robot {i} judges whether there is a {touch}"
             )

@@ -35,8 +35,15 @@ def test_joints_that_lock_unknown_to_the_controller_depart_from_the_model(tmp_pa
     ended = run(FlyerArmImpedance, tmp_path / "r", "lock_time=1.25")
     assert not ended.outcome.success
     assert "departed from the impedance model" in ended.outcome.reason
+    assert "joint 1 was held at" in ended.outcome.reason
     q_J, t = Record(tmp_path / "r" / "signals.parquet")["robot.q_J"], Record(tmp_path / "r" / "signals.parquet").time
     assert len(np.unique(q_J[t > 1.28], axis=0)) == 1
+
+
+def test_a_joint_at_its_end_stop_is_told(tmp_path: Path):
+    ended = run(FlyerArmImpedance, tmp_path / "r", "posture=1.5,1.5,1.5", "joints=3")
+    assert "joint 1 was held at 90°" in ended.outcome.reason
+    assert "of which 7 mm and 1.1° at most agree" in ended.outcome.reason
 
 
 def test_the_published_rigid_damping_is_refused_with_joints(tmp_path: Path):

@@ -8,6 +8,7 @@ from flyer_runs import metric, run
 
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.record.reader import Record
+from handover.fmus.build import cached
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Propulsion
 from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
@@ -50,7 +51,7 @@ def test_with_real_limits_a_push_saturates_the_thrusters_and_the_verdict_says_so
     assert not ended.outcome.success
     assert "did not come back to rest, within 10 mm and 1.7°" in ended.outcome.reason
     assert "and departed from the impedance model" in ended.outcome.reason
-    assert "thrusters at their limits for" in ended.outcome.reason
+    assert "more was commanded than the thrusters give for" in ended.outcome.reason
     assert metric(ended, "saturated_share") > 0.5
     assert "settling_time" not in ended.summary["metrics"]
 
@@ -89,6 +90,29 @@ def test_an_unknown_delay_makes_the_robot_lose_control_and_the_run_ends_in_time(
     assert ended.failure is None
     assert not ended.outcome.success
     assert "out of control" in ended.outcome.reason
+
+
+def test_gains_that_have_no_effect_are_refused(tmp_path: Path):
+    with pytest.raises(InitializationError, match="stiffness_translation counts with behaviour=CUSTOM only"):
+        run(FlyerImpedance, tmp_path / "r", "impedance.stiffness_translation=5,0,0,0,67,0,0,0,67")
+
+
+def test_a_controller_of_joints_is_refused_where_there_are_none():
+    fmus = {**FlyerImpedance.units, "impedance": "ArmImpedanceController"}
+    system = FlyerImpedance().build(ImpedanceParameters(), 0, lambda unit: cached(fmus[unit], 3))
+    with pytest.raises(InvalidParameter, match="drives an arm's joints, and the robot here has none"):
+        FlyerImpedance().check_unit_values(system, ())
+
+
+def test_limits_of_a_controllers_own_are_told_where_thrust_has_none():
+    fmus = {**FlyerImpedance.units, "impedance": "AdmittanceController"}
+    limited, ideal = (
+        FlyerImpedance().build(ImpedanceParameters(propulsion=p), 0, lambda unit: cached(fmus[unit], 3))
+        for p in (Propulsion.LIMITED, Propulsion.IDEAL)
+    )
+    assert limited.notes == []
+    (note,) = ideal.notes
+    assert "clips its own commands at impedance.f_max" in note
 
 
 def test_bad_parameters_are_refused_with_their_ranges(tmp_path: Path):
