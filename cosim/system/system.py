@@ -10,39 +10,17 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from numbers import Rational
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
-from handover.cosim.blocks.variable import Kind
+from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import WiringError, nearest
 from handover.cosim.fmu.clocks import FmuClock
 from handover.cosim.fmu.default_experiment import NO_STEP, DefaultExperiment, NoStep, proposed_step
 from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.system.conversion import LinearTransformation, conversion
+from handover.cosim.system.port_names import MatchedPorts, PortName, PortNames, ambiguity, matched_ports, unit_of
 from handover.cosim.system.time_series import ExternalSource, NoSource, TimeSeries, external_fault
 from handover.cosim.system.wiring_faults import clock_mismatch, event_faults, mismatch, once_faults, value_faults
-
-
-@dataclass(frozen=True)
-class PortName:
-    """One end of a connection: a port of a unit in a system."""
-
-    unit: str
-    port: str
-
-    def __str__(self) -> str:
-        return f"{self.unit}.{self.port}"
-
-
-class PortNames:
-    """Makes port names by attribute: `arm.y.p_WG`. `System.check` checks whether such a port exists."""
-
-    def __init__(self, unit: str) -> None:
-        self._unit = unit
-
-    def __getattr__(self, port: str) -> PortName:
-        if port.startswith("__"):
-            raise AttributeError(port)
-        return PortName(self._unit, port)
 
 
 @dataclass(frozen=True)
@@ -69,12 +47,12 @@ class PlacedUnit:
     @property
     def u(self) -> PortNames:
         """Its inputs, by attribute."""
-        return PortNames(self.name)
+        return PortNames(self.name, Causality.INPUT)
 
     @property
     def y(self) -> PortNames:
         """Its outputs, by attribute."""
-        return PortNames(self.name)
+        return PortNames(self.name, Causality.OUTPUT)
 
     def _repr_html_(self) -> str:
         from handover.cosim.fmu.port_table import description_html  # of notebooks alone
@@ -101,6 +79,7 @@ class System:
         self.units: dict[str, PlacedUnit] = {}
         self.connections: list[Connection] = []
         self._sources: defaultdict[str, dict[str, PortName]] = defaultdict(dict)  # by unit, by input
+        self._matches: defaultdict[PortName, list[PortName]] = defaultdict(list)  # by input, what matches it by name
         self.followed: defaultdict[str, dict[str, TimeSeries]] = defaultdict(dict)
         """By unit and input, the values over time that inputs follow."""
         self.externals: defaultdict[str, dict[str, ExternalSource]] = defaultdict(dict)
@@ -145,23 +124,77 @@ class System:
             n: replace(u, period=self._period(n, u.description.experiment, period)) for n, u in self.units.items()
         }
 
-    def connect(self, source: PortName, target: PortName, transformation: LinearTransformation | None = None) -> None:
-        """Let an output feed an input.
+    @overload
+    def connect(
+        self, source: PortName, target: PortName, transformation: LinearTransformation | None = None
+    ) -> None: ...
+    @overload
+    def connect(self, source: PortNames, target: PortNames) -> MatchedPorts: ...
+    def connect(
+        self,
+        source: PortName | PortNames,
+        target: PortName | PortNames,
+        transformation: LinearTransformation | None = None,
+    ) -> MatchedPorts | None:
+        """Let an output feed an input, `connect(arm.y.x, camera.u.x)`, or all that match, `connect(arm.y, camera.u)`.
 
         Real values are converted to the input's unit where both have the same dimension. A `transformation` replaces
-        that conversion, whatever the units; it is for real values only.
+        that conversion, whatever the units; it is for one connection of real values.
+
+        Of two units, each input is fed by the output of the same name, kind and shape whose unit is the same or can be
+        converted; what was connected and what was left is returned. An input that is connected by its own name, follows
+        values or comes from outside is left, whether that was said before or is said later; `check` finds an input that
+        several units match, and two units of which nothing matches.
 
         Raises:
-            TypeError: an end is not a port.
+            TypeError: an end is not a port, or not the outputs or inputs of a unit.
         """
+        if isinstance(source, PortNames) or isinstance(target, PortNames):
+            return self._connect_matching(source, target)
         for end in (source, target):
             if not isinstance(end, PortName):  # pyright: ignore[reportUnnecessaryIsInstance]
                 raise TypeError(f"{end!r} is not a port: give unit.y.NAME and unit.u.NAME of what add returned")
+        self._forget_matches(target)
+        self._connect(source, target, transformation)
+        return None
+
+    def _connect(self, source: PortName, target: PortName, transformation: LinearTransformation | None = None) -> None:
         self.connections.append(Connection(source, target, transformation))
         self._sources[target.unit][target.port] = source
 
+    def _connect_matching(self, source: Any, target: Any) -> MatchedPorts:
+        a, b = unit_of(source, Causality.OUTPUT), unit_of(target, Causality.INPUT)
+        outputs, inputs = self.units[a].description.outputs, self.units[b].description.inputs
+        fed = {
+            port: f"{end} feeds it" for port, end in self._sources[b].items() if PortName(b, port) not in self._matches
+        }
+        fed |= dict.fromkeys(self.followed[b], "it follows values over time")
+        fed |= dict.fromkeys(self.externals[b], "it comes from outside")
+        matched = matched_ports(a, b, outputs, inputs, fed)
+        if not matched.connected and not matched.left:
+            self._faults.append(
+                f"{a}.y -> {b}.u: no output has the name of an input; {a} has {', '.join(outputs) or 'no outputs'}, "
+                f"{b} {', '.join(inputs) or 'no inputs'}"
+            )
+        for port in matched.connected:
+            matches = self._matches[PortName(b, port)]
+            if PortName(a, port) not in matches:
+                matches.append(PortName(a, port))
+                if len(matches) == 1:
+                    self._connect(matches[0], PortName(b, port))
+        return matched
+
+    def _forget_matches(self, target: PortName) -> None:
+        """Take back that an input was connected by its match, as something else is said of it."""
+        if self._matches.pop(target, None):
+            self.connections = [c for c in self.connections if c.target != target]
+            del self._sources[target.unit][target.port]
+
     def disconnect(self, end: PortName) -> None:
         """Remove the connections of a port, and what it is set to or follows."""
+        self._matches.pop(end, None)
+        for matches in self._matches.values():
+            matches[:] = [m for m in matches if m != end]
         self.connections = [c for c in self.connections if end not in (c.source, c.target)]
         for sources in self._sources.values():
             for port in [p for p, source in sources.items() if source == end]:
@@ -171,6 +204,9 @@ class System:
         self.externals[end.unit].pop(end.port, None)
         unit = self.units[end.unit]
         self.units[end.unit] = replace(unit, start={n: x for n, x in unit.start.items() if n != end.port})
+        for target, (match,) in [(t, m) for t, m in self._matches.items() if len(m) == 1]:
+            if target.port not in self._sources[target.unit]:
+                self._connect(match, target)
 
     def add_fault(self, fault: str) -> None:
         """Let `check` raise a fault that whoever wires the system has found, besides those that it finds."""
@@ -184,6 +220,7 @@ class System:
         """
         if not isinstance(target, PortName):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise TypeError(f"{target!r} is not a port: give unit.u.NAME of what add returned")
+        self._forget_matches(target)
         self.followed[target.unit][target.port] = series
 
     def external(self, target: PortName, source: ExternalSource | None = None) -> None:
@@ -202,6 +239,7 @@ class System:
         """
         if not isinstance(target, PortName):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise TypeError(f"{target!r} is not a port: give unit.u.NAME of what add returned")
+        self._forget_matches(target)
         self.externals[target.unit][target.port] = NoSource() if source is None else source
 
     def check(self) -> None:
@@ -210,7 +248,7 @@ class System:
         Raises:
             WiringError: with every fault of the system.
         """
-        faults = list(self._faults)
+        faults = [*self._faults, *(ambiguity(end, ends) for end, ends in self._matches.items() if len(ends) > 1)]
         for unit in self.units.values():
             faults += value_faults(unit.name, unit.description, unit.start)
             faults += event_faults(unit.name, unit.description, unit.sampled)

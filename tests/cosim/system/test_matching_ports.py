@@ -1,0 +1,132 @@
+"""Units are connected in one line: which inputs and outputs match, what is left and why, and what is ambiguous."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from handover.cosim.exceptions import WiringError
+from handover.cosim.master.master import Master
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import Connection, PortName, System
+from handover.cosim.system.time_series import TimeSeries
+
+FmuOf = Callable[..., Path]
+
+
+def pair(fmu: FmuOf) -> System:
+    s = System()
+    s.add("mass", fmu("Mass"))
+    s.add("spring", fmu("Spring"))
+    return s
+
+
+def test_all_inputs_of_a_unit_are_connected_that_match(fmu: FmuOf):
+    s = pair(fmu)
+    mass, spring = s.units["mass"], s.units["spring"]
+    there, back = s.connect(mass.y, spring.u), s.connect(spring.y, mass.u)
+    s.check()
+    assert (there.connected, back.connected) == (("x",), ("f",))
+    assert s.connections == [
+        Connection(PortName("mass", "x"), PortName("spring", "x")),
+        Connection(PortName("spring", "f"), PortName("mass", "f")),
+    ]
+    assert str(there) == "mass.x -> spring.x"
+
+
+def test_one_line_gives_the_run_of_single_connections(fmu: FmuOf):
+    def run(*, whole: bool) -> list[float]:
+        s, x = pair(fmu), list[float]()
+        mass, spring = s.units["mass"], s.units["spring"]
+        if whole:
+            s.connect(mass.y, spring.u)
+            s.connect(spring.y, mass.u)
+        else:
+            s.connect(mass.y.x, spring.u.x)
+            s.connect(spring.y.f, mass.u.f)
+
+        def observe(t: float, signals: Signals) -> None:  # noqa: ARG001
+            x.append(float(signals["mass.x"]))
+
+        with Master(s) as master:
+            master.run(Fraction(1), [observe])
+        return x
+
+    assert run(whole=True) == run(whole=False)
+    assert len(set(run(whole=True))) > 10
+
+
+def test_what_has_the_name_but_does_not_fit_is_left_with_the_reason(fmu: FmuOf):
+    s = System()
+    a, b = s.add("a", fmu("Echo")), s.add("b", fmu("Echo"))
+    outputs, inputs = a.description.outputs, b.description.inputs
+    matched = s.connect(a.y, b.u)
+    fits = {
+        n for n in inputs if n in outputs and inputs[n].kind is outputs[n].kind and inputs[n].shape == outputs[n].shape
+    }
+    assert set(matched.connected) == fits
+    assert set(matched.left) == {n for n in inputs if n in outputs} - fits
+    assert set(matched.unmatched) == {n for n in inputs if n not in outputs}
+
+
+def test_a_single_connection_takes_precedence_before_and_after(fmu: FmuOf):
+    s = pair(fmu)
+    other = s.add("other", fmu("Mass"))
+    mass, spring = s.units["mass"], s.units["spring"]
+    s.connect(other.y.x, spring.u.x)
+    matched = s.connect(mass.y, spring.u)
+    assert dict(matched.left) == {"x": "other.x feeds it"}
+    s.connect(spring.y, mass.u)
+    s.connect(spring.y.f, mass.u.f)
+    s.check()
+    assert s.sources_of("spring") == {"x": PortName("other", "x")}
+    assert s.sources_of("mass") == {"f": PortName("spring", "f")}
+
+
+def test_values_over_time_take_the_place_of_a_match(fmu: FmuOf):
+    s = pair(fmu)
+    mass, spring = s.units["mass"], s.units["spring"]
+    s.connect(spring.y, mass.u)
+    s.follow(mass.u.f, TimeSeries([0.0, 1.0], [[0.0], [1.0]], linear=True))
+    s.check()
+    assert s.sources_of("mass") == {}
+    assert dict(s.connect(spring.y, mass.u).left) == {"f": "it follows values over time"}
+
+
+def test_an_input_that_two_units_match_is_refused_until_one_is_named(fmu: FmuOf):
+    s = pair(fmu)
+    other = s.add("other", fmu("Mass"))
+    mass, spring = s.units["mass"], s.units["spring"]
+    s.connect(mass.y, spring.u)
+    s.connect(mass.y, spring.u)
+    s.connect(other.y, spring.u)
+    with pytest.raises(WiringError) as caught:
+        s.check()
+    assert caught.value.faults == (
+        "spring.x: mass.y.x and other.y.x match it by name; connect the one that is meant: "
+        "connect(mass.y.x, spring.u.x)",
+    )
+    s.disconnect(mass.y.x)
+    s.check()
+    assert s.sources_of("spring") == {"x": PortName("other", "x")}
+    s.connect(mass.y, spring.u)
+    s.connect(other.y.x, spring.u.x)
+    s.check()
+
+
+def test_units_of_which_nothing_matches_are_refused(fmu: FmuOf):
+    s = System()
+    a, b = s.add("a", fmu("Mass")), s.add("b", fmu("Mass"))
+    s.connect(a.y, b.u)
+    with pytest.raises(WiringError, match=r"a\.y -> b\.u: no output has the name of an input; a has x.*, b f"):
+        s.check()
+
+
+def test_ends_that_are_no_outputs_and_inputs_are_refused(fmu: FmuOf):
+    s = pair(fmu)
+    mass, spring = s.units["mass"], s.units["spring"]
+    with pytest.raises(TypeError, match=r"mass\.u are its inputs: what feeds stands first; did you mean mass\.y"):
+        s.connect(mass.u, spring.u)
+    with pytest.raises(TypeError, match=r"PortName.* is one port or none"):
+        s.connect(mass.y, spring.u.x)  # pyright: ignore[reportCallIssue, reportArgumentType]
