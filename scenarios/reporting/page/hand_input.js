@@ -10,6 +10,7 @@
 //   hand.pose()             {p_WH, q_WH, closed}
 //   hand.place(pose)        takes in where another device has led it
 //   hand.start              as given
+//   hand.axes()             directions of the view in W: to its right, up, towards the eye
 //   hand.end()              lets go of the element
 // The mouse moves the hand in the plane of the picture, at the hand's depth: it is where the pointer is. The wheel moves
 // it towards the eye and away. A finger on a screen takes it along, two change its depth. With Alt the pointer is the view's.
@@ -169,6 +170,7 @@ const handInput = (() => {
         if (closed !== pose.closed) onChange(closed = pose.closed);
       },
       start,
+      axes: () => axes().map(e => e.toArray()),
       pose: () => ({p_WH: p.toArray(), q_WH: [q.w, q.x, q.y, q.z], closed}),
       end() {
         clearInterval(timer);

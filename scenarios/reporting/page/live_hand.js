@@ -15,6 +15,13 @@ const leadHandIn = (element, camera) => {
       + "page. Where the hand is first seen, it goes on from where it stands; take it out of the picture for a moment to begin elsewhere.",
     nothing: "Nothing leads the hand: it stops, and keeps what it holds.",
   };
+  const CAMERA = {
+    asks: () => "The browser asks whether the camera may be used.",
+    loads: () => "MediaPipe's files are loaded.",
+    seeks: () => "Show your hand to the camera: until it sees one, the hand stops.",
+    sees: () => "The camera sees the hand.",
+    fails: why => `The webcam cannot lead the hand: ${why}. Another device may be chosen.`,
+  };
   const lead = {hand: null, close}, closed = new AbortController();
   let link = null, told = 0, watched = null, cameraTold = "";
 
@@ -61,16 +68,12 @@ const leadHandIn = (element, camera) => {
 
   // The webcam's samples go the way of others', and are where the hand is for the device after it.
   function watch() {
-    const axes = () => {
-      camera.updateMatrixWorld();
-      return [0, 4, 8].map(at => camera.matrixWorld.elements.slice(at, at + 3));
-    };
     const onSample = sample => {
       lead.hand.place(sample);
       send(sample);
     };
     const start = {...lead.hand.start, ...lead.hand.pose()}, right = part("side").value === "right";
-    watched = handCamera({video: part("video"), axes, start, right, onSample, onTold: tellOfCamera});
+    watched = handCamera({video: part("video"), axes: lead.hand.axes, start, right, onSample, onTold: (how, why) => tellOfCamera(CAMERA[how](why))});
   }
   function leaveCamera() {
     watched?.end();
