@@ -10,6 +10,7 @@
   const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
   const TURNS = {"+roll": "roll_right", "-roll": "roll_left", "+pitch": "fingers_down", "-pitch": "fingers_up",
     "+yaw": "fingers_left", "-yaw": "fingers_right"};
+  const KEYS = {"+roll": "E", "-roll": "Q", "+pitch": "W", "-pitch": "S", "+yaw": "A", "-yaw": "D"};  // see hand_input.js
   const device = () => shown?.device ?? "";
 
   // A word of the page in the language of the study, with values in place of {names}.
@@ -301,7 +302,9 @@
     const name = test.place ? "place_to_go" : TURNS[test.name] ?? (test.name ? "make_fist" : "free_play");
     const at = play?.hand().p_WH ?? [];
     const far = test.place && at.length ? Math.hypot(...at.map((x, i) => x - test.place[i])) : NaN;
-    const told = Number.isFinite(far) ? [word(name, test), word("still_away", {distance: Math.round(100 * far)})] : [word(name, test)];
+    const told = [word(name, test)];
+    if (Number.isFinite(far)) told.push(word("still_away", {distance: Math.round(100 * far)}));
+    if (KEYS[test.name] && device() === "mouse") told.push(word("by_key", {key: KEYS[test.name]}));
     byId("task").textContent = told.join(" ");
   }
 
@@ -329,7 +332,8 @@
       over = true;
       endPlay();
       leaveCamera();
-      main.replaceChildren(node("p", {}, word(message.gone)));
+      main.replaceChildren(node("h1", {}, word("not_here")), node("p", {}, word(message.gone)),
+        actions(button("reload", () => location.reload(), {first: true})));
       main.hidden = false;
       root.dataset.screen = message.gone;
     }

@@ -28,7 +28,30 @@ SEEN_AT = """p => {
     return [inside(box.left + (x + 1) / 2 * box.width, box.left, box.right),
         inside(box.top + (1 - y) / 2 * box.height, box.top, box.bottom), far];
 }"""
-"""Where a point of W is seen in the view from the person's eye, in pixels of the page, and its depth towards the eye, m."""
+"""Where a point of W is seen from the person's eye, in pixels of the page, and its depth towards the eye, m."""
+
+
+class _Run:
+    """One run: what is seen of it, what is to be done, and what the mouse has done.
+
+    Attributes:
+        hand: what is to be done; None before anything is seen.
+        closed, depth: to which the mouse has closed the hand, and led it, m; `depth` None before it has.
+    """
+
+    def __init__(self, scene: SeenScene) -> None:
+        self.scene = scene
+        self.hand: ScriptedHand | None = None
+        self.closed = False
+        self.depth: float | None = None
+
+    def see(self, message: bytes, target: Mapping[str, Any] | None) -> None:
+        """Take in a state of the run."""
+        self.scene.take(message)
+        if self.hand is None:
+            self.hand = ScriptedHand(self.scene)
+            self.closed = self.hand.closed
+        self.hand.act(target)
 
 
 class MouseHand:
@@ -40,24 +63,20 @@ class MouseHand:
 
     def __init__(self, page: Page) -> None:
         self._page = page
-        self._scene: SeenScene | None = None
-        self._hand: ScriptedHand | None = None
+        self._run: _Run | None = None
         self._target: Mapping[str, Any] | None = None
-        self._depth: float | None = None  # at which it has led the hand, since a run has begun
-        self._closed, self._key = False, ""
+        self._key = ""
         page.on("websocket", lambda connection: connection.on("framereceived", self._see))
 
     def _see(self, message: str | bytes) -> None:
         """Take in what the page is told to draw, and what is to be done about it."""
         if isinstance(message, bytes):
-            if self._scene is not None:
-                self._scene.take(message)
-                self._hand = self._hand or ScriptedHand(self._scene)
-                self._hand.act(self._target)
+            if self._run is not None:
+                self._run.see(message, self._target)
             return
         told = json.loads(message)
         if "scene" in told:
-            self._scene, self._hand, self._depth = SeenScene(told["scene"]), None, None
+            self._run = _Run(SeenScene(told["scene"]))
         elif "target" in told:
             self._target = told["target"]
         elif "screen" in told and told["screen"]["screen"] != "practising":
@@ -65,30 +84,30 @@ class MouseHand:
 
     def act(self) -> None:
         """Do for a moment what is called for."""
-        scene, hand = self._scene, self._hand
-        if scene is not None and hand is not None and self._page.evaluate("study.play !== null"):
-            if self._depth is None:
-                self._closed, self._depth = hand.closed, self._seen_at(scene.place("hand"))[1]
+        run = self._run
+        if run is not None and run.hand is not None and self._page.evaluate("study.play !== null"):
             self._turn(str((self._target or {}).get("name", "")))
-            self._depth = self._go(hand.place, self._depth)
-            if hand.closed != self._closed:
+            self._go(run, run.hand.place)
+            if run.hand.closed != run.closed and run is self._run:
                 self._page.mouse.down()
                 self._page.mouse.up()
-                self._closed = not self._closed
+                run.closed = not run.closed
         self._page.wait_for_timeout(15)
 
     def _seen_at(self, p: Floats) -> tuple[tuple[float, float], float]:
-        x, y, far = self._page.evaluate(SEEN_AT, p.tolist())
-        return (x, y), far
+        seen: list[float] = self._page.evaluate(SEEN_AT, p.tolist())
+        return (seen[0], seen[1]), seen[2]
 
-    def _go(self, place: Floats, depth: float) -> float:
-        """Lead the hand from a depth, m, to a place; return at which depth it then is."""
-        pixel, there = self._seen_at(place)
+    def _go(self, run: "_Run", place: Floats) -> None:
+        """Lead the hand to a place: by the pointer, and by as many notches as it is deeper than the hand was led."""
+        pixel, depth = self._seen_at(place)
+        if run.depth is None:
+            run.depth = self._seen_at(run.scene.place("hand"))[1]
         self._page.mouse.move(*pixel)
-        notches = round((there - depth) / NOTCH)
+        notches = round((depth - run.depth) / NOTCH)
         for _ in range(abs(notches)):
             self._page.mouse.wheel(0, math.copysign(PIXELS, notches))
-        return depth + notches * NOTCH
+        run.depth += notches * NOTCH
 
     def _turn(self, name: str) -> None:
         """Hold the key that turns the hand as the practice asks, until it asks for something else."""
