@@ -52,8 +52,8 @@ async def serve_study(
         tell: is given lines for who carries it out.
 
     Raises:
-        NotServed: the address cannot be used, the page offers none of the plan's devices, or in a scenario nobody outside
-            can lead a hand.
+        NotServed: the address cannot be used, the page offers none of the plan's devices, or nobody outside can lead
+            the hand in a scenario.
         PilotsBrokenOff: scripted pilots did not get to their end.
         InvalidRunFolder, RecordNotWritten: see `StudyFolder.opened`.
     """

@@ -12,23 +12,25 @@ from typing import Any
 
 from playwright.sync_api import Page
 
-from handover.cosim.blocks.ports import Floats
 from handover.scenarios.study.session.pilot import ScriptedHand, SeenScene
 
 NOTCH, PIXELS = 0.015, 100.0
 """What a notch of a wheel moves the hand by, m, and how many pixels it is."""
 TURNS = {"+roll": "e", "-roll": "q", "+pitch": "w", "-pitch": "s", "+yaw": "a", "-yaw": "d"}
 """Keys that turn the hand as the practice asks."""
-SEEN_AT = """p => {
+SEEN_AT = """places => {
+    if (!study.play) return null;
     const camera = study.play.scene.camera, box = document.querySelector("#eye canvas").getBoundingClientRect();
     camera.updateMatrixWorld();
-    const far = camera.position.clone().set(...p).applyMatrix4(camera.matrixWorldInverse).z;
-    const {x, y} = camera.position.clone().set(...p).project(camera);
     const inside = (a, low, high) => Math.min(Math.max(a, low + 5), high - 5);
-    return [inside(box.left + (x + 1) / 2 * box.width, box.left, box.right),
-        inside(box.top + (1 - y) / 2 * box.height, box.top, box.bottom), far];
+    return places.map(p => {
+        const depth = camera.position.clone().set(...p).applyMatrix4(camera.matrixWorldInverse).z;
+        const {x, y} = camera.position.clone().set(...p).project(camera);
+        return [inside(box.left + (x + 1) / 2 * box.width, box.left, box.right),
+            inside(box.top + (1 - y) / 2 * box.height, box.top, box.bottom), depth];
+    });
 }"""
-"""Where a point of W is seen from the person's eye, in pixels of the page, and its depth towards the eye, m."""
+"""Where points of W are seen from the person's eye, in pixels, and their depths towards it, m; null between runs."""
 
 
 class _Run:
@@ -85,29 +87,28 @@ class MouseHand:
     def act(self) -> None:
         """Do for a moment what is called for."""
         run = self._run
-        if run is not None and run.hand is not None and self._page.evaluate("study.play !== null"):
-            self._turn(str((self._target or {}).get("name", "")))
-            self._go(run, run.hand.place)
-            if run.hand.closed != run.closed and run is self._run:
-                self._page.mouse.down()
-                self._page.mouse.up()
-                run.closed = not run.closed
+        if run is not None and run.hand is not None:
+            self._lead(run, run.hand)
         self._page.wait_for_timeout(15)
 
-    def _seen_at(self, p: Floats) -> tuple[tuple[float, float], float]:
-        seen: list[float] = self._page.evaluate(SEEN_AT, p.tolist())
-        return (seen[0], seen[1]), seen[2]
-
-    def _go(self, run: "_Run", place: Floats) -> None:
-        """Lead the hand to a place: by the pointer, and by as many notches as it is deeper than the hand was led."""
-        pixel, depth = self._seen_at(place)
-        if run.depth is None:
-            run.depth = self._seen_at(run.scene.place("hand"))[1]
-        self._page.mouse.move(*pixel)
+    def _lead(self, run: "_Run", hand: ScriptedHand) -> None:
+        """Lead the hand to its place: by the pointer, and by as many notches as that is deeper than it was led."""
+        places = [hand.place.tolist(), run.scene.place("hand").tolist()]
+        seen: list[list[float]] | None = self._page.evaluate(SEEN_AT, places)
+        if seen is None or run is not self._run:
+            return
+        (x, y, depth), (_, _, at_first) = seen
+        run.depth = at_first if run.depth is None else run.depth
+        self._turn(str((self._target or {}).get("name", "")))
+        self._page.mouse.move(x, y)
         notches = round((depth - run.depth) / NOTCH)
         for _ in range(abs(notches)):
             self._page.mouse.wheel(0, math.copysign(PIXELS, notches))
         run.depth += notches * NOTCH
+        if hand.closed != run.closed and run is self._run:
+            self._page.mouse.down()
+            self._page.mouse.up()
+            run.closed = not run.closed
 
     def _turn(self, name: str) -> None:
         """Hold the key that turns the hand as the practice asks, until it asks for something else."""
