@@ -6,7 +6,6 @@ the wheel.
 """
 
 import json
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -99,16 +98,16 @@ class MouseHand:
             return
         (x, y, depth), (_, _, at_first) = seen
         run.depth = at_first if run.depth is None else run.depth
-        self._turn(str((self._target or {}).get("name", "")))
-        self._page.mouse.move(x, y)
-        notches = round((depth - run.depth) / NOTCH)
-        for _ in range(abs(notches)):
-            self._page.mouse.wheel(0, math.copysign(PIXELS, notches))
-        run.depth += notches * NOTCH
-        if hand.closed != run.closed and run is self._run:
+        if hand.closed != run.closed:
             self._page.mouse.down()
             self._page.mouse.up()
             run.closed = not run.closed
+        self._turn(str((self._target or {}).get("name", "")))
+        self._page.mouse.move(x, y)
+        notches = round((depth - run.depth) / NOTCH)
+        if notches:
+            self._page.mouse.wheel(0, notches * PIXELS)
+        run.depth += notches * NOTCH
 
     def _turn(self, name: str) -> None:
         """Hold the key that turns the hand as the practice asks, until it asks for something else."""
