@@ -5,54 +5,47 @@ pilot (`pilot.py`) does; how the hand gets there is a mouse's way: in the pictur
 the wheel.
 """
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from playwright.sync_api import Page
 
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.study.session.pilot import ScriptedHand, SeenScene
 
 NOTCH, PIXELS = 0.015, 100.0
 """What a notch of a wheel moves the hand by, m, and how many pixels it is."""
+MARGIN = 5.0
+"""How far the pointer stays within the picture, pixels."""
 TURNS = {"+roll": "e", "-roll": "q", "+pitch": "w", "-pitch": "s", "+yaw": "a", "-yaw": "d"}
 """Keys that turn the hand as the practice asks."""
-SEEN_AT = """places => {
-    if (!study.play) return null;
-    const camera = study.play.scene.camera, box = document.querySelector("#eye canvas").getBoundingClientRect();
+NOTE = """
+    window.seen = {runs: 0};
+    window.WebSocket = class extends WebSocket {
+        constructor(...given) {
+            super(...given);
+            this.addEventListener("message", ({data}) => {
+                const told = typeof data === "string" ? JSON.parse(data) : {frame: data};
+                if (told.frame) seen.frame = told.frame;
+                if (told.scene) Object.assign(seen, {scene: told.scene, frame: null, runs: seen.runs + 1});
+                if (told.target) seen.target = told.target;
+                if (told.screen && told.screen.screen !== "practising") seen.target = null;
+            });
+        }
+    };
+"""
+"""Notes in the page what it is told to draw: asked for now and then, as a person looks, and not queued."""
+LOOK = """() => {
+    if (!study.play || !seen.frame) return null;
+    const {camera} = study.play.scene, box = document.querySelector("#eye canvas").getBoundingClientRect();
     camera.updateMatrixWorld();
-    const inside = (a, low, high) => Math.min(Math.max(a, low + 5), high - 5);
-    return places.map(p => {
-        const depth = camera.position.clone().set(...p).applyMatrix4(camera.matrixWorldInverse).z;
-        const {x, y} = camera.position.clone().set(...p).project(camera);
-        return [inside(box.left + (x + 1) / 2 * box.width, box.left, box.right),
-            inside(box.top + (1 - y) / 2 * box.height, box.top, box.bottom), depth];
-    });
+    return {
+        run: seen.runs, frame: Array.from(new Float64Array(seen.frame)), target: seen.target ?? null,
+        view: camera.matrixWorldInverse.elements, projection: camera.projectionMatrix.elements,
+        box: [box.left, box.top, box.width, box.height],
+    };
 }"""
-"""Where points of W are seen from the person's eye, in pixels, and their depths towards it, m; null between runs."""
-
-
-class _Run:
-    """One run: what is seen of it, what is to be done, and what the mouse has done.
-
-    Attributes:
-        hand: what is to be done; None before anything is seen.
-        closed, depth: to which the mouse has closed the hand, and led it, m; `depth` None before it has.
-    """
-
-    def __init__(self, scene: SeenScene) -> None:
-        self.scene = scene
-        self.hand: ScriptedHand | None = None
-        self.closed = False
-        self.depth: float | None = None
-
-    def see(self, message: bytes, target: Mapping[str, Any] | None) -> None:
-        """Take in a state of the run."""
-        self.scene.take(message)
-        if self.hand is None:
-            self.hand = ScriptedHand(self.scene)
-            self.closed = self.hand.closed
-        self.hand.act(target)
 
 
 class MouseHand:
@@ -64,50 +57,44 @@ class MouseHand:
 
     def __init__(self, page: Page) -> None:
         self._page = page
-        self._run: _Run | None = None
-        self._target: Mapping[str, Any] | None = None
-        self._key = ""
-        page.on("websocket", lambda connection: connection.on("framereceived", self._see))
-
-    def _see(self, message: str | bytes) -> None:
-        """Take in what the page is told to draw, and what is to be done about it."""
-        if isinstance(message, bytes):
-            if self._run is not None:
-                self._run.see(message, self._target)
-            return
-        told = json.loads(message)
-        if "scene" in told:
-            self._run = _Run(SeenScene(told["scene"]))
-        elif "target" in told:
-            self._target = told["target"]
-        elif "screen" in told and told["screen"]["screen"] != "practising":
-            self._target = None
+        self._number = 0
+        self._scene: SeenScene | None = None
+        self._hand: ScriptedHand | None = None
+        self._closed, self._depth, self._key = False, 0.0, ""
+        page.add_init_script(NOTE)
 
     def act(self) -> None:
-        """Do for a moment what is called for."""
-        run = self._run
-        if run is not None and run.hand is not None:
-            self._lead(run, run.hand)
+        """Look at the page, and do for a moment what is called for."""
+        looked: dict[str, Any] | None = self._page.evaluate(LOOK)
+        if looked is not None:
+            if looked["run"] != self._number:
+                self._scene, self._hand, self._number = (
+                    SeenScene(self._page.evaluate("seen.scene")),
+                    None,
+                    looked["run"],
+                )
+            assert self._scene is not None
+            self._scene.take(np.array(looked["frame"]).tobytes())
+            if self._hand is None:
+                self._hand = ScriptedHand(self._scene)
+                self._closed, self._depth = self._hand.closed, seen_at(self._scene.place("hand"), looked)[2]
+            self._hand.act(looked["target"])
+            self._turn(str((looked["target"] or {}).get("name", "")))
+            self._lead(self._hand, looked)
         self._page.wait_for_timeout(15)
 
-    def _lead(self, run: "_Run", hand: ScriptedHand) -> None:
-        """Lead the hand to its place: by the pointer, and by as many notches as that is deeper than it was led."""
-        places = [hand.place.tolist(), run.scene.place("hand").tolist()]
-        seen: list[list[float]] | None = self._page.evaluate(SEEN_AT, places)
-        if seen is None or run is not self._run:
-            return
-        (x, y, depth), (_, _, at_first) = seen
-        run.depth = at_first if run.depth is None else run.depth
-        if hand.closed != run.closed:
+    def _lead(self, hand: ScriptedHand, looked: Mapping[str, Any]) -> None:
+        """Click, if the hand is to close or to open; then lead it to its place."""
+        if hand.closed != self._closed:
             self._page.mouse.down()
             self._page.mouse.up()
-            run.closed = not run.closed
-        self._turn(str((self._target or {}).get("name", "")))
+            self._closed = hand.closed
+        x, y, depth = seen_at(hand.place, looked)
         self._page.mouse.move(x, y)
-        notches = round((depth - run.depth) / NOTCH)
+        notches = round((depth - self._depth) / NOTCH)
         if notches:
             self._page.mouse.wheel(0, notches * PIXELS)
-        run.depth += notches * NOTCH
+            self._depth += notches * NOTCH
 
     def _turn(self, name: str) -> None:
         """Hold the key that turns the hand as the practice asks, until it asks for something else."""
@@ -118,3 +105,14 @@ class MouseHand:
             if key:
                 self._page.keyboard.down(key)
             self._key = key
+
+
+def seen_at(p: Floats, looked: Mapping[str, Any]) -> tuple[float, float, float]:
+    """Return where a point of W is seen: pixels of the page, within the picture, and its depth towards the eye, m."""
+    view, projection = (np.array(looked[name]).reshape(4, 4).T for name in ("view", "projection"))
+    in_view = view @ [*p, 1.0]
+    x, y, _, w = projection @ in_view
+    left, top, width, height = looked["box"]
+    pixel = np.array([left + 0.5 * (1.0 + x / w) * width, top + 0.5 * (1.0 - y / w) * height])
+    pixel = np.clip(pixel, [left + MARGIN, top + MARGIN], [left + width - MARGIN, top + height - MARGIN])
+    return float(pixel[0]), float(pixel[1]), float(in_view[2])

@@ -24,7 +24,7 @@ def play_on(page: Page, hand: MouseHand, after: str) -> None:
 def test_a_person_with_a_mouse_gets_through_the_study_by_what_the_page_shows(browser: Browser, tmp_path: Path):
     plan = pilot_plan(tmp_path / "plan.toml", devices='["mouse"]', patience=60, practice=60, repetitions=1)
     out = tmp_path / "study"
-    with served(plan, out) as (address, _), browser.new_page(viewport={"width": 1400, "height": 900}) as page:
+    with served(plan, out) as (address, _), browser.new_page(viewport={"width": 1000, "height": 600}) as page:
         messages: list[str] = []
         page.on("pageerror", lambda error: messages.append(str(error)))
         hand = MouseHand(page)
