@@ -341,7 +341,9 @@
   setInterval(() => device() === "tracker" && send({clock: performance.now() / 1000}), 500);
   link.addEventListener("close", ({reason}) => {
     leaveCamera();
-    if (!over) tell(word("lost_connection") + (reason && ` (${reason})`));
+    if (over) return;
+    root.querySelectorAll("button").forEach(b => { b.disabled = true; });  // nobody is there who would do it
+    tell(word("lost_connection") + (reason && ` (${reason})`));
   });
   window.study = {send, get play() { return play; }, get screen() { return shown?.screen; }};
 })();
