@@ -84,11 +84,15 @@ class WebcamFiles:
         """Return the SHA-256 of each file, in hexadecimal digits."""
         return {name: hashlib.sha256(content).hexdigest() for name, content in self.contents.items()}
 
-    def routes(self) -> Sequence[Route]:
-        """Return where they are served, with the program that uses them."""
+    def routes(self, below: str = "/") -> Sequence[Route]:
+        """Return where they are served, with the program that uses them.
+
+        Args:
+            below: path of the page.
+        """
         served = {Path(name).name: content for name, content in self.contents.items()}
         served["worker.js"] = asset("hand_worker.js").encode()
-        return [Route(f"/webcam/{name}", _served(name, content)) for name, content in served.items()]
+        return [Route(f"{below}webcam/{name}", _served(name, content)) for name, content in served.items()]
 
 
 def _content(path: Path) -> bytes:

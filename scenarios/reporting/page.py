@@ -101,7 +101,9 @@ def page_html(
     )
 
 
-def plain_page_html(title: str, html: str, styles: Sequence[str], scripts: Sequence[str]) -> str:
+def plain_page_html(
+    title: str, html: str, styles: Sequence[str], scripts: Sequence[str], *, works: bool = False
+) -> str:
     """Return a page without headings and sections that connects to where it comes from, see `page_html`.
 
     Args:
@@ -109,6 +111,7 @@ def plain_page_html(title: str, html: str, styles: Sequence[str], scripts: Seque
         html: the body.
         styles: style sheets.
         scripts: names of files in `scenarios/reporting/page/`, in the order in which they run.
+        works: whether its scripts may begin threads (workers) of scripts from there.
     """
     texts = [asset(name) for name in scripts]
     return template("plain_page.html").render(
@@ -116,7 +119,7 @@ def plain_page_html(title: str, html: str, styles: Sequence[str], scripts: Seque
         html=Markup(html),
         styles=[Markup(s) for s in styles],
         scripts=[Markup(s) for s in texts],
-        policy=_policy(texts, connects=True),
+        policy=_policy(texts, connects=True, works=works),
     )
 
 

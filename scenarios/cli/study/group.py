@@ -193,6 +193,6 @@ def _print_plan(data: dict[str, Any], plan: "StudyPlan") -> None:
 
 
 def _device(name: str) -> str:
-    from handover.scenarios.study.plan.plan import DEVICES, NOT_OFFERED
+    from handover.scenarios.study.plan.plan import DEVICES, WEBCAM
 
-    return f"{name}, {DEVICES[name]}" + (f" (not offered: {NOT_OFFERED[name]})" if name in NOT_OFFERED else "")
+    return f"{name}, {DEVICES[name]}" + (" (offered by `study serve --webcam FOLDER`)" if name == WEBCAM else "")

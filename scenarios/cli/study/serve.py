@@ -35,6 +35,14 @@ the hand by what the page shows.
     metavar="N",
     help="Number of the first participant.  [default: the next; the page asks, if a session is not complete]",
 )
+@click.option(
+    "--webcam",
+    "webcam_folder",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Offer the plan's device webcam, by MediaPipe: the unpacked npm package @mediapipe/tasks-vision with the model"
+    " hand_landmarker.task in it.  [default: not offered]",
+)
 @click.option("--pilot", is_flag=True, help="Let a script take part in the place of people, until all have.")
 @click.option(
     "--pace",
@@ -44,7 +52,15 @@ the hand by what the page shows.
 )
 @click.help_option("-h", "--help")
 def serve(
-    file: Path, out: Path, host: str, port: int, participant: int | None, *, pilot: bool, pace: float | None
+    file: Path,
+    out: Path,
+    host: str,
+    port: int,
+    participant: int | None,
+    webcam_folder: Path | None,
+    *,
+    pilot: bool,
+    pace: float | None,
 ) -> None:
     """Carry out a study."""
     from handover.scenarios.cli.study.group import checked_plan
@@ -61,12 +77,20 @@ def serve(
             raise UsageError(f"--pace: {file} is of people, who live at pace 1; of scripted pilots it may be another")
         if participant is not None and participant > plan.participants:
             raise UsageError(f"--participant: the plan has {plan.participants}, not {participant}")
+        from handover.scenarios.live.webcam import InvalidWebcamFiles, WebcamFiles
+        from handover.scenarios.study.plan.plan import WEBCAM
         from handover.scenarios.study.session.served_study import (  # uvicorn and starlette, of the extra
             NotServed,
             PilotsBrokenOff,
             serve_study,
         )
 
+        if webcam_folder is not None and WEBCAM not in plan.devices:
+            raise UsageError(f"--webcam: {file} has no device {WEBCAM!r}; it has {', '.join(plan.devices)}")
+        try:
+            webcam = None if webcam_folder is None else WebcamFiles.read(webcam_folder)
+        except InvalidWebcamFiles as e:
+            raise UsageError(f"--webcam: {e}") from e
         try:
             with contextlib.suppress(KeyboardInterrupt):
                 asyncio.run(
@@ -78,6 +102,7 @@ def serve(
                         number=participant,
                         pace=pace or 1.0,
                         pilot=pilot,
+                        webcam=webcam,
                         tell=lambda line: click.echo(line, err=True),
                     )
                 )

@@ -1,12 +1,14 @@
 // Leads a hand by a webcam; pictures go to a thread of this page and nowhere else, and none is kept.
 //   const watched = handCamera({video, axes, start, right, onSample, onTold})
 //     video        the element that shows what the camera sees
-//     axes         returns the directions of the view in W: to its right, up, towards the eye
+//     axes         returns the directions of the view in W: to its right, up, towards the eye; null while nothing is led
 //     start        {p_WH, closed, centre, radius}, see handInput
 //     right        whether the right hand is to be seen
 //     onSample     is called with a sample for each picture with a hand; where none is seen, the sample before ages
-//     onTold       is called with what there is to tell: what is waited for, whether a hand is seen, why the webcam cannot lead
-//   watched.end()  lets go of the camera
+//     onTold       is called with how it is: "asks" for the camera, "loads" MediaPipe, "seeks" a hand, "sees" one, or
+//                  "fails", and then with why the webcam cannot lead
+//   watched.restart(start)   leads another hand from now on
+//   watched.end()            lets go of the camera
 "use strict";
 const handCamera = ({video, axes, start, right, onSample, onTold}) => {
   const REASONS = {
@@ -15,20 +17,20 @@ const handCamera = ({video, axes, start, right, onSample, onTold}) => {
     NotReadableError: "the camera cannot be read; another program may be using it",
     OverconstrainedError: "the camera gives no picture of 640 by 480 or so",
   };
-  const guide = handLandmarks.guide({start, right});
+  let guide = handLandmarks.guide({start, right});
   let worker = null, stream = null, over = false, busy = false, sees = null;
 
   function fail(why) {
     if (over) return;
     end();
-    onTold(`The webcam cannot lead the hand: ${why}. Another device may be chosen.`);
+    onTold("fails", why);
   }
 
   // Tells once that a hand comes into the picture or leaves it.
   function tellSeen(seen) {
     if (seen === sees) return;
     sees = seen;
-    onTold(seen ? "The camera sees the hand." : "Show your hand to the camera: until it sees one, the hand stops.");
+    onTold(seen ? "sees" : "seeks");
   }
 
   function take({data}) {
@@ -39,9 +41,10 @@ const handCamera = ({video, axes, start, right, onSample, onTold}) => {
     } else if (!over) {
       busy = false;
       const size = {width: video.videoWidth, height: video.videoHeight}, t = data.at / 1000;
-      const hand = data.landmarks ? guide.take(t, data.landmarks, data.world, size, axes()) : null;
+      const view = axes();
+      const hand = data.landmarks ? guide.take(t, data.landmarks, data.world, size, view ?? handLandmarks.AXES) : null;
       tellSeen(hand !== null);
-      if (hand) onSample({...hand, stamp: t, sent: performance.now() / 1000, device: right ? "webcam" : "webcam, left hand"});
+      if (hand && view) onSample({...hand, stamp: t, sent: performance.now() / 1000, device: right ? "webcam" : "webcam, left hand"});
     }
   }
 
@@ -64,7 +67,7 @@ const handCamera = ({video, axes, start, right, onSample, onTold}) => {
   async function begin() {
     if (!navigator.mediaDevices?.getUserMedia) return fail("this browser gives pages at this address no camera");
     if (!video.requestVideoFrameCallback) return fail("this browser does not tell when pictures were taken");
-    onTold("The browser asks whether the camera may be used.");
+    onTold("asks");
     try {
       const wish = {width: {ideal: 640}, height: {ideal: 480}, frameRate: {ideal: 60}, facingMode: "user"};
       stream = await navigator.mediaDevices.getUserMedia({audio: false, video: wish});
@@ -75,7 +78,7 @@ const handCamera = ({video, axes, start, right, onSample, onTold}) => {
     stream.getVideoTracks()[0].addEventListener("ended", () => fail("the camera was taken away"));
     video.srcObject = stream;
     video.hidden = false;
-    onTold("MediaPipe's files are loaded.");
+    onTold("loads");
     worker = new Worker("webcam/worker.js", {type: "module"});
     worker.addEventListener("message", take);
     worker.addEventListener("error", event => fail(`its program could not be loaded${event.message ? `: ${event.message}` : ""}`));
@@ -96,5 +99,5 @@ const handCamera = ({video, axes, start, right, onSample, onTold}) => {
   }
 
   begin();
-  return {end};
+  return {end, restart: from => { guide = handLandmarks.guide({start: from, right}); }};
 };

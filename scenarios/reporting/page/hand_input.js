@@ -10,6 +10,7 @@
 //   hand.pose()             {p_WH, q_WH, closed}
 //   hand.place(pose)        takes in where another device has led it
 //   hand.start              as given
+//   hand.axes()             directions of the view in W: to its right, up, towards the eye
 //   hand.end()              lets go of the element
 // The mouse moves the hand in the plane of the picture, at the hand's depth: it is where the pointer is. The wheel moves
 // it towards the eye and away. A finger on a screen takes it along, two change its depth. With Alt the pointer is the view's.
@@ -22,7 +23,7 @@ const handInput = (() => {
   const KEYS = {
     ArrowRight: ["move", 0, 1], ArrowLeft: ["move", 0, -1], ArrowUp: ["move", 1, 1], ArrowDown: ["move", 1, -1],
     PageDown: ["move", 2, 1], PageUp: ["move", 2, -1],
-    KeyS: ["turn", 0, 1], KeyW: ["turn", 0, -1], KeyD: ["turn", 1, 1], KeyA: ["turn", 1, -1], KeyQ: ["turn", 2, 1], KeyE: ["turn", 2, -1],
+    KeyS: ["turn", 0, 1], KeyW: ["turn", 0, -1], KeyA: ["turn", 1, 1], KeyD: ["turn", 1, -1], KeyQ: ["turn", 2, 1], KeyE: ["turn", 2, -1],
   };
   const HERE = new Set(["pointer", "gamepad"]);
   const live = x => Math.abs(x ?? 0) > DEAD ? x : 0;
@@ -87,7 +88,7 @@ const handInput = (() => {
         if (!pad) return;  // no samples: the hand stops
         const button = i => pad.buttons[i]?.value ?? 0;
         const [a, b, c, d] = [0, 1, 2, 3].map(i => live(pad.axes[i]));
-        drive([a, -b, button(7) - button(6)], [d, c, button(4) - button(5)], dt);
+        drive([a, -b, button(7) - button(6)], [d, -c, button(4) - button(5)], dt);
         const down = button(0) > 0.5;
         if (down && !pressed) grasp(!closed);
         pressed = down;
@@ -169,6 +170,7 @@ const handInput = (() => {
         if (closed !== pose.closed) onChange(closed = pose.closed);
       },
       start,
+      axes: () => axes().map(e => e.toArray()),
       pose: () => ({p_WH: p.toArray(), q_WH: [q.w, q.x, q.y, q.z], closed}),
       end() {
         clearInterval(timer);

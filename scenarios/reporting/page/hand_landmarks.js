@@ -3,8 +3,10 @@
 //     landmarks    21 points of the picture, {x, y} from 0 to 1 of its width and height
 //     world        the same points in space, {x, y, z} in m, about the hand's middle, along the axes of C
 //     width, height, right    of the picture, in pixels; whether it is a right hand
+//   handLandmarks.AXES     of a view that nothing is seen in
 //   handLandmarks.guide({start, right})   turns such samples, one after the other, into where a hand is wanted
-//     guide.take(t, landmarks, world, size, axes)   {p_WH, q_WH, closed, angles}, or null; t in s, axes of the view in W
+//     guide.take(t, landmarks, world, size, axes)   {p_WH, q_WH, closed, angles}, or null; t in s, axes of the view in W;
+//       a hand that is closed at the start, as around an object, stays so, without angles, until a fist has been seen
 // C is the camera's frame: x to the right of the picture, y down, z away from the camera. H is the hand's, see
 // hand_kinematics.py: x along straight fingers, y to a right hand's thumb, z out of the back of the hand.
 // The picture is a pinhole's, distortion is left out. A camera on a screen looks at who looks at the screen, so the right
@@ -21,6 +23,7 @@ const handLandmarks = (() => {
   // The one-euro filter of Casiez, Roussel and Vogel 2012: a low pass whose cutoff is `still` Hz at rest and grows by `quick`
   // times the speed, which is itself low-passed at 1 Hz. At 0.5 m/s the palm lags by 21 ms, at rest by 0.1 s.
   const FILTERS = {p: {still: 1.5, quick: 12}, q: {still: 1.5, quick: 4}, angles: {still: 1.5, quick: 1}}, SPEED_CUTOFF = 1;
+  const AXES = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
   const LOST = 0.5;  // s without a hand after which it may come back elsewhere, as a mouse that was lifted
 
   const sub = (a, b) => a.map((x, i) => x - b[i]), dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
@@ -111,6 +114,7 @@ const handLandmarks = (() => {
 
   function guide({start, right = true}) {
     let wanted = start.p_WH, closed = start.closed, last = -Infinity, origin = null, filters = {}, q = null;
+    let holds = start.closed;  // what the person has not taken over yet by a fist
 
     function take(t, landmarks, world, size, axes) {
       const seen = pose(landmarks, world, {...size, right});
@@ -128,11 +132,12 @@ const handLandmarks = (() => {
       const from = sub(p, start.centre), far = norm(from);
       wanted = far > start.radius ? added(start.centre, scaled(start.radius / far, from)) : p;
       q = scaled(1 / norm(raw), raw);
-      closed = closed ? seen.spread < OPENS : seen.spread < CLOSES;
+      holds &&= seen.spread >= CLOSES;
+      closed = holds || seen.spread < (closed ? OPENS : CLOSES);
       last = t;
-      return {p_WH: wanted, q_WH: q, closed, angles};
+      return {p_WH: wanted, q_WH: q, closed, ...(holds ? {} : {angles})};
     }
     return {take};
   }
-  return {pose, guide, PALM_LENGTH, FIELD, CLOSES, OPENS};
+  return {pose, guide, AXES, PALM_LENGTH, FIELD, CLOSES, OPENS};
 })();

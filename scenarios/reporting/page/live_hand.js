@@ -6,14 +6,21 @@
 const leadHandIn = (element, camera) => {
   const part = name => document.getElementById("hand-" + name);
   const HELP = {
-    pointer: "The hand is where the mouse is. The wheel moves it towards you and away; a click, or the space bar, closes and opens it; Q, E, "
-      + "W, S, A and D turn it, arrows move it. A finger takes it along, two fingers change its depth. With Alt, you turn the view instead.",
+    pointer: "The hand is where the mouse is. The wheel moves it towards you and away; a click, or the space bar, closes and opens it. Q and E "
+      + "roll it, W and S tilt its fingers down and up, A and D turn them left and right; arrows move it. A finger takes it along, two fingers change its depth. With Alt, you turn the view instead.",
     gamepad: "The left stick moves the hand, the triggers towards you and away, the right stick turns it, the first button closes and opens it.",
     tracker: `A tracker sends texts such as {"p_WH": [-0.4, 0.1, -0.05], "q_WH": [1, 0, 0, 0], "closed": false, "stamp": 12.5} to `
       + `ws://${location.host}/hand: m in the world, a quaternion with its scalar first, s.`,
     webcam: "Move your hand before the camera as if it were in the scene: palm, fist and depth are taken from its pictures, which stay in this "
       + "page. Where the hand is first seen, it goes on from where it stands; take it out of the picture for a moment to begin elsewhere.",
     nothing: "Nothing leads the hand: it stops, and keeps what it holds.",
+  };
+  const CAMERA = {
+    asks: () => "The browser asks whether the camera may be used.",
+    loads: () => "MediaPipe's files are loaded.",
+    seeks: () => "Show your hand to the camera: until it sees one, the hand stops.",
+    sees: () => "The camera sees the hand.",
+    fails: why => `The webcam cannot lead the hand: ${why}. Another device may be chosen.`,
   };
   const lead = {hand: null, close}, closed = new AbortController();
   let link = null, told = 0, watched = null, cameraTold = "";
@@ -61,16 +68,12 @@ const leadHandIn = (element, camera) => {
 
   // The webcam's samples go the way of others', and are where the hand is for the device after it.
   function watch() {
-    const axes = () => {
-      camera.updateMatrixWorld();
-      return [0, 4, 8].map(at => camera.matrixWorld.elements.slice(at, at + 3));
-    };
     const onSample = sample => {
       lead.hand.place(sample);
       send(sample);
     };
     const start = {...lead.hand.start, ...lead.hand.pose()}, right = part("side").value === "right";
-    watched = handCamera({video: part("video"), axes, start, right, onSample, onTold: tellOfCamera});
+    watched = handCamera({video: part("video"), axes: lead.hand.axes, start, right, onSample, onTold: (how, why) => tellOfCamera(CAMERA[how](why))});
   }
   function leaveCamera() {
     watched?.end();

@@ -309,7 +309,8 @@ const sceneIn = (() => {
     const span = 1.25 * reach;
     Object.assign(sun.shadow.camera, {left: -span, right: span, bottom: -span, top: span, near: 0.2 * reach, far: 7 * reach});
     scene.add(sun, sun.target);
-    const ground = weightless ? null : floorOf(floor, centre, reach, round125(Math.max(...sides) / 6));
+    // A little below what stands on it: two faces in one plane would flicker.
+    const ground = weightless ? null : floorOf(floor - reach / 500, centre, reach, round125(Math.max(...sides) / 6));
     const dot = roundDot();
     scene.add(ground ? ground.group : stars(50 * reach, dot));
 

@@ -5,10 +5,12 @@
   const root = document.querySelector(".study"), {words} = page.data(root);
   const byId = id => document.getElementById(id);
   const main = byId("screen");
-  let shown = null, play = null, input = null, test = null, named = 0, over = false, drawn = [], hasTracker = false, held = [];
+  let shown = null, play = null, input = null, test = null, named = 0, over = false, ready = false, drawn = [], hasTracker = false, held = [];
+  let watched = null, camera = {how: "", why: ""};  // by the webcam, and how it is with it, see hand_camera.js
   const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
   const TURNS = {"+roll": "roll_right", "-roll": "roll_left", "+pitch": "fingers_down", "-pitch": "fingers_up",
     "+yaw": "fingers_left", "-yaw": "fingers_right"};
+  const KEYS = {"+roll": "E", "-roll": "Q", "+pitch": "W", "-pitch": "S", "+yaw": "A", "-yaw": "D"};  // see hand_input.js
   const device = () => shown?.device ?? "";
 
   // A word of the page in the language of the study, with values in place of {names}.
@@ -81,9 +83,9 @@
     practice: s => [node("h1", {}, word("practice")), ...paragraphs(s.practice),
       ...(s.reason ? [node("p", {}, word("practice_again", s))] : []),
       node("p", {}, word(`help_${device()}`)),
-      node("p", {}, word("practice_for", {minutes: Number((s.seconds / 60).toFixed(1))})), ...trackerLine(),
+      node("p", {}, word("practice_for", {minutes: Number((s.seconds / 60).toFixed(1))})), ...deviceLines(),
       actions(button("begin", () => act("begin"), {first: true}))],
-    instruction: s => [node("h1", {}, s.name), ...paragraphs(s.instruction), node("p", {class: "soft"}, word(`help_${device()}`)), ...trackerLine(),
+    instruction: s => [node("h1", {}, s.name), ...paragraphs(s.instruction), node("p", {class: "soft"}, word(`help_${device()}`)), ...deviceLines(),
       actions(button("begin", () => act("begin"), {first: true}))],
     practising: () => waiting(),
     round: () => waiting(),
@@ -106,6 +108,45 @@
     line.textContent = word(hasTracker ? "tracker_there" : "tracker_missing", {address});
     main.querySelectorAll("button.first").forEach(b => { b.disabled = !hasTracker; });
   }
+
+  // The webcam is on from the practice to the last round; it leads the hand while a run goes on.
+  const WATCHED = new Set(["practice", "practising", "instruction", "round", "void", "rating"]);
+  const NOWHERE = {p_WH: [0, 0, 0], closed: false, centre: [0, 0, 0], radius: 1};
+  function useCamera() {
+    const isWanted = device() === "webcam" && WATCHED.has(shown.screen);
+    if (isWanted && !watched) watch();
+    else if (!isWanted) leaveCamera();
+  }
+  function watch() {
+    leaveCamera();
+    if (!byId("video")) return tellOfCamera("fails", word("camera_not_offered"));
+    byId("video").setAttribute("aria-label", word("camera_mirror"));
+    const axes = () => input?.axes() ?? null;
+    watched = handCamera({video: byId("video"), axes, start: NOWHERE, right: true, onSample: lead, onTold: tellOfCamera});
+  }
+  function leaveCamera() {
+    watched?.end();
+    watched = null;
+  }
+  function tellOfCamera(how, why = "") {
+    camera = {how, why};
+    nameCamera();
+    if (how === "sees") letGo();
+  }
+  function nameCamera() {
+    if (device() !== "webcam") return;
+    const told = word(`camera_${camera.how}`, camera), isReady = ["seeks", "sees"].includes(camera.how);
+    byId("help").textContent = camera.how === "sees" ? word("help_webcam") : told;
+    const line = byId("camera");
+    if (!line) return;
+    line.textContent = told;
+    byId("camera-again").hidden = camera.how !== "fails";
+    main.querySelectorAll("button.first").forEach(b => { b.disabled = !isReady; });
+  }
+  const cameraLines = () => device() !== "webcam" ? [] : [node("p", {id: "camera", role: "status"}),
+    node("button", {type: "button", id: "camera-again", hidden: true, onclick: watch}, word("camera_again"))];
+  const deviceLines = () => [...trackerLine(), ...cameraLines()];
+  const nameDevice = () => { nameTracker(); nameCamera(); };
   const waiting = () => [node("p", {class: "study-wait"}, node("span", {}, word("getting_ready")))];
   const settings = () => ({width: innerWidth, height: innerHeight, pixel_ratio: devicePixelRatio});
 
@@ -168,7 +209,8 @@
     byId("withdraw").textContent = word("withdraw");
     main.replaceChildren(...screens[screen.screen](screen));
     main.hidden = false;
-    nameTracker();
+    useCamera();
+    nameDevice();
     root.dataset.screen = screen.screen;
     main.focus({preventScroll: true});
     scrollTo(0, 0);
@@ -193,20 +235,34 @@
     play.sideShown = wantsSide();
     nameViews();
     byId("help").textContent = word(`help_${device()}`);
+    watched?.restart(start);
+    nameCamera();
     byId("task").textContent = shown.name ?? word("free_play");
     for (const id of ["eye", "side"]) byId(id).setAttribute("aria-label", word(id === "eye" ? "view_eye" : "view_side"));
     const onChange = closed => { byId("grasp").textContent = word(closed ? "open_hand" : "close_hand"); };
     byId("grasp").hidden = device() !== "touch";
     onChange(start.closed);
-    const onSample = hand => { if (link.bufferedAmount < 4000) send({hand}); };
-    input = handInput({element: byId("pad"), camera: play.scene.camera, start, onSample, onChange});
+    input = handInput({element: byId("pad"), camera: play.scene.camera, start, onSample: lead, onChange});
     input.choose(INPUTS[device()] ?? "nothing");
     byId("pad").focus({preventScroll: true});
     keys = event => { if (event.key === "v" || event.key === "V") turnViews(); };
-    requestAnimationFrame(() => requestAnimationFrame(() => send({ready: true})));
+    ready = false;
+    requestAnimationFrame(() => requestAnimationFrame(() => {
+      ready = true;
+      letGo();
+    }));
+  }
+  const lead = hand => link.bufferedAmount < 4000 && send({hand});
+
+  // A run begins when its scene has been drawn and, with a webcam, a hand is seen: until then nothing would lead it.
+  function letGo() {
+    if (!ready || (device() === "webcam" && camera.how !== "sees")) return;
+    ready = false;
+    send({ready: true});
   }
 
   function endPlay() {
+    ready = false;
     flush();
     input?.end();
     play?.dispose();
@@ -246,7 +302,9 @@
     const name = test.place ? "place_to_go" : TURNS[test.name] ?? (test.name ? "make_fist" : "free_play");
     const at = play?.hand().p_WH ?? [];
     const far = test.place && at.length ? Math.hypot(...at.map((x, i) => x - test.place[i])) : NaN;
-    const told = Number.isFinite(far) ? [word(name, test), word("still_away", {distance: Math.round(100 * far)})] : [word(name, test)];
+    const told = [word(name, test)];
+    if (Number.isFinite(far)) told.push(word("still_away", {distance: Math.round(100 * far)}));
+    if (KEYS[test.name] && device() === "mouse") told.push(word("by_key", {key: KEYS[test.name]}));
     byId("task").textContent = told.join(" ");
   }
 
@@ -268,17 +326,24 @@
     else if (message.refused) {
       tell(message.refused);
       release();
-      nameTracker();
+      nameDevice();
     }
     else if (message.gone) {
       over = true;
       endPlay();
-      main.replaceChildren(node("p", {}, word(message.gone)));
+      leaveCamera();
+      main.replaceChildren(node("h1", {}, word("not_here")), node("p", {}, word(message.gone)),
+        actions(button("reload", () => location.reload(), {first: true})));
       main.hidden = false;
       root.dataset.screen = message.gone;
     }
   });
   setInterval(() => device() === "tracker" && send({clock: performance.now() / 1000}), 500);
-  link.addEventListener("close", ({reason}) => { if (!over) tell(word("lost_connection") + (reason && ` (${reason})`)); });
+  link.addEventListener("close", ({reason}) => {
+    leaveCamera();
+    if (over) return;
+    root.querySelectorAll("button").forEach(b => { b.disabled = true; });  // nobody is there who would do it
+    tell(word("lost_connection") + (reason && ` (${reason})`));
+  });
   window.study = {send, get play() { return play; }, get screen() { return shown?.screen; }};
 })();

@@ -23,7 +23,7 @@ DEVICES: Mapping[str, str] = {
     "mouse": "mouse and keyboard",
     "touch": "touch screen",
     "gamepad": "gamepad",
-    "camera": "hand followed by a camera",
+    "webcam": "hand followed by a webcam",
     "tracker": "hand tracker, such as a Leap Motion",
     "script": "scripted pilot, no person",
 }
@@ -31,8 +31,8 @@ DEVICES: Mapping[str, str] = {
 
 TRACKER = "tracker"
 """The device that sends its samples by a connection of its own."""
-NOT_OFFERED: Mapping[str, str] = {"camera": "it needs a model of hands, which a study's page cannot take yet"}
-"""Devices that a plan may name and the page does not offer, and why."""
+WEBCAM = "webcam"
+"""The device that is offered only where the lab gives the files that find a hand in pictures."""
 
 _CHOICE, _TEXT = "choice", "text"
 
@@ -249,10 +249,6 @@ def _devices(plan: PlanTable, pilot: bool) -> Sequence[str]:
             plan.faults.append(f"devices: no device {name!r}; {nearest(name, DEVICES)}")
     if "script" in devices and not pilot:
         plan.faults.append("devices: 'script' is no person's; pilot = true is of scripted pilots")
-    if devices and all(name in NOT_OFFERED for name in devices):
-        why = "; ".join(f"{name}: {NOT_OFFERED[name]}" for name in dict.fromkeys(devices))
-        offered = ", ".join(name for name in DEVICES if name not in NOT_OFFERED and name != "script")
-        plan.faults.append(f"devices: the page offers none of them ({why}); it offers {offered}")
     return devices
 
 

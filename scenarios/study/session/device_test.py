@@ -22,7 +22,7 @@ _TURNS = (("roll", (1.0, 0.0, 0.0)), ("pitch", (0.0, 1.0, 0.0)), ("yaw", (0.0, 0
 _CLOSE, _ANGLE, _STAY = 0.03, 0.4, 0.3
 """How near to a place, m, how far turned, rad, and for how long, s, it counts as reached (assumed)."""
 _FISTS = 2
-TURNING = ("mouse", "gamepad", "camera", "tracker")
+TURNING = ("mouse", "gamepad", "webcam", "tracker")
 """Devices that turn the hand."""
 
 

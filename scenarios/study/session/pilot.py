@@ -99,7 +99,7 @@ class ScriptedHand:
         self.place: Floats = self._rest.copy()
         self.closed = float(np.linalg.norm(scene.place("object") - self._rest)) < _FAR
         self._steps: list[Callable[[float], bool]] = []
-        self._saw_light, self._since, self._time = False, 0.0, scene.time
+        self._saw_light, self._signalled, self._since, self._time = False, False, 0.0, scene.time
         self._gap = 0.0
 
     def act(self, target: Mapping[str, Any] | None) -> None:
@@ -110,8 +110,9 @@ class ScriptedHand:
             self._practise(dt, target)
             return
         light = scene.light
-        if light and not self._saw_light and not self._steps:
-            self._since = 0.0
+        self._signalled = self._signalled or (light and not self._saw_light)  # also while it still withdraws
+        if self._signalled and not self._steps:
+            self._since, self._signalled = 0.0, False
             self._gap = self._jaws_apart()
             self._steps = self._giving() if self.closed else self._taking()
         self._saw_light = light

@@ -22,6 +22,7 @@ import time
 import traceback
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, cast
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -31,7 +32,7 @@ from handover.scenarios.live.hand_messages import DeviceClock, InvalidHandMessag
 from handover.scenarios.results.run_folder import InvalidRunFolder
 from handover.scenarios.study.folder.session_folder import RoundRecord
 from handover.scenarios.study.plan.led_hands import round_parameters
-from handover.scenarios.study.plan.plan import TRACKER
+from handover.scenarios.study.plan.plan import TRACKER, WEBCAM
 from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session.page_messages import MessageRate, parse_message, received_text
 from handover.scenarios.study.session.practice import PRACTICE, Practice, is_lost
@@ -54,13 +55,14 @@ class StudySeat:
     Args:
         protocol: what is shown.
         pace: simulated seconds per second of wall time, which is 1 but for scripted pilots.
+        webcam: hashes of the files by which a webcam leads the hand, kept with each run that it leads.
 
     Attributes:
         on_run: is told where the hand is as a run begins; None without a tracker.
     """
 
-    def __init__(self, protocol: Protocol, pace: float = 1.0) -> None:
-        self.protocol, self._pace = protocol, pace
+    def __init__(self, protocol: Protocol, pace: float = 1.0, webcam: Mapping[str, str] = MappingProxyType({})) -> None:
+        self.protocol, self._pace, self._webcam = protocol, pace, webcam
         self._page: WebSocket | None = None
         self._leaving = asyncio.Lock()  # held until the trial of a page that has gone is over
         self._trial: Trial | None = None
@@ -218,7 +220,9 @@ class StudySeat:
     def _next_wanted(self) -> Wanted:
         session, protocol = self.protocol.session, self.protocol
         assert session is not None
-        told = {"kind": session.session.kind, "device": session.session.device}
+        told: dict[str, Any] = {"kind": session.session.kind, "device": session.session.device}
+        if session.session.device == WEBCAM:
+            told["webcam"] = {"sha256": dict(self._webcam)}
         if protocol.screen in ("practice", "practising"):
             out = _free_folder(session.path / "practice")
             return Wanted(PRACTICE, self.practice.parameters, 0, out, told, self._pace)

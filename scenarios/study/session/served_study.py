@@ -8,9 +8,10 @@ from pathlib import Path
 
 from websockets.exceptions import ConnectionClosed
 
+from handover.scenarios.live.webcam import WebcamFiles
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.led_hands import hand_faults
-from handover.scenarios.study.plan.plan import NOT_OFFERED, TRACKER, StudyPlan
+from handover.scenarios.study.plan.plan import TRACKER, WEBCAM, StudyPlan
 from handover.scenarios.study.session.pilot import PilotRefused, play_sessions
 from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.seat import StudySeat
@@ -34,6 +35,7 @@ async def serve_study(
     number: int | None,
     pace: float,
     pilot: bool,
+    webcam: WebcamFiles | None,
     tell: Callable[[str], None],
 ) -> None:
     """Serve a study's page until it is ended, or until all scripted pilots have taken part.
@@ -46,19 +48,24 @@ async def serve_study(
         number: the first participant's; None: the next, or, where a session is not complete, whom the page is told.
         pace: simulated seconds per second of wall time.
         pilot: whether scripts take part.
+        webcam: files by which a webcam leads the hand; None where it is not offered.
         tell: is given lines for who carries it out.
 
     Raises:
-        NotServed: the address cannot be used, or in a scenario nobody outside can lead a hand.
+        NotServed: the address cannot be used, the page offers none of the plan's devices, or nobody outside can lead
+            the hand in a scenario.
         PilotsBrokenOff: scripted pilots did not get to their end.
         InvalidRunFolder, RecordNotWritten: see `StudyFolder.opened`.
     """
     if faults := hand_faults(plan):
         raise NotServed("; ".join(faults))
+    devices = devices_here(plan, webcam)
+    if not devices:
+        raise NotServed("the plan has no device but a webcam, which needs --webcam FOLDER")
     study = StudyFolder.opened(out, plan)
     with study.held():
-        seat = StudySeat(Protocol(study, devices_here(plan), number), pace)
-        server = StudyServer(seat, host)
+        seat = StudySeat(Protocol(study, devices, number), pace, {} if webcam is None else webcam.hashes())
+        server = StudyServer(seat, host, webcam)
         try:
             listening = listening_socket(host, port)
         except OSError as e:
@@ -115,6 +122,6 @@ def address_of(listening: socket.socket, server: StudyServer) -> str:
     return f"http://{shown}:{port}{server.path}"
 
 
-def devices_here(plan: StudyPlan) -> list[str]:
+def devices_here(plan: StudyPlan, webcam: WebcamFiles | None = None) -> list[str]:
     """Return the plan's devices that the page offers."""
-    return [name for name in plan.devices if name not in NOT_OFFERED]
+    return [name for name in plan.devices if name != WEBCAM or webcam is not None]

@@ -24,6 +24,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from handover.scenarios.live.connections import HEADERS
+from handover.scenarios.live.webcam import WEBCAM_SCRIPTS, WebcamFiles
 from handover.scenarios.reporting.html import json_html
 from handover.scenarios.reporting.page import asset, plain_page_html, template
 from handover.scenarios.reporting.replay_section import SCENE_SCRIPTS
@@ -35,7 +36,7 @@ from handover.scenarios.study.session.tracker import TrackerSeat
 _GRACE = 30
 """Time for a run under way to end when the server does, s."""
 LOOPBACK = ("127.0.0.1", "localhost")
-_SCRIPTS = ("page.js", *SCENE_SCRIPTS, "hand_input.js", "study_scene.js", "study.js")
+_SCRIPTS = ("page.js", *SCENE_SCRIPTS, "hand_input.js", "study_scene.js")
 _PILOT = "Pilot"
 """What heads the page in a plan of pilots: a script opens no page, so that whoever sees it is a person."""
 _FALLBACK = "en"
@@ -48,14 +49,21 @@ def page_words() -> dict[str, dict[str, Any]]:
     return tomli.loads(text)
 
 
-def study_html(plan: StudyPlan) -> str:
-    """Return the page; in a language that it has no words of its own for, buttons are in English."""
+def study_html(plan: StudyPlan, *, webcam: bool = False) -> str:
+    """Return the page; in a language that it has no words of its own for, buttons are in English.
+
+    Args:
+        plan: the study's.
+        webcam: whether one is offered to lead the hand.
+    """
     words = page_words()
     content = {
         "words": {name: {**words[_FALLBACK], **words.get(name, {})} for name in plan.texts},
     }
-    html = template("study.html").render(data=json_html(content), pilot=_PILOT if plan.pilot else "")
-    return plain_page_html(plan.title, html, (asset("page.css"), asset("replay.css"), asset("study.css")), _SCRIPTS)
+    html = template("study.html").render(data=json_html(content), pilot=_PILOT if plan.pilot else "", webcam=webcam)
+    styles = (asset("page.css"), asset("replay.css"), asset("study.css"))
+    scripts = (*_SCRIPTS, *(WEBCAM_SCRIPTS if webcam else ()), "study.js")
+    return plain_page_html(plan.title, html, styles, scripts, works=webcam)
 
 
 class StudyServer:
@@ -64,13 +72,14 @@ class StudyServer:
     Args:
         seat: that pages may take.
         host: the address on which it listens; on loopback no token is needed.
+        webcam: files by which a webcam leads the hand; None where it is not offered.
 
     Attributes:
         token: part of the page's address; "" on loopback.
     """
 
-    def __init__(self, seat: StudySeat, host: str = LOOPBACK[0]) -> None:
-        self.seat, self.host = seat, host
+    def __init__(self, seat: StudySeat, host: str = LOOPBACK[0], webcam: WebcamFiles | None = None) -> None:
+        self.seat, self.host, self._webcam = seat, host, webcam
         self._tracker = TrackerSeat(seat)
         self.token = "" if host in LOOPBACK else secrets.token_urlsafe(16)
 
@@ -87,6 +96,7 @@ class StudyServer:
                 Route(self.path, self._page),
                 WebSocketRoute(f"{self.path}seat", self._connection),
                 WebSocketRoute(f"{self.path}hand", self._tracker.connection),
+                *(() if self._webcam is None else self._webcam.routes(self.path)),
             ],
             middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=hosts)],
             lifespan=self._lifespan,
@@ -98,7 +108,8 @@ class StudyServer:
         await self.seat.close()
 
     async def _page(self, _request: Request) -> Response:
-        return HTMLResponse(study_html(self.seat.protocol.study.plan), headers=HEADERS)
+        html = study_html(self.seat.protocol.study.plan, webcam=self._webcam is not None)
+        return HTMLResponse(html, headers=HEADERS)
 
     async def _connection(self, page: WebSocket) -> None:
         origin = page.headers.get("origin", "")

@@ -260,6 +260,8 @@ class Trial:
             rule = failed_by_rule(run)
         except InvalidRunFolder as e:
             raise TrialFailed(self._why()) from e
+        if not summary:  # its process was killed before it wrote one
+            raise TrialFailed(self._why())
         if summary.get("failure") or not summary.get("complete", True):
             raise TrialFailed(f"the run did not come to its end: {summary.get('reason', '')}")
         pace: Mapping[str, Any] = summary.get("pace") or {}

@@ -124,6 +124,18 @@ def test_who_floods_is_disconnected_with_the_reason(tmp_path: Path):
     with_page(tmp_path, act)
 
 
+def test_a_message_beyond_all_bounds_ends_the_connection_with_the_reason(tmp_path: Path):
+    async def act(page: PageWithHand, host: str) -> None:
+        for path in ("run", "hand"):
+            async with opened(host, path, max_queue=None) as sending:
+                await sending.send("x" * (4 * page.longest + 1))
+                await sending.wait_closed()
+                assert sending.close_code == 1009
+                assert sending.close_reason == f"frame exceeds limit of {4 * page.longest} bytes"
+
+    with_page(tmp_path, act)
+
+
 def test_a_page_that_is_too_slow_is_closed_with_the_reason(tmp_path: Path):
     async def act(page: PageWithHand, host: str) -> None:
         async with opened(host, "run", max_size=None, max_queue=1, compression=None) as slow:

@@ -10,6 +10,7 @@ from live_runs import live_run, shown
 from numpy.typing import NDArray
 from opened_page import wait_until
 from playwright.sync_api import Browser, CDPSession, Page
+from scipy.spatial.transform import Rotation
 
 pytestmark = pytest.mark.slow
 
@@ -31,6 +32,17 @@ NO_PAD = """
 
 def seen(page: Page) -> NDArray[np.float64]:
     return np.array(page.evaluate(SEEN))
+
+
+def turned_about(page: Page, q_before: list[float], axis: int) -> float:
+    """Return the sine of half the angle by which it was turned about the view's right (0), up (1) or back (2)."""
+    before, now = (quaternion(q) for q in (q_before, page.evaluate("live.hand.pose().q_WH")))
+    turn = now * before.inv()
+    return float(turn.as_quat(canonical=True)[:3] @ page.evaluate("live.hand.axes()")[axis])
+
+
+def quaternion(q: list[float]) -> Rotation:
+    return Rotation.from_quat([*q[1:], q[0]])
 
 
 def touch(screen: CDPSession, kind: str, *fingers: tuple[float, float]) -> None:
@@ -112,9 +124,9 @@ def test_a_gamepads_sticks_triggers_and_button_lead_the_hand(browser: Browser, t
             hold(page)
             assert seen(page)[2] < before[2] - 0.01  # towards the eye
             q = page.evaluate("live.hand.pose().q_WH")
-            hold(page, (0.0, 0.0, 0.8, 0.0))
+            hold(page, (0.0, 0.0, 0.5, 0.0))
             hold(page)
-            assert abs(np.dot(q, page.evaluate("live.hand.pose().q_WH"))) < 0.999
+            assert turned_about(page, q, 1) < -0.05  # to the right, seen from above
             hold(page, b0=1.0)
             assert page.evaluate("live.hand.pose().closed")  # once, however long it is held
             hold(page)
@@ -123,3 +135,22 @@ def test_a_gamepads_sticks_triggers_and_button_lead_the_hand(browser: Browser, t
             end_run(page)
         run.wait(timeout=120)
     assert told(tmp_path / "led")["samples"]["gamepad"] > 20
+
+
+def test_keys_turn_the_hand_as_they_lie_on_the_keyboard(browser: Browser, tmp_path: Path):
+    with live_run(tmp_path / "led", *GIVEN, scenario=SCENARIO) as (address, run):
+        with shown(browser, address) as page:
+            wait_until(page, "live.hand")
+            for keys, axis in (
+                ("sw", 0),
+                ("ad", 1),
+                ("qe", 2),
+            ):  # tilts, turns, rolls
+                for key, sign in zip(keys, (1.0, -1.0), strict=True):
+                    q = page.evaluate("live.hand.pose().q_WH")
+                    page.keyboard.down(key)
+                    page.wait_for_timeout(200)
+                    page.keyboard.up(key)
+                    assert sign * turned_about(page, q, axis) > 0.02, key
+            end_run(page)
+        run.wait(timeout=120)

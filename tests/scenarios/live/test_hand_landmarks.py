@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.hand.hand_kinematics import CLOSED
+from handover.plants.free_flyer.hand.hand_kinematics import CLOSED, STRAIGHT
 from handover.scenarios.reporting.page import asset
 
 pytestmark = pytest.mark.slow
@@ -144,6 +144,17 @@ def test_a_hand_closes_and_opens_with_hysteresis(page: Page):
     assert np.count_nonzero(np.diff(closed)) == 2
     closes, opens = parts[closed.index(True)], parts[closed.index(False, closed.index(True))]
     assert closes > opens + 0.1
+
+
+def test_what_a_hand_holds_at_the_start_it_keeps_until_a_fist_was_opened(page: Page):
+    open_hand, fist = (
+        seen(landmarks_of_hand(angles), np.eye(3), np.array([0.0, 0.0, 0.5])) for angles in (STRAIGHT, CLOSED)
+    )
+    shown = [open_hand] * 3 + [fist] * 3 + [open_hand]
+    samples = [[0.1 * k, *picture_and_world] for k, picture_and_world in enumerate(shown)]
+    found = guided(page, samples, {**START, "closed": True})
+    assert [s["closed"] for s in found] == [True] * 6 + [False]
+    assert ["angles" in s for s in found] == [False] * 3 + [True] * 4
 
 
 def test_a_hand_moves_as_it_is_seen_from_where_it_was_and_within_reach(page: Page):

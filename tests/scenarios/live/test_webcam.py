@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import math
 import threading
 import zipfile
 from collections.abc import Callable, Generator
@@ -17,12 +16,11 @@ from urllib.request import Request, urlopen
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from hand_points import landmarks_of_hand, turned
 from live_runs import LIVE, live_run, shown
 from opened_page import launched, wait_until
+from webcam_files import camera_of, write_files, write_video
 
 from handover.cosim.record.reader import Record
-from handover.plants.free_flyer.hand.hand_kinematics import CLOSED
 from handover.scenarios.cli.command import main
 from handover.scenarios.live.webcam import (
     BUNDLE,
@@ -37,34 +35,7 @@ from handover.scenarios.live.webcam import (
 
 SCENARIO = "flyer_robot_to_human"
 OUTSIDE = ("-p", "hand=outside")
-WIDTH, HEIGHT, RATE = 320, 240, 20
-FOCAL = 0.5 / math.tan(math.radians(30.0))
-"""Of the camera, widths of its picture."""
-SIDE = 0.12
-"""Of the square that stands for a hand, m."""
-R_CH = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-"""Fingers up in the picture, the back of the hand towards the camera: as of one who reaches towards the screen."""
 TOLD = "document.getElementById('hand-told').value"
-
-
-def write_files(folder: Path, *, model: bytes = b"", makers: str = "http://127.0.0.1:1/") -> Path:
-    """Write a folder of the files with the stand-in; `model` is a part of its model."""
-    (folder / "wasm").mkdir(parents=True)
-
-    def points(angles: tuple[float, ...]) -> list[list[float]]:
-        hand = turned(landmarks_of_hand(angles), R_CH)
-        return (hand - np.mean(hand[[0, 5, 9, 13, 17]], axis=0)).tolist()
-
-    hands = {"open": points((0.0,) * 14), "fist": points(CLOSED), "focal": FOCAL, "side": SIDE, "makers": makers}
-    stand_in = (Path(__file__).parent / "webcam_stand_in.mjs").read_text(encoding="utf-8")
-    (folder / BUNDLE).write_text(stand_in.replace("HANDS", json.dumps(hands)), encoding="utf-8")
-    (folder / LOADER).write_text("globalThis.ModuleFactory = async () => ({});", encoding="utf-8")
-    (folder / WASM).write_bytes(b"\0asm\1\0\0\0")
-    with zipfile.ZipFile(folder / MODEL, "w") as bundle:
-        for name in MODEL_PARTS:
-            bundle.writestr(name, b"\x1c\0\0\0TFL3" + model)
-    (folder / "package.json").write_text("{}", encoding="utf-8")
-    return folder
 
 
 def test_files_have_their_hashes_and_nothing_else_of_the_folder_is_served(tmp_path: Path):
@@ -177,38 +148,10 @@ def makers_of_the_package() -> Generator[tuple[str, list[str]], None, None]:
         server.server_close()
 
 
-def write_video(path: Path) -> None:
-    """Write what a camera sees: a hand at rest, that goes to its right, makes a fist, and leaves; then it comes back.
-
-    In 0.6 m, 0.12 m to its right (left in the picture).
-    """
-    focal = FOCAL * WIDTH
-    size = round(focal * SIDE / 0.6)
-    places = [
-        *[(0.0, 235)] * 30,
-        *[(-0.12 * k / 20, 235) for k in range(20)],
-        *[(-0.12, 235)] * 20,
-        *[(-0.12, 150)] * 30,
-    ]
-    frames = [b"YUV4MPEG2 W%d H%d F%d:1 Ip A1:1 C420jpeg\n" % (WIDTH, HEIGHT, RATE)]
-    grey = bytes([128]) * (WIDTH * HEIGHT // 2)
-    for at in [*places, *[None] * 40]:
-        picture = np.full((HEIGHT, WIDTH), 16, dtype=np.uint8)
-        if at is not None:
-            left, top = round(0.5 * WIDTH + focal * at[0] / 0.6 - 0.5 * size), (HEIGHT - size) // 2
-            picture[top : top + size, left : left + size] = at[1]
-        frames.append(b"FRAME\n" + picture.tobytes() + grey)
-    path.write_bytes(b"".join(frames))
-
-
 @pytest.mark.slow
 def test_a_hand_in_a_cameras_pictures_leads_the_hand_of_a_run(tmp_path: Path):
     write_video(tmp_path / "camera.y4m")
-    camera = (
-        "--use-fake-ui-for-media-stream",
-        "--use-fake-device-for-media-stream",
-        f"--use-file-for-fake-video-capture={tmp_path / 'camera.y4m'}",
-    )
+    camera = camera_of(tmp_path / "camera.y4m")
     with makers_of_the_package() as (address_of_makers, asked), launched(*camera) as browser:
         folder = write_files(tmp_path / "vision", makers=address_of_makers)
         given = (*OUTSIDE, "--webcam", str(folder), "--pace", "1", "--stop", "20")

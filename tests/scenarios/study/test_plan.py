@@ -114,12 +114,6 @@ def test_a_bad_plan_is_refused_with_the_reason(change: tuple[str, str], fault: s
     assert any(fault in told for told in faults_of(change))
 
 
-def test_a_plan_whose_devices_the_page_offers_none_of_is_refused_with_the_reason():
-    (fault,) = faults_of(('devices = ["mouse", "gamepad", "tracker"]', 'devices = ["camera"]'))
-    assert fault.startswith("devices: the page offers none of them (camera: it needs a model of hands")
-    assert fault.endswith("it offers mouse, touch, gamepad, tracker")
-
-
 def test_a_pilot_study_may_be_driven_by_scripts():
     plan = parse_plan(default_plan().replace("pilot = false", "pilot = true").replace('"mouse", ', '"script", '))
     assert plan.pilot

@@ -1,19 +1,16 @@
 """A study in a browser, and a whole session of a scripted pilot, whose rounds can be played back and analysed."""
 
 import os
-import re
 import signal
 import subprocess
-import sys
-from collections.abc import Generator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from opened_page import overflow, wait_until
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser
+from served_page import HANDOVER, at, pilot_plan, served, to_round
 
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
@@ -24,55 +21,6 @@ SEEN_AT = """(() => {
     return [box.left + (p.x + 1) / 2 * box.width, box.top + (1 - p.y) / 2 * box.height];
 })()"""
 """Where the hand is seen in the view from the person's eye, in pixels of the page."""
-HANDOVER = (sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()")
-
-
-def pilot_plan(path: Path, *, devices: str, patience: float, practice: float, repetitions: int) -> Path:
-    text = default_plan()
-    for name, value in {
-        "pilot": "true",
-        "participants": 1,
-        "repetitions": repetitions,
-        "practice": practice,
-        "devices": devices,
-    }.items():
-        text = re.sub(rf"^{name} = .*$", f"{name} = {value}", text, count=1, flags=re.MULTILINE)
-    path.write_text(f"{text}\n[parameters]\npatience = {patience}\n", encoding="utf-8")
-    return path
-
-
-@contextmanager
-def served(plan: Path, out: Path, *more: str) -> Generator[tuple[str, "subprocess.Popen[str]"], None, None]:
-    command = [*HANDOVER, "study", "serve", str(plan), "--out", str(out), *more]
-    server = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    try:
-        assert server.stderr is not None
-        address = re.search(r"study: (http://\S+)", server.stderr.readline())
-        assert address
-        yield address[1], server
-    finally:
-        server.send_signal(signal.SIGINT)
-        _, told = server.communicate(timeout=120)
-        assert "Traceback" not in told, told
-
-
-def at(page: Page, screen: str) -> None:
-    wait_until(page, f"document.querySelector('.study').dataset.screen === '{screen}'")
-
-
-def to_round(page: Page, first: str = "instruction") -> None:
-    at(page, "language")
-    page.get_by_role("button", name="English").click()
-    at(page, "consent")
-    page.get_by_role("button", name="I agree").click()
-    at(page, "eligibility")
-    assert page.get_by_role("button", name="All of this applies to me").is_disabled()
-    for box in page.get_by_role("checkbox").all():
-        box.check()
-    page.get_by_role("button", name="All of this applies to me").click()
-    at(page, "device")
-    page.get_by_role("button", name="Mouse and keyboard").click()
-    at(page, first)
 
 
 @pytest.mark.slow

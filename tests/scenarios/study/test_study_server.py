@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import psutil
 import pytest
 import uvicorn
 from sample_study import record
@@ -198,8 +199,17 @@ def test_samples_that_cannot_be_used_are_refused_and_the_round_goes_on(tmp_path:
             assert why in told(page, "refused")
         page.send(json.dumps({"drawn": [-1.0]}))
         assert "0 to 60000 ms" in told(page, "refused")
+        seen = time_seen(page)
+        assert time_seen(page) > seen
     session = StudyFolder.opened(tmp_path / "study", PLAN).session(1)
     assert session.records == {}
+
+
+def time_seen(page: ClientConnection) -> float:
+    """Return the simulated time of the next state of the run, s."""
+    while isinstance(message := page.recv(timeout=60), str):
+        assert "void" not in message
+    return float(np.frombuffer(message, dtype="<f8")[0])
 
 
 def test_a_page_that_is_closed_makes_its_round_void_and_it_is_played_again(tmp_path: Path):
@@ -236,6 +246,37 @@ def test_a_page_that_floods_is_refused_and_at_last_put_out(tmp_path: Path, monke
                 page.send('{"drawn": []}')
         assert "more than 20 messages in a second" in told(page, "refused")
         assert told(page, "gone") == "flood"
+
+
+def test_a_run_that_is_killed_makes_its_round_void(tmp_path: Path):
+    server = server_of(tmp_path / "study")
+    with served(server) as where, page_at(where) as page:
+        to_round(page)
+        page.send(json.dumps({"hand": {**HAND, "stamp": 1.0}}))
+        assert time_seen(page) >= 0.0
+        (trial,) = [p for p in psutil.Process().children() if "handover.scenarios.study.session" in p.cmdline()]
+        trial.kill()
+        shown = told(page, "screen")
+        assert (shown["screen"], shown["again"]) == ("void", True)
+        assert "the simulation's process ended (killed by signal 9)" in shown["reason"]
+    assert StudyFolder.opened(tmp_path / "study", PLAN).session(1).records == {}
+
+
+def test_a_page_that_floods_in_a_round_makes_it_void(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(page_messages, "FLOOD", 200)
+    server = server_of(tmp_path / "study")
+    with served(server) as where:
+        with page_at(where) as page:
+            to_round(page)
+            with contextlib.suppress(ConnectionClosed):
+                for k in range(1000):
+                    page.send(json.dumps({"hand": {**HAND, "stamp": 1.0 + k}}))
+            assert told(page, "gone") == "flood"
+        with page_at(where) as reloaded:
+            assert told(reloaded, "screen")["screen"] == "void"
+    session = StudyFolder.opened(tmp_path / "study", PLAN).session(1)
+    assert session.records == {}
+    assert "the page was closed" in session.notes.void_attempts[0].reason
 
 
 def test_a_tracker_leads_the_hand_and_its_pictures_are_timed_by_the_pages_clock(tmp_path: Path):
