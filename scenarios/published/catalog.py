@@ -22,6 +22,7 @@ from handover.scenarios.published.ir_grasp.ir_limits import IrLimits
 from handover.scenarios.published.ir_grasp.ir_sensor import IrSensorCurve
 from handover.scenarios.published.ir_grasp.ir_table import IrTable
 from handover.scenarios.published.published_experiment import PublishedExperiment
+from handover.scenarios.published.vsl.vsl_1 import Vsl1
 
 _ALL: tuple[type[PublishedExperiment], ...] = (
     FlyerApproaches,
@@ -43,6 +44,7 @@ _ALL: tuple[type[PublishedExperiment], ...] = (
     IrLimits,
     IrSensorCurve,
     IrTable,
+    Vsl1,
 )
 
 EXPERIMENTS: Mapping[str, type[PublishedExperiment]] = {e.name: e for e in _ALL}
