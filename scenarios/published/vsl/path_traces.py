@@ -53,7 +53,7 @@ def trace_of(record: Record) -> PathTrace:
         tracked=record["arm.p_WG_meas"][ends],
         servo=record["kinematics.p_WG_model"][ends],
         estimated=record["kinematics.p_WG_est"][ends],
-        commanded=np.array([kinematics.forward(q) for q in record["kinematics.q_cmd"][ends]]).reshape(-1, 3),
+        commanded=np.array([kinematics.forward(q) for q in record["kinematics.q_cmd"][ends - 1]]).reshape(-1, 3),
     )
 
 

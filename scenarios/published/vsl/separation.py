@@ -1,7 +1,6 @@
 """The rule by which claims on errors get their verdicts: groups of runs that do not overlap, in every cell.
 
-It was laid down before the runs. A mean over all cells could hide a cell that goes the other way, so a claim holds only
-if it holds in each; and in each every run counts, so that noise decides nothing.
+It was laid down before the runs.
 """
 
 from collections.abc import Sequence
@@ -71,11 +70,12 @@ def separation_claim(
     closest = min(found, key=lambda c: c.margin)
     reason = (
         f"{'Holds' if beyond else 'Reproduced'} if in each of the {len(found)} comparisons each run of the one errs "
-        f"less than each run of the other, which of {n} and {n} runs has a chance of {format_p_value(chance_of(n))} "
-        "where there is no difference (exact rank-sum test, two-sided)."
+        "less than each run of the other: a mean over all could hide a cell that goes the other way."
     )
     if n < MIN_RUNS:
-        reason += f" It takes {MIN_RUNS} runs a group."
+        reason += f" With {n} {'runs' if n > 1 else 'run'} of each that can be chance: it takes {MIN_RUNS}."
+    else:
+        reason += f" Without a difference {n} runs of each part so with p = {format_p_value(chance_of(n))} (rank sums)."
     if failing := [c.label for c in found if not c.holds]:
         reason += f" It fails at: {'; '.join(failing[:_NAMED])}"
         reason += f"; and {len(failing) - _NAMED} more." if len(failing) > _NAMED else "."
@@ -88,4 +88,3 @@ def separation_claim(
         where=where,
         beyond=beyond,
     )
-

@@ -1,4 +1,4 @@
-"""Experiment 1 of [Gandarias2020], sec. V-A and fig. 5: an arm of soft links, and of rigid ones, goes by rigid kinematics."""
+"""Experiment 1 of [Gandarias2020], sec. V-A and fig. 5: arms of soft and of rigid links go by rigid kinematics."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +10,16 @@ from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
 from handover.scenarios.published.vsl.vsl_1_claims import claims_of
 from handover.scenarios.published.vsl.vsl_1_figures import draw_figures
-from handover.scenarios.published.vsl.vsl_1_runs import ALL_LINKS, LOADS, PATHS, REPETITIONS, RIGID, SOFT, Cell, Vsl1Runs
+from handover.scenarios.published.vsl.vsl_1_runs import (
+    ALL_LINKS,
+    LOADS,
+    PATHS,
+    REPETITIONS,
+    RIGID,
+    SOFT,
+    Cell,
+    Vsl1Runs,
+)
 from handover.scenarios.published.vsl.vsl_1_tables import tables_of
 from handover.scenarios.vsl.path_experiments import VslModelBased
 

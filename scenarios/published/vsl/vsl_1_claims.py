@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-import numpy as np
-
 from handover.controllers.vsl.paths import Path as TipPath
 from handover.scenarios.published.published_experiment import Claim
 from handover.scenarios.published.verdicts import without_verdict
@@ -18,8 +16,8 @@ _BY_CHOICE = (
     "proves nothing."
 )
 _RIGID_BY_CHOICE = (
-    "The stiffness of rigid links and of joints was chosen so that the rigid arm errs by some millimetres, as in fig. 5, "
-    "so agreement proves nothing."
+    "The stiffness of rigid links and of joints was chosen so that the rigid arm errs by some millimetres, as in "
+    "fig. 5, so agreement proves nothing."
 )
 _SERVO_BY_CHOICE = (
     "How far a servo yields under load was chosen so that the servo's path is near the desired one, as in fig. 5, so "
@@ -96,8 +94,7 @@ def _reach(runs: Vsl1Runs, path: TipPath, sentence: str) -> Claim:
     ]
     beyond = path is not TipPath.SQUARE
     where, published = ("", "") if beyond else ("sec. V-C, fig. 5(c)", "higher")
-    claim = separation_claim(f"{sentence}.", where, published, comparisons, beyond=beyond)
-    return claim
+    return separation_claim(f"{sentence}.", where, published, comparisons, beyond=beyond)
 
 
 def _servo(runs: Vsl1Runs) -> Claim:

@@ -27,7 +27,7 @@ def draw_figures(runs: Vsl1Runs, folders: Path, folder: Path) -> list[Figure]:
     figures: list[Figure] = []
     if any(panels.values()):
         figures += [_paths(runs, panels, folder), _along(runs, panels, folder)]
-    if len(runs.loads) > 1:
+    if runs.done and len(runs.loads) > 1:
         figures.append(_by_load(runs, folder))
     return figures
 

@@ -84,6 +84,11 @@ class Vsl1Runs:
         return sum(row["status"] != "done" for row in self._rows)
 
     @property
+    def done(self) -> int:
+        """Number of runs that count."""
+        return len(self._rows) - self.not_done
+
+    @property
     def loads(self) -> tuple[float, ...]:
         """Loads that any run has, kg: a quick campaign leaves some out."""
         return tuple(load for load in LOADS if any(row["load"] == load for row in self._rows))

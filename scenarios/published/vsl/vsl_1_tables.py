@@ -5,8 +5,7 @@ import numpy as np
 from handover.controllers.vsl.paths import Path as TipPath
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.published.published_experiment import ComparisonTable
-from handover.scenarios.published.vsl.vsl_1_claims import load_comparisons, pressure_comparisons
-from handover.scenarios.published.vsl.vsl_1_runs import PATHS, RIGID, Cell, Vsl1Runs, format_load
+from handover.scenarios.published.vsl.vsl_1_runs import PATHS, Cell, Vsl1Runs, format_load
 
 PANELS = {TipPath.LINEAR: "5(a), linear", TipPath.CURVE: "5(b), curve", TipPath.SQUARE: "5(c), square"}
 """Rows of fig. 5."""
@@ -26,8 +25,9 @@ def _errors(runs: Vsl1Runs, path: TipPath) -> ComparisonTable:
         cells = [_mean(runs.metric("mean_error", Cell(path, load, links))) for links in runs.links]
         rows.append([format_load(load), _mean(servo), *cells])
     note = (
-        f"Mean distance of the tip from the desired points along the path, by the tracker, and of the place where "
-        f"encoders and rigid links put it (servos, over all links); ± the standard deviation between runs. {_NOT_PRINTED}"
+        "Mean distance of the tip from the desired points along the path, by the tracker, and of the place where "
+        "encoders and rigid links put it (servos, over all links); ± the standard deviation between runs. "
+        f"{_NOT_PRINTED}"
     )
     if runs.not_done:
         note += f" {runs.not_done} runs did not come to their end and do not count."
