@@ -66,8 +66,9 @@ def _draw_path(axes: Axes, curve: Repetitions, name: str) -> None:
     x, z = 1000 * curve.mean[:, 0], 1000 * curve.mean[:, 2]
     across = 1000 * curve.deviation[:, None] * _normals(curve.desired)
     colour = COLOURS[_COLOURS[name]]
-    upper, lower = (np.column_stack([x, z]) + sign * across for sign in (1.0, -1.0))
-    axes.fill(*np.vstack([upper, lower[::-1]]).T, color=colour, alpha=0.25, lw=0)
+    middle: Floats = np.column_stack([x, z])
+    band: Floats = np.vstack([middle + across, (middle - across)[::-1]])
+    axes.fill(band[:, 0], band[:, 1], color=colour, alpha=0.25, lw=0)
     axes.plot(x, z, color=colour, lw=1.1, label=name)
 
 
