@@ -12,7 +12,7 @@ DEFAULT_MODEL = """\
  "provenance": {
   "arm": {
    "fmu": "VslArm",
-   "key": "72608b037e7947012f2ff8008add582b4b8400eb842de6e6dc37002f202beb18",
+   "key": "9e9708c03aac85820343099841efbe0df65a191d56ff07970bb173984fa7aa37",
    "parameters": {
     "EI_0": 0.55,
     "EI_p": 1.05e-05,

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -109,6 +109,7 @@ class VslArm:
             PressureLine(p, params.pressure_time, params.leak_time, params.valve_tolerance, params.valve_band)
             for p in params.p_0.tolist()
         ]
+        self._parts = (self._mechanics, *self._servos, *self._lines)
         self._rng = np.random.default_rng(params.seed)
         self._noise = self._rng.standard_normal(11)
         self._sigma = np.repeat(
@@ -129,30 +130,35 @@ class VslArm:
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Advance from t by dt with u held."""
         _check_inputs(u)
-        before = self.get_state()
+        before = self._snapshot()
         try:
             if not self._started:
                 self._rest(u.load)
                 self._started = True
             self._advance(dt, u)
         except (NoEquilibrium, NoConvergence):
-            self.set_state(before)
+            self._restore(before)
             raise
         self._noise = self._rng.standard_normal(11)
         return self._seen()
 
     def get_state(self) -> bytes:
         """Return the complete state, random generator included."""
-        parts = [part.get_state() for part in (self._mechanics, *self._servos, *self._lines)]
-        random = (self._rng.bit_generator, self._noise)
-        return pack_state((parts, random, self._spin, self._q, self._i, self._started))
+        return pack_state((self._snapshot(), self._rng.bit_generator, self._noise))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this arm or of one with equal parameters."""
-        parts, random, self._spin, self._q, self._i, self._started = unpack_state(state)
-        for part, own in zip((self._mechanics, *self._servos, *self._lines), parts, strict=True):
-            part.set_state(own)
-        self._rng.bit_generator.state, self._noise = random
+        snapshot, self._rng.bit_generator.state, self._noise = unpack_state(state)
+        self._restore(snapshot)
+
+    def _snapshot(self) -> tuple[Any, ...]:
+        """Return all that a step changes before it can fail, as references: nothing of it is ever written to."""
+        return [part.snapshot() for part in self._parts], self._spin, self._q, self._i, self._started
+
+    def _restore(self, snapshot: tuple[Any, ...]) -> None:
+        parts, self._spin, self._q, self._i, self._started = snapshot
+        for part, own in zip(self._parts, parts, strict=True):
+            part.restore(own)
 
     def _rest(self, load: float) -> None:
         _, theta_2, theta_3 = self._aims()

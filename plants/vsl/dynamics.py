@@ -1,12 +1,11 @@
 """Dynamics of the VSL arm's chain: how it swings, integrated by generalized-alpha."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.vsl.chain import Complexes, Pose, VslChain
 from handover.plants.vsl.parameters import Params
 from handover.plants.vsl.statics import VslStatics
@@ -119,13 +118,13 @@ class VslDynamics:
         whiten = np.linalg.inv(np.linalg.cholesky(self._mass(D, held.C_y)))
         return np.sqrt(np.linalg.eigvalsh(whiten @ K @ np.transpose(whiten))) / (2.0 * math.pi)
 
-    def get_state(self) -> bytes:
-        """Return the complete state."""
-        return pack_state((self._y, self._v, self._a, self._a_mean, self._offset, tuple(self.pose)))
+    def snapshot(self) -> tuple[Any, ...]:
+        """Return the complete state, plain data; its arrays are replaced and never written to."""
+        return self._y, self._v, self._a, self._a_mean, self._offset, tuple(self.pose)
 
-    def set_state(self, state: bytes) -> None:
+    def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Restore a state of this chain or of one with equal parameters."""
-        self._y, self._v, self._a, self._a_mean, self._offset, pose = unpack_state(state)
+        self._y, self._v, self._a, self._a_mean, self._offset, pose = snapshot
         self.pose = Pose(*pose)
 
     def _held(self, p: tuple[float, float], load: float, spin: float) -> _Held:

@@ -1,11 +1,10 @@
 """Statics of the VSL arm's chain: where it rests under its weight, against bending, shear and joints."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.vsl.chain import Pose, VslChain
 
 _TOLERANCE = 1e-12
@@ -94,13 +93,13 @@ class VslStatics:
         if tip is None or not self._rest(bodies, tip):
             self.settle(theta[1], p, load)
 
-    def get_state(self) -> bytes:
-        """Return the complete state."""
-        return pack_state((self._tip, tuple(self.pose)))
+    def snapshot(self) -> tuple[Any, ...]:
+        """Return the complete state, plain data; its arrays are replaced and never written to."""
+        return self._tip, tuple(self.pose)
 
-    def set_state(self, state: bytes) -> None:
+    def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Restore a state of this chain or of one with equal parameters."""
-        self._tip, pose = unpack_state(state)
+        self._tip, pose = snapshot
         self.pose = Pose(*pose)
 
     def _bodies(self, theta: tuple[float, float], p: tuple[float, float], load: float, share: float) -> list[_Body]:

@@ -188,7 +188,7 @@ def test_droop_follows_the_torque_in_its_time(droop_time: float):
 def test_continues_bit_for_bit_from_a_state():
     one, other = swinging(LOOSE), VslDynamics(VslChain(LOOSE, 2), LOOSE)
     one.advance(0.1, (RAISED, OUTSTRETCHED), P, 0.1, 0.5)
-    other.set_state(one.get_state())
+    other.restore(one.snapshot())
     for dynamics in (one, other):
         for _ in range(10):
             dynamics.advance(0.02, (OUTSTRETCHED, OUTSTRETCHED), P, 0.1, 0.0)
