@@ -47,7 +47,7 @@ def _paths(runs: Vsl1Runs, panels: Mapping[tuple[TipPath, float], Curves], folde
     with figure(folder / "paths", len(PATHS), columns, size=(1.2 + 2.3 * columns, 9.0)) as grid:
         for axes, ((path, load), curves) in zip(grid, panels.items(), strict=True):
             for name, curve in curves.items():
-                _draw_path(axes, curve, name)
+                draw_path(axes, curve, COLOURS[_COLOURS[name]], name)
             _name(axes, path, load, first=load == runs.loads[0])
             axes.set_aspect("equal", adjustable="datalim")
         _label(grid, columns, "x in W (mm)", "z in W (mm)")
@@ -61,11 +61,10 @@ def _paths(runs: Vsl1Runs, panels: Mapping[tuple[TipPath, float], Curves], folde
     return Figure("paths", caption)
 
 
-def _draw_path(axes: Axes, curve: Repetitions, name: str) -> None:
-    """Draw mean and deviation, the latter as a band across the path."""
+def draw_path(axes: Axes, curve: Repetitions, colour: str, name: str) -> None:
+    """Draw mean and deviation, mm, the latter as a band across the path."""
     x, z = 1000 * curve.mean[:, 0], 1000 * curve.mean[:, 2]
     across = 1000 * curve.deviation[:, None] * _normals(curve.desired)
-    colour = COLOURS[_COLOURS[name]]
     middle: Floats = np.column_stack([x, z])
     band: Floats = np.vstack([middle + across, (middle - across)[::-1]])
     axes.fill(band[:, 0], band[:, 1], color=colour, alpha=0.25, lw=0)

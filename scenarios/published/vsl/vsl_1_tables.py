@@ -10,6 +10,8 @@ from handover.scenarios.published.vsl.vsl_1_runs import PATHS, Cell, Vsl1Runs, f
 PANELS = {TipPath.LINEAR: "5(a), linear", TipPath.CURVE: "5(b), curve", TipPath.SQUARE: "5(c), square"}
 """Rows of fig. 5."""
 
+_SPACE = "\u00a0"
+"""At which no line of a table is broken."""
 _NOT_PRINTED = "The paper draws these as paths and prints no numbers."
 
 
@@ -22,8 +24,8 @@ def _errors(runs: Vsl1Runs, path: TipPath) -> ComparisonTable:
     rows: list[list[str]] = []
     for load in runs.loads:
         servo = np.concatenate([runs.metric("servo_error", Cell(path, load, links)) for links in runs.links])
-        cells = [_mean(runs.metric("mean_error", Cell(path, load, links))) for links in runs.links]
-        rows.append([format_load(load), _mean(servo), *cells])
+        cells = [format_spread(runs.metric("mean_error", Cell(path, load, links))) for links in runs.links]
+        rows.append([format_load(load), format_spread(servo), *cells])
     note = (
         "Mean distance of the tip from the desired points along the path, by the tracker, and of the place where "
         "encoders and rigid links put it (servos, over all links); ± the standard deviation between runs. "
@@ -56,8 +58,12 @@ def _reach(runs: Vsl1Runs) -> ComparisonTable:
     )
 
 
-def _mean(values: Floats) -> str:
-    if not len(values):
-        return ""
-    mean = f"{1000 * values.mean():.1f}"
-    return mean if len(values) < 2 else f"{mean} ± {1000 * values.std(ddof=1):.2f}"
+def format_mean(errors: Floats) -> str:
+    """Return the mean of errors, m, in mm; "" of none."""
+    return f"{1000 * errors.mean():.1f}" if len(errors) else ""
+
+
+def format_spread(errors: Floats) -> str:
+    """Return mean and standard deviation of errors, m, in mm, such as `1.5 ± 0.03`; of one value the value alone."""
+    mean = format_mean(errors)
+    return mean if len(errors) < 2 else f"{mean}{_SPACE}±{_SPACE}{1000 * errors.std(ddof=1):.2f}"
