@@ -45,7 +45,7 @@ def fit_cubic(x: Floats, y: Floats, x_validation: Floats, y_validation: Floats) 
     for penalty in PENALTIES:
         weights: Floats = np.transpose(right) @ (projected * (singular / (singular**2 + penalty * len(x)))[:, None])
         coefficients = rounded(np.vstack([y_mean - feature_mean @ weights, weights]))
-        cubic = Cubic(mean, scale, powers, coefficients, rounded(hull))
+        cubic = Cubic(mean, scale, rounded(hull), powers, coefficients)
         error = cubic.predict(x_validation) - y_validation
         fits.append(Fit(cubic, penalty, float(np.sqrt(np.mean(error**2)))))
     return min(fits, key=lambda f: f.validation_rms)
