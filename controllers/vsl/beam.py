@@ -117,12 +117,11 @@ class Beam:
 
     def _sagged(self, m: Any, straight: list[Any], phi: list[Any], compliances: list[Any], i: Pair) -> tuple[Any, Pair]:
         """Return the pieces' angles under the torques that they have at angles phi, and those of the joints."""
-        own, lever, weight = 0.0, 0.0, self.weights.gripper
+        own, lever = 0.0, 0.0
         owns, levers = list[Any](), list[Any]()
-        for k in range(len(phi) - 1, -1, -1):
-            x = self._gravities[k] * m.cos(phi[k])
-            own, lever = own + (weight + 0.5 * self._masses[k]) * x, lever + x
-            weight += self._masses[k] + (self.weights.elbow if k == HINGES + 1 else 0.0)
+        for angle, (gravity, weight) in zip(reversed(phi), self._pulls, strict=True):
+            x = gravity * m.cos(angle)
+            own, lever = own + weight * x, lever + x
             owns.append(own)
             levers.append(lever)
         own_2, own_3, lever_2, lever_3 = owns[-1], owns[HINGES], levers[-1], levers[HINGES]
@@ -138,11 +137,9 @@ class Beam:
     def _steps(self, m: Any, phi: list[Any]) -> tuple[Pair, Pair]:
         """Return how far each link goes, outwards and upwards, m."""
         n, L = HINGES + 1, self._lengths
-        link_2, link_3 = (
-            (sum(L[k] * m.cos(phi[k]) for k in ks), sum(L[k] * m.sin(phi[k]) for k in ks))
-            for ks in (range(n), range(n, 2 * n))
-        )
-        return link_2, link_3
+        x = [l * m.cos(angle) for l, angle in zip(L, phi, strict=True)]
+        z = [l * m.sin(angle) for l, angle in zip(L, phi, strict=True)]
+        return (sum(x[:n]), sum(z[:n])), (sum(x[n:]), sum(z[n:]))
 
     def _straight(self, q: Pair) -> list[Any]:
         """Return the angles of all pieces from the horizontal of an arm that does not bend."""
@@ -166,13 +163,14 @@ class Beam:
         return [l for h in self._parts for l in (cap + h / 2.0, *[h] * (HINGES - 1), cap + h / 2.0)]
 
     @cached_property
-    def _masses(self) -> list[float]:
-        lengths = np.repeat([self.kinematics.L_2, self.kinematics.L_3], HINGES + 1).tolist()
-        return [self.weights.link * l / L for l, L in zip(self._lengths, lengths, strict=True)]
-
-    @cached_property
-    def _gravities(self) -> list[float]:
-        return [self.weights.gravity * l for l in self._lengths]
+    def _pulls(self) -> list[tuple[float, float]]:
+        """Return gravity times length of each piece, and what weighs on its end and half of its own, from the tip."""
+        w, n = self.weights, HINGES + 1
+        lengths = [self.kinematics.L_2] * n + [self.kinematics.L_3] * n
+        masses = [w.link * l / L for l, L in zip(self._lengths, lengths, strict=True)]
+        beyond = [sum(masses[k + 1 :]) + w.gripper + (w.elbow if k < n else 0.0) for k in range(2 * n)]
+        pulls = [(w.gravity * l, b + m / 2.0) for l, b, m in zip(self._lengths, beyond, masses, strict=True)]
+        return pulls[::-1]
 
 
 class _OfFloats:
@@ -219,7 +217,7 @@ class BentTip(Domain):
         q, p, i = _pairs(x)
         tip, _ = self.beam.bent(q, p, i)
         rigid = _rigid(self.beam.kinematics, q)
-        return np.stack(np.broadcast_arrays(tip[0] - rigid[0], 0.0, tip[1] - rigid[1]), axis=-1)
+        return _vectors(tip[0] - rigid[0], 0.0, tip[1] - rigid[1])
 
     def jacobian(self, x: Floats) -> Floats:
         """Return dy/dx at inputs x, shape (7,), by central differences of angles; 0 by pressures and currents."""
@@ -247,7 +245,7 @@ class BentCommand(Domain):
         q, p, i = _pairs(x)
         turned, torque = self.beam.commanded(_rigid(self.beam.kinematics, q), q, p, i)
         turns = [turned[k] - q[k] + self.droop * torque[k] for k in range(2)]
-        return np.stack(np.broadcast_arrays(0.0, *turns), axis=-1)
+        return _vectors(0.0, *turns)
 
     def jacobian(self, x: Floats) -> Floats:
         """Return dy/dx at inputs x, shape (7,), by central differences of angles; 0 by pressures and currents."""
@@ -258,6 +256,13 @@ def _pairs(x: Floats) -> tuple[Pair, Pair, Pair]:
     """Return angles and currents of joints 2 and 3 and pressures of inputs x, shape (..., 7): floats of a single one."""
     values: list[Any] = x.tolist() if x.ndim == 1 else list(np.moveaxis(x, -1, 0))
     return (values[1], values[2]), (values[3], values[4]), (values[5], values[6])
+
+
+def _vectors(first: Any, second: Any, third: Any) -> Floats:
+    """Return what has these coordinates, shape (..., 3)."""
+    if isinstance(third, float):
+        return np.array([first, second, third])
+    return np.stack(np.broadcast_arrays(first, second, third), axis=-1)
 
 
 def _rigid(k: VslKinematics, q: Pair) -> Pair:

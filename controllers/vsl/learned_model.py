@@ -96,7 +96,7 @@ class Domain:
         return np.minimum(np.maximum((x - self.mean) / self.scale, self._low), self._high)
 
     def slopes(self, x: Floats) -> Floats:
-        """Return dz/dx of `standardised` at inputs x, shape (inputs,): 0 where an input is held."""
+        """Return dz/dx of `standardised` at inputs x, shape (..., inputs): 0 where an input is held."""
         z = (x - self.mean) / self.scale
         return np.where((z < self._low) | (z > self._high), 0.0, 1.0 / self.scale)
 
@@ -156,11 +156,14 @@ class Cubic(Domain):
         return monomials(self.standardised(x), self._factors) @ self.coefficients
 
     def jacobian(self, x: Floats) -> Floats:
-        """Return dy/dx at inputs x, shape (inputs,), as shape (values, inputs)."""
-        factors = np.concatenate([[1.0], self.standardised(x)])[self._factors]
-        others = np.array([factors[1] * factors[2], factors[0] * factors[2], factors[0] * factors[1]])
-        derivatives = np.array([np.sum(others * (self._factors == i + 1), axis=0) for i in range(len(x))])
-        return np.transpose(derivatives @ self.coefficients) * self.slopes(x)
+        """Return dy/dx at inputs x, shape (..., inputs), as shape (..., values, inputs)."""
+        padded = np.concatenate([np.ones((*x.shape[:-1], 1)), self.standardised(x)], axis=-1)
+        first, second, third = (padded[..., f] for f in self._factors)
+        J = np.zeros((*x.shape[:-1], self.coefficients.shape[1], len(self.mean)))
+        for i in range(len(self.mean)):
+            is_i = self._factors == i + 1
+            J[..., i] = (second * third * is_i[0] + first * third * is_i[1] + first * second * is_i[2]) @ self.coefficients
+        return J * self.slopes(x)[..., None, :]
 
     @cached_property
     def _factors(self) -> Integers:
@@ -282,6 +285,11 @@ class VslModel:
 def inputs_of(q: Floats, p: Floats, i: Floats) -> Floats:
     """Return what a regressor takes, shape (..., 7): angles or position (..., 3), pressures (..., 2), currents (..., 3)."""
     return np.concatenate([q, p, i[..., 1:]], axis=-1)
+
+
+def turned(direction: Floats, turn: Floats, reversal: float) -> Floats:
+    """Return which way friction acts, from -1 to 1, on joints that have turned on by `turn`, rad; see `directions_of`."""
+    return np.clip(direction + 2.0 * turn / reversal, -1.0, 1.0)
 
 
 def rotate_about_z(v: Floats, theta_1: float) -> Floats:
