@@ -43,13 +43,14 @@ class Method(enum.IntEnum):
 
     MODEL_BASED = 0
     HYBRID = 1
+    ESTIMATE = 2
 
 
 @dataclass(frozen=True, kw_only=True)
 class Params:
     """Method, model and arm; the lengths are assumed."""
 
-    method: Method = parameter(Method.HYBRID, "rigid kinematics alone, or with what was learned")
+    method: Method = parameter(Method.HYBRID, "rigid kinematics, with what was learned, or with its estimate only")
     learned: Learned = parameter(Learned.CUBIC, "what corrects rigid kinematics")
     model: str = parameter("", "JSON file of a trained model; empty: the one that ships; no published one does")
     window: bool = parameter(False, "free the currents of gear friction by which way each joint has been turning")
@@ -107,6 +108,7 @@ class HybridKinematics:
     `VslModel`: what `learned` says. p and i are measured as the command for the next period is made; the current of
     joint 1 is left out. Since a correction moves joints of its own accord, qd_cmd grants qd_correction besides
     |qd_ref|, with the sign of qd_ref; 0, no limit, stays 0.
+    ESTIMATE: commands as MODEL_BASED, and p_WG as HYBRID.
 
     The command feeds the currents back to themselves: an arm that swings feels its own inertia, and takes it for a
     load. Two lags of i_lag in series attenuate that. With an arm that swings at 4 Hz, 0.1 s and less amplify the swing,
@@ -124,7 +126,7 @@ class HybridKinematics:
     `outside` reports that the input of g or h is outside the polytope of its training; see `Domain` for what follows.
 
     Raises:
-        InvalidModel: by the constructor, if HYBRID and the model cannot be read, is not what `learned` and `window` say,
+        InvalidModel: by the constructor, if the model is used and cannot be read, is not what `learned` and `window` say,
             or was trained for other links.
     """
 
@@ -140,7 +142,7 @@ class HybridKinematics:
     def __init__(self, params: Params) -> None:
         self._params = p = params
         self._kinematics = VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
-        self._model = _model(p, self._kinematics) if p.method is Method.HYBRID else None
+        self._model = _model(p, self._kinematics) if p.method is not Method.MODEL_BASED else None
         self._i: tuple[Floats, Floats] | None = None
         """Currents, smoothed once and twice."""
         self._before: tuple[Floats, Floats] | None = None
@@ -205,20 +207,15 @@ class HybridKinematics:
         self._dq = np.clip(self._dq + p.K_I / p.tracker_rate * damped, -p.dq_max, p.dq_max)
 
     def _command(self, u: Inputs, i: Floats, dq: Floats) -> Outputs:
-        p_WG = self._kinematics.forward(u.q_meas)
-        model = self._model
-        if model is None:
-            q_cmd, qd_cmd = np.array(u.q_ref), np.array(u.qd_ref)
-            if self._params.closed_loop:
-                q_cmd, qd_cmd = q_cmd + dq, self._granted(qd_cmd)
-            return Outputs(q_cmd=q_cmd, qd_cmd=qd_cmd, p_WG_model=p_WG, p_WG_est=np.array(p_WG), outside=False)
-        q_cmd = model.command(u.q_ref, u.p_meas, i)
+        p, model, p_WG = self._params, self._model, self._kinematics.forward(u.q_meas)
+        corrected = model is not None and p.method is Method.HYBRID
+        q_cmd = model.command(u.q_ref, u.p_meas, i) if model is not None and corrected else np.array(u.q_ref)
         return Outputs(
-            q_cmd=q_cmd + dq if self._params.closed_loop else q_cmd,
-            qd_cmd=self._granted(u.qd_ref),
+            q_cmd=q_cmd + dq if p.closed_loop else q_cmd,
+            qd_cmd=self._granted(u.qd_ref) if corrected or p.closed_loop else np.array(u.qd_ref),
             p_WG_model=p_WG,
-            p_WG_est=model.tip(u.q_meas, u.p_meas, i),
-            outside=model.outside(u.q_ref, u.q_meas, u.p_meas, i),
+            p_WG_est=np.array(p_WG) if model is None else model.tip(u.q_meas, u.p_meas, i),
+            outside=model is not None and model.outside(u.q_ref, u.q_meas, u.p_meas, i),
         )
 
     def _granted(self, qd_ref: Floats) -> Floats:
