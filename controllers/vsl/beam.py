@@ -75,8 +75,8 @@ class Beam:
     at the sums of l_k exp(i phi_k); each weight's torque on a hinge is its horizontal distance from it. phi follows
     from the torques and they from phi: a fixed point. The load is what explains the currents of both joints best.
 
-    All quantities are floats, or arrays of one shape: of one point it is computed in Python's own numbers, which takes a
-    tenth of the time of arrays as small as that.
+    All quantities are floats, or arrays of one shape: of one point it is computed in Python's own numbers, which
+    takes a tenth of the time of arrays as small as that.
     """
 
     kinematics: VslKinematics
@@ -104,7 +104,8 @@ class Beam:
         Args:
             tip: as seen from the shoulder, outwards and upwards, m.
             q: angles of joints 2 and 3 of a rigid arm there, rad.
-            p, i: as in `bent`.
+            p: pressures, Pa.
+            i: currents of joints 2 and 3, A.
         """
         m, compliances = _math_of(q[0]), self._compliances(p)
         phi, torques = self._straight(q), (q[0], q[0])
@@ -203,7 +204,7 @@ def _newton_turn(link_2: Pair, link_3: Pair, tip: Pair) -> Pair:
 
 @dataclass(frozen=True)
 class BentTip(Domain):
-    """Eq. (10) by a `Beam`: by how much the tip is off where the encoders and rigid links put it, in the arm's plane."""
+    """Eq. (10) by a `Beam`: how far the tip is off where encoders and rigid links put it, in the arm's plane."""
 
     beam: Beam
 
@@ -253,7 +254,7 @@ class BentCommand(Domain):
 
 
 def _pairs(x: Floats) -> tuple[Pair, Pair, Pair]:
-    """Return angles and currents of joints 2 and 3 and pressures of inputs x, shape (..., 7): floats of a single one."""
+    """Return angles, pressures and currents of joints 2 and 3 of inputs x, shape (..., 7): floats of a single one."""
     values: list[Any] = x.tolist() if x.ndim == 1 else list(np.moveaxis(x, -1, 0))
     return (values[1], values[2]), (values[3], values[4]), (values[5], values[6])
 

@@ -1,4 +1,4 @@
-"""Regressions by linear algebra: of a cubic polynomial, of the gears' friction, of what makes an arm differ, of a beam."""
+"""Regressions by linear algebra: of a cubic polynomial, gear friction, what makes an arm differ, and a beam."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ _DIGITS = 12
 """Digits kept of every number: what follows is rounding noise, which linear algebra libraries disagree on."""
 
 _FRICTION_ITERATIONS, _FRICTION_STRIDE, _FRICTION_TOLERANCE = 40, 1.5, 1e-5
-"""Steps are too short by about a third, since a fit on currents with friction takes them for less than they are worth."""
+"""Steps are too short by about a third: a fit on currents with friction takes them for less than they are worth."""
 
 _FRICTION_PENALTY = (1e-4,)
 
@@ -91,8 +91,8 @@ def domain_of(x: Floats) -> Domain:
 def directions_of(q_cmd: Floats, reversal: float) -> Floats:
     """Return which way the gears' friction acts after each of commands one after another, from -1 to 1.
 
-    It grows with the turn, from -1 to 1 over `reversal`, and stays while the joint turns on: a window of the past that is
-    as long as it takes to turn by so much.
+    It grows with the turn, from -1 to 1 over `reversal`, and stays while the joint turns on: a window of the past that
+    is as long as it takes to turn by so much.
 
     Args:
         q_cmd: commanded angles, shape (points, joints), rad; friction begins at 0.
@@ -134,7 +134,8 @@ def fit_adapted(base: Regressor, x: Floats, y: Floats) -> Adapted:
 
     Args:
         base: as trained.
-        x, y: inputs and values, shapes (points, inputs) and (points, values).
+        x: inputs, shape (points, inputs).
+        y: values, shape (points, values).
     """
     predicted = base.predict(x)
     magnitude = np.maximum(np.std(predicted, axis=0), _SMALLEST)
@@ -147,7 +148,9 @@ def fit_adapted(base: Regressor, x: Floats, y: Floats) -> Adapted:
         shares = singular**2 / (singular**2 + penalty * len(x))
         taken = np.sum(U**2 * shares, axis=1) + 1.0 / len(x)  # what each point has of its own prediction
         errors = (centred - (U * shares) @ (np.transpose(U) @ centred)) / (1.0 - taken)[:, None]
-        weights = np.transpose(right) @ ((shares / np.maximum(singular, _SMALLEST))[:, None] * (np.transpose(U) @ centred))
+        weights = np.transpose(right) @ (
+            (shares / np.maximum(singular, _SMALLEST))[:, None] * (np.transpose(U) @ centred)
+        )
         fits.append((float(np.mean(errors**2)), weights))
     weights = min(fits, key=lambda f: f[0])[1]
     n = x.shape[1]

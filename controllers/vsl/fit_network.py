@@ -1,6 +1,7 @@
-"""Trains networks: small ones by quasi-Newton steps in numpy, the published one by PyTorch. [Gandarias2020] sec. IV-B."""
+"""Trains networks: small ones by numpy, the published one by PyTorch. [Gandarias2020] sec. IV-B."""
 
 import importlib
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -67,15 +68,13 @@ def fit_small(points: Points, seed: int, steps: int = STEPS) -> NetworkFit:
     for decay in DECAYS:
         value = _objective(frame.z, frame.y, sizes, decay)
         found = minimize(value, first, jac=True, method="L-BFGS-B", options={"maxiter": steps, "maxcor": 30})
-        parts = _unpack(rounded(found.x), sizes)
+        parts = _unpack(found.x.astype(np.float32).astype(np.float64), sizes)  # as its file has them
         network = frame.network(parts, ACTIVATIONS[Learned.SMALL])
         fits.append(NetworkFit(network, rms(network, points), {"decay": decay, "steps": int(found.nit)}))
     return min(fits, key=lambda f: f.validation_rms)
 
 
-def fit_published(
-    points: Points, seed: int, epochs: int, progress: Callable[[float, float], None]
-) -> NetworkFit:
+def fit_published(points: Points, seed: int, epochs: int, progress: Callable[[float, float], None]) -> NetworkFit:
     """Train a network of the published size by Adam, on one core or several; the best epoch is kept.
 
     Raises:
@@ -175,7 +174,7 @@ _SMALLEST = 1e-12
 def _first_weights(sizes: tuple[int, ...], rng: np.random.Generator) -> list[Weights]:
     """Return weights and biases in turn: normal, such that neurons keep the size of what comes in; biases 0."""
     parts: list[Weights] = []
-    for k, (n, m) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
+    for k, (n, m) in enumerate(itertools.pairwise(sizes)):
         gain = 2.0 if len(sizes) > _DEEP and 0 < k < len(sizes) - 2 else 1.0  # ReLU lets half through
         parts += [rng.normal(0.0, math.sqrt(gain / n), (n, m)), np.zeros(m)]
     return parts
@@ -214,7 +213,7 @@ def _pack(parts: list[Any]) -> Floats:
 def _unpack(packed: Floats, sizes: tuple[int, ...]) -> list[Weights]:
     parts: list[Weights] = []
     at = 0
-    for n, m in zip(sizes[:-1], sizes[1:], strict=True):
+    for n, m in itertools.pairwise(sizes):
         parts += [packed[at : at + n * m].reshape(n, m), packed[at + n * m : at + n * m + m]]
         at += n * m + m
     return parts

@@ -29,7 +29,7 @@ _SHIPPED = {
 """Texts of the models that ship, by what they are and whether they were trained on currents without friction."""
 
 _ON_THE_WAY = 0.05
-"""Angle between command and encoder, rad, from which a joint is still on its way: the tip's error is no error (assumed)."""
+"""Angle between command and encoder, rad, from which a joint is on its way and the tip not yet to judge (assumed)."""
 
 _DAMPING = 0.01
 """Of the inverse of the Jacobian, m: singular values below it, near a stretched elbow, count for less (assumed)."""
@@ -68,13 +68,13 @@ class Params:
     reversal: Radian = parameter(
         0.002, "turn that reverses the gears' friction, of the window (assumed)", minimum=1e-6, maximum=1.0
     )
-    tracker_rate: Hertz = parameter(30.0, "rate of the tracker's readings, of the closed loop", minimum=0.1, maximum=50.0)
+    tracker_rate: Hertz = parameter(
+        30.0, "rate of the tracker's readings, of the closed loop", minimum=0.1, maximum=50.0
+    )
     K_I: PerSecond = parameter(
         3.0, "share of the tip's error that the closed loop takes away in a second (assumed)", minimum=0.0, maximum=20.0
     )
-    dq_max: Radian = parameter(
-        0.2, "largest turn of a joint by the closed loop (assumed)", minimum=0.0, maximum=3.0
-    )
+    dq_max: Radian = parameter(0.2, "largest turn of a joint by the closed loop (assumed)", minimum=0.0, maximum=3.0)
 
 
 @dataclass(kw_only=True)
@@ -86,7 +86,9 @@ class Inputs:
     q_meas: Vector3[Radian] = port(np.zeros(3), "joint angles by the encoders")
     p_meas: Vector2[Pascal] = port(np.zeros(2), "pressures of links 2 and 3 above the air's")
     i_meas: Vector3[Ampere] = port(np.zeros(3), "motor currents")
-    p_WG_meas: Vector3[Metre] = port(np.zeros(3), "position of the tip by the tracker, in the world; of the closed loop")
+    p_WG_meas: Vector3[Metre] = port(
+        np.zeros(3), "position of the tip by the tracker, in the world; of the closed loop"
+    )
 
 
 @dataclass(kw_only=True)
@@ -116,18 +118,18 @@ class HybridKinematics:
     friction acts the same way: commanded to hold still, the arm hunts, at 0.5 bar and 75 g the tip by 4 mm up and down
     in 3 s.
 
-    The window: i - c d in place of i, with c as trained and d in [-1, 1] which way each gear's friction acts. It follows
-    from the unit's own commands, which have no noise: see `turned`.
+    The window: i - c d in place of i, with c as trained and d in [-1, 1] which way each gear's friction acts. That
+    follows from the unit's own commands, which have no noise: see `turned`.
 
-    The closed loop, at the tracker's rate: q_cmd has dq besides, dq' = K_I J~^+ (f(q_ref) - p_WG_meas), with q_ref of the
-    period that ends and the corrected Jacobian J~, that of h included (without, MODEL_BASED, J); J~^+ is its damped
+    The closed loop, at the tracker's rate: q_cmd has dq besides, dq' = K_I J~^+ (f(q_ref) - p_WG_meas), with q_ref of
+    the period that ends and the corrected Jacobian J~, that of h included (without, MODEL_BASED, J); J~^+ is its damped
     inverse. dq rests while joints are on their way, and stays within dq_max.
 
     `outside` reports that the input of g or h is outside the polytope of its training; see `Domain` for what follows.
 
     Raises:
-        InvalidModel: by the constructor, if the model is used and cannot be read, is not what `learned` and `window` say,
-            or was trained for other links.
+        InvalidModel: by the constructor, if the model is used and cannot be read, is not what `learned` and `window`
+            say, or was trained for other links.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -202,7 +204,11 @@ class HybridKinematics:
         if self._before is None or np.max(np.abs(self._before[1] - u.q_meas)) > _ON_THE_WAY:
             return
         error = self._kinematics.forward(self._before[0]) - u.p_WG_meas
-        J = self._kinematics.jacobian(u.q_meas) if self._model is None else self._model.tip_jacobian(u.q_meas, u.p_meas, i)
+        J = (
+            self._kinematics.jacobian(u.q_meas)
+            if self._model is None
+            else self._model.tip_jacobian(u.q_meas, u.p_meas, i)
+        )
         damped = np.transpose(J) @ np.linalg.solve(J @ np.transpose(J) + _DAMPING**2 * np.eye(3), error)
         self._dq = np.clip(self._dq + p.K_I / p.tracker_rate * damped, -p.dq_max, p.dq_max)
 
@@ -242,7 +248,9 @@ def _model(p: Params, kinematics: VslKinematics) -> VslModel:
         )
     if (model.friction != (0.0, 0.0)) is not p.window:
         trained = "without a window" if p.window else "with a window, on currents without friction"
-        raise InvalidModel(source, f"it was trained {trained}, and the parameter window says {str(p.window).lower()}", remedy)
+        raise InvalidModel(
+            source, f"it was trained {trained}, and the parameter window says {str(p.window).lower()}", remedy
+        )
     if model.kinematics != kinematics:
         raise InvalidModel(
             source, f"it was trained for {_geometry_text(model.kinematics)}, not {_geometry_text(kinematics)}", remedy

@@ -19,7 +19,6 @@ from handover.controllers.vsl.kinematics import VslKinematics
 from handover.cosim.blocks.ports import Floats
 
 
-
 class Learned(enum.IntEnum):
     """What rigid kinematics are corrected by.
 
@@ -162,7 +161,9 @@ class Cubic(Domain):
         J = np.zeros((*x.shape[:-1], self.coefficients.shape[1], len(self.mean)))
         for i in range(len(self.mean)):
             is_i = self._factors == i + 1
-            J[..., i] = (second * third * is_i[0] + first * third * is_i[1] + first * second * is_i[2]) @ self.coefficients
+            J[..., i] = (
+                second * third * is_i[0] + first * third * is_i[1] + first * second * is_i[2]
+            ) @ self.coefficients
         return J * self.slopes(x)[..., None, :]
 
     @cached_property
@@ -283,12 +284,12 @@ class VslModel:
 
 
 def inputs_of(q: Floats, p: Floats, i: Floats) -> Floats:
-    """Return what a regressor takes, shape (..., 7): angles or position (..., 3), pressures (..., 2), currents (..., 3)."""
+    """Return inputs of a regressor, shape (..., 7): angles or position (..., 3), pressures (..., 2), currents (..., 3)."""
     return np.concatenate([q, p, i[..., 1:]], axis=-1)
 
 
 def turned(direction: Floats, turn: Floats, reversal: float) -> Floats:
-    """Return which way friction acts, from -1 to 1, on joints that have turned on by `turn`, rad; see `directions_of`."""
+    """Return which way friction acts, from -1 to 1, after a further turn, rad: all of `reversal` turns it round."""
     return np.clip(direction + 2.0 * turn / reversal, -1.0, 1.0)
 
 

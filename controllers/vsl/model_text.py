@@ -39,7 +39,11 @@ ANY = -1
 
 _FORWARD_INPUTS = {ForwardInput.Q: FORWARD_INPUTS, ForwardInput.X: FORWARD_INPUTS_X}
 
+_STORED = np.dtype("<f4")
+"""Of a network's weights in a file, and what they are rounded to when they are trained."""
+
 _PRECISIONS = ("float32", "float64")
+"""In which a network is evaluated."""
 
 _WIDTH = 115
 
@@ -48,8 +52,10 @@ _MAX_DEPTH = 3
 
 
 class InvalidModel(ValueError):
-    """Text that is no model of this version; `source` says where it came from, `fault` what is wrong, `remedy` what
-    makes one that is."""
+    """Text that is no model of this version.
+
+    `source` says where it came from, `fault` what is wrong, and `remedy` what makes one that is.
+    """
 
     is_refusal = True
 
@@ -176,7 +182,9 @@ class _Reader:
 
     def friction(self, whole: dict[str, Any]) -> tuple[float, float]:
         """Return the currents by friction; files from before it was learned have none."""
-        first, second = self.numbers(whole, "the file", "friction", (2,)).tolist() if "friction" in whole else (0.0, 0.0)
+        first, second = (
+            self.numbers(whole, "the file", "friction", (2,)).tolist() if "friction" in whole else (0.0, 0.0)
+        )
         return first, second
 
     def regressor(
@@ -241,7 +249,7 @@ class _Reader:
         precision = self.entry(table, "precision", name)
         if precision not in _PRECISIONS:
             raise InvalidModel(self._source, f"{name}.precision is {precision!r}, not one of {', '.join(_PRECISIONS)}")
-        numbers = self._weights(table, name, np.dtype(precision).newbyteorder("<"))
+        numbers = self._weights(table, name)
         shapes = [shape for n, m in itertools.pairwise(layers) for shape in ((n, m), (m,))]
         sizes = [int(np.prod(shape)) for shape in shapes]
         if len(numbers) != sum(sizes):
@@ -253,11 +261,9 @@ class _Reader:
         scale_y = self.numbers(table, name, "scale_y", (VALUES,))
         mean_y = self.numbers(table, name, "mean_y", (VALUES,))
         weights, biases = tuple(arrays[0::2]), tuple(arrays[1::2])
-        return Network(
-            domain.mean, domain.scale, domain.hull, weights, biases, Activation(activation), mean_y, scale_y
-        )
+        return Network(domain.mean, domain.scale, domain.hull, weights, biases, Activation(activation), mean_y, scale_y)
 
-    def _weights(self, table: dict[str, Any], name: str, dtype: Any) -> Any:
+    def _weights(self, table: dict[str, Any], name: str) -> Any:
         """Return the numbers of all layers one after another."""
         lines = self.entry(table, "weights", name)
         if not isinstance(lines, list) or not all(isinstance(line, str) for line in cast("list[object]", lines)):
@@ -268,9 +274,9 @@ class _Reader:
             raise InvalidModel(self._source, f"{name}.weights is not base64: {e}") from e
         if hashlib.sha256(data).hexdigest() != self.entry(table, "sha256", name):
             raise InvalidModel(self._source, f"{name}.weights is damaged: its digest is not the one stated beside it")
-        if len(data) % dtype.itemsize:
-            raise InvalidModel(self._source, f"{name}.weights is no whole number of {dtype.itemsize} bytes")
-        numbers = np.frombuffer(data, dtype)
+        if len(data) % _STORED.itemsize:
+            raise InvalidModel(self._source, f"{name}.weights is no whole number of {_STORED.itemsize} bytes")
+        numbers = np.frombuffer(data, _STORED)
         if not np.all(np.isfinite(numbers)):
             raise InvalidModel(self._source, f"{name}.weights must be made of finite numbers")
         return numbers
@@ -323,14 +329,13 @@ def _plain(regressor: Regressor) -> dict[str, Any]:
 
 
 def _plain_network(network: Network) -> dict[str, Any]:
-    precision = network.weights[0].dtype
     layers = zip(network.weights, network.biases, strict=True)
-    data = b"".join(part.astype(precision.newbyteorder("<")).tobytes() for layer in layers for part in layer)
+    data = b"".join(part.astype(_STORED).tobytes() for layer in layers for part in layer)
     text = base64.b64encode(data).decode("ascii")
     return {
         "neurons": list(network.neurons),
         "activation": network.activation.value,
-        "precision": precision.name,
+        "precision": network.weights[0].dtype.name,
         "mean_y": network.mean_y.tolist(),
         "scale_y": network.scale_y.tolist(),
         "sha256": hashlib.sha256(data).hexdigest(),

@@ -17,8 +17,8 @@ LAYERS: Mapping[Learned, tuple[int, ...]] = {
     Learned.SMALL: (32, 32),
     Learned.PUBLISHED: (64, 256, 1024, 1024, 256, 64),
 }
-"""Neurons of the hidden layers. [Gandarias2020] sec. IV-B names seven layers and six widths: the seventh is the output of
-3, which is linear."""
+"""Neurons of the hidden layers. [Gandarias2020] sec. IV-B names seven layers and six widths: the seventh is the output
+of 3, which is linear."""
 
 
 class Activation(enum.Enum):
@@ -35,8 +35,8 @@ ACTIVATIONS: Mapping[Learned, Activation] = {Learned.SMALL: Activation.TANH, Lea
 class Network(Domain):
     """y(x) = mean_y + scale_y N(z): N is one matrix after another on the standardised inputs, bent in between.
 
-    It is computed in the precision of its weights, float32 or float64: half the bytes take half the time, and 1.6 million
-    weights are read once for each y.
+    It is computed in the precision of its weights, float32 or float64: half the bytes take half the time, and 1.6
+    million weights are read for each y.
 
     Attributes:
         weights: of each layer, shape (neurons of the layer before, neurons).

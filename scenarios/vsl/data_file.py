@@ -1,4 +1,4 @@
-"""Measured points of the VSL arm as a Parquet file: the matrix D of [Gandarias2020] eq. (9), and where it comes from."""
+"""Measured points of the VSL arm as a Parquet file: matrix D of [Gandarias2020] eq. (9), and where it comes from."""
 
 import json
 import math
@@ -151,5 +151,7 @@ def _order(path: Path, values: Any) -> Any:
     """Return the places in the split: -1, or each number from 0 once."""
     places = np.sort(values[values != -1.0])
     if not np.array_equal(places, np.arange(len(places))) or math.isnan(float(np.sum(places))):
-        raise InvalidData(path, f"its column {_ORDER} must count the usable rows from 0, in any order, -1 for the others")
+        raise InvalidData(
+            path, f"its column {_ORDER} must count the usable rows from 0, in any order, -1 for the others"
+        )
     return values.astype(np.int64)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.controllers.vsl.kinematics import format_point
+from handover.controllers.vsl.learned_model import Learned
 from handover.controllers.vsl.paths import segments_of
 from handover.controllers.vsl.trajectory_planner import Elbow, Path
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
@@ -87,4 +88,9 @@ class HybridParameters(Parameters):
     tolerance: Metre = parameter(
         0.005, "largest mean error of the tip for which the run counts as a success", minimum=0.0, maximum=1.0
     )
+    learned: Learned = parameter(
+        Learned.CUBIC, "what corrects: polynomials, a small network, the paper's, which needs a model, or a beam"
+    )
     model: str = parameter("", "file of a trained model; empty: the one that ships")
+    window: bool = parameter(False, "whether the direction of motion tells the gears' friction from the load")
+    closed_loop: bool = parameter(False, "whether the tracker, too, tells the controller where the tip is")

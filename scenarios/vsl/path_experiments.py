@@ -154,5 +154,18 @@ class VslHybrid(PathExperiment):
     hybrid: ClassVar[bool] = True
 
     def kinematics(self, parameters: HybridParameters) -> dict[str, Any]:
-        """Return the trained model's file, absolute, since a unit may run in another folder."""
-        return {"model": str(Path(parameters.model).absolute()) if parameters.model else ""}
+        """Return what corrects; the trained model's file is absolute, since a unit may run in another folder."""
+        p = parameters
+        return {
+            "learned": p.learned.name,
+            "model": str(Path(p.model).absolute()) if p.model else "",
+            "window": p.window,
+            "closed_loop": p.closed_loop,
+        }
+
+    def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:
+        """Wire as the other experiment does, and the tracker to the kinematics if they close the loop."""
+        s = super().build(parameters, seed, fmu)
+        if parameters.closed_loop:
+            s.connect(s.units["arm"].y.p_WG_meas, s.units["kinematics"].u.p_WG_meas)
+        return s

@@ -120,6 +120,10 @@ class VslTraining:
     arm: Mapping[str, Any] = field(default_factory=dict[str, Any])
     epochs: int = EPOCHS
 
+    def like(self, model: VslModel) -> "VslTraining":
+        """Return the training of a model of the same kind for the same links."""
+        return replace(self, kinematics=model.kinematics, learned=model.kind, forward_input=model.forward_input)
+
     def train(self, progress: Progress) -> tuple[VslModel, Errors]:
         """Return the model, whose provenance has no date or path, and its errors.
 
@@ -220,8 +224,8 @@ class VslTraining:
     def inverse_pairs(self, data: Dataset) -> tuple[Floats, Floats]:
         """Return inputs, the rigid angles of the measured tips first, and commanded minus rigid angles, rad.
 
-        The *measured* angles in place of the commanded ones would leave the servos' droop in. Of a published network the
-        values are the commanded angles themselves.
+        The *measured* angles in place of the commanded ones would leave the servos' droop in. Of a published network
+        the values are the commanded angles themselves.
         """
         q_rigid = np.array([self.kinematics.inverse(p) for p in data.p_WG])
         values = data.q_cmd if self.learned is Learned.PUBLISHED else data.q_cmd - q_rigid
@@ -263,11 +267,18 @@ class VslTraining:
         """Fit what corrects eq. (11) and what corrects eq. (10)."""
         if self.learned is Learned.PHYSICS:
             return self._fit_beam(training, validation)
-        inverse, forward = ([pairs(d) for d in (training, validation)] for pairs in (self.inverse_pairs, self.forward_pairs))
+        inverse, forward = (
+            [pairs(d) for d in (training, validation)] for pairs in (self.inverse_pairs, self.forward_pairs)
+        )
         return self._fit(*inverse, seeds[0], progress, "rad"), self._fit(*forward, seeds[1], progress, "m")
 
     def _fit(
-        self, training: tuple[Floats, Floats], validation: tuple[Floats, Floats], seed: int, progress: Progress, unit: str
+        self,
+        training: tuple[Floats, Floats],
+        validation: tuple[Floats, Floats],
+        seed: int,
+        progress: Progress,
+        unit: str,
     ) -> _Fitted:
         """Fit one of the two, of values in a unit."""
         if self.learned is Learned.CUBIC:

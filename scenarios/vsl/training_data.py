@@ -83,7 +83,7 @@ class Dataset:
         return Dataset(self.p_WG[indices], self.p[indices], self.i[indices], self.q[indices], self.q_cmd[indices])
 
     def freed(self, directions: Floats, friction: Sequence[float] | Floats) -> "Dataset":
-        """Return the points with currents without the gears' friction, see `directions_of`; (2,) of joints 2 and 3, A."""
+        """Return the points with currents freed of friction, (2,) of joints 2 and 3, A; see `directions_of`."""
         if not np.any(friction):
             return self
         i = np.array(self.i)
@@ -164,7 +164,8 @@ def collect(
 ) -> Dataset:
     """Measure points of the workspace at random pressures, angles and loads, each after the arm has settled.
 
-    The source varies one of the three from point to point: a walk. Else all are drawn anew, which spreads points better.
+    The source varies one of the three from point to point: a walk. Else all are drawn anew, which spreads points
+    better.
     The arm is commanded above the wanted tip by a random share of what it may sag, so that measured tips cover the
     wanted places.
 
