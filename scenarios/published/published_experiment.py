@@ -133,6 +133,10 @@ class PublishedExperiment(abc.ABC):
     title: ClassVar[str]
     """What was tried, in a line, with its place in the paper."""
     scenario: ClassVar[str]
+    takes_model: ClassVar[bool] = False
+    """Whether it can be given the file of a trained model."""
+    model: Path | None = None
+    """That file, absolute, if it was given one."""
 
     @abc.abstractmethod
     def plan(self, quick: bool) -> CampaignPlan:

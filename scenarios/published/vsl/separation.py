@@ -68,14 +68,14 @@ def separation_claim(
         return nothing_measured(claim, where, published, beyond)
     n, held = min(c.runs for c in found), sum(c.holds for c in found)
     closest = min(found, key=lambda c: c.margin)
-    reason = (
-        f"{'Holds' if beyond else 'Reproduced'} if in each of the {len(found)} comparisons each run of the one errs "
-        "less than each run of the other: a mean over all could hide a cell that goes the other way."
-    )
+    every = f"in each of the {len(found)} comparisons " if len(found) > 1 else ""
+    reason = f"{'Holds' if beyond else 'Reproduced'} if {every}each run of the one errs less than each of the other."
+    if every:
+        reason += " A mean over all could hide one that goes the other way."
     if n < MIN_RUNS:
         reason += f" With {n} {'runs' if n > 1 else 'run'} of each that can be chance: it takes {MIN_RUNS}."
     else:
-        reason += f" Without a difference {n} runs of each part so with p = {format_p_value(chance_of(n))} (rank sums)."
+        reason += f" By chance {n} runs of each part so with p = {format_p_value(chance_of(n))} (rank sums)."
     if failing := [c.label for c in found if not c.holds]:
         reason += f" It fails at: {'; '.join(failing[:_NAMED])}"
         reason += f"; and {len(failing) - _NAMED} more." if len(failing) > _NAMED else "."
