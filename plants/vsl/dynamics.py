@@ -1,6 +1,7 @@
 """Dynamics of the VSL arm's chain: how it swings, integrated by generalized-alpha."""
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -65,7 +66,7 @@ class VslDynamics:
         n, m = len(chain), len(chain) + len(sheared)
         self._sheared = sheared
         self._body = np.concatenate((np.arange(n), sheared))  # of each coordinate
-        self._joints = np.array([0, chain.elbow])  # hinges of J2 and J3
+        self._joints = np.array(chain.joints)
         self._B = np.eye(m)
         self._B[np.arange(1, n), np.arange(n - 1)] = -1.0
         self._inertia = np.diag(np.concatenate((chain.inertia, np.zeros(len(sheared)))))
@@ -74,11 +75,11 @@ class VslDynamics:
         self._v: Floats = np.zeros(m)
         self._a: Floats = np.zeros(m)
         self._a_mean = np.zeros(m)
-        self._offset: Floats = np.zeros(2)
+        self._offset: Floats = np.zeros(len(chain.joints))
         self.pose = self._statics.pose
 
-    def settle(self, theta: tuple[float, float], p: tuple[float, float], load: float) -> None:
-        """Rest at the angles of J2 and J3 that the servos aim at, rad, wherever the arm was before."""
+    def settle(self, theta: Sequence[float], p: Sequence[float], load: float) -> None:
+        """Rest at the angles of the chain's joints that the servos aim at, rad, wherever the arm was before."""
         self._statics.settle(theta, p, load)
         self.pose = self._statics.pose
         self._y = np.concatenate((self.pose.angles, self.pose.shears[self._sheared]))
@@ -88,8 +89,8 @@ class VslDynamics:
     def advance(
         self,
         dt: float,
-        theta: tuple[tuple[float, float], tuple[float, float]],
-        p: tuple[float, float],
+        theta: tuple[Sequence[float], Sequence[float]],
+        p: Sequence[float],
         load: float,
         spin: float,
     ) -> None:
@@ -97,8 +98,8 @@ class VslDynamics:
 
         Args:
             dt: in s.
-            theta: angles of J2 and J3, rad, that the servos aim at first and last; they go evenly between.
-            p: pressures of links 2 and 3, Pa.
+            theta: angles of the chain's joints, rad, that the servos aim at first and last; they go evenly between.
+            p: pressures of the links, Pa.
             load: at the tip, kg.
             spin: rate of J1, rad/s.
         """
@@ -108,7 +109,7 @@ class VslDynamics:
         for i in range(steps):
             self._substep(dt / steps, aims[i], aims[i + 1], held)
 
-    def frequencies(self, p: tuple[float, float], load: float) -> Floats:
+    def frequencies(self, p: Sequence[float], load: float) -> Floats:
         """Return the natural frequencies about the pose at hand, without damping, in Hz, the lowest first."""
         held = self._held(p, load, 0.0)
         u, e, D = self._directions(self._y)
@@ -117,6 +118,15 @@ class VslDynamics:
         )
         whiten = np.linalg.inv(np.linalg.cholesky(self._mass(D, held.C_y)))
         return np.sqrt(np.linalg.eigvalsh(whiten @ K @ np.transpose(whiten))) / (2.0 * math.pi)
+
+    def acceleration(self, spin: float) -> Complexes:
+        """Return the accelerations of the bodies' ends in the arm's plane, m/s2, after that of the shoulder, (n + 1,).
+
+        J1 turns at the rate spin, rad/s.
+        """
+        u, e, _ = self._directions(self._y)
+        a = self._accelerated(u, e, self._v, self._a) - spin * spin * u.real
+        return np.concatenate(([0.0], np.cumsum(a)))
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return the complete state, plain data; its arrays are replaced and never written to."""
@@ -127,7 +137,7 @@ class VslDynamics:
         self._y, self._v, self._a, self._a_mean, self._offset, pose = snapshot
         self.pose = Pose(*pose)
 
-    def _held(self, p: tuple[float, float], load: float, spin: float) -> _Held:
+    def _held(self, p: Sequence[float], load: float, spin: float) -> _Held:
         hinge, shear = self._chain.springs(p)
         k = 1.0 / np.concatenate((hinge, np.array(shear)[self._sheared]))
         weight: Floats = self._params.gravity * (self._chain.carried + load)
@@ -135,7 +145,7 @@ class VslDynamics:
         return _Held(k, C, C[np.ix_(self._body, self._body)], weight, spin * spin)
 
     def _substep(self, h: float, first: Floats, last: Floats, held: _Held) -> None:
-        """Advance by h, or by halves of it if need be, while the servos' aims go from the first to the last, (2,)."""
+        """Advance by h, or by halves of it if need be, while the servos' aims go from the first to the last."""
         kept = math.exp(-h / self._params.droop_time)
         yielding = (1.0 - kept) / self._params.servo_stiffness
         lag = self._params.damping_time / h
@@ -212,8 +222,7 @@ class VslDynamics:
         n, at = len(self._chain), self._sheared
         v, a = rates
         by_v, by_a = by
-        accelerated = 1j * u * a[:n] - u * v[:n] ** 2
-        accelerated[at] += e[at] * (1j * a[n:] - 2.0 * v[at] * v[n:])
+        accelerated = self._accelerated(u, e, v, a)
         pull = held.C @ (accelerated - held.spin2 * u.real) + 1j * held.weight
         G = by_a * D - held.spin2 * D.real
         G[:n] += 1j * accelerated - 2.0 * by_v * u * v[:n]
@@ -221,6 +230,13 @@ class VslDynamics:
         G[n:] += 1j * e[at] * (1j * a[at] - v[at] ** 2) - 2.0 * by_v * e[at] * v[at]
         S = held.C_y * np.real(np.conj(D)[:, None] * G) + by_a * self._inertia + self._turning(u, e, pull)
         return pull, S
+
+    def _accelerated(self, u: Complexes, e: Complexes, v: Floats, a: Floats) -> Complexes:
+        """Return u_k'', (n,)."""
+        n, at = len(self._chain), self._sheared
+        accelerated = 1j * u * a[:n] - u * v[:n] ** 2
+        accelerated[at] += e[at] * (1j * a[n:] - 2.0 * v[at] * v[n:])
+        return accelerated
 
     def _turning(self, u: Complexes, e: Complexes, pull: Complexes) -> Floats:
         """Return the derivative in y of the generalised forces of the pull at u_k, as D turns, (m, m)."""
@@ -235,8 +251,7 @@ class VslDynamics:
         n = len(self._chain)
         shears = np.zeros(n)
         shears[self._sheared] = self._y[n:]
-        joints = (float(torque[0]), float(torque[1])), (float(droop[0]), float(droop[1]))
-        self.pose = Pose(np.array(self._y[:n]), shears, *joints)
+        self.pose = Pose(np.array(self._y[:n]), shears, tuple(torque.tolist()), tuple(droop.tolist()))
 
 
 def _weights(radius: float) -> tuple[float, float, float, float]:

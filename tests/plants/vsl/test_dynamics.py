@@ -72,14 +72,14 @@ def energies(chain: VslChain, poses: tuple[Pose, Pose, Pose], h: float) -> tuple
     own = UNDAMPED.link_mass * np.array(chain.lengths) / 0.225
     speed = (chain.ends(after) - chain.ends(before)) / (2.0 * h)
     turn = (after.angles - before.angles) / (2.0 * h)
-    kinetic = own @ np.abs((speed[1:] + speed[:-1]) / 2.0) ** 2 + UNDAMPED.servo_mass * abs(speed[chain.elbow]) ** 2
+    kinetic = own @ np.abs((speed[1:] + speed[:-1]) / 2.0) ** 2 + UNDAMPED.servo_mass * abs(speed[chain.joints[1]]) ** 2
     kinetic += UNDAMPED.gripper_mass * abs(speed[-1]) ** 2 + (own * np.square(chain.lengths) / 12.0) @ turn**2
     hinge, shear = chain.springs(P)
     twist = np.diff(now.angles, prepend=0.0)
-    twist[[0, chain.elbow]] -= RAISED
+    twist[[0, chain.joints[1]]] -= RAISED
     springs = np.sum(twist**2 / np.array(hinge)) + np.sum(now.shears**2 / np.array(shear))
     ends = chain.ends(now)
-    height = own @ (ends[1:] + ends[:-1]).imag / 2.0 + UNDAMPED.servo_mass * ends[chain.elbow].imag
+    height = own @ (ends[1:] + ends[:-1]).imag / 2.0 + UNDAMPED.servo_mass * ends[chain.joints[1]].imag
     return float(kinetic) / 2.0, float(springs) / 2.0 + 9.81 * float(height + UNDAMPED.gripper_mass * ends[-1].imag)
 
 
