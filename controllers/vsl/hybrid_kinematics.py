@@ -34,6 +34,9 @@ _ON_THE_WAY = 0.05
 _DAMPING = 0.01
 """Of the inverse of the Jacobian, m: singular values below it, near a stretched elbow, count for less (assumed)."""
 
+_SHORTEST_LEVER = 0.03
+"""m; of an arm that stands upright, currents say nothing of a load (assumed)."""
+
 _SAME_TIME = 1e-9
 """s; rounding of sums of intervals."""
 
@@ -119,7 +122,9 @@ class HybridKinematics:
     in 3 s.
 
     The window: i - c d in place of i, with c as trained and d in [-1, 1] which way each gear's friction acts. That
-    follows from the unit's own commands, which have no noise: see `turned`.
+    follows from the unit's own commands, which have no noise: see `turned`. What is smoothed then is not the currents
+    but what a load adds to the usual ones i_0(q, p) at its levers b(q): i - c d - i_0 = lambda b + e, with e square to
+    b. lambda and e change with the load alone, so that smoothing them does not lag behind the posture.
 
     The closed loop, at the tracker's rate: q_cmd has dq besides, dq' = K_I J~^+ (f(q_ref) - p_WG_meas), with q_ref of
     the period that ends and the corrected Jacobian J~, that of h included (without, MODEL_BASED, J); J~^+ is its damped
@@ -146,7 +151,7 @@ class HybridKinematics:
         self._kinematics = VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
         self._model = _model(p, self._kinematics) if p.method is not Method.MODEL_BASED else None
         self._i: tuple[Floats, Floats] | None = None
-        """Currents, smoothed once and twice."""
+        """Currents, or what explains them, smoothed once and twice."""
         self._before: tuple[Floats, Floats] | None = None
         """q_ref and q_cmd of the period that ends."""
         self._direction = np.zeros(2)
@@ -158,15 +163,16 @@ class HybridKinematics:
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command that a step from here would give; no time passes."""
-        i = self._smoothed(self._freed(u.i_meas), 0.0)[1]
+        i = self._currents(u, self._smoothed(self._carried(u), 0.0)[1])
         return self._command(u, i, self._dq)
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Return the command that holds until t + dt."""
-        self._i = self._smoothed(self._freed(u.i_meas), dt)
+        self._i = self._smoothed(self._carried(u), dt)
+        i = self._currents(u, self._i[1])
         if self._params.closed_loop:
-            self._integrate(t, u, self._i[1])
-        y = self._command(u, self._i[1], self._dq)
+            self._integrate(t, u, i)
+        y = self._command(u, i, self._dq)
         if self._before is not None:
             turn = (y.q_cmd - self._before[1])[1:]
             self._direction = turned(self._direction, turn, self._params.reversal)
@@ -174,18 +180,28 @@ class HybridKinematics:
         return y
 
     def get_state(self) -> bytes:
-        """Return the smoothed currents, and what window and closed loop remember."""
+        """Return what is smoothed, and what window and closed loop remember."""
         return pack_state((self._i, self._before, self._direction, self._dq, self._readings))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this unit or of one with equal parameters."""
         self._i, self._before, self._direction, self._dq, self._readings = unpack_state(state)
 
-    def _freed(self, i_meas: Floats) -> Floats:
-        """Return the currents without the gears' friction."""
+    def _carried(self, u: Inputs) -> Floats:
+        """Return what is smoothed: the currents; of a window what explains them, [lambda, e_2, e_3]."""
         if not self._params.window or self._model is None:
-            return i_meas
-        return i_meas - np.array([0.0, *(self._direction * self._model.friction).tolist()])
+            return u.i_meas
+        usual, levers = self._model.currents(u.q_meas, u.p_meas)
+        more = u.i_meas[1:] - self._direction * self._model.friction - usual
+        by_lever = levers @ more / max(levers @ levers, _SHORTEST_LEVER**2)
+        return np.concatenate([[by_lever], more - by_lever * levers])
+
+    def _currents(self, u: Inputs, carried: Floats) -> Floats:
+        """Return the currents, shape (3,), A, that what is smoothed makes at the present posture."""
+        if not self._params.window or self._model is None:
+            return carried
+        usual, levers = self._model.currents(u.q_meas, u.p_meas)
+        return np.concatenate([[0.0], usual + carried[0] * levers + carried[1:]])
 
     def _smoothed(self, i_meas: Floats, dt: float) -> tuple[Floats, Floats]:
         if self._i is None or self._params.i_lag == 0.0:

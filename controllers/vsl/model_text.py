@@ -19,6 +19,7 @@ from handover.controllers.vsl.learned_model import (
     FORWARD_INPUTS,
     FORWARD_INPUTS_X,
     INVERSE_INPUTS,
+    USUAL_INPUTS,
     VALUES,
     Adapted,
     Cubic,
@@ -77,6 +78,7 @@ def model_text(model: VslModel) -> str:
         "provenance": model.provenance,
         "links": {"L_1": k.L_1, "L_2": k.L_2, "L_3": k.L_3, "elbow": k.elbow.name},
         "friction": list(model.friction),
+        **({"usual": {"inputs": list(USUAL_INPUTS), **_plain(model.usual)}} if model.usual else {}),
         "inverse": {"inputs": list(INVERSE_INPUTS), **_plain(model.inverse)},
         "forward": {"inputs": list(_FORWARD_INPUTS[model.forward_input]), **_plain(model.forward)},
     }
@@ -131,6 +133,7 @@ def parse_model(text: str, source: str) -> VslModel:
         kind=kind,
         forward_input=forward_input,
         friction=reader.friction(whole),
+        usual=reader.usual(whole),
     )
 
 
@@ -187,13 +190,25 @@ class _Reader:
         )
         return first, second
 
+    def usual(self, whole: dict[str, Any]) -> Cubic | None:
+        """Return the usual currents, which a model without a window does not have."""
+        if not any(self.friction(whole)):
+            return None
+        table = self._named(whole, "usual", USUAL_INPUTS)
+        return self._cubic(table, "usual", self._domain(table, "usual", len(USUAL_INPUTS)), len(USUAL_INPUTS) // 2)
+
+    def _named(self, whole: dict[str, Any], name: str, inputs: tuple[str, ...]) -> dict[str, Any]:
+        """Return a table of which the inputs are these."""
+        table = self.table(self.entry(whole, name), name)
+        if (stated := self.entry(table, "inputs", name)) != list(inputs):
+            raise InvalidModel(self._source, f"{name}.inputs are {stated}, not {list(inputs)}")
+        return table
+
     def regressor(
         self, whole: dict[str, Any], name: str, inputs: tuple[str, ...], kind: Learned, kinematics: VslKinematics
     ) -> Regressor:
         """Return what was learned for one of the two equations."""
-        table = self.table(self.entry(whole, name), name)
-        if (stated := self.entry(table, "inputs", name)) != list(inputs):
-            raise InvalidModel(self._source, f"{name}.inputs are {stated}, not {list(inputs)}")
+        table = self._named(whole, name, inputs)
         domain = self._domain(table, name, len(inputs))
         if kind is Learned.CUBIC:
             regressor: Regressor = self._cubic(table, name, domain)
@@ -281,13 +296,13 @@ class _Reader:
             raise InvalidModel(self._source, f"{name}.weights must be made of finite numbers")
         return numbers
 
-    def _cubic(self, table: dict[str, Any], name: str, domain: Domain) -> Cubic:
+    def _cubic(self, table: dict[str, Any], name: str, domain: Domain, values: int = VALUES) -> Cubic:
         n = len(domain.mean)
         powers = np.transpose(self.numbers(table, name, "powers", (n, ANY)))
         if np.any(powers != np.floor(powers)) or np.any(powers < 0.0) or np.any(np.sum(powers, axis=1) > DEGREE):
             fault = f"{name}.powers must be whole numbers from 0, {DEGREE} at most in a column"
             raise InvalidModel(self._source, fault)
-        coefficients = np.transpose(self.numbers(table, name, "coefficients", (VALUES, len(powers))))
+        coefficients = np.transpose(self.numbers(table, name, "coefficients", (values, len(powers))))
         return Cubic(
             domain.mean,
             domain.scale,

@@ -19,6 +19,7 @@ from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import (
     FORWARD_INPUTS,
     Adapted,
+    Cubic,
     ForwardInput,
     Learned,
     Regressor,
@@ -175,7 +176,8 @@ class VslTraining:
         parts = data.rows(training), data.rows(validation)
         seeds = [int(n) for n in np.random.SeedSequence(measured.origin["seed"]).generate_state(4)[2:] >> 1]
         inverse, forward = self._fit_both(*parts, seeds, progress)
-        kinds = self.learned, self.forward_input, friction
+        usual = self._usual_currents(*parts) if self.window else None
+        kinds = self.learned, self.forward_input, friction, usual
         model = VslModel(inverse.regressor, forward.regressor, self.kinematics, {}, *kinds)
         errors = self.errors(model, data.rows(test))
         if self.learned is not Learned.PHYSICS:
@@ -314,6 +316,11 @@ class VslTraining:
             return residuals.forward_pairs(data.freed(directions, c))[0]
 
         return fit_friction(inputs_at, directions, residuals.forward_pairs(data)[1])
+
+    def _usual_currents(self, training: Dataset, validation: Dataset) -> Cubic:
+        """Fit the currents of joints 2 and 3 to angles and pressures, whatever the load."""
+        pairs = [(np.concatenate([d.q[:, 1:], d.p], axis=1), d.i[:, 1:]) for d in (training, validation)]
+        return fit_cubic(*pairs[0], *pairs[1]).cubic
 
     def _adapted(self, base: VslModel, data: Dataset) -> VslModel:
         return replace(
