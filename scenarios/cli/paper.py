@@ -51,7 +51,7 @@ Exit status
 @click.option("--seed", type=WholeNumber(min=0), help="Seed of the campaign.  [default: the experiment's]")
 @click.option(
     "--model",
-    type=click.Path(dir_okay=False, exists=True, path_type=Path),
+    type=click.Path(dir_okay=False, path_type=Path),
     help="vsl-2: file of a trained network of the paper's size, without which that is left out.",
 )
 @campaign_options
@@ -77,10 +77,10 @@ def paper(
         raise UsageError(f"no experiment {experiment!r}: {nearest(experiment, EXPERIMENTS)}")
     published = EXPERIMENTS[experiment]()
     if model is not None:
-        if not published.takes_model:
-            taking = ", ".join(name for name, kind in EXPERIMENTS.items() if kind.takes_model)
-            raise UsageError(f"--model: {experiment} has no use for a trained model; it is for {taking}")
-        published.model = model.absolute()
+        try:
+            published.take_model(model.absolute())
+        except ValueError as e:
+            raise UsageError(f"--model: {e}") from e
     plan = published.plan(quick)
     plan = plan if seed is None else replace(plan, seed=seed)
     finish = _Finish(published, report=not no_report)

@@ -133,10 +133,14 @@ class PublishedExperiment(abc.ABC):
     title: ClassVar[str]
     """What was tried, in a line, with its place in the paper."""
     scenario: ClassVar[str]
-    takes_model: ClassVar[bool] = False
-    """Whether it can be given the file of a trained model."""
-    model: Path | None = None
-    """That file, absolute, if it was given one."""
+
+    def take_model(self, file: Path) -> None:  # noqa: ARG002
+        """Let the plan have the file of a trained model.
+
+        Raises:
+            ValueError: with what is wrong with the model, or that it has no use for one.
+        """
+        raise ValueError(f"{self.name} has no use for a trained model")
 
     @abc.abstractmethod
     def plan(self, quick: bool) -> CampaignPlan:

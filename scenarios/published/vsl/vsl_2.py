@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
+from handover.controllers.vsl.hybrid_kinematics import Learned
+from handover.controllers.vsl.model_text import InvalidModel, read_model
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
@@ -34,21 +36,36 @@ class Vsl2(PublishedExperiment):
     """The curve with 25 g at 1.5 bar and with 75 g at 0.5 bar, five times each, by rigid kinematics and by corrections.
 
     Corrections are those of cubic polynomials, the default, of a small network and of a beam with fitted stiffnesses,
-    which ship, and of the paper's network if `model` is the file of one. Besides, the arm of rigid links goes by rigid
-    kinematics, with joints as stiff as assumed and stiffer. Corrections are tried on the arm that they were learned
-    from, and on others. The quick plan has each case once by rigid kinematics and by polynomials, on the arm that was
-    learned from and on another, and on two rigid arms.
+    which ship, and of the paper's network if `take_model` was given the file of one. Besides, the arm of rigid links
+    goes by rigid kinematics, with joints as stiff as assumed and stiffer. Corrections are tried on the arm that they
+    were learned from, and on others. The quick plan has each case once by rigid kinematics and by polynomials, on the
+    arm that was learned from and on another, and on two rigid arms.
     """
 
     name: ClassVar[str] = "vsl-2"
     title: ClassVar[str] = "the same by rigid kinematics and by learned corrections ([Gandarias2020] figs. 6, 7)"
     scenario: ClassVar[str] = VslHybrid.name
-    takes_model: ClassVar[bool] = True
+
+    def __init__(self) -> None:
+        self._network: Path | None = None
+
+    def take_model(self, file: Path) -> None:
+        """Let the paper's network be tried, too, from the file of a trained one.
+
+        Raises:
+            InvalidModel: it is none, or of another kind.
+        """
+        model = read_model(file)
+        if model.kind is not Learned.PUBLISHED:
+            kind = model.kind.name.lower()
+            remedy = "handover vsl-train --learned published"
+            raise InvalidModel(str(file), f"it is a {kind} model, and not the paper's network", remedy)
+        self._network = file
 
     def plan(self, quick: bool) -> CampaignPlan:
         """Return cases x ways, and cases x corrections x other arms, five times each; if quick, a few once."""
-        network = () if self.model is None else (PUBLISHED,)
-        given = {"model": str(self.model)}
+        network = () if self._network is None else (PUBLISHED,)
+        given = {"model": str(self._network)}
         if quick:
             ways, rigid, arms = (MODEL_BASED, CUBIC, *network), (RIGID, RIGIDS[-1]), OTHERS[:1]
         else:

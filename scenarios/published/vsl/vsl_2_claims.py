@@ -63,8 +63,8 @@ def _stiffer(runs: Vsl2Runs) -> list[Claim]:
     """Judge the claim against rigid arms with stiffer joints: it is told at which it falls."""
     return [
         separation_claim(
-            f"By {runs.hybrid.label} the soft arm's tip errs less than that of a rigid arm with joints {factor:g} times "
-            "as stiff as assumed.",
+            f"By {runs.hybrid.label} the soft arm's tip errs less than that of a rigid arm with joints {factor:g} "
+            "times as stiff as assumed.",
             "",
             "",
             [_compared(runs, case, runs.hybrid, rigid) for case in CASES],
