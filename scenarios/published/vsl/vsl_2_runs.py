@@ -1,6 +1,6 @@
 """The runs of the experiment `vsl-2`, by load and pressure, by how the tip is commanded, and by arm."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +14,7 @@ from handover.scenarios.published.rows import Row, has
 from handover.scenarios.published.vsl.vsl_1_runs import format_load
 from handover.scenarios.vsl.parameters import HybridParameters
 
-_PUBLISHED = paper_values("vsl", "published")
+_PUBLISHED, _BEYOND = (paper_values("vsl", group) for group in ("published", "beyond"))
 _BAR = 1e5  # Pa
 
 REPETITIONS: int = _PUBLISHED["repetitions"]
@@ -74,7 +74,7 @@ PHYSICS = _learned("beam", Learned.PHYSICS)
 SHIPPED = (CUBIC, SMALL, PHYSICS)
 LEARNED = (CUBIC, SMALL, PUBLISHED, PHYSICS)
 
-JOINT_FACTORS = (1.0, 2.0, 4.0, 10.0)
+JOINT_FACTORS: tuple[float, ...] = tuple(_BEYOND["joint_factors"])
 """How many times as stiff as assumed the joints of the rigid arm are."""
 
 
@@ -103,16 +103,21 @@ class Arm:
 
 
 TRAINED = Arm("trained", {})
-SCATTER = 0.1
+SCATTER: float = _BEYOND["scatter"]
 """Standard deviation of the stiffness and mass of each link of another arm, as a share."""
 
-OTHERS = (
-    Arm("links 10 % stiffer", {"EI_factor": "1.1"}),
-    Arm("links 10 % heavier", {"mass_factor": "1.1"}),
-    Arm("twice the friction", {"friction_factor": "2"}),
-    *(Arm(f"arm {n} of its kind", {"arm_scatter": f"{SCATTER:g}", "arm_seed": str(n)}) for n in range(1, 6)),
-)
-"""Arms that nothing was learned from: with one thing otherwise, and five whose links scatter."""
+
+def _others() -> Iterator[Arm]:
+    factor, friction, arms = (_BEYOND[name] for name in ("factor", "friction_factor", "arms"))
+    yield Arm(f"links {100 * (factor - 1):.0f} % stiffer", {"EI_factor": f"{factor:g}"})
+    yield Arm(f"links {100 * (factor - 1):.0f} % heavier", {"mass_factor": f"{factor:g}"})
+    yield Arm(f"friction x {friction:g}", {"friction_factor": f"{friction:g}"})
+    for n in range(1, arms + 1):
+        yield Arm(f"arm {n} of its kind", {"arm_scatter": f"{SCATTER:g}", "arm_seed": str(n)})
+
+
+OTHERS = tuple(_others())
+"""Arms that nothing was learned from: with one thing otherwise, and some whose links scatter."""
 
 _NAMES = (
     "learned",
