@@ -18,6 +18,7 @@ from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
+from handover.scenarios.vsl.arms import arm_of
 from handover.scenarios.vsl.evaluation import PathEvaluator
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 from handover.scenarios.vsl.places import PLACES
@@ -95,6 +96,7 @@ class PathExperiment(Experiment[PathEvaluator]):
             load=p.load,
             q_0=p.q_0,
             seed=arm_seed,
+            **arm_of(p).settings,
         )
         for name in ("q_ref", "qd_ref"):
             s.connect(getattr(planner.y, name), getattr(kinematics.u, name))

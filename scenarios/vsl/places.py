@@ -51,6 +51,10 @@ PLACES = {
         optional={
             "p_cmd": "",
             **dict.fromkeys(("motion", "link_2", "link_3", "load", "q_0"), "the scenario's parameter"),
+            **dict.fromkeys(
+                ("EI_factor", "mass_factor", "friction_factor", "joint_factor", "L_2", "L_3"),
+                "set for an arm that differs from the usual one",
+            ),
             "seed": "follows from the run's seed",
         },
         remarks=(_WORLD,),
