@@ -1,7 +1,6 @@
 """Model-based and hybrid, learning-based kinematics of the VSL arm. [Gandarias2020] secs. III-A, IV-B and IV-C."""
 
 import enum
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -11,12 +10,13 @@ from typing import ClassVar
 import numpy as np
 
 from handover.controllers.vsl import default_model, default_physics_model, default_small_model, default_window_model
+from handover.controllers.vsl.corrections import CurrentFilter, SwingCompensation, TrackerLoop
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
-from handover.controllers.vsl.learned_model import Learned, VslModel, turned
+from handover.controllers.vsl.learned_model import Learned, VslModel
 from handover.controllers.vsl.model_text import InvalidModel, parse_model, read_model
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.cosim.blocks.units import Ampere, Hertz, Metre, Pascal, PerSecond, Radian, RadianPerSecond, Second
+from handover.cosim.blocks.units import Ampere, Hertz, Metre, Number, Pascal, PerSecond, Radian, RadianPerSecond, Second
 
 __all__ = ["Elbow", "HybridKinematics", "Inputs", "InvalidModel", "Learned", "Method", "Outputs", "Params"]
 
@@ -27,18 +27,6 @@ _SHIPPED = {
     (Learned.PHYSICS, False): default_physics_model.DEFAULT_MODEL,
 }
 """Texts of the models that ship, by what they are and whether they were trained on currents without friction."""
-
-_ON_THE_WAY = 0.05
-"""Angle between command and encoder, rad, from which a joint is on its way and the tip not yet to judge (assumed)."""
-
-_DAMPING = 0.01
-"""Of the inverse of the Jacobian, m: singular values below it, near a stretched elbow, count for less (assumed)."""
-
-_SHORTEST_LEVER = 0.03
-"""m; of an arm that stands upright, currents say nothing of a load (assumed)."""
-
-_SAME_TIME = 1e-9
-"""s; rounding of sums of intervals."""
 
 
 class Method(enum.IntEnum):
@@ -58,6 +46,7 @@ class Params:
     model: str = parameter("", "JSON file of a trained model; empty: the one that ships; no published one does")
     window: bool = parameter(False, "free the currents of gear friction by which way each joint has been turning")
     closed_loop: bool = parameter(False, "turn the joints until the tracker sees the tip where it is wanted")
+    swing: bool = parameter(False, "turn the joints against swings that the path's changes of speed excite")
     elbow: Elbow = parameter(Elbow.UP, "which way the elbow points")
     L_1: Metre = parameter(0.15, "height of the shoulder", minimum=0.0, maximum=10.0)
     L_2: Metre = parameter(0.225, "length of link 2", minimum=0.001, maximum=10.0)
@@ -74,10 +63,25 @@ class Params:
     tracker_rate: Hertz = parameter(
         30.0, "rate of the tracker's readings, of the closed loop", minimum=0.1, maximum=50.0
     )
+    tracker_lag: Second = parameter(
+        0.2, "time constant by which the tracker's errors are smoothed (assumed)", minimum=0.0, maximum=60.0
+    )
     K_I: PerSecond = parameter(
-        3.0, "share of the tip's error that the closed loop takes away in a second (assumed)", minimum=0.0, maximum=20.0
+        2.0, "share of the tip's error that the closed loop takes away in a second (assumed)", minimum=0.0, maximum=20.0
     )
     dq_max: Radian = parameter(0.2, "largest turn of a joint by the closed loop (assumed)", minimum=0.0, maximum=3.0)
+    K_F: Number = parameter(
+        0.6,
+        "share of the bending by a path's accelerations that is commanded ahead (assumed)",
+        minimum=0.0,
+        maximum=2.0,
+    )
+    K_D: PerSecond = parameter(
+        4.0, "share of the bending by a swing that joints yield by in a second (assumed)", minimum=0.0, maximum=20.0
+    )
+    qd_max: RadianPerSecond = parameter(
+        4.8, "joint speed where a bend is commanded ahead: as fast as the servos can", minimum=0.0, maximum=100.0
+    )
 
 
 @dataclass(kw_only=True)
@@ -121,14 +125,8 @@ class HybridKinematics:
     friction acts the same way: commanded to hold still, the arm hunts, at 0.5 bar and 75 g the tip by 4 mm up and down
     in 3 s.
 
-    The window: i - c d in place of i, with c as trained and d in [-1, 1] which way each gear's friction acts. That
-    follows from the unit's own commands, which have no noise: see `turned`. What is smoothed then is not the currents
-    but what a load adds to the usual ones i_0(q, p) at its levers b(q): i - c d - i_0 = lambda b + e, with e square to
-    b. lambda and e change with the load alone, so that smoothing them does not lag behind the posture.
-
-    The closed loop, at the tracker's rate: q_cmd has dq besides, dq' = K_I J~^+ (f(q_ref) - p_WG_meas), with q_ref of
-    the period that ends and the corrected Jacobian J~, that of h included (without, MODEL_BASED, J); J~^+ is its damped
-    inverse. dq rests while joints are on their way, and stays within dq_max.
+    Beyond the source, and each for itself: the window, see `CurrentFilter`; the closed loop by the tracker, of both
+    methods, see `TrackerLoop`; and what is done against swings, see `SwingCompensation`.
 
     `outside` reports that the input of g or h is outside the polytope of its training; see `Domain` for what follows.
 
@@ -150,90 +148,54 @@ class HybridKinematics:
         self._params = p = params
         self._kinematics = VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
         self._model = _model(p, self._kinematics) if p.method is not Method.MODEL_BASED else None
-        self._i: tuple[Floats, Floats] | None = None
-        """Currents, or what explains them, smoothed once and twice."""
+        self._currents = CurrentFilter(self._model if p.window else None, p.i_lag, p.reversal)
+        self._loop = TrackerLoop(self._kinematics, self._model, p.tracker_rate, p.tracker_lag, p.K_I, p.dq_max)
+        self._swing = SwingCompensation(self._model, p.K_F, p.K_D) if p.swing and self._model else None
         self._before: tuple[Floats, Floats] | None = None
         """q_ref and q_cmd of the period that ends."""
-        self._direction = np.zeros(2)
-        """Which way the friction of joints 2 and 3 acts."""
-        self._dq = np.zeros(3)
-        """What the closed loop turns the joints by."""
-        self._readings = 0
-        """Readings of the tracker until now."""
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command that a step from here would give; no time passes."""
-        i = self._currents(u, self._smoothed(self._carried(u), 0.0)[1])
-        return self._command(u, i, self._dq)
+        return self._command(u, self._currents.now(u))
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Return the command that holds until t + dt."""
-        self._i = self._smoothed(self._carried(u), dt)
-        i = self._currents(u, self._i[1])
+        i, at_once = self._currents.step(u, dt), False
         if self._params.closed_loop:
-            self._integrate(t, u, i)
-        y = self._command(u, i, self._dq)
+            self._loop.step(t, u, i, self._before)
+        if self._swing is not None:
+            at_once = self._swing.step(dt, u, i, self._currents.swing(u, i), self._before)
+        y = self._command(u, i)
+        if at_once:
+            y.qd_cmd = np.copysign(self._params.qd_max, y.qd_cmd)
         if self._before is not None:
-            turn = (y.q_cmd - self._before[1])[1:]
-            self._direction = turned(self._direction, turn, self._params.reversal)
+            self._currents.turn(y.q_cmd - self._before[1])
         self._before = np.array(u.q_ref), y.q_cmd
         return y
 
     def get_state(self) -> bytes:
-        """Return what is smoothed, and what window and closed loop remember."""
-        return pack_state((self._i, self._before, self._direction, self._dq, self._readings))
+        """Return what currents, closed loop and swings were, and the command."""
+        swing = None if self._swing is None else self._swing.get_state()
+        return pack_state((self._currents.get_state(), self._loop.get_state(), swing, self._before))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this unit or of one with equal parameters."""
-        self._i, self._before, self._direction, self._dq, self._readings = unpack_state(state)
+        currents, loop, swing, self._before = unpack_state(state)
+        self._currents.set_state(currents)
+        self._loop.set_state(loop)
+        if self._swing is not None:
+            self._swing.set_state(swing)
 
-    def _carried(self, u: Inputs) -> Floats:
-        """Return what is smoothed: the currents; of a window what explains them, [lambda, e_2, e_3]."""
-        if not self._params.window or self._model is None:
-            return u.i_meas
-        usual, levers = self._model.currents(u.q_meas, u.p_meas)
-        more = u.i_meas[1:] - self._direction * self._model.friction - usual
-        by_lever = levers @ more / max(levers @ levers, _SHORTEST_LEVER**2)
-        return np.concatenate([[by_lever], more - by_lever * levers])
-
-    def _currents(self, u: Inputs, carried: Floats) -> Floats:
-        """Return the currents, shape (3,), A, that what is smoothed makes at the present posture."""
-        if not self._params.window or self._model is None:
-            return carried
-        usual, levers = self._model.currents(u.q_meas, u.p_meas)
-        return np.concatenate([[0.0], usual + carried[0] * levers + carried[1:]])
-
-    def _smoothed(self, i_meas: Floats, dt: float) -> tuple[Floats, Floats]:
-        if self._i is None or self._params.i_lag == 0.0:
-            return np.array(i_meas), np.array(i_meas)
-        share = 1.0 - math.exp(-dt / self._params.i_lag)
-        once = self._i[0] + share * (i_meas - self._i[0])
-        return once, self._i[1] + share * (once - self._i[1])
-
-    def _integrate(self, t: float, u: Inputs, i: Floats) -> None:
-        """Turn the joints on by a share of the tip's error, if the tracker has a reading that it had not."""
-        p = self._params
-        readings = math.floor((t + _SAME_TIME) * p.tracker_rate) + 1
-        if readings == self._readings:
-            return
-        self._readings = readings
-        if self._before is None or np.max(np.abs(self._before[1] - u.q_meas)) > _ON_THE_WAY:
-            return
-        error = self._kinematics.forward(self._before[0]) - u.p_WG_meas
-        J = (
-            self._kinematics.jacobian(u.q_meas)
-            if self._model is None
-            else self._model.tip_jacobian(u.q_meas, u.p_meas, i)
-        )
-        damped = np.transpose(J) @ np.linalg.solve(J @ np.transpose(J) + _DAMPING**2 * np.eye(3), error)
-        self._dq = np.clip(self._dq + p.K_I / p.tracker_rate * damped, -p.dq_max, p.dq_max)
-
-    def _command(self, u: Inputs, i: Floats, dq: Floats) -> Outputs:
+    def _command(self, u: Inputs, i: Floats) -> Outputs:
         p, model, p_WG = self._params, self._model, self._kinematics.forward(u.q_meas)
         corrected = model is not None and p.method is Method.HYBRID
         q_cmd = model.command(u.q_ref, u.p_meas, i) if model is not None and corrected else np.array(u.q_ref)
+        if p.closed_loop:
+            q_cmd = q_cmd + self._loop.dq
+        if self._swing is not None:
+            q_cmd = q_cmd + self._swing.dq
         return Outputs(
-            q_cmd=q_cmd + dq if p.closed_loop else q_cmd,
+            q_cmd=q_cmd,
             qd_cmd=self._granted(u.qd_ref) if corrected or p.closed_loop else np.array(u.qd_ref),
             p_WG_model=p_WG,
             p_WG_est=np.array(p_WG) if model is None else model.tip(u.q_meas, u.p_meas, i),

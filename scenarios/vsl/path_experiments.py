@@ -163,6 +163,7 @@ class VslHybrid(PathExperiment):
             "model": str(Path(p.model).absolute()) if p.model else "",
             "window": p.window,
             "closed_loop": p.closed_loop,
+            "swing": p.swing,
         }
 
     def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:

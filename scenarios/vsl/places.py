@@ -33,7 +33,7 @@ PLACES = {
             "outside": "its share of the path is a metric",
             "method": "the scenario's",
             "elbow": "the scenario's parameter",
-            **dict.fromkeys(("learned", "model", "window", "closed_loop"), "the scenario's parameter"),
+            **dict.fromkeys(("learned", "model", "window", "closed_loop", "swing"), "the scenario's parameter"),
             "p_WG_meas": "in W; wired where the loop is closed",
         },
         remarks=(_WORLD,),
