@@ -23,6 +23,7 @@ from handover.scenarios.published.ir_grasp.ir_sensor import IrSensorCurve
 from handover.scenarios.published.ir_grasp.ir_table import IrTable
 from handover.scenarios.published.published_experiment import PublishedExperiment
 from handover.scenarios.published.vsl.vsl_1 import Vsl1
+from handover.scenarios.published.vsl.vsl_2 import Vsl2
 
 _ALL: tuple[type[PublishedExperiment], ...] = (
     FlyerApproaches,
@@ -45,6 +46,7 @@ _ALL: tuple[type[PublishedExperiment], ...] = (
     IrSensorCurve,
     IrTable,
     Vsl1,
+    Vsl2,
 )
 
 EXPERIMENTS: Mapping[str, type[PublishedExperiment]] = {e.name: e for e in _ALL}

@@ -17,15 +17,16 @@ from handover.scenarios.free_flyer.parameters import Behaviour, TaskParameters
 from handover.scenarios.published.free_flyer.handover_runs import GIVING, RECEIVING, Exchange
 from handover.scenarios.published.free_flyer.variations import (
     USUAL,
+    Row,
     Variation,
     acted_alone,
+    has,
     names_of,
     noise_times,
     unfinished_note,
     values_of,
 )
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.rows import Row, has
 from handover.scenarios.published.verdicts import nothing_measured, verdict_of
 
 _DEFAULT = TaskParameters()

@@ -18,7 +18,9 @@ from handover.scenarios.published.free_flyer.push_runs import linear_loop
 from handover.scenarios.published.free_flyer.variations import (
     TASKS,
     USUAL,
+    Row,
     Variation,
+    has,
     is_done,
     names_of,
     noise_times,
@@ -27,7 +29,6 @@ from handover.scenarios.published.free_flyer.variations import (
     values_of,
 )
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.rows import Row, has
 from handover.scenarios.published.verdicts import every_claim, format_rate, nothing_measured, verdict_of
 
 CONTROLLERS = {"ImpedanceController": "impedance", "AdmittanceController": "admittance", "PoseController": "PID"}

@@ -41,13 +41,13 @@ from handover.scenarios.published.free_flyer.variations import (
     PATIENCE,
     TASKS,
     USUAL,
+    Row,
     Variation,
     acted_alone,
     succeeded,
     values_of,
 )
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.rows import Row
 
 _REPETITIONS = 3
 

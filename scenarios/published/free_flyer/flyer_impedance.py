@@ -21,11 +21,8 @@ from handover.scenarios.published.free_flyer.push_runs import (
     PushRuns,
     predicted_greatest,
 )
-from handover.scenarios.published.free_flyer.variations import (
-    EXACT,
-)
+from handover.scenarios.published.free_flyer.variations import EXACT, Row
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.rows import Row
 
 _IDEAL, _LIMITED = ({"propulsion": p.item} for p in (Propulsion.IDEAL, Propulsion.LIMITED))
 

@@ -14,13 +14,8 @@ from handover.scenarios.published.free_flyer.push_runs import (
     PushRuns,
     predicted_greatest,
 )
-from handover.scenarios.published.free_flyer.variations import (
-    is_done,
-    unfinished_note,
-    values_of,
-)
+from handover.scenarios.published.free_flyer.variations import Row, is_done, unfinished_note, values_of
 from handover.scenarios.published.published_experiment import Claim, Verdict
-from handover.scenarios.published.rows import Row
 from handover.scenarios.published.verdicts import nothing_measured, verdict_of
 
 _WHERE = "sec. 4.1.3"

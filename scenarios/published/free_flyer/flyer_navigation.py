@@ -30,6 +30,7 @@ from handover.scenarios.published.free_flyer.variations import (
     PATIENCE,
     TASKS,
     USUAL,
+    Row,
     Variation,
     acted_alone,
     changed_hands,
@@ -38,7 +39,6 @@ from handover.scenarios.published.free_flyer.variations import (
     values_of,
 )
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.rows import Row
 from handover.scenarios.published.verdicts import format_interval
 
 _REPETITIONS = 3

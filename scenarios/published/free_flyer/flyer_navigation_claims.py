@@ -21,13 +21,13 @@ from handover.scenarios.published.free_flyer.navigation_runs import (
 from handover.scenarios.published.free_flyer.push_runs import linear_loop
 from handover.scenarios.published.free_flyer.variations import (
     USUAL,
+    Row,
     acted_alone,
     succeeded_touched,
     unfinished_note,
     values_of,
 )
 from handover.scenarios.published.published_experiment import Claim, Verdict
-from handover.scenarios.published.rows import Row
 from handover.scenarios.published.verdicts import (
     every_claim,
     format_p_value,

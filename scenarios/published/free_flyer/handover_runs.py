@@ -11,11 +11,12 @@ from handover.scenarios.published.free_flyer.variations import (
     EXACT,
     TASKS,
     USUAL,
+    Row,
     Variation,
+    has,
     names_of,
     values_of,
 )
-from handover.scenarios.published.rows import Row, has
 
 _DEFAULT = TaskParameters()
 

@@ -10,12 +10,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Task, TaskParameters
-from handover.scenarios.published.free_flyer.variations import (
-    USUAL,
-    Variation,
-    names_of,
-)
-from handover.scenarios.published.rows import Row, has
+from handover.scenarios.published.free_flyer.variations import USUAL, Row, Variation, has, names_of
 
 DRIFT_TIME = 10.0
 """Correlation time of drifts, s: of the order of a transfer (assumed)."""

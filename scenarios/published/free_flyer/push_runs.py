@@ -15,11 +15,7 @@ from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Propulsion, Wrench
-from handover.scenarios.published.free_flyer.variations import (
-    EXACT,
-    is_done,
-)
-from handover.scenarios.published.rows import Row, has
+from handover.scenarios.published.free_flyer.variations import EXACT, Row, has, is_done
 
 _DEFAULT = ImpedanceParameters()
 _AFTER = 30.0

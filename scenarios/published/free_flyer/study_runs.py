@@ -13,11 +13,7 @@ from handover.scenarios.campaign.statistics import LEVEL, RESAMPLES
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.free_flyer.parameters import Behaviour, Task, TaskParameters
-from handover.scenarios.published.free_flyer.variations import (
-    is_done,
-    succeeded,
-)
-from handover.scenarios.published.rows import Row, has
+from handover.scenarios.published.free_flyer.variations import Row, has, is_done, succeeded
 
 _DEFAULT = TaskParameters()
 

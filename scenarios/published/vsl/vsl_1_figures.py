@@ -36,7 +36,7 @@ def _curves(runs: Vsl1Runs, path: TipPath, load: float, folders: Path) -> Curves
     curves: dict[str, Repetitions] = {}
     for links in runs.links:
         if traces := traces_of(folders, runs.names(Cell(path, load, links))):
-            if links is RIGID:
+            if links == RIGID:
                 curves[_SERVOS] = Repetitions.of(traces, "servo")
             curves[links.label] = Repetitions.of(traces, "tracked")
     return curves

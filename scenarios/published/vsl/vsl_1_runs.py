@@ -1,5 +1,6 @@
 """The runs of the experiment `vsl-1`, by path, load and links."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,58 +74,46 @@ def format_load(load: float) -> str:
 
 
 class Vsl1Runs:
-    """Our results cell by cell. Runs that did not come to their end do not count."""
+    """Our results cell by cell. Runs that did not come to their end do not count.
+
+    Attributes:
+        done, not_done: how many runs count, and how many do not, as a unit failed or a worker was lost.
+    """
 
     def __init__(self, table: CampaignTable) -> None:
-        self._rows = table.rows
-
-    @property
-    def not_done(self) -> int:
-        """Number of runs that do not count, as a unit failed or a worker was lost."""
-        return sum(row["status"] != "done" for row in self._rows)
-
-    @property
-    def done(self) -> int:
-        """Number of runs that count."""
-        return len(self._rows) - self.not_done
+        rows = table.rows
+        self._done: dict[Cell, list[dict[str, Any]]] = {}
+        for row in rows:
+            if row["status"] == "done":
+                self._done.setdefault(_cell_of(row), []).append(row)
+        self._cells = {_cell_of(row) for row in rows}
+        self.done = sum(map(len, self._done.values()))
+        self.not_done = len(rows) - self.done
 
     @property
     def loads(self) -> tuple[float, ...]:
-        """Loads that any run has, kg: a quick campaign leaves some out."""
-        return tuple(load for load in LOADS if any(row["load"] == load for row in self._rows))
+        """Loads that the campaign tries, kg: a quick one leaves some out."""
+        return tuple(load for load in LOADS if any(cell.load == load for cell in self._cells))
 
     @property
     def soft(self) -> tuple[Links, ...]:
-        """Links of variable stiffness that any run has, the softest first."""
-        return tuple(links for links in SOFT if any(_has_links(row, links) for row in self._rows))
+        """Links of variable stiffness that the campaign tries, the softest first."""
+        return tuple(links for links in SOFT if any(cell.links == links for cell in self._cells))
 
     @property
     def links(self) -> tuple[Links, ...]:
-        """Rigid links, and those of variable stiffness that any run has."""
+        """Rigid links, and those of variable stiffness that the campaign tries."""
         return (RIGID, *self.soft)
 
     def names(self, cell: Cell) -> list[str]:
         """Return the folders' names of a cell's runs."""
-        return [row["run"] for row in self.rows(cell)]
+        return [row["run"] for row in self._done.get(cell, [])]
 
     def metric(self, name: str, cell: Cell) -> Floats:
         """Return a metric of a cell's runs, shape (runs,)."""
-        return np.array([row[name] for row in self.rows(cell)], dtype=np.float64)
-
-    def rows(self, cell: Cell) -> list[dict[str, Any]]:
-        """Return the rows of a cell's runs that came to their end."""
-        path = cell.path.name.lower()
-        return [
-            row
-            for row in self._rows
-            if row["status"] == "done"
-            and row["path"] == path
-            and row["load"] == cell.load
-            and _has_links(row, cell.links)
-        ]
+        return np.array([row[name] for row in self._done.get(cell, [])], dtype=np.float64)
 
 
-def _has_links(row: dict[str, Any], links: Links) -> bool:
-    if links.pressure is None:
-        return row["links"] == Link.RIGID.name.lower()
-    return row["links"] == Link.VSL.name.lower() and row["pressure"] == links.pressure
+def _cell_of(row: Mapping[str, Any]) -> Cell:
+    rigid = row["links"] == Link.RIGID.name.lower()
+    return Cell(TipPath[row["path"].upper()], row["load"], RIGID if rigid else Links(row["pressure"]))

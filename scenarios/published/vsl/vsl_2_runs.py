@@ -1,16 +1,18 @@
 """The runs of the experiment `vsl-2`, by load and pressure, by how the tip is commanded, and by arm."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import enum
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from handover.controllers.vsl.hybrid_kinematics import Learned, Method
 from handover.cosim.blocks.ports import Floats
 from handover.plants.vsl.parameters import Link
+from handover.scenarios.campaign.plan import is_number
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.published.rows import Row, has
 from handover.scenarios.published.vsl.vsl_1_runs import format_load
 from handover.scenarios.vsl.parameters import HybridParameters
 
@@ -104,7 +106,7 @@ class Arm:
 
 TRAINED = Arm("trained", {})
 SCATTER: float = _BEYOND["scatter"]
-"""Standard deviation of the stiffness and mass of each link of another arm, as a share."""
+"""Standard deviation by which each link, gear and joint of another arm differs, as a share."""
 
 
 def _others() -> Iterator[Arm]:
@@ -119,26 +121,18 @@ def _others() -> Iterator[Arm]:
 OTHERS = tuple(_others())
 """Arms that nothing was learned from: with one thing otherwise, and some whose links scatter."""
 
-_NAMES = (
-    "learned",
-    "links",
-    "kinematics.method",
-    "joint_factor",
-    *dict.fromkeys(n for a in OTHERS for n in a.parameters),
-)
-"""Parameters by which ways and arms differ."""
-
 
 class Vsl2Runs:
     """Our results by case, way and arm. Runs that did not come to their end do not count."""
 
     def __init__(self, table: CampaignTable) -> None:
-        self._rows: Sequence[Row] = table.rows
-
-    @property
-    def not_done(self) -> int:
+        rows = table.rows
+        self._done: dict[_Key, list[dict[str, Any]]] = {}
+        for row in rows:
+            if row["status"] == "done":
+                self._done.setdefault(_key_of(row), []).append(row)
+        self.not_done = sum(row["status"] != "done" for row in rows)
         """Number of runs that do not count, as a unit failed or a worker was lost."""
-        return sum(row["status"] != "done" for row in self._rows)
 
     @property
     def arms(self) -> tuple[Arm, ...]:
@@ -177,7 +171,31 @@ class Vsl2Runs:
         """Return a metric of runs, shape (runs,)."""
         return np.array([row[name] for row in self.rows(case, way, arm)], dtype=np.float64)
 
-    def rows(self, case: Case, way: Way, arm: Arm = TRAINED) -> list[Row]:
+    def rows(self, case: Case, way: Way, arm: Arm = TRAINED) -> list[dict[str, Any]]:
         """Return the rows of runs that came to their end."""
-        wanted = {**case.parameters, **way.parameters, **arm.parameters}
-        return [row for row in self._rows if row["status"] == "done" and has(row, wanted, _NAMES, HybridParameters())]
+        return self._done.get(_key_of({**case.parameters, **way.parameters, **arm.parameters}), [])
+
+
+_Key = tuple[str | float, ...]
+"""The values of all parameters in `_DEFAULTS`."""
+
+
+def _key_of(given: Mapping[str, Any]) -> _Key:
+    """Return the key of a run by its parameters, as a table has them or as texts; what is not given is the default."""
+    values = ((given.get(name), default) for name, default in _DEFAULTS.items())
+    return tuple(default if value in (None, "") else _plain(value) for value, default in values)
+
+
+def _plain(value: Any) -> str | float:
+    """Return a number, also one that is a text, as such, and a name in lower case."""
+    if isinstance(value, enum.Enum):
+        return value.name.lower()
+    return float(value) if not isinstance(value, str) or is_number(value) else value
+
+
+_VARIED = {name for arm in OTHERS for name in arm.parameters} | {"load", "pressure", "links", "learned", "joint_factor"}
+_DEFAULTS: dict[str, str | float] = {
+    **{name: _plain(value) for name, value in vars(HybridParameters()).items() if name in _VARIED},
+    "kinematics.method": Method.HYBRID.name.lower(),
+}
+"""What a run has where its point does not say otherwise."""

@@ -90,9 +90,10 @@ def _others(runs: Vsl2Runs) -> ComparisonTable:
         title="The trained arm and others: mean errors (mm)",
         header=["arm", "load, pressure", *(way.label for way in ways), "told as outside"],
         rows=rows,
-        note="Nothing was learned from the others. Of arms of one kind, stiffness and mass of each link scatter by "
-        f"{100 * SCATTER:g} % (standard deviation). Told as outside: share of the points at which what was learned "
-        "says that it is asked about what it was not taught on, over all learned ways.",
+        note="Nothing was learned from the others. Arms of one kind differ in stiffness and mass of each link, "
+        f"friction of each gear and stiffness of each joint by {100 * SCATTER:g} % (standard deviation). Told as "
+        "outside: share of the points at which what was learned says that it is asked about what it was not taught "
+        "on, over all learned ways.",
     )
 
 
