@@ -115,6 +115,12 @@ _ENTRIES = (
         "arm with links whose stiffness follows their pressure",
     ),
     Entry(
+        "VacuumGripper",
+        "handover.plants.vsl.vacuum_gripper:VacuumGripper",
+        Fraction(1, 50),
+        "suction cup that picks up an object and drops it",
+    ),
+    Entry(
         "TrajectoryPlanner",
         "handover.controllers.vsl.trajectory_planner:TrajectoryPlanner",
         Fraction(1, 50),

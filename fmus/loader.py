@@ -214,7 +214,7 @@ class _PrivateModules:
         return module
 
     def _is_own(self, top: str) -> bool:
-        """Return whether a package is the FMU's own; asked in every step, as numpy imports whenever it reads a dtype."""
+        """Return whether a package is the FMU's own; asked in each step, as numpy imports where it reads a dtype."""
         own = self.own  # another thread may move to another folder meanwhile
         if top not in own:
             own[top] = self._place(top) is not None

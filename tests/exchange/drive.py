@@ -24,6 +24,7 @@ CHOSEN: Mapping[str, Mapping[str, Any]] = {
     "HybridKinematics": {"L_1": 0.15, "L_2": 0.225, "L_3": 0.225},  # the model that ships is trained for these
     "Push": {"start": 0.05, "duration": 0.06},
     "LargeObjectAndHands": {"hands": 1},  # of two at most
+    "VacuumGripper": {"reach": 0.1},
 }
 """Parameters whose values are not near those that they start with, most so that inputs act within the short run."""
 
