@@ -225,7 +225,7 @@ class SwingCompensation:
         v = k.jacobian(q) @ u.qd_ref if before is not None and self._still < _STANDSTILL else np.zeros(3)
         a, self._v = (v - self._v) / dt, v
         outwards = a[0] * math.cos(q[0]) + a[1] * math.sin(q[0])
-        link_2, link_3 = (L * np.exp(1j * angle) for L, angle in ((k.L_2, q[1]), (k.L_3, q[1] + q[2])))
-        levers = np.array([link_2 + link_3, link_3])
-        slopes = levers.imag / np.where(np.abs(levers.real) < _SHORTEST_LEVER, np.inf, levers.real)
+        lengths, angles = np.array([k.L_2, k.L_3]), np.array([q[1], q[1] + q[2]])
+        x, z = (np.cumsum((lengths * of(angles))[::-1])[::-1] for of in (np.cos, np.sin))  # from each joint
+        slopes = z / np.where(np.abs(x) < _SHORTEST_LEVER, np.inf, x)
         return (a[2] - outwards * slopes) / _GRAVITY
