@@ -22,9 +22,6 @@ _DAMPING = 0.01
 _SAME_TIME = 1e-9
 """s; rounding of sums of intervals."""
 
-_STANDSTILL = 5
-"""Periods without another q_ref after which the path rests: at 0.05 m/s its points are two periods apart."""
-
 _YIELD_TIME = 0.3
 """Time in which what a joint has yielded to a swing is given back, s: a swing's period (assumed)."""
 
@@ -183,7 +180,8 @@ class SwingCompensation:
 
     def __init__(self, model: VslModel, K_F: float, K_D: float) -> None:
         self._model, self._K_F, self._K_D = model, K_F, K_D
-        self._still = 0
+        self._path: tuple[Floats, Floats] | None = None
+        """q_ref and qd_ref of the period that ends."""
         self._v = np.zeros(3)
         self._yielded = np.zeros(2)
         self._ahead = np.zeros(2)
@@ -193,7 +191,7 @@ class SwingCompensation:
         """By how much the joints are turned, shape (3,), rad."""
         return np.concatenate([[0.0], self._yielded + self._ahead])
 
-    def step(self, dt: float, u: Readings, i: Floats, swing: Floats, before: tuple[Floats, Floats] | None) -> bool:
+    def step(self, dt: float, u: Readings, i: Floats, swing: Floats) -> bool:
         """Find how to turn the joints; return whether at once.
 
         Args:
@@ -201,31 +199,40 @@ class SwingCompensation:
             u: what is wanted and measured.
             i: smoothed currents, shape (3,), A.
             swing: by how much those of joints 2 and 3 are off them, shape (2,), A.
-            before: q_ref and q_cmd of the period that ends.
         """
         G = self._model.inverse.jacobian(inputs_of(u.q_ref, u.p_meas, i))[1:, 5:]
         self._yielded = self._yielded - dt * (self._K_D * (G @ swing) + self._yielded / _YIELD_TIME)
         was = self._ahead
-        self._ahead = self._K_F * (G @ (i[1:] * self._weights(dt, u, before)))
+        self._ahead = self._K_F * (G @ (i[1:] * self._weights(dt, u)))
         return bool(np.any(was) or np.any(self._ahead))
 
     def get_state(self) -> bytes:
-        """Return for how long the path rests, its speed, and the turns."""
-        return pack_state((self._still, self._v, self._yielded, self._ahead))
+        """Return where on the path it is, its speed, and the turns."""
+        return pack_state((self._path, self._v, self._yielded, self._ahead))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this compensation or of one with equal arguments."""
-        self._still, self._v, self._yielded, self._ahead = unpack_state(state)
+        self._path, self._v, self._yielded, self._ahead = unpack_state(state)
 
-    def _weights(self, dt: float, u: Readings, before: tuple[Floats, Floats] | None) -> Floats:
+    def _weights(self, dt: float, u: Readings) -> Floats:
         """Return by how much more of itself joints 2 and 3 carry, as the path's velocity changes, shape (2,)."""
         k, q = self._model.kinematics, u.q_ref
-        moves = before is not None and bool(np.any(q != before[0]))
-        self._still = 0 if moves else min(self._still + 1, _STANDSTILL)
-        v = k.jacobian(q) @ u.qd_ref if before is not None and self._still < _STANDSTILL else np.zeros(3)
-        a, self._v = (v - self._v) / dt, v
+        v = self._velocity(u)
+        a, self._v, self._path = (v - self._v) / dt, v, (np.array(q), np.array(u.qd_ref))
         outwards = a[0] * math.cos(q[0]) + a[1] * math.sin(q[0])
-        link_2, link_3 = (L * np.exp(1j * angle) for L, angle in ((k.L_2, q[1]), (k.L_3, q[1] + q[2])))
-        levers = np.array([link_2 + link_3, link_3])
-        slopes = levers.imag / np.where(np.abs(levers.real) < _SHORTEST_LEVER, np.inf, levers.real)
+        lengths, angles = np.array([k.L_2, k.L_3]), np.array([q[1], q[1] + q[2]])
+        x, z = (np.cumsum((lengths * of(angles))[::-1])[::-1] for of in (np.cos, np.sin))  # from each joint
+        slopes = z / np.where(np.abs(x) < _SHORTEST_LEVER, np.inf, x)
         return (a[2] - outwards * slopes) / _GRAVITY
+
+    def _velocity(self, u: Readings) -> Floats:
+        """Return the path's velocity, shape (3,), m/s.
+
+        A speed with which q_ref does not change is no speed of the path: 0. Where both stay, a point holds for several
+        periods.
+        """
+        if self._path is None:
+            return np.zeros(3)
+        if np.any(u.q_ref != self._path[0]):
+            return self._model.kinematics.jacobian(u.q_ref) @ u.qd_ref
+        return self._v if np.array_equal(u.qd_ref, self._path[1]) else np.zeros(3)

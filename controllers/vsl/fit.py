@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -147,7 +148,7 @@ def fit_adapted(base: Regressor, x: Floats, y: Floats) -> Adapted:
     for penalty in PENALTIES[4:]:
         shares = singular**2 / (singular**2 + penalty * len(x))
         taken = np.sum(U**2 * shares, axis=1) + 1.0 / len(x)  # what each point has of its own prediction
-        errors = (centred - (U * shares) @ (np.transpose(U) @ centred)) / (1.0 - taken)[:, None]
+        errors: Floats = (centred - (U * shares) @ (np.transpose(U) @ centred)) / (1.0 - taken)[:, None]
         weights = np.transpose(right) @ (
             (shares / np.maximum(singular, _SMALLEST))[:, None] * (np.transpose(U) @ centred)
         )
@@ -173,10 +174,10 @@ def fit_beam(kinematics: VslKinematics, x: Floats, y: Floats) -> Beam:
     domain, known = domain_of(x), Weights()
 
     def left(logarithms: Floats) -> Floats:
-        tip = BentTip(*vars(domain).values(), Beam(kinematics, stiffness_at(logarithms), known))
+        tip = BentTip(domain.mean, domain.scale, domain.hull, Beam(kinematics, stiffness_at(logarithms), known))
         return np.ravel((y - tip.predict(x))[:, ::2])  # sideways a beam in the plane says nothing
 
-    at = np.log(_FIRST_STIFFNESS)
+    at: Any = np.log(_FIRST_STIFFNESS)
     for _ in range(_BEAM_ITERATIONS):
         e = left(at)
         J = np.transpose([(left(at + step) - e) / _LOG_STEP for step in _LOG_STEP * np.eye(3)])

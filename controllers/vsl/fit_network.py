@@ -105,7 +105,7 @@ def fit_published(points: Points, seed: int, epochs: int, progress: Callable[[fl
             best, best_epoch = error, epoch + 1
             kept = [np.array(p.detach().numpy()) for p in module.parameters()]
         progress(epoch + 1, epochs)
-    parts: list[Weights] = [np.ascontiguousarray(np.transpose(p)) for p in kept]
+    parts: list[Weights] = list(map(_transposed, kept))
     network = frame.network(parts, ACTIVATIONS[Learned.PUBLISHED])
     facts = {"epochs": epochs, "best_epoch": best_epoch, "batch": BATCH, "rate": RATE, "torch": str(torch.__version__)}
     return NetworkFit(network, rms(network, points), facts)
@@ -171,6 +171,11 @@ class _Frame:
 _SMALLEST = 1e-12
 
 
+def _transposed(part: Any) -> Weights:
+    """Return weights as PyTorch does not have them, (inputs, outputs); biases as they are."""
+    return np.ascontiguousarray(np.transpose(part))
+
+
 def _first_weights(sizes: tuple[int, ...], rng: np.random.Generator) -> list[Weights]:
     """Return weights and biases in turn: normal, such that neurons keep the size of what comes in; biases 0."""
     parts: list[Weights] = []
@@ -192,15 +197,15 @@ def _objective(z: Floats, y: Floats, sizes: tuple[int, ...], decay: float) -> Ca
         signals: list[Any] = [z]
         for W, b in zip(parts[0:-2:2], parts[1:-2:2], strict=True):
             signals.append(np.tanh(signals[-1] @ W + b))
-        error = signals[-1] @ parts[-2] + parts[-1] - y
+        error: Any = signals[-1] @ parts[-2] + parts[-1] - y
         penalty = decay * sum(float(np.sum(W * W)) for W in parts[0::2])
         back: Any = 2.0 * error / error.size
         gradient: list[Any] = []
         for k in range(len(signals) - 1, -1, -1):
-            W = parts[2 * k]
-            gradient = [np.transpose(signals[k]) @ back + 2.0 * decay * W, np.sum(back, axis=0), *gradient]
+            weights: Any = parts[2 * k]
+            gradient = [np.transpose(signals[k]) @ back + 2.0 * decay * weights, np.sum(back, axis=0), *gradient]
             if k:
-                back = (back @ np.transpose(W)) * (1.0 - signals[k] ** 2)
+                back = (back @ np.transpose(weights)) * (1.0 - signals[k] ** 2)
         return float(np.mean(error**2)) + penalty, _pack(gradient)
 
     return value

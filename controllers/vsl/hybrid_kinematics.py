@@ -164,7 +164,7 @@ class HybridKinematics:
         if self._params.closed_loop:
             self._loop.step(t, u, i, self._before)
         if self._swing is not None:
-            at_once = self._swing.step(dt, u, i, self._currents.swing(u, i), self._before)
+            at_once = self._swing.step(dt, u, i, self._currents.swing(u, i))
         y = self._command(u, i)
         if at_once:
             y.qd_cmd = np.copysign(self._params.qd_max, y.qd_cmd)

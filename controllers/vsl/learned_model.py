@@ -297,7 +297,7 @@ class VslModel:
 
 
 def inputs_of(q: Floats, p: Floats, i: Floats) -> Floats:
-    """Return inputs of a regressor, shape (..., 7): angles or position (..., 3), pressures (..., 2), currents (..., 3)."""
+    """Return inputs of a regressor, shape (..., 7): of posture (..., 3), pressures (..., 2) and currents (..., 3)."""
     return np.concatenate([q, p, i[..., 1:]], axis=-1)
 
 

@@ -72,11 +72,11 @@ class Network(Domain):
     def jacobian(self, x: Floats) -> Floats:
         """Return dy/dx at inputs x, shape (inputs,), as shape (values, inputs)."""
         a: Any = self.standardised(x).astype(self.weights[0].dtype)
-        J: Any = np.eye(len(x), dtype=a.dtype)
+        slopes: Any = np.eye(len(x), dtype=a.dtype)
         for W, b in zip(self.weights[:-1], self.biases[:-1], strict=True):
             a = _BENDS[self.activation](a @ W + b)
-            J = (J @ W) * _SLOPES[self.activation](a)
-        return np.transpose(J @ self.weights[-1]) * self.scale_y[:, None] * self.slopes(x)
+            slopes = (slopes @ W) * _SLOPES[self.activation](a)
+        return np.transpose(slopes @ self.weights[-1]) * self.scale_y[:, None] * self.slopes(x)
 
 
 def _relu(a: Any) -> Any:

@@ -23,19 +23,18 @@ from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import cached
 from handover.fmus.compile import CompilationError, UnknownPlatform
 from handover.scenarios.cli.options import WholeNumber
-from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.errors import UsageError, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import progress_bar
 from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
 from handover.scenarios.vsl.learning_curve import curve_table, draw_curve, learning_curve
+from handover.scenarios.vsl.model_file import content_key, file_text
 from handover.scenarios.vsl.training import (
     MIN_POINTS,
     Errors,
     NothingToLearn,
     Progress,
     VslTraining,
-    content_key,
-    file_text,
 )
 from handover.scenarios.vsl.training_data import Measured, describe_arm
 
@@ -94,6 +93,8 @@ def vsl_train(context: click.Context, **given: Any) -> None:
     o = _Options(**given)
     with Interruption() as interruption, _one_line_errors(interruption), _one_thread():
         o.check(typed)
+        if o.curve:
+            require_extra("reports", "--curve")
         with progress_bar(sys.stderr) as progress:
             lines = _adapt(o, progress) if o.adapt else _train(o, progress)
     for line in lines:
@@ -248,8 +249,10 @@ def _arm_values(fmu: Path, given: Sequence[str]) -> dict[str, Any]:
     Raises:
         UsageError: the arm has no such parameter, or a value is out of its range.
     """
-    parameters = describe_arm(fmu).parameters if given else {}
     values: dict[str, Any] = {}
+    if not given:
+        return values
+    parameters = describe_arm(fmu).parameters
     for text in given:
         name, equals, value = text.partition("=")
         if not equals:

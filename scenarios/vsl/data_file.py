@@ -46,8 +46,10 @@ def write_data(path: Path, measured: Measured) -> None:
     Raises:
         OSError: it cannot be written.
     """
-    columns = {name: values for part, (port, _) in _COLUMNS.items() for name, values in _entries(measured, part, port)}
-    table = pa.table({**columns, _ORDER: measured.order})
+    columns: dict[str, Any] = {
+        name: values for part, (port, _) in _COLUMNS.items() for name, values in _entries(measured, part, port)
+    }
+    table: Any = pa.Table.from_pydict({**columns, _ORDER: measured.order})
     metadata = {_METADATA: json.dumps({"version": VERSION, **measured.origin}, sort_keys=True).encode()}
     handle, part = tempfile.mkstemp(dir=path.absolute().parent, prefix=f".{path.name}-")
     os.close(handle)

@@ -1,8 +1,6 @@
 """Learns the residuals of the VSL arm's rigid kinematics from points measured on its FMU. [Gandarias2020] sec. IV."""
 
-import hashlib
 import platform
-import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,8 +12,8 @@ from numpy.typing import NDArray
 from handover.controllers.vsl.beam import BentCommand, BentTip
 from handover.controllers.vsl.fit import directions_of, domain_of, fit_adapted, fit_beam, fit_cubic, fit_friction
 from handover.controllers.vsl.fit_network import EPOCHS, Points, fit_published, fit_small
-from handover.controllers.vsl.hybrid_kinematics import Params, train_command
-from handover.controllers.vsl.kinematics import Elbow, VslKinematics
+from handover.controllers.vsl.hybrid_kinematics import Params
+from handover.controllers.vsl.kinematics import VslKinematics
 from handover.controllers.vsl.learned_model import (
     FORWARD_INPUTS,
     Adapted,
@@ -27,14 +25,17 @@ from handover.controllers.vsl.learned_model import (
     inputs_of,
     rotate_about_z,
 )
-from handover.controllers.vsl.model_text import model_text
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.description import FmuPort
 from handover.scenarios.vsl.data_file import links_of
+from handover.scenarios.vsl.model_file import content_key
 from handover.scenarios.vsl.training_data import STRETCH, Dataset, Measured, collect, describe_arm, parameters_of
 
 Progress = Callable[[float, float], None]
+
+Pairs = tuple[Floats, Floats]
+"""Inputs and values of points, shapes (points, inputs) and (points, values)."""
 
 MIN_POINTS = 400
 """Number of points below which the 120 coefficients of a cubic are not worth fitting (assumed)."""
@@ -47,17 +48,6 @@ _FRICTION_POINTS = 1500
 
 _FOLDS = 10
 """Parts into which the few points of an adaptation are split: each is tested by what the others teach."""
-
-_MODULE = '''"""The trained model of `HybridKinematics` that ships, as JSON.
-
-Generated; when the sources of the arm (plants/vsl/) have changed, run again
-
-    {command} --points {points} --seed {seed}{elbow} --out controllers/vsl/{name}
-"""
-
-DEFAULT_MODEL = """\\
-{text}"""
-'''
 
 
 class NothingToLearn(ValueError):
@@ -182,7 +172,8 @@ class VslTraining:
         errors = self.errors(model, data.rows(test))
         if self.learned is not Learned.PHYSICS:
             other = replace(self, forward_input=_OTHER[self.forward_input])
-            beside = other._fit(*(other.forward_pairs(d) for d in parts), seeds[1], progress, "m").regressor
+            pairs = other.forward_pairs(parts[0]), other.forward_pairs(parts[1])
+            beside = other._fit(*pairs, seeds[1], progress, "m").regressor
             theirs = replace(model, forward=beside, forward_input=other.forward_input)
             errors = replace(errors, forward_other_input=self.forward_error(theirs, data.rows(test)))
         counts = {"measured": len(measured.points), "training": len(training)}
@@ -223,7 +214,7 @@ class VslTraining:
         }
         return replace(self._adapted(base, data), provenance=provenance), self.errors(base, data), errors
 
-    def inverse_pairs(self, data: Dataset) -> tuple[Floats, Floats]:
+    def inverse_pairs(self, data: Dataset) -> Pairs:
         """Return inputs, the rigid angles of the measured tips first, and commanded minus rigid angles, rad.
 
         The *measured* angles in place of the commanded ones would leave the servos' droop in. Of a published network
@@ -233,7 +224,7 @@ class VslTraining:
         values = data.q_cmd if self.learned is Learned.PUBLISHED else data.q_cmd - q_rigid
         return inputs_of(q_rigid, data.p, data.i), values
 
-    def forward_pairs(self, data: Dataset) -> tuple[Floats, Floats]:
+    def forward_pairs(self, data: Dataset) -> Pairs:
         """Return inputs, the measured angles or X = f(q) first, and measured minus rigid tips in the arm's plane, m.
 
         Of a published network the values are the measured tips themselves, in the world.
@@ -269,15 +260,14 @@ class VslTraining:
         """Fit what corrects eq. (11) and what corrects eq. (10)."""
         if self.learned is Learned.PHYSICS:
             return self._fit_beam(training, validation)
-        inverse, forward = (
-            [pairs(d) for d in (training, validation)] for pairs in (self.inverse_pairs, self.forward_pairs)
-        )
+        inverse = self.inverse_pairs(training), self.inverse_pairs(validation)
+        forward = self.forward_pairs(training), self.forward_pairs(validation)
         return self._fit(*inverse, seeds[0], progress, "rad"), self._fit(*forward, seeds[1], progress, "m")
 
     def _fit(
         self,
-        training: tuple[Floats, Floats],
-        validation: tuple[Floats, Floats],
+        training: Pairs,
+        validation: Pairs,
         seed: int,
         progress: Progress,
         unit: str,
@@ -300,8 +290,9 @@ class VslTraining:
         beam = fit_beam(self.kinematics, *forward)
         torques, droops = beam.weights.kt * training.i[:, 1:], (training.q_cmd - training.q)[:, 1:]
         droop = float(f"{np.sum(torques * droops) / np.sum(torques**2):.12g}")
-        tip = BentTip(*vars(domain_of(forward[0])).values(), beam)
-        command = BentCommand(*vars(domain_of(inverse[0])).values(), beam, droop)
+        seen, wanted = domain_of(forward[0]), domain_of(inverse[0])
+        tip = BentTip(seen.mean, seen.scale, seen.hull, beam)
+        command = BentCommand(wanted.mean, wanted.scale, wanted.hull, beam, droop)
         fitted: list[_Fitted] = []
         for bent, pairs, unit in ((command, self.inverse_pairs, "rad"), (tip, self.forward_pairs, "m")):
             x, y = pairs(validation)
@@ -363,34 +354,6 @@ _OTHER = {ForwardInput.Q: ForwardInput.X, ForwardInput.X: ForwardInput.Q}
 def _base(regressor: Regressor) -> Regressor:
     """Return what an adapted regressor was adapted from: adaptations of adaptations would pile up."""
     return regressor.base if isinstance(regressor, Adapted) else regressor
-
-
-def content_key(fmu: Path) -> str:
-    """Return a hash that changes if the sources of the arm do: those in `plants` that its FMU carries.
-
-    Changes of engine and builder leave it as it is. Of an FMU without such sources it is the hash of all bytes.
-    """
-    digest = hashlib.sha256()
-    with zipfile.ZipFile(fmu) as archive:
-        names = [n for n in archive.namelist() if n.startswith("resources/sources/handover/plants/")]
-        for name in sorted(names):
-            content = archive.read(name)
-            digest.update(f"{name}\0{len(content)}\0".encode() + content)
-    if not names:
-        digest.update(fmu.read_bytes())
-    return digest.hexdigest()
-
-
-def file_text(model: VslModel, path: Path) -> str:
-    """Return the content of a model's file: a Python module if its name ends in .py, else JSON."""
-    text = model_text(model)
-    if path.suffix != ".py":
-        return text
-    provenance = model.provenance
-    elbow = "" if model.kinematics.elbow is Elbow.UP else " --elbow down"
-    command = train_command(model.kind, window=model.friction != (0.0, 0.0))
-    points, seed = provenance["points"]["measured"], provenance["seed"]
-    return _MODULE.format(command=command, name=path.name, points=points, seed=seed, elbow=elbow, text=text)
 
 
 def _rms(validation_rms: float, unit: str) -> dict[str, float]:
