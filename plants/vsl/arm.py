@@ -11,7 +11,7 @@ import numpy as np
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Polyline25, Vector2, Vector3, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.cosim.blocks.units import Ampere, Kilogram, Metre, Pascal, Radian, RadianPerSecond
+from handover.cosim.blocks.units import Ampere, Kilogram, Metre, Newton, Pascal, Radian, RadianPerSecond
 from handover.plants.vsl.actuators import PressureLine, VslServo
 from handover.plants.vsl.chain import Complexes, VslChain
 from handover.plants.vsl.dynamics import NoConvergence, VslDynamics
@@ -67,6 +67,7 @@ class Outputs:
     tilt_meas_4: Radian = output("angle of the end of the third of three links likewise; of fewer: 0")
     p_WG: Vector3[Metre] = output("position of the gripper")
     p_WG_meas: Vector3[Metre] = output("position of the gripper by the tracker")
+    f_G: Newton = output("largest force within the step of the face that stops the gripper, upwards")
     shape: Polyline25[Metre] = output(
         "centre line: the base, 12 points on link 2, 12 from there to the gripper; on a single link all 24"
     )
@@ -234,6 +235,7 @@ class VslArm:
             tilt_meas_4=tilts[2],
             p_WG=p_WG,
             p_WG_meas=read.p_WG,
+            f_G=self._mechanics.force,
             shape=shape,
         )
 

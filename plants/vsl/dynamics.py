@@ -46,6 +46,9 @@ class VslDynamics:
     i exp(i phi_k) for a shear, M = Re(conj(D) C D) + inertia, b = -2 exp(i phi) phi' s' - u phi'^2, A the weights, e
     the deformations of the springs of stiffness k. Turning about J1 at the rate w pulls all masses outwards.
 
+    A level face at height h stops the tip: it pushes up by f = max(0, k_f (h - z) - d_f z'), z the tip's height, which
+    takes from all weights.
+
     A gear of high ratio does not yield to swings: the droop of the servos follows their torques with droop_time,
     droop' = (torque / servo_stiffness - droop) / droop_time, and the offsets are what they aim at less the droop.
 
@@ -76,6 +79,8 @@ class VslDynamics:
         self._a: Floats = np.zeros(m)
         self._a_mean = np.zeros(m)
         self._offset: Floats = np.zeros(len(chain.joints))
+        self.force = 0.0
+        """Largest force of the face on the tip during the last step, N."""
         self.pose = self._statics.pose
 
     def settle(self, theta: Sequence[float], p: Sequence[float], load: float) -> None:
@@ -106,6 +111,7 @@ class VslDynamics:
         steps = max(1, math.ceil(dt / self._params.substep - 1e-9))
         held = self._held(p, load, spin)
         aims = np.linspace(theta[0], theta[1], steps + 1)
+        self.force = 0.0
         for i in range(steps):
             self._substep(dt / steps, aims[i], aims[i + 1], held)
 
@@ -130,11 +136,11 @@ class VslDynamics:
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return the complete state, plain data; its arrays are replaced and never written to."""
-        return self._y, self._v, self._a, self._a_mean, self._offset, tuple(self.pose)
+        return self._y, self._v, self._a, self._a_mean, self._offset, self.force, tuple(self.pose)
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Restore a state of this chain or of one with equal parameters."""
-        self._y, self._v, self._a, self._a_mean, self._offset, pose = snapshot
+        self._y, self._v, self._a, self._a_mean, self._offset, self.force, pose = snapshot
         self.pose = Pose(*pose)
 
     def _held(self, p: Sequence[float], load: float, spin: float) -> _Held:
@@ -191,6 +197,8 @@ class VslDynamics:
             if np.abs(dy).max() < _TOLERANCE:
                 self._y, self._v, self._a = y, v, a
                 self._a_mean = a_mean + (1.0 - alpha_f) / (1.0 - alpha_m) * a
+                u, _, D = self._directions(y)
+                self.force = max(self.force, self._stopped(u, D, v))
                 return True
         return False
 
@@ -223,13 +231,25 @@ class VslDynamics:
         v, a = rates
         by_v, by_a = by
         accelerated = self._accelerated(u, e, v, a)
-        pull = held.C @ (accelerated - held.spin2 * u.real) + 1j * held.weight
+        force = self._stopped(u, D, v)
+        pull = held.C @ (accelerated - held.spin2 * u.real) + 1j * (held.weight - force)
         G = by_a * D - held.spin2 * D.real
         G[:n] += 1j * accelerated - 2.0 * by_v * u * v[:n]
         G[at] -= 2.0 * by_v * e[at] * v[n:]
         G[n:] += 1j * e[at] * (1j * a[at] - v[at] ** 2) - 2.0 * by_v * e[at] * v[at]
         S = held.C_y * np.real(np.conj(D)[:, None] * G) + by_a * self._inertia + self._turning(u, e, pull)
+        if force > 0.0:
+            P = self._params
+            S += (P.face_stiffness + P.face_damping * by_v) * np.outer(D.imag, D.imag)
         return pull, S
+
+    def _stopped(self, u: Complexes, D: Complexes, v: Floats) -> float:
+        """Return the force of the face on the tip, upwards, N."""
+        P = self._params
+        depth = P.face - P.L_1 - float(np.sum(u.imag))
+        if depth <= 0.0:
+            return 0.0
+        return max(0.0, P.face_stiffness * depth - P.face_damping * float(D.imag @ v))
 
     def _accelerated(self, u: Complexes, e: Complexes, v: Floats, a: Floats) -> Complexes:
         """Return u_k'', (n,)."""

@@ -20,6 +20,8 @@ from handover.cosim.blocks.units import (
     NewtonMetre2PerPascal,
     NewtonMetrePerAmpere,
     NewtonMetrePerRadian,
+    NewtonPerMetre,
+    NewtonSecondPerMetre,
     Number,
     Pascal,
     Radian,
@@ -28,6 +30,7 @@ from handover.cosim.blocks.units import (
 )
 
 TURN = 2.0 * math.pi
+NO_FACE = -10.0
 MAX_PRESSURE = 3.0e5
 """Pa; the published experiments go to 2 bar."""
 
@@ -150,6 +153,18 @@ class Params:
     )
     hinges: int = parameter(6, "hinges of a flexible link, quasi-statically", minimum=1, maximum=100)
     hinges_dynamic: int = parameter(2, "hinges of a flexible link that swings", minimum=1, maximum=12)
+    face: Metre = parameter(
+        NO_FACE,
+        "height of a level face that stops the gripper of an arm that swings; -10: none",
+        minimum=NO_FACE,
+        maximum=10.0,
+    )
+    face_stiffness: NewtonPerMetre = parameter(
+        1000.0, "stiffness of face and cup against each other", minimum=1.0, maximum=1e5
+    )
+    face_damping: NewtonSecondPerMetre = parameter(
+        3.0, "damping of face and cup against each other", minimum=0.0, maximum=1e4
+    )
     damping_time: Second = parameter(
         0.005, "damping by stiffness of all springs of an arm that swings", minimum=0.0, maximum=1.0
     )
@@ -187,6 +202,10 @@ class Params:
             faults.append(
                 f"valve_tolerance {self.valve_tolerance:g} Pa must be less than valve_band {self.valve_band:g} Pa, or "
                 "the valve chatters"
+            )
+        if self.motion is Motion.QUASI_STATIC and self.face > NO_FACE:
+            faults.append(
+                f"a face at {self.face:g} m does not stop an arm that is at rest at every instant: motion DYNAMIC"
             )
         masses = (self.link_mass, self.gripper_mass, *self.mass_factor[: self.links])
         if self.motion is Motion.DYNAMIC and not min(masses) > 0.0:

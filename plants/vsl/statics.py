@@ -73,6 +73,8 @@ class VslStatics:
         self._droop = droop
         self._weight = [gravity * m for m in chain.carried.tolist()]
         self._tip = 0.0
+        self.force = 0.0
+        """Of a face on the tip: none stops an arm that is at rest at every instant."""
         none = (0.0,) * len(chain.joints)
         self.pose = Pose(np.zeros(len(chain)), np.zeros(len(chain)), none, none)
 

@@ -200,3 +200,40 @@ def test_no_solution_is_said():
     dynamics = swinging(LOOSE)
     with pytest.raises(NoConvergence, match="no solution of the equations of motion"):
         dynamics.advance(0.02, (RAISED, (math.nan, 0.0)), P, 0.0, 0.0)
+
+
+def test_a_face_carries_what_statics_with_so_much_less_load_does_not():
+    load, damped = 0.1, replace(LOOSE, damping_time=0.05)
+    free = swinging(damped, load=load)
+    height = tip(VslChain(damped, 2), free).imag + damped.L_1
+    stopped = swinging(replace(damped, face=height + 0.005), load=load)
+    for _ in range(150):
+        stopped.advance(0.02, (RAISED, RAISED), P, load, 0.0)
+    assert 0.1 < stopped.force < load * 9.81
+    chain = VslChain(damped, 2)
+    statics = VslStatics(chain, 9.81, 1.0 / 260.0)
+    statics.settle(RAISED, P, load - stopped.force / 9.81)
+    assert tip(chain, statics).imag == pytest.approx(tip(chain, stopped).imag, abs=1e-6)
+    depth = height + 0.005 - damped.L_1 - tip(chain, stopped).imag
+    assert stopped.force == pytest.approx(damped.face_stiffness * depth, rel=1e-6)
+
+
+def test_a_tip_that_comes_down_faster_strikes_harder_and_leaves_the_face_again():
+    peaks: list[float] = []
+    for steps in (50, 5):
+        dynamics = swinging(LOOSE)
+        params = replace(LOOSE, face=LOOSE.L_1 + tip(VslChain(LOOSE, 2), dynamics).imag - 0.03)
+        dynamics = swinging(params)
+        lower = RAISED[0] - 0.2, RAISED[1]
+        aims = np.linspace(RAISED, lower, steps + 1)
+        forces = [0.0]
+        for first, last in zip(aims[:-1], aims[1:], strict=True):
+            dynamics.advance(0.02, (first, last), P, 0.0, 0.0)
+            forces.append(dynamics.force)
+        assert forces[1] == 0.0
+        for _ in range(50):
+            dynamics.advance(0.02, (RAISED, RAISED), P, 0.0, 0.0)
+            forces.append(dynamics.force)
+        assert forces[-1] == 0.0
+        peaks.append(max(forces))
+    assert peaks[1] > 1.2 * peaks[0] > 0.0
