@@ -127,6 +127,12 @@ _ENTRIES = (
         "lines, arcs and squares for a three-joint arm",
     ),
     Entry(
+        "PickAndPlace",
+        "handover.controllers.vsl.pick_and_place:PickAndPlace",
+        Fraction(1, 50),
+        "picks an object up and puts it down: soft near contacts, stiff while carrying",
+    ),
+    Entry(
         "HybridKinematics",
         "handover.controllers.vsl.hybrid_kinematics:HybridKinematics",
         Fraction(1, 50),

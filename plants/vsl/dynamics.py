@@ -197,7 +197,6 @@ class VslDynamics:
             if np.abs(dy).max() < _TOLERANCE:
                 self._y, self._v, self._a = y, v, a
                 self._a_mean = a_mean + (1.0 - alpha_f) / (1.0 - alpha_m) * a
-                u, _, D = self._directions(y)
                 self.force = max(self.force, self._stopped(u, D, v))
                 return True
         return False
@@ -238,10 +237,10 @@ class VslDynamics:
         G[at] -= 2.0 * by_v * e[at] * v[n:]
         G[n:] += 1j * e[at] * (1j * a[at] - v[at] ** 2) - 2.0 * by_v * e[at] * v[at]
         S = held.C_y * np.real(np.conj(D)[:, None] * G) + by_a * self._inertia + self._turning(u, e, pull)
-        if force > 0.0:
-            P = self._params
-            S += (P.face_stiffness + P.face_damping * by_v) * np.outer(D.imag, D.imag)
-        return pull, S
+        if force == 0.0:
+            return pull, S
+        P = self._params
+        return pull, S + (P.face_stiffness + P.face_damping * by_v) * np.outer(D.imag, D.imag)
 
     def _stopped(self, u: Complexes, D: Complexes, v: Floats) -> float:
         """Return the force of the face on the tip, upwards, N."""
