@@ -98,9 +98,9 @@ class PickAndPlace:
     """Comes down on an object, lifts it, carries it, lets it down, and leaves; straight lines at constant speed.
 
     Settled above the object with the pressure for contacts, it comes down at V_contact to `press` below the object's
-    top, sucks and waits there, while the links take the pressure for carrying. Lifted and carried at V
-    to above the other place, it waits until the links are soft again, comes down like before, stops sucking, waits, and
-    leaves. A line has as many points as periods: joints arrive at each as the period ends.
+    top, sucks and waits there. With the pressure for carrying it lifts, and carries at V to above the other place.
+    There it waits until the links are soft again, comes down like before, stops sucking, waits, and leaves. A line has
+    as many points as periods: joints arrive at each as the period ends.
 
     Raises:
         InvalidTask: by the constructor, for values out of range, and places out of reach or nearly so.
@@ -207,7 +207,7 @@ def _parts(p: Params) -> Sequence[_Part]:
     over_P, at_P, over_Q, at_Q = p.p_WP + above, p.p_WP - below, p.p_WQ + above, p.p_WQ - below
     return (
         _Part(over_P, at_P, p.V_contact, p.p_contact, vacuum=False),
-        _Part(at_P, at_P, 0.0, p.p_carry, vacuum=True, rest=p.wait),
+        _Part(at_P, at_P, 0.0, p.p_contact, vacuum=True, rest=p.wait),
         _Part(at_P, over_P, p.V, p.p_carry, vacuum=True),
         _Part(over_P, over_Q, p.V, p.p_carry, vacuum=True),
         _Part(over_Q, over_Q, 0.0, p.p_contact, vacuum=True, rest=p.wait),
