@@ -115,10 +115,22 @@ _ENTRIES = (
         "arm with links whose stiffness follows their pressure",
     ),
     Entry(
+        "VacuumGripper",
+        "handover.plants.vsl.vacuum_gripper:VacuumGripper",
+        Fraction(1, 50),
+        "suction cup that picks up an object and drops it",
+    ),
+    Entry(
         "TrajectoryPlanner",
         "handover.controllers.vsl.trajectory_planner:TrajectoryPlanner",
         Fraction(1, 50),
         "lines, arcs and squares for a three-joint arm",
+    ),
+    Entry(
+        "PickAndPlace",
+        "handover.controllers.vsl.pick_and_place:PickAndPlace",
+        Fraction(1, 50),
+        "picks an object up and puts it down: soft near contacts, stiff while carrying",
     ),
     Entry(
         "HybridKinematics",

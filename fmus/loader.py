@@ -163,7 +163,7 @@ def _modules(prefix: str, folder: str) -> "_PrivateModules":
     root.__path__ = []
     vars(root)["modules"] = _PrivateModules(prefix)
     modules: _PrivateModules = vars(sys.modules.setdefault(prefix, root))["modules"]
-    modules.folder = folder  # an earlier instance's folder may be gone
+    modules.move_to(folder)  # an earlier instance's folder may be gone
     return modules
 
 
@@ -173,8 +173,14 @@ class _PrivateModules:
     def __init__(self, prefix: str) -> None:
         self.prefix = prefix
         self.folder = ""
+        self.own: dict[str, bool] = {}
         self.lock = threading.RLock()
         self.builtins = {**vars(builtins), "__import__": self.import_from}
+
+    def move_to(self, folder: str) -> None:
+        """Take what is not loaded yet from another folder of the same FMU."""
+        self.folder = folder
+        self.own = {}  # the other folder may have been incomplete
 
     def load(self, name: str) -> types.ModuleType:
         """Return a module; it is loaded if it is not yet, after the packages that contain it."""
@@ -197,7 +203,7 @@ class _PrivateModules:
         """Import as `__import__` does; the FMU's modules call this in its place."""
         if level and globals:
             name = importlib.util.resolve_name("." * level + name, globals["__package__"])[len(self.prefix) + 1 :]
-        elif self._place(name.partition(".")[0]) is None:
+        elif not self._is_own(name.partition(".")[0]):
             return _builtin_import(name, globals, locals, fromlist or (), level)
         module = self.load(name)
         if not fromlist:
@@ -206,6 +212,13 @@ class _PrivateModules:
             if imported != "*" and not hasattr(module, imported) and self._place(f"{name}.{imported}"):
                 self.load(f"{name}.{imported}")
         return module
+
+    def _is_own(self, top: str) -> bool:
+        """Return whether a package is the FMU's own; asked in each step, as numpy imports where it reads a dtype."""
+        own = self.own  # another thread may move to another folder meanwhile
+        if top not in own:
+            own[top] = self._place(top) is not None
+        return own[top]
 
     def _place(self, name: str) -> str | None:
         """Return a module's file; for a package its `__init__.py`, or its folder if it has none."""

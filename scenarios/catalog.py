@@ -98,6 +98,10 @@ SYSTEMS = (
                 "handover.scenarios.vsl.path_experiments:VslHybrid",
                 "an arm of soft links follows a path by kinematics with learned corrections",
             ),
+            "vsl_pick_and_place": ScenarioEntry(
+                "handover.scenarios.vsl.pick_and_place:VslPickAndPlace",
+                "an arm of soft links picks an object up softly and carries it stiffly",
+            ),
         },
     ),
     RobotSystem(

@@ -1,7 +1,6 @@
 """Model-based and hybrid, learning-based kinematics of the VSL arm. [Gandarias2020] secs. III-A, IV-B and IV-C."""
 
 import enum
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -10,15 +9,24 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.vsl.default_model import DEFAULT_MODEL
+from handover.controllers.vsl import default_model, default_physics_model, default_small_model, default_window_model
+from handover.controllers.vsl.corrections import CurrentFilter, SwingCompensation, TrackerLoop
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
-from handover.controllers.vsl.learned_model import VslModel
+from handover.controllers.vsl.learned_model import Learned, VslModel
 from handover.controllers.vsl.model_text import InvalidModel, parse_model, read_model
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.cosim.blocks.units import Ampere, Metre, Pascal, Radian, RadianPerSecond, Second
+from handover.cosim.blocks.units import Ampere, Hertz, Metre, Number, Pascal, PerSecond, Radian, RadianPerSecond, Second
 
-__all__ = ["Elbow", "HybridKinematics", "Inputs", "InvalidModel", "Method", "Outputs", "Params"]
+__all__ = ["Elbow", "HybridKinematics", "Inputs", "InvalidModel", "Learned", "Method", "Outputs", "Params"]
+
+_SHIPPED = {
+    (Learned.CUBIC, False): default_model.DEFAULT_MODEL,
+    (Learned.CUBIC, True): default_window_model.DEFAULT_MODEL,
+    (Learned.SMALL, False): default_small_model.DEFAULT_MODEL,
+    (Learned.PHYSICS, False): default_physics_model.DEFAULT_MODEL,
+}
+"""Texts of the models that ship, by what they are and whether they were trained on currents without friction."""
 
 
 class Method(enum.IntEnum):
@@ -26,14 +34,19 @@ class Method(enum.IntEnum):
 
     MODEL_BASED = 0
     HYBRID = 1
+    ESTIMATE = 2
 
 
 @dataclass(frozen=True, kw_only=True)
 class Params:
     """Method, model and arm; the lengths are assumed."""
 
-    method: Method = parameter(Method.HYBRID, "rigid kinematics alone, or with what was learned")
-    model: str = parameter("", "JSON file of a trained model; empty: the one that ships")
+    method: Method = parameter(Method.HYBRID, "rigid kinematics, with what was learned, or with its estimate only")
+    learned: Learned = parameter(Learned.CUBIC, "what corrects rigid kinematics")
+    model: str = parameter("", "JSON file of a trained model; empty: the one that ships; no published one does")
+    window: bool = parameter(False, "free the currents of gear friction by which way each joint has been turning")
+    closed_loop: bool = parameter(False, "turn the joints until the tracker sees the tip where it is wanted")
+    swing: bool = parameter(False, "turn the joints against swings that the path's changes of speed excite")
     elbow: Elbow = parameter(Elbow.UP, "which way the elbow points")
     L_1: Metre = parameter(0.15, "height of the shoulder", minimum=0.0, maximum=10.0)
     L_2: Metre = parameter(0.225, "length of link 2", minimum=0.001, maximum=10.0)
@@ -43,6 +56,31 @@ class Params:
     )
     qd_correction: RadianPerSecond = parameter(
         0.2, "joint speed that corrections are granted besides the path's (assumed)", minimum=0.0, maximum=100.0
+    )
+    reversal: Radian = parameter(
+        0.002, "turn that reverses the gears' friction, of the window (assumed)", minimum=1e-6, maximum=1.0
+    )
+    tracker_rate: Hertz = parameter(
+        30.0, "rate of the tracker's readings, of the closed loop", minimum=0.1, maximum=50.0
+    )
+    tracker_lag: Second = parameter(
+        0.2, "time constant by which the tracker's errors are smoothed (assumed)", minimum=0.0, maximum=60.0
+    )
+    K_I: PerSecond = parameter(
+        2.0, "share of the tip's error that the closed loop takes away in a second (assumed)", minimum=0.0, maximum=20.0
+    )
+    dq_max: Radian = parameter(0.2, "largest turn of a joint by the closed loop (assumed)", minimum=0.0, maximum=3.0)
+    K_F: Number = parameter(
+        0.6,
+        "share of the bending by a path's accelerations that is commanded ahead (assumed)",
+        minimum=0.0,
+        maximum=2.0,
+    )
+    K_D: PerSecond = parameter(
+        4.0, "share of the bending by a swing that joints yield by in a second (assumed)", minimum=0.0, maximum=20.0
+    )
+    qd_max: RadianPerSecond = parameter(
+        4.8, "joint speed where a bend is commanded ahead: as fast as the servos can", minimum=0.0, maximum=100.0
     )
 
 
@@ -55,6 +93,9 @@ class Inputs:
     q_meas: Vector3[Radian] = port(np.zeros(3), "joint angles by the encoders")
     p_meas: Vector2[Pascal] = port(np.zeros(2), "pressures of links 2 and 3 above the air's")
     i_meas: Vector3[Ampere] = port(np.zeros(3), "motor currents")
+    p_WG_meas: Vector3[Metre] = port(
+        np.zeros(3), "position of the tip by the tracker, in the world; of the closed loop"
+    )
 
 
 @dataclass(kw_only=True)
@@ -73,9 +114,10 @@ class HybridKinematics:
 
     MODEL_BASED: q_cmd = q_ref, and the tip is taken to be at p_WG = f(q_meas), eq. (1).
     HYBRID: q_cmd = q_ref + g(q_ref, p, i), eq. (11), and p_WG = f(q_meas) + h(q_meas, p, i), eq. (10), with g and h of
-    `VslModel`, cubic polynomials where the source has networks. p and i are measured as the command for the next period
-    is made; the current of joint 1 is left out. Since a correction moves joints of its own accord, qd_cmd grants
-    qd_correction besides |qd_ref|, with the sign of qd_ref; 0, no limit, stays 0.
+    `VslModel`: what `learned` says. p and i are measured as the command for the next period is made; the current of
+    joint 1 is left out. Since a correction moves joints of its own accord, qd_cmd grants qd_correction besides
+    |qd_ref|, with the sign of qd_ref; 0, no limit, stays 0.
+    ESTIMATE: commands as MODEL_BASED, and p_WG as HYBRID.
 
     The command feeds the currents back to themselves: an arm that swings feels its own inertia, and takes it for a
     load. Two lags of i_lag in series attenuate that. With an arm that swings at 4 Hz, 0.1 s and less amplify the swing,
@@ -83,14 +125,18 @@ class HybridKinematics:
     friction acts the same way: commanded to hold still, the arm hunts, at 0.5 bar and 75 g the tip by 4 mm up and down
     in 3 s.
 
-    `outside` reports that the input of g or h is outside the polytope of its training; see `Cubic` for what follows.
+    Beyond the source, and each for itself: the window, see `CurrentFilter`; the closed loop by the tracker, of both
+    methods, see `TrackerLoop`; and what is done against swings, see `SwingCompensation`.
+
+    `outside` reports that the input of g or h is outside the polytope of its training; see `Domain` for what follows.
 
     Raises:
-        InvalidModel: by the constructor, if HYBRID and the model cannot be read, or was trained for other links.
+        InvalidModel: by the constructor, if the model is used and cannot be read, is not what `learned` and `window`
+            say, or was trained for other links.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "q_cmd": ("q_ref", "p_meas", "i_meas"),
+        "q_cmd": ("q_ref", "q_meas", "p_meas", "i_meas", "p_WG_meas"),
         "qd_cmd": ("qd_ref",),
         "p_WG_model": ("q_meas",),
         "p_WG_est": ("q_meas", "p_meas", "i_meas"),
@@ -101,62 +147,99 @@ class HybridKinematics:
     def __init__(self, params: Params) -> None:
         self._params = p = params
         self._kinematics = VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
-        self._model = _model(p, self._kinematics) if p.method is Method.HYBRID else None
-        self._i: tuple[Floats, Floats] | None = None
-        """Currents, smoothed once and twice."""
+        self._model = _model(p, self._kinematics) if p.method is not Method.MODEL_BASED else None
+        self._currents = CurrentFilter(self._model if p.window else None, p.i_lag, p.reversal)
+        self._loop = TrackerLoop(self._kinematics, self._model, p.tracker_rate, p.tracker_lag, p.K_I, p.dq_max)
+        self._swing = SwingCompensation(self._model, p.K_F, p.K_D) if p.swing and self._model else None
+        self._before: tuple[Floats, Floats] | None = None
+        """q_ref and q_cmd of the period that ends."""
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command that a step from here would give; no time passes."""
-        return self._command(u, self._smoothed(u.i_meas, 0.0)[1])
+        return self._command(u, self._currents.now(u))
 
-    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Return the command that holds until t + dt."""
-        self._i = self._smoothed(u.i_meas, dt)
-        return self._command(u, self._i[1])
+        i, at_once = self._currents.step(u, dt), False
+        if self._params.closed_loop:
+            self._loop.step(t, u, i, self._before)
+        if self._swing is not None:
+            at_once = self._swing.step(dt, u, i, self._currents.swing(u, i))
+        y = self._command(u, i)
+        if at_once:
+            y.qd_cmd = np.copysign(self._params.qd_max, y.qd_cmd)
+        if self._before is not None:
+            self._currents.turn(y.q_cmd - self._before[1])
+        self._before = np.array(u.q_ref), y.q_cmd
+        return y
 
     def get_state(self) -> bytes:
-        """Return the smoothed currents."""
-        return pack_state(self._i)
+        """Return what currents, closed loop and swings were, and the command."""
+        swing = None if self._swing is None else self._swing.get_state()
+        return pack_state((self._currents.get_state(), self._loop.get_state(), swing, self._before))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this unit or of one with equal parameters."""
-        self._i = unpack_state(state)
-
-    def _smoothed(self, i_meas: Floats, dt: float) -> tuple[Floats, Floats]:
-        if self._i is None or self._params.i_lag == 0.0:
-            return np.array(i_meas), np.array(i_meas)
-        share = 1.0 - math.exp(-dt / self._params.i_lag)
-        once = self._i[0] + share * (i_meas - self._i[0])
-        return once, self._i[1] + share * (once - self._i[1])
+        currents, loop, swing, self._before = unpack_state(state)
+        self._currents.set_state(currents)
+        self._loop.set_state(loop)
+        if self._swing is not None:
+            self._swing.set_state(swing)
 
     def _command(self, u: Inputs, i: Floats) -> Outputs:
-        p_WG = self._kinematics.forward(u.q_meas)
-        model = self._model
-        if model is None:
-            q_cmd, qd_cmd = np.array(u.q_ref), np.array(u.qd_ref)
-            return Outputs(q_cmd=q_cmd, qd_cmd=qd_cmd, p_WG_model=p_WG, p_WG_est=np.array(p_WG), outside=False)
+        p, model, p_WG = self._params, self._model, self._kinematics.forward(u.q_meas)
+        corrected = model is not None and p.method is Method.HYBRID
+        q_cmd = model.command(u.q_ref, u.p_meas, i) if model is not None and corrected else np.array(u.q_ref)
+        if p.closed_loop:
+            q_cmd = q_cmd + self._loop.dq
+        if self._swing is not None:
+            q_cmd = q_cmd + self._swing.dq
         return Outputs(
-            q_cmd=model.command(u.q_ref, u.p_meas, i),
-            qd_cmd=u.qd_ref + self._params.qd_correction * np.sign(u.qd_ref),
+            q_cmd=q_cmd,
+            qd_cmd=self._granted(u.qd_ref) if corrected or p.closed_loop else np.array(u.qd_ref),
             p_WG_model=p_WG,
-            p_WG_est=model.tip(u.q_meas, u.p_meas, i),
-            outside=model.outside(u.q_ref, u.q_meas, u.p_meas, i),
+            p_WG_est=np.array(p_WG) if model is None else model.tip(u.q_meas, u.p_meas, i),
+            outside=model is not None and model.outside(u.q_ref, u.q_meas, u.p_meas, i),
         )
+
+    def _granted(self, qd_ref: Floats) -> Floats:
+        return qd_ref + self._params.qd_correction * np.sign(qd_ref)
 
 
 def _model(p: Params, kinematics: VslKinematics) -> VslModel:
     """Return the model to be used.
 
     Raises:
-        InvalidModel: it cannot be read, or was trained for other links than these.
+        InvalidModel: there is none, it cannot be read, is of another kind, or was trained for other links than these.
     """
-    model = read_model(Path(p.model)) if p.model else parse_model(DEFAULT_MODEL, "that ships")
+    kind, remedy = p.learned.name.lower(), train_command(p.learned, window=p.window)
+    source = p.model or f"{kind}{' with a window' if p.window else ''}, as it ships"
+    if p.model:
+        model = read_model(Path(p.model))
+    elif text := _SHIPPED.get((p.learned, p.window)):
+        model = parse_model(text, source)
+    else:
+        raise InvalidModel(source, "there is none: train one and name its file by the parameter model", remedy)
+    if model.kind is not p.learned:
+        raise InvalidModel(
+            source, f"it is a {model.kind.name.lower()} model, and the parameter learned says {kind}", remedy
+        )
+    if (model.friction != (0.0, 0.0)) is not p.window:
+        trained = "without a window" if p.window else "with a window, on currents without friction"
+        raise InvalidModel(
+            source, f"it was trained {trained}, and the parameter window says {str(p.window).lower()}", remedy
+        )
     if model.kinematics != kinematics:
         raise InvalidModel(
-            p.model or "that ships",
-            f"it was trained for {_geometry_text(model.kinematics)}, not {_geometry_text(kinematics)}",
+            source, f"it was trained for {_geometry_text(model.kinematics)}, not {_geometry_text(kinematics)}", remedy
         )
     return model
+
+
+def train_command(learned: Learned, *, window: bool) -> str:
+    """Return the command that trains such a model."""
+    kind = "" if learned is Learned.CUBIC else f" --learned {learned.name.lower()}"
+    return f"handover vsl-train{kind}{' --window' if window else ''}"
 
 
 def _geometry_text(k: VslKinematics) -> str:

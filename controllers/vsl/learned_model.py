@@ -1,14 +1,16 @@
-"""The learned part of the VSL arm's hybrid kinematics: residuals as cubic polynomials. [Gandarias2020] eqs. (10), (11).
+"""The learned part of the VSL arm's hybrid kinematics. [Gandarias2020] eqs. (10), (11).
 
-`Cubic` is a polynomial of several inputs with the range of inputs that it was fitted on; `VslModel` has two of them.
+`VslModel` has two regressors, one for each equation: polynomials (`Cubic`), networks or a beam, which stand in files of
+their own. All know the range of inputs that they were fitted on, `Domain`.
 """
 
+import enum
 import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +18,34 @@ from numpy.typing import NDArray
 from handover.controllers.vsl.kinematics import VslKinematics
 from handover.cosim.blocks.ports import Floats
 
+
+class Learned(enum.IntEnum):
+    """What rigid kinematics are corrected by.
+
+    CUBIC: polynomials of third degree on residuals. SMALL: networks of two layers of 32 on residuals. PUBLISHED: the
+    networks of [Gandarias2020] sec. IV-B, which give positions and angles themselves. PHYSICS: a chain of rigid pieces
+    with three fitted stiffnesses.
+    """
+
+    CUBIC = 0
+    SMALL = 1
+    PUBLISHED = 2
+    PHYSICS = 3
+
+
+class ForwardInput(enum.Enum):
+    """What eq. (10) takes of the arm's posture: the measured angles, or as printed X = f(q)."""
+
+    Q = "q"
+    X = "X"
+
+
 FORWARD_INPUTS = ("q_meas[1]", "q_meas[2]", "q_meas[3]", "p_meas[1]", "p_meas[2]", "i_meas[2]", "i_meas[3]")
+FORWARD_INPUTS_X = tuple(f"p_WG_model[{k + 1}]" for k in range(3)) + FORWARD_INPUTS[3:]
 INVERSE_INPUTS = ("q_ref[1]", "q_ref[2]", "q_ref[3]", "p_meas[1]", "p_meas[2]", "i_meas[2]", "i_meas[3]")
-"""Inputs in rad, Pa and A; the current of joint 1, which carries no weight, is left out."""
+"""Inputs in rad or m, Pa and A; the current of joint 1, which carries no weight, is left out."""
+
+USUAL_INPUTS = ("q_meas[2]", "q_meas[3]", "p_meas[1]", "p_meas[2]")
 
 VALUES = 3
 """What each residual has: an angle a joint, or a coordinate an axis."""
@@ -48,30 +75,31 @@ def hull_directions(inputs: int) -> Floats:
 
 
 @dataclass(frozen=True)
-class Cubic:
-    """y(x) = sum_k coefficients[k] prod_i z_i^powers[k, i] of the standardised inputs z = (x - mean) / scale.
+class Domain:
+    """The inputs that something was fitted on: standardised, z = (x - mean) / scale, they lie in a polytope.
 
-    The inputs that it was fitted on lie in the polytope directions z <= hull, none of whose sides can be moved inwards.
-    For the polynomial each z_i is held between the two sides that are square to its axis: outside, a cubic that runs
-    away is worse than one that stays.
+    None of the sides of directions z <= hull can be moved inwards.
 
     Attributes:
         mean, scale: shape (inputs,), in the inputs' units.
-        powers: exponents, shape (monomials, inputs), each row's sum from 0 to 3.
-        coefficients: shape (monomials, values), in the values' units.
         hull: offsets of the sides with the normals `hull_directions`, shape (2 inputs^2,).
     """
 
     mean: Floats
     scale: Floats
-    powers: Integers
-    coefficients: Floats
     hull: Floats
 
-    def predict(self, x: Floats) -> Floats:
-        """Return y of inputs x, shape (..., inputs), as shape (..., values)."""
-        z = np.minimum(np.maximum((x - self.mean) / self.scale, self._low), self._high)
-        return monomials(z, self._factors) @ self.coefficients
+    def standardised(self, x: Floats) -> Floats:
+        """Return z of inputs x, shape (..., inputs), each held between the two sides that are square to its axis.
+
+        What runs away outside is worse than what stays.
+        """
+        return np.minimum(np.maximum((x - self.mean) / self.scale, self._low), self._high)
+
+    def slopes(self, x: Floats) -> Floats:
+        """Return dz/dx of `standardised` at inputs x, shape (..., inputs): 0 where an input is held."""
+        z = (x - self.mean) / self.scale
+        return np.where((z < self._low) | (z > self._high), 0.0, 1.0 / self.scale)
 
     def outside(self, x: Floats) -> bool:
         """Return whether inputs x, shape (inputs,), lie outside the polytope, that is, surely beyond the training."""
@@ -86,12 +114,63 @@ class Cubic:
         return self.hull[0 : 2 * len(self.mean) : 2]
 
     @cached_property
-    def _factors(self) -> Integers:
-        return factors_of(self.powers)
-
-    @cached_property
     def _directions(self) -> Floats:
         return hull_directions(len(self.mean))
+
+
+class Regressor(Protocol):
+    """A function of posture, pressures and currents that was fitted to measured points."""
+
+    @property
+    def domain(self) -> Domain:
+        """The inputs that it was fitted on."""
+        ...
+
+    def predict(self, x: Floats) -> Floats:
+        """Return y of inputs x, shape (..., inputs), as shape (..., values)."""
+        ...
+
+    def jacobian(self, x: Floats) -> Floats:
+        """Return dy/dx at inputs x, shape (inputs,), as shape (values, inputs)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Cubic(Domain):
+    """y(x) = sum_k coefficients[k] prod_i z_i^powers[k, i] of the standardised inputs.
+
+    Attributes:
+        powers: exponents, shape (monomials, inputs), each row's sum from 0 to 3.
+        coefficients: shape (monomials, values), in the values' units.
+    """
+
+    powers: Integers
+    coefficients: Floats
+
+    @property
+    def domain(self) -> Domain:
+        """The inputs that it was fitted on."""
+        return self
+
+    def predict(self, x: Floats) -> Floats:
+        """Return y of inputs x, shape (..., inputs), as shape (..., values)."""
+        return monomials(self.standardised(x), self._factors) @ self.coefficients
+
+    def jacobian(self, x: Floats) -> Floats:
+        """Return dy/dx at inputs x, shape (..., inputs), as shape (..., values, inputs)."""
+        padded = np.concatenate([np.ones((*x.shape[:-1], 1)), self.standardised(x)], axis=-1)
+        first, second, third = (padded[..., f] for f in self._factors)
+        J = np.zeros((*x.shape[:-1], self.coefficients.shape[1], len(self.mean)))
+        for i in range(len(self.mean)):
+            is_i = self._factors == i + 1
+            J[..., i] = (
+                second * third * is_i[0] + first * third * is_i[1] + first * second * is_i[2]
+            ) @ self.coefficients
+        return J * self.slopes(x)[..., None, :]
+
+    @cached_property
+    def _factors(self) -> Integers:
+        return factors_of(self.powers)
 
 
 def factors_of(powers: Integers) -> Integers:
@@ -108,41 +187,123 @@ def monomials(z: Floats, factors: Integers) -> Floats:
 
 
 @dataclass(frozen=True)
+class Adapted:
+    """A regressor b, corrected on an arm that differs: y = b(x) + offset + weights z + gain b(x).
+
+    Attributes:
+        base: b.
+        offset: shape (values,).
+        weights: shape (values, inputs), of the base's standardised inputs.
+        gain: shape (values, values): links that are stiffer by a tenth bend less by an eleventh.
+    """
+
+    base: Regressor
+    offset: Floats
+    weights: Floats
+    gain: Floats
+
+    @property
+    def domain(self) -> Domain:
+        """The inputs that the base was fitted on."""
+        return self.base.domain
+
+    def predict(self, x: Floats) -> Floats:
+        """Return y of inputs x, shape (..., inputs), as shape (..., values)."""
+        y, z = self.base.predict(x), self.domain.standardised(x)
+        return y + self.offset + z @ np.transpose(self.weights) + y @ np.transpose(self.gain)
+
+    def jacobian(self, x: Floats) -> Floats:
+        """Return dy/dx at inputs x, shape (inputs,), as shape (values, inputs)."""
+        J = self.base.jacobian(x)
+        return J + self.weights * self.domain.slopes(x) + self.gain @ J
+
+
+@dataclass(frozen=True)
 class VslModel:
-    """Residuals of rigid kinematics as cubic polynomials, in place of the networks of [Gandarias2020] sec. IV.
+    """What corrects rigid kinematics, [Gandarias2020] sec. IV.
 
     Attributes:
         inverse: commanded minus rigid angles, rad, at the wanted rigid angles, shape (3,).
-        forward: true minus rigid position, m, at the measured angles, shape (3,): outwards, sideways, upwards in the
-            arm's own plane, in which it deforms wherever joint 1 turns that.
+        forward: true minus rigid position, m, shape (3,): outwards, sideways, upwards in the arm's own plane, in which
+            it deforms wherever joint 1 turns that.
         kinematics: the rigid kinematics that is corrected.
         provenance: what it was trained on, and with what errors.
+        kind: what the two are.
+        forward_input: what `forward` takes of the posture.
+        friction: currents by the friction of the gears of joints 2 and 3, A, shape (2,), which turn with the direction
+            of motion and which the currents are to be freed of before; 0 if it was trained on the currents as measured.
+        usual: currents of joints 2 and 3 without friction under the mean of the loads that it was trained on, A, by
+            `USUAL_INPUTS`; None if it was trained on the currents as measured.
     """
 
-    inverse: Cubic
-    forward: Cubic
+    inverse: Regressor
+    forward: Regressor
     kinematics: VslKinematics
     provenance: Mapping[str, Any]
+    kind: Learned = Learned.CUBIC
+    forward_input: ForwardInput = ForwardInput.Q
+    friction: tuple[float, float] = (0.0, 0.0)
+    usual: Cubic | None = None
+
+    @property
+    def is_absolute(self) -> bool:
+        """Whether it gives angles, and the position in the world, themselves and not what is to be added."""
+        return self.kind is Learned.PUBLISHED
 
     def command(self, q_ref: Floats, p_meas: Floats, i_meas: Floats) -> Floats:
         """Return q_cmd, shape (3,), that brings the tip to where q_ref would bring a rigid arm's: eq. (11)."""
-        return q_ref + self.inverse.predict(inputs_of(q_ref, p_meas, i_meas))
+        learned = self.inverse.predict(inputs_of(q_ref, p_meas, i_meas))
+        return learned if self.is_absolute else q_ref + learned
 
     def tip(self, q_meas: Floats, p_meas: Floats, i_meas: Floats) -> Floats:
-        """Return p_WG, shape (3,), m, of the arm as it bends: eq. (10), of q instead of X = f(q)."""
-        residual = self.forward.predict(inputs_of(q_meas, p_meas, i_meas))
-        return self.kinematics.forward(q_meas) + rotate_about_z(residual, float(q_meas[0]))
+        """Return p_WG, shape (3,), m, of the arm as it bends: eq. (10)."""
+        learned = self.forward.predict(self._forward_inputs(q_meas, p_meas, i_meas))
+        if self.is_absolute:
+            return learned
+        return self.kinematics.forward(q_meas) + rotate_about_z(learned, float(q_meas[0]))
+
+    def tip_jacobian(self, q_meas: Floats, p_meas: Floats, i_meas: Floats) -> Floats:
+        """Return d tip / d q_meas, shape (3, 3), m: J of eq. (8) and what bending adds, at constant currents."""
+        x = self._forward_inputs(q_meas, p_meas, i_meas)
+        J = self.kinematics.jacobian(q_meas)
+        by_posture = self.forward.jacobian(x)[:, :3]
+        if self.forward_input is ForwardInput.X:
+            by_posture = by_posture @ J
+        if self.is_absolute:
+            return by_posture
+        theta_1 = float(q_meas[0])
+        c, s = math.cos(theta_1), math.sin(theta_1)
+        R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        turning = np.cross([0.0, 0.0, 1.0], R @ self.forward.predict(x))
+        return J + R @ by_posture + np.outer(turning, [1.0, 0.0, 0.0])
+
+    def currents(self, q_meas: Floats, p_meas: Floats) -> tuple[Floats, Floats]:
+        """Return the usual currents of joints 2 and 3, shape (2,), A, and a load's levers on them, shape (2,), m."""
+        assert self.usual is not None
+        theta_2, theta_23 = float(q_meas[1]), float(q_meas[1] + q_meas[2])
+        lever_3 = self.kinematics.L_3 * math.cos(theta_23)
+        lever_2 = self.kinematics.L_2 * math.cos(theta_2) + lever_3
+        return self.usual.predict(np.concatenate([q_meas[1:], p_meas])), np.array([lever_2, lever_3])
 
     def outside(self, q_ref: Floats, q_meas: Floats, p_meas: Floats, i_meas: Floats) -> bool:
-        """Return whether either residual is evaluated outside the polytope of its training."""
-        return self.inverse.outside(inputs_of(q_ref, p_meas, i_meas)) or self.forward.outside(
-            inputs_of(q_meas, p_meas, i_meas)
+        """Return whether either is evaluated outside the polytope of its training."""
+        return self.inverse.domain.outside(inputs_of(q_ref, p_meas, i_meas)) or self.forward.domain.outside(
+            self._forward_inputs(q_meas, p_meas, i_meas)
         )
+
+    def _forward_inputs(self, q_meas: Floats, p_meas: Floats, i_meas: Floats) -> Floats:
+        posture = q_meas if self.forward_input is ForwardInput.Q else self.kinematics.forward(q_meas)
+        return inputs_of(posture, p_meas, i_meas)
 
 
 def inputs_of(q: Floats, p: Floats, i: Floats) -> Floats:
-    """Return what the polynomials take, shape (..., 7): angles (..., 3), pressures (..., 2), currents (..., 3)."""
+    """Return inputs of a regressor, shape (..., 7): of posture (..., 3), pressures (..., 2) and currents (..., 3)."""
     return np.concatenate([q, p, i[..., 1:]], axis=-1)
+
+
+def turned(direction: Floats, turn: Floats, reversal: float) -> Floats:
+    """Return which way friction acts, from -1 to 1, after a further turn, rad: all of `reversal` turns it round."""
+    return np.clip(direction + 2.0 * turn / reversal, -1.0, 1.0)
 
 
 def rotate_about_z(v: Floats, theta_1: float) -> Floats:

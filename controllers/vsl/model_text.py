@@ -1,5 +1,9 @@
 """A learned model of the VSL arm as text: JSON of a fixed form, checked when it is read."""
 
+import base64
+import binascii
+import hashlib
+import itertools
 import json
 import math
 import textwrap
@@ -8,22 +12,39 @@ from typing import Any, cast
 
 import numpy as np
 
+from handover.controllers.vsl.beam import Beam, BentCommand, BentTip, Stiffness, Weights
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import (
     DEGREE,
     FORWARD_INPUTS,
+    FORWARD_INPUTS_X,
     INVERSE_INPUTS,
+    USUAL_INPUTS,
     VALUES,
+    Adapted,
     Cubic,
+    Domain,
+    ForwardInput,
+    Learned,
+    Regressor,
     VslModel,
     hull_directions,
 )
+from handover.controllers.vsl.network import ACTIVATIONS, LAYERS, Activation, Network
 from handover.cosim.blocks.ports import Floats
 
 FORMAT, VERSION = "handover-vsl-model", 1
 
 ANY = -1
 """A number of entries that is not checked."""
+
+_FORWARD_INPUTS = {ForwardInput.Q: FORWARD_INPUTS, ForwardInput.X: FORWARD_INPUTS_X}
+
+_STORED = np.dtype("<f4")
+"""Of a network's weights in a file, and what they are rounded to when they are trained."""
+
+_PRECISIONS = ("float32", "float64")
+"""In which a network is evaluated."""
 
 _WIDTH = 115
 
@@ -32,25 +53,34 @@ _MAX_DEPTH = 3
 
 
 class InvalidModel(ValueError):
-    """Text that is no model of this version; `source` says where it came from, `fault` what is wrong."""
+    """Text that is no model of this version.
+
+    `source` says where it came from, `fault` what is wrong, and `remedy` what makes one that is.
+    """
 
     is_refusal = True
 
-    def __init__(self, source: str, fault: str) -> None:
-        super().__init__(f"model {source}: {fault}; `handover vsl-train` makes one")
+    def __init__(self, source: str, fault: str, remedy: str = "handover vsl-train") -> None:
+        super().__init__(f"model {source}: {fault}; `{remedy}` makes one")
         self.source, self.fault = source, fault
 
 
 def model_text(model: VslModel) -> str:
-    """Return a model as JSON in lines of less than 120 characters, ending in a newline."""
+    """Return a model as JSON in lines of less than 120 characters, ending in a newline.
+
+    Weights of networks are their bytes in base64, with a digest: 1.6 million numbers as text would be read for seconds.
+    """
     k = model.kinematics
     content = {
         "format": FORMAT,
         "version": VERSION,
+        "kind": model.kind.name.lower(),
         "provenance": model.provenance,
         "links": {"L_1": k.L_1, "L_2": k.L_2, "L_3": k.L_3, "elbow": k.elbow.name},
+        "friction": list(model.friction),
+        **({"usual": {"inputs": list(USUAL_INPUTS), **_plain(model.usual)}} if model.usual else {}),
         "inverse": {"inputs": list(INVERSE_INPUTS), **_plain(model.inverse)},
-        "forward": {"inputs": list(FORWARD_INPUTS), **_plain(model.forward)},
+        "forward": {"inputs": list(_FORWARD_INPUTS[model.forward_input]), **_plain(model.forward)},
     }
     return _json(content, "") + "\n"
 
@@ -91,11 +121,19 @@ def parse_model(text: str, source: str) -> VslModel:
         raise InvalidModel(source, f"links.elbow is {elbow!r}, not 'UP' or 'DOWN'")
     if min(L_2, L_3) <= 0.0:
         raise InvalidModel(source, "links.L_2 and links.L_3 must be above 0")
+    kinematics = VslKinematics(L_1, L_2, L_3, Elbow[elbow])
+    kind = reader.kind(whole)
+    forward_input = reader.forward_input(whole)
+    forward_inputs = _FORWARD_INPUTS[forward_input]
     return VslModel(
-        inverse=reader.cubic(whole, "inverse", INVERSE_INPUTS),
-        forward=reader.cubic(whole, "forward", FORWARD_INPUTS),
-        kinematics=VslKinematics(L_1, L_2, L_3, Elbow[elbow]),
+        inverse=reader.regressor(whole, "inverse", INVERSE_INPUTS, kind, kinematics),
+        forward=reader.regressor(whole, "forward", forward_inputs, kind, kinematics),
+        kinematics=kinematics,
         provenance=reader.table(reader.entry(whole, "provenance"), "provenance"),
+        kind=kind,
+        forward_input=forward_input,
+        friction=reader.friction(whole),
+        usual=reader.usual(whole),
     )
 
 
@@ -129,29 +167,148 @@ class _Reader:
             raise InvalidModel(self._source, f"{of}.{key} has the shape {list(array.shape)}, not [{wanted}]")
         return array
 
-    def cubic(self, whole: dict[str, Any], name: str, inputs: tuple[str, ...]) -> Cubic:
-        """Return one of the two learned residuals."""
+    def kind(self, whole: dict[str, Any]) -> Learned:
+        """Return what the model is; files from before there were several say nothing, and are cubic."""
+        kind = whole.get("kind", Learned.CUBIC.name.lower())
+        for known in Learned:
+            if kind == known.name.lower():
+                return known
+        raise InvalidModel(
+            self._source, f"its kind is {kind!r}, not one of {', '.join(known.name.lower() for known in Learned)}"
+        )
+
+    def forward_input(self, whole: dict[str, Any]) -> ForwardInput:
+        """Return what eq. (10) takes: the one whose inputs are named."""
+        table = self.table(self.entry(whole, "forward"), "forward")
+        is_X = self.entry(table, "inputs", "forward") == list(FORWARD_INPUTS_X)
+        return ForwardInput.X if is_X else ForwardInput.Q
+
+    def friction(self, whole: dict[str, Any]) -> tuple[float, float]:
+        """Return the currents by friction; files from before it was learned have none."""
+        first, second = (
+            self.numbers(whole, "the file", "friction", (2,)).tolist() if "friction" in whole else (0.0, 0.0)
+        )
+        return first, second
+
+    def usual(self, whole: dict[str, Any]) -> Cubic | None:
+        """Return the usual currents, which a model without a window does not have."""
+        if not any(self.friction(whole)):
+            return None
+        table = self._named(whole, "usual", USUAL_INPUTS)
+        return self._cubic(table, "usual", self._domain(table, "usual", len(USUAL_INPUTS)), len(USUAL_INPUTS) // 2)
+
+    def _named(self, whole: dict[str, Any], name: str, inputs: tuple[str, ...]) -> dict[str, Any]:
+        """Return a table of which the inputs are these."""
         table = self.table(self.entry(whole, name), name)
         if (stated := self.entry(table, "inputs", name)) != list(inputs):
             raise InvalidModel(self._source, f"{name}.inputs are {stated}, not {list(inputs)}")
-        n = len(inputs)
-        powers = np.transpose(self.numbers(table, name, "powers", (n, ANY)))
-        if np.any(powers != np.floor(powers)) or np.any(powers < 0.0) or np.any(np.sum(powers, axis=1) > DEGREE):
-            fault = f"{name}.powers must be whole numbers from 0, {DEGREE} at most in a column"
-            raise InvalidModel(self._source, fault)
+        return table
+
+    def regressor(
+        self, whole: dict[str, Any], name: str, inputs: tuple[str, ...], kind: Learned, kinematics: VslKinematics
+    ) -> Regressor:
+        """Return what was learned for one of the two equations."""
+        table = self._named(whole, name, inputs)
+        domain = self._domain(table, name, len(inputs))
+        if kind is Learned.CUBIC:
+            regressor: Regressor = self._cubic(table, name, domain)
+        elif kind is Learned.PHYSICS:
+            regressor = self._bent(table, name, domain, kinematics)
+        else:
+            regressor = self._network(table, name, domain, kind)
+        return self._adapted(table, name, regressor) if "adaptation" in table else regressor
+
+    def _domain(self, table: dict[str, Any], name: str, n: int) -> Domain:
         scale = self.numbers(table, name, "scale", (n,))
         if np.any(scale <= 0.0):
             raise InvalidModel(self._source, f"{name}.scale must be above 0")
         hull = self.numbers(table, name, "hull", (len(hull_directions(n)),))
         if np.any(hull[0 : 2 * n : 2] < -hull[1 : 2 * n : 2]):
             raise InvalidModel(self._source, f"{name}.hull is empty: an upper side lies below its lower one")
-        coefficients = np.transpose(self.numbers(table, name, "coefficients", (VALUES, len(powers))))
+        return Domain(self.numbers(table, name, "mean", (n,)), scale, hull)
+
+    def _adapted(self, table: dict[str, Any], name: str, base: Regressor) -> Adapted:
+        part = f"{name}.adaptation"
+        adaptation = self.table(table["adaptation"], part)
+        shapes = {"offset": (VALUES,), "weights": (VALUES, len(base.domain.mean)), "gain": (VALUES, VALUES)}
+        return Adapted(base, *(self.numbers(adaptation, part, key, shape) for key, shape in shapes.items()))
+
+    def _bent(
+        self, table: dict[str, Any], name: str, domain: Domain, kinematics: VslKinematics
+    ) -> BentTip | BentCommand:
+        beam = self.table(self.entry(table, "beam", name), f"{name}.beam")
+        stiffness = Stiffness(*(self._above_0(beam, f"{name}.beam", key) for key in Stiffness._fields))
+        weights = Weights(*(self._above_0(beam, f"{name}.beam", key) for key in Weights._fields))
+        if not 2.0 * weights.cap < min(kinematics.L_2, kinematics.L_3):
+            raise InvalidModel(self._source, f"{name}.beam.cap: two caps leave nothing of a link that bends")
+        bent = Beam(kinematics, stiffness, weights)
+        if name == "forward":
+            return BentTip(domain.mean, domain.scale, domain.hull, bent)
+        droop = self.numbers(table, name, "droop", ()).item()
+        return BentCommand(domain.mean, domain.scale, domain.hull, bent, droop)
+
+    def _above_0(self, table: dict[str, Any], of: str, key: str) -> float:
+        value = self.numbers(table, of, key, ()).item()
+        if not value > 0.0:
+            raise InvalidModel(self._source, f"{of}.{key} must be above 0")
+        return value
+
+    def _network(self, table: dict[str, Any], name: str, domain: Domain, kind: Learned) -> Network:
+        layers = (len(domain.mean), *LAYERS[kind], VALUES)
+        if (stated := self.entry(table, "neurons", name)) != list(LAYERS[kind]):
+            raise InvalidModel(
+                self._source, f"{name}.neurons are {stated}; a {kind.name.lower()} network has {list(LAYERS[kind])}"
+            )
+        if (activation := self.entry(table, "activation", name)) != ACTIVATIONS[kind].value:
+            raise InvalidModel(self._source, f"{name}.activation is {activation!r}, not {ACTIVATIONS[kind].value!r}")
+        precision = self.entry(table, "precision", name)
+        if precision not in _PRECISIONS:
+            raise InvalidModel(self._source, f"{name}.precision is {precision!r}, not one of {', '.join(_PRECISIONS)}")
+        numbers = self._weights(table, name)
+        shapes = [shape for n, m in itertools.pairwise(layers) for shape in ((n, m), (m,))]
+        sizes = [int(np.prod(shape)) for shape in shapes]
+        if len(numbers) != sum(sizes):
+            raise InvalidModel(self._source, f"{name}.weights has {len(numbers)} numbers, not {sum(sizes)}")
+        arrays = [
+            part.reshape(shape).astype(precision)
+            for part, shape in zip(np.split(numbers, np.cumsum(sizes)[:-1]), shapes, strict=True)
+        ]
+        scale_y = self.numbers(table, name, "scale_y", (VALUES,))
+        mean_y = self.numbers(table, name, "mean_y", (VALUES,))
+        weights, biases = tuple(arrays[0::2]), tuple(arrays[1::2])
+        return Network(domain.mean, domain.scale, domain.hull, weights, biases, Activation(activation), mean_y, scale_y)
+
+    def _weights(self, table: dict[str, Any], name: str) -> Any:
+        """Return the numbers of all layers one after another."""
+        lines = self.entry(table, "weights", name)
+        if not isinstance(lines, list) or not all(isinstance(line, str) for line in cast("list[object]", lines)):
+            raise InvalidModel(self._source, f"{name}.weights must be a list of texts")
+        try:
+            data = base64.b64decode("".join(cast("list[str]", lines)), validate=True)
+        except (binascii.Error, ValueError) as e:
+            raise InvalidModel(self._source, f"{name}.weights is not base64: {e}") from e
+        if hashlib.sha256(data).hexdigest() != self.entry(table, "sha256", name):
+            raise InvalidModel(self._source, f"{name}.weights is damaged: its digest is not the one stated beside it")
+        if len(data) % _STORED.itemsize:
+            raise InvalidModel(self._source, f"{name}.weights is no whole number of {_STORED.itemsize} bytes")
+        numbers = np.frombuffer(data, _STORED)
+        if not np.all(np.isfinite(numbers)):
+            raise InvalidModel(self._source, f"{name}.weights must be made of finite numbers")
+        return numbers
+
+    def _cubic(self, table: dict[str, Any], name: str, domain: Domain, values: int = VALUES) -> Cubic:
+        n = len(domain.mean)
+        powers = np.transpose(self.numbers(table, name, "powers", (n, ANY)))
+        if np.any(powers != np.floor(powers)) or np.any(powers < 0.0) or np.any(np.sum(powers, axis=1) > DEGREE):
+            fault = f"{name}.powers must be whole numbers from 0, {DEGREE} at most in a column"
+            raise InvalidModel(self._source, fault)
+        coefficients = np.transpose(self.numbers(table, name, "coefficients", (values, len(powers))))
         return Cubic(
-            mean=self.numbers(table, name, "mean", (n,)),
-            scale=scale,
+            domain.mean,
+            domain.scale,
+            domain.hull,
             powers=powers.astype(np.int64),
             coefficients=np.ascontiguousarray(coefficients),  # as when it was fitted: sums round likewise
-            hull=hull,
         )
 
 
@@ -163,14 +320,41 @@ def _all_numbers(value: object, depth: int) -> bool:
     )
 
 
-def _plain(cubic: Cubic) -> dict[str, Any]:
-    """Return a cubic's numbers; powers have a row an input and coefficients a row a value, which makes few lines."""
+def _plain(regressor: Regressor) -> dict[str, Any]:
+    """Return a regressor's numbers as they stand in a file."""
+    if isinstance(regressor, Adapted):
+        parts = {name: getattr(regressor, name).tolist() for name in ("offset", "weights", "gain")}
+        return {**_plain(regressor.base), "adaptation": parts}
+    domain = regressor.domain
+    mean, scale, hull = domain.mean.tolist(), domain.scale.tolist(), domain.hull.tolist()
+    if isinstance(regressor, Network):
+        return {"mean": mean, "scale": scale, "hull": hull, **_plain_network(regressor)}
+    if isinstance(regressor, (BentTip, BentCommand)):
+        beam = {**regressor.beam.stiffness._asdict(), **regressor.beam.weights._asdict()}
+        droop = {"droop": regressor.droop} if isinstance(regressor, BentCommand) else {}
+        return {"mean": mean, "scale": scale, "hull": hull, "beam": beam, **droop}
+    assert isinstance(regressor, Cubic)
     return {
-        "mean": cubic.mean.tolist(),
-        "scale": cubic.scale.tolist(),
-        "powers": cubic.powers.T.tolist(),
-        "coefficients": cubic.coefficients.T.tolist(),
-        "hull": cubic.hull.tolist(),
+        "mean": mean,
+        "scale": scale,
+        "powers": regressor.powers.T.tolist(),  # a row an input, and coefficients a row a value: few lines
+        "coefficients": regressor.coefficients.T.tolist(),
+        "hull": hull,
+    }
+
+
+def _plain_network(network: Network) -> dict[str, Any]:
+    layers = zip(network.weights, network.biases, strict=True)
+    data = b"".join(part.astype(_STORED).tobytes() for layer in layers for part in layer)
+    text = base64.b64encode(data).decode("ascii")
+    return {
+        "neurons": list(network.neurons),
+        "activation": network.activation.value,
+        "precision": network.weights[0].dtype.name,
+        "mean_y": network.mean_y.tolist(),
+        "scale_y": network.scale_y.tolist(),
+        "sha256": hashlib.sha256(data).hexdigest(),
+        "weights": [text[k : k + _WIDTH - 8] for k in range(0, len(text), _WIDTH - 8)],
     }
 
 

@@ -1,8 +1,7 @@
 """Actuators of the VSL arm: a link's pressure regulator with its valve, and a joint's geared servo with its current."""
 
 import math
-
-from handover.cosim.blocks.state import pack_state, unpack_state
+from typing import Any
 
 
 class PressureLine:
@@ -38,13 +37,13 @@ class PressureLine:
             else:
                 dt = self._leak(dt, p_cmd)
 
-    def get_state(self) -> bytes:
-        """Return the complete state."""
-        return pack_state((self.p, self.open))
+    def snapshot(self) -> tuple[Any, ...]:
+        """Return the complete state, plain data."""
+        return self.p, self.open
 
-    def set_state(self, state: bytes) -> None:
+    def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Restore a state of this line or of one with equal arguments."""
-        self.p, self.open = unpack_state(state)
+        self.p, self.open = snapshot
 
     def _regulate(self, dt: float, p_cmd: float) -> float:
         """Regulate until the tolerance is reached, at most for dt; return what is left of dt."""
@@ -114,10 +113,10 @@ class VslServo:
         """Return the current, A, for a torque on the joint, N m."""
         return (torque + self._friction) / self._kt
 
-    def get_state(self) -> bytes:
-        """Return the complete state."""
-        return pack_state((self.angle, self._friction, self._shown))
+    def snapshot(self) -> tuple[Any, ...]:
+        """Return the complete state, plain data."""
+        return self.angle, self._friction, self._shown
 
-    def set_state(self, state: bytes) -> None:
+    def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Restore a state of this servo or of one with equal arguments."""
-        self.angle, self._friction, self._shown = unpack_state(state)
+        self.angle, self._friction, self._shown = snapshot

@@ -1,17 +1,17 @@
-"""Arm of three joints with two links of variable stiffness, its motors, air and sensors, after [Gandarias2020]."""
+"""Arm with one to three links of variable stiffness, its motors, air and sensors, after [Gandarias2020]."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Polyline25, Vector2, Vector3, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
-from handover.cosim.blocks.units import Ampere, Kilogram, Metre, Pascal, Radian, RadianPerSecond
+from handover.cosim.blocks.units import Ampere, Kilogram, Metre, Newton, Pascal, Radian, RadianPerSecond
 from handover.plants.vsl.actuators import PressureLine, VslServo
 from handover.plants.vsl.chain import Complexes, VslChain
 from handover.plants.vsl.dynamics import NoConvergence, VslDynamics
@@ -23,6 +23,7 @@ from handover.plants.vsl.parameters import (
     Motion,
     Params,
 )
+from handover.plants.vsl.sensors import Sensors, in_steps
 from handover.plants.vsl.statics import NoEquilibrium, VslStatics
 
 __all__ = ["Inputs", "InvalidInput", "InvalidVslArmParameters", "Link", "Motion", "Outputs", "Params", "VslArm"]
@@ -50,6 +51,7 @@ class Inputs:
     p_cmd: Vector2[Pascal] = port(
         np.array([1.0e5, 1.0e5]), "commanded pressures of links 2 and 3", minimum=0.0, maximum=MAX_PRESSURE
     )
+    p_cmd_4: Pascal = port(1.0e5, "commanded pressure of the third of three links", minimum=0.0, maximum=MAX_PRESSURE)
     load: Kilogram = port(0.0, "mass that hangs on the gripper", minimum=0.0, maximum=MAX_LOAD)
 
 
@@ -60,13 +62,21 @@ class Outputs:
     q_meas: Vector3[Radian] = output("joint angles by the encoders, which do not see what is behind the gears")
     i_meas: Vector3[Ampere] = output("currents of the motors, positive for a torque that turns the joint forwards")
     p_meas: Vector2[Pascal] = output("pressures of links 2 and 3 by the transducers")
+    p_meas_4: Pascal = output("pressure of the third of three links by its transducer; of fewer: 0")
+    tilt_meas: Vector2[Radian] = output("angles of the ends of links 2 and 3 above the horizontal, by accelerometers")
+    tilt_meas_4: Radian = output("angle of the end of the third of three links likewise; of fewer: 0")
     p_WG: Vector3[Metre] = output("position of the gripper")
     p_WG_meas: Vector3[Metre] = output("position of the gripper by the tracker")
-    shape: Polyline25[Metre] = output("centre line: the base, 12 points on link 2, 12 on link 3 to the gripper")
+    f_G: Newton = output("largest force within the step of the face that stops the gripper, upwards")
+    shape: Polyline25[Metre] = output(
+        "centre line: the base, 12 points on link 2, 12 from there to the gripper; on a single link all 24"
+    )
 
 
 class VslArm:
     """Arm that bends under its weight, by a pseudo-rigid chain in the plane that J1 turns, after [Gandarias2020].
+
+    It has two links; or one, with the gripper at its end; or a third, screwed to link 3 without a joint (fig. 2).
 
     - W has its origin at the foot of the axis of J1, z up. With stiff links and joints p_WG is the last column of
       eq. (1), for angles q = (theta_1, theta_2, theta_3), theta_2 from the horizontal, theta_3 from link 2.
@@ -76,7 +86,8 @@ class VslArm:
       behind the encoder. Friction shows in the current only. J1 carries no weight and does not yield: its current is
       friction and the arm's inertia about it.
     - Air: `PressureLine`. A rigid link has a line that is closed behind the transducer.
-    - Readings have white Gaussian noise, drawn once a step.
+    - J1 may be a stepper motor: it stands at the nearest whole step, which it counts. Commands and readings may be
+      rounded to what a converter resolves. Noise of the readings, tilt by accelerometers: `Sensors`.
 
     The arm starts at rest in q_0 with the load of its first instant; a load that is put on later has the gripper's
     velocity. A step ends with the rest or motion under the inputs held during it.
@@ -101,22 +112,20 @@ class VslArm:
             if dynamic
             else VslStatics(self._chain, params.gravity, 1.0 / params.servo_stiffness)
         )
+        friction: list[float] = (params.gear_friction * params.friction_factor).tolist()
         self._servos = [
-            VslServo(angle, params.servo_speed, params.kt, params.gear_friction, params.sliding)
-            for angle in params.q_0.tolist()
-        ]
+            VslServo(angle, params.servo_speed, params.kt, friction, params.sliding)
+            for angle, friction in zip(params.q_0.tolist(), friction, strict=False)
+        ][: 1 + len(self._chain.joints)]
         self._lines = [
             PressureLine(p, params.pressure_time, params.leak_time, params.valve_tolerance, params.valve_band)
-            for p in params.p_0.tolist()
+            for p in (*params.p_0.tolist(), params.p_4_0)[: params.links]
         ]
-        self._rng = np.random.default_rng(params.seed)
-        self._noise = self._rng.standard_normal(11)
-        self._sigma = np.repeat(
-            [params.servo_noise, params.current_noise, params.tracker_noise, params.pressure_noise], [3, 3, 3, 2]
-        )
+        self._parts = (self._mechanics, *self._servos, *self._lines)
+        self._sensors = Sensors(params, self._chain.sensors)
         self._spin = 0.0
-        self._q = [0.0, 0.0, 0.0]  # what the encoders show, and the currents, without noise
-        self._i = [0.0, 0.0, 0.0]
+        self._q = [0.0] * len(self._servos)  # what the encoders show, and the currents, without noise
+        self._i = list(self._q)
         self._started = False
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
@@ -129,34 +138,39 @@ class VslArm:
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Advance from t by dt with u held."""
         _check_inputs(u)
-        before = self.get_state()
+        before = self._snapshot()
         try:
             if not self._started:
                 self._rest(u.load)
                 self._started = True
             self._advance(dt, u)
         except (NoEquilibrium, NoConvergence):
-            self.set_state(before)
+            self._restore(before)
             raise
-        self._noise = self._rng.standard_normal(11)
+        self._sensors.draw()
         return self._seen()
 
     def get_state(self) -> bytes:
         """Return the complete state, random generator included."""
-        parts = [part.get_state() for part in (self._mechanics, *self._servos, *self._lines)]
-        random = (self._rng.bit_generator, self._noise)
-        return pack_state((parts, random, self._spin, self._q, self._i, self._started))
+        return pack_state((self._snapshot(), self._sensors.get_state()))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this arm or of one with equal parameters."""
-        parts, random, self._spin, self._q, self._i, self._started = unpack_state(state)
-        for part, own in zip((self._mechanics, *self._servos, *self._lines), parts, strict=True):
-            part.set_state(own)
-        self._rng.bit_generator.state, self._noise = random
+        snapshot, sensors = unpack_state(state)
+        self._restore(snapshot)
+        self._sensors.set_state(sensors)
+
+    def _snapshot(self) -> tuple[Any, ...]:
+        """Return all that a step changes before it can fail, as references: nothing of it is ever written to."""
+        return [part.snapshot() for part in self._parts], self._spin, self._q, self._i, self._started
+
+    def _restore(self, snapshot: tuple[Any, ...]) -> None:
+        parts, self._spin, self._q, self._i, self._started = snapshot
+        for part, own in zip(self._parts, parts, strict=True):
+            part.restore(own)
 
     def _rest(self, load: float) -> None:
-        _, theta_2, theta_3 = self._aims()
-        self._mechanics.settle((theta_2, theta_3), self._pressures(), load)
+        self._mechanics.settle(self._aims()[1:], self._pressures(), load)
         self._q = self._shown()
         for servo, q in zip(self._servos, self._q, strict=True):
             servo.rest(q)
@@ -164,10 +178,11 @@ class VslArm:
 
     def _advance(self, dt: float, u: Inputs) -> None:
         first = self._aims()
-        for servo, command, speed in zip(self._servos, u.q_cmd.tolist(), u.qd_cmd.tolist(), strict=True):
-            servo.turn(command, speed, dt)
-        for line, p_cmd in zip(self._lines, u.p_cmd.tolist(), strict=True):
-            line.advance(dt, p_cmd)
+        P = self._params
+        for servo, command, speed in zip(self._servos, u.q_cmd.tolist(), u.qd_cmd.tolist(), strict=False):
+            servo.turn(in_steps(command, P.encoder_step), speed, dt)
+        for line, p_cmd in zip(self._lines, (*u.p_cmd.tolist(), u.p_cmd_4), strict=False):
+            line.advance(dt, in_steps(p_cmd, P.regulator_step))
         last = self._aims()
         spin = (last[0] - first[0]) / dt
         self._mechanics.advance(dt, (first[1:], last[1:]), self._pressures(), u.load, spin)
@@ -178,45 +193,55 @@ class VslArm:
         inertia = self._chain.inertia_about_J1(self._mechanics.pose, u.load) if faster else 0.0
         self._i = self._currents(faster * inertia)
 
-    def _aims(self) -> tuple[float, float, float]:
-        J1, J2, J3 = self._servos
-        return J1.angle, J2.angle, J3.angle
+    def _aims(self) -> tuple[float, ...]:
+        return tuple(servo.angle for servo in self._servos)
 
-    def _pressures(self) -> tuple[float, float]:
-        link_2, link_3 = self._lines
-        return link_2.p, link_3.p
+    def _pressures(self) -> tuple[float, ...]:
+        return tuple(line.p for line in self._lines)
+
+    @property
+    def _theta_1(self) -> float:
+        """Where J1 stands."""
+        return in_steps(self._servos[0].angle, self._params.base_step)
 
     def _shown(self) -> list[float]:
-        """Return what the encoders show, without noise."""
-        theta_1, theta_2, theta_3 = self._aims()
-        droop_2, droop_3 = self._mechanics.pose.droop
-        return [theta_1, theta_2 - droop_2, theta_3 - droop_3]
+        """Return what encoders, and the count of a stepper motor, show, without noise."""
+        pose = self._mechanics.pose
+        aims = self._aims()[1:]
+        return [self._theta_1, *(aim - droop for aim, droop in zip(aims, pose.droop, strict=True))]
 
     def _currents(self, tau_1: float) -> list[float]:
         """Return the currents, without noise, for a torque of J1 and those that hold the links."""
-        return [
+        i = [
             servo.current(torque)
             for servo, torque in zip(self._servos, (tau_1, *self._mechanics.pose.torque), strict=True)
         ]
+        return [0.0, *i[1:]] if self._params.base_step else i
 
     def _seen(self) -> Outputs:
-        noise = self._sigma * self._noise
-        ends = self._chain.ends(self._mechanics.pose)
+        pose = self._mechanics.pose
+        ends = self._chain.ends(pose)
         p_WG = self._in_world(ends[-1:])[0]
         shape = np.zeros((25, 3))
         shape[1:] = self._in_world(self._chain.centre_line(ends))
+        read = self._sensors.read(self._q, self._i, self._pressures(), p_WG)
+        tilts = self._sensors.tilts(pose, self._mechanics.acceleration(self._spin))
         return Outputs(
-            q_meas=np.array(self._q) + noise[:3],
-            i_meas=np.array(self._i) + noise[3:6],
-            p_meas=np.array(self._pressures()) + noise[9:],
+            q_meas=read.q,
+            i_meas=read.i,
+            p_meas=read.p[:2],
+            p_meas_4=float(read.p[2]),
+            tilt_meas=np.array(tilts[:2]),
+            tilt_meas_4=tilts[2],
             p_WG=p_WG,
-            p_WG_meas=p_WG + noise[6:9],
+            p_WG_meas=read.p_WG,
+            f_G=self._mechanics.force,
             shape=shape,
         )
 
     def _in_world(self, points: Complexes) -> Floats:
         """Return points of the arm's plane, seen from the shoulder, in W, (k, 3)."""
-        theta_1 = self._servos[0].angle
+        theta_1 = self._theta_1
         p = np.empty((len(points), 3))
         p[:, 0] = math.cos(theta_1) * points.real
         p[:, 1] = math.sin(theta_1) * points.real
@@ -231,6 +256,8 @@ def _check_inputs(u: Inputs) -> None:
         faults.append(f"q_cmd {u.q_cmd}, qd_cmd {u.qd_cmd} and p_cmd {u.p_cmd} must be finite")
     elif not 0.0 <= min(u.p_cmd) <= max(u.p_cmd) <= MAX_PRESSURE:
         faults.append(f"p_cmd {u.p_cmd} Pa must be from 0 to {MAX_PRESSURE:g} Pa")
+    if not 0.0 <= u.p_cmd_4 <= MAX_PRESSURE:
+        faults.append(f"p_cmd_4 {u.p_cmd_4:g} Pa must be from 0 to {MAX_PRESSURE:g} Pa")
     if not 0.0 <= u.load <= MAX_LOAD:
         faults.append(f"load {u.load:g} kg must be from 0 to {MAX_LOAD:g} kg")
     if faults:

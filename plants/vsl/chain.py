@@ -1,6 +1,7 @@
-"""The pseudo-rigid chain that stands for the VSL arm's two upper links: its bodies, springs and masses."""
+"""The pseudo-rigid chain that stands for the VSL arm's upper links: its bodies, springs and masses."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,14 +25,22 @@ class Springs(NamedTuple):
 class Pose(NamedTuple):
     """Where the chain is: angles from the horizontal, rad, and shears, m, of all bodies, from shoulder to tip.
 
-    `torque` is what J2 and J3 hold their links with, in N m, positive upwards; `droop` is how far their servos turn
-    short of what they aim at, in rad.
+    `torque` is what the chain's joints, J2 and J3, hold their links with, in N m, positive upwards; `droop` is how far
+    their servos turn short of what they aim at, in rad.
     """
 
     angles: Floats
     shears: Floats
-    torque: tuple[float, float]
-    droop: tuple[float, float]
+    torque: tuple[float, ...]
+    droop: tuple[float, ...]
+
+
+class _Body(NamedTuple):
+    """Length, the length of what shears of it, m, and mass, kg."""
+
+    length: float
+    shearing: float
+    mass: float
 
 
 class VslChain:
@@ -40,7 +49,8 @@ class VslChain:
     A flexible link of length L has n hinges of compliance h / EI, h = (L - 2 cap) / n, in the middle of n equal pieces
     of its flexible part, so its first and last body are half a piece and a cap. A body of which the length f is
     flexible yields by s = V f / (shear_0 + p pi R^2) to the shear force V; EI = EI_0 + EI_p p. A rigid link has
-    EI_rigid and does not shear. The springs at J2 and J3 are what yields behind the encoders.
+    EI_rigid and does not shear. The springs at J2 and J3 are what yields behind the encoders. A third link is screwed
+    to link 3: the last body of the one and the first of the other are one body.
 
     With u_k = (l_k + i s_k) exp(i phi_k) in the plane of the arm (real part outwards, imaginary part up), body i ends
     at the sum of u_k, k <= i; its mass is taken at the middle of u_i, with the inertia of an even rod.
@@ -52,16 +62,29 @@ class VslChain:
 
     def __init__(self, params: Params, hinges: int) -> None:
         self._params = params
-        self._links = (params.link_2, params.link_3)
-        both = (params.L_2, params.L_3)
-        bodies = [_bodies(link, L, params.cap, hinges) for link, L in zip(self._links, both, strict=True)]
-        self.elbow = len(bodies[0])
-        """Index of the first body of link 3."""
-        self.lengths = [length for link in bodies for length, _ in link]
-        self.shearing = [shearing for link in bodies for _, shearing in link]
+        self._kinds = params.kinds
+        links = [
+            _bodies(kind, L, params.cap, hinges, params.link_mass * factor)
+            for kind, L, factor in zip(self._kinds, params.lengths, params.mass_factor.tolist(), strict=False)
+        ]
+        self._shearing = [[body.shearing for body in link] for link in links]
+        self._pieces = [(L - 2.0 * params.cap) / hinges for L in params.lengths]
+        self._EI_factor = params.EI_factor.tolist()
+        self._joint = (params.joint_stiffness * params.joint_factor).tolist()
+        bodies = [body for link in links[:2] for body in link]
+        self.joints = [0, len(links[0])][: len(links)]
+        """Indices of the bodies at J2 and, if there is one, J3."""
+        self.sensors = [(n - 1, 1.0) for n in (len(links[0]), len(bodies))][: len(links)]
+        """Where a link's inertial sensor is, at its end: on which body, and where along that, from 0 to 1."""
+        for link in links[2:]:
+            last, first = bodies.pop(), link[0]
+            self.sensors[-1] = len(bodies), last.length / (last.length + first.length)
+            bodies += [_Body(*(a + b for a, b in zip(last, first, strict=True))), *link[1:]]
+            self.sensors.append((len(bodies) - 1, 1.0))
+        self.lengths = [body.length for body in bodies]
+        self.shearing = [body.shearing for body in bodies]
         """Lengths of what shears of each body, in m."""
-        self._pieces = [(L - 2.0 * params.cap) / hinges for L in both]
-        own = [params.link_mass * length / L for link, L in zip(bodies, both, strict=True) for length, _ in link]
+        own = [body.mass for body in bodies]
         self.inertia = np.array(own) * np.square(self.lengths) / 12.0
         """Of each body about its middle, in kg m2."""
         shares, masses = self._points(own)
@@ -74,19 +97,24 @@ class VslChain:
     def __len__(self) -> int:
         return len(self.lengths)
 
-    def springs(self, p: tuple[float, float]) -> Springs:
-        """Return compliances at the pressures p of links 2 and 3, in Pa."""
+    def springs(self, p: Sequence[float]) -> Springs:
+        """Return compliances at the links' pressures p, in Pa."""
         P = self._params
         hinge: list[float] = []
         shear: list[float] = []
-        for link, (first, last) in enumerate(((0, self.elbow), (self.elbow, len(self)))):
-            if self._links[link] is Link.VSL:
-                bending = self._pieces[link] / (P.EI_0 + P.EI_p * p[link])
+        for link, (first, *others) in enumerate(self._shearing):
+            if self._kinds[link] is Link.VSL:
+                bending = self._pieces[link] / ((P.EI_0 + P.EI_p * p[link]) * self._EI_factor[link])
                 give = 1.0 / (P.shear_0 + math.pi * P.R_link**2 * p[link])
             else:
-                bending, give = self._pieces[link] / P.EI_rigid, 0.0
-            hinge += [1.0 / P.joint_stiffness] + [bending] * (last - first - 1)
-            shear += [give * f for f in self.shearing[first:last]]
+                bending, give = self._pieces[link] / (P.EI_rigid * self._EI_factor[link]), 0.0
+            if link < len(self.joints):
+                hinge.append(1.0 / self._joint[link])
+                shear.append(give * first)
+            else:
+                shear[-1] += give * first
+            hinge += [bending] * len(others)
+            shear += [give * f for f in others]
         return Springs(hinge, shear)
 
     def ends(self, pose: Pose) -> Complexes:
@@ -96,7 +124,7 @@ class VslChain:
         return points
 
     def centre_line(self, ends: Complexes) -> Complexes:
-        """Return evenly spaced points along both links, (24,), from the shoulder to the tip."""
+        """Return evenly spaced points along the links, (24,), from the shoulder to the tip."""
         body, along = self._drawn
         return ends[body] + along * (ends[body + 1] - ends[body])
 
@@ -106,27 +134,37 @@ class VslChain:
         return float(x @ (self.coupling + load) @ x)
 
     def _points(self, own: list[float]) -> tuple[Floats, Floats]:
-        """Return the shares of u_k in the places of all masses, (n + 2, n), and those masses, (n + 2,)."""
-        n = len(self)
-        shares = np.tril(np.ones((n + 2, n)), -1)
+        """Return the shares of u_k in the places of all masses, (m, n), and those masses, (m,).
+
+        They are the bodies', that of the servo J3, if there is one, and that of the gripper.
+        """
+        n, servos = len(self), self.joints[1:]
+        shares = np.tril(np.ones((n + len(servos) + 1, n)), -1)
         shares[np.arange(n), np.arange(n)] = 0.5
-        shares[n, self.elbow :] = 0.0
-        return shares, np.array([*own, self._params.servo_mass, self._params.gripper_mass])
+        for row, elbow in enumerate(servos, n):
+            shares[row, elbow:] = 0.0
+        return shares, np.array([*own, *(self._params.servo_mass for _ in servos), self._params.gripper_mass])
 
     def _evenly_spaced(self) -> tuple[NDArray[np.intp], Floats]:
-        """Return on which body, and where along it, from 0 to 1, the points of the centre line are."""
+        """Return on which body, and where along it, from 0 to 1, the points of the centre line are.
+
+        Half of them are before the elbow.
+        """
         starts = np.concatenate(([0.0], np.cumsum(self.lengths)))
-        elbow = float(starts[self.elbow])
-        upper: Floats = np.linspace(0.0, elbow, POINTS_A_LINK, endpoint=False)
-        fore: Floats = np.linspace(elbow, float(starts[-1]), POINTS_A_LINK)
-        s = np.concatenate((upper, fore))
+        tip = float(starts[-1])
+        if len(self.joints) == 1:
+            s: Floats = np.linspace(0.0, tip, 2 * POINTS_A_LINK)
+        else:
+            elbow = float(starts[self.joints[1]])
+            upper: Floats = np.linspace(0.0, elbow, POINTS_A_LINK, endpoint=False)
+            s = np.concatenate((upper, np.linspace(elbow, tip, POINTS_A_LINK)))
         body = np.clip(np.searchsorted(starts, s, side="right") - 1, 0, len(self) - 1)
         return body, (s - starts[body]) / np.array(self.lengths)[body]
 
 
-def _bodies(link: Link, length: float, cap: float, hinges: int) -> list[tuple[float, float]]:
-    """Return lengths of a link's bodies and of what shears of them, in m."""
-    h = (length - 2.0 * cap) / hinges
+def _bodies(kind: Link, L: float, cap: float, hinges: int, mass: float) -> list[_Body]:
+    """Return a link's bodies."""
+    h = (L - 2.0 * cap) / hinges
     lengths = [cap + h / 2.0, *[h] * (hinges - 1), cap + h / 2.0]
     shearing = [h / 2.0, *[h] * (hinges - 1), h / 2.0]
-    return [(l, s if link is Link.VSL else 0.0) for l, s in zip(lengths, shearing, strict=True)]
+    return [_Body(l, s if kind is Link.VSL else 0.0, mass * l / L) for l, s in zip(lengths, shearing, strict=True)]

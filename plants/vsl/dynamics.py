@@ -1,12 +1,12 @@
 """Dynamics of the VSL arm's chain: how it swings, integrated by generalized-alpha."""
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.vsl.chain import Complexes, Pose, VslChain
 from handover.plants.vsl.parameters import Params
 from handover.plants.vsl.statics import VslStatics
@@ -46,6 +46,9 @@ class VslDynamics:
     i exp(i phi_k) for a shear, M = Re(conj(D) C D) + inertia, b = -2 exp(i phi) phi' s' - u phi'^2, A the weights, e
     the deformations of the springs of stiffness k. Turning about J1 at the rate w pulls all masses outwards.
 
+    A level face at height h stops the tip: it pushes up by f = max(0, k_f (h - z) - d_f z'), z the tip's height, which
+    takes from all weights.
+
     A gear of high ratio does not yield to swings: the droop of the servos follows their torques with droop_time,
     droop' = (torque / servo_stiffness - droop) / droop_time, and the offsets are what they aim at less the droop.
 
@@ -66,7 +69,7 @@ class VslDynamics:
         n, m = len(chain), len(chain) + len(sheared)
         self._sheared = sheared
         self._body = np.concatenate((np.arange(n), sheared))  # of each coordinate
-        self._joints = np.array([0, chain.elbow])  # hinges of J2 and J3
+        self._joints = np.array(chain.joints)
         self._B = np.eye(m)
         self._B[np.arange(1, n), np.arange(n - 1)] = -1.0
         self._inertia = np.diag(np.concatenate((chain.inertia, np.zeros(len(sheared)))))
@@ -75,11 +78,13 @@ class VslDynamics:
         self._v: Floats = np.zeros(m)
         self._a: Floats = np.zeros(m)
         self._a_mean = np.zeros(m)
-        self._offset: Floats = np.zeros(2)
+        self._offset: Floats = np.zeros(len(chain.joints))
+        self.force = 0.0
+        """Largest force of the face on the tip during the last step, N."""
         self.pose = self._statics.pose
 
-    def settle(self, theta: tuple[float, float], p: tuple[float, float], load: float) -> None:
-        """Rest at the angles of J2 and J3 that the servos aim at, rad, wherever the arm was before."""
+    def settle(self, theta: Sequence[float], p: Sequence[float], load: float) -> None:
+        """Rest at the angles of the chain's joints that the servos aim at, rad, wherever the arm was before."""
         self._statics.settle(theta, p, load)
         self.pose = self._statics.pose
         self._y = np.concatenate((self.pose.angles, self.pose.shears[self._sheared]))
@@ -89,8 +94,8 @@ class VslDynamics:
     def advance(
         self,
         dt: float,
-        theta: tuple[tuple[float, float], tuple[float, float]],
-        p: tuple[float, float],
+        theta: tuple[Sequence[float], Sequence[float]],
+        p: Sequence[float],
         load: float,
         spin: float,
     ) -> None:
@@ -98,18 +103,19 @@ class VslDynamics:
 
         Args:
             dt: in s.
-            theta: angles of J2 and J3, rad, that the servos aim at first and last; they go evenly between.
-            p: pressures of links 2 and 3, Pa.
+            theta: angles of the chain's joints, rad, that the servos aim at first and last; they go evenly between.
+            p: pressures of the links, Pa.
             load: at the tip, kg.
             spin: rate of J1, rad/s.
         """
         steps = max(1, math.ceil(dt / self._params.substep - 1e-9))
         held = self._held(p, load, spin)
         aims = np.linspace(theta[0], theta[1], steps + 1)
+        self.force = 0.0
         for i in range(steps):
             self._substep(dt / steps, aims[i], aims[i + 1], held)
 
-    def frequencies(self, p: tuple[float, float], load: float) -> Floats:
+    def frequencies(self, p: Sequence[float], load: float) -> Floats:
         """Return the natural frequencies about the pose at hand, without damping, in Hz, the lowest first."""
         held = self._held(p, load, 0.0)
         u, e, D = self._directions(self._y)
@@ -119,16 +125,25 @@ class VslDynamics:
         whiten = np.linalg.inv(np.linalg.cholesky(self._mass(D, held.C_y)))
         return np.sqrt(np.linalg.eigvalsh(whiten @ K @ np.transpose(whiten))) / (2.0 * math.pi)
 
-    def get_state(self) -> bytes:
-        """Return the complete state."""
-        return pack_state((self._y, self._v, self._a, self._a_mean, self._offset, tuple(self.pose)))
+    def acceleration(self, spin: float) -> Complexes:
+        """Return the accelerations of the bodies' ends in the arm's plane, m/s2, after that of the shoulder, (n + 1,).
 
-    def set_state(self, state: bytes) -> None:
+        J1 turns at the rate spin, rad/s.
+        """
+        u, e, _ = self._directions(self._y)
+        a = self._accelerated(u, e, self._v, self._a) - spin * spin * u.real
+        return np.concatenate(([0.0], np.cumsum(a)))
+
+    def snapshot(self) -> tuple[Any, ...]:
+        """Return the complete state, plain data; its arrays are replaced and never written to."""
+        return self._y, self._v, self._a, self._a_mean, self._offset, self.force, tuple(self.pose)
+
+    def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Restore a state of this chain or of one with equal parameters."""
-        self._y, self._v, self._a, self._a_mean, self._offset, pose = unpack_state(state)
+        self._y, self._v, self._a, self._a_mean, self._offset, self.force, pose = snapshot
         self.pose = Pose(*pose)
 
-    def _held(self, p: tuple[float, float], load: float, spin: float) -> _Held:
+    def _held(self, p: Sequence[float], load: float, spin: float) -> _Held:
         hinge, shear = self._chain.springs(p)
         k = 1.0 / np.concatenate((hinge, np.array(shear)[self._sheared]))
         weight: Floats = self._params.gravity * (self._chain.carried + load)
@@ -136,7 +151,7 @@ class VslDynamics:
         return _Held(k, C, C[np.ix_(self._body, self._body)], weight, spin * spin)
 
     def _substep(self, h: float, first: Floats, last: Floats, held: _Held) -> None:
-        """Advance by h, or by halves of it if need be, while the servos' aims go from the first to the last, (2,)."""
+        """Advance by h, or by halves of it if need be, while the servos' aims go from the first to the last."""
         kept = math.exp(-h / self._params.droop_time)
         yielding = (1.0 - kept) / self._params.servo_stiffness
         lag = self._params.damping_time / h
@@ -182,6 +197,7 @@ class VslDynamics:
             if np.abs(dy).max() < _TOLERANCE:
                 self._y, self._v, self._a = y, v, a
                 self._a_mean = a_mean + (1.0 - alpha_f) / (1.0 - alpha_m) * a
+                self.force = max(self.force, self._stopped(u, D, v))
                 return True
         return False
 
@@ -213,15 +229,33 @@ class VslDynamics:
         n, at = len(self._chain), self._sheared
         v, a = rates
         by_v, by_a = by
-        accelerated = 1j * u * a[:n] - u * v[:n] ** 2
-        accelerated[at] += e[at] * (1j * a[n:] - 2.0 * v[at] * v[n:])
-        pull = held.C @ (accelerated - held.spin2 * u.real) + 1j * held.weight
+        accelerated = self._accelerated(u, e, v, a)
+        force = self._stopped(u, D, v)
+        pull = held.C @ (accelerated - held.spin2 * u.real) + 1j * (held.weight - force)
         G = by_a * D - held.spin2 * D.real
         G[:n] += 1j * accelerated - 2.0 * by_v * u * v[:n]
         G[at] -= 2.0 * by_v * e[at] * v[n:]
         G[n:] += 1j * e[at] * (1j * a[at] - v[at] ** 2) - 2.0 * by_v * e[at] * v[at]
         S = held.C_y * np.real(np.conj(D)[:, None] * G) + by_a * self._inertia + self._turning(u, e, pull)
-        return pull, S
+        if force == 0.0:
+            return pull, S
+        P = self._params
+        return pull, S + (P.face_stiffness + P.face_damping * by_v) * np.outer(D.imag, D.imag)
+
+    def _stopped(self, u: Complexes, D: Complexes, v: Floats) -> float:
+        """Return the force of the face on the tip, upwards, N."""
+        P = self._params
+        depth = P.face - P.L_1 - float(np.sum(u.imag))
+        if depth <= 0.0:
+            return 0.0
+        return max(0.0, P.face_stiffness * depth - P.face_damping * float(D.imag @ v))
+
+    def _accelerated(self, u: Complexes, e: Complexes, v: Floats, a: Floats) -> Complexes:
+        """Return u_k'', (n,)."""
+        n, at = len(self._chain), self._sheared
+        accelerated = 1j * u * a[:n] - u * v[:n] ** 2
+        accelerated[at] += e[at] * (1j * a[n:] - 2.0 * v[at] * v[n:])
+        return accelerated
 
     def _turning(self, u: Complexes, e: Complexes, pull: Complexes) -> Floats:
         """Return the derivative in y of the generalised forces of the pull at u_k, as D turns, (m, m)."""
@@ -236,8 +270,7 @@ class VslDynamics:
         n = len(self._chain)
         shears = np.zeros(n)
         shears[self._sheared] = self._y[n:]
-        joints = (float(torque[0]), float(torque[1])), (float(droop[0]), float(droop[1]))
-        self.pose = Pose(np.array(self._y[:n]), shears, *joints)
+        self.pose = Pose(np.array(self._y[:n]), shears, tuple(torque.tolist()), tuple(droop.tolist()))
 
 
 def _weights(radius: float) -> tuple[float, float, float, float]:

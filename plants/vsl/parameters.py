@@ -20,6 +20,8 @@ from handover.cosim.blocks.units import (
     NewtonMetre2PerPascal,
     NewtonMetrePerAmpere,
     NewtonMetrePerRadian,
+    NewtonPerMetre,
+    NewtonSecondPerMetre,
     Number,
     Pascal,
     Radian,
@@ -28,6 +30,7 @@ from handover.cosim.blocks.units import (
 )
 
 TURN = 2.0 * math.pi
+NO_FACE = -10.0
 MAX_PRESSURE = 3.0e5
 """Pa; the published experiments go to 2 bar."""
 
@@ -61,10 +64,18 @@ class Params:
 
     motion: Motion = parameter(Motion.QUASI_STATIC, "whether the arm swings, or is at rest at every instant")
     link_2: Link = parameter(Link.VSL, "what the link from shoulder to elbow is made of")
-    link_3: Link = parameter(Link.VSL, "what the link from elbow to gripper is made of")
+    link_3: Link = parameter(Link.VSL, "what the link behind the elbow is made of")
+    link_4: Link = parameter(Link.VSL, "what the third of three links is made of")
+    links: int = parameter(
+        2,
+        "how many links: two; one, with the gripper in place of the elbow and no J3; or a third, fixed to link 3",
+        minimum=1,
+        maximum=3,
+    )
     L_1: Metre = parameter(0.150, "height of the shoulder J2 above the base", minimum=0.0, maximum=2.0)
     L_2: Metre = parameter(0.225, "length from shoulder to elbow", minimum=0.01, maximum=2.0)
-    L_3: Metre = parameter(0.225, "length from elbow to gripper", minimum=0.01, maximum=2.0)
+    L_3: Metre = parameter(0.225, "length of the link behind the elbow", minimum=0.01, maximum=2.0)
+    L_4: Metre = parameter(0.225, "length of the third of three links", minimum=0.01, maximum=2.0)
     cap: Metre = parameter(0.030, "length of the rigid cap at each end of a link", minimum=0.0, maximum=1.0)
     EI_0: NewtonMetre2 = parameter(0.55, "bending stiffness of a link without pressure", minimum=1e-3, maximum=1e6)
     EI_p: NewtonMetre2PerPascal = parameter(1.05e-5, "what pressure adds to it", minimum=0.0, maximum=1.0)
@@ -74,6 +85,12 @@ class Params:
         150.0, "bending stiffness of a printed link, which does not shear", minimum=1.0, maximum=1e9
     )
     link_mass: Kilogram = parameter(0.140, "mass of a link, evenly spread", minimum=0.0, maximum=10.0)
+    EI_factor: Vector3[Number] = parameter(
+        np.ones(3), "bending stiffness of links 2, 3 and 4 over that of such a link", minimum=1e-3, maximum=1e3
+    )
+    mass_factor: Vector3[Number] = parameter(
+        np.ones(3), "mass of links 2, 3 and 4 over link_mass", minimum=0.0, maximum=1e3
+    )
     servo_mass: Kilogram = parameter(0.125, "mass of the servo J3, at the elbow", minimum=0.0, maximum=10.0)
     gripper_mass: Kilogram = parameter(0.035, "mass of the gripper, at the tip", minimum=0.0, maximum=10.0)
     gravity: MetrePerSecond2 = parameter(9.81, "gravity, along -z of the world", minimum=0.0, maximum=30.0)
@@ -83,12 +100,18 @@ class Params:
     servo_stiffness: NewtonMetrePerRadian = parameter(
         260.0, "torque by the servo's droop, which the encoder sees", minimum=1.0, maximum=1e12
     )
+    joint_factor: Vector2[Number] = parameter(
+        np.ones(2), "stiffness of J2 and J3 over joint_stiffness", minimum=1e-3, maximum=1e3
+    )
     droop_time: Second = parameter(
         0.1, "time constant of the droop of an arm that swings: the gear holds it longer", minimum=1e-3, maximum=10.0
     )
     servo_speed: RadianPerSecond = parameter(4.8, "fastest turn of a joint", minimum=0.01, maximum=100.0)
     kt: NewtonMetrePerAmpere = parameter(1.78, "torque by current of a servo", minimum=1e-3, maximum=100.0)
     gear_friction: NewtonMetre = parameter(0.06, "friction of a gear, in the current", minimum=0.0, maximum=10.0)
+    friction_factor: Vector3[Number] = parameter(
+        np.ones(3), "friction of the gears of J1, J2 and J3 over gear_friction", minimum=0.0, maximum=1e3
+    )
     sliding: Radian = parameter(0.002, "turn that reverses all the friction", minimum=1e-6, maximum=1.0)
     servo_noise: Radian = parameter(
         math.radians(0.06), "standard deviation of an encoder's reading", minimum=0.0, maximum=1.0
@@ -98,6 +121,21 @@ class Params:
         0.0005, "standard deviation of the tracker's reading, each axis", minimum=0.0, maximum=1.0
     )
     pressure_noise: Pascal = parameter(200.0, "standard deviation of a transducer's reading", minimum=0.0, maximum=1e5)
+    imu_noise: MetrePerSecond2 = parameter(
+        0.03, "standard deviation of an accelerometer's reading, each axis", minimum=0.0, maximum=100.0
+    )
+    base_step: Radian = parameter(
+        0.0, "step of the motor J1, with its microsteps; 0: a servo with an encoder", minimum=0.0, maximum=0.5
+    )
+    encoder_step: Radian = parameter(
+        0.0, "what a servo's encoder resolves, and its commands; 0: anything", minimum=0.0, maximum=0.5
+    )
+    transducer_step: Pascal = parameter(
+        0.0, "what the converter of the transducers' signals resolves; 0: anything", minimum=0.0, maximum=1e5
+    )
+    regulator_step: Pascal = parameter(
+        0.0, "what the signal to the pressure regulators resolves; 0: anything", minimum=0.0, maximum=1e5
+    )
     pressure_time: Second = parameter(
         0.25, "time constant of regulator and hose, valve open", minimum=1e-3, maximum=100.0
     )
@@ -110,8 +148,23 @@ class Params:
     p_0: Vector2[Pascal] = parameter(
         np.array([1.0e5, 1.0e5]), "pressures of links 2 and 3 at the start", minimum=0.0, maximum=MAX_PRESSURE
     )
+    p_4_0: Pascal = parameter(
+        1.0e5, "pressure of the third of three links at the start", minimum=0.0, maximum=MAX_PRESSURE
+    )
     hinges: int = parameter(6, "hinges of a flexible link, quasi-statically", minimum=1, maximum=100)
     hinges_dynamic: int = parameter(2, "hinges of a flexible link that swings", minimum=1, maximum=12)
+    face: Metre = parameter(
+        NO_FACE,
+        "height of a level face that stops the gripper of an arm that swings; -10: none",
+        minimum=NO_FACE,
+        maximum=10.0,
+    )
+    face_stiffness: NewtonPerMetre = parameter(
+        1000.0, "stiffness of face and cup against each other", minimum=1.0, maximum=1e5
+    )
+    face_damping: NewtonSecondPerMetre = parameter(
+        3.0, "damping of face and cup against each other", minimum=0.0, maximum=1e4
+    )
     damping_time: Second = parameter(
         0.005, "damping by stiffness of all springs of an arm that swings", minimum=0.0, maximum=1.0
     )
@@ -121,6 +174,16 @@ class Params:
     )
     seed: int = parameter(0, "seed of the random numbers", minimum=0)
 
+    @property
+    def kinds(self) -> tuple[Link, ...]:
+        """What the links are made of, from the shoulder outwards."""
+        return (self.link_2, self.link_3, self.link_4)[: self.links]
+
+    @property
+    def lengths(self) -> tuple[float, ...]:
+        """Lengths of the links, m."""
+        return (self.L_2, self.L_3, self.L_4)[: self.links]
+
     def check(self) -> None:
         """Raise InvalidVslArmParameters, with all faults, for values out of range or that contradict each other."""
         faults = parameter_faults(self) or self._contradictions()
@@ -129,7 +192,7 @@ class Params:
 
     def _contradictions(self) -> list[str]:
         faults: list[str] = []
-        for name, length in (("L_2", self.L_2), ("L_3", self.L_3)):
+        for name, length in zip(("L_2", "L_3", "L_4"), self.lengths, strict=False):
             if not 2.0 * self.cap < length:
                 faults.append(
                     f"two caps of {self.cap:g} m leave nothing flexible of {name} {length:g} m: cap must be less than "
@@ -140,6 +203,11 @@ class Params:
                 f"valve_tolerance {self.valve_tolerance:g} Pa must be less than valve_band {self.valve_band:g} Pa, or "
                 "the valve chatters"
             )
-        if self.motion is Motion.DYNAMIC and not (self.link_mass > 0.0 and self.gripper_mass > 0.0):
-            faults.append("link_mass and gripper_mass must be greater than 0 for an arm that swings")
+        if self.motion is Motion.QUASI_STATIC and self.face > NO_FACE:
+            faults.append(
+                f"a face at {self.face:g} m does not stop an arm that is at rest at every instant: motion DYNAMIC"
+            )
+        masses = (self.link_mass, self.gripper_mass, *self.mass_factor[: self.links])
+        if self.motion is Motion.DYNAMIC and not min(masses) > 0.0:
+            faults.append("link_mass, mass_factor and gripper_mass must be greater than 0 for an arm that swings")
         return faults

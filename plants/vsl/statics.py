@@ -1,11 +1,11 @@
 """Statics of the VSL arm's chain: where it rests under its weight, against bending, shear and joints."""
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.plants.vsl.chain import Pose, VslChain
 
 _TOLERANCE = 1e-12
@@ -14,17 +14,24 @@ _MAX_NEWTON_STEP = 0.5  # rad: a Newton step that is longer is cut
 _MAX_SHARE, _MIN_SHARE = 1.0 / 4.0, 1.0 / 1024.0  # steps, as shares of gravity, in which it is increased
 
 
+_LINKS = {1: "link 2", 2: "links 2 and 3", 3: "links 2, 3 and 4"}
+
+
 class NoEquilibrium(RuntimeError):
     """The arm buckles: there is no stable rest that its unloaded shape leads to."""
 
     is_refusal = True
 
-    def __init__(self, theta: tuple[float, float], p: tuple[float, float], load: float) -> None:
+    def __init__(self, theta: Sequence[float], p: Sequence[float], load: float) -> None:
         super().__init__(
-            f"VslArm: no stable rest at joint angles ({theta[0]:.4g}, {theta[1]:.4g}) rad with a load of {load:.4g} kg "
-            f"and {p[0]:.4g} and {p[1]:.4g} Pa in links 2 and 3: the arm buckles; more pressure or less load holds it"
+            f"VslArm: no stable rest at joint angles ({_listed(theta, ', ')}) rad with a load of {load:.4g} kg and "
+            f"{_listed(p, ' and ')} Pa in {_LINKS[len(p)]}: the arm buckles; more pressure or less load holds it"
         )
         self.theta, self.p, self.load = theta, p, load
+
+
+def _listed(numbers: Sequence[float], between: str) -> str:
+    return between.join(f"{x:.4g}" for x in numbers)
 
 
 class _Body(NamedTuple):
@@ -46,9 +53,10 @@ class VslStatics:
         hinge:   tau_i = tau_i+1 - A_i (l_i cos phi_i - s_i sin phi_i),   tau_n = 0
         inwards: phi_i-1 = phi_i - b_i tau_i - offset_i
 
-    with offsets theta_2 at the shoulder, theta_3 at the elbow. The angle of the tip's body therefore gives all others,
-    down to the ground's, which must be 0. Its derivative is computed with it, and is positive at every hinge if the
-    rest is stable. The search begins at the last rest; if it does not converge, gravity is increased from 0 in steps.
+    with offsets theta_2 at the shoulder, theta_3 at the elbow, if there is one. The angle of the tip's body therefore
+    gives all others, down to the ground's, which must be 0. Its derivative is computed with it, and is positive at
+    every hinge if the rest is stable. The search begins at the last rest; if it does not converge, gravity is increased
+    from 0 in steps.
 
     Args:
         chain: whose rest it is.
@@ -65,11 +73,14 @@ class VslStatics:
         self._droop = droop
         self._weight = [gravity * m for m in chain.carried.tolist()]
         self._tip = 0.0
-        self.pose = Pose(np.zeros(len(chain)), np.zeros(len(chain)), (0.0, 0.0), (0.0, 0.0))
+        self.force = 0.0
+        """Of a face on the tip: none stops an arm that is at rest at every instant."""
+        none = (0.0,) * len(chain.joints)
+        self.pose = Pose(np.zeros(len(chain)), np.zeros(len(chain)), none, none)
 
-    def settle(self, theta: tuple[float, float], p: tuple[float, float], load: float) -> None:
-        """Rest at the angles of J2 and J3 that the servos aim at, rad, wherever the arm was before."""
-        tip, reached, share = theta[0] + theta[1], 0.0, _MAX_SHARE
+    def settle(self, theta: Sequence[float], p: Sequence[float], load: float) -> None:
+        """Rest at the angles of the chain's joints that the servos aim at, rad, wherever the arm was before."""
+        tip, reached, share = sum(theta), 0.0, _MAX_SHARE
         while reached < 1.0:
             bodies = self._bodies(theta, p, load, min(reached + share, 1.0))
             found = _newton(bodies, tip)
@@ -83,34 +94,37 @@ class VslStatics:
     def advance(
         self,
         dt: float,  # noqa: ARG002
-        theta: tuple[tuple[float, float], tuple[float, float]],
-        p: tuple[float, float],
+        theta: tuple[Sequence[float], Sequence[float]],
+        p: Sequence[float],
         load: float,
         spin: float,  # noqa: ARG002
     ) -> None:
-        """Rest at the second of the two pairs of angles; time, the first pair and the turn of J1 do not matter."""
+        """Rest at the last of the angles; time, the first angles and the turn of J1 do not matter."""
         bodies = self._bodies(theta[1], p, load, 1.0)
         tip = _newton(bodies, self._tip)
         if tip is None or not self._rest(bodies, tip):
             self.settle(theta[1], p, load)
 
-    def get_state(self) -> bytes:
-        """Return the complete state."""
-        return pack_state((self._tip, tuple(self.pose)))
+    def acceleration(self, spin: float) -> None:
+        """Return None: at rest at every instant."""
 
-    def set_state(self, state: bytes) -> None:
+    def snapshot(self) -> tuple[Any, ...]:
+        """Return the complete state, plain data; its arrays are replaced and never written to."""
+        return self._tip, tuple(self.pose)
+
+    def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Restore a state of this chain or of one with equal parameters."""
-        self._tip, pose = unpack_state(state)
+        self._tip, pose = snapshot
         self.pose = Pose(*pose)
 
-    def _bodies(self, theta: tuple[float, float], p: tuple[float, float], load: float, share: float) -> list[_Body]:
+    def _bodies(self, theta: Sequence[float], p: Sequence[float], load: float, share: float) -> list[_Body]:
         """Return all bodies from the tip inwards, at a share of gravity."""
         chain = self._chain
         hinge, shear = chain.springs(p)
         offset = [0.0] * len(hinge)
-        offset[0], offset[chain.elbow] = theta
-        hinge[0] += self._droop
-        hinge[chain.elbow] += self._droop
+        for joint, angle in zip(chain.joints, theta, strict=True):
+            offset[joint] = angle
+            hinge[joint] += self._droop
         weight = [share * (w + self._gravity * load) for w in self._weight]
         return [_Body(*body) for body in zip(chain.lengths, shear, weight, hinge, offset, strict=True)][::-1]
 
@@ -133,9 +147,9 @@ class VslStatics:
             if dphi <= 0.0:
                 return False
         self._tip = tip
-        tau_2, tau_3 = -taus[-1], -taus[-1 - self._chain.elbow]
-        droop = (self._droop * tau_2, self._droop * tau_3)
-        self.pose = Pose(np.array(angles[::-1]), np.array(shears[::-1]), (tau_2, tau_3), droop)
+        torque = tuple(-taus[-1 - joint] for joint in self._chain.joints)
+        droop = tuple(self._droop * tau for tau in torque)
+        self.pose = Pose(np.array(angles[::-1]), np.array(shears[::-1]), torque, droop)
         return True
 
 

@@ -49,11 +49,17 @@ Exit status
 @click.argument("experiment", required=False, metavar="[EXPERIMENT]")
 @click.option("--quick", is_flag=True, help="A fraction of the runs; most claims need all.")
 @click.option("--seed", type=WholeNumber(min=0), help="Seed of the campaign.  [default: the experiment's]")
+@click.option(
+    "--model",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="vsl-2: file of a trained network of the paper's size, without which that is left out.",
+)
 @campaign_options
 def paper(
     experiment: str | None,
     quick: bool,
     seed: int | None,
+    model: Path | None,
     out: Path | None,
     no_report: bool,
     workers: int | None,
@@ -70,6 +76,11 @@ def paper(
     if experiment not in EXPERIMENTS:
         raise UsageError(f"no experiment {experiment!r}: {nearest(experiment, EXPERIMENTS)}")
     published = EXPERIMENTS[experiment]()
+    if model is not None:
+        try:
+            published.take_model(model.absolute())
+        except ValueError as e:
+            raise UsageError(f"--model: {e}") from e
     plan = published.plan(quick)
     plan = plan if seed is None else replace(plan, seed=seed)
     finish = _Finish(published, report=not no_report)

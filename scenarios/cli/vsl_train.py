@@ -3,27 +3,49 @@
 import os
 import sys
 import tempfile
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 
+from handover.controllers.vsl.fit_network import EPOCHS, NoPyTorch, torch_or_refusal
 from handover.controllers.vsl.hybrid_kinematics import Params
-from handover.controllers.vsl.kinematics import Elbow, VslKinematics
-from handover.cosim.exceptions import CosimError, UnitFailure
+from handover.controllers.vsl.kinematics import Elbow, Unreachable, VslKinematics
+from handover.controllers.vsl.learned_model import ForwardInput, Learned, VslModel
+from handover.controllers.vsl.model_text import InvalidModel, read_model
+from handover.cosim.blocks.start_values import fault_of
+from handover.cosim.blocks.variable import Kind
+from handover.cosim.exceptions import CosimError, UnitFailure, nearest
 from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import cached
 from handover.fmus.compile import CompilationError, UnknownPlatform
 from handover.scenarios.cli.options import WholeNumber
-from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.errors import UsageError, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import progress_bar
-from handover.scenarios.vsl.training import MIN_POINTS, Errors, NothingToLearn, VslTraining, file_text
+from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
+from handover.scenarios.vsl.learning_curve import curve_table, draw_curve, learning_curve
+from handover.scenarios.vsl.model_file import content_key, file_text
+from handover.scenarios.vsl.training import (
+    MIN_POINTS,
+    Errors,
+    NothingToLearn,
+    Progress,
+    VslTraining,
+)
+from handover.scenarios.vsl.training_data import Measured, describe_arm
 
 _PATH = click.Path(path_type=Path)
 
+_MIN_ADAPTATION = 20
+"""Number of points below which the eleven weights of an adaptation are not worth fitting (assumed)."""
+
 _ELBOW = click.Choice([e.name.lower() for e in Elbow], case_sensitive=False)
+_LEARNED = click.Choice([e.name.lower() for e in Learned], case_sensitive=False)
+_FORWARD = click.Choice([e.value for e in ForwardInput], case_sensitive=False)
 
 
 class _ArmFailed(click.ClickException):
@@ -33,48 +55,233 @@ class _ArmFailed(click.ClickException):
 
 
 @click.command("vsl-train", context_settings={"show_default": True})
-@click.option("--points", type=WholeNumber(min=MIN_POINTS, max=1_000_000), default=1500, help="Points to measure.")
+@click.option("--points", type=WholeNumber(min=_MIN_ADAPTATION, max=1_000_000), default=1500, help="Points to measure.")
+@click.option(
+    "--walk", is_flag=True, help="From point to point vary pressures, angles or load alone, as the paper does."
+)
 @click.option("--seed", type=WholeNumber(min=0), default=0, help="Seed of all random numbers.")
 @click.option("--elbow", type=_ELBOW, default="up", help="Which way the elbow points.")
 @click.option("--plant", type=_PATH, help="FMU of the arm [default: VslArm, built from its sources].")
+@click.option("--arm", multiple=True, metavar="NAME=VALUE", help="Parameter of the arm, as of one that differs.")
+@click.option("--learned", type=_LEARNED, default="cubic", help="What corrects rigid kinematics.")
+@click.option(
+    "--forward-input", type=_FORWARD, default="q", help="What eq. (10) takes: angles, or X = f(q) as printed."
+)
+@click.option("--window", is_flag=True, help="Learn the friction of the gears by the direction of motion, too.")
+@click.option("--epochs", type=WholeNumber(min=1, max=100_000), default=EPOCHS, help="Passes of a published network.")
+@click.option("--data", type=_PATH, help="Train from the points of this Parquet file in place of measuring.")
+@click.option("--save-data", type=_PATH, help="Parquet file for the measured points.")
+@click.option("--curve", type=_PATH, help="PNG file for the errors by number of points; an SVG beside it; and a table.")
+@click.option("--adapt", type=_PATH, help="Adapt this model to an arm that differs, by few points.")
 @click.option(
     "--out", type=_PATH, default=Path("vsl_model.json"), help="File for the model; one of that name is replaced."
 )
-def vsl_train(points: int, seed: int, elbow: str, plant: Path | None, out: Path) -> None:
+@click.pass_context
+def vsl_train(context: click.Context, **given: Any) -> None:
     """Train the kinematics of the arm with variable-stiffness links on the arm's own FMU.
 
     Measures points at random pressures, joint angles and loads, fits what rigid kinematics leave, and prints the errors
-    of points that were set aside. The model is a parameter of HybridKinematics: `-p model=FILE` of vsl_hybrid. An --out
-    that ends in .py gets the form of controllers/vsl/default_model.py.
+    of points that were set aside. The model is a parameter of HybridKinematics: `-p model=FILE` of vsl_hybrid, with
+    -p learned and -p window as it was trained. An --out that ends in .py gets the form of
+    controllers/vsl/default_model.py.
 
-    Ctrl-C aborts; the file is written at the end, whole or not at all.
+    The published network is trained by PyTorch: `pip install handover-cosim[train]`.
+
+    Ctrl-C aborts; each file is written at the end, whole or not at all.
     """
-    with Interruption() as interruption, _one_line_errors(interruption):
-        _check_file(out)
-        arm = Params(elbow=Elbow[elbow.upper()])
-        kinematics = VslKinematics(arm.L_1, arm.L_2, arm.L_3, arm.elbow)
-        training = VslTraining(fmu=plant or _built(), kinematics=kinematics, points=points, seed=seed)
+    typed = {name for name in given if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT}
+    o = _Options(**given)
+    with Interruption() as interruption, _one_line_errors(interruption), _one_thread():
+        o.check(typed)
+        if o.curve:
+            require_extra("reports", "--curve")
         with progress_bar(sys.stderr) as progress:
-            model, errors = training.train(progress)
-        _write(out, file_text(model, out))
-    counts = model.provenance["points"]
-    click.echo(
-        f"{counts['measured']} points measured; {counts['training']} to train on, {counts['validation']} to choose the "
-        f"penalties by, {counts['test']} to test"
-    )
-    for line in _table(errors):
+            lines = _adapt(o, progress) if o.adapt else _train(o, progress)
+    for line in lines:
         click.echo(line)
-    click.echo(str(out))
+    click.echo(str(o.out))
 
 
-def _table(errors: Errors) -> Generator[str, None, None]:
-    yield f"{'mean error of the test points, mm':44}{'model-based':>12}{'hybrid':>9}{'ratio':>8}"
-    rows = (
-        ("forward: tip from the encoders' angles", errors.forward_model_based, errors.forward_hybrid),
-        ("inverse: command for a measured tip", errors.inverse_model_based, errors.inverse_hybrid),
+@dataclass(frozen=True, kw_only=True)
+class _Options:
+    """What was typed."""
+
+    points: int
+    walk: bool
+    seed: int
+    elbow: str
+    plant: Path | None
+    arm: Sequence[str]
+    learned: str
+    forward_input: str
+    window: bool
+    epochs: int
+    data: Path | None
+    save_data: Path | None
+    curve: Path | None
+    adapt: Path | None
+    out: Path
+
+    def check(self, typed: set[str]) -> None:
+        """Raise UsageError for files that could not be written, and for options that contradict each other."""
+        _check_file("--out", self.out, (".json", ".py"), "or in .py for the module form")
+        if self.save_data:
+            _check_file("--save-data", self.save_data, (".parquet",))
+        if self.curve:
+            _check_file("--curve", self.curve, (".png",))
+        if self.adapt and (idle := typed & {"learned", "forward_input", "window", "epochs", "curve", "elbow"}):
+            raise UsageError(f"{_names(idle)}: with --adapt it is the model's")
+        if self.data and (idle := typed & {"points", "walk", "seed", "arm", "save_data"}):
+            raise UsageError(f"{_names(idle)}: with --data it is the file's")
+        if self.adapt is None and self.data is None and self.points < MIN_POINTS:
+            raise UsageError(f"--points {self.points}: {self.points} is not in the range x>={MIN_POINTS}")
+        kind = Learned[self.learned.upper()]
+        if "epochs" in typed and kind is not Learned.PUBLISHED:
+            raise UsageError("--epochs: of the published network alone")
+        if kind is Learned.PHYSICS and self.forward_input != "q":
+            raise UsageError("--forward-input X: the beam of --learned physics begins with the joints' angles")
+        if kind is Learned.PUBLISHED and self.adapt is None:
+            torch_or_refusal()
+
+    @property
+    def kinematics(self) -> VslKinematics:
+        """Rigid links as HybridKinematics has them."""
+        p = Params(elbow=Elbow[self.elbow.upper()])
+        return VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
+
+    def training(self, kinematics: VslKinematics) -> VslTraining:
+        """Return the training on the arm's FMU."""
+        fmu = self.plant or _built()
+        return VslTraining(
+            fmu=fmu,
+            kinematics=kinematics,
+            points=self.points,
+            seed=self.seed,
+            learned=Learned[self.learned.upper()],
+            forward_input=ForwardInput(self.forward_input),
+            window=self.window,
+            walk=self.walk,
+            arm=_arm_values(fmu, self.arm),
+            epochs=self.epochs,
+        )
+
+    def measured(self, training: VslTraining, progress: Progress) -> Measured:
+        """Return points from the file, or as the arm measures them, which are then saved if wanted."""
+        if self.data:
+            return read_data(self.data, content_key(training.fmu), training.kinematics)
+        return training.measure(progress)
+
+    def save(self, measured: Measured, model: VslModel) -> None:
+        """Write what is to be written of points and model."""
+        if self.save_data:
+            try:
+                write_data(self.save_data, measured)
+            except OSError as e:
+                raise UsageError(f"--save-data {self.save_data}: {e.strerror or e}") from e
+        _write(self.out, file_text(model, self.out))
+
+
+def _train(o: _Options, progress: Progress) -> list[str]:
+    """Train, write, and return what is to be printed."""
+    training = o.training(o.kinematics)
+    measured = o.measured(training, progress)
+    model, errors = training.learn(measured, progress)
+    lines = list(_summary(model, errors))
+    if o.curve:
+        points = learning_curve(training, measured, progress)
+        draw_curve(points, o.curve.with_suffix(""))
+        lines += [*curve_table(points), str(o.curve)]
+    o.save(measured, model)
+    return lines
+
+
+def _adapt(o: _Options, progress: Progress) -> list[str]:
+    """Adapt a model, write, and return what is to be printed."""
+    assert o.adapt is not None
+    base = read_model(o.adapt)
+    training = o.training(base.kinematics).like(base)
+    measured = o.measured(training, progress)
+    if measured.usable < _MIN_ADAPTATION:
+        raise UsageError(f"{measured.usable} points with a tip within reach are too few to adapt to: {_MIN_ADAPTATION}")
+    model, before, errors = training.adapt(base, measured)
+    o.save(measured, model)
+    return [
+        f"{len(measured.points)} points measured; errors of the adapted model are of points that it did not see",
+        f"{'mean error, mm':44}{'model-based':>12}{'before':>9}{'adapted':>9}",
+        *(
+            f"{heading:44}{rigid * 1000:12.2f}{was * 1000:9.2f}{now * 1000:9.2f}"
+            for heading, rigid, was, now in (
+                (_FORWARD_ROW, errors.forward_model_based, before.forward_hybrid, errors.forward_hybrid),
+                (_INVERSE_ROW, errors.inverse_model_based, before.inverse_hybrid, errors.inverse_hybrid),
+            )
+        ),
+    ]
+
+
+_FORWARD_ROW, _INVERSE_ROW = "forward: tip from the encoders' angles", "inverse: command for a measured tip"
+
+
+def _summary(model: VslModel, errors: Errors) -> Generator[str, None, None]:
+    counts = model.provenance["points"]
+    chosen = "to choose by" if model.kind is not Learned.CUBIC else "to choose the penalties by"
+    yield (
+        f"{counts['measured']} points measured; {counts['training']} to train on, {counts['validation']} {chosen}, "
+        f"{counts['test']} to test"
     )
+    if any(model.friction):
+        yield f"currents by friction of joints 2 and 3: {model.friction[0]:.4f}, {model.friction[1]:.4f} A"
+    yield f"{'mean error of the test points, mm':44}{'model-based':>12}{'hybrid':>9}{'ratio':>8}"
+    rows = [
+        (_FORWARD_ROW, errors.forward_model_based, errors.forward_hybrid),
+        (_INVERSE_ROW, errors.inverse_model_based, errors.inverse_hybrid),
+    ]
+    if errors.forward_other_input is not None:
+        other = "X = f(q)" if model.forward_input is ForwardInput.Q else "q"
+        this = "q" if model.forward_input is ForwardInput.Q else "X = f(q)"
+        rows.insert(1, (f"  from {other} in place of {this}", errors.forward_model_based, errors.forward_other_input))
     for heading, rigid, hybrid in rows:
         yield f"{heading:44}{rigid * 1000:12.2f}{hybrid * 1000:9.2f}{rigid / hybrid:8.1f}"
+
+
+def _arm_values(fmu: Path, given: Sequence[str]) -> dict[str, Any]:
+    """Return the arm's parameters from their texts.
+
+    Raises:
+        UsageError: the arm has no such parameter, or a value is out of its range.
+    """
+    values: dict[str, Any] = {}
+    if not given:
+        return values
+    parameters = describe_arm(fmu).parameters
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise UsageError(f"--arm {text!r} is not of the form NAME=VALUE")
+        if name not in parameters:
+            raise UsageError(f"--arm {text}: the arm has no parameter {name!r}; {nearest(name, parameters)}")
+        port = parameters[name]
+        try:
+            number = float(value) if port.kind in (Kind.REAL, Kind.INTEGER) and not port.shape else None
+        except ValueError as e:
+            raise UsageError(f"--arm {text}: {value!r} is not a number") from e
+        whole = number is not None and port.kind is Kind.INTEGER and number.is_integer()
+        values[name] = value if number is None else int(number) if whole else number
+        if fault := fault_of(port, values[name]):
+            raise UsageError(f"--arm {text}: {fault}")
+    return values
+
+
+def _names(options: set[str]) -> str:
+    return ", ".join(f"--{name.replace('_', '-')}" for name in sorted(options))
+
+
+@contextmanager
+def _one_thread() -> Generator[None, None, None]:
+    """Keep linear algebra on one thread: of matrices this small, several take longer, and round otherwise."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
+        yield
 
 
 def _built() -> Path:
@@ -84,19 +291,19 @@ def _built() -> Path:
         raise UsageError(f"the folder of built units cannot be used (HANDOVER_CACHE): {e}") from e
 
 
-def _check_file(out: Path) -> None:
+def _check_file(option: str, out: Path, suffixes: tuple[str, ...], more: str = "") -> None:
     folder = out.absolute().parent
     longest = 240  # of the 255 bytes of a file's name; the unfinished file's name is longer
-    if out.suffix not in (".json", ".py"):
-        raise UsageError(f"--out {out}: a name that ends in .json, or in .py for the module form")
+    if out.suffix not in suffixes:
+        raise UsageError(f"{option} {out}: a name that ends in {suffixes[0]}{', ' + more if more else ''}")
     if len(os.fsencode(out.name)) > longest:
-        raise UsageError(f"--out {out}: the name is longer than {longest} bytes")
+        raise UsageError(f"{option} {out}: the name is longer than {longest} bytes")
     if out.is_dir():
-        raise UsageError(f"--out {out}: there is a folder of that name")
+        raise UsageError(f"{option} {out}: there is a folder of that name")
     if not folder.is_dir():
-        raise UsageError(f"--out {out}: there is no folder {folder}")
+        raise UsageError(f"{option} {out}: there is no folder {folder}")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise UsageError(f"--out {out}: no permission to write to {folder}")
+        raise UsageError(f"{option} {out}: no permission to write to {folder}")
 
 
 def _write(out: Path, text: str) -> None:
@@ -122,7 +329,9 @@ def _one_line_errors(interruption: Interruption) -> Generator[None, None, None]:
     except UnitFailure as e:
         interruption.check()  # a unit may have taken Ctrl-C for a failure of its own
         raise _ArmFailed(e.cause) from e
-    except (CosimError, NotCompiled, NothingToLearn, UnknownPlatform) as e:
+    except Unreachable as e:
+        raise UsageError(f"a measured tip is where no rigid arm could be: {e}") from e
+    except (CosimError, InvalidData, InvalidModel, NoPyTorch, NotCompiled, NothingToLearn, UnknownPlatform) as e:
         interruption.check()
         raise UsageError(str(e)) from e
     except CompilationError as e:

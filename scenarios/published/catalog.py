@@ -22,6 +22,8 @@ from handover.scenarios.published.ir_grasp.ir_limits import IrLimits
 from handover.scenarios.published.ir_grasp.ir_sensor import IrSensorCurve
 from handover.scenarios.published.ir_grasp.ir_table import IrTable
 from handover.scenarios.published.published_experiment import PublishedExperiment
+from handover.scenarios.published.vsl.vsl_1 import Vsl1
+from handover.scenarios.published.vsl.vsl_2 import Vsl2
 
 _ALL: tuple[type[PublishedExperiment], ...] = (
     FlyerApproaches,
@@ -43,6 +45,8 @@ _ALL: tuple[type[PublishedExperiment], ...] = (
     IrLimits,
     IrSensorCurve,
     IrTable,
+    Vsl1,
+    Vsl2,
 )
 
 EXPERIMENTS: Mapping[str, type[PublishedExperiment]] = {e.name: e for e in _ALL}

@@ -134,6 +134,14 @@ class PublishedExperiment(abc.ABC):
     """What was tried, in a line, with its place in the paper."""
     scenario: ClassVar[str]
 
+    def take_model(self, file: Path) -> None:  # noqa: ARG002
+        """Let the plan have the file of a trained model.
+
+        Raises:
+            ValueError: with what is wrong with the model, or that it has no use for one.
+        """
+        raise ValueError(f"{self.name} has no use for a trained model")
+
     @abc.abstractmethod
     def plan(self, quick: bool) -> CampaignPlan:
         """Return the runs that it needs, with its usual seed; if `quick`, a fraction of them."""

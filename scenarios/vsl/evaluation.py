@@ -12,6 +12,7 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
+from handover.scenarios.vsl.arms import arm_of
 from handover.scenarios.vsl.parameters import Parameters
 
 
@@ -133,7 +134,7 @@ class PathEvaluator(Evaluator):
 
     def outcome(self) -> Outcome:
         """Return whether the path was completed within the tolerance, and the errors along it."""
-        metrics = self._metrics() if self.points else {}
+        metrics = {**(self._metrics() if self.points else {}), **arm_of(self.parameters).metrics}
         within = "mean_error" in metrics and metrics["mean_error"].value <= self.parameters.tolerance
         return Outcome(success=self.over and within, reason=self._reason(metrics), metrics=metrics)
 

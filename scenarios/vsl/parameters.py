@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.controllers.vsl.kinematics import format_point
+from handover.controllers.vsl.learned_model import Learned
 from handover.controllers.vsl.paths import segments_of
 from handover.controllers.vsl.trajectory_planner import Elbow, Path
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
-from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
+from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Number, Pascal, Second
 from handover.plants.vsl.parameters import MAX_PRESSURE, Link, Motion
 
 
@@ -40,6 +41,25 @@ class Parameters:
     x_g: Vector3[Metre] = parameter(
         np.array([0.40, 0.0, 0.15]), "end of a custom path in W, z at least 0", minimum=-1.0, maximum=1.0
     )
+    EI_factor: Number = parameter(
+        1.0, "bending stiffness of both links over that of the arm that was trained on", minimum=0.1, maximum=10.0
+    )
+    mass_factor: Number = parameter(1.0, "mass of both links likewise", minimum=0.0, maximum=10.0)
+    friction_factor: Number = parameter(1.0, "friction of all gears likewise", minimum=0.0, maximum=100.0)
+    joint_factor: Number = parameter(
+        1.0, "stiffness of J2 and J3 behind their encoders likewise", minimum=0.01, maximum=1e3
+    )
+    arm_scatter: Number = parameter(
+        0.0,
+        "relative standard deviation by which each link's stiffness and mass, each gear's friction and each joint's "
+        "stiffness differ besides",
+        minimum=0.0,
+        maximum=0.5,
+    )
+    length_scatter: Metre = parameter(
+        0.0, "standard deviation by which the length of each link differs", minimum=0.0, maximum=0.01
+    )
+    arm_seed: int = parameter(0, "which arm of those that scatter; apart from the run's seed", minimum=0)
     tolerance: Metre = parameter(
         0.06, "largest mean error of the tip for which the run counts as a success", minimum=0.0, maximum=1.0
     )
@@ -87,4 +107,10 @@ class HybridParameters(Parameters):
     tolerance: Metre = parameter(
         0.005, "largest mean error of the tip for which the run counts as a success", minimum=0.0, maximum=1.0
     )
+    learned: Learned = parameter(
+        Learned.CUBIC, "what corrects: polynomials, a small network, the paper's, which needs a model, or a beam"
+    )
     model: str = parameter("", "file of a trained model; empty: the one that ships")
+    window: bool = parameter(False, "whether the direction of motion tells the gears' friction from the load")
+    closed_loop: bool = parameter(False, "whether the tracker, too, tells the controller where the tip is")
+    swing: bool = parameter(False, "whether joints are turned against swings that changes of speed excite")

@@ -18,6 +18,7 @@ from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
+from handover.scenarios.vsl.arms import arm_of
 from handover.scenarios.vsl.evaluation import PathEvaluator
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 from handover.scenarios.vsl.places import PLACES
@@ -95,6 +96,7 @@ class PathExperiment(Experiment[PathEvaluator]):
             load=p.load,
             q_0=p.q_0,
             seed=arm_seed,
+            **arm_of(p).settings,
         )
         for name in ("q_ref", "qd_ref"):
             s.connect(getattr(planner.y, name), getattr(kinematics.u, name))
@@ -154,5 +156,19 @@ class VslHybrid(PathExperiment):
     hybrid: ClassVar[bool] = True
 
     def kinematics(self, parameters: HybridParameters) -> dict[str, Any]:
-        """Return the trained model's file, absolute, since a unit may run in another folder."""
-        return {"model": str(Path(parameters.model).absolute()) if parameters.model else ""}
+        """Return what corrects; the trained model's file is absolute, since a unit may run in another folder."""
+        p = parameters
+        return {
+            "learned": p.learned.name,
+            "model": str(Path(p.model).absolute()) if p.model else "",
+            "window": p.window,
+            "closed_loop": p.closed_loop,
+            "swing": p.swing,
+        }
+
+    def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:
+        """Wire as the other experiment does, and the tracker to the kinematics if they close the loop."""
+        s = super().build(parameters, seed, fmu)
+        if parameters.closed_loop:
+            s.connect(s.units["arm"].y.p_WG_meas, s.units["kinematics"].u.p_WG_meas)
+        return s

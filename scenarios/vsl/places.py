@@ -33,7 +33,8 @@ PLACES = {
             "outside": "its share of the path is a metric",
             "method": "the scenario's",
             "elbow": "the scenario's parameter",
-            "model": "the scenario's parameter",
+            **dict.fromkeys(("learned", "model", "window", "closed_loop", "swing"), "the scenario's parameter"),
+            "p_WG_meas": "in W; wired where the loop is closed",
         },
         remarks=(_WORLD,),
     ),
@@ -50,6 +51,10 @@ PLACES = {
         optional={
             "p_cmd": "",
             **dict.fromkeys(("motion", "link_2", "link_3", "load", "q_0"), "the scenario's parameter"),
+            **dict.fromkeys(
+                ("EI_factor", "mass_factor", "friction_factor", "joint_factor", "L_2", "L_3"),
+                "set for an arm that differs from the usual one",
+            ),
             "seed": "follows from the run's seed",
         },
         remarks=(_WORLD,),

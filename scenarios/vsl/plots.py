@@ -203,7 +203,7 @@ def _errors(evaluator: PathEvaluator, folder: Path) -> Figure:
     colours = (SERVO_COLOUR, TIP_COLOUR, COLOURS[4], ESTIMATE_COLOUR)
     with figure(folder / "errors", 1, 2, size=(9.0, 3.8)) as (boxes, reach):
         for k, (values, colour) in enumerate(zip(groups.values(), colours, strict=False)):
-            _draw_box(boxes, k, np.array(values) * 1000, colour)
+            draw_box(boxes, k, np.array(values) * 1000, colour)
         boxes.set_xticks(range(len(groups)), list(groups), fontsize="small")
         boxes.set(ylabel="error (mm)", ylim=(0.0, None))
         boxes.grid(visible=False, axis="x")
@@ -250,7 +250,8 @@ def _widened(limits: tuple[float, float], others: tuple[float, float]) -> tuple[
     return middle - half, middle + half
 
 
-def _draw_box(axes: Axes, x: float, values: Floats, colour: str) -> None:
+def draw_box(axes: Axes, x: float, values: Floats, colour: str) -> None:
+    """Draw values at x: the 25th to the 75th percentile as a box, range and median as lines, the mean as a dot."""
     low, q1, median, q3, high = np.percentile(values, (0, 25, 50, 75, 100))
     axes.vlines(x, low, high, color=colour, lw=1.2)
     axes.bar(x, q3 - q1, width=0.5, bottom=q1, color=colour, alpha=0.35, edgecolor=colour)

@@ -31,8 +31,8 @@ def replay_path(parameters: Parameters, record: Record, *, hybrid: bool) -> Repl
     """Return the arm over a run's time; if `hybrid`, with the model's estimate of the tip."""
     shape = record["arm.shape"]
     return Replay(
-        bodies=[_ground(), *_joints(shape), *_load(parameters, shape)],
-        lines=[*_arm(shape), *_hook(parameters, shape), *_tips(record, hybrid)],
+        bodies=[_ground(), *arm_bodies(shape), *_load(parameters, shape)],
+        lines=[*arm_lines(shape), *_hook(parameters, shape), *_tips(record, hybrid)],
         fixed=[Line(label="desired path", colour=_DESIRED, points=_desired_path(parameters)[None], width=4.0)],
         eye=(0.45, -1.45, 0.35),
         phases=phases_of_path(record),
@@ -51,7 +51,7 @@ def _desired_path(parameters: Parameters) -> Floats:
     return np.vstack(parts)
 
 
-def _arm(shape: Floats) -> list[Line]:
+def arm_lines(shape: Floats) -> list[Line]:
     """Return the links from shoulder to elbow and from elbow to gripper, and the gripper."""
     radius: float = ArmParams().R_link
     parts = (("arm", _LINK, shape[:, 1 : _ELBOW + 1], radius), ("arm", _LINK, shape[:, _ELBOW:], radius))
@@ -62,7 +62,7 @@ def _arm(shape: Floats) -> list[Line]:
     ]
 
 
-def _joints(shape: Floats) -> list[Body]:
+def arm_bodies(shape: Floats) -> list[Body]:
     """Return the base, and the servos at shoulder and elbow."""
     radius = _RADIUS_RATIO * ArmParams().R_link
     outline = circle(radius)

@@ -1,27 +1,41 @@
 """Learns the residuals of the VSL arm's rigid kinematics from points measured on its FMU. [Gandarias2020] sec. IV."""
 
-import hashlib
 import platform
-import zipfile
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.controllers.vsl.fit import Fit, fit_cubic
-from handover.controllers.vsl.kinematics import Elbow, VslKinematics
-from handover.controllers.vsl.learned_model import FORWARD_INPUTS, VslModel, inputs_of, rotate_about_z
-from handover.controllers.vsl.model_text import model_text
+from handover.controllers.vsl.beam import BentCommand, BentTip
+from handover.controllers.vsl.fit import directions_of, domain_of, fit_adapted, fit_beam, fit_cubic, fit_friction
+from handover.controllers.vsl.fit_network import EPOCHS, Points, fit_published, fit_small
+from handover.controllers.vsl.hybrid_kinematics import Params
+from handover.controllers.vsl.kinematics import VslKinematics
+from handover.controllers.vsl.learned_model import (
+    FORWARD_INPUTS,
+    Adapted,
+    Cubic,
+    ForwardInput,
+    Learned,
+    Regressor,
+    VslModel,
+    inputs_of,
+    rotate_about_z,
+)
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.description import FmuPort
-from handover.scenarios.vsl.training_data import STRETCH, Dataset, collect, describe_arm, parameters_of
+from handover.scenarios.vsl.data_file import links_of
+from handover.scenarios.vsl.model_file import content_key
+from handover.scenarios.vsl.training_data import STRETCH, Dataset, Measured, collect, describe_arm, parameters_of
 
-SPLIT = (0.70, 0.15, 0.15)
-"""Shares of training, validation and test points. [Gandarias2020] sec. IV-B"""
+Progress = Callable[[float, float], None]
+
+Pairs = tuple[Floats, Floats]
+"""Inputs and values of points, shapes (points, inputs) and (points, values)."""
 
 MIN_POINTS = 400
 """Number of points below which the 120 coefficients of a cubic are not worth fitting (assumed)."""
@@ -29,16 +43,11 @@ MIN_POINTS = 400
 _MIN_VARIATION = 1e-9
 """Range of an input, relative to its magnitude, below which it counts as constant: that much is rounding."""
 
-_MODULE = '''"""The trained model of `HybridKinematics` that ships, as JSON.
+_FRICTION_POINTS = 1500
+"""Training points of which the gears' friction is learned: two numbers."""
 
-Generated; when the sources of the arm (plants/vsl/) have changed, run again
-
-    handover vsl-train --points {points} --seed {seed}{elbow} --out controllers/vsl/default_model.py
-"""
-
-DEFAULT_MODEL = """\\
-{text}"""
-'''
+_FOLDS = 10
+"""Parts into which the few points of an adaptation are split: each is tested by what the others teach."""
 
 
 class NothingToLearn(ValueError):
@@ -57,116 +66,281 @@ class Errors:
         forward_model_based, forward_hybrid: distance of the tip from where the kinematics take it to be, m.
         inverse_model_based, inverse_hybrid: distance by which the command for the measured tip would miss it, m, by the
             Jacobian.
+        forward_other_input: forward_hybrid of what takes X = f(q) in place of q, or q in place of X; None if it was not
+            trained.
     """
 
     forward_model_based: float
     forward_hybrid: float
     inverse_model_based: float
     inverse_hybrid: float
+    forward_other_input: float | None = None
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    regressor: Regressor
+    facts: Mapping[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
 class VslTraining:
-    """Measures points, splits them, fits both residuals and tests them.
+    """Measures points, splits them, fits both regressors and tests them.
 
     Attributes:
         fmu: the arm.
-        kinematics: of rigid links, to which the learned residuals are added.
+        kinematics: of rigid links, which is corrected.
         points: how many are measured; those whose tip is too near to the limits of reach are left out.
-        seed: of the points, the split and the arm's noise.
+        seed: of the points, the split, the arm's noise and a network's first weights.
+        learned: what corrects.
+        forward_input: what eq. (10) takes.
+        window: whether it is learned on currents without the gears' friction.
+        walk: see `collect`.
+        arm: parameters of the arm, by name, in place of its own.
+        epochs: passes over the points of a published network's training.
     """
 
     fmu: Path
     kinematics: VslKinematics
     points: int
     seed: int
+    learned: Learned = Learned.CUBIC
+    forward_input: ForwardInput = ForwardInput.Q
+    window: bool = False
+    walk: bool = False
+    arm: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    epochs: int = EPOCHS
 
-    def train(self, progress: Callable[[float, float], None]) -> tuple[VslModel, Errors]:
+    def like(self, model: VslModel) -> "VslTraining":
+        """Return the training of a model of the same kind for the same links."""
+        return replace(self, kinematics=model.kinematics, learned=model.kind, forward_input=model.forward_input)
+
+    def train(self, progress: Progress) -> tuple[VslModel, Errors]:
         """Return the model, whose provenance has no date or path, and its errors.
 
         Raises:
             InvalidFmu, InitializationError, UnitFailure: the arm's FMU is invalid, does not initialize, or fails.
             NothingToLearn: fewer than half of the tips are within reach, or an input is the same at all points.
+            NoPyTorch: a published network is wanted, and PyTorch is not installed.
+        """
+        return self.learn(self.measure(progress), progress)
+
+    def measure(self, progress: Progress) -> Measured:
+        """Return measured points, with their place in the split.
+
+        Raises:
+            InvalidFmu, InitializationError, UnitFailure, NothingToLearn: as `train`.
         """
         d = describe_arm(self.fmu)
         points_seed, arm_seed = (int(n) for n in np.random.SeedSequence(self.seed).generate_state(2) >> 1)
         rng = np.random.default_rng(points_seed)
-        parameters = parameters_of(d, arm_seed)
-        measured = collect(d, self.kinematics, self.points, rng, parameters, progress)
-        usable = self._usable(measured)
-        training, validation, test = (usable.rows(indices) for indices in split(len(usable), rng))
-        inverse = fit_cubic(*self.inverse_pairs(training), *self.inverse_pairs(validation))
-        forward = fit_cubic(*self.forward_pairs(training), *self.forward_pairs(validation))
-        model = VslModel(inverse.cubic, forward.cubic, self.kinematics, {})
-        errors = self.errors(model, test)
+        parameters = {**parameters_of(d, arm_seed), **self.arm}
+        data = collect(d, self.kinematics, self.points, rng, parameters, progress, walk=self.walk)
+        usable = self._usable(data)
+        order = np.full(len(data), -1)
+        order[usable[rng.permutation(len(usable))]] = np.arange(len(usable))
+        stated = {n: _start(p) for n, p in sorted(d.parameters.items())} | parameters
+        plain = {n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in stated.items()}
+        arm = {"fmu": d.name, "key": content_key(self.fmu), "parameters": plain}
+        origin = {"arm": arm, "links": links_of(self.kinematics), "seed": self.seed, "walk": self.walk}
+        return Measured(data, order, origin)
+
+    def learn(self, measured: Measured, progress: Progress, share: float = 1.0) -> tuple[VslModel, Errors]:
+        """Return the model of measured points and its errors.
+
+        Args:
+            measured: the points, of this arm and these links.
+            progress: called with the passes of a published network's training and their number.
+            share: of the training and validation points that are used.
+
+        Raises:
+            NoPyTorch: as `train`.
+        """
+        directions = directions_of(measured.points.q_cmd[:, 1:], Params().reversal)
+        training, validation, test = measured.parts(share)
+        friction = (0.0, 0.0)
+        if self.window:
+            few = training[:_FRICTION_POINTS]
+            friction = self._friction(measured.points.rows(few), directions[few])
+        data = measured.points.freed(directions, friction)
+        parts = data.rows(training), data.rows(validation)
+        seeds = [int(n) for n in np.random.SeedSequence(measured.origin["seed"]).generate_state(4)[2:] >> 1]
+        inverse, forward = self._fit_both(*parts, seeds, progress)
+        usual = self._usual_currents(*parts) if self.window else None
+        kinds = self.learned, self.forward_input, friction, usual
+        model = VslModel(inverse.regressor, forward.regressor, self.kinematics, {}, *kinds)
+        errors = self.errors(model, data.rows(test))
+        if self.learned is not Learned.PHYSICS:
+            other = replace(self, forward_input=_OTHER[self.forward_input])
+            pairs = other.forward_pairs(parts[0]), other.forward_pairs(parts[1])
+            beside = other._fit(*pairs, seeds[1], progress, "m").regressor
+            theirs = replace(model, forward=beside, forward_input=other.forward_input)
+            errors = replace(errors, forward_other_input=self.forward_error(theirs, data.rows(test)))
+        counts = {"measured": len(measured.points), "training": len(training)}
         provenance: dict[str, Any] = {
-            "arm": {
-                "fmu": d.name,
-                "key": content_key(self.fmu),
-                "parameters": {n: _start(p) for n, p in sorted(d.parameters.items())} | parameters,
-            },
-            "seed": self.seed,
-            "points": {
-                "measured": self.points,
-                "training": len(training),
-                "validation": len(validation),
-                "test": len(test),
-            },
-            "inverse": _fit_facts(inverse, "rad"),
-            "forward": _fit_facts(forward, "m"),
-            "mean_test_errors_m": {k: float(f"{v:.4g}") for k, v in vars(errors).items()},
+            "arm": measured.origin["arm"],
+            "seed": measured.origin["seed"],
+            **({"walk": True} if measured.origin["walk"] else {}),
+            "points": {**counts, "validation": len(validation), "test": len(test)},
+            "data": measured.digest(),
+            "inverse": inverse.facts,
+            "forward": forward.facts,
+            "mean_test_errors_m": _rounded(errors),
             "versions": {"python": platform.python_version(), "numpy": np.__version__},
         }
-        return VslModel(inverse.cubic, forward.cubic, self.kinematics, provenance), errors
+        return replace(model, provenance=provenance), errors
 
-    def inverse_pairs(self, data: Dataset) -> tuple[Floats, Floats]:
+    def adapt(self, base: VslModel, measured: Measured) -> tuple[VslModel, Errors, Errors]:
+        """Return a model adapted to few points of an arm that differs, and errors of the base and with the adaptation.
+
+        The errors with it are of points that it did not see: each tenth by what the other nine teach.
+        """
+        directions = directions_of(measured.points.q_cmd[:, 1:], Params().reversal)
+        data = measured.points.freed(directions, base.friction).rows(np.flatnonzero(measured.order >= 0))
+        folds = [np.arange(len(data)) % _FOLDS == k for k in range(_FOLDS)]
+        tested = [
+            (self.errors(self._adapted(base, data.rows(~fold)), data.rows(fold)), int(np.sum(fold))) for fold in folds
+        ]
+        names = ("forward_model_based", "forward_hybrid", "inverse_model_based", "inverse_hybrid")
+        errors = Errors(**{n: sum(getattr(e, n) * size for e, size in tested) / len(data) for n in names})
+        provenance: dict[str, Any] = {
+            "arm": measured.origin["arm"],
+            "seed": measured.origin["seed"],
+            "points": {"measured": len(measured.points), "training": len(data)},
+            "data": measured.digest(),
+            "mean_test_errors_m": _rounded(errors),
+            "versions": {"python": platform.python_version(), "numpy": np.__version__},
+            "adapted_from": base.provenance,
+        }
+        return replace(self._adapted(base, data), provenance=provenance), self.errors(base, data), errors
+
+    def inverse_pairs(self, data: Dataset) -> Pairs:
         """Return inputs, the rigid angles of the measured tips first, and commanded minus rigid angles, rad.
 
-        The *measured* angles in place of the commanded ones would leave the servos' droop in.
+        The *measured* angles in place of the commanded ones would leave the servos' droop in. Of a published network
+        the values are the commanded angles themselves.
         """
         q_rigid = np.array([self.kinematics.inverse(p) for p in data.p_WG])
-        return inputs_of(q_rigid, data.p, data.i), data.q_cmd - q_rigid
+        values = data.q_cmd if self.learned is Learned.PUBLISHED else data.q_cmd - q_rigid
+        return inputs_of(q_rigid, data.p, data.i), values
 
-    def forward_pairs(self, data: Dataset) -> tuple[Floats, Floats]:
-        """Return inputs, the measured angles first, and measured minus rigid tips in the arm's plane, m."""
+    def forward_pairs(self, data: Dataset) -> Pairs:
+        """Return inputs, the measured angles or X = f(q) first, and measured minus rigid tips in the arm's plane, m.
+
+        Of a published network the values are the measured tips themselves, in the world.
+        """
         rigid = np.array([self.kinematics.forward(q) for q in data.q])
+        inputs = inputs_of(data.q if self.forward_input is ForwardInput.Q else rigid, data.p, data.i)
+        if self.learned is Learned.PUBLISHED:
+            return inputs, data.p_WG
         residuals = [
             rotate_about_z(r, -theta_1) for r, theta_1 in zip(data.p_WG - rigid, data.q[:, 0].tolist(), strict=True)
         ]
-        return inputs_of(data.q, data.p, data.i), np.array(residuals)
+        return inputs, np.array(residuals)
 
     def errors(self, model: VslModel, test: Dataset) -> Errors:
-        """Return the errors of points that were not trained on."""
+        """Return the errors of points that were not trained on; their currents are without friction if its are."""
         rigid = np.array([self.kinematics.forward(q) for q in test.q])
-        tips = np.array([model.tip(*point) for point in zip(test.q, test.p, test.i, strict=True)])
-        inputs, residuals = self.inverse_pairs(test)
+        q_rigid = np.array([self.kinematics.inverse(p) for p in test.p_WG])
+        commands = np.array([model.command(*point) for point in zip(q_rigid, test.p, test.i, strict=True)])
         return Errors(
             forward_model_based=_mean_length(test.p_WG - rigid),
-            forward_hybrid=_mean_length(test.p_WG - tips),
-            inverse_model_based=_mean_length(self._moved(inputs, residuals)),
-            inverse_hybrid=_mean_length(self._moved(inputs, residuals - model.inverse.predict(inputs))),
+            forward_hybrid=self.forward_error(model, test),
+            inverse_model_based=_mean_length(self._moved(q_rigid, test.q_cmd - q_rigid)),
+            inverse_hybrid=_mean_length(self._moved(q_rigid, test.q_cmd - commands)),
         )
 
-    def _moved(self, inputs: Floats, angles: Floats) -> Floats:
-        """Return the displacements of the tip by small joint rotations, shape (n, 3), m, by the Jacobian."""
-        jacobians = [self.kinematics.jacobian(q) for q in inputs[:, :3]]
-        return np.array([J @ dq for J, dq in zip(jacobians, angles, strict=True)])
+    def forward_error(self, model: VslModel, test: Dataset) -> float:
+        """Return the mean distance of the tip from where a model takes it to be, m."""
+        return _mean_length(test.p_WG - [model.tip(*point) for point in zip(test.q, test.p, test.i, strict=True)])
 
-    def _usable(self, measured: Dataset) -> Dataset:
-        usable = measured.rows(self._within_reach(measured.p_WG))
-        if len(usable) < len(measured) / 2:
+    def _fit_both(
+        self, training: Dataset, validation: Dataset, seeds: list[int], progress: Progress
+    ) -> tuple[_Fitted, _Fitted]:
+        """Fit what corrects eq. (11) and what corrects eq. (10)."""
+        if self.learned is Learned.PHYSICS:
+            return self._fit_beam(training, validation)
+        inverse = self.inverse_pairs(training), self.inverse_pairs(validation)
+        forward = self.forward_pairs(training), self.forward_pairs(validation)
+        return self._fit(*inverse, seeds[0], progress, "rad"), self._fit(*forward, seeds[1], progress, "m")
+
+    def _fit(
+        self,
+        training: Pairs,
+        validation: Pairs,
+        seed: int,
+        progress: Progress,
+        unit: str,
+    ) -> _Fitted:
+        """Fit one of the two, of values in a unit."""
+        if self.learned is Learned.CUBIC:
+            fit = fit_cubic(*training, *validation)
+            return _Fitted(fit.cubic, {"penalty": fit.penalty, **_rms(fit.validation_rms, unit)})
+        points = Points(*training, *validation)
+        network = (
+            fit_small(points, seed)
+            if self.learned is Learned.SMALL
+            else fit_published(points, seed, self.epochs, progress)
+        )
+        return _Fitted(network.network, {**network.facts, **_rms(network.validation_rms, unit)})
+
+    def _fit_beam(self, training: Dataset, validation: Dataset) -> tuple[_Fitted, _Fitted]:
+        """Fit a beam to tips, and the servos' droop to what their encoders show of it."""
+        forward, inverse = self.forward_pairs(training), self.inverse_pairs(training)
+        beam = fit_beam(self.kinematics, *forward)
+        torques, droops = beam.weights.kt * training.i[:, 1:], (training.q_cmd - training.q)[:, 1:]
+        droop = float(f"{np.sum(torques * droops) / np.sum(torques**2):.12g}")
+        seen, wanted = domain_of(forward[0]), domain_of(inverse[0])
+        tip = BentTip(seen.mean, seen.scale, seen.hull, beam)
+        command = BentCommand(wanted.mean, wanted.scale, wanted.hull, beam, droop)
+        fitted: list[_Fitted] = []
+        for bent, pairs, unit in ((command, self.inverse_pairs, "rad"), (tip, self.forward_pairs, "m")):
+            x, y = pairs(validation)
+            fitted.append(_Fitted(bent, _rms(float(np.sqrt(np.mean((bent.predict(x) - y) ** 2))), unit)))
+        return fitted[0], fitted[1]
+
+    def _friction(self, data: Dataset, directions: Floats) -> tuple[float, float]:
+        """Return the currents by friction that leave least of the tips unexplained."""
+        residuals = replace(self, learned=Learned.CUBIC, forward_input=ForwardInput.Q)
+
+        def inputs_at(c: Floats) -> Floats:
+            return residuals.forward_pairs(data.freed(directions, c))[0]
+
+        return fit_friction(inputs_at, directions, residuals.forward_pairs(data)[1])
+
+    def _usual_currents(self, training: Dataset, validation: Dataset) -> Cubic:
+        """Fit the currents of joints 2 and 3 to angles and pressures, whatever the load."""
+        pairs = [(np.concatenate([d.q[:, 1:], d.p], axis=1), d.i[:, 1:]) for d in (training, validation)]
+        return fit_cubic(*pairs[0], *pairs[1]).cubic
+
+    def _adapted(self, base: VslModel, data: Dataset) -> VslModel:
+        return replace(
+            base,
+            inverse=fit_adapted(_base(base.inverse), *self.inverse_pairs(data)),
+            forward=fit_adapted(_base(base.forward), *self.forward_pairs(data)),
+        )
+
+    def _moved(self, q: Floats, angles: Floats) -> Floats:
+        """Return the displacements of the tip by small joint rotations, shape (n, 3), m, by the Jacobian."""
+        return np.array([self.kinematics.jacobian(at) @ dq for at, dq in zip(q, angles, strict=True)])
+
+    def _usable(self, measured: Dataset) -> Any:
+        """Return the rows of points with tips within reach."""
+        rows = np.flatnonzero(self._within_reach(measured.p_WG))
+        if len(rows) < len(measured) / 2:
             k = self.kinematics
             raise NothingToLearn(
                 self.fmu,
-                f"{len(usable)} of {len(measured)} measured tips are where links of {k.L_2:g} and {k.L_3:g} m on a "
+                f"{len(rows)} of {len(measured)} measured tips are where links of {k.L_2:g} and {k.L_3:g} m on a "
                 f"shoulder {k.L_1:g} m high can be; half of them should be",
             )
+        usable = measured.rows(rows)
         x = inputs_of(usable.q, usable.p, usable.i)
         constant = np.ptp(x, axis=0) <= _MIN_VARIATION * np.max(np.abs(x), axis=0)
         if np.any(constant):
             names = ", ".join(name for name, c in zip(FORWARD_INPUTS, constant, strict=True) if c)
             raise NothingToLearn(self.fmu, f"the same at all points, whatever is commanded: {names}")
-        return usable
+        return rows
 
     def _within_reach(self, p_WG: Floats) -> NDArray[np.bool_]:
         min_reach, _ = self.kinematics.reach
@@ -174,41 +348,20 @@ class VslTraining:
         return (from_shoulder <= STRETCH) & (from_shoulder >= min_reach + 0.001)
 
 
-def split(points: int, rng: np.random.Generator) -> tuple[Any, Any, Any]:
-    """Return indices of training, validation and test points, drawn at random."""
-    order = rng.permutation(points)
-    first, second = round(SPLIT[0] * points), round((SPLIT[0] + SPLIT[1]) * points)
-    return order[:first], order[first:second], order[second:]
+_OTHER = {ForwardInput.Q: ForwardInput.X, ForwardInput.X: ForwardInput.Q}
 
 
-def content_key(fmu: Path) -> str:
-    """Return a hash that changes if the sources of the arm do: those in `plants` that its FMU carries.
-
-    Changes of engine and builder leave it as it is. Of an FMU without such sources it is the hash of all bytes.
-    """
-    digest = hashlib.sha256()
-    with zipfile.ZipFile(fmu) as archive:
-        names = [n for n in archive.namelist() if n.startswith("resources/sources/handover/plants/")]
-        for name in sorted(names):
-            content = archive.read(name)
-            digest.update(f"{name}\0{len(content)}\0".encode() + content)
-    if not names:
-        digest.update(fmu.read_bytes())
-    return digest.hexdigest()
+def _base(regressor: Regressor) -> Regressor:
+    """Return what an adapted regressor was adapted from: adaptations of adaptations would pile up."""
+    return regressor.base if isinstance(regressor, Adapted) else regressor
 
 
-def file_text(model: VslModel, path: Path) -> str:
-    """Return the content of a model's file: a Python module if its name ends in .py, else JSON."""
-    text = model_text(model)
-    if path.suffix != ".py":
-        return text
-    provenance = model.provenance
-    elbow = "" if model.kinematics.elbow is Elbow.UP else " --elbow down"
-    return _MODULE.format(points=provenance["points"]["measured"], seed=provenance["seed"], elbow=elbow, text=text)
+def _rms(validation_rms: float, unit: str) -> dict[str, float]:
+    return {f"validation_rms_{unit}": float(f"{validation_rms:.4g}")}
 
 
-def _fit_facts(fit: Fit, unit: str) -> dict[str, float]:
-    return {"penalty": fit.penalty, f"validation_rms_{unit}": float(f"{fit.validation_rms:.4g}")}
+def _rounded(errors: Errors) -> dict[str, float]:
+    return {name: float(f"{value:.4g}") for name, value in vars(errors).items() if value is not None}
 
 
 def _start(port: FmuPort) -> Any:

@@ -1,12 +1,14 @@
 """Points measured on the VSL arm's own FMU, to learn its kinematics from. [Gandarias2020] sec. IV-A, eq. (9)."""
 
+import hashlib
 import tempfile
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from handover.controllers.vsl.kinematics import VslKinematics
 from handover.cosim.blocks.ports import Floats
@@ -15,6 +17,9 @@ from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailu
 from handover.cosim.fmu.description import FmuDescription, describe_fmu
 from handover.cosim.fmu.fmpy_edge import unpack
 from handover.cosim.fmu.instance import Instance
+
+SPLIT = (0.70, 0.15, 0.15)
+"""Shares of training, validation and test points. [Gandarias2020] sec. IV-B"""
 
 RADII = (0.22, 0.42)
 """Distances of the wanted tip from J1's axis, m: the published paths with 2 cm around them (assumed)."""
@@ -40,10 +45,16 @@ LOADS = (0.0, 0.13)
 _STEP, _STEPS, _KEPT = 0.1, 15, 5
 """Each point: steps of 0.1 s until settled; the mean of the readings after the last ones is kept."""
 
+_THINGS = ("angles", "pressures", "load")
+"""What is varied from point to point."""
+
 _WANTED = {
     "input": {"q_cmd": (3,), "p_cmd": (2,), "load": ()},
     "output": {"q_meas": (3,), "i_meas": (3,), "p_meas": (2,), "p_WG_meas": (3,)},
 }
+
+
+Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -70,6 +81,50 @@ class Dataset:
     def rows(self, indices: Any) -> "Dataset":
         """Return some of the points."""
         return Dataset(self.p_WG[indices], self.p[indices], self.i[indices], self.q[indices], self.q_cmd[indices])
+
+    def freed(self, directions: Floats, friction: Sequence[float] | Floats) -> "Dataset":
+        """Return the points with currents freed of friction, (2,) of joints 2 and 3, A; see `directions_of`."""
+        if not np.any(friction):
+            return self
+        i = np.array(self.i)
+        i[:, 1:] -= np.asarray(friction) * directions
+        return replace(self, i=i)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Points one after another as they were measured, how they are split, and where they come from.
+
+    Attributes:
+        points: all of them.
+        order: the place of each in the split, shape (n,): training points first, then validation and test; -1 where the
+            tip is too near to the limits of reach.
+        origin: plain data: `arm` (name, key and parameters of its FMU), `links` that commanded it, `seed` and `walk`.
+    """
+
+    points: Dataset
+    order: Integers
+    origin: Mapping[str, Any]
+
+    @property
+    def usable(self) -> int:
+        """How many points have a place in the split."""
+        return int(np.sum(self.order >= 0))
+
+    def parts(self, share: float = 1.0) -> tuple[Integers, Integers, Integers]:
+        """Return rows of training, validation and test points; a share of the first two, drawn at random."""
+        n = self.usable
+        by_place = np.argsort(np.where(self.order < 0, len(self.order), self.order), kind="stable")[:n]
+        first, second = round(SPLIT[0] * n), round((SPLIT[0] + SPLIT[1]) * n)
+        taken = round(share * first), round(share * (second - first))
+        return by_place[: taken[0]], by_place[first : first + taken[1]], by_place[second:]
+
+    def digest(self) -> str:
+        """Return a hash of all numbers: equal for equal data."""
+        digest = hashlib.sha256()
+        for values in (*vars(self.points).values(), self.order.astype(np.float64)):
+            digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+        return digest.hexdigest()
 
 
 def describe_arm(fmu: Path) -> FmuDescription:
@@ -104,10 +159,13 @@ def collect(
     rng: np.random.Generator,
     parameters: Mapping[str, Any],
     progress: Callable[[float, float], None],
+    *,
+    walk: bool = False,
 ) -> Dataset:
     """Measure points of the workspace at random pressures, angles and loads, each after the arm has settled.
 
-    The source varies one of the three from point to point; here all are drawn anew, which spreads points better.
+    The source varies one of the three from point to point: a walk. Else all are drawn anew, which spreads points
+    better.
     The arm is commanded above the wanted tip by a random share of what it may sag, so that measured tips cover the
     wanted places.
 
@@ -118,6 +176,7 @@ def collect(
         rng: random numbers of the points.
         parameters: the arm's parameter settings.
         progress: called with the simulated time and its end, s.
+        walk: whether a point differs from the one before in one of the three alone, drawn at random.
 
     Raises:
         InvalidFmu, InitializationError, UnitFailure: the arm does not load, start or step.
@@ -128,11 +187,16 @@ def collect(
         arm = Instance("arm", d, Path(folder), _WANTED["input"])
         try:
             _start(arm, parameters)
+            q_cmd = np.zeros(3)
             for k in range(points):
-                q_cmd = kinematics.inverse(_commanded_tip(kinematics, rng))
-                arm.u["q_cmd"][0][:] = q_cmd
-                arm.u["p_cmd"][0][:] = rng.uniform(*PRESSURES, size=2)
-                arm.u["load"][0][:] = rng.uniform(*LOADS)
+                drawn = _THINGS if not walk or k == 0 else (_THINGS[rng.integers(len(_THINGS))],)
+                if "angles" in drawn:
+                    q_cmd = kinematics.inverse(_commanded_tip(kinematics, rng))
+                    arm.u["q_cmd"][0][:] = q_cmd
+                if "pressures" in drawn:
+                    arm.u["p_cmd"][0][:] = rng.uniform(*PRESSURES, size=2)
+                if "load" in drawn:
+                    arm.u["load"][0][:] = rng.uniform(*LOADS)
                 rows.append((_settled(arm, k * _STEPS), q_cmd))
                 progress((k + 1) * _STEPS * _STEP, points * _STEPS * _STEP)
             arm.end()

@@ -21,9 +21,11 @@ CHOSEN: Mapping[str, Mapping[str, Any]] = {
     "TendonArmFast": {"internal_step": 0.0025},
     "HandoverPartner": {"guide_stiffness": 50.0},
     "TrajectoryPlanner": {"settle": 0.06},
+    "PickAndPlace": {"settle": 0.06},
     "HybridKinematics": {"L_1": 0.15, "L_2": 0.225, "L_3": 0.225},  # the model that ships is trained for these
     "Push": {"start": 0.05, "duration": 0.06},
     "LargeObjectAndHands": {"hands": 1},  # of two at most
+    "VacuumGripper": {"reach": 0.1},
 }
 """Parameters whose values are not near those that they start with, most so that inputs act within the short run."""
 

@@ -26,6 +26,8 @@ ALIVE = {
     "IrReflex": {"move_time": 0.05, "travel_time": 0.05},
     "Push": {"start": 0.15, "duration": 0.2},
     "TrajectoryPlanner": {"settle": 0.1},
+    "PickAndPlace": {"settle": 0.1},
+    "VacuumGripper": {"reach": 0.1},
 }
 """Parameters of units that reject a change of any one alone, or that do nothing for longer than a run takes."""
 

@@ -29,6 +29,7 @@ USUAL = Inputs(
     i_meas=np.array([0.0, *MODEL.inverse.mean[5:].tolist()]),
 )
 RIGID = Params(method=Method.MODEL_BASED)
+ESTIMATE = Params(method=Method.ESTIMATE)
 
 
 def flat(y: Outputs) -> list[bytes]:
@@ -93,7 +94,7 @@ def test_currents_are_smoothed_by_two_lags():
     )
 
 
-@pytest.mark.parametrize("params", [RIGID, Params()])
+@pytest.mark.parametrize("params", [RIGID, Params(), ESTIMATE])
 def test_outputs_take_no_time(params: Params):
     unit = HybridKinematics(params)
     state = unit.get_state()
@@ -102,7 +103,7 @@ def test_outputs_take_no_time(params: Params):
     assert first == flat(unit.step(0.0, 0.02, USUAL))
 
 
-@pytest.mark.parametrize("params", [RIGID, Params()])
+@pytest.mark.parametrize("params", [RIGID, Params(), ESTIMATE])
 @pytest.mark.parametrize("steps", [0, 7])
 def test_a_restored_state_goes_on_bit_for_bit(params: Params, steps: int):
     rng = np.random.default_rng(3)
@@ -141,3 +142,10 @@ def test_a_file_that_is_no_model_is_refused(tmp_path: Path):
 def test_a_model_of_other_links_is_refused(params: Params):
     with pytest.raises(InvalidModel, match=r"trained for L_1, L_2, L_3 = 0\.15, 0\.225, 0\.225 m with the elbow up"):
         HybridKinematics(params)
+
+
+def test_an_estimate_alone_leaves_the_command_to_rigid_kinematics():
+    hybrid, rigid, estimate = (HybridKinematics(p).step(0.0, 0.02, USUAL) for p in (Params(), RIGID, ESTIMATE))
+    np.testing.assert_array_equal([estimate.q_cmd, estimate.qd_cmd], [rigid.q_cmd, rigid.qd_cmd])
+    np.testing.assert_array_equal([estimate.p_WG_est, estimate.p_WG_model], [hybrid.p_WG_est, hybrid.p_WG_model])
+    assert estimate.outside == hybrid.outside

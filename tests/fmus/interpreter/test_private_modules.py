@@ -2,6 +2,8 @@
 
 import importlib
 import json
+import math
+import os
 import sys
 from collections.abc import Iterator
 from importlib import metadata
@@ -47,6 +49,26 @@ def test_units_with_modules_of_the_same_name_run_their_own_code(tmp_path: Path, 
     assert [host.get("y") for host in hosts] == [[1.0], [2.0]]
     assert sys.path == path_before
     assert all(name.startswith("_fmu_") for name in set(sys.modules) - modules_before)
+
+
+def test_a_step_that_imports_does_not_ask_the_disk_again(
+    tmp_path: Path, hosts: list[CtypesHost], monkeypatch: pytest.MonkeyPatch
+):
+    host = CtypesHost(build_in(tmp_path / "imports_in_steps", "__import__('math').pi"), 3)
+    hosts.append(host)
+    assert host.instantiate()
+    assert host.initialise() == OK
+    assert host.step(0.0, 0.5) == OK
+    asked: list[str] = []
+    exists = os.path.exists
+
+    def counted(path: str) -> bool:
+        asked.append(path)
+        return exists(path)
+
+    monkeypatch.setattr(os.path, "exists", counted)
+    assert [host.step(0.5, 0.5), host.get("y")] == [OK, [math.pi]]
+    assert asked == []
 
 
 def test_a_second_instance_finds_its_modules_though_the_first_ones_folder_is_gone(

@@ -72,14 +72,14 @@ def energies(chain: VslChain, poses: tuple[Pose, Pose, Pose], h: float) -> tuple
     own = UNDAMPED.link_mass * np.array(chain.lengths) / 0.225
     speed = (chain.ends(after) - chain.ends(before)) / (2.0 * h)
     turn = (after.angles - before.angles) / (2.0 * h)
-    kinetic = own @ np.abs((speed[1:] + speed[:-1]) / 2.0) ** 2 + UNDAMPED.servo_mass * abs(speed[chain.elbow]) ** 2
+    kinetic = own @ np.abs((speed[1:] + speed[:-1]) / 2.0) ** 2 + UNDAMPED.servo_mass * abs(speed[chain.joints[1]]) ** 2
     kinetic += UNDAMPED.gripper_mass * abs(speed[-1]) ** 2 + (own * np.square(chain.lengths) / 12.0) @ turn**2
     hinge, shear = chain.springs(P)
     twist = np.diff(now.angles, prepend=0.0)
-    twist[[0, chain.elbow]] -= RAISED
+    twist[[0, chain.joints[1]]] -= RAISED
     springs = np.sum(twist**2 / np.array(hinge)) + np.sum(now.shears**2 / np.array(shear))
     ends = chain.ends(now)
-    height = own @ (ends[1:] + ends[:-1]).imag / 2.0 + UNDAMPED.servo_mass * ends[chain.elbow].imag
+    height = own @ (ends[1:] + ends[:-1]).imag / 2.0 + UNDAMPED.servo_mass * ends[chain.joints[1]].imag
     return float(kinetic) / 2.0, float(springs) / 2.0 + 9.81 * float(height + UNDAMPED.gripper_mass * ends[-1].imag)
 
 
@@ -188,7 +188,7 @@ def test_droop_follows_the_torque_in_its_time(droop_time: float):
 def test_continues_bit_for_bit_from_a_state():
     one, other = swinging(LOOSE), VslDynamics(VslChain(LOOSE, 2), LOOSE)
     one.advance(0.1, (RAISED, OUTSTRETCHED), P, 0.1, 0.5)
-    other.set_state(one.get_state())
+    other.restore(one.snapshot())
     for dynamics in (one, other):
         for _ in range(10):
             dynamics.advance(0.02, (OUTSTRETCHED, OUTSTRETCHED), P, 0.1, 0.0)
@@ -200,3 +200,40 @@ def test_no_solution_is_said():
     dynamics = swinging(LOOSE)
     with pytest.raises(NoConvergence, match="no solution of the equations of motion"):
         dynamics.advance(0.02, (RAISED, (math.nan, 0.0)), P, 0.0, 0.0)
+
+
+def test_a_face_carries_what_statics_with_so_much_less_load_does_not():
+    load, damped = 0.1, replace(LOOSE, damping_time=0.05)
+    free = swinging(damped, load=load)
+    height = tip(VslChain(damped, 2), free).imag + damped.L_1
+    stopped = swinging(replace(damped, face=height + 0.005), load=load)
+    for _ in range(150):
+        stopped.advance(0.02, (RAISED, RAISED), P, load, 0.0)
+    assert 0.1 < stopped.force < load * 9.81
+    chain = VslChain(damped, 2)
+    statics = VslStatics(chain, 9.81, 1.0 / 260.0)
+    statics.settle(RAISED, P, load - stopped.force / 9.81)
+    assert tip(chain, statics).imag == pytest.approx(tip(chain, stopped).imag, abs=1e-6)
+    depth = height + 0.005 - damped.L_1 - tip(chain, stopped).imag
+    assert stopped.force == pytest.approx(damped.face_stiffness * depth, rel=1e-6)
+
+
+def test_a_tip_that_comes_down_faster_strikes_harder_and_leaves_the_face_again():
+    peaks: list[float] = []
+    for steps in (50, 5):
+        dynamics = swinging(LOOSE)
+        params = replace(LOOSE, face=LOOSE.L_1 + tip(VslChain(LOOSE, 2), dynamics).imag - 0.03)
+        dynamics = swinging(params)
+        lower = RAISED[0] - 0.2, RAISED[1]
+        aims = np.linspace(RAISED, lower, steps + 1)
+        forces = [0.0]
+        for first, last in zip(aims[:-1], aims[1:], strict=True):
+            dynamics.advance(0.02, (first, last), P, 0.0, 0.0)
+            forces.append(dynamics.force)
+        assert forces[1] == 0.0
+        for _ in range(50):
+            dynamics.advance(0.02, (RAISED, RAISED), P, 0.0, 0.0)
+            forces.append(dynamics.force)
+        assert forces[-1] == 0.0
+        peaks.append(max(forces))
+    assert peaks[1] > 1.2 * peaks[0] > 0.0

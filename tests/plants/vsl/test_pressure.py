@@ -75,7 +75,7 @@ def test_ends_near_every_command(p: float, p_cmd: float):
 def test_continues_from_a_state(when: Callable[[], float]):
     one, other = line(0.0), line(1e5)
     one.advance(when(), 2e5)
-    other.set_state(one.get_state())
+    other.restore(one.snapshot())
     for air in (one, other):
         air.advance(20.0, 1.7e5)
-    assert one.get_state() == other.get_state()
+    assert one.snapshot() == other.snapshot()

@@ -48,7 +48,7 @@ def test_continues_from_a_state():
     one, other = servo(), servo()
     one.turn(1.0, 0.5, 0.3)
     one.slide(0.3505)
-    other.set_state(one.get_state())
+    other.restore(one.snapshot())
     assert (other.angle, other.current(0.1)) == (one.angle, one.current(0.1))
     one.slide(0.35)
     other.slide(0.35)

@@ -8,35 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from beams import ONE_LINK, STIFF, rest, tip
 
 from handover.plants.vsl.chain import Pose, VslChain
 from handover.plants.vsl.parameters import Link, Params
 from handover.plants.vsl.statics import NoEquilibrium, VslStatics
-
-STIFF = 1e11
-ONE_LINK = Params(
-    link_2=Link.RIGID,
-    EI_rigid=1e9,
-    cap=0.0,
-    link_mass=0.0,
-    servo_mass=0.0,
-    gripper_mass=0.0,
-    joint_stiffness=STIFF,
-    servo_stiffness=STIFF,
-)
-"""Link 2 does not give: what does is link 3, a straight beam in a wall."""
-
-
-def rest(params: Params, theta: tuple[float, float], p: float, load: float, hinges: int = 6) -> tuple[VslChain, Pose]:
-    chain = VslChain(params, hinges)
-    statics = VslStatics(chain, params.gravity, 1.0 / params.servo_stiffness)
-    statics.settle(theta, (p, p), load)
-    return chain, statics.pose
-
-
-def tip(params: Params, theta: tuple[float, float], p: float, load: float, hinges: int = 6) -> complex:
-    chain, pose = rest(params, theta, p, load, hinges)
-    return complex(chain.ends(pose)[-1])
 
 
 def cantilever(params: Params, p: float, force: float) -> float:
@@ -93,27 +69,39 @@ def test_stiff_links_obey_the_rigid_kinematics():
         assert tip(params, (theta_2, theta_3), 1e5, 0.1) == pytest.approx(wanted, abs=1e-7)
 
 
-def energy(params: Params, chain: VslChain, pose: Pose, theta: tuple[float, float], p: float, load: float) -> float:
+def energy(params: Params, chain: VslChain, pose: Pose, theta: tuple[float, ...], p: float, load: float) -> float:
     """Potential energy of springs and masses; a body's mass is at its middle."""
-    hinge, shear = chain.springs((p, p))
+    hinge, shear = chain.springs((p,) * params.links)
     ends = chain.ends(pose)
     twist = np.diff(pose.angles, prepend=0.0)
-    twist[0] -= theta[0]
-    twist[chain.elbow] -= theta[1]
+    twist[chain.joints] -= theta
     compliance = np.array(hinge)
-    compliance[[0, chain.elbow]] += 1.0 / params.servo_stiffness
+    compliance[chain.joints] += 1.0 / params.servo_stiffness
     flexible = np.array(shear) > 0.0
     springs = np.sum(twist**2 / compliance) + np.sum(pose.shears[flexible] ** 2 / np.array(shear)[flexible])
     own = params.link_mass * np.array(chain.lengths) / 0.225
     height = own @ ends.imag[:-1] / 2.0 + own @ ends.imag[1:] / 2.0
-    height += params.servo_mass * ends[chain.elbow].imag + (params.gripper_mass + load) * ends[-1].imag
+    height += (params.gripper_mass + load) * ends[-1].imag + sum(
+        params.servo_mass * ends[elbow].imag for elbow in chain.joints[1:]
+    )
     return float(springs / 2.0 + 9.81 * height)
 
 
-@pytest.mark.parametrize("links", [(Link.VSL, Link.VSL), (Link.RIGID, Link.VSL), (Link.VSL, Link.RIGID)])
+@pytest.mark.parametrize(
+    "params",
+    [
+        Params(),
+        Params(link_2=Link.RIGID),
+        Params(link_3=Link.RIGID),
+        Params(links=1),
+        Params(links=3),
+        Params(links=3, link_4=Link.RIGID),
+        Params(links=3, link_3=Link.RIGID, EI_factor=np.array([1.3, 1.0, 0.8]), joint_factor=np.array([0.5, 2.0])),
+    ],
+)
 @pytest.mark.parametrize("theta", [(0.9, -1.4), (1.6, 0.1), (-0.7, 2.0), (3.0, 0.5)])
-def test_the_rest_has_the_least_potential_energy(links: tuple[Link, Link], theta: tuple[float, float]):
-    params = Params(link_2=links[0], link_3=links[1])
+def test_the_rest_has_the_least_potential_energy(params: Params, theta: tuple[float, ...]):
+    theta = theta[: params.links]
     chain, pose = rest(params, theta, 0.7e5, 0.08)
     least = energy(params, chain, pose, theta, 0.7e5, 0.08)
     rng = np.random.default_rng(1)

@@ -38,6 +38,8 @@ def test_without_a_name_it_lists_the_experiments():
         (["ir-table", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "one of both is right"),
         (["ir-table", "--workers", "0"], "0 is not in the range x>=1"),
         (["ir-table", "--seed", "-1"], "-1 is not in the range x>=0"),
+        (["ir-table", "--model", "m.json"], "ir-table has no use for a trained model"),
+        (["vsl-2", "--model", "none.json"], "none.json: it cannot be read"),
     ],
 )
 def test_a_call_that_cannot_be_executed_is_refused_and_leaves_nothing(

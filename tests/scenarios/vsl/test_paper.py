@@ -18,6 +18,7 @@ from handover.cosim.blocks.declarations import declared_variables
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Causality
 from handover.plants.vsl.parameters import Params as ArmParams
+from handover.plants.vsl.vacuum_gripper import Params as GripperParams
 from handover.scenarios.cli.vsl_train import vsl_train
 from handover.scenarios.vsl import training_data
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
@@ -47,6 +48,7 @@ def as_paper(value: Any) -> Any:
         ("planner", PlannerParams()),
         ("kinematics", KinematicsParams()),
         ("arm", ArmParams()),
+        ("gripper", GripperParams()),
     ],
 )
 def test_defaults_are_those_of_the_paper_file(paper: Paper, group: str, params: Any):
@@ -62,6 +64,7 @@ def test_defaults_are_those_of_the_paper_file(paper: Paper, group: str, params: 
         ("planner", PlannerParams),
         ("kinematics", KinematicsParams),
         ("arm", ArmParams),
+        ("gripper", GripperParams),
     ],
 )
 def test_units_are_the_declared_ones(paper: Paper, group: str, params: type[Any]):
@@ -76,6 +79,7 @@ def test_units_are_the_declared_ones(paper: Paper, group: str, params: type[Any]
         ("planner", PlannerParams),
         ("kinematics", KinematicsParams),
         ("arm", ArmParams),
+        ("gripper", GripperParams),
     ],
 )
 def test_every_default_has_an_origin(paper: Paper, group: str, params: type[Any]):

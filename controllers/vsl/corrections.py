@@ -1,0 +1,238 @@
+"""What the corrected kinematics remember: currents, friction's direction, the tracker's errors, the path's speed."""
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from handover.controllers.vsl.kinematics import VslKinematics
+from handover.controllers.vsl.learned_model import VslModel, inputs_of, turned
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.blocks.state import pack_state, unpack_state
+
+_SHORTEST_LEVER = 0.03
+"""m; of an arm that stands upright, currents say nothing of a load (assumed)."""
+
+_ON_THE_WAY = 0.05
+"""Angle between command and encoder, rad, from which a joint is on its way and the tip not yet to judge (assumed)."""
+
+_DAMPING = 0.01
+"""Of the inverse of the Jacobian, m: singular values below it, near a stretched elbow, count for less (assumed)."""
+
+_SAME_TIME = 1e-9
+"""s; rounding of sums of intervals."""
+
+_YIELD_TIME = 0.3
+"""Time in which what a joint has yielded to a swing is given back, s: a swing's period (assumed)."""
+
+_GRAVITY = 9.81
+
+
+class Readings(Protocol):
+    """What is wanted and what is measured, of `HybridKinematics`."""
+
+    q_ref: Floats
+    qd_ref: Floats
+    q_meas: Floats
+    p_meas: Floats
+    i_meas: Floats
+    p_WG_meas: Floats
+
+
+class CurrentFilter:
+    """Currents through two lags in series, which attenuate what an arm that swings feels of its own inertia.
+
+    With a window, they are freed of the gears' friction first: i - c d, with c as trained and d in [-1, 1] which way
+    friction acts, by the unit's own commands, which have no noise. What is smoothed then is what a load adds to the
+    usual currents i_0(q, p) at its levers b(q): i - c d - i_0 = lambda b + e, with e square to b. lambda and e change
+    with the load alone, so that smoothing them does not lag behind the posture.
+
+    Args:
+        window: the model that was trained with one; None without.
+        lag: time constant of each lag, s; 0 for none.
+        reversal: turn that reverses friction, rad.
+    """
+
+    def __init__(self, window: VslModel | None, lag: float, reversal: float) -> None:
+        self._window, self._lag, self._reversal = window, lag, reversal
+        self._smoothed: tuple[Floats, Floats] | None = None
+        self._direction = np.zeros(2)
+
+    def step(self, u: Readings, dt: float) -> Floats:
+        """Return the currents, shape (3,), A, after a further period; that of joint 1 is 0 with a window."""
+        self._smoothed = self._after(u, dt)
+        return self._at_posture(u, self._smoothed[1])
+
+    def now(self, u: Readings) -> Floats:
+        """Return the currents as they would be; no time passes."""
+        return self._at_posture(u, self._after(u, 0.0)[1])
+
+    def turn(self, turn: Floats) -> None:
+        """Take up how the joints are commanded to turn on, shape (3,), rad."""
+        self._direction = turned(self._direction, turn[1:], self._reversal)
+
+    def swing(self, u: Readings, i: Floats) -> Floats:
+        """Return by how much currents of joints 2 and 3 are off the smoothed ones, i, shape (2,), A."""
+        friction = 0.0 if self._window is None else self._direction * self._window.friction
+        return u.i_meas[1:] - friction - i[1:]
+
+    def get_state(self) -> bytes:
+        """Return what is smoothed, and the direction of friction."""
+        return pack_state((self._smoothed, self._direction))
+
+    def set_state(self, state: bytes) -> None:
+        """Restore a state of this filter or of one with equal arguments."""
+        self._smoothed, self._direction = unpack_state(state)
+
+    def _after(self, u: Readings, dt: float) -> tuple[Floats, Floats]:
+        """Return what is smoothed, once and twice: the currents, or with a window [lambda, e_2, e_3]."""
+        measured = self._explained(u)
+        if self._smoothed is None or self._lag == 0.0:
+            return np.array(measured), np.array(measured)
+        share = 1.0 - math.exp(-dt / self._lag)
+        once = self._smoothed[0] + share * (measured - self._smoothed[0])
+        return once, self._smoothed[1] + share * (once - self._smoothed[1])
+
+    def _explained(self, u: Readings) -> Floats:
+        if self._window is None:
+            return u.i_meas
+        usual, levers = self._window.currents(u.q_meas, u.p_meas)
+        more = u.i_meas[1:] - self._direction * self._window.friction - usual
+        by_lever = levers @ more / max(levers @ levers, _SHORTEST_LEVER**2)
+        return np.concatenate([[by_lever], more - by_lever * levers])
+
+    def _at_posture(self, u: Readings, smoothed: Floats) -> Floats:
+        if self._window is None:
+            return smoothed
+        usual, levers = self._window.currents(u.q_meas, u.p_meas)
+        return np.concatenate([[0.0], usual + smoothed[0] * levers + smoothed[1:]])
+
+
+class TrackerLoop:
+    """Integral control of the tip by the tracker, at its rate: dq' = K_I J~^+ e, with e = f(q_ref) - p_WG_meas.
+
+    q_ref is that of the period that ends; J~ is the corrected Jacobian, J~^+ its damped inverse. e is smoothed: an arm
+    that swings would be swung up. dq rests while joints are on their way.
+
+    Args:
+        kinematics: f, of rigid links.
+        model: what corrects its Jacobian; None for rigid links.
+        rate: of the tracker, Hz.
+        lag: time constant of the smoothing, s; 0 for none.
+        K_I: share of the error that is taken away in a second, 1/s.
+        limit: largest turn of a joint, rad.
+    """
+
+    def __init__(
+        self, kinematics: VslKinematics, model: VslModel | None, rate: float, lag: float, K_I: float, limit: float
+    ) -> None:
+        self._kinematics, self._model = kinematics, model
+        self._rate, self._K_I, self._limit = rate, K_I, limit
+        self._share = 1.0 if lag == 0.0 else 1.0 - math.exp(-1.0 / (rate * lag))
+        self._readings = 0
+        self._error = np.zeros(3)
+        self.dq = np.zeros(3)
+        """By how much the joints are turned, rad."""
+
+    def step(self, t: float, u: Readings, i: Floats, before: tuple[Floats, Floats] | None) -> None:
+        """Turn the joints on by a share of the tip's error, if the tracker has a reading that it had not.
+
+        Args:
+            t: time, s.
+            u: what is measured.
+            i: smoothed currents, shape (3,), A.
+            before: q_ref and q_cmd of the period that ends.
+        """
+        readings = math.floor((t + _SAME_TIME) * self._rate) + 1
+        if readings == self._readings:
+            return
+        self._readings = readings
+        if before is None or np.max(np.abs(before[1] - u.q_meas)) > _ON_THE_WAY:
+            return
+        self._error = self._error + self._share * (self._kinematics.forward(before[0]) - u.p_WG_meas - self._error)
+        q = u.q_meas
+        J = self._kinematics.jacobian(q) if self._model is None else self._model.tip_jacobian(q, u.p_meas, i)
+        damped = np.transpose(J) @ np.linalg.solve(J @ np.transpose(J) + _DAMPING**2 * np.eye(3), self._error)
+        self.dq = np.clip(self.dq + self._K_I / self._rate * damped, -self._limit, self._limit)
+
+    def get_state(self) -> bytes:
+        """Return the readings so far, the smoothed error, and dq."""
+        return pack_state((self._readings, self._error, self.dq))
+
+    def set_state(self, state: bytes) -> None:
+        """Restore a state of this loop or of one with equal arguments."""
+        self._readings, self._error, self.dq = unpack_state(state)
+
+
+class SwingCompensation:
+    """Turns joints 2 and 3 against the swings that a path's changes of speed excite.
+
+    What joints carry weighs i (a + g) / g under an acceleration a: the tip's, by the path's velocities J qd_ref, from
+    one period to the next. That bends links by G i a / g, with G = d q_cmd / d i, eq. (11), which is commanded ahead:
+    times K_F, since the servos' share of G does not yield so fast. What swings nevertheless shows in the currents, and
+    the joints yield to it at K_D times the bending, as a damper in series does.
+
+    Args:
+        model: what corrects.
+        K_F: share of the bending that is commanded ahead.
+        K_D: share of the bending by a swing that the joints yield by in a second, 1/s.
+    """
+
+    def __init__(self, model: VslModel, K_F: float, K_D: float) -> None:
+        self._model, self._K_F, self._K_D = model, K_F, K_D
+        self._path: tuple[Floats, Floats] | None = None
+        """q_ref and qd_ref of the period that ends."""
+        self._v = np.zeros(3)
+        self._yielded = np.zeros(2)
+        self._ahead = np.zeros(2)
+
+    @property
+    def dq(self) -> Floats:
+        """By how much the joints are turned, shape (3,), rad."""
+        return np.concatenate([[0.0], self._yielded + self._ahead])
+
+    def step(self, dt: float, u: Readings, i: Floats, swing: Floats) -> bool:
+        """Find how to turn the joints; return whether at once.
+
+        Args:
+            dt: period, s.
+            u: what is wanted and measured.
+            i: smoothed currents, shape (3,), A.
+            swing: by how much those of joints 2 and 3 are off them, shape (2,), A.
+        """
+        G = self._model.inverse.jacobian(inputs_of(u.q_ref, u.p_meas, i))[1:, 5:]
+        self._yielded = self._yielded - dt * (self._K_D * (G @ swing) + self._yielded / _YIELD_TIME)
+        was = self._ahead
+        self._ahead = self._K_F * (G @ (i[1:] * self._weights(dt, u)))
+        return bool(np.any(was) or np.any(self._ahead))
+
+    def get_state(self) -> bytes:
+        """Return where on the path it is, its speed, and the turns."""
+        return pack_state((self._path, self._v, self._yielded, self._ahead))
+
+    def set_state(self, state: bytes) -> None:
+        """Restore a state of this compensation or of one with equal arguments."""
+        self._path, self._v, self._yielded, self._ahead = unpack_state(state)
+
+    def _weights(self, dt: float, u: Readings) -> Floats:
+        """Return by how much more of itself joints 2 and 3 carry, as the path's velocity changes, shape (2,)."""
+        k, q = self._model.kinematics, u.q_ref
+        v = self._velocity(u)
+        a, self._v, self._path = (v - self._v) / dt, v, (np.array(q), np.array(u.qd_ref))
+        outwards = a[0] * math.cos(q[0]) + a[1] * math.sin(q[0])
+        lengths, angles = np.array([k.L_2, k.L_3]), np.array([q[1], q[1] + q[2]])
+        x, z = (np.cumsum((lengths * of(angles))[::-1])[::-1] for of in (np.cos, np.sin))  # from each joint
+        slopes = z / np.where(np.abs(x) < _SHORTEST_LEVER, np.inf, x)
+        return (a[2] - outwards * slopes) / _GRAVITY
+
+    def _velocity(self, u: Readings) -> Floats:
+        """Return the path's velocity, shape (3,), m/s.
+
+        A speed with which q_ref does not change is no speed of the path: 0. Where both stay, a point holds for several
+        periods.
+        """
+        if self._path is None:
+            return np.zeros(3)
+        if np.any(u.q_ref != self._path[0]):
+            return self._model.kinematics.jacobian(u.q_ref) @ u.qd_ref
+        return self._v if np.array_equal(u.qd_ref, self._path[1]) else np.zeros(3)

@@ -1,0 +1,100 @@
+"""The tip along its path, point by point, from the records of runs: of each run, and of repetitions together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from handover.controllers.vsl.hybrid_kinematics import Params as KinematicsParams
+from handover.controllers.vsl.kinematics import VslKinematics
+from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
+
+
+@dataclass(frozen=True, kw_only=True)
+class PathTrace:
+    """Positions as the planner leaves each point of the path for the next, each of shape (n, 3), in W, m.
+
+    Attributes:
+        desired: the points.
+        tracked: the tip by the tracker.
+        servo: the tip by encoders and rigid links.
+        estimated: the tip by the controller's forward model.
+        commanded: where the commanded angles would put the tip of a rigid arm.
+    """
+
+    desired: Floats
+    tracked: Floats
+    servo: Floats
+    estimated: Floats
+    commanded: Floats
+
+    @property
+    def along(self) -> Floats:
+        """Distance along the path from its first point, shape (n,), m."""
+        return distances_along(self.desired)
+
+
+def distances_along(points: Floats) -> Floats:
+    """Return the distance of each of the points, shape (n, 3), from the first along the polyline, shape (n,), m."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def trace_of(record: Record) -> PathTrace:
+    """Return a run's trace; its points are those at which `PathEvaluator` measures the run's errors."""
+    goal, moving = record["planner.p_WG_goal"], record["planner.moving"].astype(bool)
+    left = moving[:-1] & ~(moving[1:] & np.all(goal[1:] == goal[:-1], axis=1))
+    ends = np.flatnonzero(left) + 1
+    p = KinematicsParams()
+    kinematics = VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
+    return PathTrace(
+        desired=goal[ends - 1],
+        tracked=record["arm.p_WG_meas"][ends],
+        servo=record["kinematics.p_WG_model"][ends],
+        estimated=record["kinematics.p_WG_est"][ends],
+        commanded=np.array([kinematics.forward(q) for q in record["kinematics.q_cmd"][ends - 1]]).reshape(-1, 3),
+    )
+
+
+def traces_of(runs: Path, names: Sequence[str]) -> list[PathTrace]:
+    """Return the traces of runs, given by the names of their folders, of those that left a record."""
+    records = [runs / name / "signals.parquet" for name in names]
+    return [trace_of(Record(path)) for path in records if path.exists()]
+
+
+@dataclass(frozen=True)
+class Repetitions:
+    """Mean and standard deviation of the positions of several runs along one path.
+
+    Attributes:
+        desired: the path's points, shape (n, 3), m.
+        mean: mean positions, shape (n, 3), m.
+        deviation: standard deviation of the positions, root of the sum of the axes' variances, shape (n,), m.
+        errors: distance from the desired point, of each run, shape (runs, n), m.
+    """
+
+    desired: Floats
+    mean: Floats
+    deviation: Floats
+    errors: Floats
+
+    @property
+    def along(self) -> Floats:
+        """Distance along the path from its first point, shape (n,), m."""
+        return distances_along(self.desired)
+
+    @classmethod
+    def of(cls, traces: Sequence[PathTrace], what: str) -> "Repetitions":
+        """Return them of a position of `PathTrace` by its name.
+
+        Raises:
+            ValueError: there are none, or their paths differ.
+        """
+        desired = traces[0].desired if traces else np.zeros((0, 3))
+        if not traces or any(not np.array_equal(t.desired, desired) for t in traces):
+            raise ValueError(f"{len(traces)} runs that do not share a path have no mean")
+        positions = np.array([getattr(t, what) for t in traces])
+        spread = np.sqrt(np.sum(np.var(positions, axis=0, ddof=min(1, len(traces) - 1)), axis=1))
+        errors = np.linalg.norm(positions - desired, axis=2)
+        return cls(desired, positions.mean(axis=0), spread, errors)

@@ -1,0 +1,90 @@
+"""The rule by which claims on errors get their verdicts: groups of runs that do not overlap, in every cell.
+
+It was laid down before the runs.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import comb, inf
+
+import numpy as np
+
+from handover.cosim.blocks.ports import Floats
+from handover.scenarios.campaign.statistics import LEVEL
+from handover.scenarios.published.published_experiment import Claim
+from handover.scenarios.published.verdicts import format_p_value, nothing_measured, verdict_of
+
+_NAMED = 5
+"""Comparisons that are named where a claim fails."""
+
+
+def chance_of(n: int) -> float:
+    """Return the exact p-value of the rank-sum test, two-sided, of two groups of n values that do not overlap."""
+    return 2.0 / comb(2 * n, n)
+
+
+MIN_RUNS = next(n for n in range(1, 64) if chance_of(n) < LEVEL)
+"""Runs of a group below which groups that do not overlap can be chance."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Errors of two groups of runs, of which the first are claimed to be less.
+
+    Attributes:
+        label: which groups, in words.
+        less, more: the errors, shapes (n,) and (m,), m.
+    """
+
+    label: str
+    less: Floats
+    more: Floats
+
+    @property
+    def margin(self) -> float:
+        """How far the groups are apart, m; negative where they overlap or are the other way round."""
+        return float(np.min(self.more) - np.max(self.less)) if self.runs else -inf
+
+    @property
+    def runs(self) -> int:
+        """Runs of the smaller group."""
+        return min(len(self.less), len(self.more))
+
+    @property
+    def holds(self) -> bool:
+        """Whether each of the first group errs less than each of the second."""
+        return self.margin > 0.0
+
+
+def separation_claim(
+    claim: str, where: str, published: str, comparisons: Sequence[Comparison], *, beyond: bool = False
+) -> Claim:
+    """Judge that, in all comparisons, each run of one group errs less than each run of the other.
+
+    Without enough runs of each group, it is not comparable.
+    """
+    found = [c for c in comparisons if c.runs]
+    if not found or len(found) < len(comparisons):
+        return nothing_measured(claim, where, published, beyond)
+    n, held = min(c.runs for c in found), sum(c.holds for c in found)
+    closest = min(found, key=lambda c: c.margin)
+    every = f"in each of the {len(found)} comparisons " if len(found) > 1 else ""
+    reason = f"{'Holds' if beyond else 'Reproduced'} if {every}each run of the one errs less than each of the other."
+    if every:
+        reason += " A mean over all could hide one that goes the other way."
+    if n < MIN_RUNS:
+        reason += f" With {n} {'runs' if n > 1 else 'run'} of each that can be chance: it takes {MIN_RUNS}."
+    else:
+        reason += f" By chance {n} runs of each part so with p = {format_p_value(chance_of(n))} (rank sums)."
+    if failing := [c.label for c in found if not c.holds]:
+        reason += f" It fails at: {'; '.join(failing[:_NAMED])}"
+        reason += f"; and {len(failing) - _NAMED} more." if len(failing) > _NAMED else "."
+    return Claim(
+        claim=claim,
+        published=published,
+        measured=f"{held} of {len(found)}; the closest {1000 * closest.margin:+.2f} mm apart ({closest.label})",
+        verdict=verdict_of(held == len(found), could_be_either=n >= MIN_RUNS),
+        reason=reason,
+        where=where,
+        beyond=beyond,
+    )

@@ -1,0 +1,159 @@
+"""Measured points of the VSL arm as a Parquet file: matrix D of [Gandarias2020] eq. (9), and where it comes from."""
+
+import json
+import math
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from handover.controllers.vsl.kinematics import VslKinematics
+from handover.scenarios.vsl.training_data import Dataset, Measured
+
+VERSION = 1
+
+_METADATA = b"handover-vsl-data"
+"""Key of the file's metadata that says, as JSON, which arm was measured and how."""
+
+_COLUMNS: Mapping[str, tuple[str, int]] = {
+    "p_WG": ("p_WG_meas", 3),
+    "p": ("p_meas", 2),
+    "i": ("i_meas", 3),
+    "q": ("q_meas", 3),
+    "q_cmd": ("q_cmd", 3),
+}
+"""By the matrix's parts: the arm's port, of which each entry is a column, in SI units; in the order of eq. (9)."""
+
+_ORDER = "order"
+
+
+class InvalidData(ValueError):
+    """A file of which no model can be trained; `path` is the file, `fault` says why."""
+
+    def __init__(self, path: Path, fault: str) -> None:
+        super().__init__(f"data {path}: {fault}; `handover vsl-train --save-data FILE` makes one")
+        self.path, self.fault = path, fault
+
+
+def write_data(path: Path, measured: Measured) -> None:
+    """Write points to a file that appears whole or not at all.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    columns: dict[str, Any] = {
+        name: values for part, (port, _) in _COLUMNS.items() for name, values in _entries(measured, part, port)
+    }
+    table: Any = pa.Table.from_pydict({**columns, _ORDER: measured.order})
+    metadata = {_METADATA: json.dumps({"version": VERSION, **measured.origin}, sort_keys=True).encode()}
+    handle, part = tempfile.mkstemp(dir=path.absolute().parent, prefix=f".{path.name}-")
+    os.close(handle)
+    try:
+        pq.write_table(table.replace_schema_metadata(metadata), part)
+        Path(part).chmod(0o644)
+        os.replace(part, path)
+    except BaseException:
+        Path(part).unlink(missing_ok=True)
+        raise
+
+
+def read_data(path: Path, key: str, kinematics: VslKinematics) -> Measured:
+    """Read points of an arm.
+
+    Args:
+        path: Parquet file.
+        key: hash of the arm's sources, see `content_key`.
+        kinematics: of rigid links, by which the arm was commanded.
+
+    Raises:
+        InvalidData: it cannot be read, is no Parquet file, lacks columns, has numbers that are not finite, or is of
+            another arm or other links.
+    """
+    try:
+        table: Any = pq.read_table(path)
+    except (OSError, pa.ArrowException) as e:
+        reason = str(e).strip().splitlines()[0] if str(e).strip() else type(e).__name__
+        raise InvalidData(path, f"it is no Parquet file that can be read: {reason}") from e
+    wanted = [*(f"{port}[{k + 1}]" for port, n in _COLUMNS.values() for k in range(n)), _ORDER]
+    if missing := [name for name in wanted if name not in table.column_names]:
+        raise InvalidData(path, f"it lacks the columns {', '.join(missing)}")
+    origin = _origin(path, table.schema.metadata or {})
+    _check_arm(path, origin, key, kinematics)
+    numbers = {name: _numbers(path, table, name) for name in wanted}
+    parts = {
+        part: np.column_stack([numbers[f"{port}[{k + 1}]"] for k in range(n)]) for part, (port, n) in _COLUMNS.items()
+    }
+    return Measured(Dataset(**parts), _order(path, numbers[_ORDER]), origin)
+
+
+def _entries(measured: Measured, part: str, port: str) -> list[tuple[str, Any]]:
+    values = getattr(measured.points, part)
+    return [(f"{port}[{k + 1}]", np.ascontiguousarray(values[:, k])) for k in range(values.shape[1])]
+
+
+def _origin(path: Path, metadata: Mapping[bytes, bytes]) -> dict[str, Any]:
+    """Return what the file says of its arm."""
+    if _METADATA not in metadata:
+        raise InvalidData(path, f"it does not say of which arm it is: no metadata {_METADATA.decode()!r}")
+    try:
+        origin: object = json.loads(metadata[_METADATA])
+    except ValueError as e:
+        raise InvalidData(path, f"its metadata {_METADATA.decode()!r} is not JSON: {e}") from e
+    content = cast("dict[str, Any]", origin) if isinstance(origin, dict) else {}
+    if content.pop("version", None) != VERSION:
+        raise InvalidData(path, f"its metadata {_METADATA.decode()!r} is not of version {VERSION}")
+    arm, links = content.get("arm"), content.get("links")
+    if not isinstance(arm, dict) or not isinstance(links, dict) or "seed" not in content or "walk" not in content:
+        raise InvalidData(path, f"its metadata {_METADATA.decode()!r} lacks arm, links, seed or walk")
+    if type(content["seed"]) is not int or content["seed"] < 0 or type(content["walk"]) is not bool:
+        raise InvalidData(path, f"its metadata {_METADATA.decode()!r} has a seed or walk of a wrong kind")
+    return content
+
+
+def _check_arm(path: Path, origin: Mapping[str, Any], key: str, kinematics: VslKinematics) -> None:
+    stated = origin["arm"].get("key")
+    if stated != key:
+        raise InvalidData(
+            path, f"it was measured on another arm: the hash of its sources is {str(stated)[:12]}, not {key[:12]}"
+        )
+    links = links_of(kinematics)
+    if dict(origin["links"]) != links:
+        raise InvalidData(path, f"it was measured with links of {_text(origin['links'])}, not {_text(links)}")
+
+
+def _text(links: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in links.items())
+
+
+def links_of(kinematics: VslKinematics) -> dict[str, Any]:
+    """Return lengths and elbow as plain data."""
+    k = kinematics
+    return {"L_1": k.L_1, "L_2": k.L_2, "L_3": k.L_3, "elbow": k.elbow.name}
+
+
+def _numbers(path: Path, table: Any, name: str) -> Any:
+    column = table.column(name)
+    if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
+        raise InvalidData(path, f"its column {name} holds {column.type}, not numbers")
+    if column.null_count:
+        raise InvalidData(path, f"its column {name} has {column.null_count} rows without a value")
+    values = np.asarray(column.to_numpy(), dtype=np.float64)
+    bad = np.flatnonzero(~np.isfinite(values))
+    if len(bad):
+        raise InvalidData(path, f"its column {name} is not finite in {len(bad)} rows, row {bad[0] + 1} first")
+    return values
+
+
+def _order(path: Path, values: Any) -> Any:
+    """Return the places in the split: -1, or each number from 0 once."""
+    places = np.sort(values[values != -1.0])
+    if not np.array_equal(places, np.arange(len(places))) or math.isnan(float(np.sum(places))):
+        raise InvalidData(
+            path, f"its column {_ORDER} must count the usable rows from 0, in any order, -1 for the others"
+        )
+    return values.astype(np.int64)

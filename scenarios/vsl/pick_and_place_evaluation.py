@@ -1,0 +1,124 @@
+"""Parameters of a pick and place, and its evaluation by ground truth; origins of the defaults are in `paper.toml`."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handover.controllers.vsl.pick_and_place import LEGS, Leg
+from handover.cosim.blocks.ports import Vector3, parameter
+from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
+from handover.cosim.system.signals import Signals
+from handover.plants.vsl.parameters import MAX_PRESSURE
+from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
+
+_TOUCHES = {"pick": (Leg.DESCEND, Leg.GRASP), "place": (Leg.LOWER, Leg.RELEASE)}
+"""Parts of the task in which something is touched."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PickAndPlaceParameters:
+    """One object that is picked up and put down."""
+
+    mass: Kilogram = parameter(0.05, "mass of the object", minimum=0.0, maximum=0.3)
+    pick: Vector3[Metre] = parameter(
+        np.array([0.30, 0.0, 0.06]), "top of the object at the start in W", minimum=-1.0, maximum=1.0
+    )
+    place: Vector3[Metre] = parameter(
+        np.array([0.36, 0.0, 0.06]), "where it is to be put down, likewise; as high as pick", minimum=-1.0, maximum=1.0
+    )
+    contact_pressure: Pascal = parameter(
+        5e4, "pressure in both links near contacts: 5e4 Pa is 0.5 bar", minimum=0.0, maximum=MAX_PRESSURE
+    )
+    carry_pressure: Pascal = parameter(
+        2e5, "pressure in both links while the arm lifts and carries", minimum=0.0, maximum=MAX_PRESSURE
+    )
+    contact_speed: MetrePerSecond = parameter(0.03, "speed at which the tip comes down", minimum=0.005, maximum=0.3)
+    speed: MetrePerSecond = parameter(0.1, "speed at which it lifts and carries", minimum=0.005, maximum=0.3)
+    hover: Metre = parameter(0.08, "how far above the object it travels", minimum=0.02, maximum=0.3)
+    press: Metre = parameter(0.008, "how far below the top it is commanded", minimum=0.0, maximum=0.05)
+    settle: Second = parameter(4.0, "time above the object before it comes down", minimum=0.0, maximum=600.0)
+    wait: Second = parameter(1.5, "time for pressures and the cup to follow", minimum=0.0, maximum=60.0)
+    tolerance: Metre = parameter(
+        0.01, "how far from its place the object may be for the run to count as a success", minimum=0.0, maximum=1.0
+    )
+
+    @property
+    def duration(self) -> float:
+        """Nominal duration of the task, s."""
+        down = self.hover + self.press
+        way = float(np.linalg.norm(self.place - self.pick))
+        return self.settle + 3.0 * self.wait + 2.0 * down / self.contact_speed + (2.0 * down + way) / self.speed
+
+    def faults(self) -> list[str]:
+        """Return what contradicts itself: one face carries the object at both places, and they differ."""
+        if self.pick[2] != self.place[2]:
+            return [f"place: its height, {self.place[2]:g} m, must be that of pick, {self.pick[2]:g} m"]
+        if np.array_equal(self.pick, self.place):
+            return ["place: it must be another than pick"]
+        return []
+
+
+class PickAndPlaceEvaluator(Evaluator):
+    """Follows one run: how hard the arm touches, how far it is from its goal while it carries, where the object is.
+
+    Attributes:
+        force: largest force of the face on the gripper or on what it holds, N, by touch.
+        carried_off: largest distance of the tip from its goal while it carries, m.
+    """
+
+    def __init__(self, parameters: PickAndPlaceParameters) -> None:
+        self.parameters = parameters
+        self.force = dict.fromkeys(_TOUCHES, 0.0)
+        self.carried_off = 0.0
+        self._t = 0.0
+        self._leg = 0
+        self._was_held = self._held = self._done = False
+        self._p_WO = np.array(parameters.pick)
+
+    def __call__(self, t: float, signals: Signals) -> None:
+        """Take in what is touched, carried and put down."""
+        self._t, self._leg = t, int(signals["planner.leg"])
+        self._held, self._done = bool(signals["gripper.held"]), bool(signals["planner.done"])
+        self._was_held = self._was_held or self._held
+        self._p_WO = np.array(signals["gripper.p_WO"])
+        for touch, legs in _TOUCHES.items():
+            if self._leg in legs:
+                self.force[touch] = max(self.force[touch], float(signals["arm.f_G"]))
+        if self._leg == Leg.CARRY:
+            off = float(np.linalg.norm(signals["arm.p_WG"] - signals["planner.p_WG_goal"]))
+            self.carried_off = max(self.carried_off, off)
+
+    @property
+    def over(self) -> bool:
+        """Whether the task has ended and the object lies."""
+        return self._done and abs(float(self._p_WO[2] - self.parameters.place[2])) < self.parameters.tolerance
+
+    @property
+    def place_error(self) -> float:
+        """Horizontal distance of the object from where it is to be put down, m."""
+        return float(np.hypot(*(self._p_WO - self.parameters.place)[:2]))
+
+    def outcome(self) -> Outcome:
+        """Return whether the object lies where it is to lie."""
+        put_down = self.over and self._was_held and not self._held
+        success = put_down and self.place_error <= self.parameters.tolerance
+        return Outcome(success=success, reason=self._reason(put_down), metrics=self._metrics())
+
+    def _reason(self, put_down: bool) -> str:
+        if put_down:
+            forces = f"touched with {self.force['pick']:.2f} N and {self.force['place']:.2f} N"
+            return f"the object lies {1000 * self.place_error:.1f} mm from its place; {forces}"
+        if self._done:
+            return "the object was never picked up" if not self._was_held else "the object did not come to rest"
+        held = "with the object" if self._held else "without the object"
+        return f"stopped at {self._t:.1f} s as it was to {LEGS[self._leg]}, {held}"
+
+    def _metrics(self) -> dict[str, Metric]:
+        what = "largest force as the tip comes down to"
+        return {
+            "pick_force": Metric(self.force["pick"], "N", f"{what} the object"),
+            "place_force": Metric(self.force["place"], "N", f"{what} put it down"),
+            "place_error": Metric(self.place_error, "m", "horizontal distance of the object from its place at the end"),
+            "carry_error": Metric(self.carried_off, "m", "largest distance of the tip from its goal while it carries"),
+            "picked_up": Metric(float(self._was_held), "1", "whether the object was picked up"),
+        }

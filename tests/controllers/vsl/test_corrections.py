@@ -1,0 +1,151 @@
+"""What the kinematics remember: currents with a window, the tracker's loop, what is done against swings."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handover.controllers.vsl import default_model, default_window_model
+from handover.controllers.vsl.corrections import CurrentFilter, SwingCompensation, TrackerLoop
+from handover.controllers.vsl.fit import directions_of
+from handover.controllers.vsl.hybrid_kinematics import Inputs
+from handover.controllers.vsl.learned_model import turned
+from handover.controllers.vsl.model_text import parse_model
+from handover.cosim.blocks.ports import Floats
+
+WINDOW = parse_model(default_window_model.DEFAULT_MODEL, "that ships")
+MODEL = parse_model(default_model.DEFAULT_MODEL, "that ships")
+ARM = MODEL.kinematics
+Q = ARM.inverse(np.array([0.35, 0.0, 0.15]))
+P = np.array([1e5, 1e5])
+
+
+def reading(q: Floats = Q, **given: Any) -> Inputs:
+    usual, _ = WINDOW.currents(q, P)
+    u = Inputs(q_ref=q, qd_ref=np.zeros(3), q_meas=q, p_meas=P, i_meas=np.array([0.0, *usual]), p_WG_meas=ARM.forward(q))
+    return dataclasses.replace(u, **given)
+
+
+@given(st.lists(st.floats(-0.01, 0.01), max_size=20), st.floats(1e-4, 0.01))
+def test_the_direction_stays_within_one_and_follows_a_long_turn(turns: list[float], reversal: float):
+    direction = np.zeros(1)
+    for turn in turns:
+        direction = turned(direction, np.array([turn]), reversal)
+        assert -1.0 <= direction[0] <= 1.0
+    assert turned(direction, np.array([reversal]), reversal)[0] == 1.0
+    assert turned(direction, np.array([-reversal]), reversal)[0] == -1.0
+    assert turned(direction, np.zeros(1), reversal)[0] == direction[0]
+
+
+def test_directions_of_commands_are_those_one_after_another():
+    q = np.array([[0.0, 0.0], [0.1, -0.1], [0.1, -0.0995], [0.0, 0.0]])
+    np.testing.assert_allclose(directions_of(q, 0.002), [[0.0, 0.0], [1.0, -1.0], [1.0, -0.5], [-1.0, 1.0]])
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_a_window_frees_currents_of_friction(direction: float):
+    friction = np.array(WINDOW.friction)
+    assert np.all(friction > 0.02)
+    unit = CurrentFilter(WINDOW, 0.2, 0.002)
+    unit.turn(np.array([0.0, 1.0, 1.0]) * direction)
+    clean = reading()
+    sliding = reading(i_meas=clean.i_meas + np.array([0.3, *(direction * friction)]))
+    np.testing.assert_allclose(unit.step(sliding, 0.02)[1:], clean.i_meas[1:], atol=1e-12)
+    np.testing.assert_allclose(unit.swing(sliding, clean.i_meas), 0.0, atol=1e-12)
+
+
+def test_what_a_load_adds_does_not_lag_behind_the_posture():
+    """A load of constant mass adds its levers to the usual currents: in any posture, at once."""
+    unit, plain = CurrentFilter(WINDOW, 0.2, 0.002), CurrentFilter(None, 0.2, 0.002)
+    worst, worst_plain = 0.0, 0.0
+    for k in range(60):
+        q = ARM.inverse(np.array([0.30 + 0.0015 * k, 0.0, 0.15]))
+        usual, levers = WINDOW.currents(q, P)
+        u = reading(q, i_meas=np.array([0.0, *(usual + 0.3 * levers)]))
+        worst = max(worst, float(np.max(np.abs(unit.step(u, 0.02) - u.i_meas))))
+        worst_plain = max(worst_plain, float(np.max(np.abs(plain.step(u, 0.02) - u.i_meas))))
+    assert worst < 1e-9
+    assert worst_plain > 0.05
+
+
+def test_a_change_of_load_is_smoothed_by_two_lags():
+    unit = CurrentFilter(WINDOW, 0.2, 0.002)
+    unit.step(reading(), 0.02)
+    _, levers = WINDOW.currents(Q, P)
+    heavier = reading(i_meas=reading().i_meas + np.array([0.0, *(0.4 * levers)]))
+    shares = [float((unit.step(heavier, 0.02) - reading().i_meas)[1] / (0.4 * levers[0])) for _ in range(100)]
+    t = 0.02 * np.arange(1, 101)
+    np.testing.assert_allclose(shares, 1.0 - (1.0 + t / 0.2) * np.exp(-t / 0.2), atol=0.05)
+
+
+def closed(error: Floats, seconds: float, **given: float) -> Floats:
+    """Return where the tip of a rigid arm is that is off by an error, after the loop was closed for a while."""
+    params = {"rate": 30.0, "lag": 0.2, "K_I": 2.0, "limit": 0.2} | given
+    loop = TrackerLoop(ARM, None, **params)
+    before = Q, Q
+    for k in range(round(seconds / 0.02)):
+        at = ARM.forward(Q + loop.dq) + error
+        loop.step(k * 0.02, reading(p_WG_meas=at), np.zeros(3), before)
+    return ARM.forward(Q + loop.dq) + error
+
+
+def test_the_loop_takes_the_tips_error_away():
+    error = np.array([-0.01, 0.005, -0.02])
+    np.testing.assert_allclose(closed(error, 6.0), ARM.forward(Q), atol=1e-4)
+    left = np.linalg.norm(closed(error, 0.5) - ARM.forward(Q)) / np.linalg.norm(error)
+    assert 0.2 < left < 0.8
+
+
+def test_the_loop_takes_each_reading_once():
+    loop = TrackerLoop(ARM, None, 10.0, 0.0, 2.0, 0.2)
+    off = reading(p_WG_meas=ARM.forward(Q) - np.array([0.0, 0.0, 0.01]))
+    seen: list[float] = []
+    for k in range(11):
+        loop.step(k * 0.02, off, np.zeros(3), (Q, Q))
+        seen.append(float(loop.dq[1]))
+    assert seen[0] == seen[4] < seen[5] == seen[9] < seen[10]
+
+
+def test_the_loop_rests_while_joints_are_on_their_way_and_stays_within_its_limit():
+    loop = TrackerLoop(ARM, None, 30.0, 0.0, 20.0, 0.05)
+    far = reading(p_WG_meas=ARM.forward(Q) - np.array([0.0, 0.0, 0.2]))
+    loop.step(0.0, far, np.zeros(3), (Q, Q + np.array([0.0, 0.1, 0.0])))
+    loop.step(0.1, far, np.zeros(3), None)
+    np.testing.assert_array_equal(loop.dq, np.zeros(3))
+    for k in range(40):
+        loop.step(0.2 + 0.05 * k, far, np.zeros(3), (Q, Q))
+    assert np.max(np.abs(loop.dq)) == 0.05
+
+
+def test_a_velocity_that_begins_is_commanded_ahead_once():
+    unit, i = SwingCompensation(MODEL, 0.6, 0.0), reading().i_meas
+    v_up = ARM.joint_velocities(Q, np.array([0.0, 0.0, 0.2]))
+    off_the_path = np.array([0.8, 0.8, 0.8])
+    for _ in range(8):
+        assert not unit.step(0.02, reading(qd_ref=off_the_path), i, np.zeros(2))
+    q = [Q + 0.02 * k * v_up for k in range(4)]
+    assert unit.step(0.02, reading(q[1], qd_ref=v_up), i, np.zeros(2))
+    assert unit.dq[1] > 0.01  # upwards: the links will bend downwards
+    unit.step(0.02, reading(q[2], qd_ref=v_up), i, np.zeros(2))
+    np.testing.assert_allclose(unit.dq, 0.0, atol=2e-3)
+    unit.step(0.02, reading(q[2], qd_ref=v_up), i, np.zeros(2))  # the same point for a further period
+    np.testing.assert_array_equal(unit.dq, np.zeros(3))
+    unit.step(0.02, reading(q[2], qd_ref=off_the_path), i, np.zeros(2))  # the path has ended
+    assert unit.dq[1] < -0.01
+    assert unit.step(0.02, reading(q[2], qd_ref=off_the_path), i, np.zeros(2))  # back, and as fast as it came
+    np.testing.assert_array_equal(unit.dq, np.zeros(3))
+    assert not unit.step(0.02, reading(q[2], qd_ref=off_the_path), i, np.zeros(2))
+
+
+def test_joints_yield_to_a_swing_and_come_back():
+    unit, i = SwingCompensation(MODEL, 0.0, 4.0), reading().i_meas
+    for _ in range(3):
+        unit.step(0.02, reading(), i, np.array([0.1, 0.0]))
+    down = float(unit.dq[1])
+    assert down < -1e-4  # more current: the links bend downwards, and the joint follows
+    for _ in range(100):
+        unit.step(0.02, reading(), i, np.zeros(2))
+    assert abs(float(unit.dq[1])) < 0.01 * abs(down)

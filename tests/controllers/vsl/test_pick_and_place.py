@@ -1,0 +1,81 @@
+"""The pick and place's planner: which part of the task comes when, how soft, and what it refuses."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from handover.controllers.vsl.kinematics import Elbow, VslKinematics
+from handover.controllers.vsl.pick_and_place import LEGS, Inputs, InvalidTask, Leg, Outputs, Params, PickAndPlace
+
+SHORT = Params(settle=0.1, wait=0.1)
+
+
+def task(params: Params, at_most: int = 3000) -> list[Outputs]:
+    """Return what it commands in each period until it is done, and once more."""
+    unit, ys = PickAndPlace(params), list[Outputs]()
+    while len(ys) < at_most and not (ys and ys[-1].done):
+        ys.append(unit.step(0.02 * len(ys), 0.02, Inputs()))
+    return ys
+
+
+def test_the_parts_come_in_their_order_with_their_pressures_and_vacuum():
+    ys = task(SHORT)
+    legs = [y.leg for y in ys]
+    assert sorted(legs) == legs
+    assert list(dict.fromkeys(legs)) == list(range(len(LEGS)))
+    stiff = {LEGS[y.leg] for y in ys if y.p_cmd[0] == SHORT.p_carry}
+    assert stiff == {"lift", "carry"}
+    assert {LEGS[y.leg] for y in ys if y.vacuum} == {"grasp", "lift", "carry", "soften", "lower"}
+    assert all(y.p_cmd[0] in (SHORT.p_contact, SHORT.p_carry) for y in ys)
+
+
+def test_the_tip_goes_at_its_speeds_by_the_joint_velocities_to_where_it_is_wanted():
+    p, ys = SHORT, task(SHORT)
+    kinematics = VslKinematics(p.L_1, p.L_2, p.L_3, Elbow.UP)
+    for y in ys:
+        np.testing.assert_allclose(kinematics.forward(y.q_ref), y.p_WG_goal, atol=1e-12)
+    for before, y in pairwise(ys):
+        moved = np.linalg.norm(y.p_WG_goal - before.p_WG_goal) / 0.02
+        if y.leg == before.leg and y.leg in (Leg.DESCEND, Leg.LOWER):
+            assert moved == pytest.approx(p.V_contact, rel=0.01)
+        elif y.leg == before.leg and y.leg in (Leg.LIFT, Leg.CARRY, Leg.LEAVE):
+            assert moved == pytest.approx(p.V, rel=0.02)
+            np.testing.assert_allclose(y.qd_ref * 0.02, y.q_ref - before.q_ref, atol=2e-4)
+    lowest = [y.p_WG_goal for y in ys if y.leg in (Leg.GRASP, Leg.RELEASE)]
+    np.testing.assert_allclose(lowest[0], p.p_WP - [0.0, 0.0, p.press])
+    np.testing.assert_allclose(lowest[-1], p.p_WQ - [0.0, 0.0, p.press])
+
+
+def test_it_waits_above_the_object_until_it_may_go():
+    unit = PickAndPlace(SHORT)
+    for k in range(50):
+        y = unit.step(0.02 * k, 0.02, Inputs(go=False))
+        assert (y.leg, y.vacuum) == (Leg.SETTLE, False)
+    assert unit.step(1.0, 0.02, Inputs()).leg == Leg.DESCEND
+    assert unit.step(1.02, 0.02, Inputs(go=False)).leg == Leg.DESCEND
+
+
+def test_a_restored_state_goes_on_bit_for_bit():
+    one, other = PickAndPlace(SHORT), PickAndPlace(SHORT)
+    for k in range(60):
+        one.step(0.02 * k, 0.02, Inputs())
+    other.set_state(one.get_state())
+    for k in range(100):
+        a, b = (unit.step(0.02 * k, 0.02, Inputs()) for unit in (one, other))
+        np.testing.assert_array_equal(a.q_ref, b.q_ref)
+        assert (a.leg, a.vacuum) == (b.leg, b.vacuum)
+
+
+@pytest.mark.parametrize(
+    ("params", "fault"),
+    [
+        (replace(SHORT, p_WQ=np.array([0.6, 0.0, 0.06])), r"carry: the elbow is stretched.*lower: .*out of reach"),
+        (replace(SHORT, p_WQ=SHORT.p_WP), r"carry: it has no length"),
+        (replace(SHORT, wait=-1.0), r"wait: -1\.0 is out of range"),
+    ],
+)
+def test_a_task_that_cannot_be_done_is_refused_with_all_faults(params: Params, fault: str):
+    with pytest.raises(InvalidTask, match=fault):
+        PickAndPlace(params)

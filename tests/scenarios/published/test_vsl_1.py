@@ -1,0 +1,142 @@
+"""The experiment `vsl-1`: its plan, and how claims and tables are judged, on tables that a test makes up."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from handover.controllers.vsl.paths import Path as TipPath
+from handover.scenarios.campaign.plan_check import checked_plan
+from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.published.published_experiment import Claim, Verdict
+from handover.scenarios.published.vsl.separation import MIN_RUNS, Comparison, chance_of, separation_claim
+from handover.scenarios.published.vsl.vsl_1 import Vsl1
+from handover.scenarios.published.vsl.vsl_1_runs import RIGID, SOFT, Cell, Vsl1Runs
+
+Error = Callable[[Mapping[str, str]], float]
+
+
+def usual(given: Mapping[str, str]) -> float:
+    """Error that grows with the load and falls with pressure, m."""
+    if given["links"] == "rigid":
+        return 0.004 + 0.01 * float(given["load"])
+    return (0.02 + 0.1 * float(given["load"])) / (0.5 + 1e-5 * float(given["pressure"]))
+
+
+def table_of(error: Error = usual, quick: bool = False, far: float = 2.0, status: str = "done") -> CampaignTable:
+    """Return the plan's runs with made-up errors, 0.01 mm apart; far from the base `far` times those near."""
+    rows: list[dict[str, Any]] = []
+    for run in Vsl1().plan(quick).runs():
+        given, size = run.parameters, error(run.parameters) + 1e-5 * run.repetition
+        row: dict[str, Any] = {"run": run.name, "status": status, "path": given["path"], "links": given["links"]}
+        row |= {"load": float(given["load"]), "pressure": float(given["pressure"]) if "pressure" in given else None}
+        spread = given["path"] != "linear"
+        row |= {"error_near": size if spread else None, "error_far": far * size if spread else None}
+        rows.append(row | {"mean_error": size, "servo_error": 0.001})
+    return CampaignTable(pa.Table.from_pylist(rows))
+
+
+def claims_of(table: CampaignTable) -> dict[str, Claim]:
+    return {claim.claim.split(":")[-1].strip(): claim for claim in Vsl1().claims(table)}
+
+
+SOFT_LOAD = "On soft links the tip's error grows with the load."
+PRESSURE = "The lower the pressure, the larger the tip's error."
+
+
+def test_the_plan_has_every_panel_and_plot_of_figure_5_five_times():
+    plan = checked_plan(Vsl1().plan(quick=False))
+    assert (len(plan.points), plan.size) == (3 * 5 * 5, 375)
+    assert Vsl1().plan(quick=True).size == 3 * 2 * 3
+
+
+def test_a_claim_is_judged_in_every_cell():
+    claims = claims_of(table_of())
+    assert claims[SOFT_LOAD].verdict is Verdict.REPRODUCED
+    assert claims[SOFT_LOAD].measured.startswith("48 of 48")
+    assert claims["the arm yields a little."].measured.startswith("12 of 12")
+    assert claims["on the square."].measured.startswith("25 of 25")
+    assert claims["on the curve, too."].beyond
+
+    def one_cell(given: Mapping[str, str]) -> float:
+        odd = given == Cell(TipPath.SQUARE, 0.05, SOFT[1]).parameters
+        return usual(given) - (0.01 if odd else 0.0)
+
+    broken = claims_of(table_of(one_cell))[SOFT_LOAD]
+    assert broken.verdict is Verdict.NOT_REPRODUCED
+    assert broken.measured.startswith("47 of 48")
+    assert "It fails at: square, 1 bar, 25 g to 50 g." in broken.reason
+
+
+def test_what_the_arm_was_made_for_is_not_comparable_and_still_counted():
+    claims = claims_of(table_of())
+    without = [c for c in claims.values() if c.verdict is Verdict.NOT_COMPARABLE]
+    assert {c.claim for c in without} == {
+        PRESSURE,
+        "On soft links the tip errs more than on rigid ones.",
+        "The path by the servos' encoders is similar to the desired one: nearer than the rigid arm's tip.",
+    }
+    assert all("so agreement proves nothing" in c.reason for c in without)
+    assert claims[PRESSURE].measured.startswith("45 of 45")
+    stiff = claims_of(table_of(lambda given: 0.02 + 0.1 * float(given["load"])))
+    assert stiff[PRESSURE].measured.startswith("0 of 45")
+
+
+def test_a_nearer_tip_that_errs_more_breaks_the_claim_on_reach():
+    assert claims_of(table_of(far=0.5))["on the square."].verdict is Verdict.NOT_REPRODUCED
+
+
+def test_of_the_quick_plan_nothing_is_concluded():
+    claims = Vsl1().claims(table_of(quick=True))
+    assert {c.verdict for c in claims} == {Verdict.NOT_COMPARABLE}
+    assert "it takes 4" in claims[0].reason
+
+
+def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(tmp_path: Path):
+    table = table_of(status="failed")
+    assert {c.verdict for c in Vsl1().claims(table)} == {Verdict.NOT_COMPARABLE}
+    assert "375 runs did not come to their end" in Vsl1().tables(table)[0].note
+    assert not Vsl1().draw(table, tmp_path, tmp_path)
+
+
+def test_tables_have_a_cell_for_each_of_the_figures():
+    linear, curve, square, reach = Vsl1().tables(table_of())
+    assert linear.header == ["load", "servos", "rigid", "0.5 bar", "1 bar", "1.5 bar", "2 bar"]
+    assert [cell.replace("\u00a0", " ") for cell in linear.rows[0]] == [
+        "0 g",
+        "1.0 ± 0.00",
+        "4.0 ± 0.02",
+        "20.0 ± 0.02",
+        "13.4 ± 0.02",
+        "10.0 ± 0.02",
+        "8.0 ± 0.02",
+    ]
+    assert [len(t.rows) for t in (linear, curve, square, reach)] == [5, 5, 5, 10]
+    assert reach.rows[0][:2] == ["square, 0 g", "4.0 to 8.0"]
+
+
+def test_a_cells_runs_are_its_own():
+    runs = Vsl1Runs(table_of())
+    cells = [
+        Cell(path, load, links)
+        for path in (TipPath.CURVE, TipPath.SQUARE)
+        for load in runs.loads
+        for links in (RIGID, *SOFT)
+    ]
+    names = [name for cell in cells for name in runs.names(cell)]
+    assert len(set(names)) == len(names) == 2 * 5 * 5 * 5
+
+
+def test_groups_that_overlap_do_not_hold_and_few_runs_decide_nothing():
+    assert chance_of(5) == pytest.approx(2 / 252)
+    assert chance_of(MIN_RUNS) < 0.05 < chance_of(MIN_RUNS - 1)
+    low, high = np.array([1.0, 2.0, 3.0, 4.0, 5.0]), np.array([4.5, 6.0, 7.0, 8.0, 9.0])
+    assert not Comparison("overlapping", low, high).holds
+    assert Comparison("apart", low, high + 1.0).margin == pytest.approx(0.5)
+    apart = Comparison("apart", low[:3], high[:3] + 1.0)
+    assert separation_claim("c", "", "", [apart]).verdict is Verdict.NOT_COMPARABLE
+    none = Comparison("none", np.zeros(0), high)
+    assert separation_claim("c", "", "", [apart, none]).measured == ""

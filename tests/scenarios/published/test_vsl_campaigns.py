@@ -1,0 +1,56 @@
+"""Small campaigns of real runs of the VSL arm's experiments."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from in_process_pool import InProcessPool
+
+from handover.controllers.vsl.paths import Path as TipPath
+from handover.cosim.record.reader import Record
+from handover.scenarios.campaign.campaign import run_campaign
+from handover.scenarios.campaign.folder import CampaignFolder
+from handover.scenarios.campaign.plan_check import prepared
+from handover.scenarios.published.published_experiment import draw_figures
+from handover.scenarios.published.vsl.path_traces import PathTrace, Repetitions, trace_of
+from handover.scenarios.published.vsl.vsl_1 import Vsl1
+from handover.scenarios.published.vsl.vsl_1_runs import RIGID, SOFT, Cell, Vsl1Runs
+
+
+def test_a_trace_is_what_the_run_was_judged_by(tmp_path: Path):
+    plan = Vsl1().plan(quick=True)
+    cells = [Cell(TipPath.CURVE, 0.1, links) for links in (RIGID, SOFT[0])]
+    folder = CampaignFolder(tmp_path / "c")
+    few = prepared(replace(plan, points=[cell.parameters for cell in cells]))
+    table = run_campaign(few, folder, InProcessPool(), lambda _tally: None)
+    runs = Vsl1Runs(table)
+    for cell in cells:
+        (name,) = runs.names(cell)
+        trace = trace_of(Record(folder.runs / name / "signals.parquet"))
+        assert len(trace.desired) == 200
+        assert np.linalg.norm(trace.tracked - trace.desired, axis=1).mean() == pytest.approx(
+            runs.metric("mean_error", cell)[0], rel=1e-9
+        )
+        assert np.linalg.norm(trace.servo - trace.desired, axis=1).mean() == pytest.approx(
+            runs.metric("servo_error", cell)[0], rel=1e-9
+        )
+        assert trace.along[-1] == pytest.approx(0.1 * np.pi, rel=0.01)
+        assert trace.commanded == pytest.approx(trace.desired, abs=1e-9)  # by rigid kinematics nothing is compensated
+    figures = draw_figures(Vsl1(), table, folder.runs, folder.figures)
+    assert [f.name for f in figures] == ["paths", "errors_along"]
+    assert all((folder.figures / f"{f.name}.png").exists() for f in figures)
+
+
+def test_repetitions_have_the_mean_and_deviation_of_their_runs():
+    desired = np.array([[0.3, 0.0, 0.1], [0.3, 0.0, 0.2]])
+
+    def shifted(by: float) -> PathTrace:
+        return PathTrace(desired=desired, tracked=desired + by, servo=desired, estimated=desired, commanded=desired)
+
+    curve = Repetitions.of([shifted(0.001), shifted(0.003)], "tracked")
+    assert curve.mean == pytest.approx(desired + 0.002)
+    assert curve.deviation == pytest.approx(np.full(2, np.sqrt(3.0) * np.sqrt(2.0) * 0.001))
+    assert curve.errors == pytest.approx(np.sqrt(3.0) * np.array([[0.001, 0.001], [0.003, 0.003]]))
+    with pytest.raises(ValueError, match="0 runs"):
+        Repetitions.of([], "tracked")

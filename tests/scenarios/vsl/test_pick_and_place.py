@@ -1,0 +1,63 @@
+"""The scenario `vsl_pick_and_place`: an object is carried to its place, touched more softly by softer links."""
+
+import pathlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli
+from flyer_runs import metric, run
+from parameter_origins import assert_every_default_has_its_origin
+
+import handover.scenarios.vsl
+from handover.controllers.vsl.pick_and_place import Leg, Params
+from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.parameters import InvalidParameter
+from handover.scenarios.vsl.pick_and_place import VslPickAndPlace
+from handover.scenarios.vsl.pick_and_place_evaluation import PickAndPlaceParameters
+
+
+def test_defaults_have_their_origins_and_the_planner_those_of_the_scenario():
+    file = pathlib.Path(handover.scenarios.vsl.__file__).parent / "paper.toml"
+    paper = tomli.loads(file.read_text(encoding="utf-8"))
+    assert_every_default_has_its_origin(paper["pick_and_place"], PickAndPlaceParameters)
+    assert_every_default_has_its_origin(paper["task"], Params)
+    names = {"pick": "p_WP", "place": "p_WQ", "speed": "V", "contact_speed": "V_contact"}
+    names |= {"contact_pressure": "p_contact", "carry_pressure": "p_carry"}
+    names |= {name: name for name in ("hover", "press", "settle", "wait")}
+    for ours, theirs in names.items():
+        assert np.array_equal(getattr(PickAndPlaceParameters(), ours), getattr(Params(), theirs)), ours
+
+
+@pytest.mark.parametrize(
+    ("given", "fault"),
+    [
+        ({"place": np.array([0.36, 0.0, 0.1])}, "its height, 0.1 m, must be that of pick, 0.06 m"),
+        ({"place": PickAndPlaceParameters().pick}, "it must be another than pick"),
+    ],
+)
+def test_places_that_contradict_each_other_are_refused(given: dict[str, np.ndarray], fault: str):
+    with pytest.raises(InvalidParameter, match=fault):
+        VslPickAndPlace().build(PickAndPlaceParameters(**given), 0, lambda _unit: Path("none.fmu"))
+
+
+def test_it_carries_an_object_to_its_place_and_touches_more_softly_with_softer_links(tmp_path: Path):
+    soft = run(VslPickAndPlace, tmp_path / "soft", drawn=True)
+    stiff = run(VslPickAndPlace, tmp_path / "stiff", "contact_pressure=2e5")
+    assert soft.outcome.success, soft.outcome.reason
+    assert metric(soft, "place_error") < 0.005
+    assert 0.1 < metric(soft, "pick_force") < metric(stiff, "pick_force")
+    assert metric(soft, "carry_error") < 0.01
+    record = Record(tmp_path / "soft" / "signals.parquet")
+    leg, held, pressure = record["planner.leg"], record["gripper.held"], record["arm.p_meas"][:, 0]
+    assert not held[leg < Leg.GRASP].any()
+    assert held[leg == Leg.CARRY].all()
+    assert pressure[leg == Leg.CARRY].min() > 1.8e5
+    assert pressure[leg == Leg.LOWER].max() < 0.6e5
+    assert (tmp_path / "soft" / "report.html").exists()
+
+
+def test_an_object_that_is_too_heavy_for_the_cup_is_never_picked_up(tmp_path: Path):
+    ended = run(VslPickAndPlace, tmp_path / "r", "mass=0.3", "gripper.suction=1.0", "settle=1", "wait=0.3")
+    assert not ended.outcome.success
+    assert ended.outcome.reason == "the object was never picked up"
