@@ -2,10 +2,21 @@
 
 import math
 from bisect import bisect_left
+from functools import lru_cache
 
 from handover.cosim.blocks.block import InvalidParameters
 
 _TOP = 4095  # of a 12-bit converter
+
+
+def _distance(a: float, b: float, c: float, d: float, ticks: float) -> float:
+    return a * math.exp(b * ticks) + c * math.exp(d * ticks)
+
+
+@lru_cache(maxsize=16)  # fingers share their constants, and a scene makes its sensors twice: to check them, and to read
+def _nearness(a: float, b: float, c: float, d: float) -> tuple[float, ...]:
+    """Return less distance, in m, by ticks: it rises, for bisection."""
+    return tuple(-_distance(a, b, c, d, float(x)) for x in range(_TOP + 1))
 
 
 class InvalidSensorParameters(InvalidParameters):
@@ -52,14 +63,14 @@ class InfraredSensor:
         self._a, self._b, self._c, self._d = a, b, c, d
         self._nearest, self._farthest = nearest, farthest
         self._contact, self._exponent = contact, exponent
-        self._nearness = [-self.distance(float(x)) for x in range(_TOP + 1)]  # rises with the ticks, for bisection
+        self._nearness = _nearness(a, b, c, d)
         if faults := [*self._shape_faults(), *self._range_faults()]:
             raise InvalidSensorParameters(faults)
         self._brightest = self._inverse(nearest)
 
     def distance(self, ticks: float) -> float:
         """Return the distance in m that the characteristic gives for ticks, eq. (11)."""
-        return self._a * math.exp(self._b * ticks) + self._c * math.exp(self._d * ticks)
+        return _distance(self._a, self._b, self._c, self._d, ticks)
 
     def ticks(
         self, distance: float, cosine: float, reflectivity: float, gloss: float = 0.0, lobe: float = 1.0

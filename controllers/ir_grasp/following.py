@@ -66,6 +66,9 @@ class Following:
         self._before: Doing = Doing.SEARCH
         self._settled, self._lost, self._pushed, self._path = 0.0, 0.0, 0.0, 0.0
         self._saw = [False] * 3
+        self._along, self._then = 0.0, math.nan  # way ahead since the distance of the side that sees was another
+        self._around: list[tuple[float, float]] = []  # corners of a way around what went along, in W
+        self._rounded = 0
         self._ticks_seen, self._ticks_lost = (self._calibration.ticks(y) for y in (params.epsilon, params.distance_max))
 
     @property
@@ -105,6 +108,8 @@ class Following:
     def advance(self, x: X, command: X) -> tuple[X, Ending]:
         """Return the command of the coming period, and whether the correction ends here."""
         p = self._params
+        if self._around:
+            return self._go_around(command), Ending.NONE
         if not any(self._saw) and (not self._front or self._lost > p.lost_time):
             self.doing = Doing.SEARCH
             goal = self._search.advance(command, self._dt)
@@ -116,6 +121,9 @@ class Following:
         both = all(self._saw[i] for i in self._in_cost)
         self.doing = Doing.TRACK if both else Doing.ONE_SIDED
         self.rounds += both
+        if not both and not deep and self._goes_along(x):
+            self._begin_around(x)
+            return self._go_around(command), Ending.NONE
         u = self._centering(feed, deep) if both else self._one_sided(feed, deep)
         over = float(np.max(np.abs(u) / p.speed_limit))
         u = u / over if over > 1.0 else u
@@ -127,6 +135,42 @@ class Following:
         made = c * (goal[0] - command[0]) + s * (goal[1] - command[1])
         stuck = float(u[0]) > 0.02 and made < 0.1 * self._dt * float(u[0])
         return (*goal.tolist(), sigma), self._ending(u, left, stuck)
+
+    def _goes_along(self, x: X) -> bool:
+        """Whether the hand goes ahead and what one side alone sees stays as far off: a fingertip pushes it.
+
+        Pushed along its length a finger does not bend, so the tendon does not show it.
+        """
+        p, d = self._params, self._filter.distances
+        seen = float(np.nanmin(np.where(self._saw, d, math.nan))) if any(self._saw) else math.nan
+        position = math.cos(p.yaw_pregrasp) * x[0] + math.sin(p.yaw_pregrasp) * x[1]
+        if not abs(seen - self._then) < p.along_change:
+            self._along, self._then = position, seen
+        return self._rounded < p.along_most and position - self._along > p.along_limit
+
+    def _begin_around(self, x: X) -> None:
+        """Plan the way back, then across to the side that sees it."""
+        p, (c, s) = self._params, (math.cos(x[2]), math.sin(x[2]))
+        side = -p.along_across if self._saw[0] else p.along_across
+        back = (x[0] - c * p.along_back, x[1] - s * p.along_back)
+        corners = np.clip([back, (back[0] - s * side, back[1] + c * side)], self._low[:2], self._high[:2])
+        self._around = [(float(a), float(b)) for a, b in corners]
+        self._rounded += 1
+        self._front, self._then = (), math.nan
+
+    def _go_around(self, command: X) -> X:
+        """Return the command of the coming period on that way."""
+        goal, way = self._around[0], self._params.search_speed * self._dt
+        away = math.dist(goal, command[:2])
+        self.doing = Doing.ONE_SIDED
+        if away <= way:
+            self._around.pop(0)
+            return (*goal, *command[2:])
+        return (
+            command[0] + way * (goal[0] - command[0]) / away,
+            command[1] + way * (goal[1] - command[1]) / away,
+            *command[2:],
+        )
 
     def _centering(self, feed: float, deep: bool) -> Floats:
         """Return rates of [ahead, left, yaw, sigma] that bring both fingers of the cost to one distance.
@@ -191,13 +235,18 @@ class Following:
         """Return estimates, search, what was seen, and counters."""
         did = (int(self.doing), int(self._before), self.rounds)
         saw = (self._saw, self._front, self._beside)
+        around = (self._along, self._then, list(self._around), self._rounded)
         counters = (self._off, self._settled, self._lost, self._pushed, self._path)
-        return self._filter.get_state(), self._search.get_state(), did, saw, counters
+        return self._filter.get_state(), self._search.get_state(), did, saw, counters, around
 
     def set_state(self, state: tuple[Any, ...]) -> None:
         """Restore a state that `get_state` gave."""
-        estimates, searched, (doing, before, self.rounds), (saw, self._front, self._beside), counters = state
+        estimates, searched, (doing, before, self.rounds), saw, counters, around = state
         self._filter.set_state(estimates)
         self._search.set_state(searched)
-        self.doing, self._before, self._saw = Doing(doing), Doing(before), list(saw)
+        self.doing, self._before = Doing(doing), Doing(before)
+        seen, self._front, self._beside = saw
+        self._saw = list(seen)
+        self._along, self._then, corners, self._rounded = around
+        self._around = list(corners)
         self._off, self._settled, self._lost, self._pushed, self._path = counters

@@ -117,8 +117,8 @@ class IrReflex:
         self._fast = p.strategy is Strategy.REFLEX and p.correction is Correction.FAST
         self._stop = Stop.RUNNING
         self._recoveries, self._closings, self._shaken = 0, 0, 0
-        pregrasp = (*p.p_WH_pregrasp.tolist(), p.yaw_pregrasp, p.sigma_pregrasp)
-        self._start(Phase.REACH, pregrasp, 0, p.travel_time)
+        self._pregrasp: X = (*p.p_WH_pregrasp.tolist(), p.yaw_pregrasp, p.sigma_pregrasp)
+        self._start(Phase.REACH, self._pregrasp, 0, p.travel_time)
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command in force and what the sensors say; no time passes."""
@@ -190,18 +190,29 @@ class IrReflex:
             self._move.goal = (goal[0] + float(v[0]), goal[1] + float(v[1]), *goal[2:])
             return
         sees = following.look(x, ticks)
-        if self._phase is Phase.REACH and not sees and not self._arrived(x):
+        arrived = self._phase is not Phase.REACH or self._arrived(x)
+        if not (sees or arrived):
+            self._move.goal = self._arriving(x)
             return
-        start = x if self._phase is Phase.REACH and not self._arrived(x) else self._move.goal
-        goal, ending = following.advance(x, start)
+        goal, ending = following.advance(x, self._move.goal if arrived else x)
         self._phase = DOING[following.doing]
         self._move.goal = goal
         if ending is not Ending.NONE:
             self._close(ENDINGS[ending])
 
+    def _arriving(self, x: X) -> X:
+        """Return the command on the way to the pre-grasp pose: slow on its last part, where an object may stand."""
+        p, goal = self.params, self._pregrasp
+        left, commanded = math.dist(x[:2], goal[:2]), math.dist(self._move.goal[:2], goal[:2])
+        if left > p.arrival_way + 0.008 or p.arrival_way == 0.0:
+            share = min(1.0, p.arrival_way / left)
+        else:
+            share = max(0.0, min(commanded, p.arrival_way) - p.arrival_speed * float(_PERIOD)) / max(left, 1e-9)
+        return (goal[0] + share * (x[0] - goal[0]), goal[1] + share * (x[1] - goal[1]), *goal[2:])
+
     def _arrived(self, x: X) -> bool:
         return all(
-            abs(a - b) <= tol for a, b, tol in zip(x, self._move.goal, self.params.tolerance.tolist(), strict=True)
+            abs(a - b) <= tol for a, b, tol in zip(x, self._pregrasp, self.params.tolerance.tolist(), strict=True)
         )
 
     def _decide(self, reading: Reading) -> None:

@@ -197,7 +197,16 @@ class Params:
     search_back: Metre = parameter(0.020, "how far the search begins behind the pre-grasp pose", minimum=0.0)
     search_ahead: Metre = parameter(0.105, "how far the search goes ahead of it", minimum=0.001, maximum=0.5)
     search_guess: Metre = parameter(0.055, "where the hand closes if nothing was found, ahead of it", minimum=0.0)
-    search_speed: MetrePerSecond = parameter(0.28, "speed of the search", minimum=1e-3, maximum=1.0)
+    search_speed: MetrePerSecond = parameter(0.14, "speed of the search", minimum=1e-3, maximum=1.0)
+    arrival_way: Metre = parameter(0.04, "last part of the way to the pre-grasp pose, of FAST", minimum=0.0, maximum=0.5)
+    arrival_speed: MetrePerSecond = parameter(0.10, "speed there", minimum=1e-3, maximum=1.0)
+    along_limit: Metre = parameter(
+        0.010, "way ahead on which what one side alone sees stays as far off: it goes along", minimum=1e-3
+    )
+    along_change: Metre = parameter(0.004, "change of its distance that shows that it does not", minimum=0.0)
+    along_back: Metre = parameter(0.025, "how far a hand that pushes it along goes back", minimum=0.0)
+    along_across: Metre = parameter(0.025, "how far it then goes across, to the side that sees", minimum=0.0)
+    along_most: int = parameter(3, "how often it does so at most", minimum=0)
     push_depth: Metre = parameter(0.020, "how much too far ahead the front is when that counts", minimum=0.0)
     push_limit: Metre = parameter(0.010, "way across that the hand may make without any effect", minimum=0.0)
     path_limit: Metre = parameter(0.15, "way ahead that it may make once it has seen the object", minimum=0.0)

@@ -30,7 +30,7 @@ from handover.scenarios.published.verdicts import (
 
 _WITHOUT = tuple(arm for arm in ARMS if not arm.looks)
 _MIN_AXES = 4
-_HELD, _MIN_RUNS = 0.95, 40
+_HELD, _MIN_RUNS = 0.95, 30
 _CARRIED, _HELD_CARRIED = 0.015, 0.90
 _PUSHED, _PUSHED_MOST = 0.005, 0.015
 _REFINED = 3.0
@@ -42,8 +42,8 @@ _CURVE = next(axis for axis in AXES if axis.key == "curve")
 class IrLimits(PublishedExperiment):
     """One thing at a time goes amiss, further and further, and six ways to grasp meet it in the same scenes.
 
-    Two ways look: the reflex, and the paper's algorithm. Four do not: closing at once, after going 35 or 55 mm ahead,
-    and closing slowly while going ahead until the first contact. Each level has three scenes of each of five objects:
+    Two ways look: the reflex, and, where its sensors are at fault, the paper's algorithm. Four do not: closing at once, after going 35 or 55 mm ahead,
+    and closing slowly while going ahead until the first contact. Each level has two scenes of each of five objects:
     the table's, or discs and bars of five masses. On no scene anything was tuned.
     """
 
@@ -52,7 +52,7 @@ class IrLimits(PublishedExperiment):
     scenario: ClassVar[str] = IrGrasp.name
 
     def plan(self, quick: bool) -> CampaignPlan:
-        """Return arms x axes x levels x objects, three times; if quick, the hardest levels of one object, once."""
+        """Return arms x axes x levels x objects, twice; if quick, the hardest levels of one object, once."""
         return plan_of_limits(self.name, quick)
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
@@ -178,10 +178,7 @@ def _pushes(runs: LimitRuns) -> Claim:
 
 def _quick_enough(runs: LimitRuns) -> Claim:
     sentence = f"The reflex refines a grasp in {_REFINED:g} s in the median."
-    times = {
-        a.title: np.concatenate([runs.values("refinement_time", a, x, x.all_levels) for x in AXES])
-        for a in (REFLEX, PAPER)
-    }
+    times = {arm.title: _of_all(runs, "refinement_time", arm) for arm in (REFLEX, PAPER)}
     ours = times[REFLEX.title]
     if not len(ours):
         return nothing_measured(sentence, beyond=True)
@@ -191,7 +188,7 @@ def _quick_enough(runs: LimitRuns) -> Claim:
         published="",
         measured=medians,
         verdict=verdict_of(float(np.median(ours)) <= _REFINED, could_be_either=len(ours) >= _MIN_RUNS),
-        reason="Holds if it is so over all its runs on these axes.",
+        reason="Holds if it is so over all its runs on these axes; the paper's algorithm is run on three of them alone.",
         beyond=True,
     )
 

@@ -23,16 +23,24 @@ class LimitArm:
         title: what it is called.
         parameters: the scenario's and the controller's that make it.
         looks: whether it uses the infrared sensors.
+        axes: keys of the axes along which it is tried; none: all.
     """
 
     title: str
     parameters: Point = field(hash=False)
     looks: bool
+    axes: tuple[str, ...] = ()
+
+    def meets(self, axis: "Axis") -> bool:
+        """Return whether it is tried along an axis."""
+        return not self.axes or axis.key in self.axes
 
 
 REFLEX = LimitArm("reflex", {"strategy": "reflex", "correction": "fast"}, True)
-PAPER = LimitArm("paper's algorithm", {"strategy": "reflex", "correction": "paper"}, True)
-BLIND = LimitArm("blind", {"strategy": "blind"}, False)
+PAPER = LimitArm("paper's algorithm", {"strategy": "reflex", "correction": "paper"}, True, ("dark", "bright", "curve"))
+"""What it claims of its sensors is judged; its runs are the longest."""
+BLIND = LimitArm("blind", {"strategy": "blind"}, False, ("towards", "any", "large", "near"))
+"""It holds less than half of what is nominal (`ir-table`), so it is tried where objects come nearer to the hand."""
 FORWARD_35 = LimitArm("forward 35 mm", {"strategy": "forward", "forward": "0.035"}, False)
 FORWARD_55 = LimitArm("forward 55 mm", {"strategy": "forward", "forward": "0.055"}, False)
 CONTACT = LimitArm("until contact", {"strategy": "contact"}, False)
@@ -119,12 +127,12 @@ AXES = (
         "vision's position off (1 sigma)",
         "mm",
         1e3,
-        (0.01, 0.02, 0.03, 0.05),
+        (0.01, 0.03, 0.05),
         {"vision_position": "{}"},
         0.003,
     ),
     Axis(
-        "yaw", "vision's heading off (1 sigma)", "°", 180.0 / math.pi, (0.1, 0.2, 0.3, 0.5), {"vision_yaw": "{}"}, 0.03
+        "yaw", "vision's heading off (1 sigma)", "°", 180.0 / math.pi, (0.1, 0.3, 0.5), {"vision_yaw": "{}"}, 0.03
     ),
     Axis(
         "small",
@@ -151,14 +159,14 @@ AXES = (
         "a slanted bar for a disc of 33 mm: length",
         "mm",
         1e3,
-        (0.06, 0.09, 0.11, 0.13),
+        (0.06, 0.09, 0.13),
         {"bar_size": "{},0.03", "turn": "0.7854"},
         None,
         scenes=_BARS,
     ),
     Axis("near", "stand-off shorter", "mm", 1e3, (0.06, 0.05, 0.03), {"standoff": "{}"}, 0.07),
     Axis("far", "stand-off longer", "mm", 1e3, (0.09, 0.105, 0.12), {"standoff": "{}"}, 0.07),
-    Axis("speed", "carried across", "mm/s", 1e3, (0.005, 0.01, 0.015, 0.02, 0.03), {"carried_speed": "{}"}),
+    Axis("speed", "carried across", "mm/s", 1e3, (0.005, 0.01, 0.015, 0.03), {"carried_speed": "{}"}),
     Axis(
         "dark",
         "returns less light, moved: reflectivity",
@@ -186,7 +194,7 @@ AXES = (
         "sensors off their curve, moved",
         "%",
         1e2,
-        (0.02, 0.05, 0.1, 0.2, 0.3),
+        (0.02, 0.05, 0.075, 0.1, 0.2, 0.3),
         {"scene.sensor_tolerance": "{}"},
         base=MOVED,
         blind_alike=True,
@@ -205,7 +213,7 @@ def plan_of_limits(name: str, quick: bool) -> CampaignPlan:
     points: dict[frozenset[tuple[str, str]], Point] = {}
     for axis in AXES:
         for level in axis.levels[-1:] if quick else axis.all_levels:
-            for arm in ARMS:
+            for arm in (arm for arm in ARMS if arm.meets(axis)):
                 settings = settings_of(arm, axis, level)
                 points.update((frozenset(point.items()), point) for point in (settings[:1] if quick else settings))
     return CampaignPlan(
@@ -219,10 +227,14 @@ def plan_of_limits(name: str, quick: bool) -> CampaignPlan:
     )
 
 
-_REPETITIONS = 3
-"""Runs of a point: with five objects 15 of an arm at a level, and 45 to 75 along an axis."""
+_REPETITIONS = 2
+"""Runs of a point: with five objects 10 of an arm at a level, and 30 to 60 along an axis.
 
-_SEED = 5000
+Of 40 pairs a difference of 25 points, all in one direction, is significant after Holm's correction over 17 axes
+(2^-9 of 10 pairs), of 30 pairs one of 33 points. A smaller one may be there and not be shown.
+"""
+
+_SEED = 71904
 """Of the campaign, and of no other: nothing is tuned on the scenes that follow from it."""
 
 PARAMETERS = tuple(
