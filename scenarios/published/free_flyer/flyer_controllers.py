@@ -228,7 +228,8 @@ def _late(rows: ControllerRows) -> Claim:
     note = (
         f"With this delay the rigid impedance loop has its largest pole at |z| = {radius:.3f}, so told of it the "
         "controller does not start; untold, limits of thrust keep a growing oscillation small. Share of the run for "
-        f"which the rigid robot's thrusters were at their limits: {limited or 'not known'}. {unfinished_note(tried)}"
+        f"which more was commanded than the rigid robot's thrusters give: {limited or 'not known'}; admittance and PID "
+        f"control clip their own commands. {unfinished_note(tried)}"
     )
     claim = f"With a {DISTURBANCES[0].label}, all controllers still hand over"
     return every_claim(claim, "", (0, 0), (succeeded(tried), len(tried)), note.strip())
