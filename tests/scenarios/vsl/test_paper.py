@@ -22,6 +22,7 @@ from handover.plants.vsl.vacuum_gripper import Params as GripperParams
 from handover.scenarios.cli.vsl_train import vsl_train
 from handover.scenarios.vsl import training_data
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
+from handover.scenarios.vsl.path_experiments import ELECTRONICS
 from handover.scenarios.vsl.training import SPLIT
 
 NUMERICAL = {"hinges", "hinges_dynamic", "substep", "high_frequency_damping"}
@@ -102,6 +103,12 @@ def test_the_scenario_leaves_the_planners_speed_and_points_as_they_are(paper: Pa
 def test_the_arm_starts_where_the_scenario_has_it_start(paper: Paper):
     np.testing.assert_array_equal(Parameters().q_0, paper["arm"]["q_0"]["value"])
     np.testing.assert_array_equal(Parameters(elbow=Elbow.DOWN).q_0, -np.array(paper["arm"]["q_0"]["value"]))
+
+
+def test_the_electronics_are_those_of_the_paper_file(paper: Paper):
+    group = paper["resolution"]
+    assert {name: entry["value"] for name, entry in group.items()} == ELECTRONICS
+    assert {name: entry["unit"] for name, entry in group.items()} == {n: paper["arm"][n]["unit"] for n in group}
 
 
 def test_the_training_is_as_stated(paper: Paper):
