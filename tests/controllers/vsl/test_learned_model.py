@@ -240,7 +240,9 @@ def test_a_damaged_network_is_refused(data: st.DataObject):
     if data.draw(st.booleans()):
         damaged = text[: data.draw(st.integers(0, len(text) - 3))]
     else:
-        at = data.draw(st.integers(weights + 20, text.index('"forward": {', weights) - 20).filter(lambda k: text[k].isalnum()))
+        at = data.draw(
+            st.integers(weights + 20, text.index('"forward": {', weights) - 20).filter(lambda k: text[k].isalnum())
+        )
         other = data.draw(st.sampled_from("abcXYZ019+/").filter(lambda c: c != text[at]))
         damaged = text[:at] + other + text[at + 1 :]
     with pytest.raises(InvalidModel):

@@ -312,7 +312,7 @@ def test_without_pytorch_the_published_network_is_refused(tmp_path: Path, monkey
     monkeypatch.setitem(sys.modules, "torch", None)
     result = call("--learned", "published", "--out", tmp_path / "m.json")
     assert result.exit_code == 2
-    assert "pip install handover-cosim[train]" in result.output
+    assert 'pip install "handover-cosim[train]"' in result.output
     assert list(tmp_path.iterdir()) == []
 
 
