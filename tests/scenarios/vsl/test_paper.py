@@ -23,10 +23,10 @@ from handover.scenarios.cli.vsl_train import vsl_train
 from handover.scenarios.vsl import training_data
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 from handover.scenarios.vsl.path_experiments import ELECTRONICS
-from handover.scenarios.vsl.training import SPLIT
 
 NUMERICAL = {"hinges", "hinges_dynamic", "substep", "high_frequency_damping"}
 CHOSEN_BY_THE_SCENARIO = {"motion", "link_2", "link_3", "path", "x_0", "x_g", "elbow", "pressure", "method", "model"}
+CHOSEN_BY_THE_SCENARIO |= {"learned", "window", "closed_loop", "swing"}
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 
@@ -115,7 +115,7 @@ def test_the_training_is_as_stated(paper: Paper):
     as_paper = {name: entry["value"] for name, entry in paper["training"].items()}
     points = next(p.default for p in vsl_train.params if p.name == "points")
     assert as_paper.pop("points") == points
-    assert as_paper.pop("split") == list(SPLIT) == paper["published"]["split"]["value"]
+    assert as_paper.pop("split") == list(training_data.SPLIT) == paper["published"]["split"]["value"]
     assert {n: np.ravel(v).tolist() for n, v in as_paper.items()} == {
         n: np.ravel(getattr(training_data, n.upper())).tolist() for n in as_paper
     }
