@@ -43,7 +43,8 @@ class Following:
     farther ahead than `depth`. J and v are estimated (`MotionFilter`).
 
     A finger of the cost that sees alone is kept at the distance `one_sided`, which moves the hand to its side if the
-    object is near it (fig. 9). An object that is lost is awaited where it was seen, then searched.
+    object is near it (fig. 9). If it stays as far off while the hand goes ahead, a fingertip pushes it along: the hand
+    goes back and around it. An object that is lost is awaited where it was seen, then searched.
 
     Attributes:
         doing: what the last round did.

@@ -83,9 +83,10 @@ class IrReflex:
       hand whose recoveries end with the object out of sight closes where it is: it may have pushed the object along.
     - PULL, SHAKE, DONE: pull_distance back, then a sine across.
 
-    That is the correction PAPER; FAST corrects on the move instead (`Following`): SEARCH, RECOVER and TRACK follow each
-    other by what is seen, CLOSE goes along with the object, and `steps` are control periods in TRACK. The strategies
-    BLIND, FORWARD and CONTACT (ahead and slowly closing until the tendon tightens) do not look.
+    That is the correction PAPER; FAST comes slowly to the pre-grasp pose and corrects on the move (`Following`):
+    SEARCH, RECOVER and TRACK follow each other by what is seen, CLOSE goes along with the object, and `steps` are
+    control periods in TRACK. The strategies BLIND, FORWARD and CONTACT (ahead and slowly closing until the tendon
+    tightens) do not look.
 
     The residuals are r_i = weight_i (d_i - target) over fingers with a weight: with the printed r_i = d_i the least
     cost is at contact, where the fingers push the object away.

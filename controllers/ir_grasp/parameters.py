@@ -198,7 +198,9 @@ class Params:
     search_ahead: Metre = parameter(0.105, "how far the search goes ahead of it", minimum=0.001, maximum=0.5)
     search_guess: Metre = parameter(0.055, "where the hand closes if nothing was found, ahead of it", minimum=0.0)
     search_speed: MetrePerSecond = parameter(0.14, "speed of the search", minimum=1e-3, maximum=1.0)
-    arrival_way: Metre = parameter(0.04, "last part of the way to the pre-grasp pose, of FAST", minimum=0.0, maximum=0.5)
+    arrival_way: Metre = parameter(
+        0.04, "last part of the way to the pre-grasp pose, of FAST", minimum=0.0, maximum=0.5
+    )
     arrival_speed: MetrePerSecond = parameter(0.10, "speed there", minimum=1e-3, maximum=1.0)
     along_limit: Metre = parameter(
         0.010, "way ahead on which what one side alone sees stays as far off: it goes along", minimum=1e-3

@@ -186,6 +186,9 @@ def capsule_hit(a: Point, b: Point, radius: float, origin: Point, direction: Poi
         direction: of the ray, a unit vector.
     """
     (x, y), (d_x, d_y) = origin, direction
+    beside, beside_b = d_x * (a[1] - y) - d_y * (a[0] - x), d_x * (b[1] - y) - d_y * (b[0] - x)
+    if min(beside, beside_b) > radius or max(beside, beside_b) < -radius:  # most rays pass by
+        return None
     e_x, e_y = b[0] - a[0], b[1] - a[1]
     length = math.hypot(e_x, e_y)
     u_x, u_y = e_x / length, e_y / length

@@ -42,9 +42,9 @@ _CURVE = next(axis for axis in AXES if axis.key == "curve")
 class IrLimits(PublishedExperiment):
     """One thing at a time goes amiss, further and further, and six ways to grasp meet it in the same scenes.
 
-    Two ways look: the reflex, and, where its sensors are at fault, the paper's algorithm. Four do not: closing at once, after going 35 or 55 mm ahead,
-    and closing slowly while going ahead until the first contact. Each level has two scenes of each of five objects:
-    the table's, or discs and bars of five masses. On no scene anything was tuned.
+    Two ways look: the reflex, and, where its sensors are at fault, the paper's algorithm. Four do not: closing at
+    once, after going 35 or 55 mm ahead, and closing slowly while going ahead until the first contact. Each level has
+    two scenes of each of five objects: the table's, or discs and bars of five masses. On no scene anything was tuned.
     """
 
     name: ClassVar[str] = "ir-limits"
@@ -188,7 +188,7 @@ def _quick_enough(runs: LimitRuns) -> Claim:
         published="",
         measured=medians,
         verdict=verdict_of(float(np.median(ours)) <= _REFINED, could_be_either=len(ours) >= _MIN_RUNS),
-        reason="Holds if it is so over all its runs on these axes; the paper's algorithm is run on three of them alone.",
+        reason="Holds if it is so over all its runs on these axes; the paper's algorithm runs on three of them.",
         beyond=True,
     )
 

@@ -131,9 +131,7 @@ AXES = (
         {"vision_position": "{}"},
         0.003,
     ),
-    Axis(
-        "yaw", "vision's heading off (1 sigma)", "°", 180.0 / math.pi, (0.1, 0.3, 0.5), {"vision_yaw": "{}"}, 0.03
-    ),
+    Axis("yaw", "vision's heading off (1 sigma)", "°", 180.0 / math.pi, (0.1, 0.3, 0.5), {"vision_yaw": "{}"}, 0.03),
     Axis(
         "small",
         "a disc, expected with 33 mm, smaller: radius",

@@ -137,7 +137,7 @@ def test_what_one_side_sees_as_far_off_on_the_way_ahead_is_gone_around(seer: Vis
         o = controller.step(k * DT, DT, Inputs(ticks=ticks, p_WH=np.array(x[:2]), yaw=x[2], sigma=x[3]))
         x = (*o.p_WH_cmd.tolist(), o.yaw_cmd, o.sigma_cmd)
         way.append((x[0] - PREGRASP[0], x[1] - PREGRASP[1]))
-    ahead, left = np.array(way).T
+    ahead, left = (np.array([place[k] for place in way]) for k in range(2))
     turned = int(np.argmax(np.diff(ahead) < 0.0))
     assert ahead[turned] < p.along_limit + 3e-3
     back = turned + 1 + int(np.argmax(np.diff(ahead)[turned + 1 :] >= 0.0))

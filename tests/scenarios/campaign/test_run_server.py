@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 import time
+import zipfile
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +18,9 @@ from sample_jobs import bad_job, job
 
 from handover.cosim.record.reader import Record
 from handover.cosim.stepping.options import MasterOptions
+from handover.fmus.build import cached
 from handover.scenarios.campaign.plan import PlannedRun
+from handover.scenarios.campaign.run_server import load_modules
 from handover.scenarios.campaign.table import row_of
 from handover.scenarios.campaign.worker import NotWanted, ServerLost, ServerProcess
 from handover.scenarios.cli.command import main
@@ -214,3 +217,25 @@ def test_runs_are_served_where_pandas_is_not_installed(tmp_path: Path, monkeypat
         assert server.run_job(job(tmp_path / "runs", "run", scenario="ir_grasp"), yes).lost == ""
     finally:
         server.end()
+
+
+def test_the_modules_of_our_fmus_are_loaded_for_all_runs_but_those_of_others_are_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    ours, other, foreign = cached("HandoverPartner", 3), tmp_path / "other.fmu", tmp_path / "foreign.fmu"
+    with zipfile.ZipFile(ours) as archive, zipfile.ZipFile(other, "w") as copy, zipfile.ZipFile(foreign, "w") as bare:
+        unit = json.loads(archive.read("resources/unit.json"))
+        for name in archive.namelist():
+            copy.writestr(name, archive.read(name))
+        bare.writestr("modelDescription.xml", archive.read("modelDescription.xml"))
+    module = f"{unit['prefix']}.handover.fmus.slave"
+    for name in [name for name in sys.modules if name.startswith(unit["prefix"])]:
+        monkeypatch.delitem(sys.modules, name)
+    own = {**unit, "block": "my_package.partner:Partner"}
+    with zipfile.ZipFile(other, "a") as copy, pytest.warns(UserWarning, match="Duplicate name"):
+        copy.writestr("resources/unit.json", json.dumps(own))
+    for path in (other, foreign):
+        load_modules(path)
+        assert module not in sys.modules
+    load_modules(ours)
+    assert module in sys.modules
