@@ -13,7 +13,7 @@ DEFAULT_MODEL = """\
  "provenance": {
   "arm": {
    "fmu": "VslArm",
-   "key": "54f541c93db50fdded063897329905b0e5a1cea7b02cd669ad74d769c4c6b9fe",
+   "key": "921bd2eb5c462ad6837cd2e528577149ea0227342c2ccfa38832709130960dd7",
    "parameters": {
     "EI_0": 0.55,
     "EI_factor": [1.0, 1.0, 1.0],
@@ -47,6 +47,7 @@ DEFAULT_MODEL = """\
     "link_4": "0",
     "link_mass": 0.14,
     "links": 2,
+    "load_steps": "",
     "mass_factor": [1.0, 1.0, 1.0],
     "motion": "QUASI_STATIC",
     "p_0": [100000.0, 100000.0],

@@ -31,7 +31,7 @@ class NoPyTorch(ValueError):
     def __init__(self) -> None:
         super().__init__(
             "the published network of 1.6 million weights is trained by PyTorch, which is not installed: "
-            "`pip install handover-cosim[train]`; it is evaluated without"
+            '`pip install "handover-cosim[train]"`; it is evaluated without'
         )
 
 

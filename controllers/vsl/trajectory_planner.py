@@ -13,6 +13,7 @@ from handover.controllers.vsl.kinematics import Elbow, Unreachable, VslKinematic
 from handover.controllers.vsl.paths import Path, Segment, segments_of
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
+from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Pascal, Radian, RadianPerSecond, Second
@@ -21,6 +22,9 @@ __all__ = ["Elbow", "Inputs", "InvalidPath", "Outputs", "Params", "Path", "Traje
 
 _MARGIN = 0.001
 """How near to a singularity a path may come, m (assumed): there a joint turns about seven times faster than usual."""
+
+MAX_PRESSURE = 1e6
+"""Highest pressure that is commanded, Pa."""
 
 _PERIOD = Fraction(1, 50)  # s
 _SAME_TIME = 1e-9  # s; rounding of sums of intervals
@@ -46,7 +50,12 @@ class Params:
     L_2: Metre = parameter(0.225, "length of link 2", minimum=0.001, maximum=10.0)
     L_3: Metre = parameter(0.225, "length of link 3", minimum=0.001, maximum=10.0)
     pressure: Vector2[Pascal] = parameter(
-        np.array([5e4, 5e4]), "pressure of links 2 and 3 above the air's", minimum=0.0, maximum=1e6
+        np.array([5e4, 5e4]), "pressure of links 2 and 3 above the air's", minimum=0.0, maximum=MAX_PRESSURE
+    )
+    pressure_steps: str = parameter(
+        "",
+        "pressures, Pa, and from when on, s, in place of pressure: `8:1e5 12:5e4,2e5`, of both links or each; "
+        "empty: none",
     )
     settle: Second = parameter(
         3.0, "time at the first point before the path begins, to get there and calm down", minimum=0.0, maximum=600.0
@@ -85,7 +94,7 @@ class TrajectoryPlanner:
     time T = length / (N V): during the k-th, the goal is x_{k+1} with q_{k+1} from the inverse kinematics, and the
     joint velocities are q'_k = J(q_k)^-1 x'_k, so that the joints arrive as the step ends. Between points the goal
     stays. The last point is held. Where T is shorter than the period, points are left out. Joint 1 goes on past half a
-    turn instead of all the way back.
+    turn instead of all the way back. Pressures are held, too, or change at the times of `pressure_steps`.
 
     Raises:
         InvalidPath: by the constructor, for values out of range, points out of reach or singular, no length.
@@ -101,6 +110,10 @@ class TrajectoryPlanner:
         self._kinematics = VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
         segments = segments_of(p.path, p.x_0, p.x_g)
         faults = parameter_faults(p) or _faults(segments, p, self._kinematics)
+        try:
+            self._pressures = pressures_of(p.pressure_steps)
+        except InvalidSchedule as e:
+            faults = [*faults, f"pressure_steps: {e.fault}"]
         if faults:
             raise InvalidPath(faults)
         self._points: list[Floats] = []
@@ -115,14 +128,14 @@ class TrajectoryPlanner:
         self._periods: int | None = None
         """Periods since the path began."""
 
-    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+    def outputs(self, t: float, u: Inputs) -> Outputs:
         """Return the command that a step from here would begin with."""
-        return self._command(self._periods_on_path(u))
+        return self._command(t, self._periods_on_path(u))
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command that holds until t + dt."""
         periods = self._periods_on_path(u)
-        y = self._command(periods)
+        y = self._command(t, periods)
         if periods is None:
             self._waited += 1
         else:
@@ -144,7 +157,7 @@ class TrajectoryPlanner:
         settled = self._waited * float(_PERIOD) >= self._params.settle - _SAME_TIME
         return 0 if settled and u.go else None
 
-    def _command(self, periods: int | None) -> Outputs:
+    def _command(self, t: float, periods: int | None) -> Outputs:
         p = self._params
         last = len(self._ends) - 1
         k = -1 if periods is None else bisect.bisect_right(self._ends, periods * float(_PERIOD) + _SAME_TIME)
@@ -154,11 +167,15 @@ class TrajectoryPlanner:
             p_WG_goal=np.array(self._x_0 if k < 0 else self._points[i]),
             q_ref=np.array(self._q_0 if k < 0 else self._q[i]),
             qd_ref=np.array(self._qd[i] if moving else p.qd_0),
-            p_cmd=np.array(p.pressure),
+            p_cmd=self._pressure(t),
             segment=0 if k < 0 else i // p.N + 1,
             moving=moving,
             done=k > last,
         )
+
+    def _pressure(self, t: float) -> Floats:
+        scheduled = self._pressures.at(t)
+        return np.array(self._params.pressure) if scheduled is None else np.resize(scheduled, 2)
 
     def _add(self, segment: Segment) -> None:
         p = self._params
@@ -173,6 +190,15 @@ class TrajectoryPlanner:
             self._q.append(q[k + 1])
             self._qd.append(self._kinematics.joint_velocities(q[k], velocities[k]))
             self._ends.append(began + (k + 1) * segment.length / (p.N * p.V))
+
+
+def pressures_of(text: str) -> Schedule:
+    """Return the pressures of links 2 and 3, or of both, of the parameter pressure_steps.
+
+    Raises:
+        InvalidSchedule: it has another form, or a pressure is out of range.
+    """
+    return Schedule.parse(text, (1, 2), 0.0, MAX_PRESSURE)
 
 
 def _faults(segments: Sequence[Segment], p: Params, kinematics: VslKinematics) -> list[str]:

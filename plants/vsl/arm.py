@@ -16,6 +16,7 @@ from handover.plants.vsl.actuators import PressureLine, VslServo
 from handover.plants.vsl.chain import Complexes, VslChain
 from handover.plants.vsl.dynamics import NoConvergence, VslDynamics
 from handover.plants.vsl.parameters import (
+    MAX_LOAD,
     MAX_PRESSURE,
     TURN,
     InvalidVslArmParameters,
@@ -27,9 +28,6 @@ from handover.plants.vsl.sensors import Sensors, in_steps
 from handover.plants.vsl.statics import NoEquilibrium, VslStatics
 
 __all__ = ["Inputs", "InvalidInput", "InvalidVslArmParameters", "Link", "Motion", "Outputs", "Params", "VslArm"]
-
-MAX_LOAD = 0.5
-"""Largest load, kg; the published experiments go to 0.1 kg."""
 
 
 class InvalidInput(InvalidParameters):
@@ -90,7 +88,8 @@ class VslArm:
       rounded to what a converter resolves. Noise of the readings, tilt by accelerometers: `Sensors`.
 
     The arm starts at rest in q_0 with the load of its first instant; a load that is put on later has the gripper's
-    velocity. A step ends with the rest or motion under the inputs held during it.
+    velocity. What hangs on it is the input, or, from its first time on, what `load_steps` says. A step ends with the
+    rest or motion under the inputs held during it.
 
     Raises:
         InvalidVslArmParameters: by the constructor, for parameters of which no arm can be built.
@@ -122,28 +121,29 @@ class VslArm:
             for p in (*params.p_0.tolist(), params.p_4_0)[: params.links]
         ]
         self._parts = (self._mechanics, *self._servos, *self._lines)
+        self._loads = params.loads()
         self._sensors = Sensors(params, self._chain.sensors)
         self._spin = 0.0
         self._q = [0.0] * len(self._servos)  # what the encoders show, and the currents, without noise
         self._i = list(self._q)
         self._started = False
 
-    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+    def outputs(self, t: float, u: Inputs) -> Outputs:
         """Return where the arm is, at the start at rest with its load; no time passes."""
         if not self._started:
             _check_inputs(u)
-            self._rest(u.load)
+            self._rest(self._load(t, u))
         return self._seen()
 
-    def step(self, t: float, dt: float, u: Inputs) -> Outputs:  # noqa: ARG002
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
         """Advance from t by dt with u held."""
         _check_inputs(u)
-        before = self._snapshot()
+        before, load = self._snapshot(), self._load(t, u)
         try:
             if not self._started:
-                self._rest(u.load)
+                self._rest(load)
                 self._started = True
-            self._advance(dt, u)
+            self._advance(dt, u, load)
         except (NoEquilibrium, NoConvergence):
             self._restore(before)
             raise
@@ -176,7 +176,12 @@ class VslArm:
             servo.rest(q)
         self._i = self._currents(0.0)
 
-    def _advance(self, dt: float, u: Inputs) -> None:
+    def _load(self, t: float, u: Inputs) -> float:
+        """Return what hangs on the gripper in a step from t."""
+        scheduled = self._loads.at(t)
+        return u.load if scheduled is None else scheduled[0]
+
+    def _advance(self, dt: float, u: Inputs, load: float) -> None:
         first = self._aims()
         P = self._params
         for servo, command, speed in zip(self._servos, u.q_cmd.tolist(), u.qd_cmd.tolist(), strict=False):
@@ -185,12 +190,12 @@ class VslArm:
             line.advance(dt, in_steps(p_cmd, P.regulator_step))
         last = self._aims()
         spin = (last[0] - first[0]) / dt
-        self._mechanics.advance(dt, (first[1:], last[1:]), self._pressures(), u.load, spin)
+        self._mechanics.advance(dt, (first[1:], last[1:]), self._pressures(), load, spin)
         self._q = self._shown()
         for servo, q in zip(self._servos, self._q, strict=True):
             servo.slide(q)
         faster, self._spin = (spin - self._spin) / dt, spin
-        inertia = self._chain.inertia_about_J1(self._mechanics.pose, u.load) if faster else 0.0
+        inertia = self._chain.inertia_about_J1(self._mechanics.pose, load) if faster else 0.0
         self._i = self._currents(faster * inertia)
 
     def _aims(self) -> tuple[float, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector2, Vector3, parameter
+from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import (
     Ampere,
@@ -33,6 +34,9 @@ TURN = 2.0 * math.pi
 NO_FACE = -10.0
 MAX_PRESSURE = 3.0e5
 """Pa; the published experiments go to 2 bar."""
+
+MAX_LOAD = 0.5
+"""Largest load, kg; the published experiments go to 0.1 kg."""
 
 
 class InvalidVslArmParameters(InvalidParameters):
@@ -151,6 +155,9 @@ class Params:
     p_4_0: Pascal = parameter(
         1.0e5, "pressure of the third of three links at the start", minimum=0.0, maximum=MAX_PRESSURE
     )
+    load_steps: str = parameter(
+        "", "masses on the gripper, kg, and from when on, s, in place of the input load: `8:0.05 12:0`; empty: none"
+    )
     hinges: int = parameter(6, "hinges of a flexible link, quasi-statically", minimum=1, maximum=100)
     hinges_dynamic: int = parameter(2, "hinges of a flexible link that swings", minimum=1, maximum=12)
     face: Metre = parameter(
@@ -184,6 +191,14 @@ class Params:
         """Lengths of the links, m."""
         return (self.L_2, self.L_3, self.L_4)[: self.links]
 
+    def loads(self) -> Schedule:
+        """Return the masses of load_steps.
+
+        Raises:
+            InvalidSchedule: it has another form, or a mass is out of range.
+        """
+        return Schedule.parse(self.load_steps, (1,), 0.0, MAX_LOAD)
+
     def check(self) -> None:
         """Raise InvalidVslArmParameters, with all faults, for values out of range or that contradict each other."""
         faults = parameter_faults(self) or self._contradictions()
@@ -192,6 +207,10 @@ class Params:
 
     def _contradictions(self) -> list[str]:
         faults: list[str] = []
+        try:
+            self.loads()
+        except InvalidSchedule as e:
+            faults.append(f"load_steps: {e.fault}")
         for name, length in zip(("L_2", "L_3", "L_4"), self.lengths, strict=False):
             if not 2.0 * self.cap < length:
                 faults.append(

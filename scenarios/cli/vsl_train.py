@@ -85,7 +85,7 @@ def vsl_train(context: click.Context, **given: Any) -> None:
     -p learned and -p window as it was trained. An --out that ends in .py gets the form of
     controllers/vsl/default_model.py.
 
-    The published network is trained by PyTorch: `pip install handover-cosim[train]`.
+    The published network is trained by PyTorch: `pip install "handover-cosim[train]"`.
 
     Ctrl-C aborts; each file is written at the end, whole or not at all.
     """

@@ -1,5 +1,7 @@
 """Parameters of the paths of the arm with variable-stiffness links; origins of the defaults are in `paper.toml`."""
 
+import enum
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +11,48 @@ from handover.controllers.vsl.learned_model import Learned
 from handover.controllers.vsl.paths import segments_of
 from handover.controllers.vsl.trajectory_planner import Elbow, Path
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
+from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
 from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Number, Pascal, Second
 from handover.plants.vsl.parameters import MAX_PRESSURE, Link, Motion
+
+_MAX_LOAD = 0.3
+
+
+class Links(enum.IntEnum):
+    """What link 2 and link 3 are made of."""
+
+    VSL = 0
+    RIGID = 1
+    VSL_RIGID = 2
+    RIGID_VSL = 3
+
+    @property
+    def kinds(self) -> tuple[Link, Link]:
+        """Of link 2 and of link 3."""
+        return (
+            Link.RIGID if self in (Links.RIGID, Links.RIGID_VSL) else Link.VSL,
+            Link.RIGID if self in (Links.RIGID, Links.VSL_RIGID) else Link.VSL,
+        )
+
+
+class Resolution(enum.IntEnum):
+    """Whether angles and pressures are told and commanded as they are, or as the published robot's electronics can."""
+
+    IDEAL = 0
+    ELECTRONICS = 1
+
+
+BASE_STEP = math.radians(1.8) / 16.0
+"""Angle of a microstep of the base's stepper motor, rad (assumed)."""
+
+ENCODER_STEP = 2.0 * math.pi / 4096.0
+"""Angle of a count of a Dynamixel XM430's encoder, rad."""
+
+TRANSDUCER_STEP = 18.75
+"""What an ADS1115 resolves of a transducer of 1 bar/V, at its range of 6.144 V and 16 bits, Pa (assumed)."""
+
+REGULATOR_STEP = MAX_PRESSURE / 255.0
+"""What PWM of 8 bits resolves of a regulator's range, Pa (assumed)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,7 +61,10 @@ class Parameters:
 
     path: Path = parameter(Path.CURVE, "path of the tip; custom is a straight line from x_0 to x_g")
     load: Kilogram = parameter(
-        0.075, "mass that hangs at the gripper; the paper's are 0 to 0.1 kg", minimum=0.0, maximum=0.3
+        0.075, "mass that hangs at the gripper; the paper's are 0 to 0.1 kg", minimum=0.0, maximum=_MAX_LOAD
+    )
+    load_steps: str = parameter(
+        "", "masses, kg, that hang there from some times on, s, in place of load, as '8:0.05 12:0'; empty: none"
     )
     pressure: Pascal = parameter(
         5e4,
@@ -27,8 +72,24 @@ class Parameters:
         minimum=0.0,
         maximum=MAX_PRESSURE,
     )
-    links: Link = parameter(Link.VSL, "links of variable stiffness, or the printed rigid ones of the same length")
+    pressure_difference: Pascal = parameter(
+        0.0,
+        "pressure inside link 3 less that inside link 2, which is then `pressure`",
+        minimum=-MAX_PRESSURE,
+        maximum=MAX_PRESSURE,
+    )
+    pressure_steps: str = parameter(
+        "",
+        "pressures, Pa, from some times on, s, of both links or each, as '8:1e5 12:5e4,2e5'; empty: none",
+    )
+    links: Links = parameter(
+        Links.VSL, "links of variable stiffness, printed rigid ones of the same length, or one of each, link 2 first"
+    )
     motion: Motion = parameter(Motion.QUASI_STATIC, "arm in equilibrium at every instant, or with its oscillations")
+    resolution: Resolution = parameter(
+        Resolution.IDEAL,
+        "ideal, or the robot's electronics: a stepper at the base, counts of encoders, 16 and 8 bits for pressures",
+    )
     speed: MetrePerSecond = parameter(0.05, "speed of the tip along the path, V", minimum=0.001, maximum=0.5)
     points: int = parameter(100, "points of each segment of the path, N", minimum=1, maximum=10000)
     settle: Second = parameter(
@@ -67,7 +128,44 @@ class Parameters:
     @property
     def pressures(self) -> Floats:
         """Pressures of the second and the third link, shape (2,), Pa."""
-        return np.array([self.pressure, self.pressure])
+        return np.array([self.pressure, self.pressure + self.pressure_difference])
+
+    def loads(self) -> Schedule:
+        """Return the masses of load_steps.
+
+        Raises:
+            InvalidSchedule: it has another form, or a mass is out of range.
+        """
+        return Schedule.parse(self.load_steps, (1,), 0.0, _MAX_LOAD)
+
+    @property
+    def masses(self) -> list[float]:
+        """All masses that hang at the gripper at some time of a long run, the lightest first, kg."""
+        return sorted({self.load, *(load for (load,) in self.loads().values)} - {0.0})
+
+    def load_at(self, times: Floats) -> Floats:
+        """Return what hangs at the gripper at some times, s, shape (n,), kg."""
+        loads = self.loads()
+        found = (loads.at(t) for t in times.tolist())
+        return np.array([self.load if load is None else load[0] for load in found])
+
+    def contradictions(self) -> list[str]:
+        """Return everything that is wrong with values that are each in range."""
+        faults = self.path_faults()
+        if not 0.0 <= (p_3 := float(self.pressures[1])) <= MAX_PRESSURE:
+            faults.append(
+                f"pressure_difference: {self.pressure_difference:g} Pa makes the pressure inside link 3 {p_3:g} Pa; it "
+                f"must be from 0 to {MAX_PRESSURE:g} Pa"
+            )
+        for name, parse in (
+            ("load_steps", self.loads),
+            ("pressure_steps", lambda: Schedule.parse(self.pressure_steps, (1, 2), 0.0, MAX_PRESSURE)),
+        ):
+            try:
+                parse()
+            except InvalidSchedule as e:
+                faults.append(f"{name}: {e.fault}")
+        return faults
 
     @property
     def q_0(self) -> Floats:
@@ -101,8 +199,9 @@ class Parameters:
 class HybridParameters(Parameters):
     """One run along a path, controlled by rigid-link kinematics with learned corrections."""
 
-    links: Link = parameter(
-        Link.VSL, "links of variable stiffness, or rigid ones, of which the model that ships knows nothing"
+    links: Links = parameter(
+        Links.VSL,
+        "links of variable stiffness, or rigid ones, of which the model that ships knows nothing; or one of each",
     )
     tolerance: Metre = parameter(
         0.005, "largest mean error of the tip for which the run counts as a success", minimum=0.0, maximum=1.0

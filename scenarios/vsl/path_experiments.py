@@ -20,11 +20,33 @@ from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.vsl.arms import arm_of
 from handover.scenarios.vsl.evaluation import PathEvaluator
-from handover.scenarios.vsl.parameters import HybridParameters, Parameters
+from handover.scenarios.vsl.parameters import (
+    BASE_STEP,
+    ENCODER_STEP,
+    REGULATOR_STEP,
+    TRANSDUCER_STEP,
+    HybridParameters,
+    Parameters,
+    Resolution,
+)
 from handover.scenarios.vsl.places import PLACES
 
 _GRACE = 5
 """Time by which the path may be completed late before the run ends, s (assumed)."""
+
+
+ELECTRONICS: dict[str, Any] = {
+    "base_step": BASE_STEP,
+    "encoder_step": ENCODER_STEP,
+    "transducer_step": TRANSDUCER_STEP,
+    "regulator_step": REGULATOR_STEP,
+}
+"""What the arm's parameters are set to for what the published robot's electronics resolve."""
+
+
+def _given(name: str, text: str) -> dict[str, Any]:
+    """Return a parameter's setting, or none for an empty text."""
+    return {name: text} if text else {}
 
 
 class PathExperiment(Experiment[PathEvaluator]):
@@ -61,10 +83,11 @@ class PathExperiment(Experiment[PathEvaluator]):
         """Wire planner, kinematics and arm.
 
         Raises:
-            InvalidParameter: an end of the path is below the ground, or is given for a path that has ends of its own.
+            InvalidParameter: an end of the path is below the ground, or is given for a path that has ends of its own; a
+                pressure of link 3 is out of range; loads or pressures over time are no schedule.
         """
         p = parameters
-        if faults := p.path_faults():
+        if faults := p.contradictions():
             raise InvalidParameter(faults)
         arm_seed = int(np.random.SeedSequence(seed).generate_state(1)[0] >> 1)
         s = System()
@@ -79,6 +102,7 @@ class PathExperiment(Experiment[PathEvaluator]):
             settle=p.settle,
             elbow=p.elbow.name,
             pressure=p.pressures,
+            **_given("pressure_steps", p.pressure_steps),
         )
         kinematics = s.add(
             "kinematics",
@@ -87,15 +111,18 @@ class PathExperiment(Experiment[PathEvaluator]):
             elbow=p.elbow.name,
             **self.kinematics(p),
         )
+        link_2, link_3 = p.links.kinds
         arm = s.add(
             "arm",
             fmu("arm"),
             motion=p.motion.name,
-            link_2=p.links.name,
-            link_3=p.links.name,
+            link_2=link_2.name,
+            link_3=link_3.name,
             load=p.load,
             q_0=p.q_0,
             seed=arm_seed,
+            **_given("load_steps", p.load_steps),
+            **(ELECTRONICS if p.resolution is Resolution.ELECTRONICS else {}),
             **arm_of(p).settings,
         )
         for name in ("q_ref", "qd_ref"):

@@ -17,7 +17,8 @@ PLACES = {
             "done": "by it the run ends",
         },
         optional=dict.fromkeys(
-            ("path", "x_0", "x_g", "N", "V", "settle", "elbow", "pressure"), "the scenario's parameter"
+            ("path", "x_0", "x_g", "N", "V", "settle", "elbow", "pressure", "pressure_steps"),
+            "the scenario's parameter",
         ),
         remarks=(_WORLD,),
     ),
@@ -50,7 +51,10 @@ PLACES = {
         },
         optional={
             "p_cmd": "",
-            **dict.fromkeys(("motion", "link_2", "link_3", "load", "q_0"), "the scenario's parameter"),
+            **dict.fromkeys(("motion", "link_2", "link_3", "load", "load_steps", "q_0"), "the scenario's parameter"),
+            **dict.fromkeys(
+                ("base_step", "encoder_step", "transducer_step", "regulator_step"), "set for resolution=electronics"
+            ),
             **dict.fromkeys(
                 ("EI_factor", "mass_factor", "friction_factor", "joint_factor", "L_2", "L_3"),
                 "set for an arm that differs from the usual one",

@@ -176,19 +176,20 @@ def _path(evaluator: PathEvaluator, folder: Path) -> Figure:
 
 def _shapes(parameters: Parameters, evaluator: PathEvaluator, record: Record, folder: Path) -> Figure:
     shapes = record["arm.shape"]
+    masses = " or ".join(f"{1000 * mass:.0f}" for mass in parameters.masses)
     with figure(folder / "shape", 1, size=(8.0, 5.2)) as (axes,):
         axes.plot(*_in_plane(evaluator.path, evaluator), color=DESIRED_COLOUR, lw=3.0, alpha=0.35, label="desired path")
         for k, (role, t) in enumerate(_moments(evaluator).items()):
             arm_x, arm_z = _along_tip(shapes[np.searchsorted(record.time, t - 1e-9)], evaluator)
             axes.plot(arm_x, arm_z, color=COLOURS[k], label=f"{role}, {t:.1f} s", **_ARM_LINES[k])
-            if parameters.load > 0.0:
+            if float(parameters.load_at(np.array([t]))[0]) > 0.0:
                 axes.plot(arm_x[-1], arm_z[-1] - 8.0, "s", ms=9, color=COLOURS[k])
-        if parameters.load > 0.0:
-            axes.plot([], [], "s", ms=9, color="#9aa3af", label=f"load, {parameters.load * 1000:.0f} g")
+        if parameters.masses:
+            axes.plot([], [], "s", ms=9, color="#9aa3af", label=f"load, {masses} g")
         axes.axhspan(-30.0, 0.0, color="#d8dde4", lw=0, zorder=0)
         axes.set(xlabel=_horizontal(evaluator), ylabel="z in W (mm)", aspect="equal")
         axes.figure.legend(ncols=5, loc="outside lower center", columnspacing=1.2, handlelength=1.6)
-    load = f" with its load of {parameters.load * 1000:.0f} g (squares)" if parameters.load > 0.0 else ""
+    load = f" with its load of {masses} g (squares)" if masses else ""
     return Figure("shape", f"Centre line of the arm{load} at three moments, above the ground. Equal scales.")
 
 

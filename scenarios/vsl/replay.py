@@ -1,5 +1,7 @@
 """A run along a path in space: the arm's links, its load, the path it is to follow, and its tip path."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from handover.controllers.vsl.paths import segments_of
@@ -30,9 +32,10 @@ _DENSITY, _BELOW = 2700.0, 0.03
 def replay_path(parameters: Parameters, record: Record, *, hybrid: bool) -> Replay:
     """Return the arm over a run's time; if `hybrid`, with the model's estimate of the tip."""
     shape = record["arm.shape"]
+    hanging = parameters.load_at(record.time)
     return Replay(
-        bodies=[_ground(), *arm_bodies(shape), *_load(parameters, shape)],
-        lines=[*arm_lines(shape), *_hook(parameters, shape), *_tips(record, hybrid)],
+        bodies=[_ground(), *arm_bodies(shape), *_load(parameters.masses, hanging, shape)],
+        lines=[*arm_lines(shape), *_hook(parameters.masses, hanging, shape), *_tips(record, hybrid)],
         fixed=[Line(label="desired path", colour=_DESIRED, points=_desired_path(parameters)[None], width=4.0)],
         eye=(0.45, -1.45, 0.35),
         phases=phases_of_path(record),
@@ -71,17 +74,25 @@ def arm_bodies(shape: Floats) -> list[Body]:
     return [Body(label="arm", colour=_SERVO, mesh=base, p_WB=shape[:1, 0]), *servos]
 
 
-def _load(parameters: Parameters, shape: Floats) -> list[Body]:
-    if parameters.load <= 0.0:
-        return []
-    radius = (3.0 * parameters.load / (4.0 * np.pi * _DENSITY)) ** (1.0 / 3.0)
-    return [Body(label="load", colour=_LOAD, mesh=ball(radius), p_WB=shape[:, -1] - [0.0, 0.0, _BELOW])]
+def _load(masses: Sequence[float], hanging: Floats, shape: Floats) -> list[Body]:
+    """Return a ball for each mass, shown while it is the one that hangs at the gripper."""
+    below = shape[:, -1] - [0.0, 0.0, _BELOW]
+    return [
+        Body(
+            label="load",
+            colour=_LOAD,
+            mesh=ball((3.0 * mass / (4.0 * np.pi * _DENSITY)) ** (1.0 / 3.0)),
+            p_WB=np.where((hanging == mass)[:, None], below, np.nan),
+        )
+        for mass in masses
+    ]
 
 
-def _hook(parameters: Parameters, shape: Floats) -> list[Line]:
-    if parameters.load <= 0.0:
+def _hook(masses: Sequence[float], hanging: Floats, shape: Floats) -> list[Line]:
+    if not masses:
         return []
     points = np.stack([shape[:, -1], shape[:, -1] - [0.0, 0.0, _BELOW]], axis=1)
+    points[hanging <= 0.0] = np.nan
     return [Line(label="load", colour=_LOAD, points=points, width=3.0)]
 
 

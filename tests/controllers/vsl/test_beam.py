@@ -33,7 +33,7 @@ def test_without_bending_the_tip_is_the_rigid_one():
 
 
 def test_a_load_bends_a_level_beam_as_a_chain_of_springs():
-    """Of little bending: each spring turns by its compliance times the load's lever, and lowers the tip by that lever."""
+    """Of little bending: each spring turns by compliance times lever of the load, and lowers the tip by that lever."""
     EI, load = 500.0, 0.1
     weightless = Weights(link=1e-12, elbow=1e-12, gripper=1e-12)
     k = weightless.kt
@@ -46,7 +46,9 @@ def test_a_load_bends_a_level_beam_as_a_chain_of_springs():
     assert torques == pytest.approx((load * 9.81 * 0.45, load * 9.81 * 0.225), rel=1e-6)
     flexible = [(0.03, 0.195), (0.255, 0.42)]
     cantilever = sum(load * 9.81 / EI * ((0.45 - a) ** 3 - (0.45 - b) ** 3) / 3.0 for a, b in flexible)
-    assert sag == pytest.approx(cantilever, rel=0.01)  # Euler-Bernoulli: the integral of F (L - s)^2 / EI over what bends
+    assert sag == pytest.approx(
+        cantilever, rel=0.01
+    )  # Euler-Bernoulli: the integral of F (L - s)^2 / EI over what bends
 
 
 @given(st.integers(0, 10_000))
@@ -77,7 +79,9 @@ def test_droop_is_commanded_besides():
     domain, beam = domain_of(x), Beam(ARM, STIFF, Weights())
     without, droopy = (BentCommand(domain.mean, domain.scale, domain.hull, beam, droop) for droop in (0.0, 0.004))
     torques = beam.bent((x[:, 1], x[:, 2]), (x[:, 3], x[:, 4]), (x[:, 5], x[:, 6]))[1]
-    np.testing.assert_allclose((droopy.predict(x) - without.predict(x))[:, 1:], 0.004 * np.transpose(torques), atol=1e-9)
+    np.testing.assert_allclose(
+        (droopy.predict(x) - without.predict(x))[:, 1:], 0.004 * np.transpose(torques), atol=1e-9
+    )
     assert np.all(droopy.predict(x)[:, 0] == 0.0)
 
 

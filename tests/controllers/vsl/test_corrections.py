@@ -25,7 +25,9 @@ P = np.array([1e5, 1e5])
 
 def reading(q: Floats = Q, **given: Any) -> Inputs:
     usual, _ = WINDOW.currents(q, P)
-    u = Inputs(q_ref=q, qd_ref=np.zeros(3), q_meas=q, p_meas=P, i_meas=np.array([0.0, *usual]), p_WG_meas=ARM.forward(q))
+    u = Inputs(
+        q_ref=q, qd_ref=np.zeros(3), q_meas=q, p_meas=P, i_meas=np.array([0.0, *usual]), p_WG_meas=ARM.forward(q)
+    )
     return dataclasses.replace(u, **given)
 
 

@@ -5,12 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from handover.controllers.vsl import default_physics_model, default_small_model, default_window_model
 from handover.controllers.vsl.default_model import DEFAULT_MODEL
 from handover.controllers.vsl.hybrid_kinematics import (
     Elbow,
     HybridKinematics,
     Inputs,
     InvalidModel,
+    Learned,
     Method,
     Outputs,
     Params,
@@ -30,6 +32,19 @@ USUAL = Inputs(
 )
 RIGID = Params(method=Method.MODEL_BASED)
 ESTIMATE = Params(method=Method.ESTIMATE)
+SHIPPED = {
+    Learned.CUBIC: DEFAULT_MODEL,
+    Learned.SMALL: default_small_model.DEFAULT_MODEL,
+    Learned.PHYSICS: default_physics_model.DEFAULT_MODEL,
+}
+ALL = [
+    RIGID,
+    ESTIMATE,
+    Params(),
+    Params(learned=Learned.SMALL, closed_loop=True),
+    Params(learned=Learned.PHYSICS, swing=True),
+    Params(window=True, closed_loop=True, swing=True),
+]
 
 
 def flat(y: Outputs) -> list[bytes]:
@@ -53,6 +68,48 @@ def test_hybrid_adds_what_was_learned():
     assert y.q_cmd[1] > USUAL.q_ref[1] + 0.02  # the arm sags: it is commanded upwards
     assert y.p_WG_est[2] < y.p_WG_model[2]
     assert not y.outside
+
+
+@pytest.mark.parametrize("learned", list(SHIPPED))
+def test_each_of_those_that_ship_is_behind_the_same_ports(learned: Learned):
+    model = parse_model(SHIPPED[learned], "that ships")
+    assert model.kind is learned
+    y = HybridKinematics(Params(learned=learned)).step(0.0, 0.02, USUAL)
+    np.testing.assert_array_equal(y.q_cmd, model.command(USUAL.q_ref, USUAL.p_meas, USUAL.i_meas))
+    np.testing.assert_array_equal(y.p_WG_est, model.tip(USUAL.q_meas, USUAL.p_meas, USUAL.i_meas))
+    cubic = HybridKinematics(Params()).step(0.0, 0.02, USUAL)
+    np.testing.assert_allclose(y.q_cmd, cubic.q_cmd, atol=0.02)
+    np.testing.assert_allclose(y.p_WG_est, cubic.p_WG_est, atol=0.008)
+
+
+def test_without_window_loop_and_swing_their_gains_change_nothing():
+    odd = Params(K_I=9.0, K_D=9.0, K_F=1.5, reversal=0.5, tracker_rate=7.0, tracker_lag=1.0, dq_max=0.01, qd_max=1.0)
+    one, other = HybridKinematics(Params()), HybridKinematics(odd)
+    for k in range(10):
+        u = dataclasses.replace(USUAL, q_ref=USUAL.q_ref + 0.01 * k, p_WG_meas=np.full(3, 0.1 * k))
+        assert flat(one.step(k * 0.02, 0.02, u)) == flat(other.step(k * 0.02, 0.02, u))
+
+
+@pytest.mark.parametrize("params", [Params(closed_loop=True), Params(method=Method.MODEL_BASED, closed_loop=True)])
+def test_the_closed_loop_raises_a_tip_that_is_too_low(params: Params):
+    unit = HybridKinematics(params)
+    first = unit.step(0.0, 0.02, USUAL)
+    low = dataclasses.replace(USUAL, q_meas=first.q_cmd, p_WG_meas=ARM.forward(Q) - np.array([0.0, 0.0, 0.02]))
+    for k in range(1, 30):
+        last = unit.step(k * 0.02, 0.02, low)
+    assert ARM.forward(last.q_cmd)[2] > ARM.forward(first.q_cmd)[2] + 0.005
+
+
+def test_a_window_forgets_no_turn():
+    """Of an arm whose currents carry friction by the direction of its commands, a window sees the currents without."""
+    window = parse_model(default_window_model.DEFAULT_MODEL, "that ships")
+    unit = HybridKinematics(Params(window=True, i_lag=0.0))
+    for k in range(10):
+        q = USUAL.q_ref + 0.01 * k * np.array([0.0, 1.0, -1.0])
+        friction = np.array([0.0, *(np.array(window.friction) * np.array([1.0, -1.0]))])
+        sliding = dataclasses.replace(USUAL, q_ref=q, i_meas=USUAL.i_meas + (friction if k > 1 else 0.0))
+        y = unit.step(k * 0.02, 0.02, sliding)
+        np.testing.assert_allclose(y.q_cmd, window.command(q, USUAL.p_meas, USUAL.i_meas), atol=1e-9)
 
 
 def test_speeds_leave_room_for_corrections():
@@ -94,7 +151,7 @@ def test_currents_are_smoothed_by_two_lags():
     )
 
 
-@pytest.mark.parametrize("params", [RIGID, Params(), ESTIMATE])
+@pytest.mark.parametrize("params", ALL)
 def test_outputs_take_no_time(params: Params):
     unit = HybridKinematics(params)
     state = unit.get_state()
@@ -103,20 +160,33 @@ def test_outputs_take_no_time(params: Params):
     assert first == flat(unit.step(0.0, 0.02, USUAL))
 
 
-@pytest.mark.parametrize("params", [RIGID, Params(), ESTIMATE])
+@pytest.mark.parametrize("params", ALL)
 @pytest.mark.parametrize("steps", [0, 7])
 def test_a_restored_state_goes_on_bit_for_bit(params: Params, steps: int):
     rng = np.random.default_rng(3)
-    us = [dataclasses.replace(USUAL, i_meas=USUAL.i_meas + rng.normal(0.0, 0.05, 3)) for _ in range(steps + 20)]
+    us = [
+        dataclasses.replace(
+            USUAL,
+            q_ref=USUAL.q_ref + 0.01 * (k // 3),
+            q_meas=USUAL.q_meas + 0.01 * (k // 3),
+            i_meas=USUAL.i_meas + rng.normal(0.0, 0.05, 3),
+            p_WG_meas=ARM.forward(Q) + rng.normal(0.0, 0.01, 3),
+        )
+        for k in range(steps + 20)
+    ]
     one, other = HybridKinematics(params), HybridKinematics(params)
-    for u in us[:steps]:
-        one.step(0.0, 0.02, u)
+
+    def go_on(unit: HybridKinematics) -> list[list[bytes]]:
+        return [flat(unit.step((steps + k) * 0.02, 0.02, u)) for k, u in enumerate(us[steps:])]
+
+    for k, u in enumerate(us[:steps]):
+        one.step(k * 0.02, 0.02, u)
     state = one.get_state()
-    after = [flat(one.step(0.0, 0.02, u)) for u in us[steps:]]
+    after = go_on(one)
     other.set_state(state)
-    assert [flat(other.step(0.0, 0.02, u)) for u in us[steps:]] == after
+    assert go_on(other) == after
     one.set_state(state)
-    assert [flat(one.step(0.0, 0.02, u)) for u in us[steps:]] == after
+    assert go_on(one) == after
 
 
 def test_a_model_is_read_from_a_file(tmp_path: Path):
@@ -136,6 +206,23 @@ def test_a_file_that_is_no_model_is_refused(tmp_path: Path):
     with pytest.raises(InvalidModel, match="cannot be read"):
         HybridKinematics(Params(model=str(tmp_path / "none.json")))
     HybridKinematics(Params(method=Method.MODEL_BASED, model="none.json"))
+
+
+@pytest.mark.parametrize(
+    ("params", "text"),
+    [
+        (Params(learned=Learned.PUBLISHED), r"there is none: train one.*`handover vsl-train --learned published`"),
+        (Params(learned=Learned.SMALL, window=True), r"there is none.*`handover vsl-train --learned small --window`"),
+        (Params(learned=Learned.SMALL, model="cubic"), "it is a cubic model, and the parameter learned says small"),
+        (Params(window=True, model="cubic"), "it was trained without a window, and the parameter window says true"),
+        (Params(model="window"), "it was trained with a window.* and the parameter window says false"),
+    ],
+)
+def test_a_model_that_is_not_what_the_parameters_say_is_refused(params: Params, text: str, tmp_path: Path):
+    (tmp_path / "cubic").write_text(DEFAULT_MODEL)
+    (tmp_path / "window").write_text(default_window_model.DEFAULT_MODEL)
+    with pytest.raises(InvalidModel, match=text):
+        HybridKinematics(dataclasses.replace(params, model=str(tmp_path / params.model) if params.model else ""))
 
 
 @pytest.mark.parametrize("params", [Params(L_2=0.2), Params(elbow=Elbow.DOWN)])

@@ -1,4 +1,6 @@
+import base64
 import functools
+import hashlib
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -6,12 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from handover.controllers.vsl import default_model, default_physics_model, default_small_model, default_window_model
 from handover.controllers.vsl.default_model import DEFAULT_MODEL
-from handover.controllers.vsl.fit import fit_cubic, rounded
+from handover.controllers.vsl.fit import fit_adapted, fit_cubic, fit_friction, rounded
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import (
+    Adapted,
     Cubic,
+    ForwardInput,
+    Learned,
     VslModel,
     all_powers,
     hull_directions,
@@ -41,6 +49,21 @@ def model() -> VslModel:
     y = np.column_stack([x[:, 0] * x[:, 3], x[:, 1] ** 3, x[:, 2] - x[:, 6]])
     fit = fit_cubic(x[:200], y[:200], x[200:], y[200:])
     return VslModel(fit.cubic, fit.cubic, VslKinematics(0.15, 0.225, 0.225, Elbow.UP), {"seed": 1})
+
+
+SHIPPED = [m.DEFAULT_MODEL for m in (default_model, default_small_model, default_physics_model, default_window_model)]
+
+
+def slopes(f: Callable[[Floats], Floats], at: Floats, step: float) -> Floats:
+    """Return df/dx by central differences, a column an input."""
+    return np.transpose([(f(at + h) - f(at - h)) / (2.0 * step) for h in step * np.eye(len(at))])
+
+
+def adapted() -> VslModel:
+    """Return a model adapted to an arm whose residuals are nine tenths of what they were, and a little off."""
+    m, x = model(), np.random.default_rng(4).normal(size=(60, 7))
+    inverse, forward = (fit_adapted(r, x, 0.9 * r.predict(x) + 0.01) for r in (m.inverse, m.forward))
+    return VslModel(inverse, forward, m.kinematics, {"seed": 2})
 
 
 def content() -> dict[str, Any]:
@@ -121,6 +144,109 @@ def test_the_forward_residual_turns_with_joint_1():
 def test_the_current_of_joint_1_is_left_out():
     q, p = np.array([0.6, 0.5, -1.0]), np.array([0.1, 0.2])
     np.testing.assert_array_equal(inputs_of(q, p, np.array([9.0, 0.3, 0.4])), [0.6, 0.5, -1.0, 0.1, 0.2, 0.3, 0.4])
+
+
+@pytest.mark.parametrize("text", SHIPPED)
+@pytest.mark.parametrize("theta_1", [0.0, 0.4])
+def test_the_corrected_jacobian_is_the_derivative_of_the_tip(text: str, theta_1: float):
+    m = parse_model(text, "that ships")
+    q, p, i = np.array([theta_1, 0.6, -1.2]), np.array([0.9e5, 1.2e5]), np.array([0.0, 0.7, 0.15])
+    expected = slopes(lambda q: m.tip(q, p, i), q, 1e-4)
+    np.testing.assert_allclose(m.tip_jacobian(q, p, i), expected, atol=2e-6)
+    assert np.max(np.abs(m.tip_jacobian(q, p, i) - m.kinematics.jacobian(q))) > 0.005
+
+
+def test_of_positions_the_corrected_jacobian_is_the_derivative_too():
+    cubic = parse_model(DEFAULT_MODEL, "that ships").forward
+    assert isinstance(cubic, Cubic)
+    by_X = Cubic(np.array([0.3, 0.0, 0.15, *cubic.mean[3:]]), cubic.scale, cubic.hull, cubic.powers, cubic.coefficients)
+    q, p, i = np.array([0.3, 0.6, -1.2]), np.array([0.9e5, 1.2e5]), np.array([0.0, 0.7, 0.15])
+    for kind in (Learned.CUBIC, Learned.PUBLISHED):
+        m = VslModel(by_X, by_X, model().kinematics, {}, kind, ForwardInput.X)
+        np.testing.assert_allclose(m.tip_jacobian(q, p, i), slopes(lambda q, m=m: m.tip(q, p, i), q, 1e-5), atol=1e-7)
+
+
+def test_a_published_model_gives_angles_and_position_themselves():
+    m = model()
+    published = VslModel(m.inverse, m.forward, m.kinematics, {}, Learned.PUBLISHED, ForwardInput.X)
+    q, p, i = np.array([0.6, 0.5, -1.0]), np.array([0.1, 0.2]), np.array([9.0, 0.3, 0.4])
+    np.testing.assert_array_equal(published.command(q, p, i), m.inverse.predict(inputs_of(q, p, i)))
+    X = m.kinematics.forward(q)
+    np.testing.assert_array_equal(published.tip(q, p, i), m.forward.predict(inputs_of(X, p, i)))
+
+
+def test_a_cubics_jacobian_is_its_derivative_and_0_where_inputs_are_held():
+    cubic, x = fitted(), X[:150].mean(axis=0)
+    step = 1e-5 * cubic.scale
+    J = np.transpose([(cubic.predict(x + h) - cubic.predict(x - h)) / (2.0 * h.sum()) for h in np.diag(step)])
+    np.testing.assert_allclose(cubic.jacobian(x) * cubic.scale, J * cubic.scale, atol=1e-7)
+    np.testing.assert_allclose(cubic.jacobian(X[:5])[3], cubic.jacobian(X[3]), rtol=1e-9)
+    assert np.all(cubic.jacobian(x + 10.0 * cubic.scale) == 0.0)
+
+
+def test_few_points_are_enough_to_adapt():
+    m, fresh = adapted(), np.random.default_rng(9).normal(size=(100, 7))
+    for now, was in ((m.inverse, model().inverse), (m.forward, model().forward)):
+        assert isinstance(now, Adapted)
+        expected = 0.9 * was.predict(fresh) + 0.01
+        error = np.sqrt(np.mean((now.predict(fresh) - expected) ** 2))
+        assert error < 0.05 * np.sqrt(np.mean((was.predict(fresh) - expected) ** 2))
+        x = np.full(7, 0.1)
+        np.testing.assert_allclose(now.jacobian(x), slopes(now.predict, x, 1e-5), atol=1e-6)
+
+
+def test_friction_in_the_currents_is_found():
+    rng = np.random.default_rng(3)
+    clean = rng.uniform(-1.0, 1.0, (600, 4))
+    directions = rng.choice([-1.0, 1.0], (600, 2))
+    y = np.column_stack([clean[:, 2] + clean[:, 0] * clean[:, 3], clean[:, 3] - 0.5 * clean[:, 2] ** 2, clean[:, 1]])
+    measured = clean.copy()
+    measured[:, 2:] += directions * [0.3, 0.2]
+
+    def inputs_at(c: Floats) -> Floats:
+        return np.column_stack([measured[:, :2], measured[:, 2:] - c * directions])
+
+    assert fit_friction(inputs_at, directions, y) == pytest.approx((0.3, 0.2), rel=0.02)
+
+
+@pytest.mark.parametrize("text", SHIPPED)
+def test_what_ships_is_what_would_be_written(text: str):
+    shipped = parse_model(text, "that ships")
+    assert model_text(shipped) == text
+    assert max(len(line) for line in text.splitlines()) < 120
+    assert len(shipped.provenance["data"]) == 64
+
+
+def test_an_adapted_model_is_written_and_read():
+    text = model_text(adapted())
+    back = parse_model(text, "x.json")
+    assert model_text(back) == text
+    x = np.linspace(-1.0, 1.0, 7)
+    np.testing.assert_array_equal(back.forward.predict(x), adapted().forward.predict(x))
+
+
+def test_a_file_of_before_there_were_kinds_is_cubic():
+    old = content()
+    del old["kind"], old["friction"]
+    assert parse_model(json.dumps(old), "x.json").kind is Learned.CUBIC
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_a_damaged_network_is_refused(data: st.DataObject):
+    """Whatever a character of its weights becomes, and wherever the file is cut."""
+    text = default_small_model.DEFAULT_MODEL
+    weights = text.index('"weights"')
+    if data.draw(st.booleans()):
+        damaged = text[: data.draw(st.integers(0, len(text) - 3))]
+    else:
+        at = data.draw(
+            st.integers(weights + 20, text.index('"forward": {', weights) - 20).filter(lambda k: text[k].isalnum())
+        )
+        other = data.draw(st.sampled_from("abcXYZ019+/").filter(lambda c: c != text[at]))
+        damaged = text[:at] + other + text[at + 1 :]
+    with pytest.raises(InvalidModel):
+        parse_model(damaged, "x.json")
 
 
 def test_text_and_model_are_the_same(tmp_path: Path):
@@ -205,6 +331,45 @@ def test_numbers_within_many_lists_are_refused():
     changed = content()
     put(deep, "forward", "mean")(changed)
     with pytest.raises(InvalidModel, match=r"forward\.mean must be made of finite numbers"):
+        parse_model(json.dumps(changed), "x.json")
+
+
+@pytest.mark.parametrize(
+    ("text", "change", "sentence"),
+    [
+        (SHIPPED[0], put("other", "kind"), "its kind is 'other', not one of cubic, small, published, physics"),
+        (SHIPPED[0], put("small", "kind"), "inverse has no 'neurons'"),
+        (SHIPPED[1], put([32, 33], "inverse", "neurons"), r"neurons are \[32, 33\]; a small network has \[32, 32\]"),
+        (SHIPPED[1], put("published", "kind"), "a published network has"),
+        (SHIPPED[1], put("relu", "inverse", "activation"), "activation is 'relu', not 'tanh'"),
+        (SHIPPED[1], put("float16", "forward", "precision"), "precision is 'float16'"),
+        (SHIPPED[1], put("abc", "forward", "weights"), "weights must be a list of texts"),
+        (SHIPPED[1], put(["ab!d"], "forward", "weights"), "weights is not base64"),
+        (SHIPPED[1], put(["abcd"], "forward", "weights"), "weights is damaged: its digest"),
+        (SHIPPED[2], cut("inverse", "beam"), "inverse has no 'beam'"),
+        (SHIPPED[2], put(-1.0, "forward", "beam", "EI_0"), "forward.beam.EI_0 must be above 0"),
+        (SHIPPED[2], put(0.2, "forward", "beam", "cap"), "two caps leave nothing"),
+        (SHIPPED[3], cut("usual"), "the file has no 'usual'"),
+        (SHIPPED[3], put([0.1], "friction"), r"friction has the shape \[1\], not \[2\]"),
+    ],
+)
+def test_what_is_no_model_of_its_kind_is_refused(text: str, change: Callable[[dict[str, Any]], None], sentence: str):
+    changed = json.loads(text)
+    change(changed)
+    with pytest.raises(InvalidModel, match=sentence):
+        parse_model(json.dumps(changed), "x.json")
+
+
+def test_weights_that_are_not_finite_are_refused():
+    changed = json.loads(SHIPPED[1])
+    data = np.full(1411, np.nan, "<f4").tobytes()
+    changed["forward"]["weights"] = [base64.b64encode(data).decode()]
+    changed["forward"]["sha256"] = hashlib.sha256(data).hexdigest()
+    with pytest.raises(InvalidModel, match="must be made of finite numbers"):
+        parse_model(json.dumps(changed), "x.json")
+    changed["forward"]["weights"] = [base64.b64encode(data[:-4]).decode()]
+    changed["forward"]["sha256"] = hashlib.sha256(data[:-4]).hexdigest()
+    with pytest.raises(InvalidModel, match=r"weights must be made|has 1410 numbers, not 1411"):
         parse_model(json.dumps(changed), "x.json")
 
 

@@ -1,6 +1,7 @@
 """Networks: evaluated by numpy as PyTorch does, with their Jacobian, and trained."""
 
 import functools
+import itertools
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ def parts(kind: Learned, dtype: str) -> list[Weights]:
     sizes = (7, *LAYERS[kind], 3)
     rng = np.random.default_rng(4)
     made: list[Weights] = []
-    for n, m in zip(sizes[:-1], sizes[1:], strict=True):
+    for n, m in itertools.pairwise(sizes):
         made += [(rng.normal(size=(n, m)) / np.sqrt(n)).astype(dtype), rng.normal(size=m).astype(dtype) * 0.1]
     return made
 
@@ -60,7 +61,15 @@ PYTORCH = {
 
 def test_the_published_network_has_the_published_layers():
     weights = network(Learned.PUBLISHED).weights
-    assert [W.shape for W in weights] == [(7, 64), (64, 256), (256, 1024), (1024, 1024), (1024, 256), (256, 64), (64, 3)]
+    assert [W.shape for W in weights] == [
+        (7, 64),
+        (64, 256),
+        (256, 1024),
+        (1024, 1024),
+        (1024, 256),
+        (256, 64),
+        (64, 3),
+    ]
     assert network(Learned.PUBLISHED).activation is Activation.RELU
     assert network(Learned.PUBLISHED).neurons == LAYERS[Learned.PUBLISHED]
 

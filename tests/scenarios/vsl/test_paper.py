@@ -22,10 +22,11 @@ from handover.plants.vsl.vacuum_gripper import Params as GripperParams
 from handover.scenarios.cli.vsl_train import vsl_train
 from handover.scenarios.vsl import training_data
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
-from handover.scenarios.vsl.training import SPLIT
+from handover.scenarios.vsl.path_experiments import ELECTRONICS
 
 NUMERICAL = {"hinges", "hinges_dynamic", "substep", "high_frequency_damping"}
 CHOSEN_BY_THE_SCENARIO = {"motion", "link_2", "link_3", "path", "x_0", "x_g", "elbow", "pressure", "method", "model"}
+CHOSEN_BY_THE_SCENARIO |= {"learned", "window", "closed_loop", "swing"}
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 
@@ -104,11 +105,17 @@ def test_the_arm_starts_where_the_scenario_has_it_start(paper: Paper):
     np.testing.assert_array_equal(Parameters(elbow=Elbow.DOWN).q_0, -np.array(paper["arm"]["q_0"]["value"]))
 
 
+def test_the_electronics_are_those_of_the_paper_file(paper: Paper):
+    group = paper["resolution"]
+    assert {name: entry["value"] for name, entry in group.items()} == ELECTRONICS
+    assert {name: entry["unit"] for name, entry in group.items()} == {n: paper["arm"][n]["unit"] for n in group}
+
+
 def test_the_training_is_as_stated(paper: Paper):
     as_paper = {name: entry["value"] for name, entry in paper["training"].items()}
     points = next(p.default for p in vsl_train.params if p.name == "points")
     assert as_paper.pop("points") == points
-    assert as_paper.pop("split") == list(SPLIT) == paper["published"]["split"]["value"]
+    assert as_paper.pop("split") == list(training_data.SPLIT) == paper["published"]["split"]["value"]
     assert {n: np.ravel(v).tolist() for n, v in as_paper.items()} == {
         n: np.ravel(getattr(training_data, n.upper())).tolist() for n in as_paper
     }

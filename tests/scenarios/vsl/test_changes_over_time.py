@@ -1,0 +1,96 @@
+"""Loads and pressures that change on the way, links that are not alike, and the robot's electronics."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from flyer_runs import metric, run
+
+from handover.cosim.record.reader import Record
+from handover.plants.vsl.parameters import Link
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
+from handover.scenarios.vsl.parameters import BASE_STEP, ENCODER_STEP, TRANSDUCER_STEP, Parameters
+from handover.scenarios.vsl.path_experiments import VslModelBased
+
+SHORT = ("path=custom", "settle=4", "points=5", "speed=0.01")
+LINE = (*SHORT, "x_0=0.35,0,0.15", "x_g=0.36,0,0.15")
+
+
+def recorded(out: Path, *given: str) -> Record:
+    run(VslModelBased, out, *given)
+    return Record(out / "signals.parquet")
+
+
+def height(record: Record, t: float) -> float:
+    return float(record["arm.p_WG"][np.searchsorted(record.time, t - 1e-9), 2])
+
+
+def test_a_load_is_put_on_and_taken_off(tmp_path: Path):
+    given = (*LINE, "load=0", "load_steps=1.5:0.1 2.5:0", "pressure=1e5")
+    record = recorded(tmp_path / "run", *given)
+    assert height(record, 2.4) < height(record, 1.4) - 0.005
+    assert height(record, 3.5) == pytest.approx(height(record, 1.4), abs=1e-4)
+    replay = VslModelBased().replay(
+        parse_parameters(VslModelBased, [*SHORT, "load=0", "load_steps=1.5:0.1 2.5:0"]), record
+    )
+    [ball] = [body for body in replay.bodies if body.label == "load"]
+    shown = np.isfinite(ball.p_WB[:, 0])
+    assert [shown[np.searchsorted(record.time, t)] for t in (1.0, 2.0, 3.0)] == [False, True, False]
+
+
+def test_pressures_step_and_the_arm_rises_with_them(tmp_path: Path):
+    record = recorded(tmp_path / "run", *LINE, "pressure=0.5e5", "pressure_steps=1:2e5 2.5:2e5,1e5")
+    at = [np.searchsorted(record.time, t) for t in (0.9, 2.4, 3.9)]
+    np.testing.assert_allclose(record["planner.p_cmd"][at], [[5e4, 5e4], [2e5, 2e5], [2e5, 1e5]])
+    np.testing.assert_allclose(record["arm.p_meas"][at], record["planner.p_cmd"][at], atol=3000.0)
+    assert height(record, 0.9) < height(record, 3.9) < height(record, 2.4)
+
+
+def test_link_3_has_another_pressure_than_link_2(tmp_path: Path):
+    record = recorded(tmp_path / "run", *LINE, "pressure=1.5e5", "pressure_difference=-1e5")
+    np.testing.assert_allclose(record["arm.p_meas"][-1], [1.5e5, 0.5e5], atol=3000.0)
+
+
+def test_one_link_of_two_may_be_rigid(tmp_path: Path):
+    errors = {
+        links: metric(run(VslModelBased, tmp_path / links, *LINE, f"links={links}"), "mean_error")
+        for links in ("vsl", "rigid", "vsl_rigid", "rigid_vsl")
+    }
+    assert errors["rigid"] < errors["rigid_vsl"] < errors["vsl_rigid"] < errors["vsl"]
+    assert parse_parameters(VslModelBased, ["links=rigid_vsl"]).links.kinds == (Link.RIGID, Link.VSL)
+
+
+def test_the_robots_electronics_tell_and_take_whole_steps(tmp_path: Path):
+    record = recorded(tmp_path / "run", *SHORT, "resolution=electronics", "x_0=0.35,0.05,0.15", "x_g=0.36,0.05,0.15")
+    q = record["arm.q_meas"]
+    for values, step in ((q[:, 0], BASE_STEP), (q[:, 1:], ENCODER_STEP), (record["arm.p_meas"], TRANSDUCER_STEP)):
+        np.testing.assert_allclose(values / step, np.round(values / step), atol=1e-6)
+    turned = math.atan2(record["arm.p_WG"][-1, 1], record["arm.p_WG"][-1, 0])
+    assert turned == pytest.approx(q[-1, 0], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "fault"),
+    [
+        ("pressure_difference=-1e5", "makes the pressure inside link 3 -50000 Pa; it must be from 0 to 300000 Pa"),
+        ("load_steps=1:0.4", r"load_steps: '1:0\.4': values are from 0 to 0\.3"),
+        ("load_steps=1,0.1", "load_steps: '1,0.1' is not of the form TIME:VALUE"),
+        ("pressure_steps=1:4e5", "pressure_steps: '1:4e5': values are from 0 to 300000"),
+        ("pressure_steps=1:1e5,1e5,1e5", "is not of the form TIME:VALUE or TIME:VALUE,VALUE"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_starts(given: str, fault: str):
+    def no_fmu(_name: str) -> Any:
+        raise AssertionError("nothing is loaded")
+
+    with pytest.raises(InvalidParameter, match=fault):
+        VslModelBased().build(parse_parameters(VslModelBased, [given]), 0, no_fmu)
+
+
+def test_masses_are_those_of_the_whole_run():
+    p = Parameters(load=0.05, load_steps="2:0.1 3:0 4:0.05")
+    assert p.masses == [0.05, 0.1]
+    np.testing.assert_array_equal(p.load_at(np.array([0.0, 2.0, 3.5, 9.0])), [0.05, 0.1, 0.0, 0.05])
+    assert Parameters(load=0.0).masses == []

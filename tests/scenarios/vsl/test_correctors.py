@@ -1,0 +1,95 @@
+"""What each corrector makes of the tip's error, on the built FMUs."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from handover.cosim.exceptions import InitializationError
+from handover.cosim.master.master import Master
+from handover.cosim.system.system import System
+from handover.fmus.build import cached
+from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.vsl.path_experiments import VslHybrid
+
+QUICK = ("settle=2", "speed=0.1")
+
+
+def wired(*parameters: str, **arm: Any) -> System:
+    """Return the scenario's system with other parameters of the arm."""
+    s = VslHybrid().build(parse_parameters(VslHybrid, parameters), 0, lambda name: cached(VslHybrid.units[name], 3))
+    s.units["arm"] = replace(s.units["arm"], start={**s.units["arm"].start, **arm})
+    return s
+
+
+def error_of(*parameters: str, **arm: Any) -> float:
+    """Return the mean distance of the tip itself from its path's points, at 0.5 bar and with 75 g, m."""
+    p = parse_parameters(VslHybrid, parameters)
+    evaluator = VslHybrid().evaluator(p)
+    with Master(wired(*parameters, **arm)) as master:
+        master.run(VslHybrid().stop_time(p), [evaluator], until=lambda: evaluator.over)
+    outcome = evaluator.outcome()
+    assert "the path was completed" in outcome.reason
+    return outcome.metrics["mean_error_true"].value
+
+
+@pytest.fixture(scope="module")
+def cubic() -> float:
+    return error_of(*QUICK)
+
+
+@pytest.mark.parametrize(
+    ("given", "share"),
+    [("learned=small", 1.3), ("learned=physics", 1.8), ("window=true", 0.6)],
+)
+def test_each_corrector_against_the_polynomials(cubic: float, given: str, share: float):
+    assert error_of(*QUICK, given) < share * cubic
+
+
+def test_the_closed_loop_makes_up_for_an_arm_that_differs(cubic: float):
+    stiffer = {"EI_0": 0.55 * 1.2, "EI_p": 1.05e-5 * 1.2}
+    open_loop = error_of(*QUICK, **stiffer)
+    assert open_loop > 2.0 * cubic
+    assert error_of("settle=2", "closed_loop=true", **stiffer) < 0.5 * open_loop
+
+
+def test_the_tracker_is_wired_only_where_it_closes_the_loop():
+    def targets(system: System) -> set[str]:
+        return {str(c.target) for c in system.connections}
+
+    assert targets(wired("closed_loop=true")) - targets(wired()) == {"kinematics.p_WG_meas"}
+
+
+def test_a_network_that_does_not_ship_is_refused_with_how_to_make_it():
+    with (
+        pytest.raises(InitializationError, match="handover vsl-train --learned published"),
+        Master(wired("learned=published")),
+    ):
+        pass
+
+
+def test_a_model_of_another_kind_is_refused(tmp_path: Path):
+    from handover.controllers.vsl.default_model import DEFAULT_MODEL
+
+    (tmp_path / "m.json").write_text(DEFAULT_MODEL)
+    with (
+        pytest.raises(InitializationError, match="it is a cubic model, and the parameter learned says physics"),
+        Master(wired("learned=physics", f"model={tmp_path / 'm.json'}")),
+    ):
+        pass
+
+
+@pytest.mark.slow
+def test_fast_motion_of_an_arm_that_swings():
+    fast = ("motion=dynamic", "speed=0.2", "window=true")
+    plain, compensated = error_of(*fast), error_of(*fast, "swing=true")
+    assert compensated < 0.8 * plain
+    assert compensated < 0.003
+
+
+@pytest.mark.slow
+def test_the_closed_loop_does_not_swing_the_arm_up():
+    swinging = [error_of("motion=dynamic", "window=true", f"closed_loop={closed}") for closed in ("false", "true")]
+    assert np.all(np.array(swinging) < 0.002)
