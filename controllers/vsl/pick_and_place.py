@@ -186,7 +186,7 @@ class PickAndPlace:
         T = float(_PERIOD)
         if part.rest:
             n = max(1, round(part.rest / T))
-            q = self._kinematics.inverse(part.p_1)
+            q = self._q[-1]
             self._points += [part.p_1] * n
             self._q += [q] * n
             self._qd += [np.array(self._params.qd_0)] * n
@@ -195,6 +195,9 @@ class PickAndPlace:
             n = max(1, round(line.length / part.speed / T))
             points, velocities = line.sampled(n, part.speed)
             angles = [self._kinematics.inverse(x) for x in points]
+            before = self._q[-1] if self._q else angles[0]
+            for q, theta_1 in zip(angles, np.unwrap([before[0], *(q[0] for q in angles)])[1:], strict=True):
+                q[0] = theta_1
             self._points += list(points[1:])
             self._q += angles[1:]
             self._qd += [self._kinematics.joint_velocities(q, v) for q, v in zip(angles[:-1], velocities, strict=False)]

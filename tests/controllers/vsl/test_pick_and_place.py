@@ -48,6 +48,18 @@ def test_the_tip_goes_at_its_speeds_by_the_joint_velocities_to_where_it_is_wante
     np.testing.assert_allclose(lowest[-1], p.p_WQ - [0.0, 0.0, p.press])
 
 
+def test_joint_1_turns_on_behind_the_foot():
+    """atan2 jumps by a turn where y = 0 and x < 0: joint 1 goes on, also while the arm rests and lets down."""
+    behind = replace(SHORT, p_WP=np.array([-0.30, 0.08, 0.06]), p_WQ=np.array([-0.30, -0.08, 0.06]))
+    ys = task(behind)
+    theta_1 = np.array([y.q_ref[0] for y in ys])
+    assert np.max(np.abs(np.diff(theta_1))) < 0.02
+    assert theta_1[-1] == pytest.approx(2.0 * np.pi + np.arctan2(-0.08, -0.30))
+    for before, y in pairwise(ys):
+        if before.leg == y.leg == Leg.CARRY:
+            np.testing.assert_allclose(y.qd_ref * 0.02, y.q_ref - before.q_ref, atol=2e-4)
+
+
 def test_it_waits_above_the_object_until_it_may_go():
     unit = PickAndPlace(SHORT)
     for k in range(50):
