@@ -84,14 +84,17 @@ class Outputs:
 
 @dataclass(frozen=True)
 class _Part:
-    """A line from p_0 to p_1, both (3,), m, at a speed, m/s, or a rest of some seconds at p_1; pressure, Pa; vacuum."""
+    """A line from p_0 to p_1, both (3,), m, at a speed, m/s, or a rest of some seconds at p_1; pressure, Pa; vacuum.
+
+    A rest takes a period at least.
+    """
 
     p_0: Floats
     p_1: Floats
     speed: float
     pressure: float
     vacuum: bool
-    rest: float = 0.0
+    rest: float | None = None
 
 
 class PickAndPlace:
@@ -184,7 +187,7 @@ class PickAndPlace:
     def _add(self, part: _Part) -> None:
         """Add a part's points, one a period, with the joint velocities towards each."""
         T = float(_PERIOD)
-        if part.rest:
+        if part.rest is not None:
             n = max(1, round(part.rest / T))
             q = self._q[-1]
             self._points += [part.p_1] * n
@@ -224,7 +227,7 @@ def _faults(parts: Sequence[_Part], kinematics: VslKinematics) -> list[str]:
     """Return what is wrong with where the tip is to go, each place once."""
     faults: dict[str, None] = {}
     for name, part in zip(LEGS[1:], parts, strict=False):
-        if part.rest:
+        if part.rest is not None:
             continue
         line = Line(part.p_0, part.p_1)
         if line.length < 1e-6:

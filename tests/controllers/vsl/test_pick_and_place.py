@@ -48,6 +48,12 @@ def test_the_tip_goes_at_its_speeds_by_the_joint_velocities_to_where_it_is_wante
     np.testing.assert_allclose(lowest[-1], p.p_WQ - [0.0, 0.0, p.press])
 
 
+def test_without_waiting_each_rest_takes_a_period():
+    legs = [y.leg for y in task(replace(SHORT, wait=0.0))]
+    assert [legs.count(leg) for leg in (Leg.GRASP, Leg.SOFTEN, Leg.RELEASE)] == [1, 1, 1]
+    assert list(dict.fromkeys(legs)) == list(range(len(LEGS)))
+
+
 def test_joint_1_turns_on_behind_the_foot():
     """atan2 jumps by a turn where y = 0 and x < 0: joint 1 goes on, also while the arm rests and lets down."""
     behind = replace(SHORT, p_WP=np.array([-0.30, 0.08, 0.06]), p_WQ=np.array([-0.30, -0.08, 0.06]))
