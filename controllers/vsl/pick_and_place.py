@@ -1,7 +1,7 @@
 """Picks an object up and puts it down elsewhere: soft near contacts, stiff while carrying. After [Gandarias2020]."""
 
 import bisect
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
@@ -41,8 +41,12 @@ LEGS = ("settle", "descend", "grasp", "lift", "carry", "soften", "lower", "relea
 class Params:
     """The task, speeds and pressures. [Gandarias2020] has no such experiment: all are assumed."""
 
-    p_WP: Vector3[Metre] = parameter(np.array([0.30, 0.0, 0.06]), "where the tip picks the object up, in the world")
-    p_WQ: Vector3[Metre] = parameter(np.array([0.36, 0.0, 0.06]), "where the tip puts it down, in the world")
+    p_WP: Vector3[Metre] = parameter(
+        np.array([0.30, 0.0, 0.06]), "where the tip picks the object up, in the world", minimum=-10.0, maximum=10.0
+    )
+    p_WQ: Vector3[Metre] = parameter(
+        np.array([0.36, 0.0, 0.06]), "where the tip puts it down, in the world", minimum=-10.0, maximum=10.0
+    )
     hover: Metre = parameter(0.08, "how far above both it travels", minimum=0.0, maximum=1.0)
     press: Metre = parameter(
         0.008, "how far below both it is commanded, to touch for certain", minimum=0.0, maximum=0.1
@@ -233,11 +237,16 @@ def _faults(parts: Sequence[_Part], kinematics: VslKinematics) -> list[str]:
         if line.length < 1e-6:
             faults[f"{name}: it has no length; p_WP and p_WQ differ, and hover and press are not both 0"] = None
             continue
-        for x in line.sampled(max(2, round(line.length / _MARGIN)), 1.0)[0]:
-            if fault := _fault(x, kinematics):
-                faults[f"{name}: {fault}"] = None
-                break
+        found = _first_fault((part.p_0, part.p_1), kinematics)
+        if found is None:
+            found = _first_fault(line.sampled(max(2, round(line.length / _MARGIN)), 1.0)[0], kinematics)
+        if found is not None:
+            faults[f"{name}: {found}"] = None
     return list(faults)
+
+
+def _first_fault(points: Iterable[Floats], kinematics: VslKinematics) -> str | None:
+    return next((fault for x in points if (fault := _fault(x, kinematics))), None)
 
 
 def _fault(x: Floats, kinematics: VslKinematics) -> str | None:
