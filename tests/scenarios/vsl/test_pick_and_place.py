@@ -34,6 +34,7 @@ def test_defaults_have_their_origins_and_the_planner_those_of_the_scenario():
     [
         ({"place": np.array([0.36, 0.0, 0.1])}, "its height, 0.1 m, must be that of pick, 0.06 m"),
         ({"place": PickAndPlaceParameters().pick}, "it must be another than pick"),
+        ({"pick": np.array([0.9, 0.0, 0.06])}, "pick: above it the arm is to start, and .*out of reach"),
     ],
 )
 def test_places_that_contradict_each_other_are_refused(given: dict[str, np.ndarray], fault: str):
@@ -55,6 +56,13 @@ def test_it_carries_an_object_to_its_place_and_touches_more_softly_with_softer_l
     assert pressure[leg == Leg.CARRY].min() > 1.8e5
     assert pressure[leg == Leg.LOWER].max() < 0.6e5
     assert (tmp_path / "soft" / "report.html").exists()
+
+
+def test_on_a_table_higher_than_the_shoulder_the_arm_starts_above_it(tmp_path: Path):
+    run(VslPickAndPlace, tmp_path / "r", "pick=0.3,0,0.2", "place=0.36,0,0.2", "settle=0.1", "wait=0.1")
+    record = Record(tmp_path / "r" / "signals.parquet")
+    assert record["arm.p_WG"][0, 2] > 0.2
+    assert np.all(record["arm.f_G"][record["planner.leg"] == Leg.SETTLE] == 0.0)
 
 
 def test_an_object_that_is_too_heavy_for_the_cup_is_never_picked_up(tmp_path: Path):
