@@ -27,8 +27,8 @@ _ITERATIONS = 4
 _SMALL = 1e-9
 """Square of a lever, m2, that keeps the load finite where the arm stands upright."""
 
-_DIFFERENCE = 1e-5
-"""Of angles, in rad, of which a Jacobian is made."""
+_DIFFERENCES = np.array([1e-5, 1e-5, 1e-5, 10.0, 10.0, 1e-4, 1e-4])
+"""Of angles, rad, pressures, Pa, and currents, A, of which a Jacobian is made."""
 
 MAX_LOAD = 0.3
 """Load up to which currents are believed, kg (assumed)."""
@@ -221,8 +221,8 @@ class BentTip(Domain):
         return _vectors(tip[0] - rigid[0], 0.0, tip[1] - rigid[1])
 
     def jacobian(self, x: Floats) -> Floats:
-        """Return dy/dx at inputs x, shape (7,), by central differences of angles; 0 by pressures and currents."""
-        return _by_angles(self, x)
+        """Return dy/dx at inputs x, shape (7,), as shape (3, 7), by central differences."""
+        return _differenced(self, x)
 
 
 @dataclass(frozen=True)
@@ -249,8 +249,8 @@ class BentCommand(Domain):
         return _vectors(0.0, *turns)
 
     def jacobian(self, x: Floats) -> Floats:
-        """Return dy/dx at inputs x, shape (7,), by central differences of angles; 0 by pressures and currents."""
-        return _by_angles(self, x)
+        """Return dy/dx at inputs x, shape (7,), as shape (3, 7), by central differences."""
+        return _differenced(self, x)
 
 
 def _pairs(x: Floats) -> tuple[Pair, Pair, Pair]:
@@ -273,14 +273,10 @@ def _rigid(k: VslKinematics, q: Pair) -> Pair:
     return outwards, k.L_2 * m.sin(q[0]) + k.L_3 * m.sin(q[0] + q[1])
 
 
-def _by_angles(bent: BentTip | BentCommand, x: Floats) -> Floats:
-    shifts = np.zeros((4, 7))
-    shifts[0, 1] = shifts[2, 2] = _DIFFERENCE
-    shifts[1], shifts[3] = -shifts[0], -shifts[2]
-    y = bent.predict(x + shifts)
-    J = np.zeros((3, 7))
-    J[:, 1], J[:, 2] = (y[0] - y[1]) / (2.0 * _DIFFERENCE), (y[2] - y[3]) / (2.0 * _DIFFERENCE)
-    return J
+def _differenced(bent: BentTip | BentCommand, x: Floats) -> Floats:
+    shifts = np.diag(_DIFFERENCES)
+    y = bent.predict(np.concatenate([x + shifts, x - shifts]))
+    return np.transpose((y[:7] - y[7:]) / (2.0 * _DIFFERENCES[:, None]))
 
 
 def stiffness_at(logarithms: Floats) -> Stiffness:

@@ -1,7 +1,7 @@
 """Picks an object up and puts it down elsewhere: soft near contacts, stiff while carrying. After [Gandarias2020]."""
 
 import bisect
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar
@@ -41,8 +41,12 @@ LEGS = ("settle", "descend", "grasp", "lift", "carry", "soften", "lower", "relea
 class Params:
     """The task, speeds and pressures. [Gandarias2020] has no such experiment: all are assumed."""
 
-    p_WP: Vector3[Metre] = parameter(np.array([0.30, 0.0, 0.06]), "where the tip picks the object up, in the world")
-    p_WQ: Vector3[Metre] = parameter(np.array([0.36, 0.0, 0.06]), "where the tip puts it down, in the world")
+    p_WP: Vector3[Metre] = parameter(
+        np.array([0.30, 0.0, 0.06]), "where the tip picks the object up, in the world", minimum=-10.0, maximum=10.0
+    )
+    p_WQ: Vector3[Metre] = parameter(
+        np.array([0.36, 0.0, 0.06]), "where the tip puts it down, in the world", minimum=-10.0, maximum=10.0
+    )
     hover: Metre = parameter(0.08, "how far above both it travels", minimum=0.0, maximum=1.0)
     press: Metre = parameter(
         0.008, "how far below both it is commanded, to touch for certain", minimum=0.0, maximum=0.1
@@ -84,14 +88,17 @@ class Outputs:
 
 @dataclass(frozen=True)
 class _Part:
-    """A line from p_0 to p_1, both (3,), m, at a speed, m/s, or a rest of some seconds at p_1; pressure, Pa; vacuum."""
+    """A line from p_0 to p_1, both (3,), m, at a speed, m/s, or a rest of some seconds at p_1; pressure, Pa; vacuum.
+
+    A rest takes a period at least.
+    """
 
     p_0: Floats
     p_1: Floats
     speed: float
     pressure: float
     vacuum: bool
-    rest: float = 0.0
+    rest: float | None = None
 
 
 class PickAndPlace:
@@ -184,9 +191,9 @@ class PickAndPlace:
     def _add(self, part: _Part) -> None:
         """Add a part's points, one a period, with the joint velocities towards each."""
         T = float(_PERIOD)
-        if part.rest:
+        if part.rest is not None:
             n = max(1, round(part.rest / T))
-            q = self._kinematics.inverse(part.p_1)
+            q = self._q[-1]
             self._points += [part.p_1] * n
             self._q += [q] * n
             self._qd += [np.array(self._params.qd_0)] * n
@@ -195,6 +202,9 @@ class PickAndPlace:
             n = max(1, round(line.length / part.speed / T))
             points, velocities = line.sampled(n, part.speed)
             angles = [self._kinematics.inverse(x) for x in points]
+            before = self._q[-1] if self._q else angles[0]
+            for q, theta_1 in zip(angles, np.unwrap([before[0], *(q[0] for q in angles)])[1:], strict=True):
+                q[0] = theta_1
             self._points += list(points[1:])
             self._q += angles[1:]
             self._qd += [self._kinematics.joint_velocities(q, v) for q, v in zip(angles[:-1], velocities, strict=False)]
@@ -221,17 +231,22 @@ def _faults(parts: Sequence[_Part], kinematics: VslKinematics) -> list[str]:
     """Return what is wrong with where the tip is to go, each place once."""
     faults: dict[str, None] = {}
     for name, part in zip(LEGS[1:], parts, strict=False):
-        if part.rest:
+        if part.rest is not None:
             continue
         line = Line(part.p_0, part.p_1)
         if line.length < 1e-6:
             faults[f"{name}: it has no length; p_WP and p_WQ differ, and hover and press are not both 0"] = None
             continue
-        for x in line.sampled(max(2, round(line.length / _MARGIN)), 1.0)[0]:
-            if fault := _fault(x, kinematics):
-                faults[f"{name}: {fault}"] = None
-                break
+        found = _first_fault((part.p_0, part.p_1), kinematics)
+        if found is None:
+            found = _first_fault(line.sampled(max(2, round(line.length / _MARGIN)), 1.0)[0], kinematics)
+        if found is not None:
+            faults[f"{name}: {found}"] = None
     return list(faults)
+
+
+def _first_fault(points: Iterable[Floats], kinematics: VslKinematics) -> str | None:
+    return next((fault for x in points if (fault := _fault(x, kinematics))), None)
 
 
 def _fault(x: Floats, kinematics: VslKinematics) -> str | None:

@@ -14,7 +14,7 @@ from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Ampere, Kilogram, Metre, Newton, Pascal, Radian, RadianPerSecond
 from handover.plants.vsl.actuators import PressureLine, VslServo
 from handover.plants.vsl.chain import Complexes, VslChain
-from handover.plants.vsl.dynamics import NoConvergence, VslDynamics
+from handover.plants.vsl.dynamics import NoConvergence, StartsInFace, VslDynamics
 from handover.plants.vsl.parameters import (
     MAX_LOAD,
     MAX_PRESSURE,
@@ -95,6 +95,7 @@ class VslArm:
         InvalidVslArmParameters: by the constructor, for parameters of which no arm can be built.
         InvalidInput: by `outputs` and `step`, which then change nothing.
         NoEquilibrium: by `outputs` and `step`, if the arm buckles.
+        StartsInFace: by `outputs` and `step`, if it would start below the face.
         NoConvergence: by `step`, if there is no solution of the equations of motion.
     """
 
@@ -144,7 +145,7 @@ class VslArm:
                 self._rest(load)
                 self._started = True
             self._advance(dt, u, load)
-        except (NoEquilibrium, NoConvergence):
+        except (NoEquilibrium, NoConvergence, StartsInFace):
             self._restore(before)
             raise
         self._sensors.draw()

@@ -27,6 +27,19 @@ class NoConvergence(RuntimeError):
         self.h = h
 
 
+class StartsInFace(RuntimeError):
+    """The arm would start with its tip below the face that is to stop it."""
+
+    is_refusal = True
+
+    def __init__(self, height: float, face: float) -> None:
+        super().__init__(
+            f"VslArm: the tip would start {height:.4g} m high, below the face at {face:.4g} m: a q_0 that puts it "
+            "above, sag included, or a lower face"
+        )
+        self.height, self.face = height, face
+
+
 class _Held(NamedTuple):
     """What is held during a step: stiffness of the springs, masses C by bodies and by coordinates, weights, w^2."""
 
@@ -57,7 +70,7 @@ class VslDynamics:
     softer within a step.
 
     Raises:
-        NoEquilibrium: by `settle`.
+        NoEquilibrium, StartsInFace: by `settle`.
         NoConvergence: by `advance`.
     """
 
@@ -86,6 +99,9 @@ class VslDynamics:
     def settle(self, theta: Sequence[float], p: Sequence[float], load: float) -> None:
         """Rest at the angles of the chain's joints that the servos aim at, rad, wherever the arm was before."""
         self._statics.settle(theta, p, load)
+        height = self._params.L_1 + float(self._chain.ends(self._statics.pose)[-1].imag)
+        if height < self._params.face:
+            raise StartsInFace(height, self._params.face)
         self.pose = self._statics.pose
         self._y = np.concatenate((self.pose.angles, self.pose.shears[self._sheared]))
         self._v, self._a, self._a_mean = (np.zeros(len(self._y)) for _ in range(3))

@@ -11,6 +11,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from handover.controllers.vsl.kinematics import Unreachable, VslKinematics
+from handover.controllers.vsl.pick_and_place import Params as Task
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
@@ -18,7 +21,6 @@ from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
-from handover.scenarios.vsl.parameters import Parameters as PathParameters
 from handover.scenarios.vsl.pick_and_place_evaluation import PickAndPlaceEvaluator, PickAndPlaceParameters
 from handover.scenarios.vsl.places import PLACES
 
@@ -80,11 +82,12 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
         """Wire planner, kinematics, arm and gripper.
 
         Raises:
-            InvalidParameter: the two places are one, or of different heights.
+            InvalidParameter: the two places are one, or of different heights, or the arm cannot start above the first.
         """
         p = parameters
         if faults := p.faults():
             raise InvalidParameter(faults)
+        q_0 = _q_above(p.pick, p.hover)
         s = System()
         planner = s.add(
             "planner",
@@ -105,7 +108,7 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
             "arm",
             fmu("arm"),
             motion="DYNAMIC",
-            q_0=PathParameters().q_0,
+            q_0=q_0,
             face=p.pick[2],
             substep=_SUBSTEP,
             seed=int(np.random.SeedSequence(seed).generate_state(1)[0] >> 1),
@@ -158,3 +161,16 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
         from handover.scenarios.vsl.pick_and_place_plots import replay_pick_and_place
 
         return replay_pick_and_place(parameters, record)
+
+
+def _q_above(p_WP: Floats, hover: float) -> Floats:
+    """Return the angles, shape (3,), rad, that put a rigid arm's tip above a place, from where it comes down.
+
+    Raises:
+        InvalidParameter: it is out of reach.
+    """
+    task = Task()
+    try:
+        return VslKinematics(task.L_1, task.L_2, task.L_3, task.elbow).inverse(p_WP + [0.0, 0.0, hover])
+    except Unreachable as e:
+        raise InvalidParameter([f"pick: above it the arm is to start, and {e}"]) from e

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.controllers.vsl.pick_and_place import LEGS, Leg
-from handover.cosim.blocks.ports import Vector3, parameter
+from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
 from handover.cosim.system.signals import Signals
 from handover.plants.vsl.parameters import MAX_PRESSURE
@@ -63,7 +63,7 @@ class PickAndPlaceEvaluator(Evaluator):
 
     Attributes:
         force: largest force of the face on the gripper or on what it holds, N, by touch.
-        carried_off: largest distance of the tip from its goal while it carries, m.
+        carried_off: largest distance of the tip while it carries from its goal, as the next one is set, m.
     """
 
     def __init__(self, parameters: PickAndPlaceParameters) -> None:
@@ -74,6 +74,8 @@ class PickAndPlaceEvaluator(Evaluator):
         self._leg = 0
         self._was_held = self._held = self._done = False
         self._p_WO = np.array(parameters.pick)
+        self._p_WG_goal: Floats | None = None
+        """While it carries, where the tip is to be when the next goal is set."""
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Take in what is touched, carried and put down."""
@@ -84,9 +86,11 @@ class PickAndPlaceEvaluator(Evaluator):
         for touch, legs in _TOUCHES.items():
             if self._leg in legs:
                 self.force[touch] = max(self.force[touch], float(signals["arm.f_G"]))
-        if self._leg == Leg.CARRY:
-            off = float(np.linalg.norm(signals["arm.p_WG"] - signals["planner.p_WG_goal"]))
+        goal, carrying = signals["planner.p_WG_goal"], self._leg == Leg.CARRY
+        if self._p_WG_goal is not None and not (carrying and np.array_equal(goal, self._p_WG_goal)):
+            off = float(np.linalg.norm(signals["arm.p_WG"] - self._p_WG_goal))
             self.carried_off = max(self.carried_off, off)
+        self._p_WG_goal = np.array(goal) if carrying else None
 
     @property
     def over(self) -> bool:

@@ -1,6 +1,7 @@
-"""The rule by which claims on errors get their verdicts: groups of runs that do not overlap, in every cell.
+"""The rules by which claims on errors get their verdicts: groups of runs that do not overlap, or pairs, in every cell.
 
-It was laid down before the runs.
+Groups are of runs of their own. Where both errors are of the same runs, they are compared run by run, without a p-value:
+five pairs reach 0.0625 at best by signed ranks whatever they show, and repetitions differ by the sensors' noise alone.
 """
 
 from collections.abc import Sequence
@@ -24,7 +25,7 @@ def chance_of(n: int) -> float:
 
 
 MIN_RUNS = next(n for n in range(1, 64) if chance_of(n) < LEVEL)
-"""Runs of a group below which groups that do not overlap can be chance."""
+"""Runs of a group below which groups that do not overlap can be chance; of fewer pairs nothing is concluded, either."""
 
 
 @dataclass(frozen=True)
@@ -34,16 +35,20 @@ class Comparison:
     Attributes:
         label: which groups, in words.
         less, more: the errors, shapes (n,) and (m,), m.
+        paired: whether both are of the same runs, in the same order.
     """
 
     label: str
     less: Floats
     more: Floats
+    paired: bool = False
 
     @property
     def margin(self) -> float:
-        """How far the groups are apart, m; negative where they overlap or are the other way round."""
-        return float(np.min(self.more) - np.max(self.less)) if self.runs else -inf
+        """How far the groups, or the pairs, are apart, m; negative where any overlap or are the other way round."""
+        if not self.runs:
+            return -inf
+        return float(np.min(self.more - self.less) if self.paired else np.min(self.more) - np.max(self.less))
 
     @property
     def runs(self) -> int:
@@ -52,16 +57,16 @@ class Comparison:
 
     @property
     def holds(self) -> bool:
-        """Whether each of the first group errs less than each of the second."""
+        """Whether each of the first group errs less than each of the second, of pairs than its own."""
         return self.margin > 0.0
 
 
 def separation_claim(
     claim: str, where: str, published: str, comparisons: Sequence[Comparison], *, beyond: bool = False
 ) -> Claim:
-    """Judge that, in all comparisons, each run of one group errs less than each run of the other.
+    """Judge that, in all comparisons, each run of one group errs less than each of the other, of pairs than its own.
 
-    Without enough runs of each group, it is not comparable.
+    All comparisons are of groups, or all of pairs. Without enough runs of each group, it is not comparable.
     """
     found = [c for c in comparisons if c.runs]
     if not found or len(found) < len(comparisons):
@@ -69,11 +74,18 @@ def separation_claim(
     n, held = min(c.runs for c in found), sum(c.holds for c in found)
     closest = min(found, key=lambda c: c.margin)
     every = f"in each of the {len(found)} comparisons " if len(found) > 1 else ""
-    reason = f"{'Holds' if beyond else 'Reproduced'} if {every}each run of the one errs less than each of the other."
+    paired = all(c.paired for c in found)
+    rule = "in each run the one error is less than the other"
+    if not paired:
+        rule = "each run of the one errs less than each of the other"
+    reason = f"{'Holds' if beyond else 'Reproduced'} if {every}{rule}."
     if every:
         reason += " A mean over all could hide one that goes the other way."
     if n < MIN_RUNS:
-        reason += f" With {n} {'runs' if n > 1 else 'run'} of each that can be chance: it takes {MIN_RUNS}."
+        why = "nothing is concluded" if paired else "that can be chance"
+        reason += f" With {n} {'runs' if n > 1 else 'run'} of each {why}: it takes {MIN_RUNS}."
+    elif paired:
+        reason += " Both errors are of the same runs, so no p-value of independent groups is given."
     else:
         reason += f" By chance {n} runs of each part so with p = {format_p_value(chance_of(n))} (rank sums)."
     if failing := [c.label for c in found if not c.holds]:

@@ -90,7 +90,8 @@ def _reach(runs: Vsl1Runs, path: TipPath, sentence: str) -> Claim:
     """Judge the nearest third of a path's points against the farthest."""
     cells = [Cell(path, load, links) for load in runs.loads for links in runs.links]
     comparisons = [
-        Comparison(cell.label, runs.metric("error_near", cell), runs.metric("error_far", cell)) for cell in cells
+        Comparison(cell.label, runs.metric("error_near", cell), runs.metric("error_far", cell), paired=True)
+        for cell in cells
     ]
     beyond = path is not TipPath.SQUARE
     where, published = ("", "") if beyond else ("sec. V-C, fig. 5(c)", "higher")

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.controllers.vsl import default_model, default_window_model
+from handover.controllers.vsl import default_model, default_physics_model, default_small_model, default_window_model
 from handover.controllers.vsl.corrections import CurrentFilter, SwingCompensation, TrackerLoop
 from handover.controllers.vsl.fit import directions_of
 from handover.controllers.vsl.hybrid_kinematics import Inputs
-from handover.controllers.vsl.learned_model import turned
+from handover.controllers.vsl.learned_model import Adapted, VslModel, inputs_of, turned
 from handover.controllers.vsl.model_text import parse_model
 from handover.cosim.blocks.ports import Floats
 
@@ -140,6 +140,41 @@ def test_a_velocity_that_begins_is_commanded_ahead_once():
     assert unit.step(0.02, reading(q[2], qd_ref=off_the_path), i, np.zeros(2))  # back, and as fast as it came
     np.testing.assert_array_equal(unit.dq, np.zeros(3))
     assert not unit.step(0.02, reading(q[2], qd_ref=off_the_path), i, np.zeros(2))
+
+
+SMALL = parse_model(default_small_model.DEFAULT_MODEL, "that ships")
+PHYSICS = parse_model(default_physics_model.DEFAULT_MODEL, "that ships")
+ADAPTED = dataclasses.replace(
+    PHYSICS, inverse=Adapted(PHYSICS.inverse, np.zeros(3), np.full((3, 7), 1e-3), 0.1 * np.eye(3))
+)
+
+
+@pytest.mark.parametrize("model", [MODEL, WINDOW, SMALL, PHYSICS, ADAPTED])
+def test_what_bends_by_a_swing_is_how_the_command_changes_with_the_currents(model: VslModel):
+    """What is commanded ahead of a first velocity is K_F G i a / g; G as differences of `VslModel.command` have it."""
+    unit, v, dt = SwingCompensation(model, 0.6, 0.0), np.array([0.0, 0.0, 0.2]), 0.02
+    i = np.array([0.0, *model.inverse.domain.mean[5:].tolist()])
+    qd = ARM.joint_velocities(Q, v)
+    unit.step(dt, reading(Q - dt * qd), i, np.zeros(2))
+    unit.step(dt, reading(Q, qd_ref=qd), i, np.zeros(2))
+    more = 1e-3 * i * v[2] / dt / 9.81
+    change = (model.command(Q, P, i + more) - model.command(Q, P, i - more)) / 2e-3
+    np.testing.assert_allclose(unit.dq[1:], 0.6 * change[1:], rtol=2e-3, atol=1e-6)
+    assert np.all(unit.dq[1:] > 0.001)
+
+
+@pytest.mark.parametrize("model", [MODEL, WINDOW, SMALL, PHYSICS, ADAPTED])
+@pytest.mark.parametrize("which", ["inverse", "forward"])
+def test_jacobians_are_those_of_differences_by_every_input(model: VslModel, which: str):
+    regressor = getattr(model, which)
+    i = np.array([0.0, *regressor.domain.mean[5:].tolist()])
+    x = inputs_of(Q, P, i)
+    J = regressor.jacobian(x)
+    for k, h in enumerate([1e-4, 1e-4, 1e-4, 50.0, 50.0, 5e-4, 5e-4]):
+        shift = h * np.eye(7)[k]
+        slope = (regressor.predict(x + shift) - regressor.predict(x - shift)) / (2.0 * h)
+        np.testing.assert_allclose(J[:, k], slope, rtol=2e-3, atol=1e-7 / h)
+    assert np.all(np.max(np.abs(J[[1, 2] if which == "inverse" else [0, 2], 3:]), axis=0) > 0.0)
 
 
 def test_joints_yield_to_a_swing_and_come_back():

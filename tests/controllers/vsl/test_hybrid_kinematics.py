@@ -236,3 +236,44 @@ def test_an_estimate_alone_leaves_the_command_to_rigid_kinematics():
     np.testing.assert_array_equal([estimate.q_cmd, estimate.qd_cmd], [rigid.q_cmd, rigid.qd_cmd])
     np.testing.assert_array_equal([estimate.p_WG_est, estimate.p_WG_model], [hybrid.p_WG_est, hybrid.p_WG_model])
     assert estimate.outside == hybrid.outside
+
+
+@pytest.mark.parametrize("params", ALL)
+def test_an_output_depends_at_once_on_the_inputs_that_it_declares_alone(params: Params):
+    """Each input is changed in the last of some periods along a path; what changes then is what is declared."""
+    rng = np.random.default_rng(5)
+
+    def last(**given: np.ndarray) -> dict[str, np.ndarray]:
+        unit = HybridKinematics(params)
+        for k in range(8):
+            q = USUAL.q_ref + 0.004 * k * np.array([0.0, 1.0, -1.0])
+            u = dataclasses.replace(USUAL, q_ref=q, q_meas=q + 0.01, p_WG_meas=ARM.forward(q) - 0.01)
+            y = unit.step(k * 0.04, 0.04, dataclasses.replace(u, **given) if k == 7 else u)
+        return {name: np.asarray(value) for name, value in vars(y).items()}
+
+    plain, found = last(), dict[str, set[str]]()
+    for name, value in vars(USUAL).items():
+        for size in (1e-3, 0.3, 3.0):
+            other = last(**{name: value + size * np.maximum(np.abs(value), 0.1) * rng.choice([-1.0, 1.0], len(value))})
+            for output, was in plain.items():
+                if not np.array_equal(was, other[output]):
+                    found.setdefault(output, set()).add(name)
+    declared = {output: set(inputs) for output, inputs in HybridKinematics.feedthrough.items()}
+    assert all(inputs <= declared[output] for output, inputs in found.items())
+    if params == ALL[-1]:  # window, closed loop and swing
+        assert found["q_cmd"] == declared["q_cmd"]
+        assert found["p_WG_est"] == declared["p_WG_est"]
+
+
+def test_where_a_swing_may_be_answered_the_speed_depends_on_references_and_currents():
+    """A bend that is commanded ahead is as fast as servos can; where nothing begins or nothing is carried, none is."""
+    v_up = ARM.joint_velocities(Q, np.array([0.0, 0.0, 0.2]))
+    still, begun = Q - 0.02 * v_up, dataclasses.replace(USUAL, q_ref=Q, qd_ref=v_up)
+    changed = [begun, dataclasses.replace(begun, q_ref=still), dataclasses.replace(begun, i_meas=np.zeros(3))]
+    speeds: list[float] = []
+    for u in changed:
+        unit = HybridKinematics(Params(swing=True, i_lag=0.0))
+        unit.step(0.0, 0.02, dataclasses.replace(USUAL, q_ref=still, qd_ref=np.zeros(3)))
+        speeds.append(float(np.abs(unit.step(0.02, 0.02, u).qd_cmd[1])))
+    assert speeds[0] == 4.8 > max(speeds[1:])
+    assert {"q_ref", "qd_ref", "i_meas"} <= set(HybridKinematics.feedthrough["qd_cmd"])

@@ -8,7 +8,7 @@ import pytest
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.vsl.chain import Pose, VslChain
-from handover.plants.vsl.dynamics import NoConvergence, VslDynamics
+from handover.plants.vsl.dynamics import NoConvergence, StartsInFace, VslDynamics
 from handover.plants.vsl.parameters import Link, Motion, Params
 from handover.plants.vsl.statics import VslStatics
 
@@ -206,7 +206,7 @@ def test_a_face_carries_what_statics_with_so_much_less_load_does_not():
     load, damped = 0.1, replace(LOOSE, damping_time=0.05)
     free = swinging(damped, load=load)
     height = tip(VslChain(damped, 2), free).imag + damped.L_1
-    stopped = swinging(replace(damped, face=height + 0.005), load=load)
+    stopped = swinging(replace(damped, face=height + 0.005))
     for _ in range(150):
         stopped.advance(0.02, (RAISED, RAISED), P, load, 0.0)
     assert 0.1 < stopped.force < load * 9.81
@@ -237,3 +237,11 @@ def test_a_tip_that_comes_down_faster_strikes_harder_and_leaves_the_face_again()
         assert forces[-1] == 0.0
         peaks.append(max(forces))
     assert peaks[1] > 1.2 * peaks[0] > 0.0
+
+
+def test_an_arm_that_would_start_below_the_face_is_refused_with_both_heights():
+    height = LOOSE.L_1 + tip(VslChain(LOOSE, 2), swinging(LOOSE)).imag
+    with pytest.raises(StartsInFace, match=rf"start {height:.4g} m high, below the face at 0\.3 m") as e:
+        swinging(replace(LOOSE, face=0.3))
+    assert e.value.height == pytest.approx(height)
+    assert swinging(replace(LOOSE, face=height - 1e-6)).force == 0.0

@@ -140,3 +140,20 @@ def test_groups_that_overlap_do_not_hold_and_few_runs_decide_nothing():
     assert separation_claim("c", "", "", [apart]).verdict is Verdict.NOT_COMPARABLE
     none = Comparison("none", np.zeros(0), high)
     assert separation_claim("c", "", "", [apart, none]).measured == ""
+
+
+def test_errors_of_the_same_runs_are_compared_run_by_run_without_a_p_value():
+    less, more = np.array([1.0, 2.0, 3.0, 4.0, 5.0]), np.array([1.5, 2.5, 3.5, 4.5, 5.5])
+    pairs, groups = Comparison("pairs", less, more, paired=True), Comparison("groups", less, more)
+    assert pairs.margin == pytest.approx(0.5)
+    assert (pairs.holds, groups.holds) == (True, False)
+    assert not Comparison("pairs", less, more[::-1], paired=True).holds
+    claim = separation_claim("c", "", "", [pairs])
+    assert claim.verdict is Verdict.REPRODUCED
+    assert "p =" not in claim.reason
+    assert "p = 0.00" in separation_claim("c", "", "", [groups]).reason
+    few = Comparison("pairs", less[:3], more[:3], paired=True)
+    assert separation_claim("c", "", "", [few]).verdict is Verdict.NOT_COMPARABLE
+    claims = claims_of(table_of())
+    assert "no p-value" in claims["on the square."].reason
+    assert "p = " in claims[SOFT_LOAD].reason
