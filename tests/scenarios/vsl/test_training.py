@@ -229,6 +229,21 @@ def test_data_that_cannot_be_trained_on_is_refused(change: Callable[[Any], Any],
         read_data(tmp_path / "d.parquet", "k", ARM)
 
 
+def test_data_of_too_few_points_or_without_gauges_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(vsl_train_command, "content_key", lambda _fmu: "k")
+    without_gauges = made_up(400)
+    without_gauges.points.p[:] = 1e5
+    for measured, text in (
+        (made_up(100), "90 points with a tip within reach are too few"),
+        (without_gauges, r"the same at all points, whatever is commanded: p_meas\[1\], p_meas\[2\]"),
+    ):
+        write_data(tmp_path / "d.parquet", measured)
+        result = call("--data", tmp_path / "d.parquet", "--out", tmp_path / "m.json")
+        assert result.exit_code == 2
+        assert re.search(text, result.output)
+        assert not (tmp_path / "m.json").exists()
+
+
 @pytest.mark.parametrize("content", [b"", b"text", b"PAR1 and more"])
 def test_a_file_that_is_no_parquet_is_refused_and_nothing_overwritten(content: bytes, tmp_path: Path):
     (tmp_path / "d.parquet").write_bytes(content)
@@ -385,7 +400,7 @@ def test_a_folder_that_goes_away_is_reported_in_a_line(tmp_path: Path, monkeypat
         return shipped(), training.errors(shipped(), measured.points.rows(np.arange(10)))
 
     (tmp_path / "a").mkdir()
-    write_data(tmp_path / "d.parquet", made_up(100))
+    write_data(tmp_path / "d.parquet", made_up(400))
     monkeypatch.setattr(VslTraining, "learn", gone)
     monkeypatch.setattr(vsl_train_command, "content_key", lambda _fmu: "k")
     result = call("--data", tmp_path / "d.parquet", "--out", tmp_path / "a" / "m.json")
