@@ -211,7 +211,8 @@ def _objective(z: Floats, y: Floats, sizes: tuple[int, ...], decay: float) -> Ca
             gradient = [np.transpose(signals[k]) @ back + 2.0 * decay * weights, np.sum(back, axis=0), *gradient]
             if k:
                 back = (back @ np.transpose(weights)) * (1.0 - signals[k] ** 2)
-        return float(np.mean(error**2)) + penalty, _pack(gradient)
+        squares: Floats = error**2
+        return float(np.mean(squares)) + penalty, _pack(gradient)
 
     return value
 

@@ -23,8 +23,23 @@ from handover.scenarios.vsl import training_data
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 
 NUMERICAL = {"hinges", "hinges_dynamic", "substep", "high_frequency_damping"}
-CHOSEN_BY_THE_SCENARIO = {"motion", "link_2", "link_3", "path", "x_0", "x_g", "elbow", "pressure", "method", "model"}
-CHOSEN_BY_THE_SCENARIO |= {"learned", "window", "closed_loop", "swing"}
+CHOSEN_BY_THE_SCENARIO = {
+    "motion",
+    "link_2",
+    "link_3",
+    "path",
+    "x_0",
+    "x_g",
+    "elbow",
+    "pressure",
+    "method",
+    "model",
+} | {
+    "learned",
+    "window",
+    "closed_loop",
+    "swing",
+}
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 
