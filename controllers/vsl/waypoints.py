@@ -61,7 +61,7 @@ def _rows(file: Path) -> list[tuple[int, dict[str, str]]]:
     try:
         with file.open(newline="", encoding="utf-8-sig") as lines:
             reader = csv.reader(lines, skipinitialspace=True)
-            columns = [name.strip() for name in next(reader, [])]
+            columns = [name.strip() for name in next(reader, list[str]())]
             rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
     except OSError as e:
         raise InvalidWaypoints(file, [f"it cannot be read: {e.strerror}"]) from e
