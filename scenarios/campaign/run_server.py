@@ -36,7 +36,6 @@ from handover.scenarios.execution import supervisor
 from handover.scenarios.execution.child_process import ChildEnd, ForkedChild
 from handover.scenarios.execution.crash import Crash
 from handover.scenarios.execution.selection import load_units
-from handover.scenarios.results.run_folder import versions
 from handover.scenarios.results.summary import ElapsedTime
 
 IDLE = 60.0
@@ -85,7 +84,6 @@ class RunServer:
         with contextlib.suppress(ImportError):  # without it pyarrow goes by itself
             importlib.import_module("pandas")  # pyarrow does as a record is looked through: a tenth of a short run
         load_units(job.scenario)
-        versions()  # each child would look through the installed packages
         for path in job.fmus.values():
             with contextlib.suppress(Exception):  # whoever runs it says what is wrong with it
                 load_modules(Path(path))

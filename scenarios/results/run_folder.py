@@ -6,7 +6,6 @@ A lock on the folder (`folder_held`) keeps two processes from working in it.
 
 import contextlib
 import errno
-import functools
 import hashlib
 import importlib.metadata
 import json
@@ -261,7 +260,6 @@ def version_differences(here: Mapping[str, str], there: Mapping[str, str]) -> st
     return ", ".join(f"{name} {there.get(name)} (here {here[name]})" for name in differing)
 
 
-@functools.cache
 def _version(package: str) -> str:
     try:
         return importlib.metadata.version(package)
