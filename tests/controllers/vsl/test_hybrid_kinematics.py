@@ -243,7 +243,7 @@ def test_an_output_depends_at_once_on_the_inputs_that_it_declares_alone(params: 
     rng = np.random.default_rng(5)
 
     def last(**given: np.ndarray) -> dict[str, np.ndarray]:
-        unit = HybridKinematics(params)
+        unit, y = HybridKinematics(params), None
         for k in range(8):
             q = USUAL.q_ref + 0.004 * k * np.array([0.0, 1.0, -1.0])
             u = dataclasses.replace(USUAL, q_ref=q, q_meas=q + 0.01, p_WG_meas=ARM.forward(q) - 0.01)

@@ -109,10 +109,15 @@ class MouseHand:
 
 def seen_at(p: Floats, looked: Mapping[str, Any]) -> tuple[float, float, float]:
     """Return where a point of W is seen: pixels of the page, within the picture, and its depth towards the eye, m."""
-    view, projection = (np.array(looked[name]).reshape(4, 4).T for name in ("view", "projection"))
-    in_view = view @ [*p, 1.0]
-    x, y, _, w = projection @ in_view
-    left, top, width, height = looked["box"]
-    pixel = np.array([left + 0.5 * (1.0 + x / w) * width, top + 0.5 * (1.0 - y / w) * height])
-    pixel = np.clip(pixel, [left + MARGIN, top + MARGIN], [left + width - MARGIN, top + height - MARGIN])
-    return float(pixel[0]), float(pixel[1]), float(in_view[2])
+
+    def matrix(name: str) -> Floats:
+        return np.array(looked[name], dtype=np.float64).reshape(4, 4).T
+
+    in_view: Floats = matrix("view") @ np.array([*p, 1.0])
+    clip: Floats = matrix("projection") @ in_view
+    x, y, _, w = (float(c) for c in clip)
+    left, top, width, height = (float(edge) for edge in looked["box"])
+    pixel: Floats = np.array([left + 0.5 * (1.0 + x / w) * width, top + 0.5 * (1.0 - y / w) * height])
+    low, high = np.array([left, top]) + MARGIN, np.array([left + width, top + height]) - MARGIN
+    x, y = np.clip(pixel, low, high).tolist()
+    return x, y, float(in_view[2])
