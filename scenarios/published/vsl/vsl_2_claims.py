@@ -40,7 +40,9 @@ def _estimates(runs: Vsl2Runs) -> list[Claim]:
 
 def _estimate(runs: Vsl2Runs, way: Way, by: str) -> Claim:
     comparisons = [
-        Comparison(case.label, *(runs.metric(f"{what}_error", case, way) for what in ("estimate", "model")), paired=True)
+        Comparison(
+            case.label, *(runs.metric(f"{what}_error", case, way) for what in ("estimate", "model")), paired=True
+        )
         for case in CASES
     ]
     sentence = (
