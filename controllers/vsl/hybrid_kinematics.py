@@ -136,8 +136,8 @@ class HybridKinematics:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "q_cmd": ("q_ref", "q_meas", "p_meas", "i_meas", "p_WG_meas"),
-        "qd_cmd": ("qd_ref",),
+        "q_cmd": ("q_ref", "qd_ref", "q_meas", "p_meas", "i_meas", "p_WG_meas"),
+        "qd_cmd": ("q_ref", "qd_ref", "q_meas", "p_meas", "i_meas"),
         "p_WG_model": ("q_meas",),
         "p_WG_est": ("q_meas", "p_meas", "i_meas"),
         "outside": ("q_ref", "q_meas", "p_meas", "i_meas"),

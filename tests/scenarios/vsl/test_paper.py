@@ -37,8 +37,12 @@ CHOSEN_BY_THE_SCENARIO = {
     "method",
     "model",
     "waypoints",
+} | {
+    "learned",
+    "window",
+    "closed_loop",
+    "swing",
 }
-CHOSEN_BY_THE_SCENARIO |= {"learned", "window", "closed_loop", "swing"}
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 
