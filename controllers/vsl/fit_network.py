@@ -59,7 +59,8 @@ def fit_small(points: Points, seed: int, steps: int = STEPS) -> NetworkFit:
 
     Of the penalties, the one with the least error of the validation points is taken.
     """
-    from scipy.optimize import minimize  # of the training alone
+    import scipy  # of the training alone
+    from scipy.optimize import minimize
 
     frame = _Frame.of(points)
     sizes = (points.x.shape[1], *LAYERS[Learned.SMALL], points.y.shape[1])
@@ -70,7 +71,11 @@ def fit_small(points: Points, seed: int, steps: int = STEPS) -> NetworkFit:
         found = minimize(value, first, jac=True, method="L-BFGS-B", options={"maxiter": steps, "maxcor": 30})
         parts = _unpack(found.x.astype(np.float32).astype(np.float64), sizes)  # as its file has them
         network = frame.network(parts, ACTIVATIONS[Learned.SMALL])
-        fits.append(NetworkFit(network, rms(network, points), {"decay": decay, "steps": int(found.nit)}))
+        fits.append(
+            NetworkFit(
+                network, rms(network, points), {"decay": decay, "steps": int(found.nit), "scipy": scipy.__version__}
+            )
+        )
     return min(fits, key=lambda f: f.validation_rms)
 
 
@@ -206,7 +211,8 @@ def _objective(z: Floats, y: Floats, sizes: tuple[int, ...], decay: float) -> Ca
             gradient = [np.transpose(signals[k]) @ back + 2.0 * decay * weights, np.sum(back, axis=0), *gradient]
             if k:
                 back = (back @ np.transpose(weights)) * (1.0 - signals[k] ** 2)
-        return float(np.mean(error**2)) + penalty, _pack(gradient)
+        squares: Floats = error**2
+        return float(np.mean(squares)) + penalty, _pack(gradient)
 
     return value
 

@@ -11,7 +11,7 @@ from handover.cosim.blocks.ports import Floats
 
 
 class Path(enum.IntEnum):
-    """Paths of [Gandarias2020] sec. V-A, and a custom line."""
+    """Paths of [Gandarias2020] sec. V-A, and custom ones."""
 
     LINEAR = 0
     CURVE = 1
@@ -82,7 +82,45 @@ class QuarterArc:
         return points, velocities
 
 
-Segment = Line | QuarterArc
+@dataclass(frozen=True)
+class Arc:
+    """Arc of a circle from x_0 by way of `via` to x_g, shapes (3,), m, which are not on one line."""
+
+    x_0: Floats
+    via: Floats
+    x_g: Floats
+
+    @property
+    def length(self) -> float:
+        """Length, m."""
+        _, r, _, _ = self._circle()
+        return r * self._sweep()
+
+    def sampled(self, N: int, V: float) -> tuple[Floats, Floats]:
+        """Return N + 1 points, m, and the velocity at each, m/s, both of shape (N + 1, 3)."""
+        x_c, r, outwards, along = self._circle()
+        alpha = np.arange(N + 1)[:, None] * (self._sweep() / N)
+        points = x_c + r * (np.cos(alpha) * outwards + np.sin(alpha) * along)
+        points[N] = self.x_g
+        return points, V * (np.cos(alpha) * along - np.sin(alpha) * outwards)
+
+    def _circle(self) -> tuple[Floats, float, Floats, Floats]:
+        """Return the centre, the radius, and the directions at x_0 outwards and along the arc."""
+        u, v = self.via - self.x_0, self.x_g - self.x_0
+        n = np.cross(u, v)
+        x_c = self.x_0 + (u @ u * np.cross(v, n) + v @ v * np.cross(n, u)) / (2.0 * n @ n)
+        r = float(np.linalg.norm(self.x_0 - x_c))
+        outwards = (self.x_0 - x_c) / r
+        return x_c, r, outwards, np.cross(n, outwards) / float(np.linalg.norm(n))
+
+    def _sweep(self) -> float:
+        """Return the angle from x_0 to x_g, from 0 to 2 pi."""
+        x_c, _, outwards, along = self._circle()
+        to = self.x_g - x_c
+        return math.atan2(float(to @ along), float(to @ outwards)) % (2.0 * math.pi)
+
+
+Segment = Line | QuarterArc | Arc
 
 
 def segments_of(path: Path, x_0: Floats, x_g: Floats) -> Sequence[Segment]:

@@ -5,12 +5,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path as FilePath
 from typing import ClassVar
 
 import numpy as np
 
 from handover.controllers.vsl.kinematics import Elbow, Unreachable, VslKinematics, format_point
 from handover.controllers.vsl.paths import Path, Segment, segments_of
+from handover.controllers.vsl.waypoints import InvalidWaypoints, read_waypoints
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
@@ -40,7 +42,12 @@ class InvalidPath(InvalidParameters):
 class Params:
     """Path and speed. [Gandarias2020] states neither the arm's lengths nor speeds: they are assumed."""
 
-    path: Path = parameter(Path.CURVE, "path: of the paper, or (CUSTOM) straight from x_0 to x_g")
+    path: Path = parameter(Path.CURVE, "path: of the paper, or (CUSTOM) straight from x_0 to x_g, or by waypoints")
+    waypoints: str = parameter(
+        "",
+        "CSV file of a CUSTOM path's waypoints in the world: columns x, y, z, and via_x, via_y, via_z for arcs; empty: "
+        "x_0 and x_g",
+    )
     x_0: Vector3[Metre] = parameter(np.array([0.3, 0.0, 0.05]), "first point of a CUSTOM path in the world")
     x_g: Vector3[Metre] = parameter(np.array([0.3, 0.0, 0.35]), "last point of a CUSTOM path in the world")
     N: int = parameter(100, "points in each segment after its first", minimum=1, maximum=10000)
@@ -97,7 +104,8 @@ class TrajectoryPlanner:
     turn instead of all the way back. Pressures are held, too, or change at the times of `pressure_steps`.
 
     Raises:
-        InvalidPath: by the constructor, for values out of range, points out of reach or singular, no length.
+        InvalidPath: by the constructor, for values out of range, points out of reach or singular, no length, a file
+            that is no list of waypoints.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
@@ -108,7 +116,10 @@ class TrajectoryPlanner:
     def __init__(self, params: Params) -> None:
         self._params = p = params
         self._kinematics = VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
-        segments = segments_of(p.path, p.x_0, p.x_g)
+        try:
+            segments = segments_by(p.path, p.x_0, p.x_g, p.waypoints)
+        except InvalidWaypoints as e:
+            raise InvalidPath([f"waypoints: {e}"]) from e
         faults = parameter_faults(p) or _faults(segments, p, self._kinematics)
         try:
             self._pressures = pressures_of(p.pressure_steps)
@@ -201,8 +212,18 @@ def pressures_of(text: str) -> Schedule:
     return Schedule.parse(text, (1, 2), 0.0, MAX_PRESSURE)
 
 
+def segments_by(path: Path, x_0: Floats, x_g: Floats, waypoints: str) -> Sequence[Segment]:
+    """Return the segments of a path: of a CUSTOM one by the file of waypoints, if one is named, else as `segments_of`.
+
+    Raises:
+        InvalidWaypoints: there is no such file, or it is no list of waypoints.
+    """
+    return read_waypoints(FilePath(waypoints)) if path is Path.CUSTOM and waypoints else segments_of(path, x_0, x_g)
+
+
 def _faults(segments: Sequence[Segment], p: Params, kinematics: VslKinematics) -> list[str]:
     faults: list[str] = []
+    by_file = p.path is Path.CUSTOM and p.waypoints
     for i, segment in enumerate(segments):
         if segment.length < 1e-6:
             faults.append("x_0 and x_g are the same point: a path has a length")
@@ -210,7 +231,8 @@ def _faults(segments: Sequence[Segment], p: Params, kinematics: VslKinematics) -
         fault = _fault_at_points(segment, p, kinematics) or _fault_between(segment, p, kinematics)
         if fault is not None:
             faults.append(
-                f"segment {i + 1} of {len(segments)}, {fault}; a path stays {_MARGIN * 1000:.0f} mm or more off "
+                f"{f'from waypoint {i + 1} to {i + 2}' if by_file else f'segment {i + 1} of {len(segments)}'}, "
+                f"{fault}; a path stays {_MARGIN * 1000:.0f} mm or more off "
                 f"joint 1's axis and off both limits of reach: |L_2 - L_3| = {kinematics.reach[0]:.4g} m and "
                 f"L_2 + L_3 = {kinematics.reach[1]:.4g} m from the shoulder (0, 0, {p.L_1:.4g}) m"
             )
@@ -241,6 +263,10 @@ def _fault(x: Floats, kinematics: VslKinematics) -> str | None:
     try:
         kinematics.inverse(x)
     except Unreachable as e:
-        return e.fault
+        least, greatest = kinematics.reach
+        r_3 = math.dist(x, (0.0, 0.0, kinematics.L_1))
+        by = f", {1000.0 * (r_3 - greatest):.4g} mm too far" if r_3 > greatest else ""
+        by = f", {1000.0 * (least - r_3):.4g} mm too near" if r_3 < least else by
+        return e.fault + by
     fault = kinematics.singularity(x, _MARGIN)
     return fault and f"singular: {fault}"

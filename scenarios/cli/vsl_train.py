@@ -185,6 +185,8 @@ def _train(o: _Options, progress: Progress) -> list[str]:
     """Train, write, and return what is to be printed."""
     training = o.training(o.kinematics)
     measured = o.measured(training, progress)
+    if measured.usable < MIN_POINTS / 2:
+        raise UsageError(f"{measured.usable} points with a tip within reach are too few: at least {MIN_POINTS // 2}")
     model, errors = training.learn(measured, progress)
     lines = list(_summary(model, errors))
     if o.curve:

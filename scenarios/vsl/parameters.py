@@ -2,14 +2,16 @@
 
 import enum
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from handover.controllers.vsl.kinematics import format_point
 from handover.controllers.vsl.learned_model import Learned
-from handover.controllers.vsl.paths import segments_of
-from handover.controllers.vsl.trajectory_planner import Elbow, Path
+from handover.controllers.vsl.paths import Segment
+from handover.controllers.vsl.trajectory_planner import Elbow, Path, segments_by
+from handover.controllers.vsl.waypoints import InvalidWaypoints
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
 from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Number, Pascal, Second
@@ -59,7 +61,12 @@ REGULATOR_STEP = MAX_PRESSURE / 255.0
 class Parameters:
     """One run along a path, controlled by rigid-link kinematics."""
 
-    path: Path = parameter(Path.CURVE, "path of the tip; custom is a straight line from x_0 to x_g")
+    path: Path = parameter(Path.CURVE, "path of the tip; custom is a straight line from x_0 to x_g, or by waypoints")
+    waypoints: str = parameter(
+        "",
+        "CSV file of a custom path's waypoints in W, m: columns x, y, z, and via_x, via_y, via_z for arcs; empty: x_0 "
+        "and x_g",
+    )
     load: Kilogram = parameter(
         0.075, "mass that hangs at the gripper; the paper's are 0 to 0.1 kg", minimum=0.0, maximum=_MAX_LOAD
     )
@@ -176,23 +183,48 @@ class Parameters:
     @property
     def points_in_all(self) -> int:
         """Points of all segments of the path together."""
-        return self.points * len(segments_of(self.path, self.x_0, self.x_g))
+        return self.points * len(self.segments())
+
+    def segments(self) -> Sequence[Segment]:
+        """Return the segments of the path.
+
+        Raises:
+            InvalidWaypoints: there is no file of that name, or it is no list of waypoints.
+        """
+        return segments_by(self.path, self.x_0, self.x_g, self.waypoints)
 
     def path_faults(self) -> list[str]:
         """Return faults of the path's ends: below the ground, or given for a path that has ends of its own."""
         default, faults = type(self)(), list[str]()
         for name, p_WG, p_WG_default in (("x_0", self.x_0, default.x_0), ("x_g", self.x_g, default.x_g)):
-            if self.path is not Path.CUSTOM and not np.array_equal(p_WG, p_WG_default):
+            if self.waypoints and self.path is Path.CUSTOM and not np.array_equal(p_WG, p_WG_default):
+                faults.append(f"{name}: the path goes by the waypoints of {self.waypoints}; {name} is for a line only")
+            elif self.path is not Path.CUSTOM and not np.array_equal(p_WG, p_WG_default):
                 path = self.path.name.lower()
                 faults.append(f"{name}: the path {path} has ends of its own; {name} is for path=custom only")
             elif self.path is Path.CUSTOM and p_WG[2] < 0.0:
                 faults.append(f"{name}: {format_point(p_WG)} is below the ground, z = 0 in W; its z must be at least 0")
-        return faults
+        return faults + self._waypoint_faults() if self.waypoints else faults
+
+    def _waypoint_faults(self) -> list[str]:
+        if self.path is not Path.CUSTOM:
+            path = self.path.name.lower()
+            return [f"waypoints: the path {path} has points of its own; waypoints is for path=custom only"]
+        try:
+            segments = self.segments()
+        except InvalidWaypoints as e:
+            return [f"waypoints: {e}"]
+        ends = [segments[0].x_0, *(segment.x_g for segment in segments)]
+        return [
+            f"waypoints: {self.waypoints}: waypoint {i}, {format_point(p_WG)}, is below the ground, z = 0 in W"
+            for i, p_WG in enumerate(ends, 1)
+            if p_WG[2] < 0.0
+        ]
 
     @property
     def length(self) -> float:
         """Length of the path, m."""
-        return sum(segment.length for segment in segments_of(self.path, self.x_0, self.x_g))
+        return sum(segment.length for segment in self.segments())
 
 
 @dataclass(frozen=True, kw_only=True)

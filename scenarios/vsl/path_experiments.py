@@ -103,6 +103,7 @@ class PathExperiment(Experiment[PathEvaluator]):
             elbow=p.elbow.name,
             pressure=p.pressures,
             **_given("pressure_steps", p.pressure_steps),
+            **_given("waypoints", str(Path(p.waypoints).absolute()) if p.waypoints else ""),
         )
         kinematics = s.add(
             "kinematics",

@@ -17,7 +17,7 @@ PLACES = {
             "done": "by it the run ends",
         },
         optional=dict.fromkeys(
-            ("path", "x_0", "x_g", "N", "V", "settle", "elbow", "pressure", "pressure_steps"),
+            ("path", "x_0", "x_g", "N", "V", "settle", "elbow", "pressure", "pressure_steps", "waypoints"),
             "the scenario's parameter",
         ),
         remarks=(_WORLD,),

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from handover.controllers.vsl.paths import segments_of
+from handover.controllers.vsl.waypoints import InvalidWaypoints
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.plants.vsl.parameters import Params as ArmParams
@@ -36,7 +36,7 @@ def replay_path(parameters: Parameters, record: Record, *, hybrid: bool) -> Repl
     return Replay(
         bodies=[_ground(), *arm_bodies(shape), *_load(parameters.masses, hanging, shape)],
         lines=[*arm_lines(shape), *_hook(parameters.masses, hanging, shape), *_tips(record, hybrid)],
-        fixed=[Line(label="desired path", colour=_DESIRED, points=_desired_path(parameters)[None], width=4.0)],
+        fixed=_desired_path(parameters),
         eye=(0.45, -1.45, 0.35),
         phases=phases_of_path(record),
         floor=_GROUND_AT - _PLATE,
@@ -45,13 +45,18 @@ def replay_path(parameters: Parameters, record: Record, *, hybrid: bool) -> Repl
     )
 
 
-def _desired_path(parameters: Parameters) -> Floats:
+def _desired_path(parameters: Parameters) -> list[Line]:
+    """Return the path; none if its file of waypoints is there no longer."""
     p = parameters
     parts: list[Floats] = []
-    for segment in segments_of(p.path, p.x_0, p.x_g):
+    try:
+        segments = p.segments()
+    except InvalidWaypoints:
+        return []
+    for segment in segments:
         points, _ = segment.sampled(p.points, p.speed)
         parts += [segment.x_0[None], points]
-    return np.vstack(parts)
+    return [Line(label="desired path", colour=_DESIRED, points=np.vstack(parts)[None], width=4.0)]
 
 
 def arm_lines(shape: Floats) -> list[Line]:

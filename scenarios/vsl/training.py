@@ -154,10 +154,11 @@ class VslTraining:
             share: of the training and validation points that are used.
 
         Raises:
-            NoPyTorch: as `train`.
+            NothingToLearn, NoPyTorch: as `train`.
         """
         directions = directions_of(measured.points.q_cmd[:, 1:], Params().reversal)
         training, validation, test = measured.parts(share)
+        self._check_varies(measured.points.rows(training))
         friction = (0.0, 0.0)
         if self.window:
             few = training[:_FRICTION_POINTS]
@@ -334,13 +335,15 @@ class VslTraining:
                 f"{len(rows)} of {len(measured)} measured tips are where links of {k.L_2:g} and {k.L_3:g} m on a "
                 f"shoulder {k.L_1:g} m high can be; half of them should be",
             )
-        usable = measured.rows(rows)
-        x = inputs_of(usable.q, usable.p, usable.i)
+        self._check_varies(measured.rows(rows))
+        return rows
+
+    def _check_varies(self, data: Dataset) -> None:
+        x = inputs_of(data.q, data.p, data.i)
         constant = np.ptp(x, axis=0) <= _MIN_VARIATION * np.max(np.abs(x), axis=0)
         if np.any(constant):
             names = ", ".join(name for name, c in zip(FORWARD_INPUTS, constant, strict=True) if c)
             raise NothingToLearn(self.fmu, f"the same at all points, whatever is commanded: {names}")
-        return rows
 
     def _within_reach(self, p_WG: Floats) -> NDArray[np.bool_]:
         min_reach, _ = self.kinematics.reach

@@ -29,7 +29,7 @@ USUAL = Inputs(
     qd_ref=np.array([0.0, -0.1, 0.3]),
     q_meas=Q + np.array([0.0, 0.05, 0.02]),
     p_meas=np.array([1e5, 1e5]),
-    i_meas=np.array([0.0, *MODEL.inverse.mean[5:].tolist()]),
+    i_meas=np.array([0.0, *MODEL.inverse.domain.mean[5:].tolist()]),
 )
 RIGID = Params(method=Method.MODEL_BASED)
 ESTIMATE = Params(method=Method.ESTIMATE)
@@ -96,8 +96,7 @@ def test_the_closed_loop_raises_a_tip_that_is_too_low(params: Params):
     unit = HybridKinematics(params)
     first = unit.step(0.0, 0.02, USUAL)
     low = dataclasses.replace(USUAL, q_meas=first.q_cmd, p_WG_meas=ARM.forward(Q) - np.array([0.0, 0.0, 0.02]))
-    for k in range(1, 30):
-        last = unit.step(k * 0.02, 0.02, low)
+    last = [unit.step(k * 0.02, 0.02, low) for k in range(1, 30)][-1]
     assert ARM.forward(last.q_cmd)[2] > ARM.forward(first.q_cmd)[2] + 0.005
 
 

@@ -200,7 +200,7 @@ def test_friction_in_the_currents_is_found():
     clean = rng.uniform(-1.0, 1.0, (600, 4))
     directions = rng.choice([-1.0, 1.0], (600, 2))
     y = np.column_stack([clean[:, 2] + clean[:, 0] * clean[:, 3], clean[:, 3] - 0.5 * clean[:, 2] ** 2, clean[:, 1]])
-    measured = clean.copy()
+    measured: Floats = np.array(clean)
     measured[:, 2:] += directions * [0.3, 0.2]
 
     def inputs_at(c: Floats) -> Floats:

@@ -117,7 +117,7 @@ def test_a_small_network_learns():
     fit = fit_small(points(), seed=1, steps=150)
     assert fit.network.neurons == (32, 32)
     assert fit.validation_rms < 0.3 * float(np.std(values(X)))
-    assert set(fit.facts) == {"decay", "steps"}
+    assert set(fit.facts) == {"decay", "steps", "scipy"}
     again = fit_small(points(), seed=1, steps=150)
     np.testing.assert_array_equal(again.network.predict(X), fit.network.predict(X))
     assert np.any(fit_small(points(), seed=2, steps=150).network.predict(X) != fit.network.predict(X))

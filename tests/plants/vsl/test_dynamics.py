@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -227,7 +228,7 @@ def test_a_tip_that_comes_down_faster_strikes_harder_and_leaves_the_face_again()
         lower = RAISED[0] - 0.2, RAISED[1]
         aims = np.linspace(RAISED, lower, steps + 1)
         forces = [0.0]
-        for first, last in zip(aims[:-1], aims[1:], strict=True):
+        for first, last in pairwise(aims):
             dynamics.advance(0.02, (first, last), P, 0.0, 0.0)
             forces.append(dynamics.force)
         assert forces[1] == 0.0

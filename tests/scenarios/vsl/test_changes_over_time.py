@@ -94,3 +94,35 @@ def test_masses_are_those_of_the_whole_run():
     assert p.masses == [0.05, 0.1]
     np.testing.assert_array_equal(p.load_at(np.array([0.0, 2.0, 3.5, 9.0])), [0.05, 0.1, 0.0, 0.05])
     assert Parameters(load=0.0).masses == []
+
+
+def test_a_path_goes_by_a_file_of_waypoints(tmp_path: Path):
+    way = tmp_path / "way.csv"
+    way.write_text("x,y,z,via_x,via_y,via_z\n0.3,0,0.1,,,\n0.35,0,0.1,,,\n0.35,0,0.15,0.375,0,0.125\n")
+    given = ("path=custom", f"waypoints={way}", "settle=2", "points=20", "speed=0.1")
+    ended = run(VslModelBased, tmp_path / "run", *given)
+    assert metric(ended, "points_visited") == 40
+    assert metric(ended, "path_time") == pytest.approx((0.05 + 0.025 * math.pi) / 0.1, abs=0.05)
+    record, p = Record(tmp_path / "run" / "signals.parquet"), parse_parameters(VslModelBased, given)
+    assert record["planner.p_WG_goal"][-1] == pytest.approx([0.35, 0.0, 0.15])
+    [drawn] = [line for line in VslModelBased().replay(p, record).fixed if line.label == "desired path"]
+    assert float(drawn.points[..., 0].max()) == pytest.approx(0.375, abs=1e-4)
+    way.unlink()
+    assert not VslModelBased().replay(p, record).fixed
+
+
+@pytest.mark.parametrize(
+    ("text", "given", "fault"),
+    [
+        ("x,y,z\n0.3,0,0.1\n0.3,0,-0.1\n", (), r"waypoint 2, \(0\.3, 0, -0\.1\) m?.*is below the ground"),
+        ("x,y,z\n0.3,0,0.1\n0.3,0,0.2\n", ("x_0=0.2,0,0.1",), "x_0 is for a line only"),
+        ("x,y,z\n0.3,0,0.1\n", (), "it has 1 waypoints"),
+        ("x,y,z\n0.3,0,0.1\n0.3,0,0.2\n", ("path=linear",), "waypoints is for path=custom only"),
+    ],
+)
+def test_waypoints_that_cannot_be_are_refused(tmp_path: Path, text: str, given: tuple[str, ...], fault: str):
+    (tmp_path / "way.csv").write_text(text)
+    path = () if any(g.startswith("path") for g in given) else ("path=custom",)
+    parameters = parse_parameters(VslModelBased, [f"waypoints={tmp_path / 'way.csv'}", *path, *given])
+    with pytest.raises(InvalidParameter, match=fault):
+        VslModelBased().build(parameters, 0, lambda name: Path(name))

@@ -25,8 +25,24 @@ from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 from handover.scenarios.vsl.path_experiments import ELECTRONICS
 
 NUMERICAL = {"hinges", "hinges_dynamic", "substep", "high_frequency_damping"}
-CHOSEN_BY_THE_SCENARIO = {"motion", "link_2", "link_3", "path", "x_0", "x_g", "elbow", "pressure", "method", "model"}
-CHOSEN_BY_THE_SCENARIO |= {"learned", "window", "closed_loop", "swing"}
+CHOSEN_BY_THE_SCENARIO = {
+    "motion",
+    "link_2",
+    "link_3",
+    "path",
+    "x_0",
+    "x_g",
+    "elbow",
+    "pressure",
+    "method",
+    "model",
+    "waypoints",
+} | {
+    "learned",
+    "window",
+    "closed_loop",
+    "swing",
+}
 
 Paper = dict[str, dict[str, dict[str, Any]]]
 

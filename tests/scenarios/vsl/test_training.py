@@ -57,6 +57,10 @@ def points(n: int, droop: Floats, sag: Floats) -> Dataset:
     return Dataset(p_WG, rng.uniform(5e4, 2e5, (n, 2)), rng.uniform(-1.0, 1.0, (n, 3)), q, q_cmd)
 
 
+def key_of_made_up(_fmu: Path) -> str:
+    return "k"
+
+
 def nobody(_done: float, _of: float) -> None:
     """Take note of no progress."""
 
@@ -193,6 +197,10 @@ def with_column(name: str, values: Any) -> Callable[[Any], Any]:
     return lambda table: table.set_column(table.column_names.index(name), name, [values])
 
 
+def with_metadata(metadata: Any) -> Callable[[Any], Any]:
+    return lambda table: table.replace_schema_metadata(metadata)
+
+
 def about(**origin: Any) -> Callable[[Any], Any]:
     def change(table: Any) -> Any:
         kept = json.loads(table.schema.metadata[b"handover-vsl-data"])
@@ -218,8 +226,8 @@ def about(**origin: Any) -> Callable[[Any], Any]:
         (about(version=9), "is not of version 1"),
         (about(seed="x"), "has a seed or walk of a wrong kind"),
         (about(arm=None), "lacks arm, links, seed or walk"),
-        (lambda table: table.replace_schema_metadata(None), "does not say of which arm it is"),
-        (lambda table: table.replace_schema_metadata({b"handover-vsl-data": b"{"}), "is not JSON"),
+        (with_metadata(None), "does not say of which arm it is"),
+        (with_metadata({b"handover-vsl-data": b"{"}), "is not JSON"),
     ],
 )
 def test_data_that_cannot_be_trained_on_is_refused(change: Callable[[Any], Any], text: str, tmp_path: Path):
@@ -227,6 +235,21 @@ def test_data_that_cannot_be_trained_on_is_refused(change: Callable[[Any], Any],
     pq.write_table(change(pq.read_table(tmp_path / "d.parquet")), tmp_path / "d.parquet")
     with pytest.raises(InvalidData, match=text):
         read_data(tmp_path / "d.parquet", "k", ARM)
+
+
+def test_data_of_too_few_points_or_without_gauges_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(vsl_train_command, "content_key", key_of_made_up)
+    without_gauges = made_up(400)
+    without_gauges.points.p[:] = 1e5
+    for measured, text in (
+        (made_up(100), "90 points with a tip within reach are too few"),
+        (without_gauges, r"the same at all points, whatever is commanded: p_meas\[1\], p_meas\[2\]"),
+    ):
+        write_data(tmp_path / "d.parquet", measured)
+        result = call("--data", tmp_path / "d.parquet", "--out", tmp_path / "m.json")
+        assert result.exit_code == 2
+        assert re.search(text, result.output)
+        assert not (tmp_path / "m.json").exists()
 
 
 @pytest.mark.parametrize("content", [b"", b"text", b"PAR1 and more"])
@@ -385,9 +408,9 @@ def test_a_folder_that_goes_away_is_reported_in_a_line(tmp_path: Path, monkeypat
         return shipped(), training.errors(shipped(), measured.points.rows(np.arange(10)))
 
     (tmp_path / "a").mkdir()
-    write_data(tmp_path / "d.parquet", made_up(100))
+    write_data(tmp_path / "d.parquet", made_up(400))
     monkeypatch.setattr(VslTraining, "learn", gone)
-    monkeypatch.setattr(vsl_train_command, "content_key", lambda _fmu: "k")
+    monkeypatch.setattr(vsl_train_command, "content_key", key_of_made_up)
     result = call("--data", tmp_path / "d.parquet", "--out", tmp_path / "a" / "m.json")
     assert result.exit_code == 2
     assert "No such file or directory" in result.output
