@@ -12,8 +12,8 @@ from handover.scenarios.published.vsl.vsl_1_runs import PATHS, RIGID, Cell, Link
 _WHERE = "sec. V-C, fig. 5"
 
 _BY_SPRINGS = (
-    "An arm of springs sags the more the more it carries, whatever its stiffness, and the stiffness was chosen for errors "
-    "about as in fig. 5, so agreement proves nothing."
+    "An arm of springs sags the more the more it carries, whatever its stiffness, and the stiffness was chosen for "
+    "errors about as in fig. 5, so agreement proves nothing."
 )
 _BY_CHOICE = (
     "How much stiffer pressure makes a link was chosen so that errors fall with it about as in fig. 5, so agreement "
