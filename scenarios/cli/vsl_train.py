@@ -168,8 +168,19 @@ class _Options:
     def measured(self, training: VslTraining, progress: Progress) -> Measured:
         """Return points from the file, or as the arm measures them, which are then saved if wanted."""
         if self.data:
-            return read_data(self.data, content_key(training.fmu), training.kinematics)
+            measured = read_data(self.data, content_key(training.fmu), training.kinematics)
+            try:
+                training.check(measured)
+            except NothingToLearn as e:
+                raise InvalidData(self.data, e.fault) from e
+            return measured
         return training.measure(progress)
+
+    def check_number(self, measured: Measured, least: int, purpose: str) -> None:
+        """Raise UsageError where fewer points than the least number are usable."""
+        if measured.usable < least:
+            of = f"--data {self.data}: " if self.data else ""
+            raise UsageError(f"{of}{measured.usable} points with a tip within reach are too few {purpose}: {least}")
 
     def save(self, measured: Measured, model: VslModel) -> None:
         """Write what is to be written of points and model."""
@@ -185,8 +196,7 @@ def _train(o: _Options, progress: Progress) -> list[str]:
     """Train, write, and return what is to be printed."""
     training = o.training(o.kinematics)
     measured = o.measured(training, progress)
-    if measured.usable < MIN_POINTS / 2:
-        raise UsageError(f"{measured.usable} points with a tip within reach are too few: at least {MIN_POINTS // 2}")
+    o.check_number(measured, MIN_POINTS // 2, "to train on")
     model, errors = training.learn(measured, progress)
     lines = list(_summary(model, errors))
     if o.curve:
@@ -203,8 +213,7 @@ def _adapt(o: _Options, progress: Progress) -> list[str]:
     base = read_model(o.adapt)
     training = o.training(base.kinematics).like(base)
     measured = o.measured(training, progress)
-    if measured.usable < _MIN_ADAPTATION:
-        raise UsageError(f"{measured.usable} points with a tip within reach are too few to adapt to: {_MIN_ADAPTATION}")
+    o.check_number(measured, _MIN_ADAPTATION, "to adapt to")
     model, before, errors = training.adapt(base, measured)
     o.save(measured, model)
     return [

@@ -241,14 +241,18 @@ def test_data_of_too_few_points_or_without_gauges_are_refused(tmp_path: Path, mo
     monkeypatch.setattr(vsl_train_command, "content_key", key_of_made_up)
     without_gauges = made_up(400)
     without_gauges.points.p[:] = 1e5
+    far = made_up(400)
+    far.points.p_WG[far.order == 7] = [0.6, 0.0, 0.15]
     for measured, text in (
-        (made_up(100), "90 points with a tip within reach are too few"),
-        (without_gauges, r"the same at all points, whatever is commanded: p_meas\[1\], p_meas\[2\]"),
+        (made_up(100), r"--data .*d\.parquet: 90 points with a tip within reach are too few to train on: 200"),
+        (without_gauges, r"d\.parquet: the same at all points, whatever is commanded: p_meas\[1\], p_meas\[2\]"),
+        (far, r"d\.parquet: 1 of 360 points in its split have a tip out of reach"),
     ):
         write_data(tmp_path / "d.parquet", measured)
         result = call("--data", tmp_path / "d.parquet", "--out", tmp_path / "m.json")
         assert result.exit_code == 2
         assert re.search(text, result.output)
+        assert "Traceback" not in result.output
         assert not (tmp_path / "m.json").exists()
 
 
