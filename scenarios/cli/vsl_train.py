@@ -199,11 +199,14 @@ def _train(o: _Options, progress: Progress) -> list[str]:
     o.check_number(measured, MIN_POINTS // 2, "to train on")
     model, errors = training.learn(measured, progress)
     lines = list(_summary(model, errors))
-    if o.curve:
-        points = learning_curve(training, measured, progress)
-        draw_curve(points, o.curve.with_suffix(""))
-        lines += [*curve_table(points), str(o.curve)]
+    points = learning_curve(training, measured, progress) if o.curve else []
     o.save(measured, model)
+    if o.curve:
+        try:
+            draw_curve(points, o.curve)
+        except OSError as e:
+            raise UsageError(f"--curve {o.curve}: {e.strerror or e}; the model is written: {o.out}") from e
+        lines += [*curve_table(points), str(o.curve)]
     return lines
 
 
