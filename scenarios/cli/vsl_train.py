@@ -2,7 +2,6 @@
 
 import os
 import sys
-import tempfile
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from handover.scenarios.cli.options import WholeNumber
 from handover.scenarios.execution.errors import UsageError, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import progress_bar
+from handover.scenarios.results.run_folder import write_whole
 from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
 from handover.scenarios.vsl.learning_curve import curve_table, draw_curve, learning_curve
 from handover.scenarios.vsl.model_file import content_key, file_text
@@ -189,7 +189,7 @@ class _Options:
                 write_data(self.save_data, measured)
             except OSError as e:
                 raise UsageError(f"--save-data {self.save_data}: {e.strerror or e}") from e
-        _write(self.out, file_text(model, self.out))
+        write_whole(self.out, file_text(model, self.out))
 
 
 def _train(o: _Options, progress: Progress) -> list[str]:
@@ -318,22 +318,6 @@ def _check_file(option: str, out: Path, suffixes: tuple[str, ...], more: str = "
         raise UsageError(f"{option} {out}: there is no folder {folder}")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise UsageError(f"{option} {out}: no permission to write to {folder}")
-
-
-def _write(out: Path, text: str) -> None:
-    """Write a file that appears whole or not at all."""
-    try:
-        handle, part = tempfile.mkstemp(dir=out.absolute().parent, prefix=f".{out.name}-")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-                file.write(text)
-            Path(part).chmod(0o644)
-            os.replace(part, out)
-        except BaseException:
-            Path(part).unlink(missing_ok=True)
-            raise
-    except OSError as e:
-        raise UsageError(f"--out {out}: {e.strerror}") from e
 
 
 @contextmanager
