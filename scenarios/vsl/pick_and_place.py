@@ -171,6 +171,6 @@ def _q_above(p_WP: Floats, hover: float) -> Floats:
     """
     task = Task()
     try:
-        return VslKinematics(task.L_1, task.L_2, task.L_3, task.elbow).inverse(p_WP + [0.0, 0.0, hover])
+        return VslKinematics(task.L_1, task.L_2, task.L_3, task.elbow).inverse(p_WP + np.array([0.0, 0.0, hover]))
     except Unreachable as e:
         raise InvalidParameter([f"pick: above it the arm is to start, and {e}"]) from e
