@@ -1,7 +1,8 @@
 """A chain of rigid pieces on springs, as the controller's own model of how the VSL arm bends under its weight.
 
-It is what learns least: three stiffnesses. Weights and lengths are as a pair of scales and a ruler give them; the load
-follows from the currents of joints 2 and 3.
+It is what learns least: three stiffnesses, and for commands the servos' droop. Weights and lengths are as a pair of
+scales and a ruler give them; the load follows from the currents of joints 2 and 3. Law and weights are those of the
+unit `VslArm`, so that on it a beam errs less than it would on a real arm, of which no law is known exactly.
 """
 
 import math
@@ -25,7 +26,7 @@ _ITERATIONS = 4
 """Of the fixed point, each of which leaves about a tenth of the error (own choice)."""
 
 _SMALL = 1e-9
-"""Square of a lever, m2, that keeps the load finite where the arm stands upright."""
+"""Square of a torque by load, (N m/kg)^2, that keeps the load finite where the arm stands upright."""
 
 _DIFFERENCES = np.array([1e-5, 1e-5, 1e-5, 10.0, 10.0, 1e-4, 1e-4])
 """Of angles, rad, pressures, Pa, and currents, A, of which a Jacobian is made."""
@@ -118,22 +119,22 @@ class Beam:
 
     def _sagged(self, m: Any, straight: list[Any], phi: list[Any], compliances: list[Any], i: Pair) -> tuple[Any, Pair]:
         """Return the pieces' angles under the torques that they have at angles phi, and those of the joints."""
-        own, lever = 0.0, 0.0
-        owns, levers = list[Any](), list[Any]()
-        for angle, (gravity, weight) in zip(reversed(phi), self._pulls, strict=True):
-            x = gravity * m.cos(angle)
-            own, lever = own + weight * x, lever + x
+        own, by_load = 0.0, 0.0  # torques on a hinge: of the arm itself, N m, and by the load, N m/kg
+        owns, by_loads = list[Any](), list[Any]()
+        for angle, (pull, mass) in zip(reversed(phi), self._pulls, strict=True):
+            x = pull * m.cos(angle)
+            own, by_load = own + mass * x, by_load + x
             owns.append(own)
-            levers.append(lever)
-        own_2, own_3, lever_2, lever_3 = owns[-1], owns[HINGES], levers[-1], levers[HINGES]
+            by_loads.append(by_load)
+        own_2, own_3, by_load_2, by_load_3 = owns[-1], owns[HINGES], by_loads[-1], by_loads[HINGES]
         left_2, left_3 = self.weights.kt * i[0] - own_2, self.weights.kt * i[1] - own_3
-        squares = lever_2 * lever_2 + lever_3 * lever_3 + _SMALL
-        load = m.clamp((lever_2 * left_2 + lever_3 * left_3) / squares)
+        squares = by_load_2 * by_load_2 + by_load_3 * by_load_3 + _SMALL
+        load = m.clamp((by_load_2 * left_2 + by_load_3 * left_3) / squares)
         sag, sagged = 0.0, list[Any]()
-        for straight_k, c, own, lever in zip(straight, compliances, reversed(owns), reversed(levers), strict=True):
-            sag = sag + c * (own + load * lever)
+        for straight_k, c, own, by_load in zip(straight, compliances, reversed(owns), reversed(by_loads), strict=True):
+            sag = sag + c * (own + load * by_load)
             sagged.append(straight_k - sag)
-        return sagged, (own_2 + load * lever_2, own_3 + load * lever_3)
+        return sagged, (own_2 + load * by_load_2, own_3 + load * by_load_3)
 
     def _steps(self, m: Any, phi: list[Any]) -> tuple[Pair, Pair]:
         """Return how far each link goes, outwards and upwards, m."""
@@ -165,7 +166,7 @@ class Beam:
 
     @cached_property
     def _pulls(self) -> list[tuple[float, float]]:
-        """Return gravity times length of each piece, and what weighs on its end and half of its own, from the tip."""
+        """Return gravity times length of each piece, N m/kg, and mass on its end and half its own, kg; tip first."""
         w, n = self.weights, HINGES + 1
         lengths = [self.kinematics.L_2] * n + [self.kinematics.L_3] * n
         masses = [w.link * l / L for l, L in zip(self._lengths, lengths, strict=True)]

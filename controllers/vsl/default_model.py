@@ -13,7 +13,7 @@ DEFAULT_MODEL = """\
  "provenance": {
   "arm": {
    "fmu": "VslArm",
-   "key": "921bd2eb5c462ad6837cd2e528577149ea0227342c2ccfa38832709130960dd7",
+   "key": "9085b21db2a2114db1cf7d9367faed5bc389008cfeece0a50723bddf195448ed",
    "parameters": {
     "EI_0": 0.55,
     "EI_factor": [1.0, 1.0, 1.0],
@@ -30,6 +30,9 @@ DEFAULT_MODEL = """\
     "damping_time": 0.005,
     "droop_time": 0.1,
     "encoder_step": 0.0,
+    "face": -10.0,
+    "face_damping": 3.0,
+    "face_stiffness": 1000.0,
     "friction_factor": [1.0, 1.0, 1.0],
     "gear_friction": 0.06,
     "gravity": 9.81,

@@ -14,11 +14,22 @@ from handover.controllers.vsl.corrections import CurrentFilter, SwingCompensatio
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import Learned, VslModel
 from handover.controllers.vsl.model_text import InvalidModel, parse_model, read_model
+from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Ampere, Hertz, Metre, Number, Pascal, PerSecond, Radian, RadianPerSecond, Second
 
-__all__ = ["Elbow", "HybridKinematics", "Inputs", "InvalidModel", "Learned", "Method", "Outputs", "Params"]
+__all__ = [
+    "Elbow",
+    "HybridKinematics",
+    "IdleParameters",
+    "Inputs",
+    "InvalidModel",
+    "Learned",
+    "Method",
+    "Outputs",
+    "Params",
+]
 
 _SHIPPED = {
     (Learned.CUBIC, False): default_model.DEFAULT_MODEL,
@@ -109,6 +120,12 @@ class Outputs:
     outside: bool = output("the learned model is asked about what it was not trained on")
 
 
+class IdleParameters(InvalidParameters):
+    """Parameters that only what was learned has, set where nothing learned is used; `faults` lists all of them."""
+
+    block = "HybridKinematics"
+
+
 class HybridKinematics:
     """Rigid kinematics, and what was learned of their error. [Gandarias2020] eqs. (1), (10), (11).
 
@@ -131,6 +148,7 @@ class HybridKinematics:
     `outside` reports that the input of g or h is outside the polytope of its training; see `Domain` for what follows.
 
     Raises:
+        IdleParameters: by the constructor, for MODEL_BASED with a model, window, swing, or kind of model of its own.
         InvalidModel: by the constructor, if the model is used and cannot be read, is not what `learned` and `window`
             say, or was trained for other links.
     """
@@ -145,6 +163,8 @@ class HybridKinematics:
     period: ClassVar[Fraction | None] = Fraction(1, 50)
 
     def __init__(self, params: Params) -> None:
+        if faults := _idle(params):
+            raise IdleParameters(faults)
         self._params = p = params
         self._kinematics = VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
         self._model = _model(p, self._kinematics) if p.method is not Method.MODEL_BASED else None
@@ -204,6 +224,15 @@ class HybridKinematics:
 
     def _granted(self, qd_ref: Floats) -> Floats:
         return qd_ref + self._params.qd_correction * np.sign(qd_ref)
+
+
+def _idle(p: Params) -> list[str]:
+    """Return what is set and has no effect by the method chosen."""
+    if p.method is not Method.MODEL_BASED:
+        return []
+    default = Params()
+    given = [name for name in ("learned", "model", "window", "swing") if getattr(p, name) != getattr(default, name)]
+    return [f"{name}: without effect with method=MODEL_BASED, which uses nothing that was learned" for name in given]
 
 
 def _model(p: Params, kinematics: VslKinematics) -> VslModel:

@@ -24,7 +24,7 @@ class Learned(enum.IntEnum):
 
     CUBIC: polynomials of third degree on residuals. SMALL: networks of two layers of 32 on residuals. PUBLISHED: the
     networks of [Gandarias2020] sec. IV-B, which give positions and angles themselves. PHYSICS: a chain of rigid pieces
-    with three fitted stiffnesses.
+    with three fitted stiffnesses, and the servos' droop.
     """
 
     CUBIC = 0

@@ -2,7 +2,6 @@
 
 import os
 import sys
-import tempfile
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from handover.scenarios.cli.options import WholeNumber
 from handover.scenarios.execution.errors import UsageError, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import progress_bar
+from handover.scenarios.results.run_folder import write_whole
 from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
 from handover.scenarios.vsl.learning_curve import curve_table, draw_curve, learning_curve
 from handover.scenarios.vsl.model_file import content_key, file_text
@@ -168,8 +168,19 @@ class _Options:
     def measured(self, training: VslTraining, progress: Progress) -> Measured:
         """Return points from the file, or as the arm measures them, which are then saved if wanted."""
         if self.data:
-            return read_data(self.data, content_key(training.fmu), training.kinematics)
+            measured = read_data(self.data, content_key(training.fmu), training.kinematics)
+            try:
+                training.check(measured)
+            except NothingToLearn as e:
+                raise InvalidData(self.data, e.fault) from e
+            return measured
         return training.measure(progress)
+
+    def check_number(self, measured: Measured, least: int, purpose: str) -> None:
+        """Raise UsageError where fewer points than the least number are usable."""
+        if measured.usable < least:
+            of = f"--data {self.data}: " if self.data else ""
+            raise UsageError(f"{of}{measured.usable} points with a tip within reach are too few {purpose}: {least}")
 
     def save(self, measured: Measured, model: VslModel) -> None:
         """Write what is to be written of points and model."""
@@ -178,22 +189,24 @@ class _Options:
                 write_data(self.save_data, measured)
             except OSError as e:
                 raise UsageError(f"--save-data {self.save_data}: {e.strerror or e}") from e
-        _write(self.out, file_text(model, self.out))
+        write_whole(self.out, file_text(model, self.out))
 
 
 def _train(o: _Options, progress: Progress) -> list[str]:
     """Train, write, and return what is to be printed."""
     training = o.training(o.kinematics)
     measured = o.measured(training, progress)
-    if measured.usable < MIN_POINTS / 2:
-        raise UsageError(f"{measured.usable} points with a tip within reach are too few: at least {MIN_POINTS // 2}")
+    o.check_number(measured, MIN_POINTS // 2, "to train on")
     model, errors = training.learn(measured, progress)
     lines = list(_summary(model, errors))
-    if o.curve:
-        points = learning_curve(training, measured, progress)
-        draw_curve(points, o.curve.with_suffix(""))
-        lines += [*curve_table(points), str(o.curve)]
+    points = learning_curve(training, measured, progress) if o.curve else []
     o.save(measured, model)
+    if o.curve:
+        try:
+            draw_curve(points, o.curve)
+        except OSError as e:
+            raise UsageError(f"--curve {o.curve}: {e.strerror or e}; the model is written: {o.out}") from e
+        lines += [*curve_table(points), str(o.curve)]
     return lines
 
 
@@ -203,8 +216,7 @@ def _adapt(o: _Options, progress: Progress) -> list[str]:
     base = read_model(o.adapt)
     training = o.training(base.kinematics).like(base)
     measured = o.measured(training, progress)
-    if measured.usable < _MIN_ADAPTATION:
-        raise UsageError(f"{measured.usable} points with a tip within reach are too few to adapt to: {_MIN_ADAPTATION}")
+    o.check_number(measured, _MIN_ADAPTATION, "to adapt to")
     model, before, errors = training.adapt(base, measured)
     o.save(measured, model)
     return [
@@ -306,22 +318,6 @@ def _check_file(option: str, out: Path, suffixes: tuple[str, ...], more: str = "
         raise UsageError(f"{option} {out}: there is no folder {folder}")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise UsageError(f"{option} {out}: no permission to write to {folder}")
-
-
-def _write(out: Path, text: str) -> None:
-    """Write a file that appears whole or not at all."""
-    try:
-        handle, part = tempfile.mkstemp(dir=out.absolute().parent, prefix=f".{out.name}-")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-                file.write(text)
-            Path(part).chmod(0o644)
-            os.replace(part, out)
-        except BaseException:
-            Path(part).unlink(missing_ok=True)
-            raise
-    except OSError as e:
-        raise UsageError(f"--out {out}: {e.strerror}") from e
 
 
 @contextmanager

@@ -1,5 +1,7 @@
 """Errors of the VSL arm's learned kinematics by the number of points that they were learned from."""
 
+import os
+import tempfile
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,7 +52,18 @@ def curve_table(points: Sequence[CurvePoint]) -> Generator[str, None, None]:
 
 
 def draw_curve(points: Sequence[CurvePoint], path: Path) -> None:
-    """Draw the errors over the number of points into PNG and SVG files; `path` is without suffix."""
+    """Draw the errors over the number of points into a PNG file, and an SVG file beside it, each whole or not at all.
+
+    Raises:
+        OSError: they cannot be written.
+    """
+    with tempfile.TemporaryDirectory(dir=path.absolute().parent, prefix=f".{path.stem[:200]}-") as folder:
+        _draw(points, Path(folder) / "curve")
+        for suffix in (".svg", ".png"):
+            os.replace(Path(folder) / f"curve{suffix}", path.with_name(path.stem + suffix))
+
+
+def _draw(points: Sequence[CurvePoint], path: Path) -> None:
     from handover.scenarios.experiment.plotting import figure, legend_below  # matplotlib is slow to import
 
     with figure(path, 1, size=(6.0, 3.6)) as [axes]:

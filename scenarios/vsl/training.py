@@ -338,6 +338,18 @@ class VslTraining:
         self._check_varies(measured.rows(rows))
         return rows
 
+    def check(self, measured: Measured) -> None:
+        """Check points that were measured before.
+
+        Raises:
+            NothingToLearn: some in the split have a tip out of reach, or an input is the same at all of them.
+        """
+        used = measured.points.rows(measured.order >= 0)
+        if out := int(np.sum(~self._within_reach(used.p_WG))):
+            raise NothingToLearn(self.fmu, f"{out} of {len(used)} points in its split have a tip out of reach")
+        if len(used):
+            self._check_varies(used)
+
     def _check_varies(self, data: Dataset) -> None:
         x = inputs_of(data.q, data.p, data.i)
         constant = np.ptp(x, axis=0) <= _MIN_VARIATION * np.max(np.abs(x), axis=0)

@@ -1,7 +1,8 @@
 """The rules by which claims on errors get their verdicts: groups of runs that do not overlap, or pairs, in every cell.
 
-Groups are of runs of their own. Errors of the same runs are compared run by run, without a p-value:
-by signed ranks five pairs reach 0.0625 at best, whatever they show, and repetitions differ by the sensors' noise alone.
+Groups are of runs of their own. Where both errors are of the same runs, they are compared run by run, without a
+p-value: five pairs reach 0.0625 at best by signed ranks whatever they show, and repetitions differ by the sensors'
+noise alone.
 """
 
 from collections.abc import Sequence

@@ -28,8 +28,8 @@ def _errors(runs: Vsl1Runs, path: TipPath) -> ComparisonTable:
         rows.append([format_load(load), format_spread(servo), *cells])
     note = (
         "Mean distance of the tip from the desired points along the path, by the tracker, and of the place where "
-        "encoders and rigid links put it (servos, over all links); ± the standard deviation between runs. "
-        f"{_NOT_PRINTED}"
+        "encoders and rigid links put it (servos: over the runs of all links together); ± the standard deviation "
+        f"between runs, of the servos also from links to links. {_NOT_PRINTED}"
     )
     if runs.not_done:
         note += f" {runs.not_done} runs did not come to their end and do not count."

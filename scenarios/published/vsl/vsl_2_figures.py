@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import StrMethodFormatter
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.experiment import Figure
@@ -20,7 +19,6 @@ from handover.scenarios.vsl.plots import draw_box
 _BLUE, _RED, _GREEN, _PURPLE = COLOURS[:4]
 _DESIRED = "#4d5866"
 _STROKES: tuple[Any, ...] = ("-", "--", ":", "-.")
-_PLAIN = StrMethodFormatter("{x:g}")
 
 
 def draw_figures(runs: Vsl2Runs, folders: Path, folder: Path) -> list[Figure]:
@@ -95,14 +93,21 @@ def _boxes(runs: Vsl2Runs, traces: Mapping[tuple[Case, Way], Sequence[PathTrace]
                 errors = np.concatenate([np.linalg.norm(t.tracked - t.desired, axis=1) for t in traces[case, way]])
                 draw_box(axes, k, 1000 * errors, _colour(way))
             axes.set_xticks(range(len(runs.ways)), [_wrapped(way) for way in runs.ways], fontsize="small")
-            axes.set(title=case.label, ylabel="error (mm)", yscale="log", ylim=(0.02, None))
-            axes.yaxis.set_major_formatter(_PLAIN)
+            axes.set(title=case.label, ylabel="error (mm)")
+            _logarithmic(axes, (0.02, 0.1, 0.5, 2.0, 10.0, 50.0))
             axes.grid(visible=False, axis="x")
     caption = (
         "Distances of the tip from the desired points of the curve, like [Gandarias2020] fig. 7(b), of all runs: 25th "
         "to 75th percentile (box), range, median (line) and mean (dot). Logarithmic, as they differ by tens."
     )
     return Figure("errors", caption)
+
+
+def _logarithmic(axes: Axes, ticks: Sequence[float]) -> None:
+    """Make the error's axis logarithmic, with these ticks, mm, alone."""
+    axes.set(yscale="log", ylim=(ticks[0], 1.4 * ticks[-1]))
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.set_yticks([], minor=True)
 
 
 def _colour(way: Way) -> str:
@@ -144,8 +149,8 @@ def _by_arm(runs: Vsl2Runs, folder: Path) -> Figure:
                 axes.plot([k - 0.12] * len(trained), trained, "o", ms=4, color=_colour(way))
                 axes.plot([k + 0.12] * len(others), others, "o", ms=5, mfc="none", mec=_colour(way))
             axes.set_xticks(range(len(ways)), [_wrapped(way) for way in ways], fontsize="small")
-            axes.set(title=case.label, yscale="log")
-            axes.yaxis.set_major_formatter(_PLAIN)
+            axes.set(title=case.label)
+            _logarithmic(axes, (1.0, 2.0, 5.0, 10.0, 20.0, 50.0))
             axes.grid(visible=False, axis="x")
         panels[0].set_ylabel("mean error of the tip (mm)")
         panels[0].plot([], [], "o", ms=4, color=_DESIRED, label="the arm that was learned from, each run")

@@ -10,6 +10,7 @@ from handover.controllers.vsl.default_model import DEFAULT_MODEL
 from handover.controllers.vsl.hybrid_kinematics import (
     Elbow,
     HybridKinematics,
+    IdleParameters,
     Inputs,
     InvalidModel,
     Learned,
@@ -204,7 +205,6 @@ def test_a_file_that_is_no_model_is_refused(tmp_path: Path):
         HybridKinematics(Params(model=str(file)))
     with pytest.raises(InvalidModel, match="cannot be read"):
         HybridKinematics(Params(model=str(tmp_path / "none.json")))
-    HybridKinematics(Params(method=Method.MODEL_BASED, model="none.json"))
 
 
 @pytest.mark.parametrize(
@@ -222,6 +222,15 @@ def test_a_model_that_is_not_what_the_parameters_say_is_refused(params: Params, 
     (tmp_path / "window").write_text(default_window_model.DEFAULT_MODEL)
     with pytest.raises(InvalidModel, match=text):
         HybridKinematics(dataclasses.replace(params, model=str(tmp_path / params.model) if params.model else ""))
+
+
+def test_by_rigid_kinematics_what_was_learned_is_refused_and_not_ignored():
+    idle = Params(method=Method.MODEL_BASED, learned=Learned.SMALL, model="m.json", window=True, swing=True)
+    with pytest.raises(IdleParameters) as e:
+        HybridKinematics(idle)
+    assert [fault.split(":")[0] for fault in e.value.faults] == ["learned", "model", "window", "swing"]
+    HybridKinematics(dataclasses.replace(RIGID, closed_loop=True, K_I=1.0))
+    HybridKinematics(dataclasses.replace(idle, method=Method.ESTIMATE, model="", learned=Learned.CUBIC))
 
 
 @pytest.mark.parametrize("params", [Params(L_2=0.2), Params(elbow=Elbow.DOWN)])

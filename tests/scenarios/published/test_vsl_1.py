@@ -55,9 +55,9 @@ def test_the_plan_has_every_panel_and_plot_of_figure_5_five_times():
 
 def test_a_claim_is_judged_in_every_cell():
     claims = claims_of(table_of())
-    assert claims[SOFT_LOAD].verdict is Verdict.REPRODUCED
     assert claims[SOFT_LOAD].measured.startswith("48 of 48")
     assert claims["the arm yields a little."].measured.startswith("12 of 12")
+    assert claims["on the square."].verdict is Verdict.REPRODUCED
     assert claims["on the square."].measured.startswith("25 of 25")
     assert claims["on the curve, too."].beyond
 
@@ -66,7 +66,6 @@ def test_a_claim_is_judged_in_every_cell():
         return usual(given) - (0.01 if odd else 0.0)
 
     broken = claims_of(table_of(one_cell))[SOFT_LOAD]
-    assert broken.verdict is Verdict.NOT_REPRODUCED
     assert broken.measured.startswith("47 of 48")
     assert "It fails at: square, 1 bar, 25 g to 50 g." in broken.reason
 
@@ -75,6 +74,8 @@ def test_what_the_arm_was_made_for_is_not_comparable_and_still_counted():
     claims = claims_of(table_of())
     without = [c for c in claims.values() if c.verdict is Verdict.NOT_COMPARABLE]
     assert {c.claim for c in without} == {
+        SOFT_LOAD,
+        "On rigid links it does, too: the arm yields a little.",
         PRESSURE,
         "On soft links the tip errs more than on rigid ones.",
         "The path by the servos' encoders is similar to the desired one: nearer than the rigid arm's tip.",

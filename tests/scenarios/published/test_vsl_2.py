@@ -119,6 +119,7 @@ def test_without_the_papers_network_the_default_is_judged_and_that_is_said():
     assert BY_NETWORK not in claims
     assert "The paper's network is left out" in Vsl2().tables(table)[0].note
     assert "left out" not in Vsl2().tables(table_of())[0].note
+    assert "masses of the simulated arm itself" in Vsl2().tables(table)[0].note
 
 
 def test_errors_on_other_arms_stand_apart():

@@ -1,3 +1,4 @@
+import errno
 import json
 import os
 import re
@@ -32,6 +33,7 @@ from handover.cosim.system.system import System
 from handover.fmus.build import build_block, cached
 from handover.scenarios.cli import vsl_train as vsl_train_command
 from handover.scenarios.cli.vsl_train import vsl_train
+from handover.scenarios.vsl import learning_curve as curve_module
 from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
 from handover.scenarios.vsl.learning_curve import curve_table, learning_curve
 from handover.scenarios.vsl.model_file import content_key
@@ -241,14 +243,18 @@ def test_data_of_too_few_points_or_without_gauges_are_refused(tmp_path: Path, mo
     monkeypatch.setattr(vsl_train_command, "content_key", key_of_made_up)
     without_gauges = made_up(400)
     without_gauges.points.p[:] = 1e5
+    far = made_up(400)
+    far.points.p_WG[far.order == 7] = [0.6, 0.0, 0.15]
     for measured, text in (
-        (made_up(100), "90 points with a tip within reach are too few"),
-        (without_gauges, r"the same at all points, whatever is commanded: p_meas\[1\], p_meas\[2\]"),
+        (made_up(100), r"--data .*d\.parquet: 90 points with a tip within reach are too few to train on: 200"),
+        (without_gauges, r"d\.parquet: the same at all points, whatever is commanded: p_meas\[1\], p_meas\[2\]"),
+        (far, r"d\.parquet: 1 of 360 points in its split have a tip out of reach"),
     ):
         write_data(tmp_path / "d.parquet", measured)
         result = call("--data", tmp_path / "d.parquet", "--out", tmp_path / "m.json")
         assert result.exit_code == 2
         assert re.search(text, result.output)
+        assert "Traceback" not in result.output
         assert not (tmp_path / "m.json").exists()
 
 
@@ -276,10 +282,23 @@ def test_errors_fall_along_the_learning_curve():
 
 
 def test_the_curve_is_drawn(tmp_path: Path):
-    result = call("--points", "400", "--curve", tmp_path / "c.png", "--out", tmp_path / "m.json")
+    result = call("--points", "400", "--curve", tmp_path / "a.b.png", "--out", tmp_path / "m.json")
     assert result.exit_code == 0, result.output
-    assert {p.name for p in tmp_path.iterdir()} == {"c.png", "c.svg", "m.json"}
+    assert {p.name for p in tmp_path.iterdir()} == {"a.b.png", "a.b.svg", "m.json"}
     assert re.search(r"^ +250 +\d+\.\d\d", result.output, re.MULTILINE)
+
+
+def test_model_and_data_are_written_before_the_curve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def full(_points: object, path: Path) -> None:
+        path.with_suffix(".svg").write_text("<svg>")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(curve_module, "_draw", full)
+    out, curve = tmp_path / "m.json", tmp_path / "c.png"
+    result = call("--points", "400", "--save-data", tmp_path / "d.parquet", "--curve", curve, "--out", out)
+    assert result.exit_code == 2
+    assert re.search(r"--curve .*c\.png: No space left on device; the model is written: .*m\.json", result.output)
+    assert {p.name for p in tmp_path.iterdir()} == {"d.parquet", "m.json"}
 
 
 @pytest.mark.parametrize("learned", [Learned.CUBIC, Learned.SMALL])
