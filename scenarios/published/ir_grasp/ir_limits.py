@@ -44,7 +44,7 @@ class IrLimits(PublishedExperiment):
 
     Two ways look: the reflex, and, where its sensors are at fault, the paper's algorithm. Four do not: closing at
     once, after going 35 or 55 mm ahead, and closing slowly while going ahead until the first contact. Each level has
-    two scenes of each of five objects: the table's, or discs and bars of five masses. On no scene anything was tuned.
+    three scenes of each of five objects: the table's, or discs and bars of five masses. On no scene anything was tuned.
     """
 
     name: ClassVar[str] = "ir-limits"
@@ -52,7 +52,7 @@ class IrLimits(PublishedExperiment):
     scenario: ClassVar[str] = IrGrasp.name
 
     def plan(self, quick: bool) -> CampaignPlan:
-        """Return arms x axes x levels x objects, twice; if quick, the hardest levels of one object, once."""
+        """Return arms x axes x levels x objects, three times; if quick, the hardest levels of one object, once."""
         return plan_of_limits(self.name, quick)
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
