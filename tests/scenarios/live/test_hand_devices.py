@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def seen(page: Page) -> NDArray[np.float64]:
 def turned_about(page: Page, q_before: list[float], axis: int) -> float:
     """Return the sine of half the angle by which it was turned about the view's right (0), up (1) or back (2)."""
     before, now = (quaternion(q) for q in (q_before, page.evaluate("live.hand.pose().q_WH")))
-    turn: Any = now * before.inv()
+    turn = cast(Rotation, now * before.inv())
     return float(turn.as_quat(canonical=True)[:3] @ page.evaluate("live.hand.axes()")[axis])
 
 

@@ -79,7 +79,7 @@ class MouseHand:
                 self._hand = ScriptedHand(self._scene)
                 self._closed, self._depth = self._hand.closed, seen_at(self._scene.place("hand"), looked)[2]
             self._hand.act(looked["target"])
-            self._turn(str((looked["target"] or {}).get("name", "")))
+            self._turn(str(looked["target"].get("name", "")) if looked["target"] else "")
             self._lead(self._hand, looked)
         self._page.wait_for_timeout(15)
 
@@ -111,7 +111,8 @@ def seen_at(p: Floats, looked: Mapping[str, Any]) -> tuple[float, float, float]:
     """Return where a point of W is seen: pixels of the page, within the picture, and its depth towards the eye, m."""
 
     def matrix(name: str) -> Floats:
-        return np.array(looked[name], dtype=np.float64).reshape(4, 4).T
+        rows: Floats = np.array(looked[name], dtype=np.float64).reshape(4, 4)
+        return np.transpose(rows)
 
     in_view: Floats = matrix("view") @ np.array([*p, 1.0])
     clip: Floats = matrix("projection") @ in_view
