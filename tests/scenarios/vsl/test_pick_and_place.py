@@ -11,6 +11,7 @@ from parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.vsl
 from handover.controllers.vsl.pick_and_place import Leg, Params
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.vsl.pick_and_place import VslPickAndPlace
@@ -30,15 +31,15 @@ def test_defaults_have_their_origins_and_the_planner_those_of_the_scenario():
 
 
 @pytest.mark.parametrize(
-    ("given", "fault"),
+    ("place", "fault"),
     [
-        ({"place": np.array([0.36, 0.0, 0.1])}, "its height, 0.1 m, must be that of pick, 0.06 m"),
-        ({"place": PickAndPlaceParameters().pick}, "it must be another than pick"),
+        (np.array([0.36, 0.0, 0.1]), "its height, 0.1 m, must be that of pick, 0.06 m"),
+        (PickAndPlaceParameters().pick, "it must be another than pick"),
     ],
 )
-def test_places_that_contradict_each_other_are_refused(given: dict[str, np.ndarray], fault: str):
+def test_places_that_contradict_each_other_are_refused(place: Floats, fault: str):
     with pytest.raises(InvalidParameter, match=fault):
-        VslPickAndPlace().build(PickAndPlaceParameters(**given), 0, lambda _unit: Path("none.fmu"))
+        VslPickAndPlace().build(PickAndPlaceParameters(place=place), 0, lambda _unit: Path("none.fmu"))
 
 
 def test_it_carries_an_object_to_its_place_and_touches_more_softly_with_softer_links(tmp_path: Path):
