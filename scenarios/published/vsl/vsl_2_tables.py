@@ -17,7 +17,7 @@ from handover.scenarios.published.vsl.vsl_2_runs import (
     Vsl2Runs,
 )
 
-_RANKS = {MODEL_BASED: "most", RIGID: "less"}
+_RANKS = {MODEL_BASED: "most", RIGID: "between"}
 """What sec. V-C says of the errors of fig. 7(b), of which it prints no numbers; of the learned way the least."""
 
 _OWN_LAW = (

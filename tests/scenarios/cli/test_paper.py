@@ -60,6 +60,17 @@ def test_a_folder_of_something_else_is_refused(tmp_path: Path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("experiment", ["vsl-1", "vsl-2"])
+def test_the_quick_plan_of_the_vsl_arm_ends_with_tables_figures_and_too_few_runs(experiment: str, tmp_path: Path):
+    ended = paper(experiment, "--quick", "--out", tmp_path / "c")
+    assert ended.exit_code == 0, ended.output
+    claims = json.loads((tmp_path / "c" / "claims.json").read_text(encoding="utf-8"))
+    assert {claim["verdict"] for claim in claims} == {"not comparable", "too few runs"}
+    assert len(list((tmp_path / "c" / "figures").glob("*.png"))) >= 3
+    assert (tmp_path / "c" / "report.html").exists()
+
+
+@pytest.mark.slow
 def test_it_leaves_claims_figures_and_a_page_and_a_second_call_repeats_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
