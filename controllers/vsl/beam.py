@@ -166,7 +166,7 @@ class Beam:
 
     @cached_property
     def _pulls(self) -> list[tuple[float, float]]:
-        """Return gravity times length of each piece, N m/kg, and the mass on its end and half its own, kg; tip first."""
+        """Return gravity times length of each piece, N m/kg, and mass on its end and half its own, kg; tip first."""
         w, n = self.weights, HINGES + 1
         lengths = [self.kinematics.L_2] * n + [self.kinematics.L_3] * n
         masses = [w.link * l / L for l, L in zip(self._lengths, lengths, strict=True)]

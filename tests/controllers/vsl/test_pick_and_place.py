@@ -37,7 +37,7 @@ def test_the_tip_goes_at_its_speeds_by_the_joint_velocities_to_where_it_is_wante
     for y in ys:
         np.testing.assert_allclose(kinematics.forward(y.q_ref), y.p_WG_goal, atol=1e-12)
     for before, y in pairwise(ys):
-        moved = np.linalg.norm(y.p_WG_goal - before.p_WG_goal) / 0.02
+        moved = float(np.linalg.norm(y.p_WG_goal - before.p_WG_goal)) / 0.02
         if y.leg == before.leg and y.leg in (Leg.DESCEND, Leg.LOWER):
             assert moved == pytest.approx(p.V_contact, rel=0.01)
         elif y.leg == before.leg and y.leg in (Leg.LIFT, Leg.CARRY, Leg.LEAVE):

@@ -38,7 +38,7 @@ def test_defaults_have_their_origins_and_the_planner_those_of_the_scenario():
         ({"pick": np.array([0.9, 0.0, 0.06])}, "pick: above it the arm is to start, and .*out of reach"),
     ],
 )
-def test_places_that_contradict_each_other_are_refused(given: dict[str, np.ndarray], fault: str):
+def test_places_that_contradict_each_other_are_refused(given: dict[str, Any], fault: str):
     with pytest.raises(InvalidParameter, match=fault):
         VslPickAndPlace().build(PickAndPlaceParameters(**given), 0, lambda _unit: Path("none.fmu"))
 
