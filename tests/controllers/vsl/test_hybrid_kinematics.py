@@ -1,6 +1,7 @@
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -251,13 +252,13 @@ def test_an_output_depends_at_once_on_the_inputs_that_it_declares_alone(params: 
     """Each input is changed in the last of some periods along a path; what changes then is what is declared."""
     rng = np.random.default_rng(5)
 
-    def last(**given: np.ndarray) -> dict[str, np.ndarray]:
-        unit, y = HybridKinematics(params), None
+    def last(**given: Any) -> dict[str, Any]:
+        unit, ys = HybridKinematics(params), list[Outputs]()
         for k in range(8):
             q = USUAL.q_ref + 0.004 * k * np.array([0.0, 1.0, -1.0])
             u = dataclasses.replace(USUAL, q_ref=q, q_meas=q + 0.01, p_WG_meas=ARM.forward(q) - 0.01)
-            y = unit.step(k * 0.04, 0.04, dataclasses.replace(u, **given) if k == 7 else u)
-        return {name: np.asarray(value) for name, value in vars(y).items()}
+            ys.append(unit.step(k * 0.04, 0.04, dataclasses.replace(u, **given) if k == 7 else u))
+        return vars(ys[-1])
 
     plain, found = last(), dict[str, set[str]]()
     for name, value in vars(USUAL).items():

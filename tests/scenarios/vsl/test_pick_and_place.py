@@ -2,6 +2,7 @@
 
 import pathlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,11 +12,10 @@ from parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.vsl
 from handover.controllers.vsl.pick_and_place import Leg, Params
-from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.vsl.pick_and_place import VslPickAndPlace
-from handover.scenarios.vsl.pick_and_place_evaluation import PickAndPlaceParameters
+from handover.scenarios.vsl.pick_and_place_evaluation import PickAndPlaceEvaluator, PickAndPlaceParameters
 
 
 def test_defaults_have_their_origins_and_the_planner_those_of_the_scenario():
@@ -31,15 +31,16 @@ def test_defaults_have_their_origins_and_the_planner_those_of_the_scenario():
 
 
 @pytest.mark.parametrize(
-    ("place", "fault"),
+    ("given", "fault"),
     [
-        (np.array([0.36, 0.0, 0.1]), "its height, 0.1 m, must be that of pick, 0.06 m"),
-        (PickAndPlaceParameters().pick, "it must be another than pick"),
+        ({"place": np.array([0.36, 0.0, 0.1])}, "its height, 0.1 m, must be that of pick, 0.06 m"),
+        ({"place": PickAndPlaceParameters().pick}, "it must be another than pick"),
+        ({"pick": np.array([0.9, 0.0, 0.06])}, "pick: above it the arm is to start, and .*out of reach"),
     ],
 )
-def test_places_that_contradict_each_other_are_refused(place: Floats, fault: str):
+def test_places_that_contradict_each_other_are_refused(given: dict[str, Any], fault: str):
     with pytest.raises(InvalidParameter, match=fault):
-        VslPickAndPlace().build(PickAndPlaceParameters(place=place), 0, lambda _unit: Path("none.fmu"))
+        VslPickAndPlace().build(PickAndPlaceParameters(**given), 0, lambda _unit: Path("none.fmu"))
 
 
 def test_it_carries_an_object_to_its_place_and_touches_more_softly_with_softer_links(tmp_path: Path):
@@ -56,6 +57,31 @@ def test_it_carries_an_object_to_its_place_and_touches_more_softly_with_softer_l
     assert pressure[leg == Leg.CARRY].min() > 1.8e5
     assert pressure[leg == Leg.LOWER].max() < 0.6e5
     assert (tmp_path / "soft" / "report.html").exists()
+
+
+def test_a_tip_that_carries_is_compared_with_the_goal_that_it_was_to_reach():
+    evaluator = PickAndPlaceEvaluator(PickAndPlaceParameters())
+
+    def seen(leg: int, goal: float, tip: float) -> Any:
+        arm = {"arm.f_G": 0.0, "arm.p_WG": np.array([tip, 0.0, 0.1])}
+        planner = {"planner.leg": leg, "planner.done": False, "planner.p_WG_goal": np.array([goal, 0.0, 0.1])}
+        return {**arm, **planner, "gripper.held": True, "gripper.p_WO": np.array([tip, 0.0, 0.1])}
+
+    for k in range(1, 5):
+        evaluator(0.04 * k, seen(Leg.CARRY, 0.002 * k, 0.002 * (k - 1)))
+        evaluator(0.04 * k + 0.02, seen(Leg.CARRY, 0.002 * k, 0.002 * (k - 0.5)))  # half the way
+    assert evaluator.carried_off == pytest.approx(0.0, abs=1e-12)
+    evaluator(0.2, seen(Leg.SOFTEN, 0.008, 0.007))
+    assert evaluator.carried_off == pytest.approx(0.001)
+    evaluator(0.22, seen(Leg.SOFTEN, 0.008, 0.1))
+    assert evaluator.carried_off == pytest.approx(0.001)
+
+
+def test_on_a_table_higher_than_the_shoulder_the_arm_starts_above_it(tmp_path: Path):
+    run(VslPickAndPlace, tmp_path / "r", "pick=0.3,0,0.2", "place=0.36,0,0.2", "settle=0.1", "wait=0.1")
+    record = Record(tmp_path / "r" / "signals.parquet")
+    assert record["arm.p_WG"][0, 2] > 0.2
+    assert np.all(record["arm.f_G"][record["planner.leg"] == Leg.SETTLE] == 0.0)
 
 
 def test_an_object_that_is_too_heavy_for_the_cup_is_never_picked_up(tmp_path: Path):
