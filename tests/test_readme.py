@@ -50,7 +50,7 @@ def test_the_readme_has_what_is_tested_here():
     assert len([c for c in COMMANDS if " export " in c]) == 1
     assert len([c for c in COMMANDS if " build " in c]) == 2
     assert len([c for c in COMMANDS if " check " in c]) == 1
-    assert len([c for c in COMMANDS if " vsl-train " in c]) == 1
+    assert len([c for c in COMMANDS if " vsl-train " in c]) == 2
     assert len([c for c in COMMANDS if " sweep " in c]) == 4
     assert len([c for c in COMMANDS if " compare " in c]) == 1
     assert len([c for c in COMMANDS if " paper " in c]) == 1
