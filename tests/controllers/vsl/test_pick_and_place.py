@@ -48,6 +48,24 @@ def test_the_tip_goes_at_its_speeds_by_the_joint_velocities_to_where_it_is_wante
     np.testing.assert_allclose(lowest[-1], p.p_WQ - [0.0, 0.0, p.press])
 
 
+def test_without_waiting_each_rest_takes_a_period():
+    legs = [y.leg for y in task(replace(SHORT, wait=0.0))]
+    assert [legs.count(leg) for leg in (Leg.GRASP, Leg.SOFTEN, Leg.RELEASE)] == [1, 1, 1]
+    assert list(dict.fromkeys(legs)) == list(range(len(LEGS)))
+
+
+def test_joint_1_turns_on_behind_the_foot():
+    """atan2 jumps by a turn where y = 0 and x < 0: joint 1 goes on, also while the arm rests and lets down."""
+    behind = replace(SHORT, p_WP=np.array([-0.30, 0.08, 0.06]), p_WQ=np.array([-0.30, -0.08, 0.06]))
+    ys = task(behind)
+    theta_1 = np.array([y.q_ref[0] for y in ys])
+    assert np.max(np.abs(np.diff(theta_1))) < 0.02
+    assert theta_1[-1] == pytest.approx(2.0 * np.pi + np.arctan2(-0.08, -0.30))
+    for before, y in pairwise(ys):
+        if before.leg == y.leg == Leg.CARRY:
+            np.testing.assert_allclose(y.qd_ref * 0.02, y.q_ref - before.q_ref, atol=2e-4)
+
+
 def test_it_waits_above_the_object_until_it_may_go():
     unit = PickAndPlace(SHORT)
     for k in range(50):
@@ -71,7 +89,9 @@ def test_a_restored_state_goes_on_bit_for_bit():
 @pytest.mark.parametrize(
     ("params", "fault"),
     [
-        (replace(SHORT, p_WQ=np.array([0.6, 0.0, 0.06])), r"carry: the elbow is stretched.*lower: .*out of reach"),
+        (replace(SHORT, p_WQ=np.array([0.6, 0.0, 0.06])), r"carry: .*out of reach.*lower: .*out of reach"),
+        (replace(SHORT, p_WQ=np.array([-0.36, 0.0, 0.06])), r"^[^;]*carry: it is on the axis of joint 1[^;]*$"),
+        (replace(SHORT, p_WP=np.array([1e9, 0.0, 0.06])), r"p_WP: .* is out of range: from -10 to 10 m"),
         (replace(SHORT, p_WQ=SHORT.p_WP), r"carry: it has no length"),
         (replace(SHORT, wait=-1.0), r"wait: -1\.0 is out of range"),
     ],
