@@ -52,7 +52,7 @@ def table_of(
         size = error(given) + 1e-5 * run.repetition
         row: dict[str, Any] = {"run": run.name, "status": status, "learned": given.get("learned", "cubic")}
         row |= {"links": given.get("links", "vsl"), "kinematics.method": given.get("kinematics.method", "")}
-        row |= {n: float(given.get(n, getattr(default, n))) for n in (*NUMBERS, "load", "pressure")}
+        row |= {n: float(given[n] if n in given else getattr(default, n)) for n in (*NUMBERS, "load", "pressure")}
         row["arm_seed"] = int(given.get("arm_seed", default.arm_seed))
         row |= dict.fromkeys(("mean_error", "median_error", "error_p25", "error_p75", "max_error"), size)
         rows.append(row | {"model_error": 0.02, "estimate_error": estimate, "outside": 0.0})
