@@ -170,7 +170,10 @@ class SwingCompensation:
     What joints carry weighs i (a + g) / g under an acceleration a: the tip's, by the path's velocities J qd_ref, from
     one period to the next. That bends links by G i a / g, with G = d q_cmd / d i, eq. (11), which is commanded ahead:
     times K_F, since the servos' share of G does not yield so fast. What swings nevertheless shows in the currents, and
-    the joints yield to it at K_D times the bending, as a damper in series does.
+    the joints yield to it at K_D times the bending, as a damper in series does. That wants a window: without one the
+    smoothed currents lag behind the posture, which is taken for a swing. On the curve with 50 g, at 0.1 and 0.2 m/s,
+    the tip errs by 1.7 and 3.3 mm with a window alone, by 1.5 and 2.5 mm with swings compensated, too; without a window
+    by 3.4 and 4.9 mm, and then by 5.3 and 7.4 mm.
 
     Args:
         model: what corrects.
