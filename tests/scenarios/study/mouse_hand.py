@@ -74,7 +74,8 @@ class MouseHand:
                     looked["run"],
                 )
             assert self._scene is not None
-            self._scene.take(np.array(looked["frame"]).tobytes())
+            frame: Floats = np.array(looked["frame"], dtype=np.float64)
+            self._scene.take(frame.tobytes())
             if self._hand is None:
                 self._hand = ScriptedHand(self._scene)
                 self._closed, self._depth = self._hand.closed, seen_at(self._scene.place("hand"), looked)[2]
@@ -109,10 +110,11 @@ class MouseHand:
 
 def seen_at(p: Floats, looked: Mapping[str, Any]) -> tuple[float, float, float]:
     """Return where a point of W is seen: pixels of the page, within the picture, and its depth towards the eye, m."""
-    view, projection = (np.array(looked[name]).reshape(4, 4).T for name in ("view", "projection"))
-    in_view = view @ [*p, 1.0]
-    x, y, _, w = projection @ in_view
-    left, top, width, height = looked["box"]
+    view: Floats = np.array(looked["view"], dtype=np.float64).reshape(4, 4).T
+    projection: Floats = np.array(looked["projection"], dtype=np.float64).reshape(4, 4).T
+    in_view: Floats = view @ np.append(p, 1.0)
+    x, y, _, w = map(float, projection @ in_view)
+    left, top, width, height = map(float, looked["box"])
     pixel = np.array([left + 0.5 * (1.0 + x / w) * width, top + 0.5 * (1.0 - y / w) * height])
     pixel = np.clip(pixel, [left + MARGIN, top + MARGIN], [left + width - MARGIN, top + height - MARGIN])
     return float(pixel[0]), float(pixel[1]), float(in_view[2])

@@ -3,6 +3,7 @@
 import json
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -55,7 +56,7 @@ def test_a_person_with_a_mouse_gets_through_the_study_by_what_the_page_shows(bro
         assert messages == []
 
     session = out / "participants" / "P01"
-    rounds = pd.read_csv(session / "rounds.csv")
+    rounds: Any = pd.read_csv(session / "rounds.csv")
     assert rounds["round"].tolist() == list(range(1, 7))
     assert set(rounds["kind"]) == {"scripted pilot"}
     assert rounds["success"].sum() >= 4, rounds[["task", "behaviour", "reason"]].to_string()
@@ -63,6 +64,6 @@ def test_a_person_with_a_mouse_gets_through_the_study_by_what_the_page_shows(bro
     assert [r["name"] for r in practice["reached"]][:3] == ["+x", "-x", "+y"]
     for more in (["report", str(out)], ["export", str(out)], ["replay", str(out), "P01", "1", "--check"]):
         subprocess.run([*HANDOVER, "study", *more], check=True, timeout=600)
-    answers = pd.read_parquet(out / "answers.parquet")
+    answers: Any = pd.read_parquet(out / "answers.parquet")
     assert set(zip(answers["statement"], answers["value"], strict=True)) == {("S1", 7), ("S2", 3), ("S3", 9)}
     assert pd.read_csv(out / "questionnaire.csv")["comments"].tolist() == ["it was a script"]
