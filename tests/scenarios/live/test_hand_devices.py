@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +10,8 @@ from live_runs import live_run, shown
 from numpy.typing import NDArray
 from opened_page import wait_until
 from playwright.sync_api import Browser, CDPSession, Page
-from scipy.spatial.transform import Rotation
+
+from handover.cosim.blocks.geometry import rotation_of
 
 pytestmark = pytest.mark.slow
 
@@ -35,14 +36,11 @@ def seen(page: Page) -> NDArray[np.float64]:
 
 
 def turned_about(page: Page, q_before: list[float], axis: int) -> float:
-    """Return the sine of half the angle by which it was turned about the view's right (0), up (1) or back (2)."""
-    before, now = (quaternion(q) for q in (q_before, page.evaluate("live.hand.pose().q_WH")))
-    turn = cast(Rotation, now * before.inv())
-    return float(turn.as_quat(canonical=True)[:3] @ page.evaluate("live.hand.axes()")[axis])
-
-
-def quaternion(q: list[float]) -> Rotation:
-    return Rotation.from_quat([*q[1:], q[0]])
+    """Return the sine of the angle by which it was turned about the view's right (0), up (1) or back (2)."""
+    before, now = (rotation_of(np.array(q)) for q in (q_before, page.evaluate("live.hand.pose().q_WH")))
+    R = now @ before.T
+    v = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    return float(v @ np.array(page.evaluate("live.hand.axes()")[axis], dtype=np.float64))
 
 
 def touch(screen: CDPSession, kind: str, *fingers: tuple[float, float]) -> None:

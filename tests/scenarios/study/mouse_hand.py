@@ -74,12 +74,13 @@ class MouseHand:
                     looked["run"],
                 )
             assert self._scene is not None
-            self._scene.take(np.array(looked["frame"]).tobytes())
+            frame: Floats = np.array(looked["frame"], dtype=np.float64)
+            self._scene.take(frame.tobytes())
             if self._hand is None:
                 self._hand = ScriptedHand(self._scene)
                 self._closed, self._depth = self._hand.closed, seen_at(self._scene.place("hand"), looked)[2]
             self._hand.act(looked["target"])
-            self._turn(str(looked["target"].get("name", "")) if looked["target"] else "")
+            self._turn(str((looked["target"] or {}).get("name", "")))
             self._lead(self._hand, looked)
         self._page.wait_for_timeout(15)
 
@@ -109,16 +110,11 @@ class MouseHand:
 
 def seen_at(p: Floats, looked: Mapping[str, Any]) -> tuple[float, float, float]:
     """Return where a point of W is seen: pixels of the page, within the picture, and its depth towards the eye, m."""
-
-    def matrix(name: str) -> Floats:
-        rows: Floats = np.array(looked[name], dtype=np.float64).reshape(4, 4)
-        return np.transpose(rows)
-
-    in_view: Floats = matrix("view") @ np.array([*p, 1.0])
-    clip: Floats = matrix("projection") @ in_view
-    x, y, _, w = (float(c) for c in clip)
-    left, top, width, height = (float(edge) for edge in looked["box"])
-    pixel: Floats = np.array([left + 0.5 * (1.0 + x / w) * width, top + 0.5 * (1.0 - y / w) * height])
-    low, high = np.array([left, top]) + MARGIN, np.array([left + width, top + height]) - MARGIN
-    x, y = np.clip(pixel, low, high).tolist()
-    return x, y, float(in_view[2])
+    view: Floats = np.array(looked["view"], dtype=np.float64).reshape(4, 4).T
+    projection: Floats = np.array(looked["projection"], dtype=np.float64).reshape(4, 4).T
+    in_view: Floats = view @ np.append(p, 1.0)
+    x, y, _, w = map(float, projection @ in_view)
+    left, top, width, height = map(float, looked["box"])
+    pixel = np.array([left + 0.5 * (1.0 + x / w) * width, top + 0.5 * (1.0 - y / w) * height])
+    pixel = np.clip(pixel, [left + MARGIN, top + MARGIN], [left + width - MARGIN, top + height - MARGIN])
+    return float(pixel[0]), float(pixel[1]), float(in_view[2])
