@@ -37,7 +37,7 @@ def take_part(page: Page, hand: MouseHand) -> list[str]:
     return screens
 
 
-@pytest.mark.slow
+@pytest.mark.real_time
 def test_a_person_with_a_mouse_gets_through_the_study_by_what_the_page_shows(browser: Browser, tmp_path: Path):
     plan = pilot_plan(tmp_path / "plan.toml", devices='["mouse"]', patience=60, practice=60, repetitions=1)
     out = tmp_path / "study"
