@@ -38,7 +38,7 @@ def seen(page: Page) -> NDArray[np.float64]:
 def turned_about(page: Page, q_before: list[float], axis: int) -> float:
     """Return the sine of the angle by which it was turned about the view's right (0), up (1) or back (2)."""
     before, now = (rotation_of(np.array(q)) for q in (q_before, page.evaluate("live.hand.pose().q_WH")))
-    R = now @ before.T
+    R: NDArray[np.float64] = now @ np.transpose(before)
     v = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return float(v @ np.array(page.evaluate("live.hand.axes()")[axis], dtype=np.float64))
 

@@ -80,7 +80,7 @@ class MouseHand:
                 self._hand = ScriptedHand(self._scene)
                 self._closed, self._depth = self._hand.closed, seen_at(self._scene.place("hand"), looked)[2]
             self._hand.act(looked["target"])
-            self._turn(str((looked["target"] or {}).get("name", "")))
+            self._turn(str(looked["target"].get("name", "")) if looked["target"] else "")
             self._lead(self._hand, looked)
         self._page.wait_for_timeout(15)
 
@@ -110,10 +110,14 @@ class MouseHand:
 
 def seen_at(p: Floats, looked: Mapping[str, Any]) -> tuple[float, float, float]:
     """Return where a point of W is seen: pixels of the page, within the picture, and its depth towards the eye, m."""
-    view: Floats = np.array(looked["view"], dtype=np.float64).reshape(4, 4).T
-    projection: Floats = np.array(looked["projection"], dtype=np.float64).reshape(4, 4).T
-    in_view: Floats = view @ np.append(p, 1.0)
-    x, y, _, w = map(float, projection @ in_view)
+
+    def matrix(name: str) -> Floats:
+        rows: Floats = np.array(looked[name], dtype=np.float64).reshape(4, 4)
+        return np.transpose(rows)
+
+    in_view: Floats = matrix("view") @ np.array([*p, 1.0])
+    clipped: Floats = matrix("projection") @ in_view
+    x, y, _, w = (float(c) for c in clipped)
     left, top, width, height = map(float, looked["box"])
     pixel = np.array([left + 0.5 * (1.0 + x / w) * width, top + 0.5 * (1.0 - y / w) * height])
     pixel = np.clip(pixel, [left + MARGIN, top + MARGIN], [left + width - MARGIN, top + height - MARGIN])
