@@ -9,7 +9,7 @@ import numpy as np
 
 from handover.controllers.free_flyer import impedance_controller, ports
 from handover.controllers.free_flyer.body import InvalidControllerParameters, stability_faults
-from handover.controllers.free_flyer.gains import PidGains, unused_gains
+from handover.controllers.free_flyer.gains import PidGains
 from handover.controllers.free_flyer.ports import PERIOD, Behaviour, Inputs
 from handover.controllers.free_flyer.rotations import from_rotation_vector, rotation_matrix, unit_quaternion
 from handover.controllers.free_flyer.sampled_loop import LinearController, SampledLoop
@@ -90,8 +90,7 @@ class Params(impedance_controller.Params):
     def faults(self, period: float) -> list[str]:
         """Return what is wrong with body, gains and the loop that is closed at a period, s."""
         position, attitude = self.inner_gains()
-        faults = self.body().faults() + unused_gains(self)
-        faults += self.gains().faults() if self.behaviour is Behaviour.CUSTOM else []
+        faults = self.body().faults() + (self.gains().faults() if self.behaviour is Behaviour.CUSTOM else [])
         faults += position.faults("inner position gains") + attitude.faults("inner attitude gains")
         return faults or stability_faults(
             self.body(), lambda factor, delay: self.law(factor, delay, period), period, self.delay, self.lag

@@ -10,7 +10,7 @@ import numpy as np
 from handover.controllers.free_flyer.arm_impedance import ArmAtRest, NullMotion
 from handover.controllers.free_flyer.arm_model import ArmModel, Chain, OperationalSpace, mass_matrix
 from handover.controllers.free_flyer.body import InvalidControllerParameters, stability_faults
-from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains, unused_gains
+from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains
 from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, Behaviour
 from handover.controllers.free_flyer.ports import Inputs as BaseInputs
 from handover.controllers.free_flyer.ports import Outputs as BaseOutputs
@@ -181,7 +181,7 @@ class ArmImpedanceController:
 
     def __init__(self, params: Params) -> None:
         model, period = params.model(), float(self.period)
-        if faults := model.faults() + unused_gains(params):
+        if faults := model.faults():
             raise InvalidControllerParameters(_NAME, faults)
         rest, gains, null = ArmAtRest(model, params.posture), params.gains(), params.null()
         faults = gains.faults() or stability_faults(

@@ -4,7 +4,6 @@ Both kinds give their control law near the goal as a `LinearController`, for the
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -47,18 +46,6 @@ class ImpedanceGains:
     def law(self, body: FlyerBody) -> LinearController:
         """Return eq. (3.25) near the goal: commanded wrench on B from displacement and twist of G."""
         return without_memory(np.transpose(body.jacobian()) @ np.hstack([self.stiffness(), self.damping()]))
-
-
-def unused_gains(params: Any) -> list[str]:
-    """Return which matrices of a controller's parameters are set though its behaviour has gains of its own."""
-    if params.behaviour is Behaviour.CUSTOM:
-        return []
-    usual = type(params)()
-    return [
-        f"{name} counts with behaviour=CUSTOM only, and behaviour is {params.behaviour.name}"
-        for name in ImpedanceGains.__dataclass_fields__
-        if not np.array_equal(getattr(params, name), getattr(usual, name))
-    ]
 
 
 def _block_diagonal(upper: Floats, lower: Floats) -> Floats:

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from handover.controllers.free_flyer.body import FlyerBody, InvalidControllerParameters, stability_faults
-from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains, unused_gains
+from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains
 from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, Behaviour, Inputs, Outputs
 from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
@@ -117,8 +117,7 @@ class ImpedanceController:
 
     def __init__(self, params: Params) -> None:
         body, gains, period = params.body(), params.gains(), float(self.period)
-        faults = body.faults() + unused_gains(params)
-        faults += gains.faults() if params.behaviour is Behaviour.CUSTOM else []
+        faults = body.faults() + (gains.faults() if params.behaviour is Behaviour.CUSTOM else [])
         faults = faults or stability_faults(
             body, lambda factor, _: gains.scaled(factor).law(body), period, params.delay, params.lag
         )

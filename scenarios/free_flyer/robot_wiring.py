@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from handover.controllers.free_flyer.ports import PERIOD
+from handover.controllers.free_flyer.ports import Behaviour as Gains
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
@@ -49,6 +50,7 @@ PUSHES_OF_TEAM = tuple(
 """Each of two robots anywhere."""
 SATURATED_SHARE = "share of the time for which more was commanded than the thrusters give"
 """What the metric `saturated_share` is; controllers that clip their own commands never command more."""
+_CUSTOM_GAINS = tuple(f"{what}_{of}" for what in ("stiffness", "damping") for of in ("translation", "rotation"))
 _TRUE = ("p_WB", "q_WB", "v_WB", "w_WB")
 _MEASURED = ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")
 _ROBOT = "FreeFlyer"
@@ -98,6 +100,16 @@ def check_reach(p_WG: Floats, person: Mapping[str, Any]) -> None:
         text = f"the hand would be {distance:.2f} m from where it rests, and can be {reach:g} m from it"
         text += "; move the place towards person.p_WH_0, or raise person.arm_reach"
         raise InvalidParameter([f"p_WG_handover: [{place}] m is out of the person's reach: {text}"])
+
+
+def idle_gains(system: System, given: Sequence[str]) -> list[str]:
+    """Return which gains were given, as `UNIT.NAME`, to impedance controllers whose behaviour has gains of its own."""
+    units = {name: system.units[name.partition(".")[0]] for name in given if name.partition(".")[2] in _CUSTOM_GAINS}
+    return [
+        f"{name} has no effect unless {unit.name}.behaviour=custom"
+        for name, unit in units.items()
+        if str(unit.start.get("behaviour", "")).lower() not in ("custom", str(int(Gains.CUSTOM)))
+    ]
 
 
 def undriven_joints(system: System) -> list[str]:

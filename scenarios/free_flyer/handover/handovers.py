@@ -36,6 +36,7 @@ from handover.scenarios.free_flyer.robot_wiring import (
     check_reach,
     common_period,
     decision_settings,
+    idle_gains,
     undriven_joints,
     wire_handover,
 )
@@ -120,12 +121,12 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         return s
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:
-        """Reject an arm that nothing drives, and what only a simulated person has where there is none.
+        """Reject an arm that nothing drives, gains without effect, and what belongs to a simulated person where none is.
 
         Raises:
             InvalidParameter: with all such values.
         """
-        if faults := undriven_joints(system) + faults_of_person(system, given):
+        if faults := undriven_joints(system) + idle_gains(system, given) + faults_of_person(system, given):
             raise InvalidParameter(faults)
 
     def stop_time(self, parameters: HandoverParameters) -> Fraction:

@@ -20,7 +20,7 @@ from handover.scenarios.free_flyer.parameters import ImpedanceParameters
 from handover.scenarios.free_flyer.places import PLACES_OF_PUSH
 from handover.scenarios.free_flyer.published import published_of_push
 from handover.scenarios.free_flyer.push.impedance_evaluation import ImpedanceEvaluator
-from handover.scenarios.free_flyer.robot_wiring import PUSHES, undriven_joints, wired_push
+from handover.scenarios.free_flyer.robot_wiring import PUSHES, idle_gains, undriven_joints, wired_push
 
 
 class FlyerImpedance(Experiment[ImpedanceEvaluator]):
@@ -61,13 +61,13 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
         }
         return wired_push(fmu, parameters, seed, controller, {**vars(robot), "p_WB_0": p_WG - robot.p_BG})
 
-    def check_unit_values(self, system: System, given: Sequence[str]) -> None:  # noqa: ARG002
-        """Reject an arm that nothing drives.
+    def check_unit_values(self, system: System, given: Sequence[str]) -> None:
+        """Reject an arm that nothing drives, and gains without effect.
 
         Raises:
-            InvalidParameter: a robot has such a one.
+            InvalidParameter: with all such values.
         """
-        if faults := undriven_joints(system):
+        if faults := undriven_joints(system) + idle_gains(system, given):
             raise InvalidParameter(faults)
 
     def stop_time(self, parameters: ImpedanceParameters) -> Fraction:

@@ -25,6 +25,7 @@ from handover.scenarios.free_flyer.robot_wiring import (
     check_reach,
     common_period,
     decision_settings,
+    idle_gains,
     undriven_joints,
     wire_handover,
 )
@@ -122,13 +123,13 @@ class TwoRobots(Experiment[TeamEvaluator]):
             wire_handover(s, f"_{r}")
         return s
 
-    def check_unit_values(self, system: System, given: Sequence[str]) -> None:  # noqa: ARG002
-        """Reject an arm that nothing drives.
+    def check_unit_values(self, system: System, given: Sequence[str]) -> None:
+        """Reject an arm that nothing drives, and gains without effect.
 
         Raises:
-            InvalidParameter: a robot has such a one.
+            InvalidParameter: with all such values.
         """
-        if faults := undriven_joints(system):
+        if faults := undriven_joints(system) + idle_gains(system, given):
             raise InvalidParameter(faults)
 
     def stop_time(self, parameters: TeamParameters) -> Fraction:

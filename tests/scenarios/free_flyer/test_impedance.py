@@ -4,11 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from flyer_runs import metric, run
 
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
+from handover.scenarios.cli.command import main
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Propulsion
 from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
@@ -93,8 +95,14 @@ def test_an_unknown_delay_makes_the_robot_lose_control_and_the_run_ends_in_time(
 
 
 def test_gains_that_have_no_effect_are_refused(tmp_path: Path):
-    with pytest.raises(InitializationError, match="stiffness_translation counts with behaviour=CUSTOM only"):
-        run(FlyerImpedance, tmp_path / "r", "impedance.stiffness_translation=5,0,0,0,67,0,0,0,67")
+    soft = "impedance.stiffness_translation=5,0,0,0,67,0,0,0,67"
+    done = CliRunner().invoke(main, ["run", "flyer_impedance", "-p", soft, "--out", str(tmp_path / "r")])
+    assert done.exit_code == 2
+    assert "impedance.stiffness_translation has no effect unless impedance.behaviour=custom" in done.output
+    assert not (tmp_path / "r").exists()
+    chosen = ["-p", soft, "-p", "impedance.behaviour=custom", "--stop", "0.1", "--no-report"]
+    done = CliRunner().invoke(main, ["run", "flyer_impedance", *chosen, "--out", str(tmp_path / "r")])
+    assert done.exit_code == 1, done.output
 
 
 def test_a_controller_of_joints_is_refused_where_there_are_none():
