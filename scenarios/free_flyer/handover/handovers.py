@@ -121,7 +121,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         return s
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:
-        """Reject an arm that nothing drives, gains without effect, and what belongs to a simulated person where none is.
+        """Reject an arm that nothing drives, gains without effect, and a person's traits where no person is simulated.
 
         Raises:
             InvalidParameter: with all such values.
