@@ -8,7 +8,7 @@ import abc
 import enum
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -125,6 +125,12 @@ class ComparisonTable:
             if len(row) != len(self.header):
                 raise ValueError(f"{self.title}: row {list(row)} has {len(row)} cells, the header {len(self.header)}")
 
+    def without_empty_columns(self) -> "ComparisonTable":
+        """Return the table without columns in which no row has a value, as a quick plan leaves some."""
+        kept = [i for i in range(len(self.header)) if any(row[i] for row in self.rows)]
+        rows = [[row[i] for i in kept] for row in self.rows]
+        return replace(self, header=[self.header[i] for i in kept], rows=rows)
+
 
 class PublishedExperiment(abc.ABC):
     """A table or figure of a paper. Published values come from its scenario's `paper.toml`."""
@@ -184,7 +190,8 @@ class PaperResults:
             KeyError: the table is of another version of the experiment, and lacks a column.
         """
         claims = [*experiment.claims(table), *experiment.record_claims(table, runs)]
-        return cls(claims=sorted(claims, key=lambda claim: claim.beyond), tables=experiment.tables(table))
+        tables = [filled.without_empty_columns() for filled in experiment.tables(table)]
+        return cls(claims=sorted(claims, key=lambda claim: claim.beyond), tables=tables)
 
 
 def write_claims(claims: Sequence[Claim], folder: CampaignFolder) -> None:

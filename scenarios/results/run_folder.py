@@ -24,10 +24,10 @@ _PACKAGES = ("handover-cosim", "fmpy", "exudyn", "numpy", "scipy", "opencv-pytho
 
 
 class InvalidRunFolder(ValueError):
-    """A folder that cannot be used as a run's output folder, or be read as one."""
+    """A folder that cannot take a run's files, or be read as a run's."""
 
     def __init__(self, path: Path, fault: str) -> None:
-        super().__init__(f"output folder {path}: {fault}")
+        super().__init__(f"folder {path}: {fault}")
         self.path, self.fault = path, fault
 
 

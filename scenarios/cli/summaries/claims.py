@@ -49,8 +49,9 @@ def print_results(
 
 def _print_table(console: Console, compared: ComparisonTable) -> None:
     rows = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
-    for heading in compared.header:
-        rows.add_column(Text(heading), overflow="fold")
+    for heading, *cells in zip(compared.header, *compared.rows, strict=True):
+        longest_word = max((len(word) for text in (heading, *cells) for word in text.split()), default=0)
+        rows.add_column(Text(heading), overflow="fold", min_width=longest_word)
     for row in compared.rows:
         rows.add_row(*map(Text, row))
     console.print(f"\n{compared.title}", style="bold", markup=False)

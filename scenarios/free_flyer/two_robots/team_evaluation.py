@@ -97,6 +97,8 @@ class TeamEvaluator(Evaluator):
             if phase != robot.phase:
                 self._closed_again(robot, codes[2], i)
                 self._count_delivery(robot, phase, signals, i)
+                if phase == "GIVEN_UP":
+                    robot.gave_up_from = self._from_place(i, signals)
                 robot.enter(phase, t)
             robot.hold(bool(codes[2] & i), float(signals[f"decision.closure_{i}"]) > 0.5, t)
         before = self._grippers, self._hands
@@ -126,10 +128,9 @@ class TeamEvaluator(Evaluator):
         robot.failed_deliveries = failed
 
     def _follow_grippers(self, t: float, signals: Signals) -> None:
-        for i, (robot, place) in enumerate(zip(self.robots, self._places, strict=True), 1):
+        for i, robot in enumerate(self.robots, 1):
             if robot.signalled is not None and robot.phase in _YIELDING:
-                away = math.dist(signals[f"robot_{i}.p_WG"].tolist(), place)
-                robot.farthest = max(robot.farthest, away)
+                robot.farthest = max(robot.farthest, self._from_place(i, signals))
             if robot.let_go is not None:
                 self._clearance = min(self._clearance, self._from_box(i, signals))
             if robot.phase == "CHECK_VELOCITY":
@@ -146,6 +147,10 @@ class TeamEvaluator(Evaluator):
         self._turn = max(self._turn, angle_between(self._q_WO, q_WO))
         forces = (norm(vector(signals[f"person.f_H_{i}"])) for i in (1, 2))
         self._force = max(self._force, *forces)
+
+    def _from_place(self, i: int, signals: Signals) -> float:
+        """Return the distance of a gripper from its handover place, m."""
+        return math.dist(signals[f"robot_{i}.p_WG"].tolist(), self._places[i - 1])
 
     def _from_box(self, i: int, signals: Signals) -> float:
         """Return the gap between a gripper's jaws and the object, m."""
@@ -322,8 +327,14 @@ class TeamEvaluator(Evaluator):
             return TeamCause.NOT_FETCHED, f"they closed their grippers on the object; {self._where}"
         if before == "MOVE_TO_HANDOVER":
             text = f"they did not come to rest at their places{within or ' in time'}"
-            return TeamCause.OUT_OF_REACH, f"{text}; {self._where}"
+            return TeamCause.OUT_OF_REACH, f"{text}: {self._gave_up_from}; {self._where}"
         return TeamCause.OTHER, f"they gave up in phase {before}{not_over(within)}; {self._where}"
+
+    @property
+    def _gave_up_from(self) -> str:
+        """How far the grippers of robots that gave up were from their places, in words."""
+        away = [(i, robot.gave_up_from) for i, robot in enumerate(self.robots, 1) if robot.gave_up_from is not None]
+        return ", ".join(f"gripper {i} was {1e3 * a:.0f} mm from its place" for i, a in away)
 
     @property
     def _where(self) -> str:

@@ -52,6 +52,7 @@ class OneRobot:
         failed_deliveries: how many it has counted.
         full: how many there were: times that it had closed again on what it had released.
         undelivered: whether it gave up when it counted one.
+        gave_up_from: distance of the gripper from its handover place when it gave up, m; None before.
     """
 
     phases: list[tuple[str, float]] = field(default_factory=list[tuple[str, float]])
@@ -67,6 +68,7 @@ class OneRobot:
     failed_deliveries: int = 0
     full: int = 0
     undelivered: bool = False
+    gave_up_from: float | None = None
 
     @property
     def phase(self) -> str:

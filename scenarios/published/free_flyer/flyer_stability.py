@@ -37,6 +37,8 @@ _MARGIN = 0.005
 """How far the largest pole must be from the unit circle for a run of half a minute to tell its side."""
 _TWISTS = {Behaviour.RIGID: "1", Behaviour.COMPLIANT: "0.3"}
 """Torques, N m, that take the robot well out of what counts as rest: from there a growing oscillation is seen."""
+_BESIDE = 0.0005
+"""How far beyond the steps that were tried the poles' boundary is drawn, s."""
 _WITHOUT_LIMITS = {"thrusters.f_max": "1000,1000,1000", "thrusters.tau_max": "1000,1000,1000"}
 
 
@@ -123,9 +125,7 @@ class FlyerStability(PublishedExperiment):
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002
         """Draw the map of each loop, with the poles' boundary."""
         found = _Map(table)
-        shown = [
-            loop for loop in _LOOPS if any(found.delays(loop, s, at_rest=r) for s in _STEPS for r in (True, False))
-        ]
+        shown = [loop for loop in _LOOPS if found.steps(loop)]
         rows = (len(shown) + 1) // 2
         if not shown:
             return []
@@ -135,7 +135,8 @@ class FlyerStability(PublishedExperiment):
                     points = [(1e3 * s, 1e3 * d) for s in _STEPS for d in found.delays(loop, s, at_rest=at_rest)]
                     x, y = zip(*points, strict=True) if points else ((), ())
                     axis.plot(x, y, mark, ms=5, color=COLOURS[0 if at_rest else 1], label=label)
-                steps = np.array([0.0005, 0.02])
+                tried = found.steps(loop)
+                steps = np.array([min(tried) - _BESIDE, max(tried) + _BESIDE])
                 limit = 1e3 * (_greatest_delay(loop) - _COUPLING_DELAYS * steps)
                 axis.plot(1e3 * steps, limit, color=COLOURS[5], lw=1.2, label="|z| = 1 by its poles")
                 most = 1e3 * max(_DELAYS[loop.behaviour])
@@ -172,6 +173,10 @@ class _Map:
     def delays(self, loop: _Loop, step: float, *, at_rest: bool) -> list[float]:
         """Return the delays at which the robot came to rest, or did not, s."""
         return [d for (l, s, d), rests in self._at_rest.items() if (l, s) == (loop, step) and rests is at_rest]
+
+    def steps(self, loop: _Loop) -> set[float]:
+        """Return the communication steps that were tried, s."""
+        return {s for l, s, _ in self._at_rest if l == loop}
 
     def compared(self) -> list[tuple[float, bool]]:
         """Return the largest pole's |z| and whether the robot came to rest, for each run."""

@@ -248,7 +248,7 @@ def test_a_folder_that_cannot_be_made_is_reported_by_its_name(tmp_path: Path, mo
 
     monkeypatch.setattr(Path, "mkdir", refuse)  # as /proc does, though it says that it can be written to
     result = call("build", "Push", "--fmi", "3", "--out", tmp_path / "out")
-    assert_refused(result, f"output folder {tmp_path / 'out'}: it cannot be written to: No such file or directory")
+    assert_refused(result, f"folder {tmp_path / 'out'}: it cannot be written to: No such file or directory")
 
 
 def test_a_folder_in_the_place_of_an_fmu_is_reported_with_what_to_do(tmp_path: Path):

@@ -203,7 +203,7 @@ def test_a_campaign_under_way_is_refused_before_anything_else(here: Path, monkey
     with folder_locked(here / "c"):
         result, begun = sweep(monkeypatch, *CALL)
     assert (result.exit_code, begun) == (2, [])
-    assert result.output.startswith("Error: output folder c: another command is running this campaign")
+    assert result.output.startswith("Error: folder c: another command is running this campaign")
 
 
 def test_a_scheduler_is_tried_before_units_are_built(here: Path, monkeypatch: pytest.MonkeyPatch):

@@ -1,12 +1,15 @@
 """Two robots, a large object and a person with two hands, on the built FMUs."""
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from flyer_runs import metric, run
 
 from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
+from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
 from handover.scenarios.free_flyer.parameters import Hands, TeamParameters, TeamTask
 from handover.scenarios.free_flyer.two_robots.team_evaluation import TeamEvaluator
@@ -85,6 +88,23 @@ def test_a_run_that_fails_says_why(given: tuple[str, ...], why: TeamCause, tmp_p
     done = run(TwoRobots, tmp_path / "run", *given)
     assert not done.summary["success"]
     assert cause(metric(done, "decided_by")) is why, done.summary["reason"]
+
+
+@pytest.mark.slow
+def test_robots_that_do_not_come_to_rest_tell_how_far_from_their_places_they_were(tmp_path: Path):
+    done = run(TwoRobots, tmp_path / "run", *_NOISE)
+    assert not done.summary["success"]
+    away = re.findall(r"gripper (\d) was (\d+) mm from its place", done.summary["reason"])
+    record = Record(tmp_path / "run" / "signals.parquet")
+    half = 0.5 * float(paper_values("free_flyer", "large_object")["grip_spacing"])
+    for (number, told), side in zip(away, (half, -half), strict=True):
+        phase = f"decision.phase_{number}"
+        given_up = {words: code for code, words in record.items(phase).items()}["GIVEN_UP"]
+        gave_up = np.flatnonzero(record[phase] == given_up)[0]
+        place = TeamParameters().p_WG_handover + np.array([0.0, side, 0.0])
+        assert float(told) == pytest.approx(
+            1e3 * np.linalg.norm(record[f"robot_{number}.p_WG"][gave_up] - place), abs=1.0
+        )
 
 
 def test_a_run_is_drawn_with_its_moments_and_curves(tmp_path: Path):

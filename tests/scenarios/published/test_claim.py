@@ -50,3 +50,10 @@ def test_a_claim_of_another_form_is_refused(change: dict[str, object]):
 def test_a_row_of_another_length_than_the_header_is_refused():
     with pytest.raises(ValueError, match="has 1 cells, the header 2"):
         ComparisonTable(title="t", header=["a", "b"], rows=[["1"]])
+
+
+def test_a_column_that_a_quick_plan_leaves_empty_is_not_shown():
+    table = ComparisonTable(title="t", header=["a", "b", "c"], rows=[["1", "", "3"], ["4", "", ""]], note="n")
+    shown = table.without_empty_columns()
+    assert (shown.header, shown.rows) == (["a", "c"], [["1", "3"], ["4", ""]])
+    assert (shown.title, shown.note) == ("t", "n")
