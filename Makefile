@@ -7,7 +7,7 @@ PARALLEL := --numprocesses auto --dist loadfile
 
 WHEELS := x86_64-linux aarch64-linux x86_64-windows x86_64-darwin aarch64-darwin
 
-.PHONY: demo test test-slow fuzz paper real-time lint bench pictures wheels install clean
+.PHONY: demo test test-slow fuzz paper real-time standalone lint bench pictures wheels install clean
 
 demo: $(VENV)/.installed
 	$(BIN)/handover run helix_handover
@@ -15,7 +15,7 @@ demo: $(VENV)/.installed
 install: $(VENV)/.installed
 
 test: lint $(VENV)/.installed-test
-	$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not fuzz and not paper and not real_time"
+	$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not fuzz and not paper and not real_time and not standalone"
 
 test-slow: $(VENV)/.installed-test
 	$(BIN)/python -m pytest $(PARALLEL) -m slow
@@ -25,6 +25,9 @@ fuzz: $(VENV)/.installed-test
 
 real-time: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -m real_time -s
+
+standalone: $(VENV)/.installed-test
+	$(BIN)/python -m pytest $(PARALLEL) -m standalone
 
 paper: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -m paper

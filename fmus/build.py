@@ -24,13 +24,14 @@ from handover.cosim.fmu.archive import FmuArchive, write_archive
 from handover.fmus import interpreter
 from handover.fmus.binaries import binaries
 from handover.fmus.catalog import Entry, find_unit, import_class
-from handover.fmus.compile import cache_folder
+from handover.fmus.compile import cache_folder, host_platform, named_platforms
 from handover.fmus.documentation import page
 from handover.fmus.fmi2_description import fmi2_description
 from handover.fmus.fmi3_description import fmi3_description
 from handover.fmus.layout import Form, Layout
 from handover.fmus.model_description import Model
-from handover.fmus.sources import Carried, closure
+from handover.fmus.sources import Carried, beside_block, closure
+from handover.fmus.standalone import CannotFreeze, frozen, try_unit
 
 _log = logging.getLogger(__name__)
 
@@ -131,9 +132,16 @@ def build_block(
 
 
 def build(
-    entry: Entry, fmi: int, out_dir: Path, *, scalar: bool = False, platforms: Sequence[str] | None = None
+    entry: Entry,
+    fmi: int,
+    out_dir: Path,
+    *,
+    scalar: bool = False,
+    platforms: Sequence[str] | None = None,
+    standalone: bool = False,
+    include: Sequence[Path] = (),
 ) -> Path:
-    """Build a unit's FMU. The same sources, packages and interpreter give the same bytes.
+    """Build a unit's FMU. The same sources, packages and interpreter give the same bytes, unless it is standalone.
 
     Args:
         entry: the unit.
@@ -143,8 +151,14 @@ def build(
             in FMI 2, which has no arrays.
         platforms: for which the FMU has the runtime, such as `x86_64-windows`, or `host`, or `all`; by default all for
             which it is compiled.
+        standalone: bring the interpreter and all packages along, for this machine's platform: nothing need be installed
+            where the FMU is used. The unit is started in them, and steps once, before the FMU is written.
+        include: data files that the block opens beside its module, by `__file__`.
 
     Raises:
+        CannotFreeze: a standalone FMU cannot be made: PyInstaller is not installed, a platform is another one than this
+            machine's, a package cannot be frozen, or the block opens files that the FMU does not have.
+        FileElsewhere: a data file does not lie in the folder of the block's module, or below.
         UnknownBlock: the entry's block does not exist.
         UnknownVersion, InvalidName, InvalidStep: the standard's version, the name or the step is invalid.
         DeclarationError, DuplicateName, AmbiguousName, InvalidText: the block's declarations are invalid, or it cannot
@@ -155,10 +169,13 @@ def build(
     """
     form = _form(fmi, scalar=scalar)
     carried = closure(entry.block)
+    if standalone and platforms and set(named_platforms(platforms)) != {host_platform()}:
+        raise CannotFreeze(f"an interpreter can be frozen for this machine's platform only, {host_platform()}")
     if not (entry.name.isidentifier() and entry.name.isascii()):
         raise InvalidName(entry.name)
     _check_step(entry.step)
     sources = {path: file.read_bytes() for path, file in carried.files.items()}
+    sources |= {path: file.read_bytes() for path, file in beside_block(entry.block, include).items()}
     packages = carried.packages()
     describe_in_xml = fmi2_description if fmi == 2 else fmi3_description
     without_token = _model(entry, form, "")
@@ -174,13 +191,17 @@ def build(
     }
     files = {
         "modelDescription.xml": describe_in_xml(model),
-        "documentation/index.html": page(model, packages),
+        "documentation/index.html": page(model, packages, host_platform() if standalone else ""),
         "resources/unit.json": json.dumps(unit, indent=2).encode() + b"\n",
-        "resources/python.txt": os.fsencode(interpreter.describe()),
         **{f"resources/sources/{path}": content for path, content in sources.items()},
-        **binaries(entry.name, fmi, platforms),
+        **binaries(entry.name, fmi, ("host",) if standalone else platforms),
     }
-    return write_archive(out_dir / file_name(entry.name, form), files)
+    if standalone:
+        files |= {f"resources/{path}": content for path, content in frozen(entry.block, carried).items()}
+        try_unit(entry.name, files, model.token, float(entry.step))
+    else:
+        files["resources/python.txt"] = os.fsencode(interpreter.describe())
+    return write_archive(out_dir / file_name(entry.name, form, standalone=standalone), files)
 
 
 def _check_step(step: object) -> None:
@@ -189,9 +210,9 @@ def _check_step(step: object) -> None:
         raise InvalidStep(step)
 
 
-def file_name(name: str, form: Form) -> str:
-    """Return the name of a unit's file, such as `TendonArm.fmi3.fmu` or `TendonArm.fmi3-scalar.fmu`."""
-    return f"{name}.{form.value}.fmu"
+def file_name(name: str, form: Form, *, standalone: bool = False) -> str:
+    """Return the name of a unit's file, such as `TendonArm.fmi3.fmu` or `TendonArm.fmi3-standalone.fmu`."""
+    return f"{name}.{form.value}{'-standalone' if standalone else ''}.fmu"
 
 
 def _form(fmi: int, *, scalar: bool) -> Form:

@@ -34,6 +34,7 @@ __all__ = [
 RUNTIME = Path(__file__).with_name("runtime")
 
 SHARED_SOURCES = (
+    "brought.c",
     "derivatives.c",
     "embedded.c",
     "lifecycle.c",
@@ -41,6 +42,7 @@ SHARED_SOURCES = (
     "platform.c",
     "process_lock.c",
     "process_posix.c",
+    "process_shared.c",
     "process_windows.c",
     "python_api.c",
     "remote.c",

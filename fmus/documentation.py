@@ -57,8 +57,8 @@ class Row:
     description: str
 
 
-def page(model: Model, packages: list[Package]) -> bytes:
-    """Return the page as HTML."""
+def page(model: Model, packages: list[Package], platform: str = "") -> bytes:
+    """Return the page as HTML; `platform` is the one for which the unit brings its interpreter, if it does."""
     import jinja2  # slow to load, and most FMUs are found in the cache
 
     environment = jinja2.Environment(
@@ -79,6 +79,7 @@ def page(model: Model, packages: list[Package]) -> bytes:
         environment.get_template("unit.html")
         .render(
             model=model,
+            platform=platform,
             form=_FORMS[model.form],
             clock=SAMPLE_CLOCK if model.layout.has_clock(model.form) else "",
             origin=d.module_doc.partition("\n\n")[0],

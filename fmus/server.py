@@ -1,6 +1,8 @@
 """Runs an FMU's Python side in a process of its own: the script that runtime/remote.c starts.
 
-It executes the host's calls, one after another, until the host closes the channel or ends. Standard library only.
+It executes the host's calls, one after another, until the host closes the channel or ends. In the interpreter that a
+unit brings along, it serves all instances of the unit in one process, each in a thread (runtime/process_shared.c).
+Standard library only.
 """
 
 import ctypes
@@ -8,9 +10,11 @@ import mmap
 import os
 import runpy
 import signal
+import socket
 import struct
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Callable
 from types import ModuleType
@@ -30,6 +34,8 @@ ANSWERED, REFUSED, RAISED = 0, 1, 2
 
 PATIENCE = 5.0
 """Seconds that a call may take to return once the host has ended."""
+
+_starting = threading.Lock()  # `runpy` works for one thread at a time
 
 
 class Channel:
@@ -118,11 +124,12 @@ class Server:
 
     def _start(self, wanted: bytes) -> bytes:
         token, _, resources = wanted.decode(errors="surrogateescape").partition("\n")
-        loader = runpy.run_path(
-            os.path.join(resources, "sources", "handover", "fmus", "loader.py"), run_name="fmu_loader"
-        )
-        self._explain = loader["explain"]
-        self._slave = loader["start"](resources, token, self._share)
+        with _starting:
+            loader = runpy.run_path(
+                os.path.join(resources, "sources", "handover", "fmus", "loader.py"), run_name="fmu_loader"
+            )
+            self._explain = loader["explain"]
+            self._slave = loader["start"](resources, token, self._share)
         warning: bytes = loader["warning"](resources).encode()
         table: bytes = self._slave.table()
         address = ctypes.addressof(ctypes.c_char.from_buffer(self._memory))
@@ -176,14 +183,52 @@ def _end_with_the_host(number: int) -> None:
     os._exit(1)
 
 
+def _serve_instances(control: int) -> None:
+    """Serve each instance whose channel and memory come by a socket, until the host closes that or ends."""
+    threads: list[threading.Thread] = []
+    incoming = socket.socket(fileno=control)
+    while True:
+        _, numbers, _, _ = socket.recv_fds(incoming, 1, 2)
+        if len(numbers) != 2:
+            break
+        threads = [thread for thread in threads if thread.is_alive()]
+        threads.append(threading.Thread(target=_serve, args=tuple(numbers), daemon=True))
+        threads[-1].start()
+    deadline = time.monotonic() + PATIENCE
+    for thread in threads:
+        thread.join(max(0.0, deadline - time.monotonic()))
+    if any(thread.is_alive() for thread in threads):
+        os._exit(1)
+
+
+def _serve(channel: int, memory: int) -> None:
+    """Serve one instance until the host closes its channel; the files are this thread's."""
+    try:
+        Server(Channel(channel), memory).run()
+    except SystemExit:
+        pass
+    finally:
+        os.close(channel)
+        os.close(memory)
+
+
 def main() -> None:
-    """Serve the host; the last two arguments are the numbers of the channel and of the shared memory."""
-    channel, memory = (int(number) for number in sys.argv[-2:])
+    """Serve the host.
+
+    The arguments are this script and numbers: of the channel and of the shared memory, or of a socket by which the host
+    sends both for each instance that it makes of the unit.
+    """
+    numbers = tuple(int(number) for number in sys.argv[2:])
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the host's to handle
-    if sys.platform != "win32":  # on Windows the host's job object ends this process
-        _close_all_but((0, 1, 2, channel, memory))
-        threading.Thread(target=_end_with_the_host, args=(channel,), daemon=True).start()
     sys.argv[1:] = []
+    if sys.platform != "win32":  # on Windows the host's job object ends this process
+        _close_all_but((0, 1, 2, *numbers))
+    if len(numbers) == 1:
+        _serve_instances(numbers[0])
+        return
+    channel, memory = numbers
+    if sys.platform != "win32":
+        threading.Thread(target=_end_with_the_host, args=(channel,), daemon=True).start()
     Server(Channel(channel), memory).run()
 
 

@@ -7,7 +7,7 @@ import ast
 import hashlib
 import importlib.util
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
@@ -103,6 +103,32 @@ def closure(block: str) -> Carried:
                 package = part if is_package else part.rpartition(".")[0]
                 waiting += _imports(files[path].read_bytes(), package, str(files[path]))
     return Carried(dict(sorted(files.items())), tuple(sorted(environment)))
+
+
+class FileElsewhere(ValueError):
+    """A data file does not lie in the folder of a block's module, or below."""
+
+    def __init__(self, file: Path, folder: Path) -> None:
+        super().__init__(f"{file} does not lie in {folder}, the folder of the block's module, or is no file there")
+        self.file, self.folder = file, folder
+
+
+def beside_block(block: str, files: Sequence[Path]) -> dict[str, Path]:
+    """Return data files by their paths in the FMU, beside the block's module as they are here.
+
+    Raises:
+        FileElsewhere: one does not lie in the folder of the module's top package, or below, or is none.
+    """
+    spec = _spec(block.partition(":")[0].partition(".")[0])
+    found: dict[str, Path] = {}
+    for file in files:
+        places = [spec.origin] if spec and spec.origin else []
+        is_package = bool(spec and spec.submodule_search_locations)
+        folder = Path(places[0]).resolve().parents[1 if is_package else 0] if places else Path.cwd()
+        if not file.is_file() or not file.resolve().is_relative_to(folder):
+            raise FileElsewhere(file, folder)
+        found[file.resolve().relative_to(folder).as_posix()] = file
+    return found
 
 
 def carried_digest(path: str) -> str:

@@ -48,7 +48,7 @@ def test_the_readme_has_what_is_tested_here():
     assert len(RUNS) == 13
     assert len(LIVE_RUNS) == 1
     assert len([c for c in COMMANDS if " export " in c]) == 1
-    assert len([c for c in COMMANDS if " build " in c]) == 2
+    assert len([c for c in COMMANDS if " build " in c]) == 3
     assert len([c for c in COMMANDS if " check " in c]) == 1
     assert len([c for c in COMMANDS if " vsl-train " in c]) == 2
     assert len([c for c in COMMANDS if " sweep " in c]) == 4
@@ -174,6 +174,16 @@ def test_a_unit_is_built_for_all_platforms(folder: Path):
     with zipfile.ZipFile(folder / "units" / "Push.fmi3.fmu") as archive:
         libraries = [name for name in archive.namelist() if name.startswith("binaries/")]
     assert len(libraries) == len(TARGETS)
+
+
+@pytest.mark.slow
+def test_a_unit_brings_its_interpreter(folder: Path):
+    done = handover(command_with(" --standalone "), folder)
+    assert done.returncode == 0, done.stderr
+    (size,) = re.findall(r"`units/Push.fmi3-standalone.fmu`, (\d+) MB", README)
+    file = folder / "units" / "Push.fmi3-standalone.fmu"
+    assert file.stat().st_size < 40e6
+    assert file.stat().st_size == pytest.approx(1e6 * float(size), rel=0.1)
 
 
 def command_with(part: str) -> str:

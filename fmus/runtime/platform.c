@@ -14,7 +14,9 @@
 #include <psapi.h>
 #else
 #include <dlfcn.h>
+#include <errno.h>
 #include <sys/stat.h>
+#include <unistd.h>
 #ifdef __APPLE__
 #include <mach-o/dyld.h>
 #else
@@ -88,6 +90,11 @@ bool platform_exists(const char *path) {
 }
 
 char *platform_real_path(const char *path) { return copy_of(path); }
+
+bool platform_make_executable(const char *path, Text *fault) {
+    (void)path, (void)fault; /* by its name it is */
+    return true;
+}
 
 char *platform_read_file(const char *path) {
     wchar_t *w = wide(path);
@@ -201,6 +208,16 @@ bool platform_exists(const char *path) {
 }
 
 char *platform_real_path(const char *path) { return realpath(path, NULL); }
+
+bool platform_make_executable(const char *path, Text *fault) {
+    struct stat facts;
+    if (access(path, X_OK) == 0) return true;
+    if (stat(path, &facts) == 0 && chmod(path, facts.st_mode | S_IXUSR | S_IXGRP | S_IXOTH) == 0 &&
+        access(path, X_OK) == 0)
+        return true;
+    text_add(fault, "%s cannot be executed: %s", path, strerror(errno));
+    return false;
+}
 
 char *platform_read_file(const char *path) {
     FILE *file = fopen(path, "rb");

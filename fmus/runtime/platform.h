@@ -25,6 +25,8 @@ void *platform_loaded_python(void);
 char *platform_environment(const char *name);
 bool platform_exists(const char *path);
 char *platform_real_path(const char *path); /* behind symbolic links, or NULL */
+/* Lets a program be executed: tools that unpack an FMU may lose that. On failure adds why to `fault`. */
+bool platform_make_executable(const char *path, Text *fault);
 char *platform_read_file(const char *path);
 
 /* What `interpreter script` writes to its standard output, or NULL if it could not be run or failed. */

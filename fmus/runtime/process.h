@@ -1,4 +1,4 @@
-/* A Python process of an instance's own, and the channel to it. */
+/* The Python process of an instance, and the channel to it. */
 #ifndef PROCESS_H
 #define PROCESS_H
 
@@ -20,6 +20,11 @@ typedef enum {
  * memory (descriptors; on Windows handles). It inherits nothing else but, on POSIX, standard output and standard error.
  * On failure returns NULL and adds why to `fault`. */
 Process *process_start(const char *interpreter, const char *const arguments[], const SharedMemory *memory, Text *fault);
+
+/* The same for a unit that brings its interpreter, of which one process serves all instances that this host makes: it is
+ * started with the first as `program arguments... CONTROL`, and ends with the last. Neither the host's PYTHONHOME nor
+ * its LD_LIBRARY_PATH reach it. On Windows each instance has a process of its own. */
+Process *process_join(const char *program, const char *const arguments[], const SharedMemory *memory, Text *fault);
 
 /* Seconds of a monotonic clock. */
 double process_clock(void);

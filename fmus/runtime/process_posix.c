@@ -1,6 +1,6 @@
 #ifndef _WIN32
 #define _GNU_SOURCE
-#include "process.h"
+#include "process_posix.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -32,19 +32,13 @@ extern char **environ;
 #define MOST_ARGUMENTS 8
 #define LOOK_AFTER 500 /* ms: how often a silent process is looked after; one that it made may hold the channel open */
 
-struct Process {
-    pid_t id, host; /* a host may fork: only the one that started the process ends it */
-    int channel;
-};
-
 double process_clock(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* Two ends of a channel that no process inherits by accident. */
-static bool open_channel(int ends[2]) {
+bool process_open_channel(int ends[2]) {
 #ifdef SOCK_CLOEXEC
     return socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) == 0;
 #else
@@ -76,41 +70,70 @@ static void set_attributes(posix_spawnattr_t *attributes) {
     posix_spawnattr_setsigdefault(attributes, &all);
 }
 
+/* Variables by which an interpreter or the dynamic linker would look elsewhere. */
+static bool leads_astray(const char *variable) {
+    const char *prefixes[] = {"PYTHON", "LD_", "DYLD_", "_PYI_", "_MEIPASS"};
+    for (size_t i = 0; i < sizeof prefixes / sizeof *prefixes; i++)
+        if (strncmp(variable, prefixes[i], strlen(prefixes[i])) == 0) return true;
+    return false;
+}
+
+/* The host's environment without them, whose strings are the host's; `libraries`, the first, is where the program's lie. */
+static char **own_environment(const char *libraries) {
+    size_t n = 0, kept = 0;
+    while (environ[n]) n++;
+    char **variables = calloc(n + 2, sizeof *variables);
+    if (variables) variables[kept++] = (char *)libraries;
+    for (size_t i = 0; variables && i < n; i++)
+        if (!leads_astray(environ[i])) variables[kept++] = environ[i];
+    return variables;
+}
+
 /* `channel` and `memory` are not among the numbers that they get: dup2 onto itself would not let them be inherited. */
-static int spawn(pid_t *id, const char *interpreter, char *const arguments[], int channel, int memory) {
+static int spawn(pid_t *id, const char *program, char *const arguments[], int channel, int memory, char **environment) {
     posix_spawn_file_actions_t actions;
     posix_spawnattr_t attributes;
     posix_spawn_file_actions_init(&actions);
     posix_spawnattr_init(&attributes);
-    posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+    if (access("/dev/null", R_OK) == 0) /* a bare root folder may have none */
+        posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+    else if (fcntl(0, F_GETFD) >= 0)
+        posix_spawn_file_actions_addclose(&actions, 0);
     posix_spawn_file_actions_adddup2(&actions, channel, CHANNEL);
-    posix_spawn_file_actions_adddup2(&actions, memory, MEMORY);
+    if (memory >= 0) posix_spawn_file_actions_adddup2(&actions, memory, MEMORY);
 #ifdef POSIX_SPAWN_CLOEXEC_DEFAULT
     for (int i = 1; i <= 2; i++)
         if (fcntl(i, F_GETFD) >= 0) posix_spawn_file_actions_adddup2(&actions, i, i);
 #endif
     set_attributes(&attributes);
-    int fault = posix_spawnp(id, interpreter, &actions, &attributes, arguments, environ);
+    int fault = posix_spawnp(id, program, &actions, &attributes, arguments, environment);
     posix_spawn_file_actions_destroy(&actions);
     posix_spawnattr_destroy(&attributes);
     return fault;
 }
 
-Process *process_start(const char *interpreter, const char *const arguments[], const SharedMemory *memory, Text *fault) {
-    char *list[MOST_ARGUMENTS + 4] = {(char *)interpreter};
-    int n = 1;
+/* Puts the arguments and the numbers of the descriptors into `list`, which has room for MOST_ARGUMENTS and four more. */
+static void list_arguments(char *list[], const char *program, const char *const arguments[], bool with_memory) {
+    int n = 0;
+    list[n++] = (char *)program;
     for (; *arguments && n <= MOST_ARGUMENTS; arguments++) list[n++] = (char *)*arguments;
     list[n++] = "3";
-    list[n++] = "4";
+    list[n++] = with_memory ? "4" : NULL;
+    list[n] = NULL;
+}
+
+Process *process_start(const char *interpreter, const char *const arguments[], const SharedMemory *memory, Text *fault) {
+    char *list[MOST_ARGUMENTS + 4];
+    list_arguments(list, interpreter, arguments, true);
     int ends[2];
-    if (!open_channel(ends)) {
+    if (!process_open_channel(ends)) {
         text_add(fault, "no channel to it: %s", strerror(errno));
         return NULL;
     }
     int channel = fcntl(ends[1], F_DUPFD_CLOEXEC, 10), shared = fcntl((int)memory->file, F_DUPFD_CLOEXEC, 10);
     Process *process = calloc(1, sizeof *process);
     int why = channel < 0 || shared < 0 ? errno : process ? 0 : ENOMEM;
-    if (!why) why = spawn(&process->id, interpreter, list, channel, shared);
+    if (!why) why = spawn(&process->id, interpreter, list, channel, shared, environ);
     close(ends[1]);
     if (channel >= 0) close(channel);
     if (shared >= 0) close(shared);
@@ -125,17 +148,38 @@ Process *process_start(const char *interpreter, const char *const arguments[], c
     return NULL;
 }
 
-typedef enum { RUNS, IS_OVER, IS_REAPED } Life;
-
-/* A process that is over stays to be reaped, unless the host reaps whatever it can. */
-static Life life_of(const Process *process) {
-    siginfo_t info = {0};
-    if (waitid(P_PID, (id_t)process->id, &info, WEXITED | WNOHANG | WNOWAIT) != 0)
-        return errno == ECHILD ? IS_REAPED : RUNS;
-    return info.si_pid == process->id ? IS_OVER : RUNS;
+bool process_start_alone(const char *program, const char *const arguments[], pid_t *id, int *control, Text *fault) {
+    char *list[MOST_ARGUMENTS + 4];
+    list_arguments(list, program, arguments, false);
+    int ends[2];
+    if (!process_open_channel(ends)) {
+        text_add(fault, "no channel to it: %s", strerror(errno));
+        return false;
+    }
+    Text libraries = {0}; /* the program is linked to some that it brings */
+    text_add(&libraries, "LD_LIBRARY_PATH=%.*s/_internal", (int)(strrchr(program, '/') - program), program);
+    char **environment = own_environment(text_of(&libraries));
+    int channel = fcntl(ends[1], F_DUPFD_CLOEXEC, 10);
+    int why = channel < 0 ? errno : environment ? 0 : ENOMEM;
+    if (!why) why = spawn(id, program, list, channel, -1, environment);
+    free(environment);
+    text_clear(&libraries);
+    close(ends[1]);
+    if (channel >= 0) close(channel);
+    *control = ends[0];
+    if (!why) return true;
+    close(ends[0]);
+    text_add(fault, "%s", strerror(why));
+    return false;
 }
 
-bool process_runs(const Process *process) { return life_of(process) == RUNS; }
+Life process_life(pid_t id) {
+    siginfo_t info = {0};
+    if (waitid(P_PID, (id_t)id, &info, WEXITED | WNOHANG | WNOWAIT) != 0) return errno == ECHILD ? IS_REAPED : RUNS;
+    return info.si_pid == id ? IS_OVER : RUNS;
+}
+
+bool process_runs(const Process *process) { return process_life(process->id) == RUNS; }
 
 /* Waits until the channel is ready for what `events` says. */
 static Transfer await_channel(const Process *process, short events, double deadline) {
@@ -145,7 +189,7 @@ static Transfer await_channel(const Process *process, short events, double deadl
         int n = poll(&channel, 1, left < LOOK_AFTER ? (left > 0 ? (int)left : 0) : LOOK_AFTER);
         if (n > 0) return TRANSFERRED;
         if (n < 0 && errno != EINTR && errno != EAGAIN) return ENDED;
-        if (n == 0 && life_of(process) != RUNS) return ENDED;
+        if (n == 0 && process_life(process->id) != RUNS) return ENDED;
         if (n == 0 && left <= LOOK_AFTER) return TOO_LATE;
     }
 }
@@ -180,7 +224,7 @@ Transfer process_receive(Process *process, void *bytes, size_t size, double dead
     return TRANSFERRED;
 }
 
-static void describe(int status, Text *how) {
+void process_describe(int status, Text *how) {
     if (WIFSIGNALED(status)) {
         int number = WTERMSIG(status);
         const char *meaning = number == SIGSEGV || number == SIGBUS || number == SIGILL || number == SIGFPE
@@ -192,27 +236,33 @@ static void describe(int status, Text *how) {
     }
 }
 
+bool process_reap(pid_t id, double patience, int *status) {
+    double deadline = process_clock() + patience;
+    while (process_life(id) == RUNS && process_clock() < deadline) nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+    if (process_life(id) == IS_REAPED) return false;
+    kill(-id, SIGKILL); /* also what it started; until it is reaped its number is no one else's */
+    pid_t reaped;
+    do {
+        reaped = waitpid(id, status, 0);
+    } while (reaped < 0 && errno == EINTR);
+    return reaped == id;
+}
+
 int process_end(Process *process, double patience, Text *how) {
-    bool ours = process->host == getpid();
+    bool ours = process->host == getpid(), reaped = false;
+    int status = 0;
     if (ours) shutdown(process->channel, SHUT_RDWR); /* also for those who have it by a fork of the host */
     close(process->channel);
-    double deadline = process_clock() + patience;
-    while (ours && life_of(process) == RUNS && process_clock() < deadline)
-        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
-    int status = 0;
-    pid_t reaped = 0;
-    if (ours && life_of(process) != IS_REAPED) {
-        kill(-process->id, SIGKILL); /* also what it started; until it is reaped its number is no one else's */
-        do {
-            reaped = waitpid(process->id, &status, 0);
-        } while (reaped < 0 && errno == EINTR);
-    }
-    if (reaped == process->id)
-        describe(status, how);
+    if (ours && process->shared)
+        reaped = process_leave(process->shared, patience, &status);
+    else if (ours)
+        reaped = process_reap(process->id, patience, &status);
+    if (reaped)
+        process_describe(status, how);
     else
-        text_add(how, "ended; the host took note of how for itself");
+        text_add(how, process->shared ? "ended for this instance" : "ended; the host took note of how for itself");
     free(process);
-    return reaped > 0 && WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return reaped && WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
 #endif

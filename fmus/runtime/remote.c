@@ -3,7 +3,7 @@
  *
  * Calls and their answers go through a channel; the variables' buffers lie in shared memory, so setting and getting
  * stay copies in memory. FMU_PYTHON is the path of the interpreter, else that of resources/python.txt is taken, else
- * `python3` on the PATH. FMU_PYTHON_TIMEOUT is how long a call may take, in seconds; 0 is without limit. Starting, which
+ * `python3` on the PATH; a unit that brings its interpreter runs in that, and in no other. FMU_PYTHON_TIMEOUT is how long a call may take, in seconds; 0 is without limit. Starting, which
  * imports packages, may always take a minute.
  */
 #include <math.h>
@@ -34,6 +34,7 @@ typedef struct {
     SharedMemory memory;
     char *interpreter, *resources, *token;
     double limit; /* s */
+    bool brought; /* the interpreter is the unit's own, of which one process serves all instances */
 } Remote;
 
 /* How calls and answers look in the channel; the numbers in them are fmus/server.py's, too. */
@@ -151,7 +152,8 @@ static Start begin(Instance *instance, const char *function, Text *fault) {
     Text script = {0}, wanted = {0};
     text_add(&script, "%s/sources/handover/fmus/server.py", side->resources);
     const char *arguments[] = {"-E", "-u", "-X", "utf8", "-c", BEGINNING, text_of(&script), NULL};
-    side->process = process_start(side->interpreter, arguments, &side->memory, fault);
+    side->process = side->brought ? process_join(side->interpreter, arguments + 6, &side->memory, fault)
+                                  : process_start(side->interpreter, arguments, &side->memory, fault);
     text_clear(&script);
     if (!side->process) return NO_PYTHON;
     text_add(&wanted, "%s\n%s", side->token, side->resources);
@@ -163,7 +165,11 @@ static Start begin(Instance *instance, const char *function, Text *fault) {
     text_clear(&wanted);
     Start start = NOT_STARTED;
     if (done != TRANSFERRED) {
-        lose(side, done, limit, done == TOO_LATE ? "" : " before the unit had started; is it a Python 3.10 or later?", fault);
+        const char *doubt = side->brought ? "" : "; is it a Python 3.10 or later?";
+        Text early = {0};
+        if (done != TOO_LATE) text_add(&early, " before the unit had started%s", doubt);
+        lose(side, done, limit, text_of(&early), fault);
+        text_clear(&early);
         start = NO_PYTHON;
     } else if (outcome != ANSWERED) {
         refuse(instance, function, "%s", answer.bytes);
@@ -268,16 +274,21 @@ static Start search(Instance *instance, const char *function, Text *tried) {
     return start;
 }
 
-Start remote_start(Instance *instance, const char *function, const char *resources, const char *token, Text *tried) {
+/* Makes an instance's side, without a process yet; false is in the log. */
+static bool prepare(Instance *instance, const char *function, const char *resources, const char *token) {
     Remote *side = calloc(1, sizeof *side);
-    if (!side) return NOT_STARTED;
-    bool is_last_resort = tried->length > 0;
+    if (!side) return false;
     *side = (Remote){.memory = NO_SHARED_MEMORY, .resources = copy_of(resources), .token = copy_of(token)};
     instance->python = side;
     instance->side = &remote_side;
-    if (!read_limit(instance, function, &side->limit) || !readable(instance, function, resources, "server.py") ||
-        !readable(instance, function, resources, "loader.py"))
-        return NOT_STARTED;
+    return read_limit(instance, function, &side->limit) && readable(instance, function, resources, "server.py") &&
+           readable(instance, function, resources, "loader.py");
+}
+
+Start remote_start(Instance *instance, const char *function, const char *resources, const char *token, Text *tried) {
+    bool is_last_resort = tried->length > 0;
+    if (!prepare(instance, function, resources, token)) return NOT_STARTED;
+    Remote *side = side_of(instance);
     Text apart = {0};
     Start start = NO_PYTHON;
     if (shared_memory_open(&side->memory, &apart)) start = search(instance, function, &apart);
@@ -290,6 +301,21 @@ Start remote_start(Instance *instance, const char *function, const char *resourc
              is_last_resort ? "\nNor is there a Python for a process" : "no usable Python for a process", text_of(&apart));
     text_add(tried, "\nCure: set the environment variable FMU_PYTHON to the interpreter of a Python 3.10 or later that "
                     "has the packages of this unit, such as /usr/bin/python3.");
+    text_clear(&apart);
+    return start;
+}
+
+Start brought_start(Instance *instance, const char *function, const char *resources, const char *token,
+                    const char *program, Text *tried) {
+    if (!prepare(instance, function, resources, token)) return NOT_STARTED;
+    Remote *side = side_of(instance);
+    side->brought = true;
+    Text apart = {0};
+    Start start = NO_PYTHON;
+    if (shared_memory_open(&side->memory, &apart))
+        start = try(instance, function, "the interpreter in the FMU", copy_of(program), &apart);
+    text_add(tried, "the unit brings its own interpreter, which does not start, and no other is tried:%s\nCure: unpack "
+                    "the FMU again, into an empty folder where programs may be executed.", text_of(&apart));
     text_clear(&apart);
     return start;
 }

@@ -44,4 +44,8 @@ typedef enum { STARTED, NOT_STARTED, NO_PYTHON } Start; /* NOT_STARTED is in the
 Start embedded_start(Instance *instance, const char *function, const char *resources, const char *token, Text *tried);
 Start remote_start(Instance *instance, const char *function, const char *resources, const char *token, Text *tried);
 
+/* In the interpreter that the unit brings, `program`; neither embedded nor another process is tried besides. */
+Start brought_start(Instance *instance, const char *function, const char *resources, const char *token,
+                    const char *program, Text *tried);
+
 #endif

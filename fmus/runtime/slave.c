@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "brought.h"
 #include "log.h"
 #include "platform.h"
 #include "side.h"
@@ -28,8 +29,25 @@ static bool only_a_library_is_chosen(void) {
     return only;
 }
 
+/* Starts a unit that brings its interpreter: whatever the environment says of other ones. */
+static Start start_brought(Instance *instance, const char *function, const char *resources, const char *token,
+                           bool *is_brought) {
+    Text tried = {0};
+    char *program;
+    Start start = NO_PYTHON;
+    Brought brought = brought_interpreter(resources, &program, &tried);
+    *is_brought = brought != BRINGS_NONE;
+    if (brought == BRINGS_ONE) start = brought_start(instance, function, resources, token, program, &tried);
+    if (*is_brought && start == NO_PYTHON) refuse(instance, function, "%s", text_of(&tried));
+    free(program);
+    text_clear(&tried);
+    return start;
+}
+
 bool slave_start(Instance *instance, const char *function, const char *resources, const char *token) {
-    bool here, apart;
+    bool here, apart, is_brought;
+    Start own = start_brought(instance, function, resources, token, &is_brought);
+    if (is_brought) return own == STARTED;
     if (!read_ways(instance, function, &here, &apart)) return false;
     Text tried = {0};
     Start start = NO_PYTHON;

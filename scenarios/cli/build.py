@@ -16,7 +16,8 @@ from handover.fmus.compile import TARGETS, compile_runtime, has_compiler, is_cur
 from handover.fmus.fmi2_description import NoFmi2Form
 from handover.fmus.layout import DuplicateName
 from handover.fmus.model_description import AmbiguousName, InvalidText
-from handover.fmus.sources import closure
+from handover.fmus.sources import FileElsewhere, closure
+from handover.fmus.standalone import CannotFreeze
 from handover.scenarios.catalog import search_folder
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
@@ -102,8 +103,28 @@ Environment, when a tool loads the units
     help="Platforms to run on: " + ", ".join(TARGETS) + ", `host` or `all`; missing ones are compiled, which takes a "
     "minute the first time  [default: all that are compiled]",
 )
+@click.option(
+    "--standalone",
+    is_flag=True,
+    help="Bring the interpreter and all packages along, for this machine's platform: whoever gets the FMU needs to "
+    "install nothing. Takes a minute a unit, and the package's extra `standalone`.",
+)
+@click.option(
+    "--include",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    help="Data file that a unit of your own opens beside its module, by __file__.",
+)
 def build_command(
-    units: Sequence[str], fmi: str, out: Path, step: str | None, platforms: Sequence[str], *, scalar: bool
+    units: Sequence[str],
+    fmi: str,
+    out: Path,
+    step: str | None,
+    platforms: Sequence[str],
+    include: Sequence[Path],
+    *,
+    scalar: bool,
+    standalone: bool,
 ) -> None:
     """Build units as FMUs for other tools."""
     named = list(dict.fromkeys(units))
@@ -114,10 +135,13 @@ def build_command(
     with Interruption(), one_line_errors():
         check_place(out)
         entries = [UNITS[u] if u in UNITS else load_user_block(u, step) for u in named or UNITS]
+        if include and any(entry in UNITS.values() for entry in entries):
+            raise UsageError("--include is for units of your own, MODULE:CLASS; those of the catalog open no files")
         if step is not None and all(entry in UNITS.values() for entry in entries):
             raise UsageError("--step is for units of your own, MODULE:CLASS; those of the catalog have theirs")
         _compile_missing(platforms)
-        make = partial(build, out_dir=out, scalar=scalar, platforms=platforms or None)
+        given = {"platforms": platforms or None, "standalone": standalone, "include": include}
+        make = partial(build, out_dir=out, scalar=scalar, **given)
         for line in _build_all(entries, fmi, make, out, named=bool(units)):
             click.echo(line)
 
@@ -141,6 +165,10 @@ def _build_all(
             except NoFmi2Form as e:
                 if named and fmi == "2":
                     raise UsageError(str(e)) from e
+            except CannotFreeze as e:
+                raise UsageError(f"--standalone: {e}") from e
+            except FileElsewhere as e:
+                raise UsageError(f"--include: {e}") from e
             except (InvalidName, InvalidStep, DuplicateName, AmbiguousName, InvalidText) as e:
                 raise UsageError(f"{entry.block}: {e}") from e
             except OSError as e:

@@ -1,0 +1,142 @@
+/* One process for all instances that a host makes of a unit that brings its interpreter: what that takes of memory does
+ * not multiply. Each instance has a channel and a memory of its own, which are handed over by the control channel.
+ */
+#ifdef _WIN32
+#include "process.h"
+
+Process *process_join(const char *program, const char *const arguments[], const SharedMemory *memory, Text *fault) {
+    return process_start(program, arguments, memory, fault); /* each instance has a process of its own here */
+}
+
+#else
+#define _GNU_SOURCE
+#include <errno.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "process_posix.h"
+
+struct SharedProcess {
+    char *program;
+    pid_t id, host;
+    int control;
+    size_t instances;
+    bool is_over, has_status; /* `status`: how it ended */
+    int status;
+    SharedProcess *next;
+};
+
+static SharedProcess *all;
+static atomic_flag taken = ATOMIC_FLAG_INIT; /* a host may make instances in several threads */
+
+static void lock(void) {
+    while (atomic_flag_test_and_set(&taken)) nanosleep(&(struct timespec){.tv_nsec = 100000}, NULL);
+}
+
+static void unlock(void) { atomic_flag_clear(&taken); }
+
+/* One that runs; those of a host that forked this one are that host's. */
+static SharedProcess *find(const char *program) {
+    for (SharedProcess *one = all; one; one = one->next)
+        if (one->host == getpid() && !one->is_over && strcmp(one->program, program) == 0 && process_life(one->id) == RUNS)
+            return one;
+    return NULL;
+}
+
+static SharedProcess *begin(const char *program, const char *const arguments[], Text *fault) {
+    SharedProcess *one = calloc(1, sizeof *one);
+    char *name = copy_of(program);
+    if (one && name && process_start_alone(program, arguments, &one->id, &one->control, fault)) {
+        one->program = name;
+        one->host = getpid();
+        one->next = all;
+        return all = one;
+    }
+    free(name);
+    free(one);
+    return NULL;
+}
+
+static bool hand_over(int control, int channel, int memory) {
+    char byte = 0, room[CMSG_SPACE(2 * sizeof(int))] = {0};
+    struct iovec content = {.iov_base = &byte, .iov_len = 1};
+    struct msghdr message = {.msg_iov = &content, .msg_iovlen = 1, .msg_control = room, .msg_controllen = sizeof room};
+    struct cmsghdr *head = CMSG_FIRSTHDR(&message);
+    head->cmsg_level = SOL_SOCKET;
+    head->cmsg_type = SCM_RIGHTS;
+    head->cmsg_len = CMSG_LEN(2 * sizeof(int));
+    memcpy(CMSG_DATA(head), (int[]){channel, memory}, 2 * sizeof(int));
+    ssize_t sent;
+    do {
+#ifdef MSG_NOSIGNAL
+        sent = sendmsg(control, &message, MSG_NOSIGNAL);
+#else
+        sent = sendmsg(control, &message, 0);
+#endif
+    } while (sent < 0 && errno == EINTR);
+    return sent == 1;
+}
+
+/* Ends one without instances and takes it off the list; its memory goes with it. */
+static void drop(SharedProcess *one) {
+    for (SharedProcess **place = &all; *place; place = &(*place)->next)
+        if (*place == one) {
+            *place = one->next;
+            break;
+        }
+    free(one->program);
+    free(one);
+}
+
+static void end(SharedProcess *one, double patience) {
+    shutdown(one->control, SHUT_RDWR);
+    close(one->control);
+    one->is_over = true;
+    one->has_status = process_reap(one->id, patience, &one->status);
+}
+
+Process *process_join(const char *program, const char *const arguments[], const SharedMemory *memory, Text *fault) {
+    int ends[2] = {-1, -1};
+    Process *process = calloc(1, sizeof *process);
+    if (!process || !process_open_channel(ends)) {
+        text_add(fault, "no channel to it: %s", strerror(errno));
+        free(process);
+        return NULL;
+    }
+    lock();
+    SharedProcess *shared = find(program);
+    if (!shared) shared = begin(program, arguments, fault);
+    bool joined = shared && hand_over(shared->control, ends[1], (int)memory->file);
+    if (shared && !joined) text_add(fault, "it takes no instance: %s", strerror(errno));
+    if (joined) {
+        shared->instances++;
+        *process = (Process){.id = shared->id, .host = getpid(), .channel = ends[0], .shared = shared};
+    } else if (shared && shared->instances == 0) {
+        end(shared, 0.0);
+        drop(shared);
+    }
+    unlock();
+    close(ends[1]);
+    if (joined) return process;
+    close(ends[0]);
+    free(process);
+    return NULL;
+}
+
+bool process_leave(SharedProcess *shared, double patience, int *status) {
+    lock();
+    bool is_last = --shared->instances == 0;
+    bool ends = is_last || patience == 0.0 || process_life(shared->id) != RUNS;
+    if (ends && !shared->is_over) end(shared, patience);
+    bool over = shared->has_status;
+    *status = shared->status;
+    if (is_last) drop(shared);
+    unlock();
+    return over;
+}
+
+#endif

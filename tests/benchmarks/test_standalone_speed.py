@@ -1,0 +1,46 @@
+"""How long units that bring their interpreter take to start, and a step of theirs beside one in the host's process.
+
+Run with `pytest tests/benchmarks/test_standalone_speed.py --benchmark-enable -s`. The host is a program in C.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bare_folder import BareFolder, can_be_entered
+from pytest_benchmark.fixture import BenchmarkFixture
+
+from handover.fmus.build import build, cached
+from handover.fmus.catalog import UNITS
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not can_be_entered(), reason="only the superuser may enter a folder as the root"),
+]
+
+ROUNDS = 5
+
+
+@pytest.mark.parametrize("name", ["Push", "TendonArm"])
+def test_start_and_step(benchmark: BenchmarkFixture, tmp_path: Path, name: str):
+    """The unit with its interpreter in a folder that has none, and as it usually is, by turns."""
+    entry = UNITS[name]
+    root = BareFolder(tmp_path / "root")
+    brought, plain = root.unpack(build(entry, 3, tmp_path, standalone=True)), root.unpack(cached(name, 3))
+    starts: list[float] = []
+    steps: dict[str, list[float]] = {"brought": [], "plain": []}
+
+    def measure() -> None:
+        inside = root.step(brought, float(entry.step), 500, inside=True)
+        outside = root.step(plain, float(entry.step), 500, inside=False)
+        starts.append(inside.figure(r"started in ([\d.]+) s"))
+        for kind, stepped in (("brought", inside), ("plain", outside)):
+            steps[kind].append(stepped.figure(r"([\d.]+) us a step"))
+
+    benchmark.pedantic(measure, rounds=ROUNDS if benchmark.enabled else 1)
+    apart, within = (float(np.median(steps[kind])) for kind in ("brought", "plain"))
+    print(
+        f"\n{name}: starts in {np.median(starts):.2f} s ({np.max(starts):.2f} at most), {apart:.1f} us a step; "
+        f"{within:.1f} us in the host's process, {apart - within:.1f} more"
+    )
+    benchmark.extra_info.update(start=float(np.median(starts)), apart=apart, within=within)

@@ -1,0 +1,104 @@
+"""A folder that is entered as the root: the C library, a host in C, unpacked units, and nothing else."""
+
+import os
+import re
+import shutil
+import subprocess
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from handover.fmus.compile import RUNTIME, host_platform, zig_cc
+
+HOST = Path(__file__).with_name("bare_host.c")
+LIBRARIES = ("libc", "libm", "libdl", "libpthread", "librt", "libutil")
+"""Of the C library, by the names before `.so`."""
+KINDS = {"Float64": "f", "Int64": "i", "Enumeration": "i", "Boolean": "b", "Binary": "p"}
+
+
+def can_be_entered() -> bool:
+    """Return whether this process may change its root: it is the superuser's, on Linux, with glibc."""
+    return os.name == "posix" and hasattr(os, "geteuid") and os.geteuid() == 0 and bool(_c_libraries())
+
+
+def _c_libraries() -> list[Path]:
+    """Return the files of the C library and the dynamic linker."""
+    listed = subprocess.run(["ldconfig", "-p"], capture_output=True, text=True, check=False).stdout
+    paths = [Path(p) for p in re.findall(r"libc6[^\n]* => (\S+)", listed)]
+    wanted = {f"{name}.so" for name in LIBRARIES}
+    chosen = {p.name: p for p in reversed(paths) if p.name.partition(".so")[0] + ".so" in wanted}
+    return [*chosen.values(), *(p for p in Path("/lib64").glob("ld-linux*") if chosen)]
+
+
+@dataclass(frozen=True)
+class Stepped:
+    """What a host printed: the outputs' bytes, a line a step, and its messages."""
+
+    outputs: list[str]
+    messages: str
+
+    def figure(self, pattern: str) -> float:
+        """Return the number in a message."""
+        found = re.search(pattern, self.messages)
+        assert found, self.messages
+        return float(found[1])
+
+
+class BareFolder:
+    """The root folder.
+
+    Args:
+        path: a new folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        for library in _c_libraries():
+            place = path / str(library).lstrip("/")
+            place.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(library.resolve(), place)
+        (path / "tmp").mkdir()
+        built = zig_cc(["-I", str(RUNTIME), str(HOST), "-o", str(path / "host"), "-ldl", "-lm"])
+        assert built.returncode == 0, built.stdout
+
+    def unpack(self, fmu: Path) -> Path:
+        """Return the folder of an unpacked FMU."""
+        folder = self.path / fmu.stem
+        with zipfile.ZipFile(fmu) as archive:
+            archive.extractall(folder)
+        return folder
+
+    def step(
+        self,
+        unit: Path,
+        dt: float,
+        steps: int,
+        instances: int = 1,
+        *,
+        inside: bool,
+        environment: Mapping[str, str] | None = None,
+    ) -> Stepped:
+        """Step an unpacked FMI 3 unit in the host, in this folder as the root or outside of it."""
+        root = ET.parse(unit / "modelDescription.xml").getroot()
+        name = root.find("CoSimulation").attrib["modelIdentifier"]  # pyright: ignore[reportOptionalMemberAccess]
+        place = Path("/", unit.relative_to(self.path)) if inside else unit
+        library = place / "binaries" / host_platform() / f"{name}.so"
+        given = [library, place / "resources", root.attrib["instantiationToken"], repr(dt), str(steps), str(instances)]
+        chroot = shutil.which("chroot") or "chroot"
+        command = ([chroot, self.path, "/host"] if inside else [self.path / "host"]) + given + _outputs(root)
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment or {}, timeout=300)
+        assert done.returncode == 0, done.stderr
+        return Stepped(done.stdout.splitlines(), done.stderr)
+
+
+def _outputs(root: ET.Element) -> list[str]:
+    listed: list[str] = []
+    for variable in root.find("ModelVariables") or ():
+        if variable.get("causality") == "output":
+            count = 1
+            for dimension in variable.findall("Dimension"):
+                count *= int(dimension.attrib["start"])
+            listed.append(f"{KINDS[variable.tag]}:{variable.attrib['valueReference']}:{count}")
+    return listed

@@ -1,0 +1,144 @@
+"""What cannot be given away with an interpreter is told when it is built, and nothing is written."""
+
+import importlib.metadata
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import pytest
+from click.testing import CliRunner
+
+from handover.fmus import standalone
+from handover.fmus.build import build
+from handover.fmus.catalog import UNITS, own_unit
+from handover.fmus.compile import TARGETS, host_platform
+from handover.fmus.sources import FileElsewhere
+from handover.fmus.standalone import CannotFreeze
+from handover.scenarios.cli.build import build_command
+
+READER = '''"""A gain out of a table."""
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+from handover.cosim.blocks.ports import output, port
+from handover.cosim.blocks.units import Number
+
+
+@dataclass(frozen=True, kw_only=True)
+class Params:
+    pass
+
+
+@dataclass(kw_only=True)
+class Inputs:
+    u: Number = port(1.0, "what is scaled")
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    y: Number = output("scaled")
+
+
+class Reader:
+    """Scales its input by a number in a file."""
+
+    feedthrough = {"y": ("u",)}
+    period = None
+
+    def __init__(self, params: Params) -> None:
+        with PLACE.open() as file:
+            self._gain = float(next(csv.reader(file))[0])
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:
+        return Outputs(y=self._gain * u.u)
+
+    def step(self, t: float, dt: float, u: Inputs) -> Outputs:
+        return self.outputs(t, u)
+
+    def get_state(self) -> bytes:
+        return b""
+
+    def set_state(self, state: bytes) -> None:
+        pass
+'''
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of modules of one's own, which has a table and a folder elsewhere beside it."""
+    folder = tmp_path / "own"
+    folder.mkdir()
+    (folder / "table.csv").write_text("2.5\n")
+    monkeypatch.syspath_prepend(folder)  # pyright: ignore[reportUnknownMemberType]
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def reader(folder: Path, name: str, place: str) -> str:
+    """Write a module whose block reads a file at a place, an expression; return the block's path."""
+    (folder / f"{name}.py").write_text(READER.replace("PLACE", place))
+    return f"{name}:Reader"
+
+
+def refused(*given: str) -> str:
+    result = CliRunner().invoke(build_command, [*given, "--out", "built"])
+    assert result.exit_code != 0
+    assert not Path("built").exists() or not list(Path("built").glob("*.fmu"))
+    return result.output
+
+
+@pytest.mark.usefixtures("folder")
+def test_for_another_platform():
+    other = next(target for target in TARGETS if target != host_platform())
+    assert f"this machine's platform only, {host_platform()}" in refused("Push", "--standalone", "--platform", other)
+
+
+@pytest.mark.usefixtures("folder")
+def test_without_pyinstaller(monkeypatch: pytest.MonkeyPatch):
+    def version(name: str) -> str:
+        if name == "pyinstaller":
+            raise importlib.metadata.PackageNotFoundError
+        return "1"
+
+    monkeypatch.setattr(standalone.importlib.metadata, "version", version)
+    assert 'Cure: pip install "handover-cosim[standalone]"' in refused("Push", "--standalone", "--fmi", "3")
+
+
+def test_a_file_elsewhere_or_of_a_unit_of_the_catalog(folder: Path, tmp_path: Path):
+    block = reader(folder, "reads_elsewhere", "Path(__file__).with_name('table.csv')")
+    elsewhere = tmp_path / "elsewhere.csv"
+    elsewhere.write_text("1\n")
+    for file in (elsewhere, folder / "nothing.csv"):
+        with pytest.raises(FileElsewhere, match="the folder of the block's module"):
+            build(own_unit(block, None), 3, tmp_path, include=[file])
+    assert "--include is for units of your own" in refused("Push", "--include", "table.csv")
+
+
+def test_a_file_beside_the_module_goes_along(folder: Path, tmp_path: Path):
+    block = reader(folder, "reads_beside", "Path(__file__).with_name('table.csv')")
+    fmu = build(own_unit(block, None), 3, tmp_path, include=[folder / "table.csv"])
+    (folder / "table.csv").write_text("no number\n")
+    result: Any = fmpy.simulate_fmu(str(fmu), stop_time=0.1, output=["y"])  # pyright: ignore[reportUnknownMemberType]
+    assert result["y"][-1] == 2.5
+
+
+@pytest.mark.slow
+def test_files_that_the_fmu_lacks_or_that_only_this_machine_has(folder: Path, tmp_path: Path):
+    beside = own_unit(reader(folder, "reads_missing", "Path(__file__).with_name('table.csv')"), None)
+    with pytest.raises(CannotFreeze, match=r"opens table\.csv, which the FMU does not have; list it with --include"):
+        build(beside, 3, tmp_path / "out", standalone=True)
+    here = own_unit(reader(folder, "reads_here", f"Path({str(folder / 'table.csv')!r})"), None)
+    with pytest.raises(CannotFreeze, match=r"files that only this machine has: .*table\.csv"):
+        build(here, 3, tmp_path / "out", standalone=True)
+    assert not list((tmp_path / "out").glob("*")) if (tmp_path / "out").exists() else True
+    assert build(beside, 3, tmp_path / "out", standalone=True, include=[folder / "table.csv"]).is_file()
+
+
+@pytest.mark.slow
+def test_a_package_that_is_not_frozen_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
+    unwanted = standalone._unwanted  # pyright: ignore[reportPrivateUsage]
+    monkeypatch.setattr(standalone, "_unwanted", lambda names: [*unwanted(names), "msgpack"])  # pyright: ignore[reportUnknownLambdaType,reportUnknownArgumentType]
+    with pytest.raises(CannotFreeze, match="msgpack"):
+        build(UNITS["FreeFlyer"], 3, tmp_path, standalone=True)

@@ -1,0 +1,126 @@
+"""Instances of a unit that brings its interpreter: one process for all, and what becomes of them if it fails."""
+
+import copy
+import ctypes
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from ctypes_host import ERROR, OK, SIZE, CtypesHost, Log3
+from sample_units.trouble import Deed
+
+from handover.fmus.build import build
+from handover.fmus.catalog import own_unit
+from handover.fmus.compile import host_platform
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform == "win32", reason="each instance has a process of its own there"),
+]
+
+DT = 1 / 64
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(own_unit("sample_units.trouble:Trouble", None), 3, tmp_path_factory.mktemp("unit"), standalone=True)
+
+
+@pytest.fixture
+def host(fmu: Path) -> Iterator[CtypesHost]:
+    made = CtypesHost(fmu, 3)
+    yield made
+    made.close()
+
+
+def instance(host: CtypesHost) -> CtypesHost:
+    """Return a host of one more instance in the same folder, which has stepped once."""
+    other = copy.copy(host)
+    other.instance, other.log = None, []
+    other.logger3 = Log3(other._take_3)  # pyright: ignore[reportPrivateUsage]
+    assert other.instantiate(), other.log
+    assert other.initialise() == OK, other.log
+    assert other.step(0.0, DT) == OK, other.log
+    return other
+
+
+def process(host: CtypesHost) -> int:
+    return int(host.get("process")[0])
+
+
+def free(host: CtypesHost) -> None:
+    host.call("FreeInstance")
+    host.instance = None
+
+
+def do(host: CtypesHost, deed: Deed) -> int:
+    """Return the status of a step in which the block does something."""
+    reference = (ctypes.c_uint32 * 1)(host.references["deed"])
+    assert host.call("SetInt64", reference, SIZE(1), (ctypes.c_int64 * 1)(deed), SIZE(1)) == OK
+    return host.step(DT, DT)
+
+
+def is_alive(number: int) -> bool:
+    try:
+        os.kill(number, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_instances_share_a_process_that_ends_with_the_last(host: CtypesHost):
+    first, second = instance(host), instance(host)
+    assert process(first) == process(second) != os.getpid()
+    number = process(first)
+    free(first)
+    assert is_alive(number)
+    assert second.step(DT, DT) == OK
+    assert second.get("count") == [2.0]
+    free(second)
+    assert not is_alive(number)
+
+
+def test_a_crash_is_told_to_every_instance_and_each_can_go_on_after_a_reset(host: CtypesHost):
+    first, second = instance(host), instance(host)
+    assert do(first, Deed.CRASH) == ERROR
+    assert "ended by signal 11 (Segmentation fault)" in first.log[-1]
+    assert second.step(DT, DT) == ERROR
+    assert "ended by signal 11 (Segmentation fault)" in second.log[-1]
+    for each in (first, second):
+        assert each.call("Reset") == OK, each.log
+        assert each.initialise() == OK
+        assert each.step(0.0, DT) == OK
+        assert each.get("count") == [1.0]
+    assert process(first) == process(second)
+    free(first)
+    free(second)
+
+
+def test_an_instance_that_hangs_is_ended_when_its_time_is_over(host: CtypesHost, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("FMU_PYTHON_TIMEOUT", "0.5")
+    first = instance(host)
+    number = process(first)
+    assert do(first, Deed.HANG) == ERROR
+    assert "did not answer for 0.5 s and was ended" in first.log[-1]
+    assert not is_alive(number)
+    free(first)
+
+
+def test_on_another_platform_it_says_so(fmu: Path):
+    host = CtypesHost(fmu, 3)
+    brought = host.folder / "resources" / "standalone" / host_platform()
+    brought.rename(brought.with_name("riscv64-linux"))
+    assert not host.instantiate()
+    assert "brings its interpreter for another platform than this one" in host.log[-1]
+    host.close()
+
+
+def test_a_program_that_is_damaged_is_told_and_no_other_python_is_tried(fmu: Path):
+    host = CtypesHost(fmu, 3)
+    program = host.folder / "resources" / "standalone" / host_platform() / "unit"
+    program.write_bytes(b"\x7fELF damaged")
+    assert not host.instantiate()
+    assert "its own interpreter, which does not start, and no other is tried" in host.log[-1]
+    host.close()

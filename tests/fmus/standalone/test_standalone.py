@@ -1,0 +1,48 @@
+"""FMUs that bring their interpreter: they step in a folder that holds the C library and nothing else."""
+
+from pathlib import Path
+
+import pytest
+from bare_folder import BareFolder, can_be_entered
+
+from handover.fmus.build import build, cached
+from handover.fmus.catalog import UNITS
+
+pytestmark = [
+    pytest.mark.skipif(not can_be_entered(), reason="only the superuser may enter a folder as the root"),
+]
+
+OF_EACH_SYSTEM = ("TendonArm", "StereoCamera", "VslArm", "FreeFlyer", "GraspScene")
+"""Their packages differ: Exudyn and SciPy, OpenCV and numba, numpy alone, pymunk."""
+STEPS = 5
+ELSEWHERE = {"PYTHONHOME": "/nowhere", "PYTHONPATH": "/nowhere", "LD_LIBRARY_PATH": "/nowhere", "PATH": "/nowhere"}
+"""What of the host's environment must not reach the interpreter in the FMU."""
+OTHER_WAYS = {"FMU_PYTHON": "/nowhere/python3", "FMU_LIBPYTHON": "/nowhere/libpython.so", "FMU_PYTHON_PROCESS": "0"}
+"""Settings of which an FMU with an interpreter takes no note."""
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> BareFolder:
+    return BareFolder(tmp_path_factory.mktemp("root"))
+
+
+def units() -> list[object]:
+    """Return all units; those that stand for the systems in the slow tier, the others in a tier of their own."""
+    return [
+        pytest.param(name, marks=pytest.mark.slow if name in OF_EACH_SYSTEM else pytest.mark.standalone)
+        for name in UNITS
+    ]
+
+
+@pytest.mark.parametrize("name", units())
+def test_a_unit_steps_without_python_as_it_does_with_it(name: str, root: BareFolder, tmp_path: Path):
+    entry = UNITS[name]
+    brought = root.unpack(build(entry, 3, tmp_path, standalone=True))
+    plain = root.unpack(cached(name, 3))
+    inside = root.step(brought, float(entry.step), STEPS, inside=True, environment=ELSEWHERE | OTHER_WAYS)
+    assert len(inside.outputs) == STEPS
+    assert len(set(inside.outputs)) == 1 or inside.outputs[0] != inside.outputs[-1]
+    assert inside.outputs == root.step(plain, float(entry.step), STEPS, inside=False).outputs
+    if name == "TendonArm":
+        alike = root.step(brought, float(entry.step), STEPS, 3, inside=True)
+        assert alike.outputs == [line for line in inside.outputs for _ in range(3)]
