@@ -69,12 +69,14 @@ def _try(resources, token, step):
     import json, os, runpy
 
     opened = set()
-    own = tuple(os.path.realpath(folder) + os.sep for folder in (resources, sys.prefix, sys._MEIPASS))
+    scratch = os.path.dirname(resources)
+    own = tuple(os.path.realpath(folder) + os.sep for folder in (scratch, sys.prefix, sys._MEIPASS))
+    systems = ("/proc/", "/sys/", "/dev/", "/etc/", "/usr/share/", "/System/", "/Library/")
 
     def note(event, arguments):
         if event == "open" and isinstance(arguments[0], str) and not arguments[2] & (os.O_WRONLY | os.O_RDWR):
             path = os.path.realpath(arguments[0])
-            if os.path.isfile(path) and not path.startswith((*own, "/proc/", "/sys/", "/dev/", "/etc/")):
+            if os.path.isfile(path) and not path.startswith(own + systems):
                 opened.add(path)
 
     loader = runpy.run_path(os.path.join(resources, "sources", "handover", "fmus", "loader.py"), run_name="fmu_loader")
@@ -149,8 +151,9 @@ def try_unit(name: str, files: Mapping[str, bytes], token: str, step: float) -> 
         program = resources / "standalone" / host_platform() / PROGRAM
         program.chmod(0o755)
         given = ["--try", str(resources), token, repr(step)]
-        empty = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "LD_", "DYLD_"))}
-        done = subprocess.run([program, *given], capture_output=True, text=True, check=False, env=empty, cwd=scratch)
+        kept = {key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "LD_", "DYLD_"))}
+        kept |= dict.fromkeys(("HOME", "XDG_CACHE_HOME", "MPLCONFIGDIR", "HANDOVER_CACHE"), scratch)
+        done = subprocess.run([program, *given], capture_output=True, text=True, check=False, env=kept, cwd=scratch)
         if done.returncode != 0:
             raise CannotFreeze(f"{name}: its frozen interpreter does not run: {done.stderr.strip()}")
         _judge(name, json.loads(done.stdout.splitlines()[-1]), resources)
@@ -183,7 +186,7 @@ def _imported(block: str, carried: Carried) -> list[str]:
     modules: list[str] = json.loads(done.stdout.splitlines()[-1])
     own = {*tops, "__main__"}
     names = {*_STANDARD, *(name for name in modules if name.partition(".")[0] not in own)}
-    return sorted(name for name in names if not name.rpartition(".")[2].startswith("_") or "." in name)
+    return sorted(name for name in names if not (name.startswith("_") and name in sys.stdlib_module_names))
 
 
 def _findable(name: str) -> bool:
