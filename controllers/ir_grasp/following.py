@@ -260,8 +260,11 @@ class Following:
 
     def _ending(self, u: Floats, left: float, stuck: bool) -> Ending:
         p = self._params
-        if self._is_pushing(u, left):
-            return Ending.PUSHED
+        self._path += self._dt * max(0.0, float(u[0]))
+        if self._is_without_effect(u, left):
+            return Ending.PUSHED if self._touching or not self._touch.measured else Ending.SETTLED
+        if self._path > p.path_limit:
+            return Ending.USED_UP
         if left > 0.0:
             return Ending.USED_UP if stuck else Ending.NONE
         d = self._filter.distances[self._in_cost]
@@ -276,16 +279,15 @@ class Following:
             return Ending.NONE
         return Ending.SETTLED if any(self._saw) else Ending.LOST
 
-    def _is_pushing(self, u: Floats, left: float) -> bool:
-        """Whether ways across no longer change what is seen, or the way ahead is used up: the object goes along."""
+    def _is_without_effect(self, u: Floats, left: float) -> bool:
+        """Whether ways across no longer change what is seen: the object goes along, or the estimate is at its end."""
         p = self._params
-        self._path += self._dt * max(0.0, float(u[0]))
         off = abs(self.offset) if self.doing is Doing.TRACK else self._beside
         if left > p.push_depth or off < self._off - 1e-3 or off < 2e-3 or self.doing is not self._before:
             self._pushed, self._off, self._before = 0.0, off, self.doing
         else:
             self._pushed += self._dt * abs(float(u[1]))
-        return self._pushed > p.push_limit or self._path > p.path_limit
+        return self._pushed > p.push_limit
 
     def get_state(self) -> tuple[object, ...]:
         """Return estimates, search, what was seen, and counters."""
