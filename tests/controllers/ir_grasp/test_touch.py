@@ -64,7 +64,7 @@ def test_a_fingertip_that_pushes_an_object_ahead_is_felt_within_fifteen_millimet
     p_WO = np.array([-0.07, left])
     plant = GraspScene(SceneParams(thing=Thing.DISC, disc_radius=0.033, mass_O=0.1, p_WO_0=p_WO, p_WH_0=START))
     seen = drive(plant, (0.1, 0.0), 80)
-    pushed = np.array([np.linalg.norm(y.p_WO - p_WO) for y in seen])
+    pushed = [float(np.linalg.norm(y.p_WO - p_WO)) for y in seen]
     felt = feel(seen)
     first = next(k for k, touch in enumerate(felt) if touch.touches)
     assert pushed[-1] > 0.03
