@@ -12,6 +12,7 @@ from handover.controllers.ir_grasp.moves import X
 from handover.controllers.ir_grasp.parameters import Params
 from handover.controllers.ir_grasp.searching import Search
 from handover.controllers.ir_grasp.sensor_geometry import surface_points
+from handover.controllers.ir_grasp.touch import Touch
 from handover.cosim.blocks.ports import Floats
 
 
@@ -33,6 +34,7 @@ class Ending(enum.IntEnum):
     PUSHED = 4
     USED_UP = 5
     CENTRED = 6
+    CONTACT = 7
 
 
 class Following:
@@ -44,7 +46,9 @@ class Following:
 
     A finger of the cost that sees alone is kept at the distance `one_sided`, which moves the hand to its side if the
     object is near it (fig. 9). If it stays as far off while the hand goes ahead, a fingertip pushes it along: the hand
-    goes back and around it. An object that is lost is awaited where it was seen, then searched.
+    goes back and around it. So it does where the joints feel that a fingertip meets something (`Touch`); what presses
+    a finger outwards near its root is between the fingers, and the hand closes. An object that is lost is awaited
+    where it was seen, then searched.
 
     Attributes:
         doing: what the last round did.
@@ -56,6 +60,7 @@ class Following:
         self._calibration = params.calibration
         self._filter = MotionFilter(params, period)
         self._search = Search(params)
+        self._touch = Touch(params, period)
         self._in_cost = [i for i in range(3) if params.weight[i] > 0.0]
         self._weight = params.weight[self._in_cost]
         pregrasp = np.array([*params.p_WH_pregrasp, params.yaw_pregrasp])
@@ -70,6 +75,8 @@ class Following:
         self._along, self._then = 0.0, math.nan  # way ahead since the distance of the side that sees was another
         self._around: list[tuple[float, float]] = []  # corners of a way around what went along, in W
         self._rounded = 0
+        self._searches_ahead = False  # whether the last corner is one that sight or touch may cut short
+        self._touching, self._touched = False, 0
         self._ticks_seen, self._ticks_lost = (self._calibration.ticks(y) for y in (params.epsilon, params.distance_max))
 
     @property
@@ -90,6 +97,12 @@ class Following:
         self._remember(x, np.array(distances))
         return any(self._saw)
 
+    def feel(self, x: X, q: Floats, tension: float) -> bool:
+        """Take the joints' encoders and the tendon's tension; return whether a finger touches something."""
+        self._touch.advance(x, q, tension)
+        self._touching = self._touch.touches
+        return self._touching
+
     def _remember(self, x: X, distances: Floats) -> None:
         """Keep the seen point that is least far ahead, and let it move on with the object."""
         c, s = math.cos(x[2]), math.sin(x[2])
@@ -109,8 +122,16 @@ class Following:
     def advance(self, x: X, command: X) -> tuple[X, Ending]:
         """Return the command of the coming period, and whether the correction ends here."""
         p = self._params
+        if self._searches_ahead and len(self._around) == 1 and (self._touching or any(self._saw)):
+            self._around = []
         if self._around:
             return self._go_around(command), Ending.NONE
+        if self._touching:
+            if self._is_gripped(x):
+                return command, Ending.CONTACT
+            if self._meets():
+                self._begin_around_touched(x)
+                return self._go_around(x), Ending.NONE
         if not any(self._saw) and (not self._front or self._lost > p.lost_time):
             self.doing = Doing.SEARCH
             goal = self._search.advance(command, self._dt)
@@ -119,7 +140,7 @@ class Following:
         deep = left <= 0.0
         self._lost = 0.0 if any(self._saw) else self._lost + self._dt
         feed = 0.0 if deep else min(p.feed, p.rate * left + 0.03)
-        both = all(self._saw[i] for i in self._in_cost)
+        both = self._sees_both
         self.doing = Doing.TRACK if both else Doing.ONE_SIDED
         self.rounds += both
         if not both and not deep and self._goes_along(x):
@@ -136,6 +157,10 @@ class Following:
         made = c * (goal[0] - command[0]) + s * (goal[1] - command[1])
         stuck = float(u[0]) > 0.02 and made < 0.1 * self._dt * float(u[0])
         return (*goal.tolist(), sigma), self._ending(u, left, stuck)
+
+    @property
+    def _sees_both(self) -> bool:
+        return all(self._saw[i] for i in self._in_cost)
 
     def _goes_along(self, x: X) -> bool:
         """Whether the hand goes ahead and what one side alone sees stays as far off: a fingertip pushes it.
@@ -157,7 +182,37 @@ class Following:
         corners = np.clip([back, (back[0] - s * side, back[1] + c * side)], self._low[:2], self._high[:2])
         self._around = [(float(a), float(b)) for a, b in corners]
         self._rounded += 1
+        self._searches_ahead = False
         self._front, self._then = (), math.nan
+
+    def _is_gripped(self, x: X) -> bool:
+        """Whether the object presses a finger outwards: near its root, or, if deep enough, seen from both sides."""
+        p, place = self._params, self._touch.place
+        if not (self._front and any(self._saw) and place.outwards):
+            return False
+        left = self.ahead(x) - p.depth
+        return left < 0.0 if place.distal and self._sees_both else not place.distal and left < p.push_depth
+
+    def _meets(self) -> bool:
+        """Whether a finger meets the object with its tip or its outer side, and may still go around it."""
+        place = self._touch.place
+        inside = place.outwards and not place.distal
+        return not (inside or self._sees_both) and self._touched < self._params.touch_most
+
+    def _begin_around_touched(self, x: X) -> None:
+        """Plan the way back, then across to the side of the finger that met it, then ahead again.
+
+        Each time it goes back farther: what is met once more on that way is beside the finger, not before its tip.
+        """
+        p, (c, s) = self._params, (math.cos(x[2]), math.sin(x[2]))
+        self._touched += 1
+        way, side = self._touched * p.touch_back, p.touch_across if self._touch.place.finger else -p.touch_across
+        corners = [(-way, 0.0), (-way, side), (way, side)]
+        W = [(x[0] + c * ahead - s * left, x[1] + s * ahead + c * left) for ahead, left in corners]
+        self._around = [(float(a), float(b)) for a, b in np.clip(W, self._low[:2], self._high[:2])]
+        self._searches_ahead = True
+        self._front, self._then = (), math.nan
+        self._touch.forget()
 
     def _go_around(self, command: X) -> X:
         """Return the command of the coming period on that way."""
@@ -205,8 +260,11 @@ class Following:
 
     def _ending(self, u: Floats, left: float, stuck: bool) -> Ending:
         p = self._params
-        if self._is_pushing(u, left):
-            return Ending.PUSHED
+        self._path += self._dt * max(0.0, float(u[0]))
+        if self._is_without_effect(u, left):
+            return Ending.PUSHED if self._touching or not self._touch.measured else Ending.SETTLED
+        if self._path > p.path_limit:
+            return Ending.USED_UP
         if left > 0.0:
             return Ending.USED_UP if stuck else Ending.NONE
         d = self._filter.distances[self._in_cost]
@@ -221,33 +279,34 @@ class Following:
             return Ending.NONE
         return Ending.SETTLED if any(self._saw) else Ending.LOST
 
-    def _is_pushing(self, u: Floats, left: float) -> bool:
-        """Whether ways across no longer change what is seen, or the way ahead is used up: the object goes along."""
+    def _is_without_effect(self, u: Floats, left: float) -> bool:
+        """Whether ways across no longer change what is seen: the object goes along, or the estimate is at its end."""
         p = self._params
-        self._path += self._dt * max(0.0, float(u[0]))
         off = abs(self.offset) if self.doing is Doing.TRACK else self._beside
         if left > p.push_depth or off < self._off - 1e-3 or off < 2e-3 or self.doing is not self._before:
             self._pushed, self._off, self._before = 0.0, off, self.doing
         else:
             self._pushed += self._dt * abs(float(u[1]))
-        return self._pushed > p.push_limit or self._path > p.path_limit
+        return self._pushed > p.push_limit
 
     def get_state(self) -> tuple[object, ...]:
         """Return estimates, search, what was seen, and counters."""
         did = (int(self.doing), int(self._before), self.rounds)
         saw = (self._saw, self._front, self._beside)
-        around = (self._along, self._then, list(self._around), self._rounded)
+        around = (self._along, self._then, list(self._around), self._rounded, self._searches_ahead)
+        touch = (self._touch.get_state(), self._touched)
         counters = (self._off, self._settled, self._lost, self._pushed, self._path)
-        return self._filter.get_state(), self._search.get_state(), did, saw, counters, around
+        return self._filter.get_state(), self._search.get_state(), did, saw, counters, around, touch
 
     def set_state(self, state: tuple[Any, ...]) -> None:
         """Restore a state that `get_state` gave."""
-        estimates, searched, (doing, before, self.rounds), saw, counters, around = state
+        estimates, searched, (doing, before, self.rounds), saw, counters, around, (touch, self._touched) = state
+        self._touch.set_state(touch)
         self._filter.set_state(estimates)
         self._search.set_state(searched)
         self.doing, self._before = Doing(doing), Doing(before)
         seen, self._front, self._beside = saw
         self._saw = list(seen)
-        self._along, self._then, corners, self._rounded = around
+        self._along, self._then, corners, self._rounded, self._searches_ahead = around
         self._around = list(corners)
         self._off, self._settled, self._lost, self._pushed, self._path = counters

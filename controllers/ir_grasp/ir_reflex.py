@@ -15,7 +15,7 @@ from handover.controllers.ir_grasp.parameters import Correction, InvalidReflexPa
 from handover.controllers.ir_grasp.phases import DOING, ENDINGS, STOPS, Phase, Stop
 from handover.controllers.ir_grasp.visibility import Recovery, Visibility, displaced
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, port
+from handover.cosim.blocks.ports import Floats, Vector2, Vector3, Vector8, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, Newton, Number, Radian, SquareMetre, Tick
 
@@ -49,7 +49,8 @@ class Inputs:
     p_WH: Vector2[Metre] = port(np.zeros(2), "wrist, in the world")
     yaw: Radian = port(0.0, "heading of the hand")
     sigma: Number = port(0.0, "closure of the hand: 0 open, 1 closed")
-    tension: Newton = port(0.0, "tension of the tendon, by the motor's current; only the strategy CONTACT reads it")
+    tension: Newton = port(0.0, "tension of the tendon, by the motor's current; read by CONTACT and FAST")
+    q: Vector8[Radian] = port(np.zeros(8), "joint angles: thumb 2, index 3, ring 3; all 0: not measured; read by FAST")
 
 
 @dataclass(kw_only=True)
@@ -99,7 +100,7 @@ class IrReflex:
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
         ("p_WH_cmd", "yaw_cmd", "sigma_cmd", "phase", "case", "cost", "distance", "steps", "stop"),
-        ("ticks", "p_WH", "yaw", "sigma", "tension"),
+        ("ticks", "p_WH", "yaw", "sigma", "tension", "q"),
     )
     period: ClassVar[Fraction | None] = _PERIOD
 
@@ -142,7 +143,7 @@ class IrReflex:
         """Continue the current move; when it is over, decide on the next one by its reading."""
         _check_inputs(u)
         if self._fast and self._phase not in (Phase.PULL, Phase.SHAKE, Phase.DONE):
-            self._follow((*u.p_WH.tolist(), u.yaw, u.sigma), tuple(u.ticks.tolist()))
+            self._follow((*u.p_WH.tolist(), u.yaw, u.sigma), tuple(u.ticks.tolist()), u.q, u.tension)
         if self._phase is Phase.SHAKE:
             self._shake()
         elif self._phase is Phase.APPROACH and self.params.strategy is Strategy.CONTACT:
@@ -182,7 +183,7 @@ class IrReflex:
         if abs(tension - p.free_tension * sigma) > p.contact_tension or way >= float(p.reach[0]):
             self._close(Stop.CONTACT)
 
-    def _follow(self, x: X, ticks: X) -> None:
+    def _follow(self, x: X, ticks: X, q: Floats, tension: float) -> None:
         """Correct on the move; while closing, go along with the object."""
         following = self._following
         if self._phase is Phase.CLOSE:  # what it last estimated: fingers that touch are not where the model has them
@@ -191,8 +192,9 @@ class IrReflex:
             self._move.goal = (goal[0] + float(v[0]), goal[1] + float(v[1]), *goal[2:])
             return
         sees = following.look(x, ticks)
+        touches = following.feel(x, q, tension)
         arrived = self._phase is not Phase.REACH or self._arrived(x)
-        if not (sees or arrived):
+        if not (sees or touches or arrived):
             self._move.goal = self._arriving(x)
             return
         goal, ending = following.advance(x, self._move.goal if arrived else x)
@@ -360,6 +362,7 @@ def _check_inputs(u: Inputs) -> None:
         "yaw": [u.yaw],
         "sigma": [u.sigma],
         "tension": [u.tension],
+        "q": u.q.tolist(),
     }
     wrong = [name for name, values in inputs.items() if not all(map(math.isfinite, values))]
     if wrong:

@@ -14,6 +14,7 @@ from handover.cosim.blocks.units import (
     Metre,
     MetrePerSecond,
     Newton,
+    NewtonMetre,
     Number,
     PerSecond,
     PerTick,
@@ -209,6 +210,12 @@ class Params:
     along_back: Metre = parameter(0.025, "how far a hand that pushes it along goes back", minimum=0.0)
     along_across: Metre = parameter(0.025, "how far it then goes across, to the side that sees", minimum=0.0)
     along_most: int = parameter(3, "how often it does so at most", minimum=0)
+    touch_torque: NewtonMetre = parameter(3.4e-3, "unexplained torque on a joint that shows a contact", minimum=1e-6)
+    touch_inertia: Number = parameter(0.3, "share of the joint's torque of inertia by which more is asked", minimum=0.0)
+    touch_time: Second = parameter(0.12, "time over which that torque is averaged", minimum=0.0, maximum=2.0)
+    touch_back: Metre = parameter(0.025, "how far the hand goes back from what a finger met", minimum=0.0, maximum=0.1)
+    touch_across: Metre = parameter(0.045, "how far it then goes across, to the side of that finger", minimum=0.0)
+    touch_most: int = parameter(3, "how often it does so at most", minimum=0)
     push_depth: Metre = parameter(0.020, "how much too far ahead the front is when that counts", minimum=0.0)
     push_limit: Metre = parameter(0.010, "way across that the hand may make without any effect", minimum=0.0)
     path_limit: Metre = parameter(0.15, "way ahead that it may make once it has seen the object", minimum=0.0)

@@ -26,9 +26,11 @@ class Phase(enum.IntEnum):
 class Stop(enum.IntEnum):
     """Why the refinement ended.
 
-    The cost is small, steps, recoveries or reach are used up, there is no progress, no finger sees the object, or the
-    strategy has no refinement. Of the correction on the move: the object goes along with the hand, or is deep between
-    two fingers that are equally far from it. Of the strategy CONTACT: the tendon tightened.
+    The cost is small, steps, recoveries, reach or way are used up, there is no progress, no finger sees the object, or
+    the strategy has no refinement. Of the correction on the move: ways across change nothing of what is seen while a
+    finger touches the object, which so goes along (PUSHED; also where no joint is measured); the object is deep between
+    two fingers that are equally far from it, or presses a finger outwards there (CONTACT). Of the strategy CONTACT: the
+    tendon tightened.
     """
 
     RUNNING = 0
@@ -51,5 +53,6 @@ ENDINGS = {
     Ending.USED_UP: Stop.PATIENCE,
     Ending.PUSHED: Stop.PUSHED,
     Ending.CENTRED: Stop.CENTRED,
+    Ending.CONTACT: Stop.CONTACT,
 }
 DOING = {Doing.SEARCH: Phase.SEARCH, Doing.ONE_SIDED: Phase.RECOVER, Doing.TRACK: Phase.TRACK}

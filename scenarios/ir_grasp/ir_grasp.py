@@ -136,6 +136,7 @@ class IrGrasp(Experiment[GraspEvaluator]):
         )
         s.connect(scene.y.ticks, reflex.u.ticks)
         s.connect(scene.y.tension, reflex.u.tension)
+        s.connect(scene.y.q, reflex.u.q)
         for name in ("p_WH", "yaw", "sigma"):
             s.connect(getattr(scene.y, f"{name}_meas"), getattr(reflex.u, name))
         for name in ("p_WH_cmd", "yaw_cmd", "sigma_cmd"):

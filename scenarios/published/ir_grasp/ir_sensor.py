@@ -165,7 +165,7 @@ def _in_order(runs: SensorRuns) -> Claim:
         reason="Reproduced, as far as the sensors go, if in each run, of reflectivities from "
         f"{min(ranks):g} to {max(ranks):g}, the rank correlation of distances by the controller's curve with the true "
         f"ones is at least {_MIN_RANKS} from the target of 10 mm to 60 mm, as far as the face is seen. What it does to "
-        "grasps is judged by `handover paper ir-limits`.",
+        "grasps is judged by the experiment ir-limits.",
         where=where,
     )
 

@@ -31,7 +31,7 @@ def scene(p_WO: tuple[float, float] = (0.0, 0.0), **more: Any) -> GraspScene:
 
 
 def read(y: Sensed) -> Inputs:
-    return Inputs(ticks=y.ticks, p_WH=y.p_WH_meas, yaw=y.yaw_meas, sigma=y.sigma_meas, tension=y.tension)
+    return Inputs(ticks=y.ticks, p_WH=y.p_WH_meas, yaw=y.yaw_meas, sigma=y.sigma_meas, tension=y.tension, q=y.q)
 
 
 def grasp(controller: IrReflex, plant: GraspScene, until: Phase = Phase.CLOSE) -> list[tuple[Outputs, Sensed]]:
@@ -148,7 +148,7 @@ def test_what_one_side_sees_as_far_off_on_the_way_ahead_is_gone_around(seer: Vis
 
 def test_an_object_before_a_fingertip_is_pushed_less_than_half_as_far():
     """A small heavy disc, met by a search so fast that it stands before the index's tip."""
-    p_WO, quick = (0.0, 0.006), {"search_speed": 0.28, "arrival_way": 0.0}
+    p_WO, quick = (0.0, 0.006), {"search_speed": 0.28, "arrival_way": 0.0, "touch_most": 0}
 
     def pushed(along_most: int) -> float:
         small = scene(p_WO, thing=Thing.DISC, disc_radius=0.015, mass_O=0.25)
@@ -157,6 +157,21 @@ def test_an_object_before_a_fingertip_is_pushed_less_than_half_as_far():
     straight, around = pushed(0), pushed(3)
     assert straight > 0.06
     assert around < straight / 2.0
+
+
+@pytest.mark.parametrize("p_WO", [(-0.02, 0.09), (0.0, 0.09)])
+@pytest.mark.parametrize("thing", [Thing.CYLINDER, Thing.BABY_CUP_B])
+def test_an_object_that_a_fingertip_is_felt_to_meet_is_gone_around(thing: Thing, p_WO: tuple[float, float]):
+    """It stands before the tip of the index, which does not see it."""
+
+    def pushed(touch_torque: float) -> tuple[float, Floats]:
+        seen = grasp(reflex(touch_torque=touch_torque), scene(p_WO, thing=thing))
+        return float(np.linalg.norm(seen[-1][1].p_WO - p_WO)), in_hand(seen[-1][1])
+
+    (unfelt, _), (felt, place) = pushed(1.0), pushed(Params().touch_torque)
+    assert unfelt > 0.015
+    assert felt < min(0.010, 0.4 * unfelt)
+    assert abs(place[1]) < 0.012
 
 
 @pytest.mark.parametrize("way", [0.0, 0.04])

@@ -48,6 +48,7 @@ class Shadow:
             yaw=float(signals["scene.yaw_meas"]),
             sigma=float(signals["scene.sigma_meas"]),
             tension=float(signals["scene.tension"]),
+            q=signals["scene.q"],
         )
         y = self._block.step(t, 0.015, u)
         self.own.append(np.concatenate([np.atleast_1d(getattr(y, name)) for name in _COMMANDS]))
