@@ -15,13 +15,13 @@ const live = (() => {
   const api = {
     scene: null, run: null, session: false, send, on(name, act) { (listeners[name] ??= []).push(act); }, get hand() { return lead?.hand; },
   };
-  let stage = null, slots = [], size = 0, paused = true, link = null, over = false, lead = null;
+  let viewport = null, slots = [], size = 0, paused = true, link = null, over = false, lead = null;
 
   // Puts the scene of a run in the place of the one before, seen from where that was seen.
   function begin(run) {
-    const before = stage?.scene.viewpoint();
-    stage?.close();
-    stage = null;
+    const before = viewport?.scene.viewpoint();
+    viewport?.close();
+    viewport = null;
     lead?.close();
     over = false;
     slots = run.scene ? replayShapes.unpack(run.scene) : [];
@@ -30,18 +30,18 @@ const live = (() => {
     if (run.scene) {
       host.append(byId("scene-of-run").content.cloneNode(true));
       for (const part of ["views", "legend"]) host.querySelector(".replay-" + part).outerHTML = run[part];
-      stage = stageIn(root, {...run.scene, live: true});
-      if (stage) recorderIn(stage, () => told.value);
-      if (before) stage?.scene.lookAs(before);
+      viewport = viewportIn(root, {...run.scene, live: true});
+      if (viewport) recorderIn(viewport, () => told.value);
+      if (before) viewport?.scene.lookAs(before);
     }
-    lead = run.hand && stage ? leadHandIn(stage.element, stage.scene.camera) : null;
+    lead = run.hand && viewport ? leadHandIn(viewport.element, viewport.scene.camera) : null;
     byId("hand").hidden = byId("hand-help").hidden = !lead;
-    Object.assign(api, {run, scene: stage?.scene ?? null});
+    Object.assign(api, {run, scene: viewport?.scene ?? null});
     if (run.title) document.title = document.querySelector("h1").textContent = run.title;
     byId("signals").replaceChildren(...run.signals.map(name => Object.assign(document.createElement("option"), {value: name})));
     byId("cameras").replaceChildren();
     byId("cameras").hidden = true;
-    byId("push-help").hidden = !(stage && run.pushes?.length);
+    byId("push-help").hidden = !(viewport && run.pushes?.length);
     byId("push-help").textContent = (run.pushes ?? []).map(({bodies, greatest}) =>
       `Press on ${bodies.join(" or ")} and drag to push, with up to ${greatest} N.`).join(" ");
     byId("verdict").hidden = byId("waiting").hidden = true;
