@@ -55,7 +55,7 @@ def live_html(
         title="Live",
         html=style + Markup(html),
         scripts=(
-            *(*SCENE_SCRIPTS, "phases.js", "hand_input.js"),
+            *(*SCENE_SCRIPTS, "phases.js", "side_view.js", "hand_input.js"),
             *(WEBCAM_SCRIPTS if webcam else ()),
             *("live_hand.js", "live.js", "push.js", *scripts),
         ),

@@ -15,11 +15,12 @@ const live = (() => {
   const api = {
     scene: null, run: null, session: false, send, on(name, act) { (listeners[name] ??= []).push(act); }, get hand() { return lead?.hand; },
   };
-  let viewport = null, slots = [], size = 0, paused = true, link = null, over = false, lead = null;
+  let viewport = null, slots = [], size = 0, paused = true, link = null, over = false, lead = null, side = null;
 
   // Puts the scene of a run in the place of the one before, seen from where that was seen.
   function begin(run) {
     const before = viewport?.scene.viewpoint();
+    side?.close();
     viewport?.close();
     viewport = null;
     lead?.close();
@@ -34,7 +35,10 @@ const live = (() => {
       if (viewport) recorderIn(viewport, () => told.value);
       if (before) viewport?.scene.lookAs(before);
     }
-    lead = run.hand && viewport ? leadHandIn(viewport.element, viewport.scene.camera) : null;
+    const isLed = run.hand && viewport;
+    lead = isLed ? leadHandIn(viewport.element, viewport.scene.camera) : null;
+    side = isLed ? sideViewIn(viewport.element.parentElement, viewport.scene, {...run.scene, live: true}, "hand") : null;
+    if (side) side.shown = byId("hand-side-view").checked;
     byId("hand").hidden = byId("hand-help").hidden = !lead;
     Object.assign(api, {run, scene: viewport?.scene ?? null});
     if (run.title) document.title = document.querySelector("h1").textContent = run.title;
@@ -64,6 +68,7 @@ const live = (() => {
       else of[key] = Float64Array.from(values);
     }
     api.scene?.show(Infinity);
+    side?.show();
   }
   function grown(points, more) {
     if (points.length + 3 > 3 * sceneIn.longestTrail) points = points.filter((_, i) => Math.floor(i / 3) % 2 === 0);
@@ -174,6 +179,7 @@ const live = (() => {
     send("choose", chosen);
   }
 
+  byId("hand-side-view").addEventListener("change", ({target}) => { if (side) side.shown = target.checked; });
   byId("signal").addEventListener("change", ({target}) => choose(target.value));
   byId("pause").addEventListener("click", () => send(paused ? "go" : "pause"));
   byId("step").addEventListener("click", () => send("step"));

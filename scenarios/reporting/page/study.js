@@ -270,7 +270,7 @@
     input = play = null;
     byId("play").hidden = true;
   }
-  const wantsSide = () => (sessionStorage.getItem("views") ?? (innerWidth >= 900 ? "2" : "1")) === "2";
+  const wantsSide = () => (sessionStorage.getItem("views") ?? "2") === "2";
   function turnViews() {
     sessionStorage.setItem("views", wantsSide() ? "1" : "2");
     if (play) play.sideShown = wantsSide();
