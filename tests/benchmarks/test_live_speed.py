@@ -1,10 +1,10 @@
 """What watching a run costs it, and how often scenes are drawn: runs with a page and without, in a real browser.
 
 Run with `pytest tests/benchmarks/test_live_speed.py --benchmark-enable -s`. The browser draws by software, on the cores
-of the run. CPU time is that of the run's own process: its page's server and the browser have theirs. A process computes
-for longer where another one uses caches, memory and the clock of its cores, so a run without a page is measured beside a
-browser, too, that draws as often as a page does, but a paused run of which nothing comes: what a run with a page costs
-more than that is the page's; the rest is the browser's, and any program's that draws.
+of the run. CPU time is that of the run's own process: its page's server and the browser have theirs. A process takes
+longer for the same where another one uses the cores' caches, memory and clock, so a run without a page is measured
+beside a browser, too, that draws as often as a page does, but a paused run of which nothing comes: what a run with a
+page costs more than that is the page's; the rest is the browser's, as of any program that draws.
 """
 
 import json
@@ -80,7 +80,7 @@ def watched(wait_until: Waiter, scenario: str, out: Path, *given: str) -> Genera
 def test_what_a_page_costs_its_run(
     benchmark: BenchmarkFixture, tmp_path: Path, wait_until: Waiter, scenario: str
 ) -> None:
-    """A run with a page, the same run without, and one without beside a browser that draws, paced alike and by turns."""
+    """A run with a page, the same without, and without beside a browser that draws, paced alike and by turns."""
     given = ("--pace", PACES[scenario], "--stop", "20")
     found: dict[str, list[dict[str, Any]]] = {"alone": [], "beside a browser": [], "watched": []}
 
@@ -104,18 +104,16 @@ def test_what_a_page_costs_its_run(
 
     benchmark.pedantic(measure, rounds=3 if benchmark.enabled else 1)
     cpu = {name: np.array([s["cpu_seconds"] for s in summaries]) for name, summaries in found.items()}
-    late = {
-        name: float(np.median([100.0 * s["pace"]["share"] for s in summaries])) for name, summaries in found.items()
-    }
+    shares = {name: [100.0 * s["pace"]["share"] for s in summaries] for name, summaries in found.items()}
+    late = {name: float(np.median(of_name)) for name, of_name in shares.items()}
     print()
     for other in ("alone", "beside a browser"):
         ratios = cpu["watched"] / cpu[other]
-        print(
-            f"CPU time of a run with a page, over that without, {other}: {np.median(ratios):.3f} (each: {ratios.round(3)})"
-        )
-        benchmark.extra_info[f"over {other}"] = float(np.median(ratios))
-    shares = ", ".join(f"{share:.1f} % {name}" for name, share in late.items())
-    print(f"{scenario}: deadlines missed at pace {PACES[scenario]}: {shares}")
+        ratio, each = float(np.median(ratios)), [round(float(r), 3) for r in ratios]
+        print(f"CPU time of a run with a page, over that without, {other}: {ratio:.3f} (each: {each})")
+        benchmark.extra_info[f"over {other}"] = ratio
+    told = ", ".join(f"{share:.1f} % {name}" for name, share in late.items())
+    print(f"{scenario}: deadlines missed at pace {PACES[scenario]}: {told}")
     benchmark.extra_info.update(late)
 
 
