@@ -75,16 +75,24 @@ class WatchedRun:
 
     @property
     def verdict(self) -> dict[str, object]:
-        """Return whether it succeeded, why, and where its report is."""
+        """Return whether it has a verdict, whether it succeeded, why, and where its report is."""
         try:
             summary = self.folder.read_summary()
         except InvalidRunFolder as e:
-            return {"success": False, "reason": str(e), "report": ""}
+            return {"judged": False, "success": False, "reason": str(e), "report": ""}
         if not summary:
-            reason = f"its process ended without a verdict; `handover resume {self.folder.path}` goes on with it"
-            return {"success": False, "reason": reason, "report": ""}
+            return {"judged": False, "success": False, "reason": self.why_lost, "report": ""}
         return {
+            "judged": True,
             "success": bool(summary.get("success")),
             "reason": str(summary.get("reason", "")),
             "report": str(self.folder.report) if self.folder.report.is_file() else "",
         }
+
+    @property
+    def why_lost(self) -> str:
+        """What is left of a run whose process has ended, as by a signal, before it could write a summary."""
+        place = self.folder.shown
+        if self.folder.checkpoint.is_file():
+            return f"its process has ended; `handover resume {place}` goes on from its last checkpoint"
+        return f"its process has ended; what it recorded is in {place}, without a checkpoint to go on from"

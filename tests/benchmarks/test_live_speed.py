@@ -3,8 +3,9 @@
 Run with `pytest tests/benchmarks/test_live_speed.py --benchmark-enable -s`. The browser draws by software, on the cores
 of the run. CPU time is that of the run's own process: its page's server and the browser have theirs. A process takes
 longer for the same where another one uses the cores' caches, memory and clock, so a run without a page is measured
-beside a browser, too, that draws as often as a page does, but a paused run of which nothing comes: what a run with a
-page costs more than that is the page's; the rest is the browser's, as of any program that draws.
+beside a browser, too, that draws as often as a page does, but a paused run of which nothing comes: so much is the
+browser's, as of any program that draws. What a run with a page costs more than that is its server's, which shares the
+cores, too, and what reading its controls takes.
 """
 
 import json

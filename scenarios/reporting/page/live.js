@@ -11,6 +11,7 @@ const live = (() => {
   const root = document.querySelector(".live"), host = document.getElementById("scene");
   const byId = id => document.getElementById(id);
   const told = root.querySelector(".replay-told"), plots = byId("plots");
+  const ASKING = "#pause, #step, #stop, #pace, #signal, #chosen button, .play :is(button, input, select), #runs button";
   const chosen = [], listeners = {};
   const api = {
     scene: null, run: null, session: false, send, on(name, act) { (listeners[name] ??= []).push(act); }, get hand() { return lead?.hand; },
@@ -149,15 +150,16 @@ const live = (() => {
     send("see", [...shown].map(part => [...plots.children].indexOf(part)).filter(i => i >= 0));
   });
 
-  function end({success, reason, report}) {
+  function end({judged, success, reason, report}) {
     over = true;
     const verdict = byId("verdict");
     verdict.hidden = false;
     byId("waiting").hidden = true;
     verdict.className = `verdict ${success ? "good" : "bad"}`;
     verdict.innerHTML = "<b></b> ";
-    verdict.firstChild.textContent = success ? "Succeeded:" : "Failed:";
-    verdict.append(reason + ".");
+    verdict.firstChild.textContent = success ? "Succeeded:" : judged ? "Failed:" : "No verdict:";
+    `${reason}.`.split("`").forEach((text, i) =>  // between two of these is a command
+      verdict.append(i % 2 ? Object.assign(document.createElement("code"), {textContent: text}) : text));
     byId("told").textContent = report ? `Its report: ${report}` : "The run has ended.";
     for (const id of ["pause", "step", "stop"]) byId(id).disabled = true;
     root.dataset.ended = success;
@@ -198,12 +200,15 @@ const live = (() => {
   // The server of a single run ends with it; that of a session goes on until somebody ends it.
   link.addEventListener("close", ({code, reason}) => {
     if (over && !api.session && code !== 1013) return;
-    const what = `The connection to the ${api.session ? "session" : "run"} is lost${reason ? ": " + reason : ""}.`;
+    const [of, why] = api.session ? ["session", "its command has ended, and what its runs recorded is in their folders"]
+      : ["run", "what serves this page has ended, and the run goes on without it"];
     const verdict = byId("verdict");
     verdict.hidden = false;
     verdict.className = "verdict bad";
-    verdict.textContent = byId("told").textContent = what;
-    for (const id of ["pause", "step", "stop"]) byId(id).disabled = true;
+    verdict.textContent = `The connection to the ${of} is lost: ${reason || why}.`;
+    byId("waiting").hidden = true;
+    byId("told").textContent = "";
+    for (const entry of document.querySelectorAll(ASKING)) entry.disabled = true;  // nobody is there who would do it
   });
   return api;
 })();
