@@ -59,7 +59,7 @@ class HandSample(NamedTuple):
     sent: float | None = None
 
     def entries(self, led: LedHand) -> dict[str, Sequence[float]]:
-        """Return what an `InputBoard` takes of it."""
+        """Return what an `SharedInputs` takes of it."""
         values = {
             "p_WH_track": self.p_WH,
             "q_WH_track": self.q_WH,

@@ -24,7 +24,7 @@ from handover.scenarios.live.connections import (
     same_origin,
 )
 from handover.scenarios.live.hand_messages import HandSample, HandStream, InvalidHandMessage
-from handover.scenarios.live.input_board import InputBoard
+from handover.scenarios.live.shared_inputs import SharedInputs
 from handover.scenarios.results.run_folder import write_whole
 
 INPUTS_FILE = "inputs.json"
@@ -42,7 +42,7 @@ class HandSeat:
 
     Args:
         led: the hand.
-        board: what the run reads.
+        inputs: what the run reads.
         now: returns where the hand is wanted as it stands.
         webcam: hashes of the files by which a webcam leads it, for the report; empty where it is not offered.
     """
@@ -50,11 +50,11 @@ class HandSeat:
     def __init__(
         self,
         led: LedHand,
-        board: InputBoard,
+        inputs: SharedInputs,
         now: Callable[[], HandSample],
         webcam: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        self._led, self._board, self._now, self._webcam = led, board, now, webcam
+        self._led, self._inputs, self._now, self._webcam = led, inputs, now, webcam
         self._device: WebSocket | None = None
         self._samples: Counter[str] = Counter()
         self._refused: Counter[str] = Counter()
@@ -104,7 +104,7 @@ class HandSeat:
                 continue
             name = sample.device or name
             self._samples[name or "unnamed"] += 1
-            self._board.set(sample.entries(self._led), stamp)
+            self._inputs.set(sample.entries(self._led), stamp)
 
     def _greeting(self) -> dict[str, Any]:
         now, led = self._now(), self._led
@@ -119,7 +119,7 @@ class HandSeat:
 
     def report(self) -> Mapping[str, Any]:
         """Return by which devices the hand was led, what was refused, and how old samples were at their use."""
-        ages = self._board.ages()
+        ages = self._inputs.ages()
         age = {"uses": len(ages)}
         if len(ages):
             of_ages = {"median": np.median(ages), "p95": np.percentile(ages, 95), "most": np.max(ages)}

@@ -11,7 +11,7 @@ from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.webcam import WEBCAM_SCRIPTS
 from handover.scenarios.reporting.html import packed_json
 from handover.scenarios.reporting.page import Section, asset, page_html, template
-from handover.scenarios.reporting.replay_section import FILM_HTML, SCENE_SCRIPTS, STAGE_HTML
+from handover.scenarios.reporting.replay_section import FILM_HTML, SCENE_SCRIPTS, VIEWPORT_HTML
 from handover.scenarios.reporting.time_plots import time_figure
 
 
@@ -20,13 +20,13 @@ def figure_json(plot: TimePlot, time: Floats) -> str:
     return packed_json(time_figure(plot, time).to_dict())
 
 
-def stage_content(shown: ShownRun) -> dict[str, Any]:
+def begun_content(shown: ShownRun) -> dict[str, Any]:
     """Return what a page is told when a run begins."""
-    stage = shown.stage
-    assert stage is not None
-    surroundings = {name: str(html) for name, html in stage.surroundings().items()}
+    scene = shown.scene
+    assert scene is not None
+    surroundings = {name: str(html) for name, html in scene.surroundings().items()}
     pushes = [{"bodies": push.labels, "greatest": push.greatest} for push in shown.pushes]
-    told = {"title": shown.run.title, "scene": stage.scene(), "signals": list(stage.signals), "pushes": pushes}
+    told = {"title": shown.run.title, "scene": scene.content(), "signals": list(scene.signals), "pushes": pushes}
     return {**told, **surroundings, "hand": shown.seat is not None}
 
 
@@ -48,14 +48,14 @@ def live_html(
         webcam: whether one is offered to lead a hand.
     """
     hand = Markup(template("live_hand.html").render(webcam=webcam))
-    html = template("live.html").render(stage=STAGE_HTML, film=FILM_HTML, hand=hand, beside=beside or Markup())
+    html = template("live.html").render(viewport=VIEWPORT_HTML, film=FILM_HTML, hand=hand, beside=beside or Markup())
     style = Markup("<style>{}</style>").format(Markup("\n".join(map(asset, ("replay.css", "live.css", *styles)))))
     section = Section(
         anchor="live",
         title="Live",
         html=style + Markup(html),
         scripts=(
-            *(*SCENE_SCRIPTS, "phases.js", "hand_input.js"),
+            *(*SCENE_SCRIPTS, "phases.js", "side_view.js", "hand_input.js"),
             *(WEBCAM_SCRIPTS if webcam else ()),
             *("live_hand.js", "live.js", "push.js", *scripts),
         ),

@@ -42,9 +42,9 @@ from handover.scenarios.live.connections import (
     next_text,
     same_origin,
 )
-from handover.scenarios.live.live_html import figure_json, live_html, stage_content
+from handover.scenarios.live.live_html import begun_content, figure_json, live_html
+from handover.scenarios.live.live_scene import LiveScene
 from handover.scenarios.live.shown_run import ShownRun
-from handover.scenarios.live.stage import Stage
 from handover.scenarios.live.viewers import Viewers
 from handover.scenarios.live.webcam import WebcamFiles
 from handover.scenarios.reporting.html import packed_json
@@ -127,7 +127,7 @@ class LivePage:
     async def hand(self, device: WebSocket) -> None:
         """Serve a device that leads the hand of the run that is shown, which another one than the page may be."""
         late = time.monotonic() + _EARLY
-        while (self.shown is None or self.shown.stage is None) and time.monotonic() < late:
+        while (self.shown is None or self.shown.scene is None) and time.monotonic() < late:
             await asyncio.sleep(_POLL)
         if self.shown is None or self.shown.seat is None:
             await device.close(POLICY_VIOLATION)
@@ -136,7 +136,7 @@ class LivePage:
 
     async def greet(self, page: WebSocket) -> None:
         """Tell a page that has connected what is shown."""
-        await self._tell_stage(page)
+        await self._tell_scene(page)
         await self._tell_state(page)
 
     def _push(self, page: WebSocket, value: Any) -> None:
@@ -178,8 +178,8 @@ class LivePage:
         if name in ("choose", "see"):
             viewer = self._viewers.of(page)
             if name == "choose":
-                stage = self.shown.stage if self.shown is not None else None
-                viewer.chosen = signal_names(value, () if stage is None else stage.signals)
+                scene = self.shown.scene if self.shown is not None else None
+                viewer.chosen = signal_names(value, () if scene is None else scene.signals)
             else:
                 viewer.seen = plot_numbers(value)
             await self._send_plots(page)
@@ -201,29 +201,29 @@ class LivePage:
         """
         self.shown = self.shown or shown
         late = time.monotonic() + _PATIENCE
-        while shown.stage is None:
+        while shown.scene is None:
             if shown.run.is_over or failed() or time.monotonic() > late:
                 break
-            if stage := await asyncio.to_thread(shown.run.stage):
-                shown.begin(stage)
+            if scene := await asyncio.to_thread(shown.run.scene):
+                shown.begin(scene)
             await asyncio.sleep(_POLL)
         try:
-            if shown.stage is not None:
-                await self._show_stage(shown, shown.stage)
-                await self._follow(shown, shown.stage, failed)
+            if shown.scene is not None:
+                await self._show_scene(shown, shown.scene)
+                await self._follow(shown, shown.scene, failed)
             await self._end(shown)
         finally:  # not lost where this is cancelled, as another run is to be shown
             _leave_report(shown)
 
-    async def _show_stage(self, shown: ShownRun, stage: Stage) -> None:
+    async def _show_scene(self, shown: ShownRun, scene: LiveScene) -> None:
         """Show the scene of another run than before."""
         self._pushes.release_all()
-        shown.stage, self.shown, self._size = stage, shown, None
-        await self._tell_stage(*self._viewers.pages)
+        shown.scene, self.shown, self._size = scene, shown, None
+        await self._tell_scene(*self._viewers.pages)
         await self._tell_states()
         await self.begun()
 
-    async def _follow(self, shown: ShownRun, stage: Stage, failed: Callable[[], bool]) -> None:
+    async def _follow(self, shown: ShownRun, scene: LiveScene, failed: Callable[[], bool]) -> None:
         loop = asyncio.get_running_loop()
         last_plots, last_pictures, started = 0.0, 0.0, False
         while not shown.run.is_over and not failed():
@@ -235,7 +235,7 @@ class LivePage:
             if self._viewers.pages and not started:
                 started, shown.control.paused = True, False
                 await self._tell_states()
-            if self._viewers.pages and stage.refresh():
+            if self._viewers.pages and scene.refresh():
                 await self._send_frame()
                 if began - last_plots >= PLOT_PERIOD:
                     last_plots = began
@@ -244,22 +244,22 @@ class LivePage:
 
     async def show_past(self, past: ShownRun) -> None:
         """Show a run that is over, from its record, at the pace that its controls say; these wait at its end."""
-        stage, control = await asyncio.to_thread(past.run.past_stage), past.control
-        if stage is None:
+        scene, control = await asyncio.to_thread(past.run.recorded_scene), past.control
+        if scene is None:
             return
         control.paused = control.stop = False
-        await self._show_stage(past, stage)
+        await self._show_scene(past, scene)
         loop = asyncio.get_running_loop()
-        t, before, last_plots = stage.begin, loop.time(), -math.inf
-        while t < stage.end and not control.stop:
+        t, before, last_plots = scene.begin, loop.time(), -math.inf
+        while t < scene.end and not control.stop:
             await asyncio.sleep(FRAME_PERIOD)
             passed, before = loop.time() - before, loop.time()
             if control.take_step():
-                t = stage.after(t)
+                t = scene.after(t)
             elif not control.paused:
                 control.forget_steps()
-                t = min(t + control.pace * passed, stage.end)
-            stage.go_to(t)
+                t = min(t + control.pace * passed, scene.end)
+            scene.go_to(t)
             await self._send_frame()
             if before - last_plots >= PLOT_PERIOD:
                 last_plots = before
@@ -274,34 +274,34 @@ class LivePage:
         """Called when another run is shown."""
 
     async def _end(self, shown: ShownRun) -> None:
-        if shown.stage is None and not shown.run.is_over:  # it never began: whoever began it says why
+        if shown.scene is None and not shown.run.is_over:  # it never began: whoever began it says why
             return
-        if shown.stage is not None:
+        if shown.scene is not None:
             record = whole_record_of(shown.run.folder)
             if record is not None:  # its last rows were never in the file of the newest ones
-                shown.stage.complete(record)
+                shown.scene.complete(record)
             await self._send_frame()
             await self._send_plots(*self._viewers.ready)
         await self.tell({"ended": shown.run.verdict})
 
-    async def _tell_stage(self, *pages: WebSocket) -> None:
+    async def _tell_scene(self, *pages: WebSocket) -> None:
         """Send the scene of the run that is shown, where there is one."""
-        if self.shown is None or self.shown.stage is None:
+        if self.shown is None or self.shown.scene is None:
             return
-        begun = packed_json({"begun": stage_content(self.shown)})
+        begun = packed_json({"begun": begun_content(self.shown)})
         for page in pages:
             await self._viewers.send(page, begun)
             self._viewers.of(page).ready = True
 
     async def _send_frame(self) -> None:
         assert self.shown is not None
-        assert self.shown.stage is not None
-        stage = self.shown.stage
-        data = stage.places()
+        assert self.shown.scene is not None
+        scene = self.shown.scene
+        data = scene.places()
         if self._size not in (None, len(data)):  # other things are drawn than before
-            await self._tell_stage(*self._viewers.pages)
+            await self._tell_scene(*self._viewers.pages)
         self._size = len(data)
-        head = json.dumps({"time": stage.time, "phase": stage.phase})
+        head = json.dumps({"time": scene.time, "phase": scene.phase})
         for page in self._viewers.ready:
             await self._viewers.send(page, head)
             await self._viewers.send(page, data.astype("<f8").tobytes())
@@ -311,17 +311,17 @@ class LivePage:
 
         They are drawn in a thread: that takes long, and samples of a hand come meanwhile.
         """
-        stage = self.shown.stage if self.shown is not None else None
-        if stage is None:
+        scene = self.shown.scene if self.shown is not None else None
+        if scene is None:
             return
         seen: dict[tuple[str, ...], set[int]] = {}
         for viewer in map(self._viewers.of, pages):
             if viewer.ready:
                 seen.setdefault(tuple(viewer.chosen), set()).update(viewer.seen)
         for chosen, numbers in seen.items():
-            time_of_rows, plots = stage.history.time, stage.plots(chosen)
+            time_of_rows, plots = scene.history.time, scene.plots(chosen)
             figures = await asyncio.to_thread(_figures, plots, time_of_rows, frozenset(numbers))
-            if self.shown is None or self.shown.stage is not stage:
+            if self.shown is None or self.shown.scene is not scene:
                 return
             for page in pages:
                 viewer = self._viewers.of(page)

@@ -142,7 +142,8 @@ class PlayedRun:
         }
         summary = _summary_of(self.watched.folder)
         if not summary:
-            return {**facts, "state": "lost" if self.is_over else "under way", "reason": "", "metrics": []}
+            state, reason = ("lost", self.watched.why_lost) if self.is_over else ("under way", "")
+            return {**facts, "state": state, "reason": reason, "metrics": []}
         state = "succeeded" if summary.get("success") else "ended by a change" if self.superseded else "failed"
         metrics: Mapping[str, Any] = summary.get("metrics", {})
         shown = [(name, metrics[name]) for name in (headline or metrics) if name in metrics]

@@ -15,8 +15,8 @@ from pathlib import Path
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.system.time_series import ExternalSource
 from handover.scenarios.experiment.live_inputs import LedHand
-from handover.scenarios.live.input_board import InputBoard
-from handover.scenarios.live.picture_board import PictureWriter
+from handover.scenarios.live.shared_inputs import SharedInputs
+from handover.scenarios.live.shared_pictures import PictureWriter
 
 HOST = "127.0.0.1"
 CONTROL_FILE = "control"
@@ -39,8 +39,8 @@ class PageInputs:
     """
 
     folder: Path | None = None
-    pushes: InputBoard | None = None
-    hand: InputBoard | None = None
+    pushes: SharedInputs | None = None
+    hand: SharedInputs | None = None
 
     @property
     def pictures(self) -> PictureWriter | None:
@@ -58,19 +58,19 @@ class PageInputs:
         """
         return cls(
             folder,
-            InputBoard.create(folder / _PUSHES_FILE, pushes) if pushes else None,
-            InputBoard.create(folder / _HAND_FILE, hand.inputs, [hand.age]) if hand is not None else None,
+            SharedInputs.create(folder / _PUSHES_FILE, pushes) if pushes else None,
+            SharedInputs.create(folder / _HAND_FILE, hand.inputs, [hand.age]) if hand is not None else None,
         )
 
     @classmethod
     def open(cls, folder: Path) -> "PageInputs":
         """Return those that another process has made in a folder."""
-        boards = [InputBoard(folder / f) if (folder / f).is_file() else None for f in (_PUSHES_FILE, _HAND_FILE)]
-        return cls(folder, *boards)
+        shared = [SharedInputs(folder / f) if (folder / f).is_file() else None for f in (_PUSHES_FILE, _HAND_FILE)]
+        return cls(folder, *shared)
 
     def sources(self) -> dict[str, ExternalSource]:
         """Return who gives values to the inputs, by their names."""
-        return {name: source for board in self._boards for name, source in board.sources().items()}
+        return {name: source for inputs in self._shared for name, source in inputs.sources().items()}
 
     def let_go(self) -> None:
         """Push nothing any more."""
@@ -79,12 +79,12 @@ class PageInputs:
 
     def close(self) -> None:
         """Release the files."""
-        for board in self._boards:
-            board.close()
+        for inputs in self._shared:
+            inputs.close()
 
     @property
-    def _boards(self) -> list[InputBoard]:
-        return [board for board in (self.pushes, self.hand) if board is not None]
+    def _shared(self) -> list[SharedInputs]:
+        return [inputs for inputs in (self.pushes, self.hand) if inputs is not None]
 
 
 @contextlib.contextmanager

@@ -12,9 +12,9 @@ from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.live.commands import Push
 from handover.scenarios.live.hand_seat import HandSeat
-from handover.scenarios.live.picture_board import PictureReader, Pixels
+from handover.scenarios.live.live_scene import LiveScene
 from handover.scenarios.live.process import PICTURE_FILE, PageInputs
-from handover.scenarios.live.stage import Stage
+from handover.scenarios.live.shared_pictures import PictureReader, Pixels
 from handover.scenarios.live.watched_run import WatchedRun
 
 
@@ -26,7 +26,7 @@ class ShownRun:
         run: its folder.
         control: of its pace; it is paused until a page shows it.
         controls: folder of the controls, and of the inputs that a page sets, once the run has made them.
-        stage: its scene and plots, None until its first row.
+        scene: its scene and plots, None until its first row.
         inputs: these inputs, likewise.
         seat: of the device that leads a hand, likewise; None where none is led.
         webcam: hashes of the files by which a webcam leads it; empty where it is not offered.
@@ -35,7 +35,7 @@ class ShownRun:
     run: WatchedRun
     control: LiveControl
     controls: Path
-    stage: Stage | None = None
+    scene: LiveScene | None = None
     inputs: PageInputs = field(default_factory=PageInputs)
     seat: HandSeat | None = None
     webcam: Mapping[str, str] = field(default_factory=dict[str, str])
@@ -56,12 +56,12 @@ class ShownRun:
         shown = {name: _jpeg(seen.t, name, pixels) for name, pixels in seen.pictures.items() if name in self._not_black}
         return {"time": seen.t, "cameras": shown} if shown else None
 
-    def begin(self, stage: Stage) -> None:
-        """Take in the run's stage, and let pages set its inputs."""
-        self.stage, self.inputs = stage, PageInputs.open(self.controls)
+    def begin(self, scene: LiveScene) -> None:
+        """Take in the run's scene, and let pages set its inputs."""
+        self.scene, self.inputs = scene, PageInputs.open(self.controls)
         led = None if self.inputs.hand is None else self.run.led_hand()
         if self.inputs.hand is not None and led is not None:
-            self.seat = HandSeat(led, self.inputs.hand, lambda: stage.wanted_hand(led), self.webcam)
+            self.seat = HandSeat(led, self.inputs.hand, lambda: scene.wanted_hand(led), self.webcam)
 
     def end(self) -> None:
         """Leave in the run's folder what led its hand."""
@@ -71,10 +71,10 @@ class ShownRun:
     @property
     def pushes(self) -> Sequence[Pushable]:
         """What can be pushed in it."""
-        board = self.inputs.pushes
-        if board is None or self.stage is None:
+        inputs = self.inputs.pushes
+        if inputs is None or self.scene is None:
             return ()
-        return [push for push in self.stage.pushes if f"{push.unit}.{push.force}" in board.sizes]
+        return [push for push in self.scene.pushes if f"{push.unit}.{push.force}" in inputs.sizes]
 
     def push(self, asked: Push) -> None:
         """Push a body."""

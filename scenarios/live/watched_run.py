@@ -9,7 +9,7 @@ from handover.scenarios.catalog import scenario_of
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.experiment.parameters import InvalidParameter, parameters_of
-from handover.scenarios.live.stage import PastStage, Stage
+from handover.scenarios.live.live_scene import LiveScene, RecordedScene
 from handover.scenarios.results.run_facts import whole_record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 
@@ -24,18 +24,18 @@ class WatchedRun:
     def __init__(self, path: Path) -> None:
         self.folder = RunFolder.of_run(path)
 
-    def stage(self) -> Stage | None:
-        """Return the stage of the run; None if it has not written its first row, or its last one already."""
+    def scene(self) -> LiveScene | None:
+        """Return the scene of the run; None if it has not written its first row, or its last one already."""
         try:
             record = GrowingRecord(self.folder.signals)
-            return Stage(*self._scenario(), record)
+            return LiveScene(*self._scenario(), record)
         except (NoRows, InvalidRunFolder):
             return None
 
-    def past_stage(self) -> PastStage | None:
-        """Return the stage of the run that is over; None where it left no record that can be read."""
+    def recorded_scene(self) -> RecordedScene | None:
+        """Return the scene of the run that is over; None where it left no record that can be read."""
         record = whole_record_of(self.folder)
-        return None if record is None else PastStage(*self._scenario(), record)
+        return None if record is None else RecordedScene(*self._scenario(), record)
 
     def _scenario(self) -> tuple[Experiment[Any] | None, Any]:
         """Return the scenario and its parameters; None for a system without, or where it cannot be had."""
@@ -75,16 +75,24 @@ class WatchedRun:
 
     @property
     def verdict(self) -> dict[str, object]:
-        """Return whether it succeeded, why, and where its report is."""
+        """Return whether it has a verdict, whether it succeeded, why, and where its report is."""
         try:
             summary = self.folder.read_summary()
         except InvalidRunFolder as e:
-            return {"success": False, "reason": str(e), "report": ""}
+            return {"judged": False, "success": False, "reason": str(e), "report": ""}
         if not summary:
-            reason = f"its process ended without a verdict; `handover resume {self.folder.path}` goes on with it"
-            return {"success": False, "reason": reason, "report": ""}
+            return {"judged": False, "success": False, "reason": self.why_lost, "report": ""}
         return {
+            "judged": True,
             "success": bool(summary.get("success")),
             "reason": str(summary.get("reason", "")),
             "report": str(self.folder.report) if self.folder.report.is_file() else "",
         }
+
+    @property
+    def why_lost(self) -> str:
+        """What is left of a run whose process has ended, as by a signal, before it could write a summary."""
+        place = self.folder.shown
+        if self.folder.checkpoint.is_file():
+            return f"its process has ended; `handover resume {place}` goes on from its last checkpoint"
+        return f"its process has ended; what it recorded is in {place}, without a checkpoint to go on from"

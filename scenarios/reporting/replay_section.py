@@ -40,7 +40,7 @@ def phase_changes(record: Record, phases: str | Sequence[Phase]) -> list[tuple[f
     return [(p.begin, p.name) for p in phases]
 
 
-SCENE_SCRIPTS = ("three.min.js", "replay_shapes.js", "scene.js", "stage.js", "recorder.js")
+SCENE_SCRIPTS = ("three.min.js", "replay_shapes.js", "scene.js", "viewport.js", "recorder.js")
 """What a page needs to draw a scene."""
 _MARGIN = 0.04
 """Margin around what is drawn, as a share of its longest side."""
@@ -257,8 +257,8 @@ def views_html(replay: Replay) -> Markup:
     return Markup(f'<div class="replay-views" role="group" aria-label="view">{"".join(views)}</div>')
 
 
-STAGE_HTML = Markup(
-    '<div class="replay-stage"><div class="replay-scene" role="img" aria-label="the scene in space"></div>'
+VIEWPORT_HTML = Markup(
+    '<div class="replay-viewport"><div class="replay-scene" role="img" aria-label="the scene in space"></div>'
     '<button type="button" class="replay-wake"><span>Tap to turn and zoom</span></button></div>'
 )
 """Where a scene is drawn."""
@@ -273,7 +273,7 @@ def _html(data: Markup, drawn: Sequence[Drawn], frames: int, replay: Replay) -> 
         f"<style>{asset('replay.css')}</style>"
         f'<div class="replay">{data}'
         '<p class="replay-missing" hidden>The replay needs WebGL, which this browser does not offer.</p>'
-        f'<div class="replay-shown">{STAGE_HTML}'
+        f'<div class="replay-shown">{VIEWPORT_HTML}'
         '<div class="replay-controls"><button type="button" class="replay-play" aria-label="play">&#9654;&#xFE0E;'
         '</button><input type="range" class="replay-time" aria-label="time in the run" min="0" '
         f'max="{frames - 1}" step="1" value="0"><output class="replay-told"></output>'

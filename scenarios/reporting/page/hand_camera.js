@@ -6,24 +6,20 @@
 //     right        whether the right hand is to be seen
 //     onSample     is called with a sample for each picture with a hand; where none is seen, the sample before ages
 //     onTold       is called with how it is: "asks" for the camera, "loads" MediaPipe, "seeks" a hand, "sees" one, or
-//                  "fails", and then with why the webcam cannot lead
+//                  "fails", and then with the name of the fault, which the page has words for, and what is known besides:
+//                  refused, absent, busy, unfit, no_access, no_times, unplugged, unloaded, failed, unknown
 //   watched.restart(start)   leads another hand from now on
 //   watched.end()            lets go of the camera
 "use strict";
 const handCamera = ({video, axes, start, right, onSample, onTold}) => {
-  const REASONS = {
-    NotAllowedError: "the browser was not allowed to use the camera; allow it beside the page's address and choose it again",
-    NotFoundError: "no camera is connected",
-    NotReadableError: "the camera cannot be read; another program may be using it",
-    OverconstrainedError: "the camera gives no picture of 640 by 480 or so",
-  };
+  const FAULTS = {NotAllowedError: "refused", NotFoundError: "absent", NotReadableError: "busy", OverconstrainedError: "unfit"};
   let guide = handLandmarks.guide({start, right});
   let worker = null, stream = null, over = false, busy = false, sees = null;
 
-  function fail(why) {
+  function fail(fault, detail = "") {
     if (over) return;
     end();
-    onTold("fails", why);
+    onTold("fails", fault, detail);
   }
 
   // Tells once that a hand comes into the picture or leaves it.
@@ -34,7 +30,7 @@ const handCamera = ({video, axes, start, right, onSample, onTold}) => {
   }
 
   function take({data}) {
-    if (data.failed) fail(`MediaPipe failed: ${data.failed.split("\n")[0].slice(0, 300)}`);
+    if (data.failed) fail("failed", data.failed.split("\n")[0].slice(0, 300));
     else if (data.ready) {
       tellSeen(false);
       follow();
@@ -65,27 +61,27 @@ const handCamera = ({video, axes, start, right, onSample, onTold}) => {
   }
 
   async function begin() {
-    if (!navigator.mediaDevices?.getUserMedia) return fail("this browser gives pages at this address no camera");
-    if (!video.requestVideoFrameCallback) return fail("this browser does not tell when pictures were taken");
+    if (!navigator.mediaDevices?.getUserMedia) return fail("no_access");
+    if (!video.requestVideoFrameCallback) return fail("no_times");
     onTold("asks");
     try {
       const wish = {width: {ideal: 640}, height: {ideal: 480}, frameRate: {ideal: 60}, facingMode: "user"};
       stream = await navigator.mediaDevices.getUserMedia({audio: false, video: wish});
     } catch (error) {
-      return fail(REASONS[error.name] ?? `${error.name}: ${error.message}`);
+      return fail(FAULTS[error.name] ?? "unknown", `${error.name}: ${error.message}`);
     }
     if (over) return end();
-    stream.getVideoTracks()[0].addEventListener("ended", () => fail("the camera was taken away"));
+    stream.getVideoTracks()[0].addEventListener("ended", () => fail("unplugged"));
     video.srcObject = stream;
     video.hidden = false;
     onTold("loads");
     worker = new Worker("webcam/worker.js", {type: "module"});
     worker.addEventListener("message", take);
-    worker.addEventListener("error", event => fail(`its program could not be loaded${event.message ? `: ${event.message}` : ""}`));
+    worker.addEventListener("error", event => fail("unloaded", event.message ?? ""));
     try {
       await video.play();
     } catch (error) {
-      fail(error.message);
+      fail("unknown", error.message);
     }
   }
 

@@ -11,17 +11,19 @@ const live = (() => {
   const root = document.querySelector(".live"), host = document.getElementById("scene");
   const byId = id => document.getElementById(id);
   const told = root.querySelector(".replay-told"), plots = byId("plots");
+  const ASKING = "#pause, #step, #stop, #pace, #signal, #chosen button, .play :is(button, input, select), #runs button";
   const chosen = [], listeners = {};
   const api = {
     scene: null, run: null, session: false, send, on(name, act) { (listeners[name] ??= []).push(act); }, get hand() { return lead?.hand; },
   };
-  let stage = null, slots = [], size = 0, paused = true, link = null, over = false, lead = null;
+  let viewport = null, slots = [], size = 0, paused = true, link = null, over = false, lead = null, side = null;
 
   // Puts the scene of a run in the place of the one before, seen from where that was seen.
   function begin(run) {
-    const before = stage?.scene.viewpoint();
-    stage?.close();
-    stage = null;
+    const before = viewport?.scene.viewpoint();
+    side?.close();
+    viewport?.close();
+    viewport = null;
     lead?.close();
     over = false;
     slots = run.scene ? replayShapes.unpack(run.scene) : [];
@@ -30,18 +32,21 @@ const live = (() => {
     if (run.scene) {
       host.append(byId("scene-of-run").content.cloneNode(true));
       for (const part of ["views", "legend"]) host.querySelector(".replay-" + part).outerHTML = run[part];
-      stage = stageIn(root, {...run.scene, live: true});
-      if (stage) recorderIn(stage, () => told.value);
-      if (before) stage?.scene.lookAs(before);
+      viewport = viewportIn(root, {...run.scene, live: true});
+      if (viewport) recorderIn(viewport, () => told.value);
+      if (before) viewport?.scene.lookAs(before);
     }
-    lead = run.hand && stage ? leadHandIn(stage.element, stage.scene.camera) : null;
+    const isLed = run.hand && viewport;
+    lead = isLed ? leadHandIn(viewport.element, viewport.scene.camera) : null;
+    side = isLed ? sideViewIn(viewport.element.parentElement, viewport.scene, {...run.scene, live: true}, "hand") : null;
+    if (side) side.shown = byId("hand-side-view").checked;
     byId("hand").hidden = byId("hand-help").hidden = !lead;
-    Object.assign(api, {run, scene: stage?.scene ?? null});
+    Object.assign(api, {run, scene: viewport?.scene ?? null});
     if (run.title) document.title = document.querySelector("h1").textContent = run.title;
     byId("signals").replaceChildren(...run.signals.map(name => Object.assign(document.createElement("option"), {value: name})));
     byId("cameras").replaceChildren();
     byId("cameras").hidden = true;
-    byId("push-help").hidden = !(stage && run.pushes?.length);
+    byId("push-help").hidden = !(viewport && run.pushes?.length);
     byId("push-help").textContent = (run.pushes ?? []).map(({bodies, greatest}) =>
       `Press on ${bodies.join(" or ")} and drag to push, with up to ${greatest} N.`).join(" ");
     byId("verdict").hidden = byId("waiting").hidden = true;
@@ -64,6 +69,7 @@ const live = (() => {
       else of[key] = Float64Array.from(values);
     }
     api.scene?.show(Infinity);
+    side?.show();
   }
   function grown(points, more) {
     if (points.length + 3 > 3 * sceneIn.longestTrail) points = points.filter((_, i) => Math.floor(i / 3) % 2 === 0);
@@ -144,15 +150,16 @@ const live = (() => {
     send("see", [...shown].map(part => [...plots.children].indexOf(part)).filter(i => i >= 0));
   });
 
-  function end({success, reason, report}) {
+  function end({judged, success, reason, report}) {
     over = true;
     const verdict = byId("verdict");
     verdict.hidden = false;
     byId("waiting").hidden = true;
     verdict.className = `verdict ${success ? "good" : "bad"}`;
     verdict.innerHTML = "<b></b> ";
-    verdict.firstChild.textContent = success ? "Succeeded:" : "Failed:";
-    verdict.append(reason + ".");
+    verdict.firstChild.textContent = success ? "Succeeded:" : judged ? "Failed:" : "No verdict:";
+    `${reason}.`.split("`").forEach((text, i) =>  // between two of these is a command
+      verdict.append(i % 2 ? Object.assign(document.createElement("code"), {textContent: text}) : text));
     byId("told").textContent = report ? `Its report: ${report}` : "The run has ended.";
     for (const id of ["pause", "step", "stop"]) byId(id).disabled = true;
     root.dataset.ended = success;
@@ -174,6 +181,7 @@ const live = (() => {
     send("choose", chosen);
   }
 
+  byId("hand-side-view").addEventListener("change", ({target}) => { if (side) side.shown = target.checked; });
   byId("signal").addEventListener("change", ({target}) => choose(target.value));
   byId("pause").addEventListener("click", () => send(paused ? "go" : "pause"));
   byId("step").addEventListener("click", () => send("step"));
@@ -192,12 +200,15 @@ const live = (() => {
   // The server of a single run ends with it; that of a session goes on until somebody ends it.
   link.addEventListener("close", ({code, reason}) => {
     if (over && !api.session && code !== 1013) return;
-    const what = `The connection to the ${api.session ? "session" : "run"} is lost${reason ? ": " + reason : ""}.`;
+    const [of, why] = api.session ? ["session", "its command has ended, and what its runs recorded is in their folders"]
+      : ["run", "what serves this page has ended, and the run goes on without it"];
     const verdict = byId("verdict");
     verdict.hidden = false;
     verdict.className = "verdict bad";
-    verdict.textContent = byId("told").textContent = what;
-    for (const id of ["pause", "step", "stop"]) byId(id).disabled = true;
+    verdict.textContent = `The connection to the ${of} is lost: ${reason || why}.`;
+    byId("waiting").hidden = true;
+    byId("told").textContent = "";
+    for (const entry of document.querySelectorAll(ASKING)) entry.disabled = true;  // nobody is there who would do it
   });
   return api;
 })();

@@ -20,7 +20,19 @@ const leadHandIn = (element, camera) => {
     loads: () => "MediaPipe's files are loaded.",
     seeks: () => "Show your hand to the camera: until it sees one, the hand stops.",
     sees: () => "The camera sees the hand.",
-    fails: why => `The webcam cannot lead the hand: ${why}. Another device may be chosen.`,
+    fails: (fault, detail) => `The webcam cannot lead the hand: ${FAULTS[fault](detail)}. Another device may be chosen.`,
+  };
+  const FAULTS = {
+    refused: () => "the browser was not allowed to use the camera; allow it beside the page's address and choose it again",
+    absent: () => "no camera is connected",
+    busy: () => "the camera cannot be read; another program may be using it",
+    unfit: () => "the camera gives no picture of 640 by 480 or so",
+    no_access: () => "this browser gives pages at this address no camera",
+    no_times: () => "this browser does not tell when pictures were taken",
+    unplugged: () => "the camera was taken away",
+    unloaded: detail => `its program could not be loaded${detail ? `: ${detail}` : ""}`,
+    failed: detail => `MediaPipe failed: ${detail}`,
+    unknown: detail => detail,
   };
   const lead = {hand: null, close}, closed = new AbortController();
   let link = null, told = 0, watched = null, cameraTold = "";
@@ -73,7 +85,7 @@ const leadHandIn = (element, camera) => {
       send(sample);
     };
     const start = {...lead.hand.start, ...lead.hand.pose()}, right = part("side").value === "right";
-    watched = handCamera({video: part("video"), axes: lead.hand.axes, start, right, onSample, onTold: (how, why) => tellOfCamera(CAMERA[how](why))});
+    watched = handCamera({video: part("video"), axes: lead.hand.axes, start, right, onSample, onTold: (how, ...why) => tellOfCamera(CAMERA[how](...why))});
   }
   function leaveCamera() {
     watched?.end();

@@ -167,7 +167,10 @@
   byId("again").addEventListener("click", again);
   byId("defaults").addEventListener("click", () => {
     for (const it of fields.values()) it.set(it.field.default);
-    if (seed) seed.value = 0;
+    if (seed) {
+      seed.value = 0;
+      seed.dispatchEvent(new Event("input"));  // what was wrong with it is so no more
+    }
     again();
   });
   byId("search").addEventListener("input", ({target}) => {

@@ -1,15 +1,15 @@
 // Records what a scene shows, with its background, its scale and a line of text, and offers the film to be saved. The
 // film lasts as long as it takes to record it.
-//   const recorder = recorderIn(stage, text, {begin, end})   null, and no button, where the browser records nothing
+//   const recorder = recorderIn(viewport, text, {begin, end})   null, and no button, where the browser records nothing
 //     text()   what stands in the film's corner
 //     begin()  is called when a film begins, end() when the button ends it; a film without end() goes on until then
 //   recorder.stop()   ends a film, if there is one, and saves it
 "use strict";
-const recorderIn = (stage, text, {begin = () => {}, end = null} = {}) => {
+const recorderIn = (viewport, text, {begin = () => {}, end = null} = {}) => {
   const FORMATS = ["video/mp4;codecs=avc1.640028", "video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm", "video/mp4"];
   const BITS = 8e6;     // a second
   const REST = 300;     // ms that the last picture stays
-  const button = stage.button, {scene, element} = stage;
+  const button = viewport.button, {scene, element} = viewport;
   const format = globalThis.MediaRecorder && HTMLCanvasElement.prototype.captureStream
     && FORMATS.find(f => MediaRecorder.isTypeSupported(f));
   if (!button || !format) return null;

@@ -1,4 +1,4 @@
-// Plays a run in space: time, phase, speed. The scene with its views and legend is stage.js's; traces come from replay_section.py.
+// Plays a run in space: time, phase, speed. The scene with its views and legend is viewport.js's; traces come from replay_section.py.
 // The page's plots over time share its cursor (page.onTime).
 "use strict";
 const replays = [];  // {element, scene} of each, for who looks from outside
@@ -54,11 +54,11 @@ for (const replay of document.querySelectorAll(".replay")) {
     playing = requestAnimationFrame(step);
   }
 
-  const stage = stageIn(replay, run);
-  if (!stage) continue;
-  scene = stage.scene;
-  stage.onFollow = show;
-  recorder = recorderIn(stage, () => told.value, {
+  const viewport = viewportIn(replay, run);
+  if (!viewport) continue;
+  scene = viewport.scene;
+  viewport.onFollow = show;
+  recorder = recorderIn(viewport, () => told.value, {
     begin() {
       cancelAnimationFrame(playing);
       u = 0;
@@ -67,7 +67,7 @@ for (const replay of document.querySelectorAll(".replay")) {
     },
     end: stop,
   });
-  replays.push(stage);
+  replays.push(viewport);
   play.addEventListener("click", () => playing ? stop() : start());
   slider.addEventListener("input", () => { stop(); u = Number(slider.value); show(); });
   page.onTime((t, from) => {

@@ -8,6 +8,7 @@
 //   scene.show(u)                 everything u frames after the first; u may lie between two
 //   scene.turn(view)              looks from one of scene.views: "start", "front", "side", "top";
 //                                 side is from that end of x which the eye is nearer to at the start
+//   scene.lookFrom([x, y, z])     looks from that side, along a vector of W that points to the eye
 //   scene.follows = true          the view moves with the body of that label from now on
 //   scene.setVisible(label, yes)
 //   scene.recolour()              takes the page's colours anew
@@ -422,6 +423,7 @@ const sceneIn = (() => {
         }
         request();
       },
+      lookFrom,
       turn: view => lookFrom(VIEWS[view]?.(eye) ?? eye),
       get follows() { return follows; },
       set follows(yes) { follows = Boolean(yes && follow); },

@@ -6,7 +6,7 @@
   const byId = id => document.getElementById(id);
   const main = byId("screen");
   let shown = null, play = null, input = null, test = null, named = 0, over = false, ready = false, drawn = [], hasTracker = false, held = [];
-  let watched = null, camera = {how: "", why: ""};  // by the webcam, and how it is with it, see hand_camera.js
+  let watched = null, camera = {how: "", fault: "", detail: ""};  // by the webcam, and how it is with it, see hand_camera.js
   const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
   const TURNS = {"+roll": "roll_right", "-roll": "roll_left", "+pitch": "fingers_down", "-pitch": "fingers_up",
     "+yaw": "fingers_left", "-yaw": "fingers_right"};
@@ -119,7 +119,7 @@
   }
   function watch() {
     leaveCamera();
-    if (!byId("video")) return tellOfCamera("fails", word("camera_not_offered"));
+    if (!byId("video")) return tellOfCamera("fails", "not_offered");
     byId("video").setAttribute("aria-label", word("camera_mirror"));
     const axes = () => input?.axes() ?? null;
     watched = handCamera({video: byId("video"), axes, start: NOWHERE, right: true, onSample: lead, onTold: tellOfCamera});
@@ -128,14 +128,15 @@
     watched?.end();
     watched = null;
   }
-  function tellOfCamera(how, why = "") {
-    camera = {how, why};
+  function tellOfCamera(how, fault = "", detail = "") {
+    camera = {how, fault, detail};
     nameCamera();
     if (how === "sees") letGo();
   }
   function nameCamera() {
     if (device() !== "webcam") return;
-    const told = word(`camera_${camera.how}`, camera), isReady = ["seeks", "sees"].includes(camera.how);
+    const why = camera.fault && word(`camera_${camera.fault}`, camera);
+    const told = word(`camera_${camera.how}`, {why}), isReady = ["seeks", "sees"].includes(camera.how);
     byId("help").textContent = camera.how === "sees" ? word("help_webcam") : told;
     const line = byId("camera");
     if (!line) return;
@@ -269,7 +270,7 @@
     input = play = null;
     byId("play").hidden = true;
   }
-  const wantsSide = () => (sessionStorage.getItem("views") ?? (innerWidth >= 900 ? "2" : "1")) === "2";
+  const wantsSide = () => (sessionStorage.getItem("views") ?? "2") === "2";
   function turnViews() {
     sessionStorage.setItem("views", wantsSide() ? "1" : "2");
     if (play) play.sideShown = wantsSide();

@@ -13,7 +13,7 @@ from handover.cosim.master.live_control import LiveControl
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import run_task
-from handover.scenarios.live.input_board import InputBoard
+from handover.scenarios.live.shared_inputs import SharedInputs
 from handover.scenarios.results.task import InputSources
 
 _GRACE = 5.0
@@ -31,7 +31,7 @@ def _end_with_parent() -> None:
 if __name__ == "__main__":
     threading.Thread(target=_end_with_parent, daemon=True).start()
     spec = json.loads(sys.argv[1])
-    board, control = InputBoard(Path(spec["board"])), LiveControl(Path(spec["control"]))
+    inputs, control = SharedInputs(Path(spec["inputs"])), LiveControl(Path(spec["control"]))
     with Interruption() as interruption, contextlib.ExitStack() as opened:
         task = RunRequest(
             subject=spec["scenario"],
@@ -39,6 +39,6 @@ if __name__ == "__main__":
             seed=spec["seed"],
             out=Path(spec["out"]),
             presented=False,
-            sources=InputSources(board.sources(), spec["told"], where="the study's page", is_complete=True),
+            sources=InputSources(inputs.sources(), spec["told"], where="the study's page", is_complete=True),
         ).task(opened)
         run_task(task, lambda _t, _end: None, interruption, control=control)

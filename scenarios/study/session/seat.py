@@ -261,10 +261,10 @@ class StudySeat:
 
     async def _run(self, trial: Trial) -> str | None:
         """Show a run to its end; return why it is void, None if it is not."""
-        stage = trial.stage
-        assert stage is not None
+        scene = trial.scene
+        assert scene is not None
         self._page_ready.clear()
-        await self._send({"scene": trial.scene(), "hand": trial.hand})
+        await self._send({"scene": trial.scene_content(), "hand": trial.hand})
         if self.on_run is not None:
             await self.on_run(trial.hand)
         await self._send_frame(trial, always=True)

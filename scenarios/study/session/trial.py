@@ -22,8 +22,8 @@ from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.replay import Line
 from handover.scenarios.live.hand_messages import HandStream, hand_sample
-from handover.scenarios.live.input_board import InputBoard
-from handover.scenarios.live.stage import Stage
+from handover.scenarios.live.live_scene import LiveScene
+from handover.scenarios.live.shared_inputs import SharedInputs
 from handover.scenarios.live.watched_run import WatchedRun
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
@@ -77,7 +77,7 @@ class Frame:
     Attributes:
         time: simulated time, s.
         stamp: page's stamp, s, of the newest sample of the hand whose effect is in it; NaN before the first.
-        places: where all that is drawn is, see `Stage.places`.
+        places: where all that is drawn is, see `LiveScene.places`.
     """
 
     def __init__(self, time: float, stamp: float, places: Floats) -> None:
@@ -100,22 +100,22 @@ class Trial:
 
     Attributes:
         latency: times that the page has measured.
-        stage: what is seen of the run; None until `begin` has returned.
+        scene: what is seen of the run; None until `begin` has returned.
         first_place: of the object, in W, m; None before the run stands at its start.
     """
 
     def __init__(self, wanted: Wanted) -> None:
         self.wanted = wanted
         self.latency = LatencyLog()
-        self.stage: Stage | None = None
+        self.scene: LiveScene | None = None
         self.first_place: Floats | None = None
         self.led = led_hand_of(wanted.scenario, wanted.parameters)
         with contextlib.ExitStack() as opened:  # what fails here leaves nothing behind
             place = Path(opened.enter_context(tempfile.TemporaryDirectory(prefix="handover-study-")))
             self._control = LiveControl.create(place / "control", wanted.pace, paused=True)
             opened.callback(self._control.close)
-            self._board = InputBoard.create(place / "board", self.led.inputs, [self.led.age])
-            opened.callback(self._board.close)
+            self._inputs = SharedInputs.create(place / "inputs", self.led.inputs, [self.led.age])
+            opened.callback(self._inputs.close)
             self._told = opened.enter_context(open(place / "told", "w+b"))
             self._stream = HandStream(self.led)
             self._stamps: deque[tuple[int, float]] = deque(maxlen=_MOST_STAMPS)
@@ -132,7 +132,7 @@ class Trial:
             "seed": wanted.seed,
             "out": str(wanted.out),
             "control": str(place / "control"),
-            "board": str(place / "board"),
+            "inputs": str(place / "inputs"),
             "told": {"from": "page", **wanted.told},
         }
         command = [sys.executable, "-m", "handover.scenarios.study.session", json.dumps(spec)]
@@ -147,13 +147,13 @@ class Trial:
             TrialFailed: it did not get there.
         """
         late = time.monotonic() + _PATIENCE
-        while self.stage is None:
+        while self.scene is None:
             if not self.is_running or time.monotonic() > late:
                 raise TrialFailed(self._why())
-            self.stage = self._run.stage()
+            self.scene = self._run.scene()
             time.sleep(_POLL)
-        if f"{self.led.unit}.p_WO" in self.stage.newest:
-            self.first_place = self.stage.newest[f"{self.led.unit}.p_WO"][0].copy()
+        if f"{self.led.unit}.p_WO" in self.scene.newest:
+            self.first_place = self.scene.newest[f"{self.led.unit}.p_WO"][0].copy()
 
     @property
     def is_running(self) -> bool:
@@ -163,9 +163,9 @@ class Trial:
     @property
     def newest(self) -> Record | None:
         """The newest row of the run."""
-        return None if self.stage is None else self.stage.newest
+        return None if self.scene is None else self.scene.newest
 
-    def scene(self) -> dict[str, Any]:
+    def scene_content(self) -> dict[str, Any]:
         """Return the scene as the person sees it and `sceneIn` takes it.
 
         Its last traces are moved by the page, and hidden at first: a ball at `TARGET`, then two `PLUMB` lines, of the
@@ -174,22 +174,22 @@ class Trial:
         Raises:
             TrialFailed: the scenario has no scene, or fails as it is drawn; the message says where.
         """
-        assert self.stage is not None
+        assert self.scene is not None
         hidden = np.full((1, 2, 3), np.nan)
         ball = Line(label=TARGET, colour=_GHOST, points=hidden, radii=np.full(2, _RADIUS), opacity=0.5)
         plumbs = [Line(label=PLUMB, colour=colour, points=hidden, width=_WIDTH) for colour in (_HAND, _OBJECT)]
-        scene = self.stage.scene_of_person([ball, *plumbs])
-        if scene is None:
+        content = self.scene.content_for_person([ball, *plumbs])
+        if content is None:
             raise TrialFailed(f"nothing can be seen of {self.wanted.scenario}: {self._no_scene()}")
-        return scene
+        return content
 
     def _no_scene(self) -> str:
-        """Return why the stage has no scene."""
-        assert self.stage is not None
+        """Return why nothing of the run can be drawn."""
+        assert self.scene is not None
         kind = find_scenario(self.wanted.scenario)
         faults = ToleratedFaults()
         with faults.tolerated("the scene"):
-            kind().replay(parse_parameters(kind, self.wanted.parameters), self.stage.newest)
+            kind().replay(parse_parameters(kind, self.wanted.parameters), self.scene.newest)
         return "; ".join(faults.lines) or "the scenario has no scene"
 
     def go(self) -> None:
@@ -207,7 +207,7 @@ class Trial:
             InvalidHandMessage: it is none, is wanted beyond reach, or is older than the one before.
         """
         sample, at = self._stream.check(hand_sample(content), arrival)
-        number = self._board.set(sample.entries(self.led), at)
+        number = self._inputs.set(sample.entries(self.led), at)
         self._stamps.append((number, sample.stamp))
 
     def lead_by_tracker(self, text: str, page_offset: float) -> None:
@@ -217,28 +217,28 @@ class Trial:
             InvalidHandMessage: it is none, is wanted beyond reach, older than the one before, or one too many.
         """
         sample, at = self._stream.take(text)
-        number = self._board.set(sample.entries(self.led), at)
+        number = self._inputs.set(sample.entries(self.led), at)
         self._stamps.append((number, at - page_offset))
 
     @property
     def hand(self) -> dict[str, Any]:
         """Where the hand is wanted as it stands, and how far it goes, as `handInput` takes it."""
-        assert self.stage is not None
-        wanted = self.stage.wanted_hand(self.led)
+        assert self.scene is not None
+        wanted = self.scene.wanted_hand(self.led)
         pose = {"p_WH": list(wanted.p_WH), "q_WH": list(wanted.q_WH), "angles": list(wanted.angles)}
         reach = {"centre": list(self.led.p_WH_0), "radius": self.led.reach}
         return {**pose, "closed": wanted.closed, **reach}
 
     def frame(self, *, always: bool = False) -> Frame | None:
         """Return what is there to be seen, None if nothing is new; `always`: also then."""
-        stage = self.stage
-        if stage is None or not (stage.refresh() or always):
+        scene = self.scene
+        if scene is None or not (scene.refresh() or always):
             return None
-        return Frame(stage.time, self._stamp_seen(stage.time), stage.places())
+        return Frame(scene.time, self._stamp_seen(scene.time), scene.places())
 
     def _stamp_seen(self, t: float) -> float:
         """Return the page's stamp of the sample that was used at the last communication point before t, s."""
-        uses = self._board.uses()
+        uses = self._inputs.uses()
         k = int(np.searchsorted(uses["t"], t - 1e-9)) - 1
         if k < 0:
             return math.nan
@@ -273,7 +273,7 @@ class Trial:
             latency_median_ms=self.latency.median,
             latency_p95_ms=self.latency.p95,
             latency_max_ms=self.latency.longest,
-            age_at_use_ms=median_ms(self._board.ages().tolist()),
+            age_at_use_ms=median_ms(self._inputs.ages().tolist()),
             missed_deadlines=pace.get("missed"),
         )
 

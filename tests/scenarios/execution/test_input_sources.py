@@ -1,4 +1,4 @@
-"""Runs whose inputs come from outside: from a board, from the record of a run, or from where they cannot."""
+"""Runs whose inputs come from outside: from another process, from the record of a run, or from where they cannot."""
 
 import json
 import shutil
@@ -28,7 +28,7 @@ from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.free_flyer.handover.handovers import RobotToHuman
 from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
-from handover.scenarios.live.input_board import InputBoard
+from handover.scenarios.live.shared_inputs import SharedInputs
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.task import InputSources
 
@@ -41,20 +41,20 @@ GOALS = {
 
 
 class Scripted:
-    """Has a hand do what another one wanted at the time, by a board, before the board is asked."""
+    """Has a hand do what another one wanted at the time, by shared inputs, before they are read."""
 
-    def __init__(self, board: InputBoard, wanted: Record) -> None:
-        self._board = board
+    def __init__(self, inputs: SharedInputs, wanted: Record) -> None:
+        self._inputs = inputs
         self._series = {name: wanted.series(goal) for name, goal in GOALS.items()}
         self._written = -1.0
 
     def sources(self) -> dict[str, ExternalSource]:
-        return {name: _After(self, source) for name, source in self._board.sources().items()}
+        return {name: _After(self, source) for name, source in self._inputs.sources().items()}
 
     def write(self, t: float) -> None:
         if t != self._written:
             self._written = t
-            self._board.set({name: series.at(t) for name, series in self._series.items()}, time.monotonic())
+            self._inputs.set({name: series.at(t) for name, series in self._series.items()}, time.monotonic())
 
 
 class _After:
@@ -72,14 +72,14 @@ def tell_nobody(*_: float) -> None:
 
 def led_by_script(wanted: Path, out: Path, *given: str) -> bool:
     sizes = {"person.p_WH_track": 3, "person.q_WH_track": 4, "person.finger_track": 14, "person.closed_track": 1}
-    board = InputBoard.create(out.with_suffix(".board"), sizes, ["person.age"])
-    script = Scripted(board, Record(wanted / "signals.parquet"))
+    inputs = SharedInputs.create(out.with_suffix(".inputs"), sizes, ["person.age"])
+    script = Scripted(inputs, Record(wanted / "signals.parquet"))
     inputs = InputSources(script.sources(), {"from": "program", "what": "a script"})
     task = replace(task_of(RobotToHuman, out, "hand=outside", *given), inputs=inputs)
     return run_task(task, tell_nobody, Interruption()).outcome.success
 
 
-def test_a_run_led_by_a_board_is_played_back_byte_for_byte(tmp_path: Path):
+def test_a_run_led_by_shared_inputs_is_played_back_byte_for_byte(tmp_path: Path):
     run(RobotToHuman, tmp_path / "person", "skill=1")
     assert led_by_script(tmp_path / "person", tmp_path / "led")
     led = Record(tmp_path / "led" / "signals.parquet")

@@ -20,9 +20,9 @@ from handover.scenarios.live.commands import InvalidCommand, parse_command
 from handover.scenarios.live.connections import HEADERS, FloodGuard
 from handover.scenarios.live.hand_messages import HandSample
 from handover.scenarios.live.hand_seat import HandSeat
-from handover.scenarios.live.input_board import InputBoard
 from handover.scenarios.live.live_page import LivePage
 from handover.scenarios.live.server import serve
+from handover.scenarios.live.shared_inputs import SharedInputs
 
 LED = LedHand("person", (-0.4, 0.1, -0.05), 0.9)
 AT_REST = HandSample(LED.p_WH_0, (1.0, 0.0, 0.0, 0.0), STRAIGHT, closed=False, stamp=0.0)
@@ -35,8 +35,8 @@ class PageWithHand(LivePage):
 
     def __init__(self, folder: Path) -> None:
         super().__init__()
-        self.board = InputBoard.create(folder / "hand", LED.inputs, [LED.age])
-        self.seat = HandSeat(LED, self.board, lambda: AT_REST)
+        self.inputs = SharedInputs.create(folder / "hand", LED.inputs, [LED.age])
+        self.seat = HandSeat(LED, self.inputs, lambda: AT_REST)
 
     async def hand(self, device: WebSocket) -> None:
         await self.seat.connection(device)
@@ -103,7 +103,7 @@ def test_a_binary_message_and_deep_json_are_refused_and_the_connection_goes_on(t
             assert "binary" in (await answer(tracker))["refused"]
             sample = {"p_WH": LED.p_WH_0, "q_WH": [1, 0, 0, 0], "closed": False, "stamp": 1.0}
             await tracker.send(json.dumps(sample))
-            while page.board.read() is None:
+            while page.inputs.read() is None:
                 await asyncio.sleep(0.01)
 
     with_page(tmp_path, act)

@@ -152,3 +152,29 @@ def test_keys_turn_the_hand_as_they_lie_on_the_keyboard(browser: Browser, tmp_pa
                     assert sign * turned_about(page, q, axis) > 0.02, key
             end_run(page)
         run.wait(timeout=120)
+
+
+def test_a_view_from_the_side_shows_depth_beside_the_first_view_and_on_a_phone_below_it(
+    browser: Browser, tmp_path: Path
+):
+    with live_run(tmp_path / "led", *GIVEN, scenario=SCENARIO) as (address, run):
+        with shown(browser, address) as page:
+            wait_until(page, "live.hand")
+            side, first = page.locator(".replay-inset"), page.locator(".replay-scene")
+            wait_until(page, "document.querySelector('.replay-inset').dataset.pictures > 2")
+            around, of_side = first.bounding_box(), side.bounding_box()
+            assert around is not None
+            assert of_side is not None
+            assert of_side["y"] + of_side["height"] <= around["y"] + around["height"]
+            page.set_viewport_size({"width": 390, "height": 844})
+            around, of_side = first.bounding_box(), side.bounding_box()
+            assert around is not None
+            assert of_side is not None
+            assert of_side["y"] >= around["y"] + around["height"]
+            assert of_side["y"] + of_side["height"] <= 844.0
+            page.get_by_label("view from the side").uncheck()
+            assert side.count() == 0
+            page.get_by_label("view from the side").check()
+            wait_until(page, "document.querySelector('.replay-inset').dataset.pictures > 2")
+            end_run(page)
+        run.wait(timeout=120)

@@ -19,10 +19,10 @@ from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live.hand_messages import HandSample
 from handover.scenarios.live.hand_seat import HandSeat
-from handover.scenarios.live.input_board import InputBoard
 from handover.scenarios.live.live_page import LivePage
+from handover.scenarios.live.live_scene import RecordedScene
+from handover.scenarios.live.shared_inputs import SharedInputs
 from handover.scenarios.live.shown_run import ShownRun
-from handover.scenarios.live.stage import PastStage
 from handover.scenarios.live.watched_run import WatchedRun
 
 LED = LedHand("person", (-0.4, 0.1, -0.05), 0.9)
@@ -33,9 +33,9 @@ class LedSeat(HandSeat):
     """A seat whose device has sent a sample."""
 
     def __init__(self, folder: Path) -> None:
-        board = InputBoard.create(folder / "hand", LED.inputs, [LED.age])
-        board.set(AT_REST.entries(LED), time.monotonic())
-        super().__init__(LED, board, lambda: AT_REST)
+        inputs = SharedInputs.create(folder / "hand", LED.inputs, [LED.age])
+        inputs.set(AT_REST.entries(LED), time.monotonic())
+        super().__init__(LED, inputs, lambda: AT_REST)
         self._samples["test"] += 1
 
 
@@ -55,8 +55,8 @@ def shown_run(folder: Path) -> ShownRun:
     system.add("mass", native_fmu("mass", 3))
     with Master(system) as master, Recorder(folder / "signals.parquet") as recorder:
         master.run(Fraction(1, 10), [recorder])
-    stage = PastStage(None, None, Record(folder / "signals.parquet"))
-    return ShownRun(WatchedRun(folder / "run"), LiveControl.in_memory(1.0), folder, stage, seat=LedSeat(folder))
+    scene = RecordedScene(None, None, Record(folder / "signals.parquet"))
+    return ShownRun(WatchedRun(folder / "run"), LiveControl.in_memory(1.0), folder, scene, seat=LedSeat(folder))
 
 
 async def cancelled(page: LivePage, shown: ShownRun) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import psutil
 import pyarrow.parquet as pq
 import pytest
 from live_runs import HANDOVER, LIVE, TOLD, live_run, shown
@@ -145,14 +146,36 @@ def test_ctrl_c_ends_the_run_and_the_page_is_told_how(browser: Browser, tmp_path
 
 
 @pytest.mark.slow
-def test_the_page_of_a_killed_run_says_how_to_go_on(browser: Browser, tmp_path: Path):
-    with live_run(tmp_path / "live", "--pace", "0.5") as (address, run), shown(browser, address) as page:
+@pytest.mark.parametrize(
+    ("given", "left"),
+    [
+        ((), "what it recorded is in {}, without a checkpoint to go on from."),
+        (("--checkpoint", "0.1"), "handover resume {} goes on from its last checkpoint."),
+    ],
+)
+def test_the_page_of_a_killed_run_says_what_is_left_of_it(
+    browser: Browser, tmp_path: Path, given: tuple[str, ...], left: str
+):
+    out = tmp_path / "live"
+    with live_run(out, "--pace", "0.5", *given) as (address, run), shown(browser, address) as page:
         wait_until(page, f"{LIVE}.dataset.frames > 3")
+        if given:
+            wait_until(page, f"parseFloat({TOLD}) > 0.3")
         run.kill()
         wait_until(page, f"{LIVE}.dataset.ended")
-        assert page.locator(".verdict").inner_text() == (
-            f"Failed: its process ended without a verdict; `handover resume {tmp_path / 'live'}` goes on with it."
-        )
+        told = page.locator(".verdict").inner_text()
+        assert told == f"No verdict: its process has ended; {left.format(out)}"
+
+
+@pytest.mark.slow
+def test_a_page_whose_server_ends_says_that_the_run_goes_on_and_offers_nothing(browser: Browser, tmp_path: Path):
+    with live_run(tmp_path / "live", "--pace", "1") as (address, run), shown(browser, address) as page:
+        wait_until(page, f"{LIVE}.dataset.frames > 3")
+        begun = psutil.Process(run.pid).children(recursive=True)
+        (server,) = [process for process in begun if "handover.scenarios.live" in process.cmdline()]
+        server.kill()
+        page.get_by_text("is lost: what serves this page has ended, and the run goes on without it.").wait_for()
+        assert page.locator("#pace").is_disabled()
 
 
 def test_a_run_goes_on_without_its_page_if_the_pages_server_ends(tmp_path: Path):

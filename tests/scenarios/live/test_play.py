@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pyarrow.parquet as pq
 import pytest
 from opened_page import wait_until
@@ -267,6 +268,19 @@ def test_a_run_ends_where_its_session_is_killed(tmp_path: Path):
             assert time.monotonic() < late
             time.sleep(0.1)
         assert json.loads(summary.read_text(encoding="utf-8"))["reason"].startswith("interrupted")
+
+
+@pytest.mark.slow
+def test_a_run_that_is_killed_is_told_as_lost_and_a_lost_session_offers_nothing(browser: Browser, tmp_path: Path):
+    out = tmp_path / "runs"
+    with played("flyer_impedance", out, "--pace", "0.2") as (address, session), shown(browser, address) as page:
+        wait_until(page, f"{LIVE}.dataset.frames > 3")
+        min(psutil.Process(session.pid).children(), key=psutil.Process.create_time).kill()  # later ones wait
+        page.locator("#runs").get_by_text(f"lost: its process has ended; what it recorded is in {out}").wait_for()
+        assert page.locator(".verdict").inner_text().startswith("No verdict: its process has ended; ")
+        session.kill()
+        page.get_by_text("The connection to the session is lost: its command has ended").wait_for()
+        assert page.get_by_role("button", name="run again").is_disabled()
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from opened_page import wait_until
 from playwright.sync_api import Page
 
 from handover.scenarios.study.plan.plan import default_plan
+from handover.scenarios.study.session.server import page_words
 
 HANDOVER = (sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()")
 
@@ -52,17 +53,18 @@ def at(page: Page, screen: str) -> None:
     wait_until(page, f"document.querySelector('.study').dataset.screen === '{screen}'")
 
 
-def to_round(page: Page, first: str = "instruction", device: str = "Mouse and keyboard") -> None:
+def to_round(page: Page, first: str = "instruction", device: str = "Mouse and keyboard", language: str = "en") -> None:
     """Go through the page from its opening to the screen after the choice of a device."""
+    words = page_words()[language]
     at(page, "language")
-    page.get_by_role("button", name="English").click()
+    page.locator(f".study-choice[lang={language}]").click()
     at(page, "consent")
-    page.get_by_role("button", name="I agree").click()
+    page.get_by_role("button", name=words["agree"], exact=True).click()
     at(page, "eligibility")
-    assert page.get_by_role("button", name="All of this applies to me").is_disabled()
+    assert page.get_by_role("button", name=words["eligibility_all"]).is_disabled()
     for box in page.get_by_role("checkbox").all():
         box.check()
-    page.get_by_role("button", name="All of this applies to me").click()
+    page.get_by_role("button", name=words["eligibility_all"]).click()
     at(page, "device")
     page.get_by_role("button", name=device).click()
     at(page, first)

@@ -7,6 +7,7 @@ import pytest
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.study.plan.led_hands import hand_faults
 from handover.scenarios.study.plan.plan import InvalidPlan, default_plan, parse_plan, read_plan
 
 
@@ -126,3 +127,10 @@ def test_a_file_that_is_no_plan_is_told(tmp_path: Path):
     (tmp_path / "plan.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(InvalidPlan, match="it is not text in UTF-8"):
         read_plan(tmp_path / "plan.toml")
+
+
+def test_a_plan_in_whose_rounds_nobody_can_lead_a_hand_is_told():
+    plan = parse_plan(default_plan().replace('"flyer_robot_to_human"', '"flyer_two_robots"'))
+    (rigid, compliant) = hand_faults(plan)
+    assert rigid.startswith("tasks.robot_to_human, rigid: in flyer_two_robots nobody outside can lead a hand")
+    assert compliant.startswith("tasks.robot_to_human, compliant: ")

@@ -125,6 +125,25 @@ def test_the_practice_tells_how_far_the_hand_is_from_the_ball(browser: Browser, 
 
 
 @pytest.mark.slow
+def test_a_phone_shows_the_view_from_the_side_below_that_of_the_eye_from_the_first(browser: Browser, tmp_path: Path):
+    plan = pilot_plan(tmp_path / "plan.toml", devices='["touch"]', patience=15, practice=60, repetitions=1)
+    phone = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
+    with served(plan, tmp_path / "out") as (address, _), phone, phone.new_page() as page:
+        page.goto(address)
+        to_round(page, "practice", "Touch screen")
+        page.get_by_role("button", name="Begin").click()
+        wait_until(page, "study.play?.time > 0.5")
+        eye, side = page.locator("#eye").bounding_box(), page.locator("#side canvas").bounding_box()
+        assert eye is not None
+        assert side is not None
+        assert side["y"] >= eye["y"] + eye["height"]
+        assert side["y"] + side["height"] <= 844.0
+        assert overflow(page) == 0
+        page.get_by_role("button", name="one view").click()
+        assert page.locator("#side canvas").count() == 0
+
+
+@pytest.mark.slow
 def test_a_scripted_pilot_plays_twelve_rounds_that_survive_a_kill_and_are_played_back(tmp_path: Path):
     plan = pilot_plan(tmp_path / "plan.toml", devices='["script"]', patience=60, practice=5, repetitions=2)
     out = tmp_path / "study"

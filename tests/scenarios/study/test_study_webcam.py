@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import urlopen
@@ -16,8 +17,10 @@ from webcam_files import camera_of, write_files, write_video
 from handover.cosim.record.reader import Record
 from handover.scenarios.cli.command import main
 from handover.scenarios.live.webcam import FILES, MODEL, WebcamFiles
+from handover.scenarios.reporting.page import asset
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.plan import default_plan
+from handover.scenarios.study.session.server import page_words
 
 TOLD = "document.getElementById('camera').textContent"
 
@@ -105,6 +108,42 @@ def test_without_a_camera_no_round_begins_and_it_can_be_tried_again(tmp_path: Pa
             assert word not in text
         with pytest.raises(HTTPError, match="404"):
             urlopen(f"{address}webcam/worker.js")
+
+
+@pytest.mark.slow
+def test_why_a_camera_cannot_lead_is_told_in_the_language_of_the_participant(tmp_path: Path):
+    folder, plan = write_files(tmp_path / "vision", model=b"broken"), plan_of_webcam(tmp_path / "plan.toml")
+    begins, again = "Die Webcam kann die Hand nicht führen: ", page_words()["de"]["camera_again"]
+    with (
+        launched("--use-fake-ui-for-media-stream") as browser,
+        served(plan, tmp_path / "study", "--webcam", str(folder)) as (address, _),
+        browser.new_page() as page,
+    ):
+        page.goto(address)
+        to_round(page, device="Webcam", language="de")
+        wait_until(page, f"{TOLD} === '{begins}Es ist keine Kamera angeschlossen.'")
+        page.evaluate(
+            "navigator.mediaDevices.getUserMedia = () => Promise.reject(new DOMException('', 'NotAllowedError')); 0"
+        )
+        page.get_by_role("button", name=again).click()
+        wait_until(page, f"{TOLD}.startsWith('{begins}Der Browser durfte die Kamera nicht benutzen. ')")
+        page.evaluate(
+            "navigator.mediaDevices.getUserMedia = async () => document.createElement('canvas').captureStream(); 0"
+        )
+        page.get_by_role("button", name=again).click()
+        wait_until(page, f"{TOLD}.startsWith('{begins}MediaPipe, das eine Hand findet, meldet einen Fehler: ')")
+        assert page.get_by_role("button", name="Beginnen").is_disabled()
+
+
+def test_every_fault_of_a_camera_has_words_in_each_language_and_on_the_live_page():
+    script = asset("hand_camera.js")
+    named = re.search(r"const FAULTS = \{(.*?)\}", script)
+    assert named
+    faults = {*re.findall(r'"(\w+)"', named[1]), *re.findall(r'(?:fail\(|\?\? )"(\w+)"', script)}
+    assert len(faults) == 10
+    for words in page_words().values():
+        assert {f"camera_{fault}" for fault in faults} <= words.keys()
+    assert all(re.search(rf"^ +{fault}: ", asset("live_hand.js"), re.MULTILINE) for fault in faults)
 
 
 def test_a_webcam_without_files_or_plan_is_told_before_anything_starts(tmp_path: Path):

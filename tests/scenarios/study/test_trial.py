@@ -39,6 +39,6 @@ def test_a_scene_that_fails_is_told_with_the_reason(tmp_path: Path, monkeypatch:
     try:
         trial.begin()
         with pytest.raises(TrialFailed, match=r"ValueError: the lamp is broken \(dark_scene.py, line 9\)"):
-            trial.scene()
+            trial.scene_content()
     finally:
         trial.close()

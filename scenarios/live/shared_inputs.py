@@ -38,10 +38,10 @@ _TRIES = 1000
 
 
 class UnknownInput(KeyError):
-    """A value is set that the board does not have."""
+    """A value is set of an input that there is not."""
 
 
-class InputBoard:
+class SharedInputs:
     """Inputs by their names `unit.input`, in a file of both processes: one writes samples, the other uses them.
 
     A sample is all inputs at one time, its stamp: seconds of the monotonic clock (`time.monotonic`), which all
@@ -75,7 +75,7 @@ class InputBoard:
         self._writing = threading.Lock()
 
     @classmethod
-    def create(cls, path: Path, inputs: Mapping[str, int], ages: Sequence[str] = ()) -> "InputBoard":
+    def create(cls, path: Path, inputs: Mapping[str, int], ages: Sequence[str] = ()) -> "SharedInputs":
         """Make the file.
 
         Args:
@@ -101,7 +101,7 @@ class InputBoard:
             stamp: when the device saw that, s of the monotonic clock.
 
         Raises:
-            UnknownInput: the board has no such input.
+            UnknownInput: there is no such input.
             ValueError: a value is of another size, or it or the stamp is not finite.
         """
         given = {name: self._entries_of(name, value) for name, value in entries.items()}
@@ -172,7 +172,7 @@ class InputBoard:
 
     def _entries_of(self, name: str, value: Any) -> Floats:
         if name not in self.sizes:
-            raise UnknownInput(f"no input {name!r} on the board: {', '.join(self.sizes)} are")
+            raise UnknownInput(f"no input {name!r}: {', '.join(self.sizes)} are")
         entries = np.asarray(value, dtype=np.float64).ravel()
         if len(entries) != self.sizes[name]:
             raise ValueError(f"{name} takes {self.sizes[name]} values, not {len(entries)}")
@@ -188,12 +188,12 @@ class InputBoard:
 class _SampleReader:
     """Takes a sample at each new time, and notes its use."""
 
-    def __init__(self, board: InputBoard) -> None:
-        self._board = board
+    def __init__(self, inputs: SharedInputs) -> None:
+        self._inputs = inputs
         self._asked: float | None = None
         self._number, self._stamp = 0, -math.inf
         self.age = NEVER
-        self.given: Integers = np.zeros(len(board.sizes), dtype=np.int64)
+        self.given: Integers = np.zeros(len(inputs.sizes), dtype=np.int64)
         self.values: Floats = np.zeros(0)
 
     def take(self, t: float) -> None:
@@ -201,14 +201,14 @@ class _SampleReader:
         if t == self._asked:
             return
         self._asked = t
-        sample = self._board.read()
+        sample = self._inputs.read()
         if sample is not None:
             self._number, self._stamp, self.given, self.values = sample
         at = time.monotonic()
         if self._number == 0:
             return
         self.age = min(max(0.0, at - self._stamp), NEVER)
-        self._board.note_use(t, self._number, self._stamp, at)
+        self._inputs.note_use(t, self._number, self._stamp, at)
 
 
 class _OfSample:

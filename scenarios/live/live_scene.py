@@ -67,7 +67,7 @@ class History(Record):
         return self._stacked[name]
 
 
-class Stage:
+class LiveScene:
     """The scene of a growing record, and plots of what was seen of it.
 
     Args:
@@ -122,11 +122,11 @@ class Stage:
         """Names of the signals that can be plotted."""
         return self._record.signals
 
-    def scene(self) -> dict[str, Any] | None:
+    def content(self) -> dict[str, Any] | None:
         """Return the scene with everything where it is now; None where the scenario has none."""
         return None if self._shown is None else scene_content(self._shown, self._record, room=_AROUND)
 
-    def scene_of_person(self, fixed: Sequence[Line] = ()) -> dict[str, Any] | None:
+    def content_for_person(self, fixed: Sequence[Line] = ()) -> dict[str, Any] | None:
         """Return the scene as the person in it sees it, above a floor on which shadows tell how near things are.
 
         Args:
@@ -208,7 +208,7 @@ class Stage:
         return None
 
 
-class PastStage(Stage):
+class RecordedScene(LiveScene):
     """The scene of a run that is over, at any time of its record, and its plots."""
 
     def __init__(self, experiment: Experiment[Any] | None, parameters: Any, record: Record) -> None:

@@ -7,25 +7,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handover.scenarios.live.input_board import NEVER, InputBoard, UnknownInput
+from handover.scenarios.live.shared_inputs import NEVER, SharedInputs, UnknownInput
 
 SIZES = {"person.p": 3, "person.closed": 1, "push.f": 40}
 
 
-def board_in(folder: Path) -> InputBoard:
-    return InputBoard.create(folder / "board", SIZES, ["person.age"])
+def inputs_in(folder: Path) -> SharedInputs:
+    return SharedInputs.create(folder / "inputs", SIZES, ["person.age"])
 
 
 def test_inputs_hold_their_start_values_and_are_old_until_a_sample_comes(tmp_path: Path):
-    sources = board_in(tmp_path).sources()
+    sources = inputs_in(tmp_path).sources()
     assert set(sources) == {*SIZES, "person.age"}
     assert sources["person.p"].at(0.0) is None
     assert sources["person.age"].at(0.0) == [NEVER]
 
 
 def test_a_sample_is_used_with_its_age_and_what_it_does_not_say_holds_on(tmp_path: Path):
-    written = board_in(tmp_path)
-    sources = InputBoard(tmp_path / "board").sources()
+    written = inputs_in(tmp_path)
+    sources = SharedInputs(tmp_path / "inputs").sources()
     assert written.set({"person.p": [1.0, 2.0, 3.0]}, time.monotonic() - 0.5) == 1
     assert sources["person.closed"].at(0.0) is None
     np.testing.assert_array_equal(sources["person.p"].at(0.0), [1.0, 2.0, 3.0])
@@ -38,35 +38,35 @@ def test_a_sample_is_used_with_its_age_and_what_it_does_not_say_holds_on(tmp_pat
 
 
 def test_all_inputs_of_a_communication_point_are_of_one_sample(tmp_path: Path):
-    board = board_in(tmp_path)
-    sources = board.sources()
-    board.set({"person.p": [1.0, 1.0, 1.0], "person.closed": 0.0}, time.monotonic())
+    inputs = inputs_in(tmp_path)
+    sources = inputs.sources()
+    inputs.set({"person.p": [1.0, 1.0, 1.0], "person.closed": 0.0}, time.monotonic())
     sources["person.p"].at(0.5)
-    board.set({"person.p": [2.0, 2.0, 2.0], "person.closed": 1.0}, time.monotonic())
+    inputs.set({"person.p": [2.0, 2.0, 2.0], "person.closed": 1.0}, time.monotonic())
     np.testing.assert_array_equal(sources["person.closed"].at(0.5), [0.0])
     np.testing.assert_array_equal(sources["person.closed"].at(0.516), [1.0])
 
 
-def test_the_board_tells_which_samples_were_used_when(tmp_path: Path):
-    board = board_in(tmp_path)
-    sources = InputBoard(tmp_path / "board").sources()
+def test_shared_inputs_tell_which_samples_were_used_when(tmp_path: Path):
+    inputs = inputs_in(tmp_path)
+    sources = SharedInputs(tmp_path / "inputs").sources()
     stamps = [time.monotonic() - age for age in (0.3, 0.2, 0.1)]
     for k, stamp in enumerate(stamps):
-        board.set({"person.closed": k % 2}, stamp)
+        inputs.set({"person.closed": k % 2}, stamp)
         for source in sources.values():
             source.at(0.016 * k)
-    uses = board.uses()
+    uses = inputs.uses()
     np.testing.assert_array_equal(uses["t"], [0.0, 0.016, 0.032])
     np.testing.assert_array_equal(uses["number"], [1, 2, 3])
     np.testing.assert_array_equal(uses["stamp"], stamps)
-    assert (np.diff(board.ages()) < 0.0).all()
+    assert (np.diff(inputs.ages()) < 0.0).all()
 
 
 def test_of_a_long_run_the_last_uses_are_told(tmp_path: Path):
-    board = board_in(tmp_path)
+    inputs = inputs_in(tmp_path)
     for k in range(20_000):
-        board.note_use(0.016 * k, k + 1, 0.0, 1.0)
-    numbers = board.uses()["number"]
+        inputs.note_use(0.016 * k, k + 1, 0.0, 1.0)
+    numbers = inputs.uses()["number"]
     assert numbers[-1] == 20_000
     assert len(numbers) > 15_000
     assert (np.diff(numbers) == 1).all()
@@ -83,27 +83,27 @@ def test_of_a_long_run_the_last_uses_are_told(tmp_path: Path):
 def test_a_sample_that_cannot_be_is_refused_whole(
     tmp_path: Path, entries: dict[str, list[float]], stamp: float, why: str
 ):
-    board = board_in(tmp_path)
+    inputs = inputs_in(tmp_path)
     with pytest.raises(ValueError, match=why):
-        board.set({"person.closed": 1.0, **entries}, stamp)
+        inputs.set({"person.closed": 1.0, **entries}, stamp)
     with pytest.raises(UnknownInput, match=r"person\.q"):
-        board.set({"person.q": 1.0}, 0.0)
-    assert board.read() is None
+        inputs.set({"person.q": 1.0}, 0.0)
+    assert inputs.read() is None
 
 
 def _write(path: Path, until: float) -> None:
-    board, k = InputBoard(path), 0
+    inputs, k = SharedInputs(path), 0
     while time.monotonic() < until:
         k += 1
-        board.set({"person.p": [k] * 3, "person.closed": k % 2, "push.f": [-k] * 40}, time.monotonic())
+        inputs.set({"person.p": [k] * 3, "person.closed": k % 2, "push.f": [-k] * 40}, time.monotonic())
 
 
 def test_no_sample_is_torn_between_two_processes(tmp_path: Path):
-    board = board_in(tmp_path)
+    inputs = inputs_in(tmp_path)
     end = time.monotonic() + 4.0
-    writer = multiprocessing.get_context("spawn").Process(target=_write, args=(tmp_path / "board", end))
+    writer = multiprocessing.get_context("spawn").Process(target=_write, args=(tmp_path / "inputs", end))
     writer.start()
-    sources, seen, point = board.sources(), set[float](), 0
+    sources, seen, point = inputs.sources(), set[float](), 0
     while time.monotonic() < end:
         point += 1
         p = sources["person.p"].at(float(point))
@@ -117,16 +117,16 @@ def test_no_sample_is_torn_between_two_processes(tmp_path: Path):
     writer.join()
     assert writer.exitcode == 0
     assert len(seen) > 100
-    assert board.ages().max() < 30.0
+    assert inputs.ages().max() < 30.0
 
 
 def test_a_writer_that_was_killed_within_a_sample_stops_no_reader(tmp_path: Path):
-    board = board_in(tmp_path)
-    sources = board.sources()
-    board.set({"person.closed": 1.0}, time.monotonic())
+    inputs = inputs_in(tmp_path)
+    sources = inputs.sources()
+    inputs.set({"person.closed": 1.0}, time.monotonic())
     np.testing.assert_array_equal(sources["person.closed"].at(0.0), [1.0])
-    board._sample["begun"] = 2  # pyright: ignore[reportPrivateUsage]
-    board._values[3] = 0.0  # pyright: ignore[reportPrivateUsage]
+    inputs._sample["begun"] = 2  # pyright: ignore[reportPrivateUsage]
+    inputs._values[3] = 0.0  # pyright: ignore[reportPrivateUsage]
     np.testing.assert_array_equal(sources["person.closed"].at(0.016), [1.0])
-    assert InputBoard(tmp_path / "board").set({"person.closed": 0.0}, time.monotonic()) == 3
+    assert SharedInputs(tmp_path / "inputs").set({"person.closed": 0.0}, time.monotonic()) == 3
     np.testing.assert_array_equal(sources["person.closed"].at(0.032), [0.0])

@@ -1,10 +1,10 @@
 // A scene with what belongs to it on a page: views, legend, full screen, and the touch that wakes it.
-//   const stage = stageIn(root, content)   null without WebGL, after the page has said so; see sceneIn for the content
-//   stage.scene, stage.button     the scene, and the button that records it
-//   stage.close()                 ends the scene, before its elements are taken out of the page
-//   stage.onFollow = act                   is called when the view begins or ceases to follow
+//   const viewport = viewportIn(root, content)   null without WebGL, after the page has said so; see sceneIn for the content
+//   viewport.scene, viewport.button   the scene, and the button that records it
+//   viewport.close()                  ends the scene, before its elements are taken out of the page
+//   viewport.onFollow = act           is called when the view begins or ceases to follow
 "use strict";
-const stageIn = (root, content) => {
+const viewportIn = (root, content) => {
   const part = name => root.querySelector(".replay-" + name);
   const element = part("scene"), wake = part("wake"), full = part("full");
   const scene = sceneIn(element, content);
@@ -14,7 +14,7 @@ const stageIn = (root, content) => {
     return null;
   }
   const life = new AbortController();
-  const stage = {scene, element, button: part("film"), onFollow: () => {}, close() { life.abort(); scene.dispose(); }};
+  const viewport = {scene, element, button: part("film"), onFollow: () => {}, close() { life.abort(); scene.dispose(); }};
 
   // A page scrolls over the scene until the scene is touched.
   wake.addEventListener("click", () => root.classList.add("awake"));
@@ -35,7 +35,7 @@ const stageIn = (root, content) => {
     }
     scene.follows = button.getAttribute("aria-pressed") !== "true";
     button.setAttribute("aria-pressed", scene.follows);
-    stage.onFollow();
+    viewport.onFollow();
   });
   part("legend").addEventListener("click", ({target}) => {
     const button = target.closest("button");
@@ -48,5 +48,5 @@ const stageIn = (root, content) => {
   full.addEventListener("click", () => document.fullscreenElement ? document.exitFullscreen()
     : part("shown").requestFullscreen());
   page.onColours(() => life.signal.aborted || scene.recolour());
-  return stage;
+  return viewport;
 };

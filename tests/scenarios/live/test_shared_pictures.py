@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Raster
 from handover.cosim.system.signals import Signals
-from handover.scenarios.live.picture_board import PERIOD, PictureReader, PictureWriter
+from handover.scenarios.live.shared_pictures import PERIOD, PictureReader, PictureWriter
 
 
 class Camera:

@@ -1,0 +1,63 @@
+// A second, smaller view of a scene, across the first one's, which shows how far away things are.
+//   const side = sideViewIn(element, scene, content, label)   element holds both; see sceneIn for the content, which scene
+//                         has, too; it is seen from that side on which what the label names is, lest others hide that
+//   side.show()           takes where everything is
+//   side.shown = true     whether it is seen
+//   side.close()          ends it
+"use strict";
+const sideViewIn = (element, first, content, label) => {
+  const LEVEL = 0.12;  // how far the eye is above what it looks at, over how far it is from there
+  const TURNED = 0.01;  // rad between two pictures from which on it turns with the first view
+  const ROOM = 0.08;  // on each side, as a share of the longest
+  const inset = document.createElement("div"), name = document.createElement("span");
+  inset.className = "replay-inset";
+  inset.setAttribute("aria-hidden", "true");  // it shows nothing that the first view does not
+  name.textContent = "from the side";
+  inset.append(name);
+  let scene = null, azimuth = NaN;
+
+  // Corners of a box around all that is drawn now, with some room: things move.
+  function around() {
+    const points = content.traces.flatMap(trace => first.points(trace.label)).filter(p => p.every(Number.isFinite));
+    const ends = [0, 1, 2].map(i => points.reduce(([low, high], p) => [Math.min(low, p[i]), Math.max(high, p[i])], [Infinity, -Infinity]));
+    const room = ROOM * Math.max(...ends.map(([low, high]) => high - low));
+    return [0, 1, 2, 3, 4, 5, 6, 7].map(n => ends.map(([low, high], i) => n >> i & 1 ? high + room : low - room));
+  }
+
+  // Looks from the first view's right or left, whose azimuth is a quarter turn from its eye's.
+  function follow() {
+    const now = first.view().azimuth;
+    if (!scene || Math.abs(now - azimuth) < TURNED) return;
+    azimuth = now;
+    const right = [-Math.sin(azimuth), Math.cos(azimuth)], middle = first.looksAt();
+    const away = first.points(label).reduce((sum, p) => sum + right[0] * (p[0] - middle[0]) + right[1] * (p[1] - middle[1]), 0);
+    const to = away < 0 ? -1 : 1;
+    scene.lookFrom([to * right[0], to * right[1], LEVEL]);
+  }
+  const api = {
+    show() { scene?.show(Infinity); },
+    get shown() { return scene !== null; },
+    set shown(yes) {
+      if (yes === api.shown) return;
+      if (yes) {
+        element.append(inset);
+        scene = sceneIn(inset, {...content, held: around()});
+        azimuth = NaN;
+        follow();
+        api.show();
+      } else {
+        scene?.dispose();
+        scene = null;
+        inset.querySelectorAll("canvas, svg").forEach(node => node.remove());
+        inset.remove();
+      }
+    },
+    close() {
+      first.beforePicture = () => {};
+      api.shown = false;
+    },
+  };
+  first.beforePicture = follow;
+  api.shown = true;
+  return api;
+};

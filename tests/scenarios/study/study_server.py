@@ -1,0 +1,95 @@
+"""A study's server in a thread, and its page as a connection that is led through the protocol."""
+
+import json
+import socket
+import threading
+import urllib.error
+import urllib.request
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+from websockets.sync.client import ClientConnection, connect
+
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.plan.plan import default_plan, parse_plan
+from handover.scenarios.study.session.protocol import Protocol
+from handover.scenarios.study.session.seat import StudySeat
+from handover.scenarios.study.session.server import StudyServer, uvicorn_config
+
+HOST = "127.0.0.1"
+SHORT = default_plan().replace("practice = 600 ", "practice = 0 ") + "\n[parameters]\npatience = 30\n"
+PLAN = parse_plan(SHORT)
+HAND = {"p_WH": [-0.4, 0.1, -0.05], "q_WH": [1.0, 0.0, 0.0, 0.0], "closed": False}
+
+
+def server_of(path: Path, host: str = HOST) -> StudyServer:
+    return StudyServer(StudySeat(Protocol(StudyFolder.opened(path, PLAN), ["mouse", "tracker"])), host)
+
+
+@contextmanager
+def served(server: StudyServer) -> Generator[str, None, None]:
+    """Serve a study in a thread; yield host and port. A run under way ends with it."""
+    running = uvicorn.Server(uvicorn_config(server))
+    with socket.create_server((HOST, 0)) as listening:
+        thread = threading.Thread(target=running.run, kwargs={"sockets": [listening]})
+        thread.start()
+        try:
+            yield f"{HOST}:{listening.getsockname()[1]}"
+        finally:
+            running.should_exit = True
+            thread.join()
+
+
+@contextmanager
+def page_at(where: str, path: str = "/", origin: str | None = None) -> Generator[ClientConnection, None, None]:
+    own = f"http://{where}" if origin is None else origin
+    with connect(f"ws://{where}{path}seat", origin=own, max_size=None, max_queue=None) as page:  # pyright: ignore[reportArgumentType]
+        yield page
+
+
+@contextmanager
+def page_of(server: StudyServer) -> Generator[ClientConnection, None, None]:
+    with served(server) as where, page_at(where) as page:
+        yield page
+
+
+def status(where: str, path: str, host: str = "") -> int:
+    """Return the status by which a server answers a path."""
+    request = urllib.request.Request(f"http://{where}{path}", headers={"Host": host} if host else {})
+    try:
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            return answer.status
+    except urllib.error.HTTPError as e:
+        return e.code
+
+
+def told(page: ClientConnection, name: str) -> Any:
+    """Return the next message of a name; states of the run are passed over."""
+    while True:
+        message = page.recv(timeout=120)
+        content: dict[str, Any] = json.loads(message) if isinstance(message, str) else {}
+        if name in content:
+            return content[name]
+
+
+def act(page: ClientConnection, action: str, value: Any = None) -> None:
+    page.send(json.dumps({"act": {"action": action, "value": value}}))
+
+
+def to_instruction(page: ClientConnection, device: str = "mouse") -> None:
+    act(page, "language", "en")
+    act(page, "consent", True)
+    act(page, "eligibility", [True] * 3)
+    act(page, "device", device)
+    while told(page, "screen")["screen"] != "instruction":
+        pass
+
+
+def to_round(page: ClientConnection) -> None:
+    to_instruction(page)
+    act(page, "begin")
+    told(page, "scene")
+    page.send('{"ready": true}')

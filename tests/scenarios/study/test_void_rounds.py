@@ -1,0 +1,161 @@
+"""What goes wrong as a round is played: it is void, or goes on, but never counts as what it was not."""
+
+import contextlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import psutil
+import pytest
+from sample_study import record
+from study_server import (
+    HAND,
+    PLAN,
+    act,
+    page_at,
+    page_of,
+    served,
+    server_of,
+    to_round,
+    told,
+)
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection
+
+from handover.cosim.exceptions import RecordNotWritten
+from handover.scenarios.study.folder.study_folder import StudyFolder
+from handover.scenarios.study.session import page_messages
+from handover.scenarios.study.session import seat as seat_module
+from handover.scenarios.study.session.device_test import Reached
+
+
+def test_samples_that_cannot_be_used_are_refused_and_the_round_goes_on(tmp_path: Path):
+    with page_of(server_of(tmp_path / "study")) as page:
+        to_round(page)
+        wrong: list[tuple[dict[str, Any], str]] = [
+            ({**HAND, "stamp": 1.0, "p_WH": [float("nan"), 0.0, 0.0]}, "p_WH: 3 finite numbers"),
+            ({**HAND, "stamp": 1.0, "p_WH": [9.0, 0.0, 0.0]}, "reaches"),
+            ({**HAND, "stamp": float("inf")}, "stamp"),
+            ({**HAND, "stamp": 0.5}, "not after the one before"),
+        ]
+        page.send(json.dumps({"hand": {**HAND, "stamp": 0.9}}))
+        for sample, why in wrong:
+            page.send(json.dumps({"hand": sample}))
+            assert why in told(page, "refused")
+        page.send(json.dumps({"drawn": [-1.0]}))
+        assert "0 to 60000 ms" in told(page, "refused")
+        seen = time_seen(page)
+        assert time_seen(page) > seen
+    session = StudyFolder.opened(tmp_path / "study", PLAN).session(1)
+    assert session.records == {}
+
+
+def time_seen(page: ClientConnection) -> float:
+    """Return the simulated time of the next state of the run, s."""
+    while isinstance(message := page.recv(timeout=60), str):
+        assert "void" not in message
+    return float(np.frombuffer(message, dtype="<f8")[0])
+
+
+def test_a_page_that_is_closed_makes_its_round_void_and_it_is_played_again(tmp_path: Path):
+    server = server_of(tmp_path / "study")
+    with served(server) as where:
+        with page_at(where) as page:
+            to_round(page)
+            page.send(json.dumps({"hand": {**HAND, "stamp": 1.0}}))
+        with page_at(where) as reloaded:  # while the run of the page that has gone is ended
+            assert told(reloaded, "screen")["screen"] == "void"
+    attempts = StudyFolder.opened(tmp_path / "study", PLAN).session(1).notes.void_attempts
+    assert [(a.number, a.attempt) for a in attempts] == [(1, 1)], attempts
+    assert "the page was closed" in attempts[0].reason
+    assert server.seat.protocol.screen == "void"
+
+
+def test_a_device_that_falls_silent_makes_the_round_void(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(seat_module, "SILENCE", 0.5)
+    with page_of(server_of(tmp_path / "study")) as page:
+        to_round(page)
+        shown = told(page, "screen")
+        assert shown["screen"] == "void"
+        assert "no sample of the hand" in shown["reason"]
+        act(page, "next")
+        assert told(page, "screen")["round"] == 1
+
+
+def test_a_run_that_is_killed_makes_its_round_void(tmp_path: Path):
+    server = server_of(tmp_path / "study")
+    with served(server) as where, page_at(where) as page:
+        to_round(page)
+        page.send(json.dumps({"hand": {**HAND, "stamp": 1.0}}))
+        assert time_seen(page) >= 0.0
+        (trial,) = [p for p in psutil.Process().children() if "handover.scenarios.study.session" in p.cmdline()]
+        trial.kill()
+        shown = told(page, "screen")
+        assert (shown["screen"], shown["again"]) == ("void", True)
+        assert "the simulation's process ended (killed by signal 9)" in shown["reason"]
+    assert StudyFolder.opened(tmp_path / "study", PLAN).session(1).records == {}
+
+
+def test_a_page_that_floods_in_a_round_makes_it_void(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(page_messages, "FLOOD", 200)
+    server = server_of(tmp_path / "study")
+    with served(server) as where:
+        with page_at(where) as page:
+            to_round(page)
+            with contextlib.suppress(ConnectionClosed):
+                for k in range(1000):
+                    page.send(json.dumps({"hand": {**HAND, "stamp": 1.0 + k}}))
+            assert told(page, "gone") == "flood"
+        with page_at(where) as reloaded:
+            assert told(reloaded, "screen")["screen"] == "void"
+    session = StudyFolder.opened(tmp_path / "study", PLAN).session(1)
+    assert session.records == {}
+    assert "the page was closed" in session.notes.void_attempts[0].reason
+
+
+def test_who_sits_down_after_a_withdrawal_has_practised_nothing(tmp_path: Path):
+    seat = server_of(tmp_path / "study").seat
+    for _ in range(2):
+        for action, value in (("language", "en"), ("consent", True), ("eligibility", [True] * 3), ("device", "mouse")):
+            seat.protocol.act(action, value)
+        assert seat.practice.done == 0.0
+        assert seat.practice.test.reached == []
+        seat.practice.done = 100.0
+        seat.practice.test.reached.append(Reached("+x", 1.0))
+        assert seat.practice.done == 100.0
+        seat.protocol.act("withdraw")
+        seat.protocol.act("next")
+
+
+def test_a_round_that_cannot_be_kept_is_told_and_can_be_played_again(tmp_path: Path):
+    seat = server_of(tmp_path / "study").seat
+    protocol = seat.protocol
+    for action, value in (("language", "en"), ("consent", True), ("eligibility", [True] * 3), ("device", "mouse")):
+        protocol.act(action, value)
+    protocol.act("begin")
+    in_the_way = protocol.study.session(1).path / "rounds" / "01.json"
+    in_the_way.mkdir()
+    seat.keep(None, record(), is_round=True)
+    assert protocol.screen == "void"
+    assert "it could not be kept" in protocol.void_reason
+    protocol.act("next")
+    protocol.act("begin")
+    seat.keep("the page was closed", is_round=True)
+    assert protocol.screen == "void"
+    in_the_way.rmdir()
+    protocol.act("next")
+    protocol.act("begin")
+    tables = protocol.study.session(1).path / "rounds.csv"
+    tables.unlink()
+    tables.mkdir()
+    seat.keep(None, record(), is_round=True)
+    assert protocol.screen == "rating"
+    ratings = {"S1": 7, "S2": 8, "S3": 9}
+    with pytest.raises(RecordNotWritten):
+        protocol.act("rate", ratings)
+    tables.rmdir()
+    protocol.act("rate", ratings)
+    assert (protocol.screen, protocol.content()["round"]) == ("instruction", 2)
+    assert len(pd.read_csv(tables)) == 1
