@@ -9,8 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.vsl import default_model, default_physics_model, default_small_model, default_window_model
-from handover.controllers.vsl.corrections import CurrentFilter, SwingCompensation, TrackerLoop
+from handover.controllers.vsl import default_friction_model, default_model, default_physics_model, default_small_model
+from handover.controllers.vsl.feedback import CurrentFilter, TrackerLoop, VibrationDamping
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import Learned, VslModel
 from handover.controllers.vsl.model_text import InvalidModel, parse_model, read_model
@@ -33,7 +33,7 @@ __all__ = [
 
 _SHIPPED = {
     (Learned.CUBIC, False): default_model.DEFAULT_MODEL,
-    (Learned.CUBIC, True): default_window_model.DEFAULT_MODEL,
+    (Learned.CUBIC, True): default_friction_model.DEFAULT_MODEL,
     (Learned.SMALL, False): default_small_model.DEFAULT_MODEL,
     (Learned.PHYSICS, False): default_physics_model.DEFAULT_MODEL,
 }
@@ -55,9 +55,11 @@ class Params:
     method: Method = parameter(Method.HYBRID, "rigid kinematics, with what was learned, or with its estimate only")
     learned: Learned = parameter(Learned.CUBIC, "what corrects rigid kinematics")
     model: str = parameter("", "JSON file of a trained model; empty: the one that ships; no published one does")
-    window: bool = parameter(False, "free the currents of gear friction by which way each joint has been turning")
+    friction_compensation: bool = parameter(
+        False, "free the currents of gear friction by which way each joint has been turning"
+    )
     closed_loop: bool = parameter(False, "turn the joints until the tracker sees the tip where it is wanted")
-    swing: bool = parameter(False, "turn the joints against swings that the path's changes of speed excite")
+    vibration_damping: bool = parameter(False, "turn the joints against swings that the path's changes of speed excite")
     elbow: Elbow = parameter(Elbow.UP, "which way the elbow points")
     L_1: Metre = parameter(0.15, "height of the shoulder", minimum=0.0, maximum=10.0)
     L_2: Metre = parameter(0.225, "length of link 2", minimum=0.001, maximum=10.0)
@@ -69,7 +71,7 @@ class Params:
         0.2, "joint speed that corrections are granted besides the path's (assumed)", minimum=0.0, maximum=100.0
     )
     reversal: Radian = parameter(
-        0.002, "turn that reverses the gears' friction, of the window (assumed)", minimum=1e-6, maximum=1.0
+        0.002, "turn that reverses the gears' friction, of its compensation (assumed)", minimum=1e-6, maximum=1.0
     )
     tracker_rate: Hertz = parameter(
         30.0, "rate of the tracker's readings, of the closed loop", minimum=0.1, maximum=50.0
@@ -142,15 +144,16 @@ class HybridKinematics:
     friction acts the same way: commanded to hold still, the arm hunts, at 0.5 bar and 75 g the tip by 4 mm up and down
     in 3 s.
 
-    Beyond the source, and each for itself: the window, see `CurrentFilter`; the closed loop by the tracker, of both
-    methods, see `TrackerLoop`; and what is done against swings, see `SwingCompensation`.
+    Beyond the source, and each for itself: friction compensation, see `CurrentFilter`; the closed loop by the tracker,
+    of both methods, see `TrackerLoop`; and the damping of vibrations, see `VibrationDamping`.
 
     `outside` reports that the input of g or h is outside the polytope of its training; see `Domain` for what follows.
 
     Raises:
-        IdleParameters: by the constructor, for MODEL_BASED with a model, window, swing, or kind of model of its own.
-        InvalidModel: by the constructor, if the model is used and cannot be read, is not what `learned` and `window`
-            say, or was trained for other links.
+        IdleParameters: by the constructor, for MODEL_BASED with a model, friction_compensation, vibration_damping, or
+            kind of model of its own.
+        InvalidModel: by the constructor, if the model is used and cannot be read, is not what `learned` and
+            `friction_compensation` say, or was trained for other links.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -168,9 +171,9 @@ class HybridKinematics:
         self._params = p = params
         self._kinematics = VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
         self._model = _model(p, self._kinematics) if p.method is not Method.MODEL_BASED else None
-        self._currents = CurrentFilter(self._model if p.window else None, p.i_lag, p.reversal)
+        self._currents = CurrentFilter(self._model if p.friction_compensation else None, p.i_lag, p.reversal)
         self._loop = TrackerLoop(self._kinematics, self._model, p.tracker_rate, p.tracker_lag, p.K_I, p.dq_max)
-        self._swing = SwingCompensation(self._model, p.K_F, p.K_D) if p.swing and self._model else None
+        self._damping = VibrationDamping(self._model, p.K_F, p.K_D) if p.vibration_damping and self._model else None
         self._before: tuple[Floats, Floats] | None = None
         """q_ref and q_cmd of the period that ends."""
 
@@ -183,8 +186,8 @@ class HybridKinematics:
         i, at_once = self._currents.step(u, dt), False
         if self._params.closed_loop:
             self._loop.step(t, u, i, self._before)
-        if self._swing is not None:
-            at_once = self._swing.step(dt, u, i, self._currents.swing(u, i))
+        if self._damping is not None:
+            at_once = self._damping.step(dt, u, i, self._currents.oscillation(u, i))
         y = self._command(u, i)
         if at_once:
             y.qd_cmd = np.copysign(self._params.qd_max, y.qd_cmd)
@@ -195,16 +198,16 @@ class HybridKinematics:
 
     def get_state(self) -> bytes:
         """Return what currents, closed loop and swings were, and the command."""
-        swing = None if self._swing is None else self._swing.get_state()
-        return pack_state((self._currents.get_state(), self._loop.get_state(), swing, self._before))
+        damping = None if self._damping is None else self._damping.get_state()
+        return pack_state((self._currents.get_state(), self._loop.get_state(), damping, self._before))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state of this unit or of one with equal parameters."""
-        currents, loop, swing, self._before = unpack_state(state)
+        currents, loop, damping, self._before = unpack_state(state)
         self._currents.set_state(currents)
         self._loop.set_state(loop)
-        if self._swing is not None:
-            self._swing.set_state(swing)
+        if self._damping is not None:
+            self._damping.set_state(damping)
 
     def _command(self, u: Inputs, i: Floats) -> Outputs:
         p, model, p_WG = self._params, self._model, self._kinematics.forward(u.q_meas)
@@ -212,8 +215,8 @@ class HybridKinematics:
         q_cmd = model.command(u.q_ref, u.p_meas, i) if model is not None and corrected else np.array(u.q_ref)
         if p.closed_loop:
             q_cmd = q_cmd + self._loop.dq
-        if self._swing is not None:
-            q_cmd = q_cmd + self._swing.dq
+        if self._damping is not None:
+            q_cmd = q_cmd + self._damping.dq
         return Outputs(
             q_cmd=q_cmd,
             qd_cmd=self._granted(u.qd_ref) if corrected or p.closed_loop else np.array(u.qd_ref),
@@ -231,7 +234,11 @@ def _idle(p: Params) -> list[str]:
     if p.method is not Method.MODEL_BASED:
         return []
     default = Params()
-    given = [name for name in ("learned", "model", "window", "swing") if getattr(p, name) != getattr(default, name)]
+    given = [
+        name
+        for name in ("learned", "model", "friction_compensation", "vibration_damping")
+        if getattr(p, name) != getattr(default, name)
+    ]
     return [f"{name}: without effect with method=MODEL_BASED, which uses nothing that was learned" for name in given]
 
 
@@ -241,11 +248,11 @@ def _model(p: Params, kinematics: VslKinematics) -> VslModel:
     Raises:
         InvalidModel: there is none, it cannot be read, is of another kind, or was trained for other links than these.
     """
-    kind, remedy = p.learned.name.lower(), train_command(p.learned, window=p.window)
-    source = p.model or f"{kind}{' with a window' if p.window else ''}, as it ships"
+    kind, remedy = p.learned.name.lower(), train_command(p.learned, friction_compensation=p.friction_compensation)
+    source = p.model or f"{kind}{' with friction compensation' if p.friction_compensation else ''}, as it ships"
     if p.model:
         model = read_model(Path(p.model))
-    elif text := _SHIPPED.get((p.learned, p.window)):
+    elif text := _SHIPPED.get((p.learned, p.friction_compensation)):
         model = parse_model(text, source)
     else:
         raise InvalidModel(source, "there is none: train one and name its file by the parameter model", remedy)
@@ -253,10 +260,12 @@ def _model(p: Params, kinematics: VslKinematics) -> VslModel:
         raise InvalidModel(
             source, f"it is a {model.kind.name.lower()} model, and the parameter learned says {kind}", remedy
         )
-    if (model.friction != (0.0, 0.0)) is not p.window:
-        trained = "without a window" if p.window else "with a window, on currents without friction"
+    if (model.friction != (0.0, 0.0)) is not p.friction_compensation:
+        trained, wanted = ("with", "true") if p.friction_compensation else ("without", "false")
         raise InvalidModel(
-            source, f"it was trained {trained}, and the parameter window says {str(p.window).lower()}", remedy
+            source,
+            f"it was trained on currents {trained} friction, and the parameter friction_compensation says {wanted}",
+            remedy,
         )
     if model.kinematics != kinematics:
         raise InvalidModel(
@@ -265,10 +274,10 @@ def _model(p: Params, kinematics: VslKinematics) -> VslModel:
     return model
 
 
-def train_command(learned: Learned, *, window: bool) -> str:
+def train_command(learned: Learned, *, friction_compensation: bool) -> str:
     """Return the command that trains such a model."""
     kind = "" if learned is Learned.CUBIC else f" --learned {learned.name.lower()}"
-    return f"handover vsl-train{kind}{' --window' if window else ''}"
+    return f"handover vsl-train{kind}{' --friction-compensation' if friction_compensation else ''}"
 
 
 def _geometry_text(k: VslKinematics) -> str:

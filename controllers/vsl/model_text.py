@@ -191,7 +191,7 @@ class _Reader:
         return first, second
 
     def usual(self, whole: dict[str, Any]) -> Cubic | None:
-        """Return the usual currents, which a model without a window does not have."""
+        """Return the usual currents, which a model on currents with friction does not have."""
         if not any(self.friction(whole)):
             return None
         table = self._named(whole, "usual", USUAL_INPUTS)

@@ -242,6 +242,8 @@ class HybridParameters(Parameters):
         Learned.CUBIC, "what corrects: polynomials, a small network, the paper's, which needs a model, or a beam"
     )
     model: str = parameter("", "file of a trained model; empty: the one that ships")
-    window: bool = parameter(False, "whether the direction of motion tells the gears' friction from the load")
+    friction_compensation: bool = parameter(
+        False, "whether the direction of motion tells the gears' friction from the load"
+    )
     closed_loop: bool = parameter(False, "whether the tracker, too, tells the controller where the tip is")
-    swing: bool = parameter(False, "whether joints are turned against swings that changes of speed excite")
+    vibration_damping: bool = parameter(False, "whether joints are turned against swings that changes of speed excite")

@@ -189,9 +189,9 @@ class VslHybrid(PathExperiment):
         return {
             "learned": p.learned.name,
             "model": str(Path(p.model).absolute()) if p.model else "",
-            "window": p.window,
+            "friction_compensation": p.friction_compensation,
             "closed_loop": p.closed_loop,
-            "swing": p.swing,
+            "vibration_damping": p.vibration_damping,
         }
 
     def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:

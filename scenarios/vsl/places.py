@@ -34,7 +34,10 @@ PLACES = {
             "outside": "its share of the path is a metric",
             "method": "the scenario's",
             "elbow": "the scenario's parameter",
-            **dict.fromkeys(("learned", "model", "window", "closed_loop", "swing"), "the scenario's parameter"),
+            **dict.fromkeys(
+                ("learned", "model", "friction_compensation", "closed_loop", "vibration_damping"),
+                "the scenario's parameter",
+            ),
             "p_WG_meas": "in W; wired where the loop is closed",
         },
         remarks=(_WORLD,),

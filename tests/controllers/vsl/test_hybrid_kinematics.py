@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.vsl import default_physics_model, default_small_model, default_window_model
+from handover.controllers.vsl import default_friction_model, default_physics_model, default_small_model
 from handover.controllers.vsl.default_model import DEFAULT_MODEL
 from handover.controllers.vsl.hybrid_kinematics import (
     Elbow,
@@ -44,8 +44,8 @@ ALL = [
     ESTIMATE,
     Params(),
     Params(learned=Learned.SMALL, closed_loop=True),
-    Params(learned=Learned.PHYSICS, swing=True),
-    Params(window=True, closed_loop=True, swing=True),
+    Params(learned=Learned.PHYSICS, vibration_damping=True),
+    Params(friction_compensation=True, closed_loop=True, vibration_damping=True),
 ]
 
 
@@ -101,16 +101,16 @@ def test_the_closed_loop_raises_a_tip_that_is_too_low(params: Params):
     assert ARM.forward(last.q_cmd)[2] > ARM.forward(first.q_cmd)[2] + 0.005
 
 
-def test_a_window_forgets_no_turn():
-    """Of an arm whose currents carry friction by the direction of its commands, a window sees the currents without."""
-    window = parse_model(default_window_model.DEFAULT_MODEL, "that ships")
-    unit = HybridKinematics(Params(window=True, i_lag=0.0))
+def test_friction_compensation_forgets_no_turn():
+    """Of an arm whose currents carry friction by the direction of its commands, the currents are seen without."""
+    frictionless = parse_model(default_friction_model.DEFAULT_MODEL, "that ships")
+    unit = HybridKinematics(Params(friction_compensation=True, i_lag=0.0))
     for k in range(10):
         q = USUAL.q_ref + 0.01 * k * np.array([0.0, 1.0, -1.0])
-        friction = np.array([0.0, *(np.array(window.friction) * np.array([1.0, -1.0]))])
+        friction = np.array([0.0, *(np.array(frictionless.friction) * np.array([1.0, -1.0]))])
         sliding = dataclasses.replace(USUAL, q_ref=q, i_meas=USUAL.i_meas + (friction if k > 1 else 0.0))
         y = unit.step(k * 0.02, 0.02, sliding)
-        np.testing.assert_allclose(y.q_cmd, window.command(q, USUAL.p_meas, USUAL.i_meas), atol=1e-9)
+        np.testing.assert_allclose(y.q_cmd, frictionless.command(q, USUAL.p_meas, USUAL.i_meas), atol=1e-9)
 
 
 def test_speeds_leave_room_for_corrections():
@@ -212,24 +212,44 @@ def test_a_file_that_is_no_model_is_refused(tmp_path: Path):
     ("params", "text"),
     [
         (Params(learned=Learned.PUBLISHED), r"there is none: train one.*`handover vsl-train --learned published`"),
-        (Params(learned=Learned.SMALL, window=True), r"there is none.*`handover vsl-train --learned small --window`"),
+        (
+            Params(learned=Learned.SMALL, friction_compensation=True),
+            r"there is none.*`handover vsl-train --learned small --friction-compensation`",
+        ),
         (Params(learned=Learned.SMALL, model="cubic"), "it is a cubic model, and the parameter learned says small"),
-        (Params(window=True, model="cubic"), "it was trained without a window, and the parameter window says true"),
-        (Params(model="window"), "it was trained with a window.* and the parameter window says false"),
+        (
+            Params(friction_compensation=True, model="cubic"),
+            "it was trained on currents with friction, and the parameter friction_compensation says true",
+        ),
+        (
+            Params(model="frictionless"),
+            "it was trained on currents without friction, and the parameter friction_compensation says false",
+        ),
     ],
 )
 def test_a_model_that_is_not_what_the_parameters_say_is_refused(params: Params, text: str, tmp_path: Path):
     (tmp_path / "cubic").write_text(DEFAULT_MODEL)
-    (tmp_path / "window").write_text(default_window_model.DEFAULT_MODEL)
+    (tmp_path / "frictionless").write_text(default_friction_model.DEFAULT_MODEL)
     with pytest.raises(InvalidModel, match=text):
         HybridKinematics(dataclasses.replace(params, model=str(tmp_path / params.model) if params.model else ""))
 
 
 def test_by_rigid_kinematics_what_was_learned_is_refused_and_not_ignored():
-    idle = Params(method=Method.MODEL_BASED, learned=Learned.SMALL, model="m.json", window=True, swing=True)
+    idle = Params(
+        method=Method.MODEL_BASED,
+        learned=Learned.SMALL,
+        model="m.json",
+        friction_compensation=True,
+        vibration_damping=True,
+    )
     with pytest.raises(IdleParameters) as e:
         HybridKinematics(idle)
-    assert [fault.split(":")[0] for fault in e.value.faults] == ["learned", "model", "window", "swing"]
+    assert [fault.split(":")[0] for fault in e.value.faults] == [
+        "learned",
+        "model",
+        "friction_compensation",
+        "vibration_damping",
+    ]
     HybridKinematics(dataclasses.replace(RIGID, closed_loop=True, K_I=1.0))
     HybridKinematics(dataclasses.replace(idle, method=Method.ESTIMATE, model="", learned=Learned.CUBIC))
 
@@ -269,7 +289,7 @@ def test_an_output_depends_at_once_on_the_inputs_that_it_declares_alone(params: 
                     found.setdefault(output, set()).add(name)
     declared = {output: set(inputs) for output, inputs in HybridKinematics.feedthrough.items()}
     assert all(inputs <= declared[output] for output, inputs in found.items())
-    if params == ALL[-1]:  # window, closed loop and swing
+    if params == ALL[-1]:  # all of them
         assert found["q_cmd"] == declared["q_cmd"]
         assert found["p_WG_est"] == declared["p_WG_est"]
 
@@ -281,7 +301,7 @@ def test_where_a_swing_may_be_answered_the_speed_depends_on_references_and_curre
     changed = [begun, dataclasses.replace(begun, q_ref=still), dataclasses.replace(begun, i_meas=np.zeros(3))]
     speeds: list[float] = []
     for u in changed:
-        unit = HybridKinematics(Params(swing=True, i_lag=0.0))
+        unit = HybridKinematics(Params(vibration_damping=True, i_lag=0.0))
         unit.step(0.0, 0.02, dataclasses.replace(USUAL, q_ref=still, qd_ref=np.zeros(3)))
         speeds.append(float(np.abs(unit.step(0.02, 0.02, u).qd_cmd[1])))
     assert speeds[0] == 4.8 > max(speeds[1:])

@@ -42,7 +42,7 @@ def cubic() -> float:
 
 @pytest.mark.parametrize(
     ("given", "share"),
-    [("learned=small", 1.3), ("learned=physics", 1.8), ("window=true", 0.6)],
+    [("learned=small", 1.3), ("learned=physics", 1.8), ("friction_compensation=true", 0.6)],
 )
 def test_each_corrector_against_the_polynomials(cubic: float, given: str, share: float):
     assert error_of(*QUICK, given) < share * cubic
@@ -83,13 +83,16 @@ def test_a_model_of_another_kind_is_refused(tmp_path: Path):
 
 @pytest.mark.slow
 def test_fast_motion_of_an_arm_that_swings():
-    fast = ("motion=dynamic", "speed=0.2", "window=true")
-    plain, compensated = error_of(*fast), error_of(*fast, "swing=true")
+    fast = ("motion=dynamic", "speed=0.2", "friction_compensation=true")
+    plain, compensated = error_of(*fast), error_of(*fast, "vibration_damping=true")
     assert compensated < 0.8 * plain
     assert compensated < 0.003
 
 
 @pytest.mark.slow
 def test_the_closed_loop_does_not_swing_the_arm_up():
-    swinging = [error_of("motion=dynamic", "window=true", f"closed_loop={closed}") for closed in ("false", "true")]
+    swinging = [
+        error_of("motion=dynamic", "friction_compensation=true", f"closed_loop={closed}")
+        for closed in ("false", "true")
+    ]
     assert np.all(np.array(swinging) < 0.002)

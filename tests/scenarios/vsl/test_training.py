@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
 
-from handover.controllers.vsl import default_model, default_physics_model, default_small_model, default_window_model
+from handover.controllers.vsl import default_friction_model, default_model, default_physics_model, default_small_model
 from handover.controllers.vsl.default_model import DEFAULT_MODEL
 from handover.controllers.vsl.hybrid_kinematics import HybridKinematics, Inputs, Params
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
@@ -169,7 +169,7 @@ def test_a_walk_changes_one_thing_a_point():
     assert np.sum(~turned & ~blown) > 5  # another load
 
 
-@pytest.mark.parametrize("learned", [[], ["--learned", "physics"], ["--window"]])
+@pytest.mark.parametrize("learned", [[], ["--learned", "physics"], ["--friction-compensation"]])
 def test_training_from_saved_points_gives_the_same_bytes(learned: list[str], tmp_path: Path):
     first = call("--points", "400", *learned, "--save-data", tmp_path / "d.parquet", "--out", tmp_path / "a.json")
     assert first.exit_code == 0, first.output
@@ -177,7 +177,7 @@ def test_training_from_saved_points_gives_the_same_bytes(learned: list[str], tmp
     assert second.exit_code == 0, second.output
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
     assert first.output.replace("a.json", "b.json") == second.output
-    assert ("currents by friction" in first.output) == (learned == ["--window"])
+    assert ("currents by friction" in first.output) == (learned == ["--friction-compensation"])
     assert ("from X = f(q) in place of q" in first.output) == (learned != ["--learned", "physics"])
 
 
@@ -460,7 +460,7 @@ def shipped() -> VslModel:
     return parse_model(DEFAULT_MODEL, "that ships")
 
 
-@pytest.mark.parametrize("module", [default_model, default_window_model, default_small_model, default_physics_model])
+@pytest.mark.parametrize("module", [default_model, default_friction_model, default_small_model, default_physics_model])
 def test_the_models_that_ship_were_trained_on_the_present_arm(module: types.ModuleType):
     key = parse_model(module.DEFAULT_MODEL, "that ships").provenance["arm"]["key"]
     assert key == content_key(cached("VslArm", 3)), (module.__doc__ or "").splitlines()[-1]

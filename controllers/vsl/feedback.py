@@ -42,24 +42,24 @@ class Readings(Protocol):
 class CurrentFilter:
     """Currents through two lags in series, which attenuate what an arm that swings feels of its own inertia.
 
-    With a window, they are freed of the gears' friction first: i - c d, with c as trained and d in [-1, 1] which way
-    friction acts, by the unit's own commands, which have no noise. What is smoothed then is what a load adds to the
-    usual currents i_0(q, p) at its levers b(q): i - c d - i_0 = lambda b + e, with e square to b. lambda and e change
-    with the load alone, so that smoothing them does not lag behind the posture.
+    With friction compensation, they are freed of the gears' friction first: i - c d, with c as trained and d in
+    [-1, 1] which way friction acts, by the unit's own commands, which have no noise. What is smoothed then is what a
+    load adds to the usual currents i_0(q, p) at its levers b(q): i - c d - i_0 = lambda b + e, with e square to b.
+    lambda and e change with the load alone, so that smoothing them does not lag behind the posture.
 
     Args:
-        window: the model that was trained with one; None without.
+        friction_model: the model that was trained on currents without friction; None without compensation.
         lag: time constant of each lag, s; 0 for none.
         reversal: turn that reverses friction, rad.
     """
 
-    def __init__(self, window: VslModel | None, lag: float, reversal: float) -> None:
-        self._window, self._lag, self._reversal = window, lag, reversal
+    def __init__(self, friction_model: VslModel | None, lag: float, reversal: float) -> None:
+        self._friction_model, self._lag, self._reversal = friction_model, lag, reversal
         self._smoothed: tuple[Floats, Floats] | None = None
         self._direction = np.zeros(2)
 
     def step(self, u: Readings, dt: float) -> Floats:
-        """Return the currents, shape (3,), A, after a further period; that of joint 1 is 0 with a window."""
+        """Return the currents, shape (3,), A, after a further period; of joint 1 0 with friction compensation."""
         self._smoothed = self._after(u, dt)
         return self._at_posture(u, self._smoothed[1])
 
@@ -71,9 +71,9 @@ class CurrentFilter:
         """Take up how the joints are commanded to turn on, shape (3,), rad."""
         self._direction = turned(self._direction, turn[1:], self._reversal)
 
-    def swing(self, u: Readings, i: Floats) -> Floats:
+    def oscillation(self, u: Readings, i: Floats) -> Floats:
         """Return by how much currents of joints 2 and 3 are off the smoothed ones, i, shape (2,), A."""
-        friction = 0.0 if self._window is None else self._direction * self._window.friction
+        friction = 0.0 if self._friction_model is None else self._direction * self._friction_model.friction
         return u.i_meas[1:] - friction - i[1:]
 
     def get_state(self) -> bytes:
@@ -85,7 +85,7 @@ class CurrentFilter:
         self._smoothed, self._direction = unpack_state(state)
 
     def _after(self, u: Readings, dt: float) -> tuple[Floats, Floats]:
-        """Return what is smoothed, once and twice: the currents, or with a window [lambda, e_2, e_3]."""
+        """Return what is smoothed, once and twice: the currents, or with friction compensation [lambda, e_2, e_3]."""
         measured = self._explained(u)
         if self._smoothed is None or self._lag == 0.0:
             return np.array(measured), np.array(measured)
@@ -94,17 +94,17 @@ class CurrentFilter:
         return once, self._smoothed[1] + share * (once - self._smoothed[1])
 
     def _explained(self, u: Readings) -> Floats:
-        if self._window is None:
+        if self._friction_model is None:
             return u.i_meas
-        usual, levers = self._window.currents(u.q_meas, u.p_meas)
-        more = u.i_meas[1:] - self._direction * self._window.friction - usual
+        usual, levers = self._friction_model.currents(u.q_meas, u.p_meas)
+        more = u.i_meas[1:] - self._direction * self._friction_model.friction - usual
         by_lever = levers @ more / max(levers @ levers, _SHORTEST_LEVER**2)
         return np.concatenate([[by_lever], more - by_lever * levers])
 
     def _at_posture(self, u: Readings, smoothed: Floats) -> Floats:
-        if self._window is None:
+        if self._friction_model is None:
             return smoothed
-        usual, levers = self._window.currents(u.q_meas, u.p_meas)
+        usual, levers = self._friction_model.currents(u.q_meas, u.p_meas)
         return np.concatenate([[0.0], usual + smoothed[0] * levers + smoothed[1:]])
 
 
@@ -164,16 +164,16 @@ class TrackerLoop:
         self._readings, self._error, self.dq = unpack_state(state)
 
 
-class SwingCompensation:
+class VibrationDamping:
     """Turns joints 2 and 3 against the swings that a path's changes of speed excite.
 
     What joints carry weighs i (a + g) / g under an acceleration a: the tip's, by the path's velocities J qd_ref, from
     one period to the next. That bends links by G i a / g, with G = d q_cmd / d i, eq. (11), which is commanded ahead:
     times K_F, since the servos' share of G does not yield so fast. What swings nevertheless shows in the currents, and
-    the joints yield to it at K_D times the bending, as a damper in series does. That wants a window: without one the
-    smoothed currents lag behind the posture, which is taken for a swing. On the curve with 50 g, at 0.1 and 0.2 m/s,
-    the tip errs by 1.7 and 3.3 mm with a window alone, by 1.5 and 2.5 mm with swings compensated, too; without a window
-    by 3.4 and 4.9 mm, and then by 5.3 and 7.4 mm.
+    the joints yield to it at K_D times the bending, as a damper in series does. That wants friction compensation:
+    without it the smoothed currents lag behind the posture, which is taken for a swing. On the curve with 50 g, at 0.1
+    and 0.2 m/s, the tip errs by 1.7 and 3.3 mm with that alone, by 1.5 and 2.5 mm with swings compensated, too; without
+    it by 3.4 and 4.9 mm, and then by 5.3 and 7.4 mm.
 
     Args:
         model: what corrects.
@@ -194,17 +194,17 @@ class SwingCompensation:
         """By how much the joints are turned, shape (3,), rad."""
         return np.concatenate([[0.0], self._yielded + self._ahead])
 
-    def step(self, dt: float, u: Readings, i: Floats, swing: Floats) -> bool:
+    def step(self, dt: float, u: Readings, i: Floats, oscillation: Floats) -> bool:
         """Find how to turn the joints; return whether at once.
 
         Args:
             dt: period, s.
             u: what is wanted and measured.
             i: smoothed currents, shape (3,), A.
-            swing: by how much those of joints 2 and 3 are off them, shape (2,), A.
+            oscillation: by how much those of joints 2 and 3 are off them, shape (2,), A.
         """
         G = self._model.inverse.jacobian(inputs_of(u.q_ref, u.p_meas, i))[1:, 5:]
-        self._yielded = self._yielded - dt * (self._K_D * (G @ swing) + self._yielded / _YIELD_TIME)
+        self._yielded = self._yielded - dt * (self._K_D * (G @ oscillation) + self._yielded / _YIELD_TIME)
         was = self._ahead
         self._ahead = self._K_F * (G @ (i[1:] * self._weights(dt, u)))
         return bool(np.any(was) or np.any(self._ahead))

@@ -1,4 +1,4 @@
-"""What the kinematics remember: currents with a window, the tracker's loop, what is done against swings."""
+"""What the kinematics remember: currents with friction compensation, the tracker's loop, the damping of vibrations."""
 
 import dataclasses
 from typing import Any
@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.controllers.vsl import default_model, default_physics_model, default_small_model, default_window_model
-from handover.controllers.vsl.corrections import CurrentFilter, SwingCompensation, TrackerLoop
+from handover.controllers.vsl import default_friction_model, default_model, default_physics_model, default_small_model
+from handover.controllers.vsl.feedback import CurrentFilter, TrackerLoop, VibrationDamping
 from handover.controllers.vsl.fit import directions_of
 from handover.controllers.vsl.hybrid_kinematics import Inputs
 from handover.controllers.vsl.learned_model import Adapted, VslModel, inputs_of, turned
 from handover.controllers.vsl.model_text import parse_model
 from handover.cosim.blocks.ports import Floats
 
-WINDOW = parse_model(default_window_model.DEFAULT_MODEL, "that ships")
+FRICTION_MODEL = parse_model(default_friction_model.DEFAULT_MODEL, "that ships")
 MODEL = parse_model(default_model.DEFAULT_MODEL, "that ships")
 ARM = MODEL.kinematics
 Q = ARM.inverse(np.array([0.35, 0.0, 0.15]))
@@ -24,7 +24,7 @@ P = np.array([1e5, 1e5])
 
 
 def reading(q: Floats = Q, **given: Any) -> Inputs:
-    usual, _ = WINDOW.currents(q, P)
+    usual, _ = FRICTION_MODEL.currents(q, P)
     u = Inputs(
         q_ref=q, qd_ref=np.zeros(3), q_meas=q, p_meas=P, i_meas=np.array([0.0, *usual]), p_WG_meas=ARM.forward(q)
     )
@@ -49,23 +49,23 @@ def test_directions_of_commands_are_those_one_after_another():
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_a_window_frees_currents_of_friction(direction: float):
-    friction = np.array(WINDOW.friction)
+    friction = np.array(FRICTION_MODEL.friction)
     assert np.all(friction > 0.02)
-    unit = CurrentFilter(WINDOW, 0.2, 0.002)
+    unit = CurrentFilter(FRICTION_MODEL, 0.2, 0.002)
     unit.turn(np.array([0.0, 1.0, 1.0]) * direction)
     clean = reading()
     sliding = reading(i_meas=clean.i_meas + np.array([0.3, *(direction * friction)]))
     np.testing.assert_allclose(unit.step(sliding, 0.02)[1:], clean.i_meas[1:], atol=1e-12)
-    np.testing.assert_allclose(unit.swing(sliding, clean.i_meas), 0.0, atol=1e-12)
+    np.testing.assert_allclose(unit.oscillation(sliding, clean.i_meas), 0.0, atol=1e-12)
 
 
 def test_what_a_load_adds_does_not_lag_behind_the_posture():
     """A load of constant mass adds its levers to the usual currents: in any posture, at once."""
-    unit, plain = CurrentFilter(WINDOW, 0.2, 0.002), CurrentFilter(None, 0.2, 0.002)
+    unit, plain = CurrentFilter(FRICTION_MODEL, 0.2, 0.002), CurrentFilter(None, 0.2, 0.002)
     worst, worst_plain = 0.0, 0.0
     for k in range(60):
         q = ARM.inverse(np.array([0.30 + 0.0015 * k, 0.0, 0.15]))
-        usual, levers = WINDOW.currents(q, P)
+        usual, levers = FRICTION_MODEL.currents(q, P)
         u = reading(q, i_meas=np.array([0.0, *(usual + 0.3 * levers)]))
         worst = max(worst, float(np.max(np.abs(unit.step(u, 0.02) - u.i_meas))))
         worst_plain = max(worst_plain, float(np.max(np.abs(plain.step(u, 0.02) - u.i_meas))))
@@ -74,9 +74,9 @@ def test_what_a_load_adds_does_not_lag_behind_the_posture():
 
 
 def test_a_change_of_load_is_smoothed_by_two_lags():
-    unit = CurrentFilter(WINDOW, 0.2, 0.002)
+    unit = CurrentFilter(FRICTION_MODEL, 0.2, 0.002)
     unit.step(reading(), 0.02)
-    _, levers = WINDOW.currents(Q, P)
+    _, levers = FRICTION_MODEL.currents(Q, P)
     heavier = reading(i_meas=reading().i_meas + np.array([0.0, *(0.4 * levers)]))
     shares = [float((unit.step(heavier, 0.02) - reading().i_meas)[1] / (0.4 * levers[0])) for _ in range(100)]
     t = 0.02 * np.arange(1, 101)
@@ -123,7 +123,7 @@ def test_the_loop_rests_while_joints_are_on_their_way_and_stays_within_its_limit
 
 
 def test_a_velocity_that_begins_is_commanded_ahead_once():
-    unit, i = SwingCompensation(MODEL, 0.6, 0.0), reading().i_meas
+    unit, i = VibrationDamping(MODEL, 0.6, 0.0), reading().i_meas
     v_up = ARM.joint_velocities(Q, np.array([0.0, 0.0, 0.2]))
     off_the_path = np.array([0.8, 0.8, 0.8])
     for _ in range(8):
@@ -149,10 +149,10 @@ ADAPTED = dataclasses.replace(
 )
 
 
-@pytest.mark.parametrize("model", [MODEL, WINDOW, SMALL, PHYSICS, ADAPTED])
+@pytest.mark.parametrize("model", [MODEL, FRICTION_MODEL, SMALL, PHYSICS, ADAPTED])
 def test_what_bends_by_a_swing_is_how_the_command_changes_with_the_currents(model: VslModel):
     """What is commanded ahead of a first velocity is K_F G i a / g; G as differences of `VslModel.command` have it."""
-    unit, v, dt = SwingCompensation(model, 0.6, 0.0), np.array([0.0, 0.0, 0.2]), 0.02
+    unit, v, dt = VibrationDamping(model, 0.6, 0.0), np.array([0.0, 0.0, 0.2]), 0.02
     i = np.array([0.0, *model.inverse.domain.mean[5:].tolist()])
     qd = ARM.joint_velocities(Q, v)
     unit.step(dt, reading(Q - dt * qd), i, np.zeros(2))
@@ -163,7 +163,7 @@ def test_what_bends_by_a_swing_is_how_the_command_changes_with_the_currents(mode
     assert np.all(unit.dq[1:] > 0.001)
 
 
-@pytest.mark.parametrize("model", [MODEL, WINDOW, SMALL, PHYSICS, ADAPTED])
+@pytest.mark.parametrize("model", [MODEL, FRICTION_MODEL, SMALL, PHYSICS, ADAPTED])
 @pytest.mark.parametrize("which", ["inverse", "forward"])
 def test_jacobians_are_those_of_differences_by_every_input(model: VslModel, which: str):
     regressor = getattr(model, which)
@@ -178,7 +178,7 @@ def test_jacobians_are_those_of_differences_by_every_input(model: VslModel, whic
 
 
 def test_joints_yield_to_a_swing_and_come_back():
-    unit, i = SwingCompensation(MODEL, 0.0, 4.0), reading().i_meas
+    unit, i = VibrationDamping(MODEL, 0.0, 4.0), reading().i_meas
     for _ in range(3):
         unit.step(0.02, reading(), i, np.array([0.1, 0.0]))
     down = float(unit.dq[1])
