@@ -1,4 +1,4 @@
-"""What the corrected kinematics remember: currents, friction's direction, the tracker's errors, the path's speed."""
+"""What the corrected kinematics remember: currents, friction's direction, the tip's errors, the path's speed."""
 
 import math
 from typing import Protocol
@@ -27,6 +27,13 @@ _YIELD_TIME = 0.3
 
 _GRAVITY = 9.81
 
+_SHAKEN = 0.05
+"""Root mean square by which an accelerometer's angle changes from period to period, rad, from which it tells more of
+shaking than of where a link points (assumed)."""
+
+_SHAKING_TIME = 0.2
+"""Time over which that mean is taken, s (assumed)."""
+
 
 class Readings(Protocol):
     """What is wanted and what is measured, of `HybridKinematics`."""
@@ -37,6 +44,7 @@ class Readings(Protocol):
     p_meas: Floats
     i_meas: Floats
     p_WG_meas: Floats
+    tilt_meas: Floats
 
 
 class CurrentFilter:
@@ -108,8 +116,8 @@ class CurrentFilter:
         return np.concatenate([[0.0], usual + smoothed[0] * levers + smoothed[1:]])
 
 
-class TrackerLoop:
-    """Integral control of the tip by the tracker, at its rate: dq' = K_I J~^+ e, with e = f(q_ref) - p_WG_meas.
+class TipLoop:
+    """Integral control of the tip as tracker or IMUs see it, at their rate: dq' = K_I J~^+ e, e = f(q_ref) - p_WG.
 
     q_ref is that of the period that ends; J~ is the corrected Jacobian, J~^+ its damped inverse. e is smoothed: an arm
     that swings would be swung up. dq rests while joints are on their way.
@@ -117,7 +125,7 @@ class TrackerLoop:
     Args:
         kinematics: f, of rigid links.
         model: what corrects its Jacobian; None for rigid links.
-        rate: of the tracker, Hz.
+        rate: of readings, Hz.
         lag: time constant of the smoothing, s; 0 for none.
         K_I: share of the error that is taken away in a second, 1/s.
         limit: largest turn of a joint, rad.
@@ -134,12 +142,13 @@ class TrackerLoop:
         self.dq = np.zeros(3)
         """By how much the joints are turned, rad."""
 
-    def step(self, t: float, u: Readings, i: Floats, before: tuple[Floats, Floats] | None) -> None:
-        """Turn the joints on by a share of the tip's error, if the tracker has a reading that it had not.
+    def step(self, t: float, u: Readings, p_WG: Floats, i: Floats, before: tuple[Floats, Floats] | None) -> None:
+        """Turn the joints on by a share of the tip's error, if there is a reading that there was not.
 
         Args:
             t: time, s.
             u: what is measured.
+            p_WG: where the tip is seen, shape (3,), m.
             i: smoothed currents, shape (3,), A.
             before: q_ref and q_cmd of the period that ends.
         """
@@ -147,9 +156,9 @@ class TrackerLoop:
         if readings == self._readings:
             return
         self._readings = readings
-        if before is None or np.max(np.abs(before[1] - u.q_meas)) > _ON_THE_WAY:
+        if before is None or on_the_way(before[1], u.q_meas):
             return
-        self._error = self._error + self._share * (self._kinematics.forward(before[0]) - u.p_WG_meas - self._error)
+        self._error = self._error + self._share * (self._kinematics.forward(before[0]) - p_WG - self._error)
         q = u.q_meas
         J = self._kinematics.jacobian(q) if self._model is None else self._model.tip_jacobian(q, u.p_meas, i)
         damped = np.transpose(J) @ np.linalg.solve(J @ np.transpose(J) + _DAMPING**2 * np.eye(3), self._error)
@@ -164,16 +173,98 @@ class TrackerLoop:
         self._readings, self._error, self.dq = unpack_state(state)
 
 
+class ImuTip:
+    """Sees the tip by the inclinations of the links' ends, see `VslKinematics.bent`, as long as the links do not shake.
+
+    An accelerometer takes every acceleration for a change of gravity's direction, and atan2 does not let that average
+    out: of an arm that swings at 1.5 bar with 25 g, whose inclinations shake by 0.26 rad, the tip seems 15 mm off.
+
+    Args:
+        kinematics: of rigid links.
+        shares: see `VslKinematics.bent`.
+    """
+
+    def __init__(self, kinematics: VslKinematics, shares: Floats) -> None:
+        self._kinematics, self._shares = kinematics, shares
+        self._before: Floats | None = None
+        self._square = np.zeros(2)
+
+    def step(self, dt: float, u: Readings) -> Floats | None:
+        """Return where the tip is, shape (3,), m, a period, s, after the last; None while links shake."""
+        if self._before is not None:
+            share = 1.0 - math.exp(-dt / _SHAKING_TIME)
+            self._square = self._square + share * ((u.tilt_meas - self._before) ** 2 - self._square)
+        self._before = np.array(u.tilt_meas)
+        if np.max(self._square) > _SHAKEN**2:
+            return None
+        return self._kinematics.bent(u.q_meas, u.tilt_meas, self._shares)
+
+    def get_state(self) -> bytes:
+        """Return the inclinations of the last period, and how they shake."""
+        return pack_state((self._before, self._square))
+
+    def set_state(self, state: bytes) -> None:
+        """Restore a state of this sensor or of one with equal arguments."""
+        self._before, self._square = unpack_state(state)
+
+
+class ModelMonitor:
+    """Tells by a sensor that the arm is not the one that was learned from: by the innovation, measured - estimated tip.
+
+    It is smoothed, so that noise and swings do not count, and rests while joints are on their way. What was learned
+    cannot tell by its own inputs: on an arm with stiffer links they are as they were.
+
+    Args:
+        lag: time constant of the smoothing, s; 0 for none.
+        limit: length of the smoothed innovation above which the arm differs, m.
+    """
+
+    def __init__(self, lag: float, limit: float) -> None:
+        self._lag, self._limit = lag, limit
+        self._mean = np.zeros(3)
+
+    @property
+    def innovation(self) -> float:
+        """Length of the smoothed innovation, m."""
+        return float(np.linalg.norm(self._mean))
+
+    @property
+    def mismatch(self) -> bool:
+        """Whether it is above the limit."""
+        return self.innovation > self._limit
+
+    def step(self, dt: float, p_WG: Floats, p_WG_est: Floats) -> None:
+        """Take up where the tip is seen and where it is taken to be, shape (3,), m, a period, s, after the last."""
+        share = 1.0 if self._lag == 0.0 else 1.0 - math.exp(-dt / self._lag)
+        self._mean = self._mean + share * (p_WG - p_WG_est - self._mean)
+
+    def get_state(self) -> bytes:
+        """Return the smoothed innovation."""
+        return pack_state(self._mean)
+
+    def set_state(self, state: bytes) -> None:
+        """Restore a state of this monitor or of one with equal arguments."""
+        self._mean = unpack_state(state)
+
+
+def on_the_way(q_cmd: Floats, q_meas: Floats) -> bool:
+    """Return whether a joint is still far from where it was commanded to, so that the tip is not yet to judge."""
+    return bool(np.max(np.abs(q_cmd - q_meas)) > _ON_THE_WAY)
+
+
 class VibrationDamping:
     """Turns joints 2 and 3 against the swings that a path's changes of speed excite.
 
     What joints carry weighs i (a + g) / g under an acceleration a: the tip's, by the path's velocities J qd_ref, from
     one period to the next. That bends links by G i a / g, with G = d q_cmd / d i, eq. (11), which is commanded ahead:
     times K_F, since the servos' share of G does not yield so fast. What swings nevertheless shows in the currents, and
-    the joints yield to it at K_D times the bending, as a damper in series does. That wants friction compensation:
-    without it the smoothed currents lag behind the posture, which is taken for a swing. On the curve with 50 g, at 0.1
-    and 0.2 m/s, the tip errs by 1.7 and 3.3 mm with that alone, by 1.5 and 2.5 mm with swings compensated, too; without
-    it by 3.4 and 4.9 mm, and then by 5.3 and 7.4 mm.
+    the joints yield to it at K_D times the bending, as a damper in series does.
+
+    Without friction compensation K_D must be 0: smoothed currents lag behind the posture, and what they lack is taken
+    for a swing. On the curve with 50 g, at 0.1 and 0.2 m/s, the tip errs by 3.1 and 4.4 mm without damping, by 5.1 and
+    6.7 mm with K_D = 4 (at 0.1 m/s by 2.4 and 3.9 mm on an arm without friction, too; by 3.8 and 7.3 mm with lags of
+    1 s), and by 3.0 and 4.3 mm with what is commanded ahead alone. With friction compensation it errs by 1.4 and 3.0
+    mm, and by 1.2 and 2.2 mm with both.
 
     Args:
         model: what corrects.

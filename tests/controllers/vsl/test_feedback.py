@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handover.controllers.vsl import default_friction_model, default_model, default_physics_model, default_small_model
-from handover.controllers.vsl.feedback import CurrentFilter, TrackerLoop, VibrationDamping
+from handover.controllers.vsl.feedback import CurrentFilter, ImuTip, ModelMonitor, TipLoop, VibrationDamping
 from handover.controllers.vsl.fit import directions_of
 from handover.controllers.vsl.hybrid_kinematics import Inputs
 from handover.controllers.vsl.learned_model import Adapted, VslModel, inputs_of, turned
@@ -86,11 +86,11 @@ def test_a_change_of_load_is_smoothed_by_two_lags():
 def closed(error: Floats, seconds: float, **given: float) -> Floats:
     """Return where the tip of a rigid arm is that is off by an error, after the loop was closed for a while."""
     params = {"rate": 30.0, "lag": 0.2, "K_I": 2.0, "limit": 0.2} | given
-    loop = TrackerLoop(ARM, None, **params)
+    loop = TipLoop(ARM, None, **params)
     before = Q, Q
     for k in range(round(seconds / 0.02)):
         at = ARM.forward(Q + loop.dq) + error
-        loop.step(k * 0.02, reading(p_WG_meas=at), np.zeros(3), before)
+        loop.step(k * 0.02, reading(), at, np.zeros(3), before)
     return ARM.forward(Q + loop.dq) + error
 
 
@@ -102,23 +102,23 @@ def test_the_loop_takes_the_tips_error_away():
 
 
 def test_the_loop_takes_each_reading_once():
-    loop = TrackerLoop(ARM, None, 10.0, 0.0, 2.0, 0.2)
-    off = reading(p_WG_meas=ARM.forward(Q) - np.array([0.0, 0.0, 0.01]))
+    loop = TipLoop(ARM, None, 10.0, 0.0, 2.0, 0.2)
+    off = ARM.forward(Q) - np.array([0.0, 0.0, 0.01])
     seen: list[float] = []
     for k in range(11):
-        loop.step(k * 0.02, off, np.zeros(3), (Q, Q))
+        loop.step(k * 0.02, reading(), off, np.zeros(3), (Q, Q))
         seen.append(float(loop.dq[1]))
     assert seen[0] == seen[4] < seen[5] == seen[9] < seen[10]
 
 
 def test_the_loop_rests_while_joints_are_on_their_way_and_stays_within_its_limit():
-    loop = TrackerLoop(ARM, None, 30.0, 0.0, 20.0, 0.05)
-    far = reading(p_WG_meas=ARM.forward(Q) - np.array([0.0, 0.0, 0.2]))
-    loop.step(0.0, far, np.zeros(3), (Q, Q + np.array([0.0, 0.1, 0.0])))
-    loop.step(0.1, far, np.zeros(3), None)
+    loop = TipLoop(ARM, None, 30.0, 0.0, 20.0, 0.05)
+    far = ARM.forward(Q) - np.array([0.0, 0.0, 0.2])
+    loop.step(0.0, reading(), far, np.zeros(3), (Q, Q + np.array([0.0, 0.1, 0.0])))
+    loop.step(0.1, reading(), far, np.zeros(3), None)
     np.testing.assert_array_equal(loop.dq, np.zeros(3))
     for k in range(40):
-        loop.step(0.2 + 0.05 * k, far, np.zeros(3), (Q, Q))
+        loop.step(0.2 + 0.05 * k, reading(), far, np.zeros(3), (Q, Q))
     assert np.max(np.abs(loop.dq)) == 0.05
 
 
@@ -186,3 +186,35 @@ def test_joints_yield_to_a_swing_and_come_back():
     for _ in range(100):
         unit.step(0.02, reading(), i, np.zeros(2))
     assert abs(float(unit.dq[1])) < 0.01 * abs(down)
+
+
+def test_imus_see_the_tip_of_links_bent_in_arcs():
+    """Of arcs, whose direction turns evenly, the chord leads half way between their ends."""
+    begins, bends = np.array([0.6, -0.5]), np.array([0.08, 0.12])
+    along = [np.exp(1j * (a - d * np.linspace(0.0, 1.0, 20001))).mean() for a, d in zip(begins, bends, strict=True)]
+    tip = 0.225 * (along[0] + along[1])
+    q = np.array([0.3, begins[0], begins[1] - (begins[0] - bends[0])])
+    seen = ARM.bent(q, begins - bends, np.array([0.5, 0.5]))
+    np.testing.assert_allclose(seen, [tip.real * np.cos(0.3), tip.real * np.sin(0.3), 0.15 + tip.imag], atol=2e-4)
+    np.testing.assert_allclose(ARM.bent(q, np.array([q[1], q[1] + q[2]]), np.array([0.75, 1.0])), ARM.forward(q))
+
+
+def test_imus_do_not_tell_the_tip_while_links_shake():
+    sensor, still = ImuTip(ARM, np.array([0.75, 1.0])), np.array([Q[1], Q[1] + Q[2]])
+    for k in range(50):
+        assert sensor.step(0.02, reading(tilt_meas=still + 0.003 * (-1) ** k)) is not None
+    shaken = [sensor.step(0.02, reading(tilt_meas=still + 0.1 * (-1) ** k)) for k in range(50)]
+    assert shaken[-1] is None
+    calm = [sensor.step(0.02, reading(tilt_meas=still)) for _ in range(100)]
+    np.testing.assert_allclose(calm[-1], ARM.forward(Q))
+
+
+def test_the_innovation_is_smoothed_and_has_a_limit():
+    monitor, off = ModelMonitor(2.0, 0.004), np.array([0.0, 0.003, -0.004])
+    for _ in range(100):
+        monitor.step(0.02, off, np.zeros(3))
+    assert monitor.innovation == pytest.approx(0.005 * (1.0 - np.exp(-1.0)))
+    assert not monitor.mismatch
+    for _ in range(200):
+        monitor.step(0.02, off, np.zeros(3))
+    assert monitor.mismatch

@@ -8,6 +8,7 @@ from handover.scenarios.published.vsl.separation import Comparison, separation_c
 from handover.scenarios.published.vsl.vsl_2.runs import (
     CASES,
     CUBIC,
+    IMU,
     MODEL_BASED,
     PUBLISHED,
     RIGID,
@@ -27,7 +28,7 @@ _RIGID_BY_CHOICE = (
 
 def claims_of(runs: Vsl2Runs) -> list[Claim]:
     """Return the claims, those beyond the paper last."""
-    return [*_estimates(runs), _command(runs), _rigid(runs), *_stiffer(runs), *_other_arms(runs)]
+    return [*_estimates(runs), _command(runs), _rigid(runs), *_stiffer(runs), *_other_arms(runs), *_imus(runs)]
 
 
 def _estimates(runs: Vsl2Runs) -> list[Claim]:
@@ -101,6 +102,16 @@ def _other_arms(runs: Vsl2Runs) -> list[Claim]:
             for what, comparisons in against.items()
         ]
     return claims
+
+
+def _imus(runs: Vsl2Runs) -> list[Claim]:
+    """Judge the polynomials with feedback by IMUs against themselves without."""
+    pairs = [(case, arm) for case in CASES for arm in (TRAINED, *runs.arms)]
+    if IMU not in runs.feedback:
+        return []
+    comparisons = [_compared(runs, case, IMU, CUBIC, arm, arm) for case, arm in pairs]
+    sentence = "On every arm the tip errs less by polynomials with an IMU a link than by polynomials alone."
+    return [separation_claim(sentence, "", "", comparisons, beyond=True)]
 
 
 def _compared(

@@ -15,6 +15,7 @@ from handover.scenarios.published.vsl.vsl_2.figures import draw_figures
 from handover.scenarios.published.vsl.vsl_2.runs import (
     CASES,
     CUBIC,
+    FEEDBACK,
     MODEL_BASED,
     OTHERS,
     PUBLISHED,
@@ -36,10 +37,11 @@ class Vsl2(PublishedExperiment):
     """The curve with 25 g at 1.5 bar and with 75 g at 0.5 bar, five times each, by rigid kinematics and by corrections.
 
     Corrections are those of cubic polynomials, the default, of a small network and of a beam of four fitted numbers,
-    which ship, and of the paper's network if `take_model` was given the file of one. Besides, the arm of rigid links
-    goes by rigid kinematics, with joints as stiff as assumed and stiffer. Corrections are tried on the arm that they
-    were learned from, and on others. The quick plan has each case once by rigid kinematics and by polynomials, on the
-    arm that was learned from and on another, and on two rigid arms.
+    which ship, and of the paper's network if `take_model` was given the file of one. Polynomials are tried with
+    feedback, too, by the tracker or by an IMU a link. Besides, the arm of rigid links goes by rigid kinematics, with
+    joints as stiff as assumed and stiffer. Corrections are tried on the arm that they were learned from, and on others.
+    The quick plan has each case once by rigid kinematics and by polynomials, on the arm that was learned from and on
+    another, and on two rigid arms.
 
     The beam has the law of bending and the masses of the arm that it is tried on (an inverse crime): its errors are the
     least that such a correction could reach, and say nothing of one on a real arm.
@@ -72,7 +74,7 @@ class Vsl2(PublishedExperiment):
         if quick:
             methods, rigid, arms = (MODEL_BASED, CUBIC, *network), (RIGID, RIGIDS[-1]), OTHERS[:1]
         else:
-            methods, rigid, arms = (MODEL_BASED, *SHIPPED, *network), RIGIDS, OTHERS
+            methods, rigid, arms = (MODEL_BASED, *SHIPPED, *network, *FEEDBACK), RIGIDS, OTHERS
         tried = [(method, arm) for arm in (TRAINED, *arms) for method in methods] + [
             (method, TRAINED) for method in rigid
         ]

@@ -89,7 +89,7 @@ def _label_plane(axes: Axes, case: Case) -> None:
 
 
 def _boxes(runs: Vsl2Runs, traces: Mapping[tuple[Case, ControlMethod], Sequence[PathTrace]], folder: Path) -> Figure:
-    with figure(folder / "errors", len(CASES), size=(9.0, 6.6)) as panels:
+    with figure(folder / "errors", len(CASES), size=(11.0, 6.6)) as panels:
         for axes, case in zip(panels, CASES, strict=True):
             for k, method in enumerate(runs.methods):
                 errors = np.concatenate([np.linalg.norm(t.tracked - t.desired, axis=1) for t in traces[case, method]])
@@ -143,7 +143,7 @@ def _by_joints(runs: Vsl2Runs, folder: Path) -> Figure:
 
 def _by_arm(runs: Vsl2Runs, folder: Path) -> Figure:
     methods = [method for method in runs.methods if method.is_learned or method is MODEL_BASED]
-    with figure(folder / "other_arms", 1, len(CASES), size=(9.0, 3.8)) as panels:
+    with figure(folder / "other_arms", len(CASES), size=(9.0, 6.6)) as panels:
         for axes, case in zip(panels, CASES, strict=True):
             for k, method in enumerate(methods):
                 trained = 1000 * runs.metric("mean_error", case, method, TRAINED)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.controllers.vsl.hybrid_kinematics import Learned, Method
+from handover.controllers.vsl.hybrid_kinematics import Imu, Learned, Method
 from handover.cosim.blocks.ports import Floats
 from handover.plants.vsl.parameters import Link
 from handover.scenarios.campaign.plan import is_number
@@ -75,6 +75,11 @@ PUBLISHED = _learned("the paper's network", Learned.PUBLISHED)
 PHYSICS = _learned("beam", Learned.PHYSICS)
 SHIPPED = (CUBIC, SMALL, PHYSICS)
 LEARNED = (CUBIC, SMALL, PUBLISHED, PHYSICS)
+
+TRACKER = ControlMethod("polynomials and tracker", {**CUBIC.parameters, "closed_loop": "true"})
+IMU = ControlMethod("polynomials and IMUs", {**CUBIC.parameters, "imu": Imu.FEEDBACK.name.lower()})
+FEEDBACK = (TRACKER, IMU)
+"""Beyond the paper's open loop, of its future work: with feedback by a tracker of 30 Hz, or by an IMU a link."""
 
 JOINT_FACTORS: tuple[float, ...] = tuple(_BEYOND["joint_factors"])
 """How many times as stiff as assumed the joints of the rigid arm are."""
@@ -147,6 +152,11 @@ class Vsl2Runs:
         return tuple(method for method in LEARNED if self.rows(CASES[0], method))
 
     @property
+    def feedback(self) -> tuple[ControlMethod, ...]:
+        """The methods with feedback that any run goes."""
+        return tuple(method for method in FEEDBACK if self.rows(CASES[0], method))
+
+    @property
     def rigid(self) -> tuple[tuple[float, ControlMethod], ...]:
         """Rigid arms that any run is on, with how many times as stiff their joints are."""
         return tuple(
@@ -159,6 +169,7 @@ class Vsl2Runs:
         return (
             *((MODEL_BASED,) if self.rows(CASES[0], MODEL_BASED) else ()),
             *self.learned,
+            *self.feedback,
             *(w for _, w in self.rigid),
         )
 
@@ -194,10 +205,20 @@ def _plain(value: Any) -> str | float:
     """Return a number, also one that is a text, as such, and a name in lower case."""
     if isinstance(value, enum.Enum):
         return value.name.lower()
+    if value in ("true", "false"):
+        return float(value == "true")
     return float(value) if not isinstance(value, str) or is_number(value) else value
 
 
-_VARIED = {name for arm in OTHERS for name in arm.parameters} | {"load", "pressure", "links", "learned", "joint_factor"}
+_VARIED = {name for arm in OTHERS for name in arm.parameters} | {
+    "load",
+    "pressure",
+    "links",
+    "learned",
+    "closed_loop",
+    "imu",
+    "joint_factor",
+}
 _DEFAULTS: dict[str, str | float] = {
     **{name: _plain(value) for name, value in vars(HybridParameters()).items() if name in _VARIED},
     "kinematics.method": Method.HYBRID.name.lower(),

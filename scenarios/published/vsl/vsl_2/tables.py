@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from handover.cosim.blocks.ports import Floats
 from handover.scenarios.published.published_experiment import ComparisonTable, Verdict
 from handover.scenarios.published.vsl.separation import Comparison, separation_claim
 from handover.scenarios.published.vsl.vsl_1.tables import format_mean, format_spread
@@ -91,20 +92,30 @@ def _others(runs: Vsl2Runs) -> ComparisonTable:
         for case in CASES:
             found = [runs.rows(case, method, arm) for method in methods]
             values = [runs.metric("mean_error", case, method, arm) for method in methods]
-            outside = np.concatenate(
-                [runs.metric("outside", case, method, arm) for method in methods if method.is_learned]
-            )
-            share = f"{100 * outside.mean():.0f} %" if any(found) and len(outside) else ""
-            rows.append([arm.label, case.label, *(format_mean(v) for v in values), share])
+            outside = np.concatenate([runs.metric("outside", case, method, arm) for method in runs.learned])
+            share = _share(outside) if any(found) else ""
+            told = [_share(runs.metric("model_mismatch", case, method, arm)) for method in runs.feedback]
+            rows.append([arm.label, case.label, *(format_mean(v) for v in values), share, *told])
     return ComparisonTable(
         title="The trained arm and others: mean errors (mm)",
-        header=["arm", "load, pressure", *(method.label for method in methods), "told as outside"],
+        header=[
+            "arm",
+            "load, pressure",
+            *(method.label for method in methods),
+            "told as outside",
+            *(f"mismatch, {method.label}" for method in runs.feedback),
+        ],
         rows=rows,
         note="Nothing was learned from the others. Arms of one kind differ in stiffness and mass of each link, "
         f"friction of each gear and stiffness of each joint by {100 * SCATTER:g} % (standard deviation). Told as "
         "outside: share of the points at which what was learned says that it is asked about what it was not taught "
-        f"on, over all learned methods.{_OWN_LAW if PHYSICS in methods else ''}",
+        "on, over all learned methods. Mismatch: share at which the controller tells by tracker or IMUs that the arm "
+        f"is another; without such a sensor that cannot be known.{_OWN_LAW if PHYSICS in methods else ''}",
     )
+
+
+def _share(values: Floats) -> str:
+    return f"{100 * values.mean():.0f} %" if len(values) else ""
 
 
 def _estimates(runs: Vsl2Runs) -> ComparisonTable:
