@@ -68,12 +68,14 @@ class CurrentFilter:
 
     def step(self, u: Readings, dt: float) -> Floats:
         """Return the currents, shape (3,), A, after a further period; of joint 1 0 with friction compensation."""
-        self._smoothed = self._after(u, dt)
-        return self._at_posture(u, self._smoothed[1])
+        usual = self._usual(u)
+        self._smoothed = self._after(u, dt, usual)
+        return self._at_posture(self._smoothed[1], usual)
 
     def now(self, u: Readings) -> Floats:
         """Return the currents as they would be; no time passes."""
-        return self._at_posture(u, self._after(u, 0.0)[1])
+        usual = self._usual(u)
+        return self._at_posture(self._after(u, 0.0, usual)[1], usual)
 
     def turn(self, turn: Floats) -> None:
         """Take up how the joints are commanded to turn on, shape (3,), rad."""
@@ -92,27 +94,32 @@ class CurrentFilter:
         """Restore a state of this filter or of one with equal arguments."""
         self._smoothed, self._direction = unpack_state(state)
 
-    def _after(self, u: Readings, dt: float) -> tuple[Floats, Floats]:
+    def _usual(self, u: Readings) -> tuple[Floats, Floats]:
+        """Return i_0 and b at the posture, A and m; nothing without friction compensation."""
+        model = self._friction_model
+        return (np.zeros(0), np.zeros(0)) if model is None else model.currents(u.q_meas, u.p_meas)
+
+    def _after(self, u: Readings, dt: float, usual: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Return what is smoothed, once and twice: the currents, or with friction compensation [lambda, e_2, e_3]."""
-        measured = self._explained(u)
+        measured = self._explained(u, usual)
         if self._smoothed is None or self._lag == 0.0:
             return np.array(measured), np.array(measured)
         share = 1.0 - math.exp(-dt / self._lag)
         once = self._smoothed[0] + share * (measured - self._smoothed[0])
         return once, self._smoothed[1] + share * (once - self._smoothed[1])
 
-    def _explained(self, u: Readings) -> Floats:
+    def _explained(self, u: Readings, at_posture: tuple[Floats, Floats]) -> Floats:
         if self._friction_model is None:
             return u.i_meas
-        usual, levers = self._friction_model.currents(u.q_meas, u.p_meas)
+        usual, levers = at_posture
         more = u.i_meas[1:] - self._direction * self._friction_model.friction - usual
         by_lever = levers @ more / max(levers @ levers, _SHORTEST_LEVER**2)
         return np.concatenate([[by_lever], more - by_lever * levers])
 
-    def _at_posture(self, u: Readings, smoothed: Floats) -> Floats:
+    def _at_posture(self, smoothed: Floats, at_posture: tuple[Floats, Floats]) -> Floats:
         if self._friction_model is None:
             return smoothed
-        usual, levers = self._friction_model.currents(u.q_meas, u.p_meas)
+        usual, levers = at_posture
         return np.concatenate([[0.0], usual + smoothed[0] * levers + smoothed[1:]])
 
 
@@ -226,7 +233,7 @@ class ModelMonitor:
     @property
     def innovation(self) -> float:
         """Length of the smoothed innovation, m."""
-        return float(np.linalg.norm(self._mean))
+        return math.hypot(*self._mean.tolist())
 
     @property
     def mismatch(self) -> bool:
@@ -313,11 +320,12 @@ class VibrationDamping:
         k, q = self._model.kinematics, u.q_ref
         v = self._velocity(u)
         a, self._v, self._path = (v - self._v) / dt, v, (np.array(q), np.array(u.qd_ref))
-        outwards = a[0] * math.cos(q[0]) + a[1] * math.sin(q[0])
-        lengths, angles = np.array([k.L_2, k.L_3]), np.array([q[1], q[1] + q[2]])
-        x, z = (np.cumsum((lengths * of(angles))[::-1])[::-1] for of in (np.cos, np.sin))  # from each joint
-        slopes = z / np.where(np.abs(x) < _SHORTEST_LEVER, np.inf, x)
-        return (a[2] - outwards * slopes) / _GRAVITY
+        theta_1, theta_2, theta_3 = q.tolist()
+        outwards, upwards = float(a[0]) * math.cos(theta_1) + float(a[1]) * math.sin(theta_1), float(a[2])
+        x_3, z_3 = k.L_3 * math.cos(theta_2 + theta_3), k.L_3 * math.sin(theta_2 + theta_3)
+        x_2, z_2 = x_3 + k.L_2 * math.cos(theta_2), z_3 + k.L_2 * math.sin(theta_2)
+        slopes = [z / x if abs(x) >= _SHORTEST_LEVER else 0.0 for x, z in ((x_2, z_2), (x_3, z_3))]  # from each joint
+        return np.array([upwards - outwards * slope for slope in slopes]) / _GRAVITY
 
     def _velocity(self, u: Readings) -> Floats:
         """Return the path's velocity, shape (3,), m/s.

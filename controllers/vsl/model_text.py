@@ -333,7 +333,8 @@ def _plain(regressor: Regressor) -> dict[str, Any]:
         beam = {**regressor.beam.stiffness._asdict(), **regressor.beam.weights._asdict()}
         droop = {"droop": regressor.droop} if isinstance(regressor, BentCommand) else {}
         return {"mean": mean, "scale": scale, "hull": hull, "beam": beam, **droop}
-    assert isinstance(regressor, Cubic)
+    if not isinstance(regressor, Cubic):
+        raise TypeError(f"a model's file has no form for {type(regressor).__name__}")
     return {
         "mean": mean,
         "scale": scale,
