@@ -149,6 +149,26 @@ class VslKinematics:
             return f"it is on the axis of joint 1, {r_1:.4g} m from it"
         return None
 
+    def fault(self, p_WG: Floats, margin: float) -> str | None:
+        """Return why the tip cannot be at a point of a path, or a singularity is too near, or None.
+
+        Args:
+            p_WG: the point, shape (3,), m.
+            margin: see `singularity`.
+        """
+        if not np.all(np.isfinite(p_WG)):
+            return "it is not finite"
+        try:
+            self.inverse(p_WG)
+        except Unreachable as e:
+            least, greatest = self.reach
+            r_3 = math.dist(p_WG, (0.0, 0.0, self.L_1))
+            by = f", {1000.0 * (r_3 - greatest):.4g} mm too far" if r_3 > greatest else ""
+            by = f", {1000.0 * (least - r_3):.4g} mm too near" if r_3 < least else by
+            return e.fault + by
+        fault = self.singularity(p_WG, margin)
+        return fault and f"singular: {fault}"
+
 
 def _cosine(x: float) -> float:
     """Clip what rounding adds at the limits of reach."""

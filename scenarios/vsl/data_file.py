@@ -2,8 +2,6 @@
 
 import json
 import math
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -13,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handover.controllers.vsl.kinematics import VslKinematics
+from handover.scenarios.results.run_folder import replacing
 from handover.scenarios.vsl.training_data import Dataset, Measured
 
 VERSION = 1
@@ -51,15 +50,8 @@ def write_data(path: Path, measured: Measured) -> None:
     }
     table: Any = pa.Table.from_pydict({**columns, _ORDER: measured.order})
     metadata = {_METADATA: json.dumps({"version": VERSION, **measured.origin}, sort_keys=True).encode()}
-    handle, part = tempfile.mkstemp(dir=path.absolute().parent, prefix=f".{path.name}-")
-    os.close(handle)
-    try:
-        pq.write_table(table.replace_schema_metadata(metadata), part)
-        Path(part).chmod(0o644)
-        os.replace(part, path)
-    except BaseException:
-        Path(part).unlink(missing_ok=True)
-        raise
+    with replacing(path) as unfinished:
+        pq.write_table(table.replace_schema_metadata(metadata), unfinished)
 
 
 def read_data(path: Path, key: str, kinematics: VslKinematics) -> Measured:
