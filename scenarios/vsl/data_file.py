@@ -2,6 +2,8 @@
 
 import json
 import math
+import os
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -11,7 +13,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handover.controllers.vsl.kinematics import VslKinematics
-from handover.scenarios.results.run_folder import replacing
 from handover.scenarios.vsl.training_data import Dataset, Measured
 
 VERSION = 1
@@ -50,8 +51,15 @@ def write_data(path: Path, measured: Measured) -> None:
     }
     table: Any = pa.Table.from_pydict({**columns, _ORDER: measured.order})
     metadata = {_METADATA: json.dumps({"version": VERSION, **measured.origin}, sort_keys=True).encode()}
-    with replacing(path) as unfinished:
-        pq.write_table(table.replace_schema_metadata(metadata), unfinished)
+    handle, part = tempfile.mkstemp(dir=path.absolute().parent, prefix=f".{path.name}-")
+    os.close(handle)
+    try:
+        pq.write_table(table.replace_schema_metadata(metadata), part)
+        Path(part).chmod(0o644)
+        os.replace(part, path)
+    except BaseException:
+        Path(part).unlink(missing_ok=True)
+        raise
 
 
 def read_data(path: Path, key: str, kinematics: VslKinematics) -> Measured:
