@@ -92,7 +92,7 @@ def domain_of(x: Floats) -> Domain:
 def directions_of(q_cmd: Floats, reversal: float) -> Floats:
     """Return which way the gears' friction acts after each of commands one after another, from -1 to 1.
 
-    It grows with the turn, from -1 to 1 over `reversal`, and stays while the joint turns on: a window of the past that
+    It grows with the turn, from -1 to 1 over `reversal`, and stays while the joint turns on: over the past that
     is as long as it takes to turn by so much.
 
     Args:

@@ -62,6 +62,26 @@ class VslKinematics:
         r_2 = self.L_2 * math.sin(theta_2) + self.L_3 * math.sin(theta_2 + theta_3)
         return np.array([r_1 * math.cos(theta_1), r_1 * math.sin(theta_1), self.L_1 + r_2])
 
+    def bent(self, q: Floats, inclinations: Floats, shares: Floats) -> Floats:
+        """Return the tip's position p_WG, shape (3,), m, of links that bend in the arm's plane, by their ends.
+
+        A link begins at the angle phi_0 of its joint, joint 3 on the end of link 2, and ends at phi_1; from its first
+        to its last point it leads at phi_0 + s (phi_1 - phi_0). s is 1/2 of a cantilever under a moment at its end, 2/3
+        under a weight there, and 1 where the joint alone yields behind its encoder.
+
+        Args:
+            q: angles by the encoders, shape (3,), rad.
+            inclinations: of the ends of links 2 and 3, shape (2,), rad.
+            shares: s of links 2 and 3, shape (2,).
+        """
+        theta_1, theta_2, theta_3 = q.tolist()
+        (end_2, end_3), (s_2, s_3) = inclinations.tolist(), shares.tolist()
+        phi_2, begin_3 = theta_2 + s_2 * (end_2 - theta_2), end_2 + theta_3
+        phi_3 = begin_3 + s_3 * (end_3 - begin_3)
+        r_1 = self.L_2 * math.cos(phi_2) + self.L_3 * math.cos(phi_3)
+        r_2 = self.L_2 * math.sin(phi_2) + self.L_3 * math.sin(phi_3)
+        return np.array([r_1 * math.cos(theta_1), r_1 * math.sin(theta_1), self.L_1 + r_2])
+
     def inverse(self, p_WG: Floats) -> Floats:
         """Return the angles q, shape (3,), that put the tip at p_WG, shape (3,): eqs. (2)-(7).
 
@@ -128,6 +148,26 @@ class VslKinematics:
         if r_1 < margin:
             return f"it is on the axis of joint 1, {r_1:.4g} m from it"
         return None
+
+    def fault(self, p_WG: Floats, margin: float) -> str | None:
+        """Return why the tip cannot be at a point of a path, or a singularity is too near, or None.
+
+        Args:
+            p_WG: the point, shape (3,), m.
+            margin: see `singularity`.
+        """
+        if not np.all(np.isfinite(p_WG)):
+            return "it is not finite"
+        try:
+            self.inverse(p_WG)
+        except Unreachable as e:
+            least, greatest = self.reach
+            r_3 = math.dist(p_WG, (0.0, 0.0, self.L_1))
+            by = f", {1000.0 * (r_3 - greatest):.4g} mm too far" if r_3 > greatest else ""
+            by = f", {1000.0 * (least - r_3):.4g} mm too near" if r_3 < least else by
+            return e.fault + by
+        fault = self.singularity(p_WG, margin)
+        return fault and f"singular: {fault}"
 
 
 def _cosine(x: float) -> float:

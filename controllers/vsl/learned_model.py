@@ -158,15 +158,23 @@ class Cubic(Domain):
 
     def jacobian(self, x: Floats) -> Floats:
         """Return dy/dx at inputs x, shape (..., inputs), as shape (..., values, inputs)."""
+        pairs, by_pair = self._derivative
         padded = np.concatenate([np.ones((*x.shape[:-1], 1)), self.standardised(x)], axis=-1)
-        first, second, third = (padded[..., f] for f in self._factors)
-        J = np.zeros((*x.shape[:-1], self.coefficients.shape[1], len(self.mean)))
-        for i in range(len(self.mean)):
-            is_i = self._factors == i + 1
-            J[..., i] = (
-                second * third * is_i[0] + first * third * is_i[1] + first * second * is_i[2]
-            ) @ self.coefficients
-        return J * self.slopes(x)[..., None, :]
+        J = (padded[..., pairs[0]] * padded[..., pairs[1]]) @ by_pair
+        return J.reshape(*x.shape[:-1], self.coefficients.shape[1], len(self.mean)) * self.slopes(x)[..., None, :]
+
+    @cached_property
+    def _derivative(self) -> tuple[Integers, Floats]:
+        """Pairs of what to multiply, shape (2, pairs), and dy/dz by their products, shape (pairs, values x inputs)."""
+        n = len(self.mean)
+        numbers = {pair: k for k, pair in enumerate(itertools.combinations_with_replacement(range(n + 1), 2))}
+        by_pair = np.zeros((len(numbers), self.coefficients.shape[1], n))
+        for factors, coefficients in zip(self._factors.T.tolist(), self.coefficients, strict=True):
+            for place, factor in enumerate(factors):
+                if factor:
+                    a, b = sorted(factors[:place] + factors[place + 1 :])
+                    by_pair[numbers[a, b], :, factor - 1] += coefficients
+        return np.transpose(list(numbers)), by_pair.reshape(len(numbers), -1)
 
     @cached_property
     def _factors(self) -> Integers:
@@ -278,8 +286,13 @@ class VslModel:
         return J + R @ by_posture + np.outer(turning, [1.0, 0.0, 0.0])
 
     def currents(self, q_meas: Floats, p_meas: Floats) -> tuple[Floats, Floats]:
-        """Return the usual currents of joints 2 and 3, shape (2,), A, and a load's levers on them, shape (2,), m."""
-        assert self.usual is not None
+        """Return the usual currents of joints 2 and 3, shape (2,), A, and a load's levers on them, shape (2,), m.
+
+        Raises:
+            ValueError: it was trained on the currents as measured.
+        """
+        if self.usual is None:
+            raise ValueError("it was trained on the currents as measured, and has no usual ones")
         theta_2, theta_23 = float(q_meas[1]), float(q_meas[1] + q_meas[2])
         lever_3 = self.kinematics.L_3 * math.cos(theta_23)
         lever_2 = self.kinematics.L_2 * math.cos(theta_2) + lever_3
@@ -303,7 +316,7 @@ def inputs_of(q: Floats, p: Floats, i: Floats) -> Floats:
 
 def turned(direction: Floats, turn: Floats, reversal: float) -> Floats:
     """Return which way friction acts, from -1 to 1, after a further turn, rad: all of `reversal` turns it round."""
-    return np.clip(direction + 2.0 * turn / reversal, -1.0, 1.0)
+    return np.minimum(np.maximum(direction + 2.0 * turn / reversal, -1.0), 1.0)
 
 
 def rotate_about_z(v: Floats, theta_1: float) -> Floats:

@@ -191,7 +191,7 @@ class _Reader:
         return first, second
 
     def usual(self, whole: dict[str, Any]) -> Cubic | None:
-        """Return the usual currents, which a model without a window does not have."""
+        """Return the usual currents, which a model on currents with friction does not have."""
         if not any(self.friction(whole)):
             return None
         table = self._named(whole, "usual", USUAL_INPUTS)
@@ -333,7 +333,8 @@ def _plain(regressor: Regressor) -> dict[str, Any]:
         beam = {**regressor.beam.stiffness._asdict(), **regressor.beam.weights._asdict()}
         droop = {"droop": regressor.droop} if isinstance(regressor, BentCommand) else {}
         return {"mean": mean, "scale": scale, "hull": hull, "beam": beam, **droop}
-    assert isinstance(regressor, Cubic)
+    if not isinstance(regressor, Cubic):
+        raise TypeError(f"a model's file has no form for {type(regressor).__name__}")
     return {
         "mean": mean,
         "scale": scale,

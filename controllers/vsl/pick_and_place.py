@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.vsl.kinematics import Elbow, Unreachable, VslKinematics
+from handover.controllers.vsl.kinematics import Elbow, VslKinematics, format_point
 from handover.controllers.vsl.paths import Line
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
@@ -246,12 +246,5 @@ def _faults(parts: Sequence[_Part], kinematics: VslKinematics) -> list[str]:
 
 
 def _first_fault(points: Iterable[Floats], kinematics: VslKinematics) -> str | None:
-    return next((fault for x in points if (fault := _fault(x, kinematics))), None)
-
-
-def _fault(x: Floats, kinematics: VslKinematics) -> str | None:
-    try:
-        kinematics.inverse(x)
-    except Unreachable as e:
-        return str(e)
-    return kinematics.singularity(x, _MARGIN)
+    found = ((x, kinematics.fault(x, _MARGIN)) for x in points)
+    return next((f"{format_point(x)}: {fault}" for x, fault in found if fault), None)

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.vsl.kinematics import Elbow, Unreachable, VslKinematics, format_point
+from handover.controllers.vsl.kinematics import Elbow, VslKinematics, format_point
 from handover.controllers.vsl.paths import Path, Segment, segments_of
 from handover.controllers.vsl.waypoints import InvalidWaypoints, read_waypoints
 from handover.cosim.blocks.block import InvalidParameters
@@ -241,7 +241,7 @@ def _faults(segments: Sequence[Segment], p: Params, kinematics: VslKinematics) -
 
 def _fault_at_points(segment: Segment, p: Params, kinematics: VslKinematics) -> str | None:
     """Return which of a segment's points is the first bad one, and why; None if all are good."""
-    bad = [(k, x, f) for k, x in enumerate(segment.sampled(p.N, p.V)[0]) if (f := _fault(x, kinematics))]
+    bad = [(k, x, f) for k, x in enumerate(segment.sampled(p.N, p.V)[0]) if (f := kinematics.fault(x, _MARGIN))]
     if not bad:
         return None
     k, x, fault = bad[0]
@@ -252,21 +252,6 @@ def _fault_at_points(segment: Segment, p: Params, kinematics: VslKinematics) -> 
 def _fault_between(segment: Segment, p: Params, kinematics: VslKinematics) -> str | None:
     """Return where a segment whose points are good runs through a singularity between them, and which; or None."""
     for x in segment.sampled(math.ceil(segment.length / _MARGIN), p.V)[0]:
-        if fault := _fault(x, kinematics):
+        if fault := kinematics.fault(x, _MARGIN):
             return f"between its points, at {format_point(x)}: {fault}"
     return None
-
-
-def _fault(x: Floats, kinematics: VslKinematics) -> str | None:
-    if not np.all(np.isfinite(x)):
-        return "it is not finite"
-    try:
-        kinematics.inverse(x)
-    except Unreachable as e:
-        least, greatest = kinematics.reach
-        r_3 = math.dist(x, (0.0, 0.0, kinematics.L_1))
-        by = f", {1000.0 * (r_3 - greatest):.4g} mm too far" if r_3 > greatest else ""
-        by = f", {1000.0 * (least - r_3):.4g} mm too near" if r_3 < least else by
-        return e.fault + by
-    fault = kinematics.singularity(x, _MARGIN)
-    return fault and f"singular: {fault}"

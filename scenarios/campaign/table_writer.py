@@ -5,7 +5,6 @@ A campaign that was killed may have runs whose rows are missing: `rebuild_table`
 
 import contextlib
 import math
-import os
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -25,7 +24,13 @@ from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_value
-from handover.scenarios.results.run_folder import InvalidRunFolder, check_place, disk_errors_reported, versions
+from handover.scenarios.results.run_folder import (
+    InvalidRunFolder,
+    check_place,
+    disk_errors_reported,
+    replacing,
+    versions,
+)
 
 _MAX_SHARE = 0.005
 """Share of the time that may go into writing tables while runs end."""
@@ -106,15 +111,8 @@ class TableWriter:
             RecordNotWritten: it cannot be written.
         """
         began = time.monotonic()
-        unfinished = self._path.with_name(self._path.name + ".part")
-        with disk_errors_reported(self._path):
-            try:
-                pq.write_table(table_of(self._plan, self.rows), unfinished)
-                os.replace(unfinished, self._path)
-            except BaseException:
-                with contextlib.suppress(OSError):
-                    unfinished.unlink(missing_ok=True)
-                raise
+        with disk_errors_reported(self._path), replacing(self._path) as unfinished:
+            pq.write_table(table_of(self._plan, self.rows), unfinished)
         took = time.monotonic() - began
         self._next = began + took + max(_PAUSE, took / _MAX_SHARE)
 

@@ -67,7 +67,9 @@ class _ArmFailed(click.ClickException):
 @click.option(
     "--forward-input", type=_FORWARD, default="q", help="What eq. (10) takes: angles, or X = f(q) as printed."
 )
-@click.option("--window", is_flag=True, help="Learn the friction of the gears by the direction of motion, too.")
+@click.option(
+    "--friction-compensation", is_flag=True, help="Learn the friction of the gears by the direction of motion, too."
+)
 @click.option("--epochs", type=WholeNumber(min=1, max=100_000), default=EPOCHS, help="Passes of a published network.")
 @click.option("--data", type=_PATH, help="Train from the points of this Parquet file in place of measuring.")
 @click.option("--save-data", type=_PATH, help="Parquet file for the measured points.")
@@ -82,7 +84,7 @@ def vsl_train(context: click.Context, **given: Any) -> None:
 
     Measures points at random pressures, joint angles and loads, fits what rigid kinematics leave, and prints the errors
     of points that were set aside. The model is a parameter of HybridKinematics: `-p model=FILE` of vsl_hybrid, with
-    -p learned and -p window as it was trained. An --out that ends in .py gets the form of
+    -p learned and -p friction_compensation as it was trained. An --out that ends in .py gets the form of
     controllers/vsl/default_model.py.
 
     The published network is trained by PyTorch: `pip install "handover-cosim[train]"`.
@@ -114,7 +116,7 @@ class _Options:
     arm: Sequence[str]
     learned: str
     forward_input: str
-    window: bool
+    friction_compensation: bool
     epochs: int
     data: Path | None
     save_data: Path | None
@@ -129,7 +131,9 @@ class _Options:
             _check_file("--save-data", self.save_data, (".parquet",))
         if self.curve:
             _check_file("--curve", self.curve, (".png",))
-        if self.adapt and (idle := typed & {"learned", "forward_input", "window", "epochs", "curve", "elbow"}):
+        if self.adapt and (
+            idle := typed & {"learned", "forward_input", "friction_compensation", "epochs", "curve", "elbow"}
+        ):
             raise UsageError(f"{_names(idle)}: with --adapt it is the model's")
         if self.data and (idle := typed & {"points", "walk", "seed", "arm", "save_data"}):
             raise UsageError(f"{_names(idle)}: with --data it is the file's")
@@ -159,7 +163,7 @@ class _Options:
             seed=self.seed,
             learned=Learned[self.learned.upper()],
             forward_input=ForwardInput(self.forward_input),
-            window=self.window,
+            friction_compensation=self.friction_compensation,
             walk=self.walk,
             arm=_arm_values(fmu, self.arm),
             epochs=self.epochs,

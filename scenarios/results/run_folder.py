@@ -224,14 +224,21 @@ def write_whole(path: Path, text: str) -> None:
     Raises:
         RecordNotWritten: it cannot be written.
     """
+    with disk_errors_reported(path), replacing(path) as unfinished:
+        unfinished.write_text(text, encoding="utf-8")
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Generator[Path, None, None]:
+    """Give the place of an unfinished file, which takes that of `path` at the end, or goes away on any error."""
     unfinished = path.with_name(path.name + ".part")
-    with disk_errors_reported(path):
-        try:
-            unfinished.write_text(text, encoding="utf-8")
-            os.replace(unfinished, path)
-        except OSError:
+    try:
+        yield unfinished
+        os.replace(unfinished, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
             unfinished.unlink(missing_ok=True)
-            raise
+        raise
 
 
 def dated_folder(place: Path, stem: str) -> Path:

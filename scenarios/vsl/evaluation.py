@@ -13,7 +13,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.vsl.arms import arm_of
-from handover.scenarios.vsl.parameters import Parameters
+from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 
 
 def _point(signals: Signals, name: str) -> Floats:
@@ -33,6 +33,7 @@ class PathPoint:
         servo: the tip by encoders and rigid links; NaN where the controller does not give it.
         estimated: the tip by the forward model; likewise.
         outside: whether the learned model had to extrapolate; None where the controller does not say.
+        mismatch: whether a sensor tells that the arm is not the one learned from; None where none is looked at.
     """
 
     t: float
@@ -42,10 +43,11 @@ class PathPoint:
     servo: Floats
     estimated: Floats
     outside: bool | None
+    mismatch: bool | None = None
 
     @classmethod
-    def take(cls, t: float, desired: Floats, signals: Signals) -> "PathPoint":
-        """Return the point with the current positions."""
+    def take(cls, t: float, desired: Floats, signals: Signals, *, monitored: bool) -> "PathPoint":
+        """Return the point with the current positions; if monitored, a sensor may tell of a mismatch."""
         return cls(
             t,
             desired,
@@ -54,6 +56,9 @@ class PathPoint:
             _point(signals, "kinematics.p_WG_model"),
             _point(signals, "kinematics.p_WG_est"),
             bool(signals["kinematics.outside"]) if "kinematics.outside" in signals else None,
+            bool(signals["kinematics.model_mismatch"])
+            if monitored and "kinematics.model_mismatch" in signals
+            else None,
         )
 
     @property
@@ -100,6 +105,7 @@ class PathEvaluator(Evaluator):
         self.parameters, self.hybrid = parameters, hybrid
         self.points: list[PathPoint] = []
         self.completed: float | None = None
+        self._monitored = isinstance(parameters, HybridParameters) and parameters.is_monitored
         self._began: float | None = None
         self._t = 0.0
         self._start: Floats = np.zeros(3)
@@ -112,7 +118,7 @@ class PathEvaluator(Evaluator):
         """Follow the planner; keep a point when the planner proceeds to the next."""
         goal, moving = signals["planner.p_WG_goal"], bool(signals["planner.moving"])
         if self._goal is not None and self._moving and not (moving and np.array_equal(goal, self._goal)):
-            self.points.append(PathPoint.take(t, self._goal, signals))
+            self.points.append(PathPoint.take(t, self._goal, signals, monitored=self._monitored))
         if moving and self._began is None:
             self._began = t
             self._start = goal if self._goal is None else self._goal
@@ -184,6 +190,12 @@ class PathEvaluator(Evaluator):
         if self.hybrid and self.points[0].outside is not None:
             metrics["outside"] = self._mean(
                 lambda p: float(bool(p.outside)), "share of points at which the model had to extrapolate", "1"
+            )
+        if self.points[0].mismatch is not None:
+            metrics["model_mismatch"] = self._mean(
+                lambda p: float(bool(p.mismatch)),
+                "share of points at which a sensor told that the arm is not the one that was learned from",
+                "1",
             )
         visited = f"points visited of the path's {self.parameters.points_in_all}"
         if self.completed is not None and len(self.points) < self.parameters.points_in_all:

@@ -44,6 +44,6 @@ def file_text(model: VslModel, path: Path) -> str:
         return text
     provenance = model.provenance
     elbow = "" if model.kinematics.elbow is Elbow.UP else " --elbow down"
-    command = train_command(model.kind, window=model.friction != (0.0, 0.0))
+    command = train_command(model.kind, friction_compensation=model.friction != (0.0, 0.0))
     points, seed = provenance["points"]["measured"], provenance["seed"]
     return _MODULE.format(command=command, name=path.name, points=points, seed=seed, elbow=elbow, text=text)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handover.controllers.vsl.hybrid_kinematics import Imu
 from handover.controllers.vsl.kinematics import format_point
 from handover.controllers.vsl.learned_model import Learned
 from handover.controllers.vsl.paths import Segment
@@ -242,6 +243,23 @@ class HybridParameters(Parameters):
         Learned.CUBIC, "what corrects: polynomials, a small network, the paper's, which needs a model, or a beam"
     )
     model: str = parameter("", "file of a trained model; empty: the one that ships")
-    window: bool = parameter(False, "whether the direction of motion tells the gears' friction from the load")
+    friction_compensation: bool = parameter(
+        False, "whether the direction of motion tells the gears' friction from the load"
+    )
     closed_loop: bool = parameter(False, "whether the tracker, too, tells the controller where the tip is")
-    swing: bool = parameter(False, "whether joints are turned against swings that changes of speed excite")
+    imu: Imu = parameter(
+        Imu.NONE, "IMUs at the links' ends: none, to monitor what was learned, or feedback by them, too"
+    )
+    vibration_damping: bool = parameter(False, "whether joints are turned against swings that changes of speed excite")
+
+    @property
+    def is_monitored(self) -> bool:
+        """Whether tracker or IMUs tell if the arm is the one that was learned from."""
+        return self.closed_loop or self.imu is not Imu.NONE
+
+    def contradictions(self) -> list[str]:
+        """Return everything that is wrong with values that are each in range."""
+        faults = super().contradictions()
+        if self.closed_loop and self.imu is not Imu.NONE:
+            faults.append("imu: with closed_loop=true the tracker sees the tip itself, and IMUs are without effect")
+        return faults

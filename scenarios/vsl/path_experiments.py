@@ -4,13 +4,14 @@ Both experiments wire planner, kinematics and arm alike. `VslModelBased` command
 experiment 1), `VslHybrid` by the same with learned corrections (sec. V-B, experiment 2).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
+from handover.controllers.vsl.hybrid_kinematics import Imu
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
@@ -66,6 +67,7 @@ class PathExperiment(Experiment[PathEvaluator]):
         "model_error",
         "estimate_error",
         "outside",
+        "model_mismatch",
         "points_visited",
         "lowest",
         "path_time",
@@ -189,14 +191,31 @@ class VslHybrid(PathExperiment):
         return {
             "learned": p.learned.name,
             "model": str(Path(p.model).absolute()) if p.model else "",
-            "window": p.window,
+            "friction_compensation": p.friction_compensation,
             "closed_loop": p.closed_loop,
-            "swing": p.swing,
+            "imu": p.imu.name,
+            "vibration_damping": p.vibration_damping,
         }
 
     def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:
-        """Wire as the other experiment does, and the tracker to the kinematics if they close the loop."""
+        """Wire as the other experiment does, and tracker or IMUs to the kinematics if these look at them."""
         s = super().build(parameters, seed, fmu)
         if parameters.closed_loop:
             s.connect(s.units["arm"].y.p_WG_meas, s.units["kinematics"].u.p_WG_meas)
+        if parameters.imu is not Imu.NONE:
+            s.connect(s.units["arm"].y.tilt_meas, s.units["kinematics"].u.tilt_meas)
         return s
+
+    def check_unit_values(self, system: System, given: Sequence[str]) -> None:
+        """Reject a gain of damping that is without effect.
+
+        Raises:
+            InvalidParameter: K_D is given, and friction is not compensated.
+        """
+        start = system.units["kinematics"].start
+        if "kinematics.K_D" in given and not start.get("friction_compensation"):
+            fault = (
+                "kinematics.K_D: without effect unless friction_compensation=true: currents with friction lag behind "
+                "the posture, which would be taken for a swing"
+            )
+            raise InvalidParameter([fault])

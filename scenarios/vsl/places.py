@@ -32,10 +32,16 @@ PLACES = {
             "p_WG_model": "in W; compared with goal and tip",
             "p_WG_est": "in W; compared with the tip",
             "outside": "its share of the path is a metric",
+            "model_mismatch": "likewise, where tracker or IMUs are wired",
+            "innovation": "in W",
             "method": "the scenario's",
             "elbow": "the scenario's parameter",
-            **dict.fromkeys(("learned", "model", "window", "closed_loop", "swing"), "the scenario's parameter"),
+            **dict.fromkeys(
+                ("learned", "model", "friction_compensation", "closed_loop", "imu", "vibration_damping"),
+                "the scenario's parameter",
+            ),
             "p_WG_meas": "in W; wired where the loop is closed",
+            "tilt_meas": "of links 2 and 3; wired where there are IMUs",
         },
         remarks=(_WORLD,),
     ),
@@ -51,6 +57,7 @@ PLACES = {
         },
         optional={
             "p_cmd": "",
+            "tilt_meas": "of links 2 and 3; wired where there are IMUs",
             **dict.fromkeys(("motion", "link_2", "link_3", "load", "load_steps", "q_0"), "the scenario's parameter"),
             **dict.fromkeys(
                 ("base_step", "encoder_step", "transducer_step", "regulator_step"), "set for resolution=electronics"

@@ -94,7 +94,7 @@ class VslTraining:
         seed: of the points, the split, the arm's noise and a network's first weights.
         learned: what corrects.
         forward_input: what eq. (10) takes.
-        window: whether it is learned on currents without the gears' friction.
+        friction_compensation: whether it is learned on currents without the gears' friction.
         walk: see `collect`.
         arm: parameters of the arm, by name, in place of its own.
         epochs: passes over the points of a published network's training.
@@ -106,7 +106,7 @@ class VslTraining:
     seed: int
     learned: Learned = Learned.CUBIC
     forward_input: ForwardInput = ForwardInput.Q
-    window: bool = False
+    friction_compensation: bool = False
     walk: bool = False
     arm: Mapping[str, Any] = field(default_factory=dict[str, Any])
     epochs: int = EPOCHS
@@ -160,14 +160,14 @@ class VslTraining:
         training, validation, test = measured.parts(share)
         self._check_varies(measured.points.rows(training))
         friction = (0.0, 0.0)
-        if self.window:
+        if self.friction_compensation:
             few = training[:_FRICTION_POINTS]
             friction = self._friction(measured.points.rows(few), directions[few])
         data = measured.points.freed(directions, friction)
         parts = data.rows(training), data.rows(validation)
         seeds = [int(n) for n in np.random.SeedSequence(measured.origin["seed"]).generate_state(4)[2:] >> 1]
         inverse, forward = self._fit_both(*parts, seeds, progress)
-        usual = self._usual_currents(*parts) if self.window else None
+        usual = self._usual_currents(*parts) if self.friction_compensation else None
         kinds = self.learned, self.forward_input, friction, usual
         model = VslModel(inverse.regressor, forward.regressor, self.kinematics, {}, *kinds)
         errors = self.errors(model, data.rows(test))

@@ -1,15 +1,13 @@
 """The columns of a study's tables, what each means, and tables as CSV and Parquet, written whole or not at all."""
 
-import contextlib
 import csv
 import io
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from handover.scenarios.results.run_folder import disk_errors_reported, write_whole
+from handover.scenarios.results.run_folder import disk_errors_reported, replacing, write_whole
 from handover.scenarios.study.plan.plan import DEVICES, StudyPlan
 
 PERSON, PILOT = "person", "scripted pilot"
@@ -193,15 +191,8 @@ def write_parquet(path: Path, columns: Sequence[Column], rows: Sequence[Row]) ->
     types: dict[str, pa.DataType] = {TEXT: pa.string(), WHOLE: pa.int64(), NUMBER: pa.float64(), FLAG: pa.bool_()}
     fields = [pa.field(c.name, types[c.kind], metadata={"unit": c.unit, "description": c.meaning}) for c in columns]
     arrays = [pa.array([row.get(c.name) for row in rows], types[c.kind]) for c in columns]
-    unfinished = path.with_name(path.name + ".part")
-    with disk_errors_reported(path):
-        try:
-            pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), unfinished)
-            os.replace(unfinished, path)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                unfinished.unlink(missing_ok=True)
-            raise
+    with disk_errors_reported(path), replacing(path) as unfinished:
+        pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), unfinished)
 
 
 def csv_text(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.vsl import default_physics_model, default_small_model, default_window_model
+from handover.controllers.vsl import default_friction_model, default_physics_model, default_small_model
 from handover.controllers.vsl.default_model import DEFAULT_MODEL
 from handover.controllers.vsl.hybrid_kinematics import (
     Elbow,
     HybridKinematics,
     IdleParameters,
+    Imu,
     Inputs,
     InvalidModel,
     Learned,
@@ -44,8 +45,9 @@ ALL = [
     ESTIMATE,
     Params(),
     Params(learned=Learned.SMALL, closed_loop=True),
-    Params(learned=Learned.PHYSICS, swing=True),
-    Params(window=True, closed_loop=True, swing=True),
+    Params(learned=Learned.PHYSICS, vibration_damping=True),
+    Params(friction_compensation=True, closed_loop=True, vibration_damping=True),
+    Params(imu=Imu.FEEDBACK, mismatch_limit=0.0001),
 ]
 
 
@@ -101,16 +103,16 @@ def test_the_closed_loop_raises_a_tip_that_is_too_low(params: Params):
     assert ARM.forward(last.q_cmd)[2] > ARM.forward(first.q_cmd)[2] + 0.005
 
 
-def test_a_window_forgets_no_turn():
-    """Of an arm whose currents carry friction by the direction of its commands, a window sees the currents without."""
-    window = parse_model(default_window_model.DEFAULT_MODEL, "that ships")
-    unit = HybridKinematics(Params(window=True, i_lag=0.0))
+def test_friction_compensation_forgets_no_turn():
+    """Of an arm whose currents carry friction by the direction of its commands, the currents are seen without."""
+    frictionless = parse_model(default_friction_model.DEFAULT_MODEL, "that ships")
+    unit = HybridKinematics(Params(friction_compensation=True, i_lag=0.0))
     for k in range(10):
         q = USUAL.q_ref + 0.01 * k * np.array([0.0, 1.0, -1.0])
-        friction = np.array([0.0, *(np.array(window.friction) * np.array([1.0, -1.0]))])
+        friction = np.array([0.0, *(np.array(frictionless.friction) * np.array([1.0, -1.0]))])
         sliding = dataclasses.replace(USUAL, q_ref=q, i_meas=USUAL.i_meas + (friction if k > 1 else 0.0))
         y = unit.step(k * 0.02, 0.02, sliding)
-        np.testing.assert_allclose(y.q_cmd, window.command(q, USUAL.p_meas, USUAL.i_meas), atol=1e-9)
+        np.testing.assert_allclose(y.q_cmd, frictionless.command(q, USUAL.p_meas, USUAL.i_meas), atol=1e-9)
 
 
 def test_speeds_leave_room_for_corrections():
@@ -172,6 +174,7 @@ def test_a_restored_state_goes_on_bit_for_bit(params: Params, steps: int):
             q_meas=USUAL.q_meas + 0.01 * (k // 3),
             i_meas=USUAL.i_meas + rng.normal(0.0, 0.05, 3),
             p_WG_meas=ARM.forward(Q) + rng.normal(0.0, 0.01, 3),
+            tilt_meas=np.array([Q[1], Q[1] + Q[2]]) + rng.normal(0.0, 0.01, 2),
         )
         for k in range(steps + 20)
     ]
@@ -212,24 +215,44 @@ def test_a_file_that_is_no_model_is_refused(tmp_path: Path):
     ("params", "text"),
     [
         (Params(learned=Learned.PUBLISHED), r"there is none: train one.*`handover vsl-train --learned published`"),
-        (Params(learned=Learned.SMALL, window=True), r"there is none.*`handover vsl-train --learned small --window`"),
+        (
+            Params(learned=Learned.SMALL, friction_compensation=True),
+            r"there is none.*`handover vsl-train --learned small --friction-compensation`",
+        ),
         (Params(learned=Learned.SMALL, model="cubic"), "it is a cubic model, and the parameter learned says small"),
-        (Params(window=True, model="cubic"), "it was trained without a window, and the parameter window says true"),
-        (Params(model="window"), "it was trained with a window.* and the parameter window says false"),
+        (
+            Params(friction_compensation=True, model="cubic"),
+            "it was trained on currents with friction, and the parameter friction_compensation says true",
+        ),
+        (
+            Params(model="frictionless"),
+            "it was trained on currents without friction, and the parameter friction_compensation says false",
+        ),
     ],
 )
 def test_a_model_that_is_not_what_the_parameters_say_is_refused(params: Params, text: str, tmp_path: Path):
     (tmp_path / "cubic").write_text(DEFAULT_MODEL)
-    (tmp_path / "window").write_text(default_window_model.DEFAULT_MODEL)
+    (tmp_path / "frictionless").write_text(default_friction_model.DEFAULT_MODEL)
     with pytest.raises(InvalidModel, match=text):
         HybridKinematics(dataclasses.replace(params, model=str(tmp_path / params.model) if params.model else ""))
 
 
 def test_by_rigid_kinematics_what_was_learned_is_refused_and_not_ignored():
-    idle = Params(method=Method.MODEL_BASED, learned=Learned.SMALL, model="m.json", window=True, swing=True)
+    idle = Params(
+        method=Method.MODEL_BASED,
+        learned=Learned.SMALL,
+        model="m.json",
+        friction_compensation=True,
+        vibration_damping=True,
+    )
     with pytest.raises(IdleParameters) as e:
         HybridKinematics(idle)
-    assert [fault.split(":")[0] for fault in e.value.faults] == ["learned", "model", "window", "swing"]
+    assert [fault.split(":")[0] for fault in e.value.faults] == [
+        "learned",
+        "model",
+        "friction_compensation",
+        "vibration_damping",
+    ]
     HybridKinematics(dataclasses.replace(RIGID, closed_loop=True, K_I=1.0))
     HybridKinematics(dataclasses.replace(idle, method=Method.ESTIMATE, model="", learned=Learned.CUBIC))
 
@@ -257,6 +280,7 @@ def test_an_output_depends_at_once_on_the_inputs_that_it_declares_alone(params: 
         for k in range(8):
             q = USUAL.q_ref + 0.004 * k * np.array([0.0, 1.0, -1.0])
             u = dataclasses.replace(USUAL, q_ref=q, q_meas=q + 0.01, p_WG_meas=ARM.forward(q) - 0.01)
+            u.tilt_meas = np.array([q[1], q[1] + q[2]])
             ys.append(unit.step(k * 0.04, 0.04, dataclasses.replace(u, **given) if k == 7 else u))
         return vars(ys[-1])
 
@@ -269,9 +293,12 @@ def test_an_output_depends_at_once_on_the_inputs_that_it_declares_alone(params: 
                     found.setdefault(output, set()).add(name)
     declared = {output: set(inputs) for output, inputs in HybridKinematics.feedthrough.items()}
     assert all(inputs <= declared[output] for output, inputs in found.items())
-    if params == ALL[-1]:  # window, closed loop and swing
-        assert found["q_cmd"] == declared["q_cmd"]
+    if params.vibration_damping and params.closed_loop:
+        assert found["q_cmd"] == declared["q_cmd"] - {"tilt_meas"}
         assert found["p_WG_est"] == declared["p_WG_est"]
+    if params.imu is Imu.FEEDBACK:
+        assert "tilt_meas" in found["q_cmd"]
+        assert found["innovation"] == declared["innovation"] - {"p_WG_meas"}
 
 
 def test_where_a_swing_may_be_answered_the_speed_depends_on_references_and_currents():
@@ -281,8 +308,35 @@ def test_where_a_swing_may_be_answered_the_speed_depends_on_references_and_curre
     changed = [begun, dataclasses.replace(begun, q_ref=still), dataclasses.replace(begun, i_meas=np.zeros(3))]
     speeds: list[float] = []
     for u in changed:
-        unit = HybridKinematics(Params(swing=True, i_lag=0.0))
+        unit = HybridKinematics(Params(vibration_damping=True, i_lag=0.0))
         unit.step(0.0, 0.02, dataclasses.replace(USUAL, q_ref=still, qd_ref=np.zeros(3)))
         speeds.append(float(np.abs(unit.step(0.02, 0.02, u).qd_cmd[1])))
     assert speeds[0] == 4.8 > max(speeds[1:])
     assert {"q_ref", "qd_ref", "i_meas"} <= set(HybridKinematics.feedthrough["qd_cmd"])
+
+
+def test_without_friction_compensation_nothing_is_done_by_currents_against_vibrations():
+    """Smoothed currents with friction lag behind the posture: taken for a swing, they made the tip err by half more."""
+    runs: list[list[list[bytes]]] = []
+    for K_D in (0.0, 4.0):
+        unit = HybridKinematics(Params(vibration_damping=True, K_D=K_D))
+        moved = [USUAL, *(dataclasses.replace(USUAL, i_meas=USUAL.i_meas + 0.02 * k) for k in range(5))]
+        runs.append([flat(unit.step(0.02 * k, 0.02, u)) for k, u in enumerate(moved)])
+    assert runs[0] == runs[1]
+
+
+def bending(softer: float) -> Inputs:
+    """Return readings of an arm that bends by so much more than learned, which the encoders do not see."""
+    sag = softer * np.array([0.0, 0.05, 0.05])
+    tip = MODEL.tip(USUAL.q_meas, USUAL.p_meas, USUAL.i_meas) - np.array([0.0, 0.0, 0.02 * (softer - 1.0)])
+    return dataclasses.replace(USUAL, tilt_meas=np.array([Q[1], Q[1] + Q[2]]) - sag[1:], p_WG_meas=tip)
+
+
+@pytest.mark.parametrize("sensor", [{"closed_loop": True}, {"imu": Imu.MONITOR}, {}])
+def test_a_sensor_at_the_arm_tells_a_mismatch_that_inputs_do_not(sensor: dict[str, Any]):
+    unit = HybridKinematics(Params(K_I=0.0, mismatch_limit=0.01, **sensor))
+    for k in range(400):
+        y = unit.step(k * 0.02, 0.02, dataclasses.replace(bending(2.0), q_meas=unit.outputs(0.0, USUAL).q_cmd))
+    assert y.model_mismatch == bool(sensor)
+    assert (y.innovation > 0.01) == bool(sensor)
+    assert not y.outside

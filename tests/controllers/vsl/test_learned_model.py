@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from handover.controllers.vsl import default_model, default_physics_model, default_small_model, default_window_model
+from handover.controllers.vsl import default_friction_model, default_model, default_physics_model, default_small_model
 from handover.controllers.vsl.default_model import DEFAULT_MODEL
 from handover.controllers.vsl.fit import fit_adapted, fit_cubic, fit_friction, rounded
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
@@ -51,7 +51,7 @@ def model() -> VslModel:
     return VslModel(fit.cubic, fit.cubic, VslKinematics(0.15, 0.225, 0.225, Elbow.UP), {"seed": 1})
 
 
-SHIPPED = [m.DEFAULT_MODEL for m in (default_model, default_small_model, default_physics_model, default_window_model)]
+SHIPPED = [m.DEFAULT_MODEL for m in (default_model, default_small_model, default_physics_model, default_friction_model)]
 
 
 def slopes(f: Callable[[Floats], Floats], at: Floats, step: float) -> Floats:

@@ -13,8 +13,8 @@ from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.published_experiment import Claim, Verdict
 from handover.scenarios.published.vsl.separation import MIN_RUNS, Comparison, chance_of, separation_claim
-from handover.scenarios.published.vsl.vsl_1 import Vsl1
-from handover.scenarios.published.vsl.vsl_1_runs import RIGID, SOFT, Cell, Vsl1Runs
+from handover.scenarios.published.vsl.vsl_1.experiment import Vsl1
+from handover.scenarios.published.vsl.vsl_1.runs import RIGID, SOFT, Cell, Vsl1Runs
 
 Error = Callable[[Mapping[str, str]], float]
 

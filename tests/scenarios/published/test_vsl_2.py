@@ -10,10 +10,11 @@ import pytest
 from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.published_experiment import Claim, Verdict
-from handover.scenarios.published.vsl.vsl_2 import Vsl2
-from handover.scenarios.published.vsl.vsl_2_runs import (
+from handover.scenarios.published.vsl.vsl_2.experiment import Vsl2
+from handover.scenarios.published.vsl.vsl_2.runs import (
     CASES,
     CUBIC,
+    FEEDBACK,
     JOINT_FACTORS,
     LEARNED,
     MODEL_BASED,
@@ -53,9 +54,10 @@ def table_of(
         row: dict[str, Any] = {"run": run.name, "status": status, "learned": given.get("learned", "cubic")}
         row |= {"links": given.get("links", "vsl"), "kinematics.method": given.get("kinematics.method", "")}
         row |= {n: float(given[n] if n in given else getattr(default, n)) for n in (*NUMBERS, "load", "pressure")}
+        row |= {"closed_loop": given.get("closed_loop") == "true", "imu": given.get("imu", "none")}
         row["arm_seed"] = int(given.get("arm_seed", default.arm_seed))
         row |= dict.fromkeys(("mean_error", "median_error", "error_p25", "error_p75", "max_error"), size)
-        rows.append(row | {"model_error": 0.02, "estimate_error": estimate, "outside": 0.0})
+        rows.append(row | {"model_error": 0.02, "estimate_error": estimate, "outside": 0.0, "model_mismatch": 0.5})
     return CampaignTable(pa.Table.from_pylist(rows))
 
 
@@ -75,17 +77,26 @@ STIFFER = "By {} the soft arm's tip errs less than that of a rigid arm with join
 
 def test_the_plan_has_both_cases_in_every_way_and_on_every_arm_five_times():
     plan = checked_plan(Vsl2().plan(quick=False))
-    ways = 1 + len(SHIPPED)
-    assert plan.size == 5 * len(CASES) * (ways + len(JOINT_FACTORS) + ways * len(OTHERS))
+    methods = 1 + len(SHIPPED) + len(FEEDBACK)
+    assert plan.size == 5 * len(CASES) * (methods + len(JOINT_FACTORS) + methods * len(OTHERS))
     assert Vsl2().plan(quick=True).size == 12
 
 
 def test_each_run_is_of_one_way_on_one_arm():
     table = table_of()
     runs = Vsl2Runs(table)
-    trained = [name for case in CASES for way in (MODEL_BASED, *LEARNED, *RIGIDS) for name in runs.names(case, way)]
+    trained = [
+        name
+        for case in CASES
+        for method in (MODEL_BASED, *LEARNED, *FEEDBACK, *RIGIDS)
+        for name in runs.names(case, method)
+    ]
     others = [
-        n for case in CASES for arm in OTHERS for way in (MODEL_BASED, *LEARNED) for n in runs.names(case, way, arm)
+        n
+        for case in CASES
+        for arm in OTHERS
+        for method in (MODEL_BASED, *LEARNED, *FEEDBACK)
+        for n in runs.names(case, method, arm)
     ]
     assert len(trained + others) == len(table)
     assert len(set(trained + others)) == Vsl2().plan(quick=False).size

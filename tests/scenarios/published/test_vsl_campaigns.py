@@ -14,8 +14,8 @@ from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.published.published_experiment import draw_figures
 from handover.scenarios.published.vsl.path_traces import PathTrace, Repetitions, trace_of
-from handover.scenarios.published.vsl.vsl_1 import Vsl1
-from handover.scenarios.published.vsl.vsl_1_runs import RIGID, SOFT, Cell, Vsl1Runs
+from handover.scenarios.published.vsl.vsl_1.experiment import Vsl1
+from handover.scenarios.published.vsl.vsl_1.runs import RIGID, SOFT, Cell, Vsl1Runs
 
 
 def test_a_trace_is_what_the_run_was_judged_by(tmp_path: Path):

@@ -11,7 +11,7 @@ from handover.cosim.exceptions import InitializationError
 from handover.cosim.master.master import Master
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
-from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
 from handover.scenarios.vsl.path_experiments import VslHybrid
 
 QUICK = ("settle=2", "speed=0.1")
@@ -26,13 +26,18 @@ def wired(*parameters: str, **arm: Any) -> System:
 
 def error_of(*parameters: str, **arm: Any) -> float:
     """Return the mean distance of the tip itself from its path's points, at 0.5 bar and with 75 g, m."""
+    return metrics_of(*parameters, **arm)["mean_error_true"]
+
+
+def metrics_of(*parameters: str, **arm: Any) -> dict[str, float]:
+    """Return the metrics of a run that came to its end, in SI units."""
     p = parse_parameters(VslHybrid, parameters)
     evaluator = VslHybrid().evaluator(p)
     with Master(wired(*parameters, **arm)) as master:
         master.run(VslHybrid().stop_time(p), [evaluator], until=lambda: evaluator.over)
     outcome = evaluator.outcome()
     assert "the path was completed" in outcome.reason
-    return outcome.metrics["mean_error_true"].value
+    return {name: metric.value for name, metric in outcome.metrics.items()}
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +47,7 @@ def cubic() -> float:
 
 @pytest.mark.parametrize(
     ("given", "share"),
-    [("learned=small", 1.3), ("learned=physics", 1.8), ("window=true", 0.6)],
+    [("learned=small", 1.3), ("learned=physics", 1.8), ("friction_compensation=true", 0.6)],
 )
 def test_each_corrector_against_the_polynomials(cubic: float, given: str, share: float):
     assert error_of(*QUICK, given) < share * cubic
@@ -60,6 +65,31 @@ def test_the_tracker_is_wired_only_where_it_closes_the_loop():
         return {str(c.target) for c in system.connections}
 
     assert targets(wired("closed_loop=true")) - targets(wired()) == {"kinematics.p_WG_meas"}
+    assert targets(wired("imu=monitor")) - targets(wired()) == {"kinematics.tilt_meas"}
+
+
+def test_imus_make_up_for_an_arm_that_differs_and_tell_that_it_does(cubic: float):
+    stiffer = ("settle=2", "EI_factor=1.2")
+    assert metrics_of(*stiffer, "imu=feedback")["mean_error_true"] < 1.5 * cubic
+    monitored, open_loop = metrics_of(*stiffer, "imu=monitor"), metrics_of(*stiffer)
+    assert monitored["mean_error_true"] == open_loop["mean_error_true"] > 2.0 * cubic
+    assert monitored["model_mismatch"] > 0.8
+    assert monitored["outside"] < 0.1
+    assert "model_mismatch" not in open_loop
+    assert metrics_of("settle=2", "imu=monitor")["model_mismatch"] == 0.0
+
+
+def test_imus_beside_a_tracker_are_refused():
+    with pytest.raises(InvalidParameter, match="imu: with closed_loop=true the tracker sees the tip itself"):
+        wired("closed_loop=true", "imu=monitor")
+
+
+def test_a_gain_of_damping_without_friction_compensation_is_refused():
+    plain = wired("vibration_damping=true")
+    with pytest.raises(InvalidParameter, match="K_D: without effect unless friction_compensation=true"):
+        VslHybrid().check_unit_values(plain, ["kinematics.K_D"])
+    VslHybrid().check_unit_values(plain, ["kinematics.K_F"])
+    VslHybrid().check_unit_values(wired("friction_compensation=true"), ["kinematics.K_D"])
 
 
 def test_a_network_that_does_not_ship_is_refused_with_how_to_make_it():
@@ -83,13 +113,16 @@ def test_a_model_of_another_kind_is_refused(tmp_path: Path):
 
 @pytest.mark.slow
 def test_fast_motion_of_an_arm_that_swings():
-    fast = ("motion=dynamic", "speed=0.2", "window=true")
-    plain, compensated = error_of(*fast), error_of(*fast, "swing=true")
+    fast = ("motion=dynamic", "speed=0.2", "friction_compensation=true")
+    plain, compensated = error_of(*fast), error_of(*fast, "vibration_damping=true")
     assert compensated < 0.8 * plain
     assert compensated < 0.003
 
 
 @pytest.mark.slow
 def test_the_closed_loop_does_not_swing_the_arm_up():
-    swinging = [error_of("motion=dynamic", "window=true", f"closed_loop={closed}") for closed in ("false", "true")]
+    swinging = [
+        error_of("motion=dynamic", "friction_compensation=true", f"closed_loop={closed}")
+        for closed in ("false", "true")
+    ]
     assert np.all(np.array(swinging) < 0.002)

@@ -27,7 +27,7 @@ from handover.scenarios.vsl.path_experiments import ELECTRONICS
 NUMERICAL = {"hinges", "hinges_dynamic", "substep", "high_frequency_damping"}
 CHOSEN_BY_THE_SCENARIO = {
     *("motion", "link_2", "link_3", "path", "x_0", "x_g", "elbow", "pressure", "waypoints"),
-    *("method", "model", "learned", "window", "closed_loop", "swing"),
+    *("method", "model", "learned", "friction_compensation", "closed_loop", "imu", "vibration_damping"),
 }
 
 Paper = dict[str, dict[str, dict[str, Any]]]

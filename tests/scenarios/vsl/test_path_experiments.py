@@ -83,7 +83,7 @@ def test_the_default_run_succeeds_and_leaves_its_whole_folder(experiment: type[P
     out, ended = finished(experiment)
     assert ended.outcome.success, ended.outcome.reason
     summary = json.loads((out / "summary.json").read_text())
-    assert set(summary["metrics"]) >= set(PathExperiment.headline) - {"estimate_error", "outside"}
+    assert set(summary["metrics"]) >= set(PathExperiment.headline) - {"estimate_error", "outside", "model_mismatch"}
     figures = {p.name for p in (out / "figures").iterdir()}
     assert figures == {f"{n}.{s}" for n in ("path", "shape", "errors", "error", "signals") for s in ("png", "svg")}
     assert (out / "report.html").is_file()

@@ -2,7 +2,7 @@
 
 Generated; when the sources of the arm (plants/vsl/) have changed, run again
 
-    handover vsl-train --window --points 1500 --seed 0 --out controllers/vsl/default_window_model.py
+    handover vsl-train --friction-compensation --points 1500 --seed 0 --out controllers/vsl/default_friction_model.py
 """
 
 DEFAULT_MODEL = """\

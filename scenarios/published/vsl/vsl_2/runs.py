@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from handover.controllers.vsl.hybrid_kinematics import Learned, Method
+from handover.controllers.vsl.hybrid_kinematics import Imu, Learned, Method
 from handover.cosim.blocks.ports import Floats
 from handover.plants.vsl.parameters import Link
 from handover.scenarios.campaign.plan import is_number
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.published.vsl.vsl_1_runs import format_load
+from handover.scenarios.published.vsl.vsl_1.runs import format_load
 from handover.scenarios.vsl.parameters import HybridParameters
 
 _PUBLISHED, _BEYOND = (paper_values("vsl", group) for group in ("published", "beyond"))
@@ -45,7 +45,7 @@ CASES = tuple(Case(load, pressure) for load, pressure in _PUBLISHED["experiment_
 
 
 @dataclass(frozen=True)
-class Way:
+class ControlMethod:
     """How the tip is brought along the path.
 
     Attributes:
@@ -62,11 +62,11 @@ class Way:
         return "learned" in self.parameters
 
 
-def _learned(label: str, learned: Learned) -> Way:
-    return Way(label, {"learned": learned.name.lower()})
+def _learned(label: str, learned: Learned) -> ControlMethod:
+    return ControlMethod(label, {"learned": learned.name.lower()})
 
 
-MODEL_BASED = Way("model-based", {"kinematics.method": Method.ESTIMATE.name.lower()})
+MODEL_BASED = ControlMethod("model-based", {"kinematics.method": Method.ESTIMATE.name.lower()})
 """By rigid kinematics, while the hybrid forward model estimates the tip: figs. 6 and 7."""
 
 CUBIC = _learned("cubic polynomials", Learned.CUBIC)
@@ -76,15 +76,20 @@ PHYSICS = _learned("beam", Learned.PHYSICS)
 SHIPPED = (CUBIC, SMALL, PHYSICS)
 LEARNED = (CUBIC, SMALL, PUBLISHED, PHYSICS)
 
+TRACKER = ControlMethod("polynomials and tracker", {**CUBIC.parameters, "closed_loop": "true"})
+IMU = ControlMethod("polynomials and IMUs", {**CUBIC.parameters, "imu": Imu.FEEDBACK.name.lower()})
+FEEDBACK = (TRACKER, IMU)
+"""Beyond the paper's open loop, of its future work: with feedback by a tracker of 30 Hz, or by an IMU a link."""
+
 JOINT_FACTORS: tuple[float, ...] = tuple(_BEYOND["joint_factors"])
 """How many times as stiff as assumed the joints of the rigid arm are."""
 
 
-def rigid(factor: float) -> Way:
+def rigid(factor: float) -> ControlMethod:
     """Return the arm of rigid links by rigid kinematics, whose joints are `factor` times as stiff as assumed."""
     label = "rigid arm" if factor == 1.0 else f"rigid arm, joints x {factor:g}"
     method = {"kinematics.method": Method.MODEL_BASED.name.lower()}
-    return Way(label, {"links": Link.RIGID.name.lower(), **method, "joint_factor": f"{factor:g}"})
+    return ControlMethod(label, {"links": Link.RIGID.name.lower(), **method, "joint_factor": f"{factor:g}"})
 
 
 RIGID = rigid(1.0)
@@ -93,7 +98,7 @@ RIGIDS = tuple(rigid(factor) for factor in JOINT_FACTORS)
 
 @dataclass(frozen=True)
 class Arm:
-    """An arm on which the ways are tried.
+    """An arm on which the methods are tried.
 
     Attributes:
         label: what it is like.
@@ -123,7 +128,7 @@ OTHERS = tuple(_others())
 
 
 class Vsl2Runs:
-    """Our results by case, way and arm. Runs that did not come to their end do not count."""
+    """Our results by case, method and arm. Runs that did not come to their end do not count."""
 
     def __init__(self, table: CampaignTable) -> None:
         rows = table.rows
@@ -137,43 +142,53 @@ class Vsl2Runs:
     @property
     def arms(self) -> tuple[Arm, ...]:
         """The arms that nothing was learned from, as far as any run is on them."""
-        return tuple(arm for arm in OTHERS if any(self.rows(CASES[0], way, arm) for way in (MODEL_BASED, *LEARNED)))
+        return tuple(
+            arm for arm in OTHERS if any(self.rows(CASES[0], method, arm) for method in (MODEL_BASED, *LEARNED))
+        )
 
     @property
-    def learned(self) -> tuple[Way, ...]:
-        """The ways that any run goes that were taught."""
-        return tuple(way for way in LEARNED if self.rows(CASES[0], way))
+    def learned(self) -> tuple[ControlMethod, ...]:
+        """The methods that any run goes that were taught."""
+        return tuple(method for method in LEARNED if self.rows(CASES[0], method))
 
     @property
-    def rigid(self) -> tuple[tuple[float, Way], ...]:
+    def feedback(self) -> tuple[ControlMethod, ...]:
+        """The methods with feedback that any run goes."""
+        return tuple(method for method in FEEDBACK if self.rows(CASES[0], method))
+
+    @property
+    def rigid(self) -> tuple[tuple[float, ControlMethod], ...]:
         """Rigid arms that any run is on, with how many times as stiff their joints are."""
-        return tuple((f, way) for f, way in zip(JOINT_FACTORS, RIGIDS, strict=True) if self.rows(CASES[0], way))
+        return tuple(
+            (f, method) for f, method in zip(JOINT_FACTORS, RIGIDS, strict=True) if self.rows(CASES[0], method)
+        )
 
     @property
-    def ways(self) -> tuple[Way, ...]:
-        """All ways that any run goes on the arm that was learned from, or on the rigid one."""
+    def methods(self) -> tuple[ControlMethod, ...]:
+        """All methods that any run goes on the arm that was learned from, or on the rigid one."""
         return (
             *((MODEL_BASED,) if self.rows(CASES[0], MODEL_BASED) else ()),
             *self.learned,
+            *self.feedback,
             *(w for _, w in self.rigid),
         )
 
     @property
-    def hybrid(self) -> Way:
-        """The way that the paper's claims are judged by: its own network if there is one, else the default."""
+    def hybrid(self) -> ControlMethod:
+        """The method that the paper's claims are judged by: its own network if there is one, else the default."""
         return PUBLISHED if PUBLISHED in self.learned else CUBIC
 
-    def names(self, case: Case, way: Way, arm: Arm = TRAINED) -> list[str]:
+    def names(self, case: Case, method: ControlMethod, arm: Arm = TRAINED) -> list[str]:
         """Return the folders' names of runs."""
-        return [row["run"] for row in self.rows(case, way, arm)]
+        return [row["run"] for row in self.rows(case, method, arm)]
 
-    def metric(self, name: str, case: Case, way: Way, arm: Arm = TRAINED) -> Floats:
+    def metric(self, name: str, case: Case, method: ControlMethod, arm: Arm = TRAINED) -> Floats:
         """Return a metric of runs, shape (runs,)."""
-        return np.array([row[name] for row in self.rows(case, way, arm)], dtype=np.float64)
+        return np.array([row[name] for row in self.rows(case, method, arm)], dtype=np.float64)
 
-    def rows(self, case: Case, way: Way, arm: Arm = TRAINED) -> list[dict[str, Any]]:
+    def rows(self, case: Case, method: ControlMethod, arm: Arm = TRAINED) -> list[dict[str, Any]]:
         """Return the rows of runs that came to their end."""
-        return self._done.get(_key_of({**case.parameters, **way.parameters, **arm.parameters}), [])
+        return self._done.get(_key_of({**case.parameters, **method.parameters, **arm.parameters}), [])
 
 
 _Key = tuple[str | float, ...]
@@ -190,10 +205,20 @@ def _plain(value: Any) -> str | float:
     """Return a number, also one that is a text, as such, and a name in lower case."""
     if isinstance(value, enum.Enum):
         return value.name.lower()
+    if value in ("true", "false"):
+        return float(value == "true")
     return float(value) if not isinstance(value, str) or is_number(value) else value
 
 
-_VARIED = {name for arm in OTHERS for name in arm.parameters} | {"load", "pressure", "links", "learned", "joint_factor"}
+_VARIED = {name for arm in OTHERS for name in arm.parameters} | {
+    "load",
+    "pressure",
+    "links",
+    "learned",
+    "closed_loop",
+    "imu",
+    "joint_factor",
+}
 _DEFAULTS: dict[str, str | float] = {
     **{name: _plain(value) for name, value in vars(HybridParameters()).items() if name in _VARIED},
     "kinematics.method": Method.HYBRID.name.lower(),

@@ -12,8 +12,8 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
 from handover.scenarios.published.vsl.path_traces import PathTrace, Repetitions, traces_of
-from handover.scenarios.published.vsl.vsl_1_figures import draw_path
-from handover.scenarios.published.vsl.vsl_2_runs import CASES, MODEL_BASED, TRAINED, Case, Vsl2Runs, Way
+from handover.scenarios.published.vsl.vsl_1.figures import draw_path
+from handover.scenarios.published.vsl.vsl_2.runs import CASES, MODEL_BASED, TRAINED, Case, ControlMethod, Vsl2Runs
 from handover.scenarios.vsl.plots import draw_box
 
 _BLUE, _RED, _GREEN, _PURPLE = COLOURS[:4]
@@ -23,13 +23,13 @@ _STROKES: tuple[Any, ...] = ("-", "--", ":", "-.")
 
 def draw_figures(runs: Vsl2Runs, folders: Path, folder: Path) -> list[Figure]:
     """Draw into a folder, of runs whose folders are in `folders`; what has no runs, or no records, is left out."""
-    traces = {(case, way): traces_of(folders, runs.names(case, way)) for case in CASES for way in runs.ways}
+    traces = {(case, method): traces_of(folders, runs.names(case, method)) for case in CASES for method in runs.methods}
     figures: list[Figure] = []
     if all(traces.get((case, MODEL_BASED)) for case in CASES):
         figures.append(_estimates({case: traces[case, MODEL_BASED] for case in CASES}, folder))
         if all(traces.get((case, runs.hybrid)) for case in CASES):
             figures.append(_compensated(runs, traces, folder))
-    if runs.ways and all(traces.values()):
+    if runs.methods and all(traces.values()):
         figures.append(_boxes(runs, traces, folder))
     if len(runs.rigid) > 1 and runs.learned:
         figures.append(_by_joints(runs, folder))
@@ -54,10 +54,12 @@ def _estimates(traces: Mapping[Case, Sequence[PathTrace]], folder: Path) -> Figu
     return Figure("estimates", caption)
 
 
-def _compensated(runs: Vsl2Runs, traces: Mapping[tuple[Case, Way], Sequence[PathTrace]], folder: Path) -> Figure:
+def _compensated(
+    runs: Vsl2Runs, traces: Mapping[tuple[Case, ControlMethod], Sequence[PathTrace]], folder: Path
+) -> Figure:
     with figure(folder / "compensated", 1, len(CASES), size=(9.0, 4.2)) as panels:
         for axes, case in zip(panels, CASES, strict=True):
-            plain, hybrid = (traces[case, way][0] for way in (MODEL_BASED, runs.hybrid))
+            plain, hybrid = (traces[case, method][0] for method in (MODEL_BASED, runs.hybrid))
             _draw_desired(axes, plain)
             axes.plot(*_in_plane(plain.tracked), color=_GREEN, lw=1.1, label="tip, by rigid kinematics")
             axes.plot(*_in_plane(hybrid.tracked), color=_RED, lw=1.1, label=f"tip, by {runs.hybrid.label}")
@@ -86,13 +88,13 @@ def _label_plane(axes: Axes, case: Case) -> None:
     axes.set_aspect("equal", adjustable="datalim")
 
 
-def _boxes(runs: Vsl2Runs, traces: Mapping[tuple[Case, Way], Sequence[PathTrace]], folder: Path) -> Figure:
-    with figure(folder / "errors", len(CASES), size=(9.0, 6.6)) as panels:
+def _boxes(runs: Vsl2Runs, traces: Mapping[tuple[Case, ControlMethod], Sequence[PathTrace]], folder: Path) -> Figure:
+    with figure(folder / "errors", len(CASES), size=(11.0, 6.6)) as panels:
         for axes, case in zip(panels, CASES, strict=True):
-            for k, way in enumerate(runs.ways):
-                errors = np.concatenate([np.linalg.norm(t.tracked - t.desired, axis=1) for t in traces[case, way]])
-                draw_box(axes, k, 1000 * errors, _colour(way))
-            axes.set_xticks(range(len(runs.ways)), [_wrapped(way) for way in runs.ways], fontsize="small")
+            for k, method in enumerate(runs.methods):
+                errors = np.concatenate([np.linalg.norm(t.tracked - t.desired, axis=1) for t in traces[case, method]])
+                draw_box(axes, k, 1000 * errors, _colour(method))
+            axes.set_xticks(range(len(runs.methods)), [_wrapped(method) for method in runs.methods], fontsize="small")
             axes.set(title=case.label, ylabel="error (mm)")
             _logarithmic(axes, (0.02, 0.1, 0.5, 2.0, 10.0, 50.0))
             axes.grid(visible=False, axis="x")
@@ -110,22 +112,22 @@ def _logarithmic(axes: Axes, ticks: Sequence[float]) -> None:
     axes.set_yticks([], minor=True)
 
 
-def _colour(way: Way) -> str:
-    return _GREEN if way is MODEL_BASED else _RED if way.is_learned else _BLUE
+def _colour(method: ControlMethod) -> str:
+    return _GREEN if method is MODEL_BASED else _RED if method.is_learned else _BLUE
 
 
-def _wrapped(way: Way) -> str:
-    return "\n".join(wrap(way.label, 13))
+def _wrapped(method: ControlMethod) -> str:
+    return "\n".join(wrap(method.label, 13))
 
 
 def _by_joints(runs: Vsl2Runs, folder: Path) -> Figure:
     with figure(folder / "rigid_joints", 1, len(CASES), size=(9.0, 3.6)) as panels:
         for axes, case in zip(panels, CASES, strict=True):
-            points = [(f, 1000 * runs.metric("mean_error", case, way).mean()) for f, way in runs.rigid]
+            points = [(f, 1000 * runs.metric("mean_error", case, method).mean()) for f, method in runs.rigid]
             axes.plot(*zip(*points, strict=True), "o-", ms=5, lw=1.2, color=_BLUE, label="rigid arm")
-            for k, way in enumerate(runs.learned):
-                level = 1000 * runs.metric("mean_error", case, way).mean()
-                axes.axhline(level, color=_RED, lw=1.2, ls=_STROKES[k], label=way.label)
+            for k, method in enumerate(runs.learned):
+                level = 1000 * runs.metric("mean_error", case, method).mean()
+                axes.axhline(level, color=_RED, lw=1.2, ls=_STROKES[k], label=method.label)
             axes.set(title=case.label, xlabel="joints stiffer by", ylim=(0.0, None), xscale="log")
             axes.set_xticks([f for f, _ in runs.rigid], [f"{f:g}" for f, _ in runs.rigid], minor=False)
             axes.set_xticks([], minor=True)
@@ -140,15 +142,17 @@ def _by_joints(runs: Vsl2Runs, folder: Path) -> Figure:
 
 
 def _by_arm(runs: Vsl2Runs, folder: Path) -> Figure:
-    ways = [way for way in runs.ways if way.is_learned or way is MODEL_BASED]
-    with figure(folder / "other_arms", 1, len(CASES), size=(9.0, 3.8)) as panels:
+    methods = [method for method in runs.methods if method.is_learned or method is MODEL_BASED]
+    with figure(folder / "other_arms", len(CASES), size=(9.0, 6.6)) as panels:
         for axes, case in zip(panels, CASES, strict=True):
-            for k, way in enumerate(ways):
-                trained = 1000 * runs.metric("mean_error", case, way, TRAINED)
-                others = [1000 * v.mean() for arm in runs.arms if len(v := runs.metric("mean_error", case, way, arm))]
-                axes.plot([k - 0.12] * len(trained), trained, "o", ms=4, color=_colour(way))
-                axes.plot([k + 0.12] * len(others), others, "o", ms=5, mfc="none", mec=_colour(way))
-            axes.set_xticks(range(len(ways)), [_wrapped(way) for way in ways], fontsize="small")
+            for k, method in enumerate(methods):
+                trained = 1000 * runs.metric("mean_error", case, method, TRAINED)
+                others = [
+                    1000 * v.mean() for arm in runs.arms if len(v := runs.metric("mean_error", case, method, arm))
+                ]
+                axes.plot([k - 0.12] * len(trained), trained, "o", ms=4, color=_colour(method))
+                axes.plot([k + 0.12] * len(others), others, "o", ms=5, mfc="none", mec=_colour(method))
+            axes.set_xticks(range(len(methods)), [_wrapped(method) for method in methods], fontsize="small")
             axes.set(title=case.label)
             _logarithmic(axes, (1.0, 2.0, 5.0, 10.0, 20.0, 50.0))
             axes.grid(visible=False, axis="x")
@@ -156,5 +160,5 @@ def _by_arm(runs: Vsl2Runs, folder: Path) -> Figure:
         panels[0].plot([], [], "o", ms=4, color=_DESIRED, label="the arm that was learned from, each run")
         panels[0].plot([], [], "o", ms=5, mfc="none", mec=_DESIRED, label="another arm, mean of its runs")
         legend_below(panels[0])
-    caption = "Mean errors of the tip along the curve on the arm that was learned from and on others, by way."
+    caption = "Mean errors of the tip along the curve on the arm that was learned from and on others, by method."
     return Figure("other_arms", caption)

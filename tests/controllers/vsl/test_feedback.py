@@ -1,4 +1,4 @@
-"""What the kinematics remember: currents with a window, the tracker's loop, what is done against swings."""
+"""What the kinematics remember: currents with friction compensation, the tracker's loop, the damping of vibrations."""
 
 import dataclasses
 from typing import Any
@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.controllers.vsl import default_model, default_physics_model, default_small_model, default_window_model
-from handover.controllers.vsl.corrections import CurrentFilter, SwingCompensation, TrackerLoop
+from handover.controllers.vsl import default_friction_model, default_model, default_physics_model, default_small_model
+from handover.controllers.vsl.feedback import CurrentFilter, ImuTip, ModelMonitor, TipLoop, VibrationDamping
 from handover.controllers.vsl.fit import directions_of
 from handover.controllers.vsl.hybrid_kinematics import Inputs
 from handover.controllers.vsl.learned_model import Adapted, VslModel, inputs_of, turned
 from handover.controllers.vsl.model_text import parse_model
 from handover.cosim.blocks.ports import Floats
 
-WINDOW = parse_model(default_window_model.DEFAULT_MODEL, "that ships")
+FRICTION_MODEL = parse_model(default_friction_model.DEFAULT_MODEL, "that ships")
 MODEL = parse_model(default_model.DEFAULT_MODEL, "that ships")
 ARM = MODEL.kinematics
 Q = ARM.inverse(np.array([0.35, 0.0, 0.15]))
@@ -24,7 +24,7 @@ P = np.array([1e5, 1e5])
 
 
 def reading(q: Floats = Q, **given: Any) -> Inputs:
-    usual, _ = WINDOW.currents(q, P)
+    usual, _ = FRICTION_MODEL.currents(q, P)
     u = Inputs(
         q_ref=q, qd_ref=np.zeros(3), q_meas=q, p_meas=P, i_meas=np.array([0.0, *usual]), p_WG_meas=ARM.forward(q)
     )
@@ -49,23 +49,23 @@ def test_directions_of_commands_are_those_one_after_another():
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_a_window_frees_currents_of_friction(direction: float):
-    friction = np.array(WINDOW.friction)
+    friction = np.array(FRICTION_MODEL.friction)
     assert np.all(friction > 0.02)
-    unit = CurrentFilter(WINDOW, 0.2, 0.002)
+    unit = CurrentFilter(FRICTION_MODEL, 0.2, 0.002)
     unit.turn(np.array([0.0, 1.0, 1.0]) * direction)
     clean = reading()
     sliding = reading(i_meas=clean.i_meas + np.array([0.3, *(direction * friction)]))
     np.testing.assert_allclose(unit.step(sliding, 0.02)[1:], clean.i_meas[1:], atol=1e-12)
-    np.testing.assert_allclose(unit.swing(sliding, clean.i_meas), 0.0, atol=1e-12)
+    np.testing.assert_allclose(unit.oscillation(sliding, clean.i_meas), 0.0, atol=1e-12)
 
 
 def test_what_a_load_adds_does_not_lag_behind_the_posture():
     """A load of constant mass adds its levers to the usual currents: in any posture, at once."""
-    unit, plain = CurrentFilter(WINDOW, 0.2, 0.002), CurrentFilter(None, 0.2, 0.002)
+    unit, plain = CurrentFilter(FRICTION_MODEL, 0.2, 0.002), CurrentFilter(None, 0.2, 0.002)
     worst, worst_plain = 0.0, 0.0
     for k in range(60):
         q = ARM.inverse(np.array([0.30 + 0.0015 * k, 0.0, 0.15]))
-        usual, levers = WINDOW.currents(q, P)
+        usual, levers = FRICTION_MODEL.currents(q, P)
         u = reading(q, i_meas=np.array([0.0, *(usual + 0.3 * levers)]))
         worst = max(worst, float(np.max(np.abs(unit.step(u, 0.02) - u.i_meas))))
         worst_plain = max(worst_plain, float(np.max(np.abs(plain.step(u, 0.02) - u.i_meas))))
@@ -74,9 +74,9 @@ def test_what_a_load_adds_does_not_lag_behind_the_posture():
 
 
 def test_a_change_of_load_is_smoothed_by_two_lags():
-    unit = CurrentFilter(WINDOW, 0.2, 0.002)
+    unit = CurrentFilter(FRICTION_MODEL, 0.2, 0.002)
     unit.step(reading(), 0.02)
-    _, levers = WINDOW.currents(Q, P)
+    _, levers = FRICTION_MODEL.currents(Q, P)
     heavier = reading(i_meas=reading().i_meas + np.array([0.0, *(0.4 * levers)]))
     shares = [float((unit.step(heavier, 0.02) - reading().i_meas)[1] / (0.4 * levers[0])) for _ in range(100)]
     t = 0.02 * np.arange(1, 101)
@@ -86,11 +86,11 @@ def test_a_change_of_load_is_smoothed_by_two_lags():
 def closed(error: Floats, seconds: float, **given: float) -> Floats:
     """Return where the tip of a rigid arm is that is off by an error, after the loop was closed for a while."""
     params = {"rate": 30.0, "lag": 0.2, "K_I": 2.0, "limit": 0.2} | given
-    loop = TrackerLoop(ARM, None, **params)
+    loop = TipLoop(ARM, None, **params)
     before = Q, Q
     for k in range(round(seconds / 0.02)):
         at = ARM.forward(Q + loop.dq) + error
-        loop.step(k * 0.02, reading(p_WG_meas=at), np.zeros(3), before)
+        loop.step(k * 0.02, reading(), at, np.zeros(3), before)
     return ARM.forward(Q + loop.dq) + error
 
 
@@ -102,28 +102,28 @@ def test_the_loop_takes_the_tips_error_away():
 
 
 def test_the_loop_takes_each_reading_once():
-    loop = TrackerLoop(ARM, None, 10.0, 0.0, 2.0, 0.2)
-    off = reading(p_WG_meas=ARM.forward(Q) - np.array([0.0, 0.0, 0.01]))
+    loop = TipLoop(ARM, None, 10.0, 0.0, 2.0, 0.2)
+    off = ARM.forward(Q) - np.array([0.0, 0.0, 0.01])
     seen: list[float] = []
     for k in range(11):
-        loop.step(k * 0.02, off, np.zeros(3), (Q, Q))
+        loop.step(k * 0.02, reading(), off, np.zeros(3), (Q, Q))
         seen.append(float(loop.dq[1]))
     assert seen[0] == seen[4] < seen[5] == seen[9] < seen[10]
 
 
 def test_the_loop_rests_while_joints_are_on_their_way_and_stays_within_its_limit():
-    loop = TrackerLoop(ARM, None, 30.0, 0.0, 20.0, 0.05)
-    far = reading(p_WG_meas=ARM.forward(Q) - np.array([0.0, 0.0, 0.2]))
-    loop.step(0.0, far, np.zeros(3), (Q, Q + np.array([0.0, 0.1, 0.0])))
-    loop.step(0.1, far, np.zeros(3), None)
+    loop = TipLoop(ARM, None, 30.0, 0.0, 20.0, 0.05)
+    far = ARM.forward(Q) - np.array([0.0, 0.0, 0.2])
+    loop.step(0.0, reading(), far, np.zeros(3), (Q, Q + np.array([0.0, 0.1, 0.0])))
+    loop.step(0.1, reading(), far, np.zeros(3), None)
     np.testing.assert_array_equal(loop.dq, np.zeros(3))
     for k in range(40):
-        loop.step(0.2 + 0.05 * k, far, np.zeros(3), (Q, Q))
+        loop.step(0.2 + 0.05 * k, reading(), far, np.zeros(3), (Q, Q))
     assert np.max(np.abs(loop.dq)) == 0.05
 
 
 def test_a_velocity_that_begins_is_commanded_ahead_once():
-    unit, i = SwingCompensation(MODEL, 0.6, 0.0), reading().i_meas
+    unit, i = VibrationDamping(MODEL, 0.6, 0.0), reading().i_meas
     v_up = ARM.joint_velocities(Q, np.array([0.0, 0.0, 0.2]))
     off_the_path = np.array([0.8, 0.8, 0.8])
     for _ in range(8):
@@ -149,10 +149,10 @@ ADAPTED = dataclasses.replace(
 )
 
 
-@pytest.mark.parametrize("model", [MODEL, WINDOW, SMALL, PHYSICS, ADAPTED])
+@pytest.mark.parametrize("model", [MODEL, FRICTION_MODEL, SMALL, PHYSICS, ADAPTED])
 def test_what_bends_by_a_swing_is_how_the_command_changes_with_the_currents(model: VslModel):
     """What is commanded ahead of a first velocity is K_F G i a / g; G as differences of `VslModel.command` have it."""
-    unit, v, dt = SwingCompensation(model, 0.6, 0.0), np.array([0.0, 0.0, 0.2]), 0.02
+    unit, v, dt = VibrationDamping(model, 0.6, 0.0), np.array([0.0, 0.0, 0.2]), 0.02
     i = np.array([0.0, *model.inverse.domain.mean[5:].tolist()])
     qd = ARM.joint_velocities(Q, v)
     unit.step(dt, reading(Q - dt * qd), i, np.zeros(2))
@@ -163,7 +163,7 @@ def test_what_bends_by_a_swing_is_how_the_command_changes_with_the_currents(mode
     assert np.all(unit.dq[1:] > 0.001)
 
 
-@pytest.mark.parametrize("model", [MODEL, WINDOW, SMALL, PHYSICS, ADAPTED])
+@pytest.mark.parametrize("model", [MODEL, FRICTION_MODEL, SMALL, PHYSICS, ADAPTED])
 @pytest.mark.parametrize("which", ["inverse", "forward"])
 def test_jacobians_are_those_of_differences_by_every_input(model: VslModel, which: str):
     regressor = getattr(model, which)
@@ -178,7 +178,7 @@ def test_jacobians_are_those_of_differences_by_every_input(model: VslModel, whic
 
 
 def test_joints_yield_to_a_swing_and_come_back():
-    unit, i = SwingCompensation(MODEL, 0.0, 4.0), reading().i_meas
+    unit, i = VibrationDamping(MODEL, 0.0, 4.0), reading().i_meas
     for _ in range(3):
         unit.step(0.02, reading(), i, np.array([0.1, 0.0]))
     down = float(unit.dq[1])
@@ -186,3 +186,35 @@ def test_joints_yield_to_a_swing_and_come_back():
     for _ in range(100):
         unit.step(0.02, reading(), i, np.zeros(2))
     assert abs(float(unit.dq[1])) < 0.01 * abs(down)
+
+
+def test_imus_see_the_tip_of_links_bent_in_arcs():
+    """Of arcs, whose direction turns evenly, the chord leads half way between their ends."""
+    begins, bends = np.array([0.6, -0.5]), np.array([0.08, 0.12])
+    along = [np.exp(1j * (a - d * np.linspace(0.0, 1.0, 20001))).mean() for a, d in zip(begins, bends, strict=True)]
+    tip = 0.225 * (along[0] + along[1])
+    q = np.array([0.3, begins[0], begins[1] - (begins[0] - bends[0])])
+    seen = ARM.bent(q, begins - bends, np.array([0.5, 0.5]))
+    np.testing.assert_allclose(seen, [tip.real * np.cos(0.3), tip.real * np.sin(0.3), 0.15 + tip.imag], atol=2e-4)
+    np.testing.assert_allclose(ARM.bent(q, np.array([q[1], q[1] + q[2]]), np.array([0.75, 1.0])), ARM.forward(q))
+
+
+def test_imus_do_not_tell_the_tip_while_links_shake():
+    sensor, still = ImuTip(ARM, np.array([0.75, 1.0])), np.array([Q[1], Q[1] + Q[2]])
+    for k in range(50):
+        assert sensor.step(0.02, reading(tilt_meas=still + 0.003 * (-1) ** k)) is not None
+    shaken = [sensor.step(0.02, reading(tilt_meas=still + 0.1 * (-1) ** k)) for k in range(50)]
+    assert shaken[-1] is None
+    calm = [sensor.step(0.02, reading(tilt_meas=still)) for _ in range(100)]
+    np.testing.assert_allclose(calm[-1], ARM.forward(Q))
+
+
+def test_the_innovation_is_smoothed_and_has_a_limit():
+    monitor, off = ModelMonitor(2.0, 0.004), np.array([0.0, 0.003, -0.004])
+    for _ in range(100):
+        monitor.step(0.02, off, np.zeros(3))
+    assert monitor.innovation == pytest.approx(0.005 * (1.0 - np.exp(-1.0)))
+    assert not monitor.mismatch
+    for _ in range(200):
+        monitor.step(0.02, off, np.zeros(3))
+    assert monitor.mismatch

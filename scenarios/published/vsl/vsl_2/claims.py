@@ -5,17 +5,18 @@ from dataclasses import replace
 from handover.scenarios.published.published_experiment import Claim
 from handover.scenarios.published.verdicts import without_verdict
 from handover.scenarios.published.vsl.separation import Comparison, separation_claim
-from handover.scenarios.published.vsl.vsl_2_runs import (
+from handover.scenarios.published.vsl.vsl_2.runs import (
     CASES,
     CUBIC,
+    IMU,
     MODEL_BASED,
     PUBLISHED,
     RIGID,
     TRAINED,
     Arm,
     Case,
+    ControlMethod,
     Vsl2Runs,
-    Way,
 )
 
 _RIGID_BY_CHOICE = (
@@ -27,7 +28,7 @@ _RIGID_BY_CHOICE = (
 
 def claims_of(runs: Vsl2Runs) -> list[Claim]:
     """Return the claims, those beyond the paper last."""
-    return [*_estimates(runs), _command(runs), _rigid(runs), *_stiffer(runs), *_other_arms(runs)]
+    return [*_estimates(runs), _command(runs), _rigid(runs), *_stiffer(runs), *_other_arms(runs), *_imus(runs)]
 
 
 def _estimates(runs: Vsl2Runs) -> list[Claim]:
@@ -38,10 +39,10 @@ def _estimates(runs: Vsl2Runs) -> list[Claim]:
     return [_estimate(runs, PUBLISHED, f"{PUBLISHED.label}, while the tip goes by its commands"), shipped]
 
 
-def _estimate(runs: Vsl2Runs, way: Way, by: str) -> Claim:
+def _estimate(runs: Vsl2Runs, method: ControlMethod, by: str) -> Claim:
     comparisons = [
         Comparison(
-            case.label, *(runs.metric(f"{what}_error", case, way) for what in ("estimate", "model")), paired=True
+            case.label, *(runs.metric(f"{what}_error", case, method) for what in ("estimate", "model")), paired=True
         )
         for case in CASES
     ]
@@ -88,25 +89,35 @@ def _stiffer(runs: Vsl2Runs) -> list[Claim]:
 
 
 def _other_arms(runs: Vsl2Runs) -> list[Claim]:
-    """Judge each way that was taught on arms that it was not taught on."""
+    """Judge each method that was taught on arms that it was not taught on."""
     on, claims = "On every arm that nothing was learned from the tip errs less by", list[Claim]()
     pairs = [(case, arm) for case in CASES for arm in runs.arms]
-    for way in runs.learned if pairs else ():
+    for method in runs.learned if pairs else ():
         against = {
-            "by rigid kinematics": [_compared(runs, case, way, MODEL_BASED, arm, arm) for case, arm in pairs],
-            "that of the rigid arm": [_compared(runs, case, way, RIGID, arm) for case, arm in pairs],
+            "by rigid kinematics": [_compared(runs, case, method, MODEL_BASED, arm, arm) for case, arm in pairs],
+            "that of the rigid arm": [_compared(runs, case, method, RIGID, arm) for case, arm in pairs],
         }
         claims += [
-            separation_claim(f"{on} {way.label} than {what}.", "", "", comparisons, beyond=True)
+            separation_claim(f"{on} {method.label} than {what}.", "", "", comparisons, beyond=True)
             for what, comparisons in against.items()
         ]
     return claims
 
 
+def _imus(runs: Vsl2Runs) -> list[Claim]:
+    """Judge the polynomials with feedback by IMUs against themselves without."""
+    pairs = [(case, arm) for case in CASES for arm in (TRAINED, *runs.arms)]
+    if IMU not in runs.feedback:
+        return []
+    comparisons = [_compared(runs, case, IMU, CUBIC, arm, arm) for case, arm in pairs]
+    sentence = "On every arm the tip errs less by polynomials with an IMU a link than by polynomials alone."
+    return [separation_claim(sentence, "", "", comparisons, beyond=True)]
+
+
 def _compared(
-    runs: Vsl2Runs, case: Case, less: Way, more: Way, arm: Arm = TRAINED, other_arm: Arm = TRAINED
+    runs: Vsl2Runs, case: Case, less: ControlMethod, more: ControlMethod, arm: Arm = TRAINED, other_arm: Arm = TRAINED
 ) -> Comparison:
-    """Return the comparison of a way on an arm with another way, maybe on another arm."""
+    """Return the comparison of a method on an arm with another method, maybe on another arm."""
     label = case.label if arm is TRAINED else f"{case.label}, {arm.label}"
     errors = runs.metric("mean_error", case, less, arm), runs.metric("mean_error", case, more, other_arm)
     return Comparison(label, *errors)

@@ -7,7 +7,7 @@ from handover.controllers.vsl.paths import Path as TipPath
 from handover.scenarios.published.published_experiment import Claim
 from handover.scenarios.published.verdicts import without_verdict
 from handover.scenarios.published.vsl.separation import Comparison, separation_claim
-from handover.scenarios.published.vsl.vsl_1_runs import PATHS, RIGID, Cell, Links, Vsl1Runs, format_load
+from handover.scenarios.published.vsl.vsl_1.runs import PATHS, RIGID, Cell, Links, Vsl1Runs, format_load
 
 _WHERE = "sec. V-C, fig. 5"
 

@@ -11,7 +11,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
 from handover.scenarios.published.vsl.path_traces import Repetitions, traces_of
-from handover.scenarios.published.vsl.vsl_1_runs import PATHS, RIGID, SOFT, Cell, Vsl1Runs, format_load
+from handover.scenarios.published.vsl.vsl_1.runs import PATHS, RIGID, SOFT, Cell, Vsl1Runs, format_load
 
 _SERVOS = "servos"
 _COLOURS = dict(zip((_SERVOS, RIGID.label, *(links.label for links in SOFT)), (0, 1, 2, 3, 4, 8), strict=True))

@@ -10,11 +10,12 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.vsl.vsl_2_claims import claims_of
-from handover.scenarios.published.vsl.vsl_2_figures import draw_figures
-from handover.scenarios.published.vsl.vsl_2_runs import (
+from handover.scenarios.published.vsl.vsl_2.claims import claims_of
+from handover.scenarios.published.vsl.vsl_2.figures import draw_figures
+from handover.scenarios.published.vsl.vsl_2.runs import (
     CASES,
     CUBIC,
+    FEEDBACK,
     MODEL_BASED,
     OTHERS,
     PUBLISHED,
@@ -25,7 +26,7 @@ from handover.scenarios.published.vsl.vsl_2_runs import (
     TRAINED,
     Vsl2Runs,
 )
-from handover.scenarios.published.vsl.vsl_2_tables import tables_of
+from handover.scenarios.published.vsl.vsl_2.tables import tables_of
 from handover.scenarios.vsl.path_experiments import VslHybrid
 
 _SEED = 2021
@@ -36,10 +37,11 @@ class Vsl2(PublishedExperiment):
     """The curve with 25 g at 1.5 bar and with 75 g at 0.5 bar, five times each, by rigid kinematics and by corrections.
 
     Corrections are those of cubic polynomials, the default, of a small network and of a beam of four fitted numbers,
-    which ship, and of the paper's network if `take_model` was given the file of one. Besides, the arm of rigid links
-    goes by rigid kinematics, with joints as stiff as assumed and stiffer. Corrections are tried on the arm that they
-    were learned from, and on others. The quick plan has each case once by rigid kinematics and by polynomials, on the
-    arm that was learned from and on another, and on two rigid arms.
+    which ship, and of the paper's network if `take_model` was given the file of one. Polynomials are tried with
+    feedback, too, by the tracker or by an IMU a link. Besides, the arm of rigid links goes by rigid kinematics, with
+    joints as stiff as assumed and stiffer. Corrections are tried on the arm that they were learned from, and on others.
+    The quick plan has each case once by rigid kinematics and by polynomials, on the arm that was learned from and on
+    another, and on two rigid arms.
 
     The beam has the law of bending and the masses of the arm that it is tried on (an inverse crime): its errors are the
     least that such a correction could reach, and say nothing of one on a real arm.
@@ -66,19 +68,21 @@ class Vsl2(PublishedExperiment):
         self._network = file
 
     def plan(self, quick: bool) -> CampaignPlan:
-        """Return cases x ways, and cases x corrections x other arms, five times each; if quick, a few once."""
+        """Return cases x methods, and cases x corrections x other arms, five times each; if quick, a few once."""
         network = () if self._network is None else (PUBLISHED,)
         given = {"model": str(self._network)}
         if quick:
-            ways, rigid, arms = (MODEL_BASED, CUBIC, *network), (RIGID, RIGIDS[-1]), OTHERS[:1]
+            methods, rigid, arms = (MODEL_BASED, CUBIC, *network), (RIGID, RIGIDS[-1]), OTHERS[:1]
         else:
-            ways, rigid, arms = (MODEL_BASED, *SHIPPED, *network), RIGIDS, OTHERS
-        tried = [(way, arm) for arm in (TRAINED, *arms) for way in ways] + [(way, TRAINED) for way in rigid]
+            methods, rigid, arms = (MODEL_BASED, *SHIPPED, *network, *FEEDBACK), RIGIDS, OTHERS
+        tried = [(method, arm) for arm in (TRAINED, *arms) for method in methods] + [
+            (method, TRAINED) for method in rigid
+        ]
         return CampaignPlan(
             scenario=self.scenario,
             points=[
-                {**case.parameters, **way.parameters, **arm.parameters, **(given if way is PUBLISHED else {})}
-                for way, arm in tried
+                {**case.parameters, **method.parameters, **arm.parameters, **(given if method is PUBLISHED else {})}
+                for method, arm in tried
                 for case in CASES
             ],
             repetitions=1 if quick else REPETITIONS,
@@ -91,7 +95,7 @@ class Vsl2(PublishedExperiment):
         return claims_of(Vsl2Runs(table))
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
-        """Return errors by way, the rigid arm's by its joints, those on other arms, and those of estimates."""
+        """Return errors by method, the rigid arm's by its joints, those on other arms, and those of estimates."""
         return tables_of(Vsl2Runs(table))
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:

@@ -8,9 +8,9 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
-from handover.scenarios.published.vsl.vsl_1_claims import claims_of
-from handover.scenarios.published.vsl.vsl_1_figures import draw_figures
-from handover.scenarios.published.vsl.vsl_1_runs import (
+from handover.scenarios.published.vsl.vsl_1.claims import claims_of
+from handover.scenarios.published.vsl.vsl_1.figures import draw_figures
+from handover.scenarios.published.vsl.vsl_1.runs import (
     ALL_LINKS,
     LOADS,
     PATHS,
@@ -20,7 +20,7 @@ from handover.scenarios.published.vsl.vsl_1_runs import (
     Cell,
     Vsl1Runs,
 )
-from handover.scenarios.published.vsl.vsl_1_tables import tables_of
+from handover.scenarios.published.vsl.vsl_1.tables import tables_of
 from handover.scenarios.vsl.path_experiments import VslModelBased
 
 _SEED = 2020

@@ -5,7 +5,7 @@ import numpy as np
 from handover.controllers.vsl.paths import Path as TipPath
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.published.published_experiment import ComparisonTable
-from handover.scenarios.published.vsl.vsl_1_runs import PATHS, Cell, Vsl1Runs, format_load
+from handover.scenarios.published.vsl.vsl_1.runs import PATHS, Cell, Vsl1Runs, format_load
 
 PANELS = {TipPath.LINEAR: "5(a), linear", TipPath.CURVE: "5(b), curve", TipPath.SQUARE: "5(c), square"}
 """Rows of fig. 5."""

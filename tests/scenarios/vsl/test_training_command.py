@@ -1,0 +1,207 @@
+"""The command `handover vsl-train`."""
+
+import errno
+import os
+import re
+import signal
+import sys
+import types
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+import pytest
+from vsl_training_points import ARM, TRAINING, call, key_of_made_up, made_up, nobody, shipped
+
+from handover.controllers.vsl.default_model import DEFAULT_MODEL
+from handover.controllers.vsl.kinematics import Elbow
+from handover.controllers.vsl.learned_model import ForwardInput, VslModel
+from handover.controllers.vsl.model_text import parse_model, read_model
+from handover.fmus.build import build_block
+from handover.scenarios.cli import vsl_train as vsl_train_command
+from handover.scenarios.vsl import learning_curve as curve_module
+from handover.scenarios.vsl.data_file import write_data
+from handover.scenarios.vsl.learning_curve import curve_table, learning_curve
+from handover.scenarios.vsl.training import Errors, Progress, VslTraining
+from handover.scenarios.vsl.training_data import Measured
+
+
+def test_the_same_seed_gives_the_same_model_in_both_forms(tmp_path: Path):
+    for name in ("m.json", "m.py"):
+        result = call("--points", "400", "--seed", "1", "--out", tmp_path / name)
+        assert result.exit_code == 0, result.output
+        assert "400 points measured" in result.output
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["m.json", "m.py"]
+    module = types.ModuleType("m")
+    exec((tmp_path / "m.py").read_text(), vars(module))
+    assert vars(module)["DEFAULT_MODEL"] == (tmp_path / "m.json").read_text()
+    assert "--points 400 --seed 1" in (module.__doc__ or "")
+    text = read_model(tmp_path / "m.json").provenance
+    assert text["arm"]["fmu"] == "VslArm"
+    assert text["arm"]["parameters"]["motion"] == "QUASI_STATIC"
+    assert text["seed"] == 1
+    assert 300 < sum(text["points"][k] for k in ("training", "validation", "test")) <= 400
+    assert text["mean_test_errors_m"]["forward_hybrid"] < 0.1 * text["mean_test_errors_m"]["forward_model_based"]
+
+
+def test_errors_fall_along_the_learning_curve():
+    training, measured = replace(TRAINING, forward_input=ForwardInput.X), made_up(800)
+    seen: list[float] = []
+    curve = learning_curve(training, measured, lambda done, _of: seen.append(done), sizes=(400, 600, 9999))
+    assert [p.points for p in curve] == [400, 600, 800]
+    assert curve[-1].errors == training.learn(measured, nobody)[1]
+    assert curve[-1].errors.forward_hybrid < curve[0].errors.forward_hybrid
+    assert len({p.errors.forward_model_based for p in curve}) == 1  # the same test points
+    assert len(list(curve_table(curve))) == 4
+    assert seen == [1, 2, 3]
+
+
+def test_the_curve_is_drawn(tmp_path: Path):
+    result = call("--points", "400", "--curve", tmp_path / "a.b.png", "--out", tmp_path / "m.json")
+    assert result.exit_code == 0, result.output
+    assert {p.name for p in tmp_path.iterdir()} == {"a.b.png", "a.b.svg", "m.json"}
+    assert re.search(r"^ +250 +\d+\.\d\d", result.output, re.MULTILINE)
+
+
+def test_model_and_data_are_written_before_the_curve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def full(_points: object, path: Path) -> None:
+        path.with_suffix(".svg").write_text("<svg>")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(curve_module, "_draw", full)
+    out, curve = tmp_path / "m.json", tmp_path / "c.png"
+    result = call("--points", "400", "--save-data", tmp_path / "d.parquet", "--curve", curve, "--out", out)
+    assert result.exit_code == 2
+    assert re.search(r"--curve .*c\.png: No space left on device; the model is written: .*m\.json", result.output)
+    assert {p.name for p in tmp_path.iterdir()} == {"d.parquet", "m.json"}
+
+
+def test_a_model_is_adapted_to_stiffer_links_by_few_points(tmp_path: Path):
+    (tmp_path / "m.json").write_text(DEFAULT_MODEL)
+    stiffer = ("--arm", "EI_0=0.605", "--arm", "EI_p=1.155e-5")
+    result = call("--adapt", tmp_path / "m.json", "--points", "50", *stiffer, "--out", tmp_path / "a.json")
+    assert result.exit_code == 0, result.output
+    rows = [
+        [float(x) for x in line.split()[-3:]]
+        for line in result.output.splitlines()
+        if re.match("forward|inverse", line)
+    ]
+    assert all(adapted < 0.7 * before for _, before, adapted in rows)
+    model = read_model(tmp_path / "a.json")
+    assert model.provenance["adapted_from"] == shipped().provenance
+    assert model.provenance["arm"]["parameters"]["EI_0"] == 0.605
+    again = call("--adapt", tmp_path / "a.json", "--points", "50", *stiffer, "--out", tmp_path / "b.json")
+    assert again.exit_code == 0, again.output
+    np.testing.assert_array_equal(
+        read_model(tmp_path / "b.json").inverse.predict(np.ones(7)), model.inverse.predict(np.ones(7))
+    )
+
+
+def test_without_pytorch_the_published_network_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "torch", None)
+    result = call("--learned", "published", "--out", tmp_path / "m.json")
+    assert result.exit_code == 2
+    assert 'pip install "handover-cosim[train]"' in result.output
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--points", "10"], "10 is not in the range"),
+        (["--points", "50"], "50 is not in the range x>=400"),
+        (["--arm", "EI_0"], "is not of the form NAME=VALUE"),
+        (["--arm", "EI=1"], "the arm has no parameter 'EI'"),
+        (["--arm", "EI_0=x"], "'x' is not a number"),
+        (["--arm", "EI_0=-1"], "--arm EI_0=-1"),
+        (["--save-data", "d.csv"], "ends in .parquet"),
+        (["--curve", "c.pdf"], "ends in .png"),
+        (["--epochs", "3"], "of the published network alone"),
+        (["--learned", "physics", "--forward-input", "X"], "begins with the joints' angles"),
+        (["--data", "d.parquet", "--seed", "1", "--walk"], "--seed, --walk: with --data it is the file's"),
+        (["--adapt", "m.json", "--learned", "small"], "--learned: with --adapt it is the model's"),
+        (["--adapt", "none.json"], "none.json: it cannot be read"),
+        (["--data", "none.parquet"], "it is no Parquet file that can be read"),
+        (["--seed", "-1"], "-1 is not in the range"),
+        (["--out", "none/m.json"], "there is no folder"),
+        (["--out", "m.txt"], "ends in .json"),
+        (["--out", "m" * 250 + ".json"], "the name is longer than"),
+        (["--elbow", "left"], "'left' is not one of"),
+        (["--out", "folder.json"], "there is a folder of that name"),
+        (["--plant", "none.fmu"], "none.fmu"),
+        (["--plant", "text.fmu"], "not an FMU"),
+    ],
+)
+def test_usage_errors_take_a_line(arguments: list[str], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder.json").mkdir()
+    (tmp_path / "text.fmu").write_text("text")
+    before = sorted(tmp_path.iterdir())
+    result = call(*arguments)
+    assert result.exit_code == 2
+    assert text in result.output
+    assert "Traceback" not in result.output
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_an_arm_that_fails_leaves_no_file(tmp_path: Path):
+    fmu = build_block("vsl_training_arms:BreakingArm", 3, tmp_path, step=Fraction(1, 50))
+    result = call("--plant", fmu, "--out", tmp_path / "m.json")
+    assert result.exit_code == 3
+    assert "the arm broke" in result.output
+    assert not (tmp_path / "m.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("arm", "text"),
+    [
+        ("DistantArm", "0 of 400 measured tips are where links of 0.225 and 0.225 m"),
+        ("ArmWithoutGauges", r"the same at all points, whatever is commanded: p_meas\[1\], p_meas\[2\]"),
+    ],
+)
+def test_an_arm_that_teaches_nothing_is_refused(arm: str, text: str, tmp_path: Path):
+    fmu = build_block(f"vsl_training_arms:{arm}", 3, tmp_path, step=Fraction(1, 50))
+    result = call("--points", "400", "--plant", fmu, "--out", tmp_path / "m.json")
+    assert result.exit_code == 2
+    assert re.search(text, result.output)
+    assert "Traceback" not in result.output
+    assert not (tmp_path / "m.json").exists()
+
+
+def test_a_folder_that_goes_away_is_reported_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def gone(training: VslTraining, measured: Measured, _progress: Progress) -> tuple[VslModel, Errors]:
+        (tmp_path / "a").rmdir()
+        return shipped(), training.errors(shipped(), measured.points.rows(np.arange(10)))
+
+    (tmp_path / "a").mkdir()
+    write_data(tmp_path / "d.parquet", made_up(400))
+    monkeypatch.setattr(VslTraining, "learn", gone)
+    monkeypatch.setattr(vsl_train_command, "content_key", key_of_made_up)
+    result = call("--data", tmp_path / "d.parquet", "--out", tmp_path / "a" / "m.json")
+    assert result.exit_code == 2
+    assert "No such file or directory" in result.output
+    assert "Traceback" not in result.output
+
+
+def test_the_elbow_is_the_models(tmp_path: Path):
+    result = call("--points", "400", "--elbow", "down", "--out", tmp_path / "m.py")
+    assert result.exit_code == 0, result.output
+    module = types.ModuleType("m")
+    exec((tmp_path / "m.py").read_text(), vars(module))
+    assert parse_model(vars(module)["DEFAULT_MODEL"], "m").kinematics == replace(ARM, elbow=Elbow.DOWN)
+    assert "--seed 0 --elbow down --out" in (module.__doc__ or "")
+
+
+def test_ctrl_c_leaves_the_file_of_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    @contextmanager
+    def interrupted(_stream: TextIO) -> Generator[Callable[[float, float], None], None, None]:
+        yield lambda _t, _end: os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(vsl_train_command, "progress_bar", interrupted)
+    (tmp_path / "m.json").write_text("former")
+    assert call("--out", tmp_path / "m.json").exit_code == 130
+    assert [p.read_text() for p in tmp_path.iterdir()] == ["former"]

@@ -1,0 +1,115 @@
+"""Measured points as a file: written, read, refused."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from vsl_training_points import ARM, call, key_of_made_up, made_up
+
+from handover.scenarios.cli import vsl_train as vsl_train_command
+from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
+
+
+@pytest.mark.parametrize("learned", [[], ["--learned", "physics"], ["--friction-compensation"]])
+def test_training_from_saved_points_gives_the_same_bytes(learned: list[str], tmp_path: Path):
+    first = call("--points", "400", *learned, "--save-data", tmp_path / "d.parquet", "--out", tmp_path / "a.json")
+    assert first.exit_code == 0, first.output
+    second = call("--data", tmp_path / "d.parquet", *learned, "--out", tmp_path / "b.json")
+    assert second.exit_code == 0, second.output
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+    assert first.output.replace("a.json", "b.json") == second.output
+    assert ("currents by friction" in first.output) == (learned == ["--friction-compensation"])
+    assert ("from X = f(q) in place of q" in first.output) == (learned != ["--learned", "physics"])
+
+
+def test_points_of_a_file_are_those_written(tmp_path: Path):
+    measured = made_up(100)
+    write_data(tmp_path / "d.parquet", measured)
+    back = read_data(tmp_path / "d.parquet", "k", ARM)
+    assert back.digest() == measured.digest()
+    assert back.origin == measured.origin
+    for name, values in vars(measured.points).items():
+        np.testing.assert_array_equal(getattr(back.points, name), values)
+
+
+def without(name: str) -> Callable[[Any], Any]:
+    return lambda table: table.drop_columns([name])
+
+
+def with_column(name: str, values: Any) -> Callable[[Any], Any]:
+    return lambda table: table.set_column(table.column_names.index(name), name, [values])
+
+
+def with_metadata(metadata: Any) -> Callable[[Any], Any]:
+    return lambda table: table.replace_schema_metadata(metadata)
+
+
+def about(**origin: Any) -> Callable[[Any], Any]:
+    def change(table: Any) -> Any:
+        kept = json.loads(table.schema.metadata[b"handover-vsl-data"])
+        return table.replace_schema_metadata({b"handover-vsl-data": json.dumps(kept | origin).encode()})
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (without("p_WG_meas[2]"), r"it lacks the columns p_WG_meas\[2\]"),
+        (without("order"), "it lacks the columns order"),
+        (
+            with_column("i_meas[3]", [0.0] * 7 + [float("nan")] * 93),
+            r"i_meas\[3\] is not finite in 93 rows, row 8 first",
+        ),
+        (with_column("i_meas[3]", [None] + [1.0] * 99), r"i_meas\[3\] has 1 rows without a value"),
+        (with_column("q_cmd[1]", ["x"] * 100), r"q_cmd\[1\] holds string, not numbers"),
+        (with_column("order", [0] * 100), "order must count the usable rows from 0"),
+        (about(arm={"key": "other"}), "measured on another arm: the hash of its sources is other, not k"),
+        (about(links={"L_1": 0.15, "L_2": 0.2, "L_3": 0.2, "elbow": "UP"}), "with links of L_1 0.15, L_2 0.2"),
+        (about(version=9), "is not of version 1"),
+        (about(seed="x"), "has a seed or walk of a wrong kind"),
+        (about(arm=None), "lacks arm, links, seed or walk"),
+        (with_metadata(None), "does not say of which arm it is"),
+        (with_metadata({b"handover-vsl-data": b"{"}), "is not JSON"),
+    ],
+)
+def test_data_that_cannot_be_trained_on_is_refused(change: Callable[[Any], Any], text: str, tmp_path: Path):
+    write_data(tmp_path / "d.parquet", made_up(100))
+    pq.write_table(change(pq.read_table(tmp_path / "d.parquet")), tmp_path / "d.parquet")
+    with pytest.raises(InvalidData, match=text):
+        read_data(tmp_path / "d.parquet", "k", ARM)
+
+
+def test_data_of_too_few_points_or_without_gauges_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(vsl_train_command, "content_key", key_of_made_up)
+    without_gauges = made_up(400)
+    without_gauges.points.p[:] = 1e5
+    far = made_up(400)
+    far.points.p_WG[far.order == 7] = [0.6, 0.0, 0.15]
+    for measured, text in (
+        (made_up(100), r"--data .*d\.parquet: 90 points with a tip within reach are too few to train on: 200"),
+        (without_gauges, r"d\.parquet: the same at all points, whatever is commanded: p_meas\[1\], p_meas\[2\]"),
+        (far, r"d\.parquet: 1 of 360 points in its split have a tip out of reach"),
+    ):
+        write_data(tmp_path / "d.parquet", measured)
+        result = call("--data", tmp_path / "d.parquet", "--out", tmp_path / "m.json")
+        assert result.exit_code == 2
+        assert re.search(text, result.output)
+        assert "Traceback" not in result.output
+        assert not (tmp_path / "m.json").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"text", b"PAR1 and more"])
+def test_a_file_that_is_no_parquet_is_refused_and_nothing_overwritten(content: bytes, tmp_path: Path):
+    (tmp_path / "d.parquet").write_bytes(content)
+    (tmp_path / "m.json").write_text("former")
+    result = call("--data", tmp_path / "d.parquet", "--out", tmp_path / "m.json")
+    assert result.exit_code == 2
+    assert "it is no Parquet file that can be read" in result.output
+    assert "Traceback" not in result.output
+    assert (tmp_path / "m.json").read_text() == "former"
