@@ -196,15 +196,19 @@ class SessionFolder:
         """Whether it is complete, or the participant has withdrawn."""
         return self.is_complete or self.notes.withdrawn is not None
 
+    def is_broken_off(self, number: int) -> bool:
+        """Return whether a round has been begun and not finished."""
+        return self.run_folder(number).exists() and not self._file(number).is_file()
+
     def clear_unfinished(self, number: int) -> Path | None:
         """Put the folder of a run that did not come to its end aside, for the round to be played again; return where.
 
         Raises:
             RecordNotWritten: it cannot be renamed.
         """
-        folder = self.run_folder(number)
-        if self._file(number).is_file() or not folder.exists():
+        if not self.is_broken_off(number):
             return None
+        folder = self.run_folder(number)
         k = 1
         while (aside := folder.with_name(f"{folder.name}_unfinished_{k}")).exists():
             k += 1

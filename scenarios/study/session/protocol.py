@@ -21,6 +21,7 @@ from handover.scenarios.study.plan.order import Round
 from handover.scenarios.study.plan.plan import DEVICES, StudyText
 from handover.scenarios.study.session.screen_content import questions, rating, round_to_play, who
 
+_SERVER_ENDED = "the study's server ended before the round did"
 MOST_ATTEMPTS = 3
 """How often a round is played at most that fails for a reason which is not the participant's (assumed)."""
 _LONGEST_TEXT = 5000
@@ -72,7 +73,11 @@ class Protocol:
         if number in self.study.numbers:
             self.session = self.study.session(number)
             self._language = self.session.session.language
-            self.screen = self._next_of_session()
+            planned = self.session.next_round
+            if planned is not None and self.session.is_broken_off(planned.number):
+                self.void_round(_SERVER_ENDED)
+            else:
+                self.screen = self._next_of_session()
         else:
             self.screen = "language" if number <= self.study.plan.participants else "complete"
 

@@ -159,3 +159,24 @@ def test_a_round_that_cannot_be_kept_is_told_and_can_be_played_again(tmp_path: P
     protocol.act("rate", ratings)
     assert (protocol.screen, protocol.content()["round"]) == ("instruction", 2)
     assert len(pd.read_csv(tables)) == 1
+
+
+def test_a_round_that_the_servers_end_broke_off_is_an_attempt_in_the_tables(tmp_path: Path):
+    protocol = server_of(tmp_path / "study").seat.protocol
+    for action, value in (("language", "en"), ("consent", True), ("eligibility", [True] * 3), ("device", "mouse")):
+        protocol.act(action, value)
+    protocol.act("begin")
+    session = protocol.study.session(1)
+    (session.run_folder(1)).mkdir(parents=True)  # its run had begun; then the server was killed
+    again = server_of(tmp_path / "study").seat.protocol
+    again.act("continue", 1)
+    assert again.screen == "void"
+    again.act("next")
+    assert (again.screen, again.content()["round"]) == ("instruction", 1)
+    again.act("begin")
+    session.run_folder(1).mkdir()
+    again.void_round("the page was closed")
+    table: Any = pd.read_csv(session.path / "void_attempts.csv")
+    assert table["attempt"].tolist() == [1, 2]
+    assert table["reason"].tolist() == ["the study's server ended before the round did", "the page was closed"]
+    assert table["folder"].tolist() == ["01_unfinished_1", "01_unfinished_2"]
