@@ -14,7 +14,8 @@ const sideViewIn = (element, first, content, label) => {
   inset.setAttribute("aria-hidden", "true");  // it shows nothing that the first view does not
   name.textContent = "from the side";
   inset.append(name);
-  let scene = null, azimuth = NaN;
+  const PERIOD = 100;  // ms between two pictures at least: the first view's, and a camera's, come before
+  let scene = null, azimuth = NaN, shownAt = 0;
 
   // Corners of a box around all that is drawn now, with some room: things move.
   function around() {
@@ -35,7 +36,11 @@ const sideViewIn = (element, first, content, label) => {
     scene.lookFrom([to * right[0], to * right[1], LEVEL]);
   }
   const api = {
-    show() { scene?.show(Infinity); },
+    show() {
+      if (performance.now() - shownAt < PERIOD) return;
+      shownAt = performance.now();
+      scene?.show(Infinity);
+    },
     get shown() { return scene !== null; },
     set shown(yes) {
       if (yes === api.shown) return;
