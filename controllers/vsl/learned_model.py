@@ -169,7 +169,8 @@ class Cubic(Domain):
         n = len(self.mean)
         numbers = {pair: k for k, pair in enumerate(itertools.combinations_with_replacement(range(n + 1), 2))}
         by_pair = np.zeros((len(numbers), self.coefficients.shape[1], n))
-        for factors, coefficients in zip(self._factors.T.tolist(), self.coefficients, strict=True):
+        rows: list[list[int]] = np.transpose(self._factors).tolist()
+        for factors, coefficients in zip(rows, self.coefficients, strict=True):
             for place, factor in enumerate(factors):
                 if factor:
                     a, b = sorted(factors[:place] + factors[place + 1 :])

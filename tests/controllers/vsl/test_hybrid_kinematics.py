@@ -335,6 +335,7 @@ def bending(softer: float) -> Inputs:
 @pytest.mark.parametrize("sensor", [{"closed_loop": True}, {"imu": Imu.MONITOR}, {}])
 def test_a_sensor_at_the_arm_tells_a_mismatch_that_inputs_do_not(sensor: dict[str, Any]):
     unit = HybridKinematics(Params(K_I=0.0, mismatch_limit=0.01, **sensor))
+    y = unit.outputs(0.0, USUAL)
     for k in range(400):
         y = unit.step(k * 0.02, 0.02, dataclasses.replace(bending(2.0), q_meas=unit.outputs(0.0, USUAL).q_cmd))
     assert y.model_mismatch == bool(sensor)
