@@ -191,8 +191,9 @@ class HybridKinematics:
     tracker in closed loop or by IMUs, see `ImuTip` and `ModelMonitor`. Without either, or while links shake, it cannot
     be known, and the last answer stays, false at first. On paths at 0.5 to 1.5 bar with 25 to 100 g the innovation by
     IMUs is 3.9 mm at most on the arm that was learned from, 4.3 mm with links 10 % heavier (error as before), and above
-    the limit of 4 mm in every case in which stiffer or softer links double the error. Friction that doubles it shows as
-    its direction turns alone, and in one of three cases.
+    the limit of 4 mm in the cases tried in which stiffer or softer links double the error. Friction that doubles it
+    shows as its direction turns alone, and in one of two cases. On the arm that was learned from, while it swings, IMUs
+    may add to the error.
 
     Raises:
         IdleParameters: by the constructor, for MODEL_BASED with a model, friction_compensation, vibration_damping, or
