@@ -32,6 +32,7 @@ from handover.scenarios.live.hand_messages import DeviceClock, InvalidHandMessag
 from handover.scenarios.results.run_folder import InvalidRunFolder
 from handover.scenarios.study.folder.session_folder import RoundRecord
 from handover.scenarios.study.plan.led_hands import round_parameters
+from handover.scenarios.study.plan.order import Round
 from handover.scenarios.study.plan.plan import TRACKER, WEBCAM
 from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session.page_messages import MessageRate, parse_message, received_text
@@ -74,6 +75,7 @@ class StudySeat:
         self._practice: Practice | None = None
         self._has_tracker, self._page_clock, self._page_offset = False, DeviceClock(), math.nan
         self.on_run: Callable[[Mapping[str, Any]], Awaitable[None]] | None = None
+        self.on_round_end: Callable[[Round, RoundRecord | str], None] | None = None
 
     @property
     def is_taken(self) -> bool:
@@ -321,7 +323,7 @@ class StudySeat:
 
         Where the disk is full or a file is damaged, the page says so, and it can be tried again.
         """
-        protocol = self.protocol
+        protocol, planned = self.protocol, self.protocol.round
         try:
             if not is_round:
                 if fault is None:
@@ -332,6 +334,8 @@ class StudySeat:
                 protocol.end_round(record)
             else:
                 protocol.void_round(fault or "the run has no record")
+            if is_round and planned is not None and self.on_round_end is not None:
+                self.on_round_end(planned, fault or record or "the run has no record")
         except Exception as e:
             if not isinstance(e, (RecordNotWritten, InvalidRunFolder)):
                 traceback.print_exc()

@@ -9,8 +9,10 @@ from pathlib import Path
 from websockets.exceptions import ConnectionClosed
 
 from handover.scenarios.live.webcam import WebcamFiles
+from handover.scenarios.study.folder.session_folder import RoundRecord, pseudonym_of
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.led_hands import hand_faults
+from handover.scenarios.study.plan.order import Round
 from handover.scenarios.study.plan.plan import TRACKER, WEBCAM, StudyPlan
 from handover.scenarios.study.session.pilot import PilotRefused, play_sessions
 from handover.scenarios.study.session.protocol import Protocol
@@ -70,6 +72,7 @@ async def serve_study(
             listening = listening_socket(host, port)
         except OSError as e:
             raise NotServed(f"--host {host} --port {port}: it cannot listen there: {e.strerror or e}") from e
+        seat.on_round_end = lambda planned, ended: tell(line_of_round(plan, seat.protocol.number, planned, ended))
         with listening:
             address = address_of(listening, server)
             tell(f"study: {address}  (results in {out}; Ctrl-C ends it)")
@@ -113,6 +116,27 @@ async def _ended(playing: "asyncio.Task[None]", *, was_ended: bool) -> None:
     except (ConnectionClosed, OSError, PilotRefused) as e:
         if not was_ended:
             raise PilotsBrokenOff(f"the scripted pilot was broken off: {e}") from e
+
+
+def line_of_round(plan: StudyPlan, number: int, planned: Round, ended: RoundRecord | str) -> str:
+    """Return what became of a round, for who carries the study out.
+
+    Args:
+        plan: the study's.
+        number: the participant's.
+        planned: the round.
+        ended: its record; why it does not count, if it does not.
+    """
+    c = planned.condition
+    which = f"{pseudonym_of(number)}, round {planned.number} ({c.task}, {c.behaviour})"
+    if isinstance(ended, str):
+        return f"{which} does not count: {ended}"
+    line = f"{which}: {'succeeded' if ended.success else 'failed'}"
+    if ended.latency_median_ms is None or ended.latency_p95_ms is None:
+        return line
+    line += f"; from the hand to the picture {ended.latency_median_ms:.0f} ms, at 95 % {ended.latency_p95_ms:.0f} ms"
+    is_over = ended.latency_p95_ms > plan.latency_limit
+    return line + (f", over the plan's {plan.latency_limit:g} ms: the round is marked" if is_over else "")
 
 
 def address_of(listening: socket.socket, server: StudyServer) -> str:

@@ -29,6 +29,7 @@ from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session import seat as seat_module
 from handover.scenarios.study.session.device_test import Reached
+from handover.scenarios.study.session.served_study import line_of_round
 
 
 def test_samples_that_cannot_be_used_are_refused_and_the_round_goes_on(tmp_path: Path):
@@ -180,3 +181,24 @@ def test_a_round_that_the_servers_end_broke_off_is_an_attempt_in_the_tables(tmp_
     assert table["attempt"].tolist() == [1, 2]
     assert table["reason"].tolist() == ["the study's server ended before the round did", "the page was closed"]
     assert table["folder"].tolist() == ["01_unfinished_1", "01_unfinished_2"]
+
+
+def test_who_carries_the_study_out_is_told_what_became_of_each_round(tmp_path: Path):
+    seat = server_of(tmp_path / "study").seat
+    told_lines: list[str] = []
+    seat.on_round_end = lambda planned, ended: told_lines.append(line_of_round(PLAN, 1, planned, ended))
+    for action, value in (("language", "en"), ("consent", True), ("eligibility", [True] * 3), ("device", "mouse")):
+        seat.protocol.act(action, value)
+    seat.protocol.act("begin")
+    seat.keep("the page was closed", is_round=True)
+    seat.protocol.act("next")
+    for latency in (90.0, 376.0):
+        seat.protocol.act("begin")
+        seat.keep(None, record(latency=latency), is_round=True)
+        seat.protocol.act("rate", {"S1": 7, "S2": 8, "S3": 9})
+    first, second, third = told_lines
+    condition = seat.protocol.study.session(1).rounds[0].condition
+    assert first == f"P01, round 1 ({condition.task}, {condition.behaviour}) does not count: the page was closed"
+    assert second.endswith("succeeded; from the hand to the picture 70 ms, at 95 % 90 ms")
+    assert third.endswith("376 ms, over the plan's 100 ms: the round is marked")
+    assert "round 2" in third
