@@ -66,7 +66,8 @@ class HandoverStateMachine:
     impedance control begins within gate_error of the place, at any speed, the light follows at once, and the threshold
     counts from its end. The gripper's velocity is v + w x R p_BG. GIVEN_UP, holding the pose and not moving the
     gripper, is entered after `patience` in a phase, after `attempts` failures, and when an object that was fetched is
-    not between the fingers, which have not released it: from MOVE_TO_HANDOVER on that is a failed delivery.
+    not between the fingers, which have not released it: from MOVE_TO_HANDOVER on that is a failed delivery, except
+    in CHECK_VELOCITY of a gradual gripper, which takes it for a release.
 
     Where it is to `verify`, which the thesis does not, RELEASE_OBJECT lasts until the fingers have opened by
     free_angle, and VERIFY_RELEASE follows: verify_wait later they close once more. In both the robot coasts, without

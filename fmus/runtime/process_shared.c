@@ -81,7 +81,7 @@ static bool hand_over(int control, int channel, int memory) {
     return sent == 1;
 }
 
-/* Ends one without instances and takes it off the list; its memory goes with it. */
+/* Takes a process without instances, which end() has ended, off the list and frees its entry. */
 static void drop(SharedProcess *one) {
     for (SharedProcess **place = &all; *place; place = &(*place)->next)
         if (*place == one) {

@@ -70,10 +70,9 @@ def _finger(name: str, y: float, lengths: tuple[float, ...], first: int) -> Fing
 
 
 _THUMB_ROOT = (-0.036, 0.022, 0.020)
+"""Where the thumb joins the palm, in H, m."""
 FINGERS = (
-    Finger(
-        "thumb", (-0.036, 0.022, 0.020), (0.0, 0.2, -math.sqrt(0.96)), (1.0, 0.0, 0.0), (0.035, 0.028), 0, (1.0, 0.8)
-    ),
+    Finger("thumb", _THUMB_ROOT, (0.0, 0.2, -math.sqrt(0.96)), (1.0, 0.0, 0.0), (0.035, 0.028), 0, (1.0, 0.8)),
     _finger("index", 0.03, (0.038, 0.024, 0.018), 2),
     _finger("middle", 0.01, (0.042, 0.027, 0.018), 5),
     _finger("ring", -0.01, (0.039, 0.025, 0.018), 8),

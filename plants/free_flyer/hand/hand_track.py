@@ -89,7 +89,7 @@ def read_track(path: Path, max_gap: float) -> HandTrack:
             too far apart, or hold a quaternion that is no rotation or a joint beyond 0 to 90 degrees.
     """
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        with path.open(newline="", encoding="utf-8-sig") as file:
             table = list(csv.reader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as e:
         raise InvalidTrack(path, [f"it cannot be read: {e}"]) from e

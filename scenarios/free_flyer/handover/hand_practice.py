@@ -53,7 +53,7 @@ class PracticeEvaluator(Evaluator):
         p_WH = [float(x) for x in signals["person.p_WH"]]
         self._low = [min(a, b) for a, b in zip(self._low, p_WH, strict=True)]
         self._high = [max(a, b) for a, b in zip(self._high, p_WH, strict=True)]
-        closed, has = bool(signals["person.closed_goal"]), str(signals.plain("person.holder")) == "HAND"
+        closed, has = bool(signals["person.closed_goal"]), signals.text("person.holder") == "HAND"
         self._fists += closed and not self._was_closed
         self._grasps += has and not self._had
         self._was_closed, self._had = closed, has

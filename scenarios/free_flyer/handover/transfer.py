@@ -21,7 +21,8 @@ class Transfer:
         in_vain: times at which it had felt one in receptions and deliveries that failed, s.
         speed: the gripper's speed when it was felt, m/s.
         fastest: maximum speed while the robot has been waiting since it last asked, m/s.
-        at_rest: the same until the person first touches the gripper, or what it holds, since the robot asked, m/s.
+        at_rest: its greatest while the robot waits after any of its signals and nobody has touched the gripper, or what
+            it holds, m/s.
         touched: whether the person has, since then.
         farthest: maximum distance of the gripper from its place, from the signal for as long as it yields, m.
         farthest_along: the same along each axis of W.

@@ -130,7 +130,7 @@ class FlyerStability(PublishedExperiment):
         if not shown:
             return []
         with figure(folder / "stability", rows, 2, size=(9.0, 0.6 + 2.9 * rows)) as panels:
-            for axis, loop in zip(panels, shown, strict=True):
+            for axis, loop in zip(panels, shown, strict=False):
                 for at_rest, mark, label in ((True, "o", "came to rest"), (False, "x", "did not")):
                     points = [(1e3 * s, 1e3 * d) for s in _STEPS for d in found.delays(loop, s, at_rest=at_rest)]
                     x, y = zip(*points, strict=True) if points else ((), ())
@@ -142,6 +142,8 @@ class FlyerStability(PublishedExperiment):
                 most = 1e3 * max(_DELAYS[loop.behaviour])
                 axis.set(title=loop.label, xlim=(0.0, 17.0), ylim=(-0.04 * most, 1.04 * most))
                 axis.set(xlabel="communication step (ms)", ylabel="delay of the thrust (ms)")
+            for axis in panels[len(shown) :]:
+                axis.set_visible(False)
             legend_below(panels[0])
         caption = (
             "Whether the robot comes to rest after a twist where all units step in parallel, by communication step and "

@@ -37,6 +37,13 @@ def spoiled(path: Path, **changes: tuple[int, object]) -> Path:
     return path
 
 
+def test_a_track_is_read_as_excel_writes_it(tmp_path: Path):
+    path = tmp_path / "track.csv"
+    write_track(path, poses())
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert read_track(path, 0.2).times == tuple(t for t, _ in poses())
+
+
 def test_a_track_is_read_as_it_was_written(tmp_path: Path):
     write_track(tmp_path / "t.csv", poses())
     track = read_track(tmp_path / "t.csv", 0.2)

@@ -1,6 +1,7 @@
 """What scenes of the free-flyer hold in view, and that the hand is as round as where it touches."""
 
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -36,6 +37,27 @@ def test_the_palm_is_drawn_where_it_touches(record: Record):
     half = np.ptp(bones, axis=0) / 2.0
     away = np.stack([np.abs(x) - half[0], np.abs(y) - half[1], z])
     np.testing.assert_allclose(np.linalg.norm(np.maximum(away[:2], 0.0), axis=0) ** 2 + away[2] ** 2, PALM_RADIUS**2)
+
+
+class Practised:
+    """Signals of a practice: who holds the object, and whether the hand is to be closed."""
+
+    def __init__(self, holder: str, closed: bool) -> None:
+        self._holder, self._closed = holder, closed
+
+    def __getitem__(self, name: str) -> Any:
+        return {"person.p_WH": np.zeros(3), "person.closed_goal": np.array(self._closed)}[name]
+
+    def text(self, name: str) -> str:
+        return {"person.holder": self._holder}[name]
+
+
+def test_a_practice_counts_how_often_the_hand_got_the_object():
+    evaluator = HandPractice().evaluator(PracticeParameters())
+    for t, (holder, closed) in enumerate([("NOBODY", False), ("HAND", True), ("NOBODY", False), ("HAND", True)]):
+        evaluator(float(t), cast(Any, Practised(holder, closed)))
+    outcome = evaluator.outcome()
+    assert (outcome.metrics["fists"].value, outcome.metrics["grasps"].value) == (2.0, 2.0)
 
 
 def test_a_practice_shows_object_and_hand_without_a_robot(tmp_path: Path):

@@ -91,6 +91,13 @@ def test_runs_that_were_lost_decide_nothing():
     assert {claim.measured for claim in claims} == {""}
 
 
+def test_of_some_changes_alone_nothing_is_decided():
+    rows = [row for row in table_of().rows if row["behaviour"] == "rigid"]
+    told = verdicts(CampaignTable(pa.Table.from_pylist(rows)))
+    of_changes = next(claim for text, claim in told.items() if text.startswith("A mass or an inertia"))
+    assert (of_changes.verdict, of_changes.measured) == (Verdict.NOT_COMPARABLE, "in 4 of 4 cases")
+
+
 def test_a_quick_plan_decides_nothing_on_durations_and_has_no_table_of_them():
     claims, tables = verdicts(table_of(quick=True)), FlyerImpedanceTable().tables(table_of(quick=True))
     ratio = claims["A force takes the compliant robot ten times as far as the rigid one"]

@@ -74,3 +74,9 @@ def test_the_table_has_a_row_for_each_loop_and_step():
 def test_its_figure_is_drawn(tmp_path: Path):
     (drawn,) = FlyerStability().draw(table_of(), tmp_path, tmp_path)
     assert (tmp_path / f"{drawn.name}.png").stat().st_size > 20_000
+
+
+def test_a_campaign_that_was_broken_off_in_its_first_loop_is_drawn(tmp_path: Path):
+    rows = [r for r in table_of().rows if (r["behaviour"], r["propulsion"]) == ("rigid", "ideal")]
+    (drawn,) = FlyerStability().draw(CampaignTable(pa.Table.from_pylist(rows)), tmp_path, tmp_path)
+    assert (tmp_path / f"{drawn.name}.png").stat().st_size > 10_000
