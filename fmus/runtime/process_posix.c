@@ -236,9 +236,13 @@ void process_describe(int status, Text *how) {
     }
 }
 
-bool process_reap(pid_t id, double patience, int *status) {
+static void await_end(pid_t id, double patience) {
     double deadline = process_clock() + patience;
     while (process_life(id) == RUNS && process_clock() < deadline) nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+}
+
+bool process_reap(pid_t id, double patience, int *status) {
+    await_end(id, patience);
     if (process_life(id) == IS_REAPED) return false;
     kill(-id, SIGKILL); /* also what it started; until it is reaped its number is no one else's */
     pid_t reaped;
@@ -248,16 +252,25 @@ bool process_reap(pid_t id, double patience, int *status) {
     return reaped == id;
 }
 
+/* Whether the other end of the channel is closed: the process is over, or about to be. */
+static bool has_hung_up(const Process *process) {
+    struct pollfd channel = {.fd = process->channel};
+    return poll(&channel, 1, 0) > 0 && (channel.revents & POLLHUP);
+}
+
 int process_end(Process *process, double patience, Text *how) {
-    bool ours = process->host == getpid(), reaped = false;
+    bool ours = process->host == getpid(), reaped = false, was_silent = false;
     int status = 0;
+    if (ours && process->shared && has_hung_up(process)) await_end(process->id, patience);
     if (ours) shutdown(process->channel, SHUT_RDWR); /* also for those who have it by a fork of the host */
     close(process->channel);
     if (ours && process->shared)
-        reaped = process_leave(process->shared, patience, &status);
+        reaped = process_leave(process->shared, patience, &status, &was_silent);
     else if (ours)
         reaped = process_reap(process->id, patience, &status);
-    if (reaped)
+    if (was_silent)
+        text_add(how, "was ended, as it did not answer another instance of the unit in time");
+    else if (reaped)
         process_describe(status, how);
     else
         text_add(how, process->shared ? "ended for this instance" : "ended; the host took note of how for itself");

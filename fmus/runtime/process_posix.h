@@ -30,7 +30,7 @@ bool process_reap(pid_t id, double patience, int *status);
 void process_describe(int status, Text *how);
 
 /* Takes an instance off a shared process, which ends with its last one, or at once if there is to be no patience. True
- * if it is over; then `status` is how it ended. */
-bool process_leave(SharedProcess *shared, double patience, int *status);
+ * if it is over; then `status` is how it ended, and `was_silent` whether it was for want of an answer to any instance. */
+bool process_leave(SharedProcess *shared, double patience, int *status, bool *was_silent);
 
 #endif

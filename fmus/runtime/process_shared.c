@@ -26,6 +26,7 @@ struct SharedProcess {
     int control;
     size_t instances;
     bool is_over, has_status; /* `status`: how it ended */
+    bool was_silent;          /* it was ended as an instance got no answer */
     int status;
     SharedProcess *next;
 };
@@ -127,13 +128,15 @@ Process *process_join(const char *program, const char *const arguments[], const 
     return NULL;
 }
 
-bool process_leave(SharedProcess *shared, double patience, int *status) {
+bool process_leave(SharedProcess *shared, double patience, int *status, bool *was_silent) {
     lock();
     bool is_last = --shared->instances == 0;
-    bool ends = is_last || patience == 0.0 || process_life(shared->id) != RUNS;
+    bool runs = process_life(shared->id) == RUNS, ends = is_last || patience == 0.0 || !runs;
+    if (runs && patience == 0.0 && !shared->is_over) shared->was_silent = true;
     if (ends && !shared->is_over) end(shared, patience);
     bool over = shared->has_status;
     *status = shared->status;
+    *was_silent = shared->was_silent;
     if (is_last) drop(shared);
     unlock();
     return over;

@@ -100,12 +100,15 @@ def test_a_crash_is_told_to_every_instance_and_each_can_go_on_after_a_reset(host
 
 def test_an_instance_that_hangs_is_ended_when_its_time_is_over(host: CtypesHost, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("FMU_PYTHON_TIMEOUT", "0.5")
-    first = instance(host)
+    first, second = instance(host), instance(host)
     number = process(first)
     assert do(first, Deed.HANG) == ERROR
     assert "did not answer for 0.5 s and was ended" in first.log[-1]
     assert not is_alive(number)
+    assert second.step(DT, DT) == ERROR
+    assert "was ended, as it did not answer another instance of the unit in time" in second.log[-1]
     free(first)
+    free(second)
 
 
 def test_on_another_platform_it_says_so(fmu: Path):
