@@ -2,7 +2,8 @@
 
 session.json, rounds.csv, rounds.parquet, answers.csv, void_attempts.csv, questionnaire.csv, and rounds/01/, a run's
 folder as `handover run` writes it. What is known of a round is in rounds/01.json, one file that is replaced as a whole;
-the tables are made of these files. No name, no picture and no video of a person is kept.
+rounds/01.begun says that the participant began it. The tables are made of these files.
+No name, no picture and no video of a person is kept.
 """
 
 import json
@@ -196,9 +197,22 @@ class SessionFolder:
         """Whether it is complete, or the participant has withdrawn."""
         return self.is_complete or self.notes.withdrawn is not None
 
+    def note_begun(self, number: int) -> None:
+        """Note that a participant has begun a round: its run is made ready before.
+
+        Raises:
+            RecordNotWritten: it cannot be written.
+        """
+        with disk_errors_reported(self.path):
+            self._begun(number).parent.mkdir(exist_ok=True)
+        write_whole(self._begun(number), "")
+
     def is_broken_off(self, number: int) -> bool:
         """Return whether a round has been begun and not finished."""
-        return self.run_folder(number).exists() and not self._file(number).is_file()
+        return self._begun(number).is_file() and not self._file(number).is_file()
+
+    def _begun(self, number: int) -> Path:
+        return self._file(number).with_suffix(".begun")
 
     def clear_unfinished(self, number: int) -> Path | None:
         """Put the folder of a run that did not come to its end aside, for the round to be played again; return where.
@@ -206,9 +220,9 @@ class SessionFolder:
         Raises:
             RecordNotWritten: it cannot be renamed.
         """
-        if not self.is_broken_off(number):
-            return None
         folder = self.run_folder(number)
+        if self._file(number).is_file() or not folder.exists():
+            return None
         k = 1
         while (aside := folder.with_name(f"{folder.name}_unfinished_{k}")).exists():
             k += 1
@@ -235,6 +249,7 @@ class SessionFolder:
             RecordNotWritten: it cannot be written.
         """
         self.notes.keep_void_attempt(attempt)
+        self._begun(attempt.number).unlink(missing_ok=True)
         self.write_tables()
 
     def record_answers(self, number: int, answers: Mapping[str, int]) -> None:

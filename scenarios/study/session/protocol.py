@@ -8,6 +8,7 @@ what was not finished, when whoever carries out the study says that it is the sa
 does not agree, or may not take part.
 """
 
+import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime, timezone
@@ -256,6 +257,8 @@ class Protocol:
         self.screen = "practising"
 
     def _begin_round(self, _value: Any) -> None:
+        with contextlib.suppress(RecordNotWritten):  # told where the round itself is to be kept
+            self._begun.note_begun(self._planned.number)
         self.screen = "round"
 
     def _go_on(self, _value: Any) -> None:

@@ -168,14 +168,17 @@ def test_a_round_that_the_servers_end_broke_off_is_an_attempt_in_the_tables(tmp_
         protocol.act(action, value)
     protocol.act("begin")
     session = protocol.study.session(1)
-    (session.run_folder(1)).mkdir(parents=True)  # its run had begun; then the server was killed
+    session.run_folder(1).mkdir(parents=True)  # then the server was killed
     again = server_of(tmp_path / "study").seat.protocol
     again.act("continue", 1)
     assert again.screen == "void"
     again.act("next")
     assert (again.screen, again.content()["round"]) == ("instruction", 1)
+    session.run_folder(1).mkdir()  # is made ready, and not begun when the server is killed once more
+    again = server_of(tmp_path / "study").seat.protocol
+    again.act("continue", 1)
+    assert again.screen == "instruction"
     again.act("begin")
-    session.run_folder(1).mkdir()
     again.void_round("the page was closed")
     table: Any = pd.read_csv(session.path / "void_attempts.csv")
     assert table["attempt"].tolist() == [1, 2]
