@@ -120,11 +120,10 @@ def beside_block(block: str, files: Sequence[Path]) -> dict[str, Path]:
         FileElsewhere: one does not lie in the folder of the module's top package, or below, or is none.
     """
     spec = _spec(block.partition(":")[0].partition(".")[0])
+    levels = 1 if spec and spec.submodule_search_locations else 0
+    folder = Path(spec.origin).resolve().parents[levels] if spec and spec.origin else Path.cwd()
     found: dict[str, Path] = {}
     for file in files:
-        places = [spec.origin] if spec and spec.origin else []
-        is_package = bool(spec and spec.submodule_search_locations)
-        folder = Path(places[0]).resolve().parents[1 if is_package else 0] if places else Path.cwd()
         if not file.is_file() or not file.resolve().is_relative_to(folder):
             raise FileElsewhere(file, folder)
         found[file.resolve().relative_to(folder).as_posix()] = file

@@ -120,7 +120,7 @@ def frozen(block: str, carried: Carried) -> Mapping[str, bytes]:
     """
     names = _imported(block, carried)
     versions = sorted({f"{p.distribution}=={p.version}" for p in carried.packages()})
-    key = json.dumps([names, versions, sys.version, _freezer_version(), _MAIN])
+    key = json.dumps([names, versions, sys.version, host_platform(), _freezer_version(), _MAIN])
     folder = cache_folder().absolute() / "frozen" / hashlib.sha256(key.encode()).hexdigest()[:32]
     if not folder.is_dir():
         _freeze(names, carried, folder)

@@ -323,19 +323,19 @@ class StudySeat:
 
         Where the disk is full or a file is damaged, the page says so, and it can be tried again.
         """
-        protocol, planned = self.protocol, self.protocol.round
+        protocol, planned, ended = self.protocol, self.protocol.round, fault or record or "the run has no record"
         try:
             if not is_round:
                 if fault is None:
                     protocol.end_practice(self.practice.shown)
                 else:
                     protocol.break_off_practice(fault)
-            elif fault is None and record is not None:
-                protocol.end_round(record)
+            elif isinstance(ended, str):
+                protocol.void_round(ended)
             else:
-                protocol.void_round(fault or "the run has no record")
-            if is_round and planned is not None and self.on_round_end is not None:
-                self.on_round_end(planned, fault or record or "the run has no record")
+                protocol.end_round(ended)
+            if is_round and planned and self.on_round_end:
+                self.on_round_end(planned, ended)
         except Exception as e:
             if not isinstance(e, (RecordNotWritten, InvalidRunFolder)):
                 traceback.print_exc()
