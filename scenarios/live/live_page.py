@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
+import pyarrow.dataset  # pyright: ignore[reportUnusedImport] # noqa: F401  imports pandas, see `_figures`
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 from starlette.routing import BaseRoute
@@ -342,7 +343,11 @@ class LivePage:
 
 
 def _figures(plots: Sequence[TimePlot], time_of_rows: Floats, numbers: Collection[int]) -> dict[int, str]:
-    """Return some of the plots as a page draws them, in JSON, by their numbers."""
+    """Return some of the plots as a page draws them, in JSON, by their numbers.
+
+    Plotly uses pandas if it finds that among the modules; were it imported by the reading of a record meanwhile, in
+    another thread, Plotly would find one half made.
+    """
     return {i: figure_json(plot, time_of_rows) for i, plot in enumerate(plots) if i in numbers}
 
 

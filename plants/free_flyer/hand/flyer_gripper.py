@@ -79,7 +79,7 @@ class FlyerGripper:
         before, max_turn = self.angle, p.gripper_rate * dt
         after = before + min(max(target - before, -max_turn), max_turn)
         if self.grip is None:
-            if after <= self._angle_object < before:
+            if after <= self._angle_object <= before:
                 self.grip = self._grasp(G, body)
         elif after > self._angle_object + p.release_angle or not self._is_around(G, body):
             self.grip = None

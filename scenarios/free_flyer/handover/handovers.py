@@ -130,8 +130,10 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
             raise InvalidParameter(faults)
 
     def stop_time(self, parameters: HandoverParameters) -> Fraction:
-        """Return the robot's patience for each signal, plus time for flying."""
+        """Return the robot's patience for each signal that may be needed, plus time for flying."""
         waits = len(self.receivers) + self.failures
+        if parameters.verify:  # a delivery that failed is repeated
+            waits += int(paper_values("free_flyer", "decision")["attempts"]) - 1
         return Fraction(round(1000 * parameters.patience), 1000) * waits + _FLIGHT
 
     def led_hand(self, parameters: HandoverParameters) -> LedHand | None:

@@ -35,6 +35,14 @@ def test_gripper_that_starts_closed_opens_and_takes_nothing_by_that():
     assert {y.holder for y in scene.seen} == {Holder.FREE}
 
 
+def test_gripper_that_starts_at_the_object_takes_it_by_closing():
+    scene = Scene(replace(IDLE, angle_0=IDLE.angle_object))
+    assert scene.go(1.0, closure=0.0).holder is Holder.FREE
+    scene = Scene(replace(IDLE, angle_0=IDLE.angle_object))
+    assert scene.go(1.0, closure=1.0).holder is Holder.GRIPPER
+    assert scene.y.gripper_angle == IDLE.angle_object
+
+
 def test_object_comes_free_when_the_fingers_are_open_enough():
     scene = Scene(IDLE)
     closed = scene.go(2.0, closure=1.0).gripper_angle

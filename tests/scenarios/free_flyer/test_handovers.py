@@ -211,3 +211,10 @@ def test_the_scenario_of_any_task_is_that_of_the_task(task: Task):
         {name: {k: np.array(v).tolist() for k, v in unit.start.items()} for name, unit in u.items()} for u in units
     ]
     assert starts[0] == starts[1]
+
+
+def test_a_robot_that_verifies_has_time_for_as_many_deliveries_as_it_attempts():
+    scenario, p = RobotToHuman(), HandoverParameters(verify=True)
+    attempts = paper_values("free_flyer", "decision")["attempts"]
+    assert scenario.stop_time(p) >= attempts * p.patience
+    assert scenario.stop_time(HandoverParameters()) < attempts * p.patience
