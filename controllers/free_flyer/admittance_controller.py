@@ -149,9 +149,7 @@ class AdmittanceController:
         self.loop = SampledLoop(
             params.body().linear_plant(params.lag), params.law(1.0, params.delay, self._T), self._T, params.delay
         )
-        self._pole_radius = self.loop.pole_radius
-        self._damping_ratio, self._pole_frequency = self.loop.least_damped
-        self._slowest_decay = self.loop.slowest_decay
+        self._loop_figures = self.loop.figures
         self._virtual, self._thrust_model = params.virtual_body(self._T), ThrustModel(params.lag, params.delay, self._T)
         self._observer = WrenchObserver(params.observer_rate, self._T)
         self._position, self._attitude = params.inner_gains()
@@ -179,12 +177,9 @@ class AdmittanceController:
             tau_cmd=command[3:],
             error_p=norm(now.x),
             error_R=norm(now.phi),
-            pole_radius=self._pole_radius,
-            damping_ratio=self._damping_ratio,
-            pole_frequency=self._pole_frequency,
-            slowest_decay=self._slowest_decay,
             f_G_est=w_G[:3],
             tau_G_est=w_G[3:],
+            **self._loop_figures,
         )
 
     def get_state(self) -> bytes:

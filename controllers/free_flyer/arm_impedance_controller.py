@@ -194,9 +194,7 @@ class ArmImpedanceController:
         if faults:
             raise InvalidControllerParameters(_NAME, faults)
         loop = SampledLoop(rest.linear_plant(params.lag), rest.law(gains, null), period, params.delay)
-        self._pole_radius = loop.pole_radius
-        self._damping_ratio, self._pole_frequency = loop.least_damped
-        self._slowest_decay = loop.slowest_decay
+        self._loop_figures = loop.figures
         self._model, self._gains, self._null, self._posture = model, gains, null, params.posture
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
@@ -232,10 +230,7 @@ class ArmImpedanceController:
             tau_J_cmd=tau_J,
             error_p=float(np.linalg.norm(e)),
             error_R=float(np.linalg.norm(phi)),
-            pole_radius=self._pole_radius,
-            damping_ratio=self._damping_ratio,
-            pole_frequency=self._pole_frequency,
-            slowest_decay=self._slowest_decay,
+            **self._loop_figures,
         )
 
     def _forces(self, chain: Chain, R_WD: Floats, e: Floats, phi: Floats, xi_dot: Floats, q_J: Floats) -> Floats:

@@ -124,9 +124,7 @@ class ImpedanceController:
         if faults:
             raise InvalidControllerParameters(_NAME, faults)
         self.loop = SampledLoop(body.linear_plant(params.lag), gains.law(body), period, params.delay)
-        self._pole_radius = self.loop.pole_radius
-        self._damping_ratio, self._pole_frequency = self.loop.least_damped
-        self._slowest_decay = self.loop.slowest_decay
+        self._loop_figures = self.loop.figures
         self._p_BG = vector(params.p_BG)
         self._k, self._d = row_major(gains.stiffness_translation), row_major(gains.damping_translation)
         self._k_R, self._d_R = row_major(gains.stiffness_rotation), row_major(gains.damping_rotation)
@@ -167,8 +165,5 @@ class ImpedanceController:
             tau_cmd=np.array(tau) if u.active else np.zeros(3),
             error_p=norm(e),
             error_R=norm(phi),
-            pole_radius=self._pole_radius,
-            damping_ratio=self._damping_ratio,
-            pole_frequency=self._pole_frequency,
-            slowest_decay=self._slowest_decay,
+            **self._loop_figures,
         )

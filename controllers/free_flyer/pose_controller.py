@@ -171,9 +171,7 @@ class PoseController:
         self.loop = SampledLoop(
             body.linear_plant(params.lag), pid_law(body, position, attitude, self._T), self._T, params.delay
         )
-        self._pole_radius = self.loop.pole_radius
-        self._damping_ratio, self._pole_frequency = self.loop.least_damped
-        self._slowest_decay = self.loop.slowest_decay
+        self._loop_figures = self.loop.figures
         self._position, self._attitude, self._mass = position, attitude, params.mass
         self._I_B, self._p_BG = row_major(params.I_B), vector(params.p_BG)
         self._f_max, self._tau_max = vector(params.f_max), vector(params.tau_max)
@@ -209,10 +207,7 @@ class PoseController:
             tau_cmd=np.array(tau) if u.active else np.zeros(3),
             error_p=norm(e),
             error_R=angle_between(q_goal, q_WB),
-            pole_radius=self._pole_radius,
-            damping_ratio=self._damping_ratio,
-            pole_frequency=self._pole_frequency,
-            slowest_decay=self._slowest_decay,
+            **self._loop_figures,
         )
 
     def get_state(self) -> bytes:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -55,6 +55,15 @@ def without_memory(D: Floats) -> LinearController:
     """Return the controller u[n] = -D y[n]."""
     inputs, measured = D.shape
     return LinearController(A=np.zeros((0, 0)), B=np.zeros((0, measured)), C=np.zeros((inputs, 0)), D=D)
+
+
+class LoopFigures(TypedDict):
+    """What a controller's outputs tell of its closed loop: the keys are the outputs' names."""
+
+    pole_radius: float
+    damping_ratio: float
+    pole_frequency: float
+    slowest_decay: float
 
 
 class SampledLoop:
@@ -119,6 +128,17 @@ class SampledLoop:
         ratio = -s.real / np.maximum(frequency, 1e-300)
         least = int(np.argmin(ratio))
         return float(ratio[least]), float(frequency[least])
+
+    @property
+    def figures(self) -> LoopFigures:
+        """Pole radius, least damping ratio with its pole's frequency (rad/s), and slowest decay (s)."""
+        ratio, frequency = self.least_damped
+        return LoopFigures(
+            pole_radius=self.pole_radius,
+            damping_ratio=ratio,
+            pole_frequency=frequency,
+            slowest_decay=self.slowest_decay,
+        )
 
     def response(self, d: Floats) -> Floats:
         """Return y, shape (n, outputs), at the beginnings of n periods from rest, with d of shape (n, disturbances)."""
