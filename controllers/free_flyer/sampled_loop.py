@@ -87,9 +87,8 @@ class SampledLoop:
     def system(self) -> Any:
         """The closed loop from d to y, a discrete `control.StateSpace`."""
         commands, disturbances = self._plant.B.shape[1], self._plant.E.shape[1]
-        whole = math.floor(self.delay / self.period + _WHOLE)
+        whole, past = split_delay(self.delay, self.period)
         line = _delay_line(commands, whole, self.period)
-        past = max(self.delay - whole * self.period, 0.0)
         straight = _control().ss([], [], [], np.eye(disturbances), self.period)
         forward = _sampled(self._plant, past, self.period) * _control().append(line, straight)
         c = self._controller
@@ -145,6 +144,12 @@ class SampledLoop:
         T = self.period * np.arange(len(d))
         y: Floats = _control().forced_response(self.system, T, np.transpose(d), squeeze=False).outputs
         return np.transpose(y)
+
+
+def split_delay(delay: float, period: float) -> tuple[int, float]:
+    """Return a delay's whole periods, and what is left of it, s."""
+    whole = math.floor(delay / period + _WHOLE)
+    return whole, max(delay - whole * period, 0.0)
 
 
 def largest_stable(radius: Callable[[float], float], upper: float, steps: int = 10) -> float:

@@ -7,9 +7,8 @@ or (6, n), columns side by side: so a controller's analysis of its stability use
 import math
 from collections.abc import Sequence
 
+from handover.controllers.free_flyer.sampled_loop import split_delay
 from handover.cosim.blocks.ports import Floats
-
-_WHOLE = 1e-9  # of a period: what a delay of whole periods may err by rounding
 
 
 class ThrustModel:
@@ -23,8 +22,7 @@ class ThrustModel:
 
     def __init__(self, lag: float, delay: float, period: float) -> None:
         self._lag, self._period = lag, period
-        self._whole = math.floor(delay / period + _WHOLE)
-        self._part = max(delay - self._whole * period, 0.0)
+        self._whole, self._part = split_delay(delay, period)
         self.remembered = self._whole + (1 if self._part > 0.0 else 0)
         """How many commands before the current one still count."""
 

@@ -14,6 +14,7 @@ from matplotlib.colors import to_rgb
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.plants.free_flyer.hand.gripper_contact import JAW_SIDES, PALM_THICKNESS
 from handover.plants.free_flyer.hand.hand_kinematics import FINGERS, PALM, PALM_SIDES, RADIUS, joint_places
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
@@ -28,7 +29,7 @@ OBJECT = (0.021, 0.195, 0.017)
 """Sides of the object, m."""
 PALM_DEPTH = 0.03
 """How far the gripper's palm lies behind G, m."""
-_ARM_WIDTH, _PALM_SIDES, _JAW_SIDES = 0.04, (0.012, 0.05, 0.075), (0.06, 0.04, 0.008)
+_ARM_WIDTH, _PALM_SIDES = 0.04, (PALM_THICKNESS, 0.05, 0.075)
 FINGER_WIDTH = 2 * RADIUS
 """Thickness of a person's fingers, m."""
 
@@ -78,13 +79,13 @@ def robot_at(record: Record, row: int, gap: float, robot: str = "robot") -> list
     p_BG: Floats = np.transpose(R_WB) @ (p_WG - p_WB)
     face, palm = np.array([-EDGE / 2, 0.0, 0.0]), p_BG + np.array([PALM_DEPTH + _PALM_SIDES[0] / 2, 0.0, 0.0])
     arm = (float(np.linalg.norm(palm - face)), _ARM_WIDTH, _ARM_WIDTH)
-    apart = np.array([0.0, 0.0, (gap + _JAW_SIDES[2]) / 2])
+    apart = np.array([0.0, 0.0, (gap + JAW_SIDES[2]) / 2])
     parts: tuple[tuple[Floats, tuple[float, float, float], str], ...] = (
         (np.zeros(3), (EDGE, EDGE, EDGE), _CUBE),
         ((face + palm) / 2, arm, _ARM),
         (palm, _PALM_SIDES, _JAW),
-        (p_BG + apart, _JAW_SIDES, _JAW),
-        (p_BG - apart, _JAW_SIDES, _JAW),
+        (p_BG + apart, JAW_SIDES, _JAW),
+        (p_BG - apart, JAW_SIDES, _JAW),
     )
     return [_box(p_WB + R_WB @ p_BX, R_WB, sides, colour) for p_BX, sides, colour in parts]
 

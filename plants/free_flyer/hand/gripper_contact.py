@@ -23,7 +23,7 @@ from handover.plants.free_flyer.hand.box import Box
 from handover.plants.free_flyer.hand.hand_kinematics import RADIUS, REACH, Ball, Segment
 from handover.plants.free_flyer.hand.parameters import ContactParams
 
-_PALM_THICKNESS, _JAW = 0.012, (0.06, 0.04, 0.008)
+PALM_THICKNESS, JAW_SIDES = 0.012, (0.06, 0.04, 0.008)
 """Thickness of the palm, and sides of a jaw, m, assumed."""
 _NEAR = RADIUS + 1e-9
 """Metres from the gripper within which a ball around bones may have one whose phalanx touches it."""
@@ -38,10 +38,10 @@ class GripperSolids:
 
     def __init__(self, params: ContactParams) -> None:
         self._p = p = params
-        self._palm = Box((0.5 * _PALM_THICKNESS, p.palm_width, p.palm_width))
-        self._jaw = Box(scale(0.5, _JAW))
-        deep, wide = p.palm_depth + _PALM_THICKNESS, max(p.palm_width, 0.5 * _JAW[1])
-        self._around = Box((max(deep, 0.5 * _JAW[0]), wide, max(p.palm_width, 0.5 * p.aperture + _JAW[2])))
+        self._palm = Box((0.5 * PALM_THICKNESS, p.palm_width, p.palm_width))
+        self._jaw = Box(scale(0.5, JAW_SIDES))
+        deep, wide = p.palm_depth + PALM_THICKNESS, max(p.palm_width, 0.5 * JAW_SIDES[1])
+        self._around = Box((max(deep, 0.5 * JAW_SIDES[0]), wide, max(p.palm_width, 0.5 * p.aperture + JAW_SIDES[2])))
         """A box about G that has the others in it, whatever the angle."""
         self._far = norm(self._around.half) + REACH
 
@@ -60,9 +60,9 @@ class GripperSolids:
             return ZERO, ZERO
         p = self._p
         gap = max(0.0, p.aperture * (angle - p.angle_empty) / (p.angle_open - p.angle_empty))
-        aside = 0.5 * (gap + _JAW[2])
+        aside = 0.5 * (gap + JAW_SIDES[2])
         solids = [
-            (self._palm, (p.palm_depth + 0.5 * _PALM_THICKNESS, 0.0, 0.0)),
+            (self._palm, (p.palm_depth + 0.5 * PALM_THICKNESS, 0.0, 0.0)),
             (self._jaw, (0.0, 0.0, aside)),
             (self._jaw, (0.0, 0.0, -aside)),
         ]

@@ -16,11 +16,10 @@ from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuO
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.replay import Replay
+from handover.scenarios.free_flyer.handover.led_hand import NEVER_TRACKED
 
 _FAR = np.array([50.0, 0.0, 0.0])
 """Where the gripper is that nobody sees, in W, m."""
-_LOST = 1e6
-"""Age of tracking that never began, s: more than any limit."""
 _AXES = ("x", "y", "z")
 
 
@@ -96,7 +95,7 @@ class HandPractice(Experiment[PracticeEvaluator]):
             p_WO_0=parameters.p_WO_0,
             p_WG=_FAR,
             driven_by="outside",
-            age=_LOST,
+            age=NEVER_TRACKED,
         )
         led = self.led_hand(parameters)
         for name in (*led.inputs, led.age):

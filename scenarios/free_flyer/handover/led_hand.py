@@ -14,7 +14,7 @@ from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.parameters import Hand, HandoverParameters
 
-_LOST = 1e6
+NEVER_TRACKED = 1e6
 """Age of tracking that never began, s: more than any limit."""
 _OF_SIMULATED_PERSON = ("skill", "sight_error", "depth_error", "interface_delay")
 """Parameters that only a simulated person has; strength is also the force at which any arm yields."""
@@ -53,7 +53,7 @@ def leader(p: HandoverParameters, stop: float) -> dict[str, Any]:
     if faults:
         raise InvalidParameter(faults)
     if p.hand is Hand.OUTSIDE:
-        return {"driven_by": "outside", "age": _LOST}
+        return {"driven_by": "outside", "age": NEVER_TRACKED}
     return {"driven_by": "track", "track": str(path)}
 
 

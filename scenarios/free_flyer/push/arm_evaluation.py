@@ -25,6 +25,10 @@ from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.push.arm_parameters import ArmPushParameters, ArmTarget
 from handover.scenarios.free_flyer.push.impedance_evaluation import (
+    REST_ANGLE,
+    REST_POSITION,
+    RESTING,
+    SPINNING,
     Errors,
     agreement_bound,
     mean_between,
@@ -40,8 +44,6 @@ SIGNALS = (
 )
 """Signals of which a motion is made, in the order of its columns after time."""
 
-_REST_POSITION, _REST_ANGLE, _RESTING, _SPINNING = 0.010, 0.030, 5.0, 60.0
-"""As in `impedance_evaluation`: errors at rest, m and rad, for how long, s, and speed out of control, rad/s."""
 _TURNED = 1e-9
 """Radians by which a joint has turned."""
 
@@ -128,8 +130,8 @@ class ArmImpedanceEvaluator(Evaluator):
         cosine = (np.trace(np.transpose(self._R_WG) @ rotation_of(signals["robot.q_WG"])) - 1.0) / 2.0
         turned = math.acos(min(1.0, max(-1.0, float(cosine))))
         self._greatest = [max(self._greatest[0], away), max(self._greatest[1], turned)]
-        self._t, self._spins = t, float(np.linalg.norm(signals["robot.w_WB"])) > _SPINNING
-        if away > _REST_POSITION or turned > _REST_ANGLE:
+        self._t, self._spins = t, float(np.linalg.norm(signals["robot.w_WB"])) > SPINNING
+        if away > REST_POSITION or turned > REST_ANGLE:
             self._astray = t
 
     @property
@@ -139,7 +141,7 @@ class ArmImpedanceEvaluator(Evaluator):
 
     @property
     def _at_rest(self) -> bool:
-        return self._t - max(self._astray, self.parameters.end) >= _RESTING
+        return self._t - max(self._astray, self.parameters.end) >= RESTING
 
     def outcome(self) -> Outcome:
         """Return whether the gripper rests again and agreed with the model, why, and the metrics."""

@@ -20,6 +20,15 @@ from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Body, ImpedanceParameters
 from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
 
+REST_POSITION, REST_ANGLE = 0.010, 0.030
+"""Errors below which the robot counts as at rest, m and rad: some three times the noise of its navigation (assumed)."""
+RESTING = 5.0
+"""How long the errors must stay below these, s (assumed)."""
+SPINNING = 60.0
+"""Angular speed at which control counts as lost, rad/s: more than the strongest push can cause (assumed)."""
+_BAND = f"{1000 * REST_POSITION:.0f} mm and {math.degrees(REST_ANGLE):.1f}°"
+_MODEL = "[Fernandes2020] eq. (4.4)"
+
 MOTION_SIGNALS = ("robot.p_WG", "robot.v_WG", "robot.q_WB", "robot.w_WB", "push.f_G", "push.tau_G")
 """Signals of a push that make up a `Motion`, in the order of its fields after time."""
 
@@ -178,19 +187,6 @@ def _times(M: Floats, v: Floats) -> Floats:
     return v @ np.transpose(M)
 
 
-_REST_POSITION, _REST_ANGLE = 0.010, 0.030
-"""Errors below which the robot counts as at rest, m and rad: some three times the noise of its navigation (assumed)."""
-
-_BAND = f"{1000 * _REST_POSITION:.0f} mm and {math.degrees(_REST_ANGLE):.1f}°"
-_MODEL = "[Fernandes2020] eq. (4.4)"
-
-_RESTING = 5.0
-"""How long the errors must stay below these, s (assumed)."""
-
-_SPINNING = 60.0
-"""Angular speed at which control counts as lost, rad/s: more than the strongest push can cause (assumed)."""
-
-
 def agreement_bound() -> str:
     """Return how far errors may be from those by eq. (4.4) at most to agree with them, as a clause."""
     by = paper_values("free_flyer", "published")["model_agreement"]
@@ -230,9 +226,9 @@ class ImpedanceEvaluator(Evaluator):
         away = math.dist(seen[0].tolist(), self._goal)
         turned = 2.0 * math.acos(min(1.0, abs(float(seen[2][0]))))
         self._t, self._last = t, (away, turned)
-        self._spins = math.hypot(*seen[3].tolist()) > _SPINNING
+        self._spins = math.hypot(*seen[3].tolist()) > SPINNING
         self._greatest = [max(self._greatest[0], away), max(self._greatest[1], turned)]
-        if away > _REST_POSITION or turned > _REST_ANGLE:
+        if away > REST_POSITION or turned > REST_ANGLE:
             self._astray = t
 
     @property
@@ -242,7 +238,7 @@ class ImpedanceEvaluator(Evaluator):
 
     @property
     def _at_rest(self) -> bool:
-        return self._t - max(self._astray, self.parameters.end) >= _RESTING
+        return self._t - max(self._astray, self.parameters.end) >= RESTING
 
     @property
     def _settled(self) -> float:
@@ -294,10 +290,10 @@ class ImpedanceEvaluator(Evaluator):
         if self._at_rest:
             return f"the gripper was back at rest, within {_BAND}, {self._settled:.1f} s after the push"
         if self._spins:
-            return f"the robot was out of control at {self._t:.1f} s, turning by more than {_SPINNING:.0f} rad/s"
+            return f"the robot was out of control at {self._t:.1f} s, turning by more than {SPINNING:.0f} rad/s"
         if self._t < float(p.stop) - 0.02:
             return f"stopped at {self._t:.1f} s, before the robot could come to rest"
         return (
-            f"the gripper did not come back to rest, within {_BAND} for {_RESTING:g} s, in {p.patience:g} s: "
+            f"the gripper did not come back to rest, within {_BAND} for {RESTING:g} s, in {p.patience:g} s: "
             f"{1000 * self._last[0]:.0f} mm and {math.degrees(self._last[1]):.1f}° away at the end"
         )
