@@ -136,8 +136,13 @@ def stability_faults(
         f"its largest pole has |z| = {radius:.4f}, which must be less than 1"
     )
     remedies: list[str] = []
-    if (limit := largest_stable(lambda shorter: pole_radius(1.0, shorter), min(delay, _MAX_DELAY))) > 0.0:
-        remedies.append(f"a delay of at most about {limit:.3f} s")
-    if (limit := largest_stable(lambda factor: pole_radius(factor, delay), 1.0)) > 0.0:
-        remedies.append(f"at most about {limit:.3g} times these gains")
+    if (limit := largest_stable(lambda shorter: pole_radius(1.0, shorter), min(delay, _MAX_DELAY))) >= 0.001:
+        remedies.append(f"a delay of at most about {_floor(limit):g} s")
+    if (limit := largest_stable(lambda factor: pole_radius(factor, delay), 1.0)) >= 0.001:
+        remedies.append(f"at most about {_floor(limit):g} times these gains")
     return [fault + ("; it is stable with " + " or with ".join(remedies) if remedies else "; no remedy was found")]
+
+
+def _floor(limit: float) -> float:
+    """Return a limit with three decimals that is not above it."""
+    return math.floor(1000.0 * limit) / 1000.0

@@ -41,7 +41,7 @@ def _write(run: RunFolder, out: Path) -> int:
     """Write where person or tracker wanted the hand, without what arm and object made of it; return the rows.
 
     Raises:
-        UsageError: the run has no such signals.
+        UsageError: the run has no such signals, or the file cannot be written.
     """
     from handover.cosim.record.reader import Record  # pyarrow is slow to import
     from handover.plants.free_flyer.hand.hand_track import HandPose, write_track
@@ -51,5 +51,9 @@ def _write(run: RunFolder, out: Path) -> int:
         raise UsageError(f"{run.shown}: the run has no {', '.join(lacking)}; a handover of the free-flyer has")
     p, q, angles, closed = (record[name].tolist() for name in _SIGNALS)
     poses = (HandPose(tuple(a), tuple(b), tuple(c), bool(d)) for a, b, c, d in zip(p, q, angles, closed, strict=True))
-    write_track(out, zip(record.time.tolist(), poses, strict=True))
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_track(out, zip(record.time.tolist(), poses, strict=True))
+    except OSError as e:
+        raise UsageError(f"{out} cannot be written: {e.strerror}") from e
     return len(record.time)

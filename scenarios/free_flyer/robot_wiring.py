@@ -51,6 +51,11 @@ PUSHES_OF_TEAM = tuple(
 SATURATED_SHARE = "share of the time for which more was commanded than the thrusters give"
 """What the metric `saturated_share` is; controllers that clip their own commands never command more."""
 _CUSTOM_GAINS = tuple(f"{what}_{of}" for what in ("stiffness", "damping") for of in ("translation", "rotation"))
+_OF_JOINTS = (
+    *("axis_J", "link", "centre_L", "mass_L", "I_L", "rotor_J", "q_J_0", "lower_J", "upper_J", "tolerance_J"),
+    *("torque_max_J", "friction_J", "drag_J", "lock_time"),
+)
+"""Parameters of a robot that mean nothing where it has no joints."""
 _TRUE = ("p_WB", "q_WB", "v_WB", "w_WB")
 _MEASURED = ("p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas")
 _ROBOT = "FreeFlyer"
@@ -102,14 +107,28 @@ def check_reach(p_WG: Floats, person: Mapping[str, Any]) -> None:
         raise InvalidParameter([f"p_WG_handover: [{place}] m is out of the person's reach: {text}"])
 
 
-def idle_gains(system: System, given: Sequence[str]) -> list[str]:
-    """Return which gains were given, as `UNIT.NAME`, to impedance controllers whose behaviour has gains of its own."""
-    units = {name: system.units[name.partition(".")[0]] for name in given if name.partition(".")[2] in _CUSTOM_GAINS}
+def idle_values(system: System, given: Sequence[str]) -> list[str]:
+    """Return which values were given, as `UNIT.NAME`, that have no effect.
+
+    These are gains of impedance controllers whose behaviour has gains of its own, and joints and links of robots that
+    have none.
+    """
+    units = {name: system.units[name.partition(".")[0]] for name in given if "." in name}
     return [
-        f"{name} has no effect unless {unit.name}.behaviour=custom"
+        f"{name} has no effect unless {unit.name}.{needed}"
         for name, unit in units.items()
-        if str(unit.start.get("behaviour", "")).lower() not in ("custom", str(int(Gains.CUSTOM)))
+        if (needed := _needed_by(name.partition(".")[2], unit))
     ]
+
+
+def _needed_by(parameter: str, unit: PlacedUnit) -> str:
+    """Return what a unit's parameter needs to have an effect, "" where it has one."""
+    behaviour = str(unit.start.get("behaviour", "")).lower()
+    if parameter in _CUSTOM_GAINS and behaviour not in ("custom", str(int(Gains.CUSTOM))):
+        return "behaviour=custom"
+    if parameter in _OF_JOINTS and unit.description.name == _ROBOT and not unit.start.get("joints", 0):
+        return "joints is 1 or more"
+    return ""
 
 
 def undriven_joints(system: System) -> list[str]:

@@ -85,19 +85,19 @@ def read_track(path: Path, max_gap: float) -> HandTrack:
         max_gap: longest time between two rows, s.
 
     Raises:
-        InvalidTrack: it cannot be read, lacks columns, or rows are not numbers, before 0 s, not in the order of time,
-            too far apart, or hold a quaternion that is no rotation or a joint beyond 0 to 90 degrees.
+        InvalidTrack: it cannot be read, lacks columns or names one twice, or rows are not numbers, before 0 s, not in
+            the order of time, too far apart, or hold a quaternion that is no rotation or a joint beyond 0 to 90
+            degrees.
     """
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             table = list(csv.reader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as e:
-        raise InvalidTrack(path, [f"it cannot be read: {e}"]) from e
-    header = [name.strip() for name in table[0]] if table else []
-    lacking = [name for name in COLUMNS if name not in header]
-    if lacking:
-        fault = f"its first row must name all of {', '.join(COLUMNS)}; lacking: {', '.join(lacking)}"
+        why = e.strerror if isinstance(e, OSError) and e.strerror else str(e)
+        raise InvalidTrack(path, [f"it cannot be read: {why}"]) from e
+    if fault := _fault_of_header(table):
         raise InvalidTrack(path, [fault])
+    header = [name.strip() for name in table[0]]
     at = [header.index(name) for name in COLUMNS]
     rows = [(n, _numbers(row, at)) for n, row in enumerate(table[1:], start=2) if row]
     if not rows:
@@ -115,6 +115,21 @@ def write_track(path: Path, rows: Iterable[tuple[float, HandPose]]) -> None:
         writer.writerow(COLUMNS)
         for t, pose in rows:
             writer.writerow([repr(float(x)) for x in (t, *pose.p, *pose.q, *pose.angles)] + [int(pose.closed)])
+
+
+def _fault_of_header(table: Sequence[Sequence[str]]) -> str:
+    """Return what is wrong with the first row of a table, "" if nothing is."""
+    if not any(table):
+        return "it is empty"
+    header = [name.strip() for name in table[0]]
+    lacking = [name for name in COLUMNS if name not in header]
+    if not lacking:
+        twice = [name for name in COLUMNS if header.count(name) > 1]
+        return f"its first row names {', '.join(twice)} more than once" if twice else ""
+    told = f"its first row must name all of {', '.join(COLUMNS)}, separated by commas"
+    if len(lacking) == len(COLUMNS):
+        return f"{told}; it names none of them"
+    return f"{told}; lacking: {', '.join(lacking)}"
 
 
 def _numbers(row: Sequence[str], at: Sequence[int]) -> list[float]:

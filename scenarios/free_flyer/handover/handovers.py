@@ -36,7 +36,7 @@ from handover.scenarios.free_flyer.robot_wiring import (
     check_reach,
     common_period,
     decision_settings,
-    idle_gains,
+    idle_values,
     undriven_joints,
     wire_handover,
 )
@@ -121,12 +121,12 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         return s
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:
-        """Reject an arm that nothing drives, gains without effect, and a person's traits where no person is simulated.
+        """Reject an arm that nothing drives, values without effect, and a person's traits where no person is simulated.
 
         Raises:
             InvalidParameter: with all such values.
         """
-        if faults := undriven_joints(system) + idle_gains(system, given) + faults_of_person(system, given):
+        if faults := undriven_joints(system) + idle_values(system, given) + faults_of_person(system, given):
             raise InvalidParameter(faults)
 
     def stop_time(self, parameters: HandoverParameters) -> Fraction:

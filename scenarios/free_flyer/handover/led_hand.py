@@ -108,6 +108,12 @@ def _faults(track: HandTrack, stop: float) -> list[str]:
         else:
             unit = ""
         faults.append(f"{text} and an arm reaches {reach:g} m from there{unit}")
+    steps = np.linalg.norm(np.diff(p_WH, axis=0), axis=1)
+    if len(steps) and (far := float(np.max(steps))) > 2.0 * reach:
+        t = track.times[int(np.argmax(steps)) + 1]
+        faults.append(f"the hand jumps by {far:.3g} m to its place at {t:g} s, and an arm reaches {reach:g} m")
+    if not any(pose.closed for pose in track.poses):
+        faults.append("closed is 1 in none of its rows: the hand never holds anything")
     return faults
 
 

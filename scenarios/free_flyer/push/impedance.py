@@ -20,7 +20,7 @@ from handover.scenarios.free_flyer.parameters import ImpedanceParameters
 from handover.scenarios.free_flyer.places import PLACES_OF_PUSH
 from handover.scenarios.free_flyer.published import published_of_push
 from handover.scenarios.free_flyer.push.impedance_evaluation import ImpedanceEvaluator
-from handover.scenarios.free_flyer.robot_wiring import PUSHES, idle_gains, undriven_joints, wired_push
+from handover.scenarios.free_flyer.robot_wiring import PUSHES, idle_values, undriven_joints, wired_push
 
 
 class FlyerImpedance(Experiment[ImpedanceEvaluator]):
@@ -62,12 +62,12 @@ class FlyerImpedance(Experiment[ImpedanceEvaluator]):
         return wired_push(fmu, parameters, seed, controller, {**vars(robot), "p_WB_0": p_WG - robot.p_BG})
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:
-        """Reject an arm that nothing drives, and gains without effect.
+        """Reject an arm that nothing drives, and values without effect.
 
         Raises:
             InvalidParameter: with all such values.
         """
-        if faults := undriven_joints(system) + idle_gains(system, given):
+        if faults := undriven_joints(system) + idle_values(system, given):
             raise InvalidParameter(faults)
 
     def stop_time(self, parameters: ImpedanceParameters) -> Fraction:

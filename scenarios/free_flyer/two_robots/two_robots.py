@@ -25,7 +25,7 @@ from handover.scenarios.free_flyer.robot_wiring import (
     check_reach,
     common_period,
     decision_settings,
-    idle_gains,
+    idle_values,
     undriven_joints,
     wire_handover,
 )
@@ -124,12 +124,12 @@ class TwoRobots(Experiment[TeamEvaluator]):
         return s
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:
-        """Reject an arm that nothing drives, and gains without effect.
+        """Reject an arm that nothing drives, and values without effect.
 
         Raises:
             InvalidParameter: with all such values.
         """
-        if faults := undriven_joints(system) + idle_gains(system, given):
+        if faults := undriven_joints(system) + idle_values(system, given):
             raise InvalidParameter(faults)
 
     def stop_time(self, parameters: TeamParameters) -> Fraction:

@@ -100,7 +100,9 @@ def test_all_faults_are_told_at_once_and_the_first_lines_of_each(tmp_path: Path)
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("", "its first row must name all of t, p_x"),
+        ("", "it is empty"),
+        ("t;p_x\n0;1\n", "all of t, p_x, .*, closed, separated by commas; it names none of them"),
+        (",".join((*COLUMNS, "t")) + "\n", "its first row names t more than once"),
         ("t,p_x\n0,1\n", "lacking: p_y"),
         (",".join(COLUMNS) + "\n", "no rows"),
         (",".join(COLUMNS) + "\n0,1,2\n", "every entry must be a finite number: line 2"),
@@ -113,7 +115,7 @@ def test_a_file_that_is_no_track_is_refused(tmp_path: Path, text: str, says: str
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path):
-    with pytest.raises(InvalidTrack, match="cannot be read"):
+    with pytest.raises(InvalidTrack, match=r"cannot be read: No such file or directory$"):
         read_track(tmp_path / "none.csv", 0.2)
     for params in (Params(driven_by=Driver.TRACK), Params(track="t.csv")):
         with pytest.raises(InvalidHandParameters, match="track"):

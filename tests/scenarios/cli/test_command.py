@@ -87,7 +87,7 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
         (("run", "helix_handover", "-p", "alpha=7"), "from 0.01 to 1"),
         (("run", "helix_handover", "-p", "alpha=quick"), "not a number"),
         (("run", "helix_handover", "--seed", "-1"), "x>=0"),
-        (("run", "flyer_impedance", "-p", "delay=0.032"), "stable with a delay of at most about 0.027 s"),
+        (("run", "flyer_impedance", "-p", "delay=0.032"), "stable with a delay of at most about 0.026 s"),
         (("run", "vsl_hybrid", "-p", "path=custom", "-p", "x_g=0.6,0,0.15"), "point 49 of 100"),
         (
             (

@@ -60,7 +60,8 @@ def changed(track: Path, change: Callable[[dict[str, str]], dict[str, str] | Non
 
 
 def early(row: dict[str, str]) -> dict[str, str] | None:
-    return row if float(row["t"]) < 5.0 else None
+    t = float(row["t"])
+    return row | {"closed": "1" if t > 4.5 else "0"} if t < 5.0 else None
 
 
 def aside(row: dict[str, str]) -> dict[str, str]:
@@ -113,9 +114,17 @@ def by_the_clock(row: dict[str, str]) -> dict[str, str]:
     return row | {"t": repr(float(row["t"]) + 1.7e9)}
 
 
+def jumping(row: dict[str, str]) -> dict[str, str]:
+    return row | {"p_x": "50.0"} if float(row["t"]) == 0.5 else row
+
+
+def never_closed(row: dict[str, str]) -> dict[str, str]:
+    return row | {"closed": "0"}
+
+
 def track_at_rest(out: Path) -> Path:
     pose = HandPose((-0.4, 0.1, -0.05), (1.0, 0.0, 0.0, 0.0), (0.0,) * 14, closed=False)
-    write_track(out, [(0.1 * i, pose) for i in range(20)])
+    write_track(out, [(0.1 * i, pose._replace(closed=i > 10)) for i in range(20)])
     return out
 
 
@@ -125,6 +134,8 @@ def track_at_rest(out: Path) -> Path:
         (one_row, r"it has one row"),
         (far_off, r"never nearer than 2 m to \(-0\.4, 0\.1, -0\.05\) m .* reaches 0\.9 m from there$"),
         (in_millimetres, r"reaches 0\.9 m from there; they look like millimetres, and must be metres$"),
+        (jumping, r"the hand jumps by 50\.4 m to its place at 0\.5 s, and an arm reaches 0\.9 m$"),
+        (never_closed, r"closed is 1 in none of its rows: the hand never holds anything$"),
         (by_the_clock, r"begins at 1\.7e\+09 s, and the run ends by 180 s"),
     ],
 )
@@ -159,6 +170,15 @@ def test_a_run_without_a_hand_has_no_track(tmp_path: Path):
     assert told.exit_code == 2
     assert "has no person.p_WH_goal, person.q_WH_goal" in told.output
     assert not (tmp_path / "t.csv").exists()
+
+
+def test_a_track_goes_into_a_new_folder_and_not_where_nothing_can_be_written(tmp_path: Path):
+    run(RobotToHuman, tmp_path / "run", "patience=1")
+    assert tracked(tmp_path / "run", tmp_path / "new" / "folder" / "track.csv").is_file()
+    (tmp_path / "file").write_text("")
+    told = CliRunner().invoke(flyer_track, [str(tmp_path / "run"), "--out", str(tmp_path / "file" / "track.csv")])
+    assert told.exit_code == 2
+    assert "Error" in told.output
 
 
 def test_a_folder_that_is_no_run_has_no_track(tmp_path: Path):

@@ -94,11 +94,16 @@ def test_an_unknown_delay_makes_the_robot_lose_control_and_the_run_ends_in_time(
     assert "out of control" in ended.outcome.reason
 
 
-def test_gains_that_have_no_effect_are_refused(tmp_path: Path):
+def test_values_that_have_no_effect_are_refused(tmp_path: Path):
     soft = "impedance.stiffness_translation=5,0,0,0,67,0,0,0,67"
     done = CliRunner().invoke(main, ["run", "flyer_impedance", "-p", soft, "--out", str(tmp_path / "r")])
     assert done.exit_code == 2
     assert "impedance.stiffness_translation has no effect unless impedance.behaviour=custom" in done.output
+    assert not (tmp_path / "r").exists()
+    crossed = ["-p", "robot.lower_J=2,2,2", "-p", "robot.upper_J=-1,-1,-1"]
+    done = CliRunner().invoke(main, ["run", "flyer_impedance", *crossed, "--out", str(tmp_path / "r")])
+    assert done.exit_code == 2
+    assert "robot.lower_J has no effect unless robot.joints is 1 or more" in done.output
     assert not (tmp_path / "r").exists()
     chosen = ["-p", soft, "-p", "impedance.behaviour=custom", "--stop", "0.1", "--no-report"]
     done = CliRunner().invoke(main, ["run", "flyer_impedance", *chosen, "--out", str(tmp_path / "r")])
