@@ -43,6 +43,7 @@ def test_the_newest_row_is_what_was_recorded_last(tmp_path: Path):
         GrowingRecord(file)
 
 
+@pytest.mark.slow
 def test_no_row_is_torn_while_blocks_are_flushed(tmp_path: Path):
     """Each row holds one number many times; the writer flushes some hundred blocks while another thread reads."""
     file = tmp_path / "signals.parquet"

@@ -79,6 +79,7 @@ def led_by_script(wanted: Path, out: Path, *given: str) -> bool:
     return run_task(task, tell_nobody, Interruption()).outcome.success
 
 
+@pytest.mark.slow
 def test_a_run_led_by_shared_inputs_is_played_back_byte_for_byte(tmp_path: Path):
     run(RobotToHuman, tmp_path / "person", "skill=1")
     assert led_by_script(tmp_path / "person", tmp_path / "led")

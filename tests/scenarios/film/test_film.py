@@ -90,6 +90,7 @@ def test_the_scene_moves_and_the_cursor_with_the_time(mp4: Path):
     assert per_picture * len(shown) > 0.2 * WIDE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".gif", ".webm"])
 def test_a_gif_and_a_webm_have_the_same_moments(grasp: Path, tmp_path: Path, suffix: str):
     out = tmp_path / f"film{suffix}"
@@ -113,6 +114,7 @@ def test_a_gif_and_a_webm_have_the_same_moments(grasp: Path, tmp_path: Path, suf
     assert np.abs(shown[-1].astype(float) - shown[0]).max() > 60.0
 
 
+@pytest.mark.slow
 def test_a_moment_looks_the_same_whatever_was_shown_before(grasp: Path):
     content = film_content(RunFolder.of_run(grasp), (), 720)
     with open_camera(film_html(content, (1280, 720), "follow"), (1920, 1080), dark=True) as camera:

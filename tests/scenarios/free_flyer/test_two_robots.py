@@ -21,6 +21,7 @@ def cause(metrics: float) -> TeamCause:
     return TeamCause(int(metrics))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("task", ["robots_to_human", "human_to_robots"])
 def test_the_object_changes_hands(task: str, seed: int, tmp_path: Path):

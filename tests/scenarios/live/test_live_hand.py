@@ -65,6 +65,7 @@ def take_object(page: Page) -> None:
         move_hand(page, [0.0, 0.07, 0.0], steps=10)
 
 
+@pytest.mark.slow
 def test_the_pages_hand_takes_the_object_and_its_record_is_played_back_byte_for_byte(browser: Browser, tmp_path: Path):
     given = ("-p", "hand=outside", "--pace", "4")
     with live_run(tmp_path / "led", *given, scenario=SCENARIO) as (address, run), shown(browser, address) as page:

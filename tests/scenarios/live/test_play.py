@@ -111,6 +111,7 @@ def changed(page: Page) -> list[str]:
     return page.locator("#runs td.set").all_inner_texts()
 
 
+@pytest.mark.slow
 def test_a_slider_begins_a_run_anew_and_each_run_is_that_of_its_command(browser: Browser, tmp_path: Path):
     with played("flyer_impedance", tmp_path / "runs", "--pace", "2") as (address, session):
         with shown(browser, address) as page:
@@ -144,6 +145,7 @@ def test_a_slider_begins_a_run_anew_and_each_run_is_that_of_its_command(browser:
     assert (tmp_path / "runs/002/signals.parquet").read_bytes() == (tmp_path / "again/signals.parquet").read_bytes()
 
 
+@pytest.mark.slow
 def test_what_is_refused_is_told_beside_its_parameter_and_the_run_goes_on(browser: Browser, tmp_path: Path):
     with played("flyer_robot_to_human", tmp_path / "runs") as (address, _), shown(browser, address) as page:
         begun(page, 1)
@@ -177,6 +179,7 @@ BEYOND = """[...document.querySelectorAll("body *")]
 """What makes a page wider than its window."""
 
 
+@pytest.mark.slow
 def test_a_run_is_shown_again_and_gets_a_report(browser: Browser, tmp_path: Path):
     with played("ir_grasp", tmp_path / "runs", "-p", "strategy=blind", "--pace", "100") as (address, _):
         with shown(browser, address, 390, 844) as page:
@@ -301,6 +304,7 @@ def test_a_session_that_cannot_begin_is_refused_in_a_line(given: tuple[str, ...]
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_push_moves_the_robot_a_compliant_one_farther_and_is_played_back(browser: Browser, tmp_path: Path):
     with (
         played("flyer_impedance", tmp_path / "runs", "-p", "begin=30") as (address, _),

@@ -196,6 +196,7 @@ def test_a_run_is_found_by_what_it_is_for():
     assert not runs.of(Task.COLLABORATIVE, Behaviour.RIGID, variation=STRENGTHS[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("variation", "same"), [(RATES[0], True), (USUAL, False)], ids=["without chance", "usual"])
 def test_runs_without_chance_do_not_depend_on_their_seed(variation: Variation, same: bool, tmp_path: Path):
     point = point_of(GIVING.task, Behaviour.RIGID, Propulsion.LIMITED, variation)

@@ -22,6 +22,7 @@ def compliant_fails(number: int, planned: Round) -> bool:
     return number % 2 == 0 and (planned.condition.task, planned.condition.behaviour) == ("human_to_robot", "compliant")
 
 
+@pytest.mark.slow
 def test_ratings_of_one_statement_that_differ_are_found(tmp_path: Path):
     analysis = StudyAnalysis(write_study(tmp_path / "out", 12, rigid_is_better))
     tests = {(t.statement, t.task): t for t in analysis.rating_tests}
@@ -39,6 +40,7 @@ def test_ratings_of_one_statement_that_differ_are_found(tmp_path: Path):
     assert (other.test.p, other.p_holm, other.test.zeros) == (1.0, 1.0, 12)
 
 
+@pytest.mark.slow
 def test_failures_are_compared_within_persons(tmp_path: Path):
     analysis = StudyAnalysis(write_study(tmp_path / "out", 12, same, compliant_fails))
     counts = {(c.task, c.behaviour): c for c in analysis.failures}
@@ -76,6 +78,7 @@ def test_too_few_are_not_tested(people: int, tmp_path: Path):
     assert all(m.model is None and "fewer than 6" in m.reason for m in analysis.models)
 
 
+@pytest.mark.slow
 def test_gains_by_practice_are_found_and_do_not_touch_the_comparison(tmp_path: Path):
     def learns(number: int, planned: Round, statement: str) -> int:
         return 1 + (planned.number + number % 3) // 2 if statement == "S2" else 5
@@ -94,6 +97,7 @@ def test_gains_by_practice_are_found_and_do_not_touch_the_comparison(tmp_path: P
     assert all(t.p_holm is not None and t.p_holm > 0.9 for t in analysis.rating_tests)
 
 
+@pytest.mark.slow
 def test_what_a_rigid_round_leaves_behind_is_carry_over(tmp_path: Path):
     rounds = {n: StudyFolder.opened(tmp_path / "plan", PLAN).begin(session(n)).rounds for n in range(1, 13)}
 
@@ -132,6 +136,7 @@ def test_practice_is_not_taken_for_carry_over_where_rounds_are_void_and_orders_u
     assert carry.p > 0.05
 
 
+@pytest.mark.slow
 def test_the_model_has_the_behaviours_effect_in_each_task(tmp_path: Path):
     def rates(number: int, planned: Round, statement: str) -> int:
         noise = (7 * number + 3 * planned.number + 5 * int(statement[1])) % 5 - 2

@@ -15,6 +15,7 @@ from handover.scenarios.study.statistics.power import PowerAssumptions, fewest_p
 PLAN = parse_plan(default_plan())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("people", "exact"), [(10, 0.616), (18, 0.892)])
 def test_the_t_test_agrees_with_the_noncentral_distribution(people: int, exact: float):
     c = stats.t.ppf(0.975, people - 1)

@@ -76,6 +76,7 @@ def test_scripted_pilots_are_told_in_every_section_and_file(tmp_path: Path):
         assert "no person took part" in file.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_pandas_reads_all_tables_by_their_codebooks(tmp_path: Path):
     folder = tmp_path / "out"
     write_study(folder, 7, rigid_is_better, compliant_fails)
@@ -110,6 +111,7 @@ def test_too_few_are_told_and_nothing_is_computed(people: int, tmp_path: Path):
     assert ("Fewer than 6 are too few for a test" in text) == (people == 3)
 
 
+@pytest.mark.slow
 def test_a_session_broken_off_and_void_rounds_are_told(tmp_path: Path):
     study_folder = write_study(tmp_path / "out", 6, rigid_is_better)
     folder = study_folder.begin(session(7))
@@ -136,6 +138,7 @@ def test_a_session_broken_off_and_void_rounds_are_told(tmp_path: Path):
     assert f"P07: the session is not complete; it enters {told}" in text
 
 
+@pytest.mark.slow
 def test_who_withdrew_is_told_with_the_time_and_nothing_else(tmp_path: Path):
     out = tmp_path / "out"
     write_study(out, 7, rigid_is_better)
@@ -158,6 +161,7 @@ def test_who_withdrew_is_told_with_the_time_and_nothing_else(tmp_path: Path):
     assert "nothing of theirs is shown" in refused.output
 
 
+@pytest.mark.slow
 def test_twelve_sessions_with_a_gap_in_their_rows_are_not_called_balanced(tmp_path: Path):
     write_study(tmp_path / "out", 13, rigid_is_better).withdraw(2, "2026-11-24T15:00:00", delete=False)
     text = text_of(report_of(tmp_path / "out"))

@@ -43,6 +43,7 @@ def test_places_that_contradict_each_other_are_refused(given: dict[str, Any], fa
         VslPickAndPlace().build(PickAndPlaceParameters(**given), 0, lambda _unit: Path("none.fmu"))
 
 
+@pytest.mark.slow
 def test_it_carries_an_object_to_its_place_and_touches_more_softly_with_softer_links(tmp_path: Path):
     soft = run(VslPickAndPlace, tmp_path / "soft", drawn=True)
     stiff = run(VslPickAndPlace, tmp_path / "stiff", "contact_pressure=2e5")
