@@ -24,6 +24,8 @@ _NAMED = 3
 """How many rows a fault names."""
 _UNIT = 1e-3
 """How far a quaternion's norm may be from 1."""
+_SAME_TIME = 1e-9
+"""Seconds by which a row's time may be later than a time that is told, by rounding, and still be reached."""
 _ROUNDING = 1e-6
 """Radians by which a joint may be beyond its range, by rounding."""
 
@@ -68,11 +70,11 @@ class HandTrack:
 
     def at(self, t: float) -> HandPose:
         """Return where the hand is to be at a time, s."""
-        i = bisect_right(self._times, t)
+        i = bisect_right(self._times, t + _SAME_TIME)
         if i == 0 or i == len(self._times):
             return self._poses[max(0, i - 1)]
         a, b = self._poses[i - 1], self._poses[i]
-        s = (t - self._times[i - 1]) / (self._times[i] - self._times[i - 1])
+        s = max(t - self._times[i - 1], 0.0) / (self._times[i] - self._times[i - 1])
         angles = tuple(x + s * (y - x) for x, y in zip(a.angles, b.angles, strict=True))
         return HandPose(lerp(a.p, b.p, s), nlerp(a.q, b.q, s), angles, a.closed)
 

@@ -302,7 +302,7 @@ class TeamEvaluator(Evaluator):
         if grippers:
             most = self._most_hands
             held = "the person had let go of it" if most == self._wanted else f"only {_which(most, 'hand')} had held it"
-            only = f": {held}" if most else ""
+            only = f": {held if most else 'no hand had held it'}"
             text = f"the robots opened their grippers though the person did not hold the object, lost at {t:.1f} s"
             return TeamCause.RELEASED_UNHELD, text + only
         return (
@@ -324,7 +324,9 @@ class TeamEvaluator(Evaluator):
             often = counted(self._failed, "reception")
             return TeamCause.RECEPTIONS_FAILED, f"they gave up after {often}; {self._where}"
         if before == "GRASP_OBJECT":
-            return TeamCause.NOT_FETCHED, f"they closed their grippers on the object; {self._where}"
+            without = _which(3 & ~self._grippers, "gripper")
+            text = f"they closed their grippers, and {without} got nothing" if without else "they had the object"
+            return TeamCause.NOT_FETCHED, f"{text}; {self._where}"
         if before == "MOVE_TO_HANDOVER":
             text = f"they did not come to rest at their places{within or ' in time'}"
             return TeamCause.OUT_OF_REACH, f"{text}: {self._gave_up_from}; {self._where}"

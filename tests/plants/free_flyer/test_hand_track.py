@@ -53,6 +53,8 @@ def test_a_track_is_read_as_it_was_written(tmp_path: Path):
         np.testing.assert_allclose(got.q, pose.q, atol=1e-15)
     middle = track.at(0.075)
     np.testing.assert_allclose(middle.p, 0.5 * (np.array(poses()[1][1].p) + poses()[2][1].p), atol=1e-15)
+    assert track.at(poses()[31][0] - 1e-12).closed  # a time that rounding made earlier than its row's
+    assert not track.at(poses()[31][0] - 1e-6).closed
     assert track.at(-1.0) == track.at(0.0)
     assert track.at(99.0) == track.at(0.05 * 59)
 
