@@ -215,8 +215,12 @@ class CampaignResults:
             return f"{text} {unit_symbol(self.unit(parameter))}".rstrip()
         return self.words(parameter, text)
 
-    def words(self, parameter: str, text: str) -> str:  # noqa: ARG002 (a name may be shown as it was given)
-        """Return a value that is no number as one reads it; paths of files and of blocks as they are."""
+    def words(self, parameter: str, text: str) -> str:
+        """Return a value that is no number as one reads it; of a block its class alone, paths of files as they are."""
+        module, _, name = text.rpartition(":")
+        if name.isidentifier() and module.replace(".", "").isidentifier():
+            namesakes = {t for p in self.points if (t := p.values.get(parameter, "")).endswith(f":{name}")}
+            return text if len(namesakes) > 1 else name
         return text if any(mark in text for mark in ":/.") else text.replace("_", " ")
 
     def label(self, point: PointResults) -> str:

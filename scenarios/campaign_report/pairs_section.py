@@ -36,7 +36,7 @@ def pairs_section(results: CampaignResults) -> Section | None:
         text += f" {left} pairs of points more are left out."
     header = ("of", "first", "second", "pairs", "both", "only first", "only second", "neither", "p")
     table = rows_table(header, rows, numbers=range(3, 9), sortable=True)
-    html = Markup("<div class='tall'>{}</div><p class='soft'>{}</p>").format(table, text)
+    html = Markup("<div class='tall names'>{}</div><p class='soft'>{}</p>").format(table, text)
     return Section(anchor="pairs", title="Paired comparisons", html=html, scripts=("campaign.js",))
 
 

@@ -48,8 +48,9 @@ def points_section(results: CampaignResults, layout: PointLayout | None) -> Sect
     if not layout.fits_a_page:
         line += f" {len(points)} points are too many for plots: click on a column's name to sort by it."
     table = rows_table(header, rows, numbers=range(first, len(header)), sortable=True)
+    box = Markup("<div class='tall'>{}</div>").format(table)
     note = Markup("<p class='soft'>{}</p>").format(line)
-    return Section(anchor="points", title="Points", html=table + note, scripts=("campaign.js",))
+    return Section(anchor="points", title="Points", html=box + note, scripts=("campaign.js",))
 
 
 def _units_of_varied(results: CampaignResults) -> Mapping[str, DisplayUnit]:
@@ -152,8 +153,8 @@ def place_axis(figure: Any, layout: PointLayout) -> None:
         axis |= {"tickmode": "array", "tickvals": [place for place, _ in layout.ticks], "ticktext": names}
     along, across = ("yaxis", "xaxis") if layout.listed else ("xaxis", "yaxis")
     figure.update_layout({along: axis, across: {"type": "linear"}})
-    if layout.listed and len(layout.places) > _SCREEN:
-        figure.update_layout({"xaxis": {"side": "top"}})
+    if layout.listed:
+        figure.update_layout(meta={"list": True}, xaxis_side="top" if len(layout.places) > _SCREEN else None)
 
 
 def plot_height(layout: PointLayout) -> int:

@@ -49,7 +49,7 @@ def runs_section(results: CampaignResults, folder: Path) -> Section | None:
         "<div class='controls'><label>Show runs with <input type='search' data-filters='all-runs' "
         "placeholder='words, such as failed'></label>"
         "<output class='soft' data-counts='all-runs'>{}</output></div>\n"
-        "<div id='all-runs' class='tall'>{}</div><p class='soft'>{}</p>"
+        "<div id='all-runs' class='tall names'>{}</div><p class='soft'>{}</p>"
     ).format(_number_of(rows), rows_table(header, rows, numbers=numbers, sortable=True), note)
     return Section(anchor="runs", title="Runs", html=html, scripts=("campaign.js",))
 

@@ -42,7 +42,7 @@ def _fmus(units: Mapping[str, Mapping[str, str]]) -> Markup:
         return Markup()
     rows = [
         (
-            name,
+            Markup("<span class='name'>{}</span>").format(name),
             Markup("<span class='name'>{}</span>").format(u["fmu"]),
             Markup("<code>{}</code>").format(u["sha256"][:12]),
         )
@@ -69,5 +69,6 @@ def figures_section(figures: Sequence[Figure], folder: Path) -> Section | None:
 def _html(figure: Figure, file: Path) -> Markup:
     data = base64.b64encode(file.read_bytes()).decode()
     return Markup(
-        "<figure><img class='paper' alt='{}' src='data:image/png;base64,{}'><figcaption>{}</figcaption></figure>"
+        "<figure><div class='scroll'><img class='paper' alt='{}' src='data:image/png;base64,{}'></div>"
+        "<figcaption>{}</figcaption></figure>"
     ).format(figure.name.replace("_", " "), data, figure.caption)

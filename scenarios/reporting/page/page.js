@@ -68,7 +68,8 @@ const page = (() => {
     const {data, layout, config} = coloured(figure, colours());
     const shown = {...layout, template: template(), autosize: true};
     if (figure.layout.meta?.time) asOthers(shown);
-    if (div.clientWidth < 560) narrow(shown);
+    if (div.clientWidth < 560) narrow(div, shown);
+    else if (layout.meta?.list) delete div.dataset.more;
     for (const change of changes) change(div, shown);
     div.dataset.height ??= parseFloat(div.style.height);
     div.dataset.width = div.clientWidth;
@@ -119,12 +120,21 @@ const page = (() => {
     redraw(figure => figure.layout.meta?.time);
   }
 
-  // On a phone: few ticks, small margins.
-  function narrow(layout) {
+  // On a phone: few ticks, small margins, and the names of a list above its rows instead of beside them.
+  function narrow(div, layout) {
     for (const key of Object.keys(layout).filter(k => /^[xy]axis\d*$/.test(k)))
       layout[key] = {nticks: key[0] === "x" ? 5 : 6, ...layout[key]};
     layout.margin = {l: 44, r: 6, t: 30, b: 40, ...layout.margin};
     layout.font = {size: 12, ...layout.font};
+    if (layout.meta?.list) {
+      const {tickvals, ticktext} = layout.yaxis;
+      layout.annotations = tickvals.map((y, k) => ({
+        text: ticktext[k], x: 0, xref: "paper", xanchor: "left", y, yanchor: "bottom", yshift: 10, align: "left", showarrow: false,
+      }));
+      layout.yaxis = {...layout.yaxis, showticklabels: false};
+      layout.margin.l = 6;
+      div.dataset.more = 18 * tickvals.length;
+    }
   }
 
   // Makes room below a figure for its legend, so that the axes keep their height.

@@ -33,14 +33,16 @@ def test_there_is_no_interval_that_says_nothing_or_takes_too_long(points: int, v
     assert results.median_interval(results.points[0], "moved") is None
 
 
-def test_labels_have_the_names_of_numbers_and_paths_as_they_are():
+def test_labels_have_the_names_of_numbers_and_of_classes_and_files_as_they_are():
     numbers = [{"forward": a, "standoff": b} for a in ("0.03", "0.05") for b in ("0.06", "0.1")]
     results = results_of("ir_grasp", numbers)
     assert results.label(results.points[0]) == "forward 30 mm, standoff 60 mm"
     paths = ("my_own:Reflex", "b_1.fmu")
     units = [{"thing": thing, "reflex": path} for thing in ("baby_cup_a", "cylinder") for path in paths]
     results = results_of("ir_grasp", units)
-    assert [results.label(p) for p in results.points[:2]] == ["baby cup a, my_own:Reflex", "baby cup a, b_1.fmu"]
+    assert [results.label(p) for p in results.points[:2]] == ["baby cup a, Reflex", "baby cup a, b_1.fmu"]
+    namesakes = results_of("ir_grasp", [{"reflex": path} for path in ("my_own:Reflex", "old.my_own:Reflex")])
+    assert [namesakes.label(p) for p in namesakes.points] == ["my_own:Reflex", "old.my_own:Reflex"]
 
 
 def test_an_array_has_a_label_with_its_name_and_unit(tmp_path: Path):

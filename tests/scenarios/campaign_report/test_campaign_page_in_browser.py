@@ -72,6 +72,26 @@ def test_values_stand_along_an_axis_of_numbers(browser: Browser, tmp_path: Path,
         assert types == ["linear"] * 4
 
 
+def test_a_list_has_its_names_above_its_rows_on_a_phone_and_beside_them_elsewhere(browser: Browser, tmp_path: Path):
+    values = product(("0.01", "0.02"), ("0.06", "0.1"), ("my_own.long_name_of_a_module:Reflex", "blind.fmu"))
+    points = [dict(zip(("forward", "standoff", "reflex"), v, strict=True)) for v in values]
+    folder = folder_of(tmp_path, campaign_metadata("ir_grasp", points), table_of([{}] * len(points)))
+    write_campaign_page(folder)
+    names = "document.querySelector('.plot')._fullLayout.annotations.map(a => a.text)"
+    beside = "document.querySelectorAll('.plot .ytick').length"
+    width = "document.querySelector('.plot')._fullLayout.xaxis._length"
+    with opened(browser, folder.report, width=400) as page:
+        assert page.evaluate(names)[0] == "forward 10 mm,<br>standoff 60 mm, Reflex"
+        assert (page.evaluate(f"{names}.length"), page.evaluate(beside)) == (len(points), 0)
+        assert page.evaluate(width) > 300
+        assert overflow(page) <= 0
+        high = page.evaluate("document.querySelector('.plot').clientHeight")
+        page.set_viewport_size({"width": 1200, "height": 800})
+        wait_until(page, f"{beside} >= {len(points)}")
+        assert page.evaluate(f"{names}.length") == 0
+        assert page.evaluate("document.querySelector('.plot').clientHeight") < high
+
+
 @pytest.mark.slow
 def test_a_campaigns_page_is_no_wider_than_a_phone(browser: Browser, campaign: CampaignFolder):
     with opened(browser, campaign.report, width=400, scheme="dark") as page:
