@@ -117,7 +117,7 @@ class HandoverEvaluator(Evaluator):
         x, y, z = plain("robot.p_WG")
         held_before = self._holder
         if codes != self._codes:
-            self._change(t, signals, (x, y, z), plain("decision.speed_G"))
+            self._change(t, signals, (x, y, z))
             self._codes = codes
         phase, holder, transfer = self._phase, self._holder, self._under_way
         if transfer is not None:
@@ -144,7 +144,7 @@ class HandoverEvaluator(Evaluator):
             self._approach = Approach(goal, gate_error if phase == "MOVE_TO_HANDOVER" else tolerance)
         self._approach.moved(p_WG, speed)
 
-    def _change(self, t: float, signals: Signals, p_WG: tuple[float, float, float], speed: float) -> None:
+    def _change(self, t: float, signals: Signals, p_WG: tuple[float, float, float]) -> None:
         """Handle a change of phase or holder."""
         if not self._stability:
             self._stability = stability_metrics(signals, ("impedance", "pose"))
@@ -159,12 +159,13 @@ class HandoverEvaluator(Evaluator):
             if left in _CLOSING:
                 self._closed(float(signals["person.gripper_angle"]), holder)
                 self._off = self._deeds.from_fingers(signals)
-            self._enter(phase, left, t, p_WG, speed)
+            self._enter(phase, left, t, p_WG, signals)
         if holder != self._holder:
             self.holders.append((holder, t))
             self._receive(holder, t)
 
-    def _enter(self, phase: str, left: str, t: float, p_WG: tuple[float, float, float], speed: float) -> None:
+    def _enter(self, phase: str, left: str, t: float, p_WG: tuple[float, float, float], signals: Signals) -> None:
+        speed = signals.plain("decision.speed_G")
         if phase in _ARRIVING:
             self._approach = None
         if phase == "ACTIVATE_IMPEDANCE" and self._arrival is None:
@@ -184,6 +185,7 @@ class HandoverEvaluator(Evaluator):
             self.transfers.append(Transfer(self.receivers[len(self.transfers)], t))
         if left == "CHECK_VELOCITY" and phase != "GIVEN_UP" and self._under_way is not None:
             self._under_way.felt, self._under_way.speed = t, speed
+            self._under_way.true_speed = math.hypot(*signals.plain("robot.v_WG"))
             self._unprovoked += not self._under_way.touched
 
     def _closed(self, angle: float, holder: str) -> None:
@@ -249,7 +251,7 @@ class HandoverEvaluator(Evaluator):
         )
         cause, reason = (Cause.NONE, self._success()) if success else self._failure()
         return Outcome(
-            success=success, reason=reason + self.parameters.stuck, metrics=self._metrics() | self._causes(cause)
+            success=success, reason=reason + self.parameters.untold, metrics=self._metrics() | self._causes(cause)
         )
 
     def _metrics(self) -> dict[str, Metric]:
@@ -344,7 +346,7 @@ class HandoverEvaluator(Evaluator):
     def _loss(self, t: float, holder: str, phase: str) -> tuple[Cause, str]:
         """Return why the object was lost at t by a holder in a phase of the robot."""
         if holder == "GRIPPER" and phase in _OPENING:
-            return self._deeds.released(t)
+            return self._deeds.released(t, self.transfers[-1].seen if self.transfers else "")
         if holder == "HAND":
             return self._deeds.dropped(t)
         before = _PEOPLE.get(holder, "both")

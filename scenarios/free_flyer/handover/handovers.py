@@ -72,7 +72,6 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         "saturated_share",
         "pole_margin_impedance",
         "damping_ratio_impedance",
-        "slowest_decay_pose",
         "damping_ratio_pose",
         "cpu_per_cycle",
     )

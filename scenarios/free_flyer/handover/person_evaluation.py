@@ -174,15 +174,15 @@ class PersonsDeeds:
             self.let_go = (t, held_before)
         self.activity = activity
 
-    def released(self, t: float) -> tuple[Cause, str]:
-        """Return why a robot let go that nobody had taken the object from, which was lost at t."""
+    def released(self, t: float, seen: str) -> tuple[Cause, str]:
+        """Return why a robot that had `seen` something let go of an object that nobody had taken, lost at t."""
         opened = f"the robot opened its gripper though the person did not hold the object, which was lost at {t:.1f} s"
         if self.let_go is not None and self.let_go[1] == "BOTH":
             return Cause.RELEASED_UNHELD, f"{opened}: the person had let go of it at {self.let_go[0]:.1f} s, unfelt"
         if self.bump is not None and t - self.bump[0] < _SHORTLY:
             bumped = f"what it felt was the open hand, which bumped the object with {self.bump[1]:.1f} N"
             return Cause.BUMPED, f"{opened}: {bumped} at {self.bump[0]:.1f} s"
-        return Cause.RELEASED_UNHELD, f"{opened}: {self._missed() or 'what it felt was no pull'}"
+        return Cause.RELEASED_UNHELD, f"{opened}: {self._missed() or f'nobody had pulled, but {seen}'}"
 
     def dropped(self, t: float) -> tuple[Cause, str]:
         """Return why the hand lost the object at t, of which the gripper had no hold."""

@@ -19,7 +19,8 @@ class Transfer:
         asked: when it last gave the signal, s; later than `signalled` after a failed reception or delivery.
         felt: when, since then, it took the gripper's speed for a pull or a push, s; None before.
         in_vain: times at which it had felt one in receptions and deliveries that failed, s.
-        speed: the gripper's speed when it was felt, m/s.
+        speed: the gripper's speed when it was felt, as the robot saw it, m/s.
+        true_speed: the same by ground truth.
         fastest: maximum speed while the robot has been waiting since it last asked, m/s.
         at_rest: its greatest while the robot waits after any of its signals and nobody has touched the gripper, or what
             it holds, m/s.
@@ -36,6 +37,7 @@ class Transfer:
     felt: float | None = None
     in_vain: list[float] = field(default_factory=list[float])
     speed: float = 0.0
+    true_speed: float = 0.0
     fastest: float = 0.0
     at_rest: float = 0.0
     touched: bool = False
@@ -58,6 +60,11 @@ class Transfer:
         self.fastest = max(self.fastest, speed)
         if not self.touched:
             self.at_rest = max(self.at_rest, speed)
+
+    @property
+    def seen(self) -> str:
+        """What the robot took for a pull or push, if it felt one, as a clause."""
+        return f"it saw its gripper move at {self.speed:.3f} m/s, which moved at {self.true_speed:.3f} m/s"
 
     def displaced(self, p_WG: tuple[float, float, float], place: tuple[float, float, float]) -> None:
         """Update the displacement by the gripper's position and its handover place."""

@@ -163,7 +163,7 @@ class ArmImpedanceEvaluator(Evaluator):
         extent = f"{'within' if agrees else 'by'} {1000 * by[0]:.1f} mm and {math.degrees(by[1]):.2f}°"
         bound = "" if agrees else f", {agreement_bound()}"
         reason = f"{back}, {joined} {verb} the impedance model {extent}{bound}{self._stopped_joints(motion)}"
-        return Outcome(success=self._at_rest and agrees, reason=reason + self.parameters.stuck, metrics=metrics)
+        return Outcome(success=self._at_rest and agrees, reason=reason + self.parameters.untold, metrics=metrics)
 
     def _stopped_joints(self, motion: Columns) -> str:
         """Return which free joints were held away from where they began, as a clause; one that turns is never at 0."""

@@ -281,8 +281,9 @@ class ImpedanceEvaluator(Evaluator):
         )
         joined = "and" if agrees is self._at_rest else "but"
         thrust = f"; more was commanded than the thrusters give for {100 * share:.0f} % of the time" if share else ""
-        stuck = self.parameters.stuck
-        return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}{stuck}"
+        return (
+            f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}{self.parameters.untold}"
+        )
 
     def _back(self) -> str:
         """Return whether the gripper came back to rest, as a clause of the reason."""

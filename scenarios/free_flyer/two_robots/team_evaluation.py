@@ -198,7 +198,7 @@ class TeamEvaluator(Evaluator):
         metrics = self._metrics() | {
             "decided_by": Metric(int(cause), "1", f"why it failed, by number: {codes}"),
         }
-        return Outcome(success=success, reason=reason + self.parameters.stuck, metrics=metrics)
+        return Outcome(success=success, reason=reason + self.parameters.untold, metrics=metrics)
 
     def _success(self) -> str:
         whom = "the person" if self.parameters.task is TeamTask.ROBOTS_TO_HUMAN else "both robots"

@@ -43,7 +43,11 @@ STAGED = (
     Staged(Cause.NOT_FELT, "stayed below the threshold", parameters={"strength": 0.2, "patience": 20.0}),
     Staged(Cause.NOT_TRIED, "the person did not pull", parameters={**NOBODY, "patience": 20.0}),
     Staged(Cause.BUMPED, "which bumped the object", parameters={"skill": 0.0}),
-    Staged(Cause.RELEASED_UNHELD, "was no pull", parameters={**NOBODY, "gated": False, "decision.gate_error": 0.2}),
+    Staged(
+        Cause.RELEASED_UNHELD,
+        "nobody had pulled, but it saw its gripper move at",
+        parameters={**NOBODY, "gated": False, "decision.gate_error": 0.2},
+    ),
     Staged(Cause.LET_GO_EARLY, "before the fingers closed", RECEIVES, {"person.haste": 1.0}),
     Staged(
         Cause.RECEPTIONS_FAILED,

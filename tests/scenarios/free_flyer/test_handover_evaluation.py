@@ -35,7 +35,7 @@ def signals(
 ) -> Signals:
     loop = {"pole_radius": [0.99], "damping_ratio": [0.3], "pole_frequency": [2.7]}
     values: dict[str, dict[str, Any]] = {
-        "robot": {"p_WG": PLACE + np.array([0.0, 0.0, away])},
+        "robot": {"p_WG": PLACE + np.array([0.0, 0.0, away]), "v_WG": np.array([0.0, 0.0, speed])},
         "thrusters": {"saturated": [saturated]},
         "impedance": loop,
         "pose": loop,
@@ -65,7 +65,7 @@ def signals(
                 causality=Causality.OUTPUT,
                 fmi_type="",
                 references=(),
-                shape=(3,) if name in ("p_WG", "p_WG_goal", "f_G", "f_H") else (),
+                shape=(3,) if name in ("p_WG", "v_WG", "p_WG_goal", "f_G", "f_H") else (),
                 items=tuple((i.name, int(i)) for i in items[name]) if name in items else (),
             )
             for name in ys

@@ -183,6 +183,15 @@ def test_a_push_is_borne_by_nozzles_and_a_stuck_one_is_told(tmp_path: Path):
     assert metric(stuck, "greatest_orientation_error") > metric(whole, "greatest_orientation_error")
 
 
+def test_a_reason_says_what_the_controllers_do_not_know():
+    assert not ImpedanceParameters(mass_factor=1.3, model_mass_factor=1.3).untold
+    unlike = ImpedanceParameters(mass_factor=1.3, model_arm_factor=0.5, stuck_nozzle=2)
+    mass, arm = ("the robot's mass was 1.3 times what", "the robot's arm was 2 times what")
+    assert (
+        unlike.untold == f"; nozzle 2 was stuck closed; {mass} its controllers assumed; {arm} its controllers assumed"
+    )
+
+
 def test_only_nozzles_can_be_stuck():
     p = ImpedanceParameters(propulsion=Propulsion.LIMITED, stuck_nozzle=3)
     with pytest.raises(InvalidParameter, match="stuck_nozzle: 3 is to be stuck, and propulsion limited has no nozzle"):
