@@ -74,8 +74,8 @@ def test_values_stand_along_an_axis_of_numbers(browser: Browser, tmp_path: Path,
 
 def test_a_list_has_its_names_above_its_rows_on_a_phone_and_beside_them_elsewhere(browser: Browser, tmp_path: Path):
     values = product(("0.01", "0.02"), ("0.06", "0.1"), ("my_own.long_name_of_a_module:Reflex", "blind.fmu"))
-    points = [dict(zip(("forward", "standoff", "reflex"), v, strict=True)) for v in values]
-    folder = folder_of(tmp_path, campaign_metadata("ir_grasp", points), table_of([{}] * len(points)))
+    points: list[dict[str, str]] = [dict(zip(("forward", "standoff", "reflex"), v, strict=True)) for v in values]
+    folder = folder_of(tmp_path, campaign_metadata("ir_grasp", points), table_of([dict[str, float]()] * len(points)))
     write_campaign_page(folder)
     names = "document.querySelector('.plot')._fullLayout.annotations.map(a => a.text)"
     beside = "document.querySelectorAll('.plot .ytick').length"
