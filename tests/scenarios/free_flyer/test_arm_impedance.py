@@ -59,6 +59,7 @@ def test_factors_of_the_arm_scale_its_links():
     np.testing.assert_allclose(model["mass_L"], 0.7 * robot["mass_L"])
 
 
+@pytest.mark.slow
 def test_the_age_of_the_estimate_reaches_navigation_and_controller(tmp_path: Path):
     with pytest.raises(InitializationError, match=r"with a delay of 0\.15 s"):
         run(FlyerArmImpedance, tmp_path / "r", "delay=0.05", "navigation_delay=0.1")

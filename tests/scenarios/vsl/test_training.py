@@ -90,7 +90,7 @@ def test_a_walk_changes_one_thing_a_point():
     assert np.sum(~turned & ~blown) > 5  # another load
 
 
-@pytest.mark.parametrize("learned", [Learned.CUBIC, Learned.SMALL])
+@pytest.mark.parametrize("learned", [Learned.CUBIC, pytest.param(Learned.SMALL, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("forward_input", list(ForwardInput))
 def test_either_input_of_the_forward_model_is_learned(learned: Learned, forward_input: ForwardInput):
     training = replace(TRAINING, learned=learned, forward_input=forward_input)
