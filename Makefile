@@ -58,6 +58,7 @@ $(VENV)/.installed: pyproject.toml constraints.txt setup.py $(wildcard fmus/runt
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet --editable ".[all]" --constraint constraints.txt
 	touch $@
+	@echo "installed; begin with: $(BIN)/handover list"
 
 $(VENV)/.installed-test: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --editable ".[test]" --constraint constraints.txt

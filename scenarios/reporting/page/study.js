@@ -6,7 +6,9 @@
   const byId = id => document.getElementById(id);
   const main = byId("screen");
   let shown = null, play = null, input = null, test = null, named = 0, over = false, ready = false, drawn = [], hasTracker = false, held = [];
+  let still = {pose: "", since: 0, told: false};  // since when the hand has been where it is, and whether the page says so
   let watched = null, camera = {how: "", fault: "", detail: ""};  // by the webcam, and how it is with it, see hand_camera.js
+  const STILL = 30000;  // ms
   const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
   const TURNS = {"+roll": "roll_right", "-roll": "roll_left", "+pitch": "fingers_down", "-pitch": "fingers_up",
     "+yaw": "fingers_left", "-yaw": "fingers_right"};
@@ -81,15 +83,16 @@
         onclick: once(() => act("device", {device: name, settings: settings()}))},
         node("b", {}, word(`device_${name}`)), node("span", {}, word(`help_${name}`)))))],
     practice: s => [node("h1", {}, word("practice")), ...paragraphs(s.practice),
-      ...(s.reason ? [node("p", {}, word("practice_again", s))] : []),
+      ...(s.reason ? [node("p", {}, word("practice_again", {reason: reasonOf(s)}))] : []),
       node("p", {}, word(`help_${device()}`)),
       node("p", {}, word("practice_for", {minutes: Number((s.seconds / 60).toFixed(1))})), ...deviceLines(),
       actions(button("begin", () => act("begin"), {first: true}))],
-    instruction: s => [node("h1", {}, s.name), ...paragraphs(s.instruction), node("p", {class: "soft"}, word(`help_${device()}`)), ...deviceLines(),
+    instruction: s => [...(s.practice_over ? [node("p", {class: "soft"}, word("practice_over"))] : []),
+      node("h1", {}, s.name), ...paragraphs(s.instruction), node("p", {class: "soft"}, word(`help_${device()}`)), ...deviceLines(),
       actions(button("begin", () => act("begin"), {first: true}))],
-    practising: () => waiting(),
-    round: () => waiting(),
-    void: s => [node("h1", {}, word("void")), node("p", {}, word(s.again ? "void_again" : "void_on", s)),
+    practising: s => [node("h1", {}, word("practice")), ...paragraphs(s.practice), ...waiting()],
+    round: s => [node("h1", {}, s.name), ...paragraphs(s.instruction), ...waiting()],
+    void: s => [node("h1", {}, word("void")), node("p", {}, word(s.again ? "void_again" : "void_on", {reason: reasonOf(s)})),
       actions(button("next", () => act("next"), {first: true}))],
     rating,
     questions,
@@ -99,6 +102,9 @@
       actions(button("next_participant", () => act("next")))],
     complete: () => [node("h1", {}, word("thanks")), node("p", {}, word("complete"))],
   };
+  // Why what was played does not count, in the language of the study where it has words for it.
+  const reasonOf = s => s.cause ? word(`void_${s.cause}`) : s.reason;
+
   // A tracker connects by itself: before it is there, nothing begins.
   const trackerLine = () => device() === "tracker" ? [node("p", {id: "tracker", role: "status"})] : [];
   function nameTracker() {
@@ -253,12 +259,23 @@
       letGo();
     }));
   }
-  const lead = hand => link.bufferedAmount < 4000 && send({hand});
+  function lead(hand) {
+    if (link.bufferedAmount < 4000) send({hand});
+    const pose = JSON.stringify([hand.p_WH, hand.closed]), now = performance.now();
+    if (pose !== still.pose) {
+      if (still.told) tell("");
+      still = {pose, since: now, told: false};
+    } else if (!still.told && now - still.since > STILL) {
+      still.told = true;
+      tell(word("hand_still"));
+    }
+  }
 
   // A run begins when its scene has been drawn and, with a webcam, a hand is seen: until then nothing would lead it.
   function letGo() {
     if (!ready || (device() === "webcam" && camera.how !== "sees")) return;
     ready = false;
+    still.since = performance.now();
     send({ready: true});
   }
 

@@ -20,9 +20,8 @@ from handover.scenarios.study.folder.session_notes import VoidAttempt, Withdrawa
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.order import Round
 from handover.scenarios.study.plan.plan import DEVICES, StudyText
-from handover.scenarios.study.session.screen_content import questions, rating, round_to_play, who
+from handover.scenarios.study.session.screen_content import VoidCause, questions, rating, round_to_play, who
 
-_SERVER_ENDED = "the study's server ended before the round did"
 MOST_ATTEMPTS = 3
 """How often a round is played at most that fails for a reason which is not the participant's (assumed)."""
 _LONGEST_TEXT = 5000
@@ -51,6 +50,7 @@ class Protocol:
         self.study, self._devices = study, list(devices)
         self.session: SessionFolder | None = None
         self.void_reason = ""
+        self._practice_over = False
         self._asked_for = number
         self._begin()
 
@@ -76,7 +76,7 @@ class Protocol:
             self._language = self.session.session.language
             planned = self.session.next_round
             if planned is not None and self.session.is_broken_off(planned.number):
-                self.void_round(_SERVER_ENDED)
+                self.void_round(VoidCause.SERVER_ENDED.value)
             else:
                 self.screen = self._next_of_session()
         else:
@@ -136,7 +136,7 @@ class Protocol:
     def end_practice(self, test: Mapping[str, Any]) -> None:
         """Keep what the practice showed of the device, and go on."""
         self._begun.notes.keep_practice(test)
-        self.screen = self._next_of_session()
+        self.screen, self._practice_over = self._next_of_session(), True
 
     def break_off_practice(self, reason: str) -> None:
         """Let the practice begin again, as it could not go on."""
@@ -259,7 +259,7 @@ class Protocol:
     def _begin_round(self, _value: Any) -> None:
         with contextlib.suppress(RecordNotWritten):  # told where the round itself is to be kept
             self._begun.note_begun(self._planned.number)
-        self.screen = "round"
+        self.screen, self._practice_over = "round", False
 
     def _go_on(self, _value: Any) -> None:
         self.screen, self.void_reason = self._next_of_session(), ""
@@ -328,11 +328,14 @@ class Protocol:
             case "device":
                 return {"devices": {name: DEVICES[name] for name in self._devices}}
             case "practice" | "practising":
-                return {"practice": text.practice, "seconds": plan.practice, "reason": self.void_reason}
+                told = {"reason": self.void_reason, "cause": VoidCause.of(self.void_reason)}
+                return {"practice": text.practice, "seconds": plan.practice, **told}
             case "instruction" | "round":
-                return {} if planned is None else round_to_play(plan, planned, text)
+                begins = {} if planned is None else round_to_play(plan, planned, text)
+                return {**begins, "practice_over": self._practice_over}
             case "void":
-                return {"reason": self.void_reason, "again": planned is not None}
+                told = {"reason": self.void_reason, "cause": VoidCause.of(self.void_reason)}
+                return {**told, "again": planned is not None}
             case "rating":
                 return rating(plan, self._begun.unrated_round, text)
             case "questions":

@@ -1,12 +1,32 @@
 """What the screens of a study show that is made of its plan and its folder, as JSON can hold it."""
 
 from collections.abc import Sequence
+from enum import Enum
 from typing import Any
 
 from handover.scenarios.study.folder.session_folder import SessionFolder, pseudonym_of
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.order import Round
 from handover.scenarios.study.plan.plan import StudyPlan, StudyText
+
+
+class VoidCause(Enum):
+    """Why a round does not count, or a practice begins again: a reason begins with the cause's value.
+
+    Reasons are kept, in English, for those who carry a study out; the page tells causes in its own words.
+    """
+
+    NO_SAMPLE = "no sample of the hand came"
+    NOT_DRAWN = "the page did not draw the scene"
+    PAGE_CLOSED = "the page was closed, or its connection was lost"
+    SERVER_ENDED = "the study's server ended before the round did"
+    SERVER_FAILED = "the server failed"
+    NOT_KEPT = "it could not be kept"
+
+    @classmethod
+    def of(cls, reason: str) -> str:
+        """Return the name of a reason's cause as the page has it; "" of one that it has no words for."""
+        return next((cause.name.lower() for cause in cls if reason.startswith(cause.value)), "")
 
 
 def who(study: StudyFolder, unfinished: Sequence[SessionFolder]) -> dict[str, Any]:

@@ -38,6 +38,7 @@ from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session.page_messages import MessageRate, parse_message, received_text
 from handover.scenarios.study.session.practice import PRACTICE, Practice, is_lost
 from handover.scenarios.study.session.protocol import InvalidAction, Protocol
+from handover.scenarios.study.session.screen_content import VoidCause
 from handover.scenarios.study.session.trial import Trial, TrialFailed, Wanted
 
 PERIOD = 1.0 / 60.0
@@ -113,12 +114,12 @@ class StudySeat:
         finally:
             async with self._leaving:
                 self._page = None
-                await self._leave("the page was closed, or its connection was lost")
+                await self._leave(VoidCause.PAGE_CLOSED.value)
 
     async def close(self) -> None:
         """End what is under way; a round that is not finished is played again."""
         async with self._leaving:
-            await self._leave("the server was ended")
+            await self._leave(VoidCause.SERVER_ENDED.value)
 
     async def _listen(self, page: WebSocket) -> None:
         rate, told = MessageRate(), -1.0
@@ -211,13 +212,13 @@ class StudySeat:
         """Let the next run stand at its start, while the person reads what is to be done."""
         self._fault = ""
         try:
-            self._trial = trial = await _opened(self._next_wanted())
+            self._trial = trial = await Trial.opened(self._next_wanted())
             await asyncio.to_thread(trial.begin)
         except (TrialFailed, RecordNotWritten, InvalidRunFolder) as e:
             self._fault = str(e)
         except Exception as e:
             traceback.print_exc()
-            self._fault = f"the server failed: {type(e).__name__}: {e}"
+            self._fault = f"{VoidCause.SERVER_FAILED.value}: {type(e).__name__}: {e}"
 
     def _next_wanted(self) -> Wanted:
         session, protocol = self.protocol.session, self.protocol
@@ -259,7 +260,7 @@ class StudySeat:
             return str(e)
         except Exception as e:
             traceback.print_exc()
-            return f"the server failed: {type(e).__name__}: {e}"
+            return f"{VoidCause.SERVER_FAILED.value}: {type(e).__name__}: {e}"
 
     async def _run(self, trial: Trial) -> str | None:
         """Show a run to its end; return why it is void, None if it is not."""
@@ -273,7 +274,7 @@ class StudySeat:
         try:
             await asyncio.wait_for(self._page_ready.wait(), _READY)
         except (TimeoutError, asyncio.TimeoutError):
-            return f"the page did not draw the scene within {_READY:.0f} s"
+            return f"{VoidCause.NOT_DRAWN.value} within {_READY:.0f} s"
         if self.protocol.screen == "practising":
             await self._send({"target": self.practice.test.target})
         trial.go()
@@ -283,7 +284,7 @@ class StudySeat:
                 raise asyncio.CancelledError
             began = time.monotonic()
             if began - self._last_sample > SILENCE:
-                return f"no sample of the hand came for {SILENCE:.0f} s: the device or the page was lost"
+                return f"{VoidCause.NO_SAMPLE.value} for {SILENCE:.0f} s: the device or the page was lost"
             await self._send_frame(trial)
             await self._test_device(trial)
             if self.protocol.screen == "practising" and is_lost(trial):
@@ -311,7 +312,7 @@ class StudySeat:
                 fault = str(e)
             except Exception as e:
                 traceback.print_exc()
-                fault = f"the server failed: {type(e).__name__}: {e}"
+                fault = f"{VoidCause.SERVER_FAILED.value}: {type(e).__name__}: {e}"
         await self._drop_trial(keep_playing=True)
         self._playing = None
         self.keep(fault, record, is_round=is_round)
@@ -339,7 +340,7 @@ class StudySeat:
         except Exception as e:
             if not isinstance(e, (RecordNotWritten, InvalidRunFolder)):
                 traceback.print_exc()
-            protocol.break_off(f"it could not be kept: {e}" + (f" ({fault})" if fault else ""))
+            protocol.break_off(f"{VoidCause.NOT_KEPT.value}: {e}" + (f" ({fault})" if fault else ""))
 
     async def _leave(self, reason: str) -> None:
         """End the trial under way, if any, since nobody sits there; its round is void."""
@@ -381,17 +382,6 @@ class StudySeat:
     async def _within_time(sending: Any) -> None:
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError, asyncio.TimeoutError):
             await asyncio.wait_for(sending, _SLOWEST)
-
-
-async def _opened(wanted: Wanted) -> Trial:
-    """Return a trial that was opened in a thread; where nobody waits for it any more, it is closed again."""
-    opening = asyncio.ensure_future(asyncio.to_thread(Trial, wanted))
-    try:
-        return await asyncio.shield(opening)
-    except asyncio.CancelledError:
-        with contextlib.suppress(Exception):
-            await asyncio.to_thread((await opening).close)
-        raise
 
 
 def _free_folder(path: Path) -> Path:

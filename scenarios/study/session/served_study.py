@@ -140,10 +140,21 @@ def line_of_round(plan: StudyPlan, number: int, planned: Round, ended: RoundReco
 
 
 def address_of(listening: socket.socket, server: StudyServer) -> str:
-    """Return the page's address."""
+    """Return the page's address; of a server that listens on all of them, that at which others reach it."""
     host, port = listening.getsockname()[:2]
+    if host in ("0.0.0.0", "::"):
+        host = _own_address(listening.family)
     shown = f"[{host}]" if ":" in host else host
     return f"http://{shown}:{port}{server.path}"
+
+
+def _own_address(family: int) -> str:
+    """Return this computer's address on its network, or its name if it is on none."""
+    elsewhere = "2001:db8::1" if family == socket.AF_INET6 else "192.0.2.1"  # of documentation: nothing is sent there
+    with contextlib.suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as probe:
+        probe.connect((elsewhere, 9))
+        return str(probe.getsockname()[0])
+    return socket.gethostname()
 
 
 def devices_here(plan: StudyPlan, webcam: WebcamFiles | None = None) -> list[str]:

@@ -1,5 +1,6 @@
 """A trial: one run in a process of its own, whose hand is led from outside and whose state is seen as it goes on."""
 
+import asyncio
 import contextlib
 import json
 import math
@@ -122,6 +123,17 @@ class Trial:
             self._process = self._started(place)
             self._run = WatchedRun(wanted.out)
             self._opened = opened.pop_all()
+
+    @classmethod
+    async def opened(cls, wanted: Wanted) -> "Trial":
+        """Return a trial that was opened in a thread; where nobody waits for it any more, it is closed again."""
+        opening = asyncio.ensure_future(asyncio.to_thread(cls, wanted))
+        try:
+            return await asyncio.shield(opening)
+        except asyncio.CancelledError:
+            with contextlib.suppress(Exception):
+                await asyncio.to_thread((await opening).close)
+            raise
 
     def _started(self, place: Path) -> "subprocess.Popen[bytes]":
         """Return the process of the run."""

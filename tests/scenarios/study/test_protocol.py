@@ -9,6 +9,8 @@ from sample_study import PLAN, play, record, same, session
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.session.device_test import DeviceTest
 from handover.scenarios.study.session.protocol import MOST_ATTEMPTS, SCREENS, InvalidAction, Protocol
+from handover.scenarios.study.session.screen_content import VoidCause
+from handover.scenarios.study.session.server import page_words
 
 RATINGS = {"S1": 7, "S2": 8, "S3": 9}
 
@@ -134,6 +136,21 @@ def test_a_void_round_is_played_again_with_its_reason_and_at_last_kept_as_void(t
     assert attempts["folder"].tolist() == ["01_unfinished_1", "01_unfinished_2"]
     assert attempts["reason"].tolist() == ["the page was closed, 1", "the page was closed, 2"]
     assert session.answers == {}
+
+
+def test_why_a_round_is_void_is_told_in_every_language_and_the_end_of_the_practice_once(tmp_path: Path):
+    protocol = practised(tmp_path / "study")
+    assert protocol.content()["practice_over"]
+    protocol.act("begin")
+    protocol.void_round(f"{VoidCause.NO_SAMPLE.value} for 3 s: the device or the page was lost")
+    assert protocol.content()["cause"] == "no_sample"
+    protocol.act("next")
+    assert not protocol.content()["practice_over"]
+    protocol.act("begin")
+    protocol.void_round("another reason")
+    assert protocol.content()["cause"] == ""
+    for words in page_words().values():
+        assert {f"void_{cause.name.lower()}" for cause in VoidCause} <= set(words)
 
 
 def test_who_withdraws_is_not_asked_again_and_is_in_no_result(tmp_path: Path):

@@ -122,6 +122,36 @@ def test_the_practice_tells_how_far_the_hand_is_from_the_ball(browser: Browser, 
         wait_until(page, f"{far} === 18")  # from where it rests, along x
         page.mouse.move(500, 300)
         wait_until(page, f"{far} > 25")
+        told = "document.querySelector('#told')"
+        wait_until(page, f"{told}.textContent.startsWith('The hand has not moved for half a minute.')")
+        page.mouse.move(400, 300)
+        wait_until(page, f"{told}.hidden")
+
+
+@pytest.mark.slow
+def test_a_page_in_german_tells_that_the_practice_is_over_and_why_a_round_is_void(browser: Browser, tmp_path: Path):
+    plan = pilot_plan(tmp_path / "plan.toml", devices='["mouse"]', patience=15, practice=2, repetitions=1)
+    main = "document.querySelector('main').innerText"
+    with served(plan, tmp_path / "out") as (address, _):
+        with browser.new_page() as page:
+            page.set_default_timeout(120_000)
+            page.goto(address)
+            to_round(page, "practice", "Maus und Tastatur", "de")
+            page.get_by_role("button", name="Beginnen").click()
+            wait_until(page, "study.play?.time > 0.5")
+            at(page, "instruction")
+            assert "Die Übung ist vorbei." in page.evaluate(main)
+            task = page.locator("h1").inner_text()
+            page.get_by_role("button", name="Beginnen").click()
+            wait_until(page, f"{main}.includes('Die Simulation wird vorbereitet') && {main}.includes({task!r})")
+            wait_until(page, "study.play?.time > 0.5")
+        with browser.new_page() as page:
+            page.goto(address)
+            at(page, "void")
+            assert "Die Seite wurde geschlossen, oder ihre Verbindung war verloren." in page.evaluate(main)
+            page.get_by_role("button", name="Weiter").click()
+            at(page, "instruction")
+            assert "Übung" not in page.evaluate(main)
 
 
 @pytest.mark.slow

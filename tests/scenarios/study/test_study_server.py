@@ -2,10 +2,12 @@
 
 import asyncio
 import contextlib
+import socket
 import threading
 import time
 import urllib.request
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 from study_server import (
@@ -25,6 +27,7 @@ from websockets.sync.server import ServerConnection, serve
 
 from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session.pilot import PilotRefused, play_sessions
+from handover.scenarios.study.session.served_study import address_of
 
 
 def test_the_page_alone_is_served_and_to_this_computer_alone(tmp_path: Path):
@@ -61,6 +64,15 @@ def test_on_another_address_the_page_is_below_a_token(tmp_path: Path):
             pass
         with page_at(where, server.path) as page:
             assert told(page, "screen")["screen"] == "language"
+
+
+@pytest.mark.parametrize("family", [socket.AF_INET, socket.AF_INET6])
+def test_a_server_on_all_addresses_names_one_that_others_can_open(family: socket.AddressFamily, tmp_path: Path):
+    server = server_of(tmp_path / "study", host="0.0.0.0")
+    with socket.socket(family) as unbound:
+        address = urlsplit(address_of(unbound, server))
+    assert address.hostname not in (None, "", "0.0.0.0", "::")
+    assert address.path == server.path
 
 
 def test_a_second_page_is_told_that_the_seat_is_taken_and_the_first_stays(tmp_path: Path):
