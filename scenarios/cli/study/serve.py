@@ -43,6 +43,12 @@ the hand by what the page shows.
     help="Offer the plan's device webcam, by MediaPipe: the unpacked npm package @mediapipe/tasks-vision with the model"
     " hand_landmarker.task in it.  [default: not offered]",
 )
+@click.option(
+    "--photodiode",
+    is_flag=True,
+    help="Show a square that changes between black and white with each picture of a new sample of the hand: a"
+    " photodiode there checks the latency that the page measures.",
+)
 @click.option("--pilot", is_flag=True, help="Let a script take part in the place of people, until all have.")
 @click.option(
     "--pace",
@@ -59,6 +65,7 @@ def serve(
     participant: int | None,
     webcam_folder: Path | None,
     *,
+    photodiode: bool,
     pilot: bool,
     pace: float | None,
 ) -> None:
@@ -103,6 +110,7 @@ def serve(
                         pace=pace or 1.0,
                         pilot=pilot,
                         webcam=webcam,
+                        photodiode=photodiode,
                         tell=lambda line: click.echo(line, err=True),
                     )
                 )

@@ -1,4 +1,5 @@
 // The scene of a round as the person sees it, in one view or two, and how long it takes until a sample is drawn.
+// `photodiode` is an element that changes with each new sample, or null.
 //   const play = studyScene(content, {eye, side, photodiode, onDrawn})   null without WebGL; see Trial.scene in trial.py
 //   play.take(buffer)       a state of the run: time, stamp of the sample that it shows, s, and the places of all
 //   play.target(place)      where the ball of the device's test is, [x, y, z] in W, m; null hides it
@@ -60,7 +61,7 @@ const studyScene = (content, {eye, side, photodiode, onDrawn}) => {
   scenes[0].onPicture = () => {
     if (!Number.isFinite(stamp) || stamp === drawn) return;
     drawn = stamp;
-    photodiode.classList.toggle("lit");
+    photodiode?.classList.toggle("lit");
     onDrawn(performance.now() - 1000 * stamp);
   };
 

@@ -38,6 +38,7 @@ async def serve_study(
     pace: float,
     pilot: bool,
     webcam: WebcamFiles | None,
+    photodiode: bool,
     tell: Callable[[str], None],
 ) -> None:
     """Serve a study's page until it is ended, or until all scripted pilots have taken part.
@@ -51,6 +52,7 @@ async def serve_study(
         pace: simulated seconds per second of wall time.
         pilot: whether scripts take part.
         webcam: files by which a webcam leads the hand; None where it is not offered.
+        photodiode: see `study_html`.
         tell: is given lines for who carries it out.
 
     Raises:
@@ -67,7 +69,7 @@ async def serve_study(
     study = StudyFolder.opened(out, plan)
     with study.held():
         seat = StudySeat(Protocol(study, devices, number), pace, {} if webcam is None else webcam.hashes())
-        server = StudyServer(seat, host, webcam)
+        server = StudyServer(seat, host, webcam, photodiode=photodiode)
         try:
             listening = listening_socket(host, port)
         except OSError as e:

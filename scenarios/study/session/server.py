@@ -49,18 +49,21 @@ def page_words() -> dict[str, dict[str, Any]]:
     return tomli.loads(text)
 
 
-def study_html(plan: StudyPlan, *, webcam: bool = False) -> str:
+def study_html(plan: StudyPlan, *, webcam: bool = False, photodiode: bool = False) -> str:
     """Return the page; in a language that it has no words of its own for, buttons are in English.
 
     Args:
         plan: the study's.
         webcam: whether one is offered to lead the hand.
+        photodiode: whether a square turns from black to white, or back, with each picture that shows a new sample of
+            the hand: a photodiode before it checks the latency that the page measures.
     """
     words = page_words()
     content = {
         "words": {name: {**words[_FALLBACK], **words.get(name, {})} for name in plan.texts},
     }
-    html = template("study.html").render(data=json_html(content), pilot=_PILOT if plan.pilot else "", webcam=webcam)
+    pilot = _PILOT if plan.pilot else ""
+    html = template("study.html").render(data=json_html(content), pilot=pilot, webcam=webcam, photodiode=photodiode)
     styles = (asset("page.css"), asset("replay.css"), asset("study.css"))
     scripts = (*_SCRIPTS, *(WEBCAM_SCRIPTS if webcam else ()), "study.js")
     return plain_page_html(plan.title, html, styles, scripts, works=webcam)
@@ -73,13 +76,16 @@ class StudyServer:
         seat: that pages may take.
         host: the address on which it listens; on loopback no token is needed.
         webcam: files by which a webcam leads the hand; None where it is not offered.
+        photodiode: see `study_html`.
 
     Attributes:
         token: part of the page's address; "" on loopback.
     """
 
-    def __init__(self, seat: StudySeat, host: str = LOOPBACK[0], webcam: WebcamFiles | None = None) -> None:
-        self.seat, self.host, self._webcam = seat, host, webcam
+    def __init__(
+        self, seat: StudySeat, host: str = LOOPBACK[0], webcam: WebcamFiles | None = None, *, photodiode: bool = False
+    ) -> None:
+        self.seat, self.host, self._webcam, self._photodiode = seat, host, webcam, photodiode
         self._tracker = TrackerSeat(seat)
         self.token = "" if host in LOOPBACK else secrets.token_urlsafe(16)
 
@@ -108,7 +114,8 @@ class StudyServer:
         await self.seat.close()
 
     async def _page(self, _request: Request) -> Response:
-        html = study_html(self.seat.protocol.study.plan, webcam=self._webcam is not None)
+        plan = self.seat.protocol.study.plan
+        html = study_html(plan, webcam=self._webcam is not None, photodiode=self._photodiode)
         return HTMLResponse(html, headers=HEADERS)
 
     async def _connection(self, page: WebSocket) -> None:

@@ -26,7 +26,7 @@ SEEN_AT = """(() => {
 @pytest.mark.slow
 def test_a_round_is_played_with_the_mouse_and_rated_by_keys(browser: Browser, tmp_path: Path):
     plan = pilot_plan(tmp_path / "plan.toml", devices='["mouse"]', patience=15, practice=0, repetitions=1)
-    with served(plan, tmp_path / "study", "--pace", "4") as (address, _):
+    with served(plan, tmp_path / "study", "--pace", "4", "--photodiode") as (address, _):
         page = browser.new_page(viewport={"width": 1000, "height": 600})
         page.set_default_timeout(120_000)
         messages: list[str] = []
@@ -43,6 +43,8 @@ def test_a_round_is_played_with_the_mouse_and_rated_by_keys(browser: Browser, tm
         page.mouse.wheel(0, -200)
         wait_until(page, f"Math.hypot(...study.play.hand().p_WH.map((x, i) => x - {before}[i])) > 0.05")
         wait_until(page, "document.querySelector('.study').dataset.drawn > 5")
+        lit = "document.querySelector('#photodiode').classList.contains('lit')"
+        wait_until(page, f"{lit} !== {str(page.evaluate(lit)).lower()}")
         assert not page.locator("#side").is_hidden()
         wait_until(page, f"Math.hypot(...{SEEN_AT}.map((x, i) => x - [350, 220][i])) < 15")
         notch = f"Math.hypot(...study.play.hand().p_WH.map((x, i) => x - {page.evaluate('study.play.hand().p_WH')}[i]))"
@@ -117,6 +119,7 @@ def test_the_practice_tells_how_far_the_hand_is_from_the_ball(browser: Browser, 
         page.goto(address)
         to_round(page, "practice")
         assert "1 min." in page.locator("main").inner_text()
+        assert page.locator("#photodiode").count() == 0
         page.get_by_role("button", name="Begin").click()
         wait_until(page, "study.play?.time > 0.5")
         wait_until(page, f"{far} === 18")  # from where it rests, along x
