@@ -88,17 +88,6 @@ class RobotAndModel:
         return _body(self.model_mass_factor, self.model_inertia_factor, self.model_arm_factor)
 
     @property
-    def untold(self) -> str:
-        """What the robot's controllers do not know of it, as the end of a sentence."""
-        parts = [f"nozzle {self.stuck_nozzle} was stuck closed"] if self.stuck_nozzle else []
-        for what in ("mass", "inertia", "arm"):
-            actual, assumed = getattr(self, f"{what}_factor"), getattr(self, f"model_{what}_factor")
-            if actual != assumed:
-                whose = {"arm": "the robot's arm"}.get(what, f"the robot's {what}")
-                parts.append(f"{whose} was {actual / assumed:.3g} times what its controllers assumed")
-        return "".join(f"; {part}" for part in parts)
-
-    @property
     def is_published(self) -> bool:
         """Whether robot and model are as published."""
         return all(getattr(self, f.name) == f.default for f in fields(RobotAndModel))

@@ -6,6 +6,7 @@ that is not square, by the controllers' model of the robot.
 
 import itertools
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.push.arm_parameters import ArmPushParameters, ArmTarget
@@ -35,6 +37,7 @@ from handover.scenarios.free_flyer.push.impedance_evaluation import (
     steps_of_period,
 )
 from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
+from handover.scenarios.free_flyer.untold import untold
 
 SIGNALS = (
     *(f"robot.{name}" for name in ("p_WG", "q_WG", "v_WG", "w_WG", "p_WB", "q_WB", "v_WB", "w_WB", "q_J", "v_J")),
@@ -119,6 +122,11 @@ class ArmImpedanceEvaluator(Evaluator):
         self._saturated, self._t, self._astray, self._spins = 0, 0.0, 0.0, False
         self._greatest = [0.0, 0.0]
         self._stability: dict[str, Metric] = {}
+        self._untold = ""
+
+    def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
+        """Keep what the controllers do not know of the robot."""
+        self._untold = untold(units)
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Keep the motion and follow the errors."""
@@ -163,7 +171,7 @@ class ArmImpedanceEvaluator(Evaluator):
         extent = f"{'within' if agrees else 'by'} {1000 * by[0]:.1f} mm and {math.degrees(by[1]):.2f}°"
         bound = "" if agrees else f", {agreement_bound()}"
         reason = f"{back}, {joined} {verb} the impedance model {extent}{bound}{self._stopped_joints(motion)}"
-        return Outcome(success=self._at_rest and agrees, reason=reason + self.parameters.untold, metrics=metrics)
+        return Outcome(success=self._at_rest and agrees, reason=reason + self._untold, metrics=metrics)
 
     def _stopped_joints(self, motion: Columns) -> str:
         """Return which free joints were held away from where they began, as a clause; one that turns is never at 0."""

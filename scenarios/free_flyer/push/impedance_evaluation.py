@@ -5,7 +5,7 @@ The gripper's pose error is compared with the one by the impedance model, [Ferna
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from handover.controllers.free_flyer.ports import PERIOD
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Body, ImpedanceParameters
 from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
+from handover.scenarios.free_flyer.untold import assumed_body, untold
 
 REST_POSITION, REST_ANGLE = 0.010, 0.030
 """Errors below which the robot counts as at rest, m and rad: some three times the noise of its navigation (assumed)."""
@@ -215,6 +217,13 @@ class ImpedanceEvaluator(Evaluator):
         self._greatest = [0.0, 0.0]
         self._last = (0.0, 0.0)
         self._stability: dict[str, Metric] = {}
+        self._untold, self._model = "", parameters.model
+
+    def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
+        """Keep what the controller takes the robot to be, and what it does not know of it."""
+        self._untold = untold(units)
+        if "impedance" in units:
+            self._model = assumed_body(units["impedance"], self._model)
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Keep the motion and follow the errors."""
@@ -246,7 +255,7 @@ class ImpedanceEvaluator(Evaluator):
 
     def errors(self) -> Errors:
         """Return the errors, actual and by the model."""
-        return errors_of(Motion.of(self._rows), self.p_WG_goal, self.parameters.behaviour, self.parameters.model)
+        return errors_of(Motion.of(self._rows), self.p_WG_goal, self.parameters.behaviour, self._model)
 
     def outcome(self) -> Outcome:
         """Return whether the robot rests again and agreed with the model, why, and the metrics."""
@@ -281,9 +290,7 @@ class ImpedanceEvaluator(Evaluator):
         )
         joined = "and" if agrees is self._at_rest else "but"
         thrust = f"; more was commanded than the thrusters give for {100 * share:.0f} % of the time" if share else ""
-        return (
-            f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}{self.parameters.untold}"
-        )
+        return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}{self._untold}"
 
     def _back(self) -> str:
         """Return whether the gripper came back to rest, as a clause of the reason."""

@@ -123,8 +123,8 @@ def errors_over_time(
             quantity=f"error, {axis}",
             unit=unit,
             curves=(
-                Curve(label="calculated", values=_to_the_end(calculated[:, i])),
-                Curve(label="actual", values=_to_the_end(actual[:, i]), stroke="dashed"),
+                Curve(label="actual", values=_to_the_end(actual[:, i])),
+                Curve(label="calculated", values=_to_the_end(calculated[:, i]), stroke="dashed"),
             ),
             phases=phases,
             limits=(-limit, limit),

@@ -47,7 +47,9 @@ class FlyerStudy(PublishedExperiment):
     """
 
     name: ClassVar[str] = "flyer-study"
-    title: ClassVar[str] = "simulated participants hand objects over with a free-flyer ([Fernandes2020] ch. 5)"
+    title: ClassVar[str] = (
+        "simulated participants, and no person, hand objects over with a free-flyer ([Fernandes2020] ch. 5)"
+    )
     scenario: ClassVar[str] = HandoverOfTask.name
 
     def plan(self, quick: bool) -> CampaignPlan:

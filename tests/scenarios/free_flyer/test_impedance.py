@@ -1,5 +1,6 @@
 """A push against the free-flyer's gripper, on the built FMUs."""
 
+import contextlib
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,13 @@ from handover.cosim.exceptions import InitializationError
 from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
 from handover.scenarios.cli.command import main
+from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.execution.runner import experiment_system
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Propulsion
 from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 from handover.scenarios.free_flyer.robot_wiring import expected_lag, thruster_settings
+from handover.scenarios.free_flyer.untold import untold
 
 
 def test_a_pushed_robot_comes_back_and_moves_as_the_impedance_model_says(tmp_path: Path):
@@ -183,13 +187,30 @@ def test_a_push_is_borne_by_nozzles_and_a_stuck_one_is_told(tmp_path: Path):
     assert metric(stuck, "greatest_orientation_error") > metric(whole, "greatest_orientation_error")
 
 
-def test_a_reason_says_what_the_controllers_do_not_know():
-    assert not ImpedanceParameters(mass_factor=1.3, model_mass_factor=1.3).untold
-    unlike = ImpedanceParameters(mass_factor=1.3, model_arm_factor=0.5, stuck_nozzle=2)
-    mass, arm = ("the robot's mass was 1.3 times what", "the robot's arm was 2 times what")
-    assert (
-        unlike.untold == f"; nozzle 2 was stuck closed; {mass} its controllers assumed; {arm} its controllers assumed"
-    )
+STUCK = ("propulsion=nozzles", "stuck_nozzle=5")
+ASSUMED = "what its controllers assumed"
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (("mass_factor=1.3", "model_mass_factor=1.3"), ""),
+        (("mass_factor=1.3", "impedance.mass=12.4592"), ""),
+        (("robot.mass=19.168",), f"the robot's mass was 2 times {ASSUMED}"),
+        (
+            ("inertia_factor=1.3", "model_arm_factor=0.5"),
+            f"the robot's inertia was 1.3 times {ASSUMED}; the robot's arm was 2 times {ASSUMED}",
+        ),
+        (STUCK, "nozzle 5 was stuck closed"),
+        ((*STUCK, "thrusters.propulsion=ideal"), ""),
+        ((*STUCK, "thrusters.flapper_range=1,1,0,1,1,1,1,1,1,1,1,0"), "nozzles 3, 12 were stuck closed"),
+        (("navigation.delay=0.008",), "the robot's thrust followed its state 8 ms late, of which impedance knew 0 ms"),
+    ],
+)
+def test_what_the_controllers_do_not_know_is_told_by_the_values_that_the_units_got(given: tuple[str, ...], told: str):
+    task = RunRequest(subject="flyer_impedance", parameters=given).task(contextlib.ExitStack())
+    system = experiment_system(task.experiment, task.parameters, task.seed, task.fmus, task.unit_values, task.options)
+    assert untold(system.units) == (f"; {told}" if told else "")
 
 
 def test_only_nozzles_can_be_stuck():
