@@ -17,7 +17,7 @@ _BODY = {"mass": "mass", "I_B": "inertia", "p_BG": "arm"}
 _LINKS = {"link": "arm's links", "mass_L": "links' mass", "I_L": "links' inertia"}
 """What a robot has in common with its controllers' model of it, by the name of the parameter."""
 _CONTROLLERS = ("impedance", "pose")
-_TOLERANCE = 1e-6
+_TOLERANCE = 1e-3
 """Share by which values differ that are not the same."""
 _TIME = 1e-6
 """The same of times, s."""
@@ -95,7 +95,7 @@ def _compared(what: str, actual: Floats, controller: PlacedUnit, name: str) -> l
         return []
     ratio = float(np.sum(actual * assumed)) / max(float(np.sum(assumed**2)), 1e-300)
     if np.allclose(actual, ratio * assumed, rtol=_TOLERANCE, atol=_TOLERANCE * scale):
-        return [f"{what} was {ratio:.3g} times what its controllers assumed"]
+        return [f"{what} was {ratio:.4g} times what its controllers assumed"]
     return [f"{what} was another than its controllers assumed"]
 
 
