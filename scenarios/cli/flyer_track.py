@@ -48,7 +48,7 @@ def _write(run: RunFolder, out: Path) -> int:
 
     record = Record(run.signals)
     if lacking := [name for name in _SIGNALS if name not in record]:
-        raise UsageError(f"{run.shown}: the run has no {', '.join(lacking)}; a handover of the free-flyer has")
+        raise UsageError(f"{run.shown}: the run has no {', '.join(lacking)}; a handover by one free-flyer has")
     p, q, angles, closed = (record[name].tolist() for name in _SIGNALS)
     poses = (HandPose(tuple(a), tuple(b), tuple(c), bool(d)) for a, b, c, d in zip(p, q, angles, closed, strict=True))
     try:

@@ -229,6 +229,8 @@ class TeamParameters(HandoverParameters):
     strength: Newton = parameter(
         4.0, "force with which each hand of the person pulls; with half of it, pushes", minimum=0.1, maximum=20.0
     )
+    hand: Hand = parameter(Hand.SIMULATED, "who moves the person's hands: here a simulated person alone")
+    hand_track: str = parameter("", "always empty here: a track leads one hand")
     hands: Hands = parameter(Hands.TWO, "with which hands the person holds the object, and where")
     hand_delay: Second = parameter(
         0.0, "how much later than the first the second hand closes and opens", minimum=0.0, maximum=5.0

@@ -96,7 +96,7 @@ def _compared(what: str, actual: Floats, controller: PlacedUnit, name: str) -> l
     ratio = float(np.sum(actual * assumed)) / max(float(np.sum(assumed**2)), 1e-300)
     if np.allclose(actual, ratio * assumed, rtol=_TOLERANCE, atol=_TOLERANCE * scale):
         return [f"{what} was {ratio:.4g} times what its controllers assumed"]
-    return [f"{what} was another than its controllers assumed"]
+    return [f"{what} was not what its controllers assumed"]
 
 
 def _number(unit: PlacedUnit | None, name: str) -> float:

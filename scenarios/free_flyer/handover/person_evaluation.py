@@ -182,7 +182,8 @@ class PersonsDeeds:
         if self.bump is not None and t - self.bump[0] < _SHORTLY:
             bumped = f"what it felt was the open hand, which bumped the object with {self.bump[1]:.1f} N"
             return Cause.BUMPED, f"{opened}: {bumped} at {self.bump[0]:.1f} s"
-        return Cause.RELEASED_UNHELD, f"{opened}: {self._missed() or f'nobody had pulled, but {seen}'}"
+        felt = ", but ".join(filter(None, ("" if self.pulled else "nobody had pulled", seen)))
+        return Cause.RELEASED_UNHELD, f"{opened}: {self._missed() or felt or 'why is unknown'}"
 
     def dropped(self, t: float) -> tuple[Cause, str]:
         """Return why the hand lost the object at t, of which the gripper had no hold."""
