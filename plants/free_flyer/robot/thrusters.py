@@ -73,14 +73,23 @@ class Params:
     )
 
     def check(self) -> None:
-        """Raise InvalidThrusterParameters if stuck nozzles leave a force or a torque that the others cannot give."""
+        """Raise InvalidThrusterParameters if limits, or stuck nozzles, leave no thrust at all in a direction."""
+        given = (("f_max", "force along", self.f_max), ("tau_max", "torque about", self.tau_max))
+        faults = [
+            f"{name}: there is no {what} {', '.join(axes)}; a value above 0, or propulsion IDEAL, is right"
+            for name, what, most in given
+            if self.propulsion is not Propulsion.IDEAL
+            and (axes := [axis for axis, x in zip("xyz", np.asarray(most).tolist(), strict=True) if x == 0.0])
+        ]
         stuck = [i for i, part in enumerate(np.asarray(self.flapper_range).tolist()) if part == 0.0]
         lost = lost_directions(stuck) if stuck and self.propulsion is Propulsion.NOZZLES else []
         if lost:
             numbers = ", ".join(str(i + 1) for i in stuck)
-            raise InvalidThrusterParameters(
-                [f"flapper_range: with nozzles {numbers} stuck closed there is no {', no '.join(lost)}; open one"]
+            faults.append(
+                f"flapper_range: with nozzles {numbers} stuck closed there is no {', no '.join(lost)}; open one"
             )
+        if faults:
+            raise InvalidThrusterParameters(faults)
 
     def modules(self) -> PropulsionModules:
         """Return the nozzles with closed flappers."""
@@ -131,7 +140,7 @@ class Thrusters:
     ways.
 
     Raises:
-        InvalidThrusterParameters: by the constructor, if without the stuck nozzles a force or torque cannot be given.
+        InvalidThrusterParameters: by the constructor, if limits or stuck nozzles leave no thrust in a direction.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {

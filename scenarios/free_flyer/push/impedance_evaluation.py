@@ -202,7 +202,7 @@ class ImpedanceEvaluator(Evaluator):
         KeyError: `paper.toml` lacks the place of rest.
     """
 
-    records = (Metric,)
+    records = (Metric, Body)
 
     def __init__(self, parameters: ImpedanceParameters) -> None:
         self.parameters = parameters

@@ -5,7 +5,14 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.free_flyer.robot.thrusters import Inputs, Outputs, Params, Propulsion, Thrusters
+from handover.plants.free_flyer.robot.thrusters import (
+    Inputs,
+    InvalidThrusterParameters,
+    Outputs,
+    Params,
+    Propulsion,
+    Thrusters,
+)
 
 DT = 0.016
 
@@ -109,3 +116,11 @@ def test_goes_on_bit_for_bit_after_a_state_is_restored(delay: float):
     for thrusters in (a, b):
         thrusters.set_state(state)
         np.testing.assert_array_equal([y.f_B for y in walk(thrusters, command(-0.4, 0.1), 8)], expected)
+
+
+@pytest.mark.parametrize("propulsion", [Propulsion.LIMITED, Propulsion.NOZZLES])
+def test_limits_that_leave_no_thrust_along_an_axis_are_refused_together(propulsion: Propulsion):
+    nothing: dict[str, Any] = {"f_max": np.array([0.5, 0.0, 0.0]), "tau_max": np.array([0.0, 0.1, 0.1])}
+    with pytest.raises(InvalidThrusterParameters, match=r"no force along y, z; .*no torque about x; "):
+        Thrusters(Params(propulsion=propulsion, **nothing))
+    assert Thrusters(Params(propulsion=Propulsion.IDEAL, **nothing))
