@@ -3,12 +3,14 @@
 Both sides are taken from the values that the units got, whether by the scenario's parameters or by the units' own.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any, cast
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.plants.free_flyer.robot.thrusters import Propulsion
 from handover.scenarios.free_flyer.parameters import ROBOTS, Body
@@ -16,6 +18,7 @@ from handover.scenarios.free_flyer.parameters import ROBOTS, Body
 _BODY = {"mass": "mass", "I_B": "inertia", "p_BG": "arm"}
 _LINKS = {"link": "arm's links", "mass_L": "links' mass", "I_L": "links' inertia"}
 """What a robot has in common with its controllers' model of it, by the name of the parameter."""
+_PUSHES_BY_HAND = ("robot.f_P", "robot.f_Q")
 _CONTROLLERS = ("impedance", "pose")
 _TOLERANCE = 1e-3
 """Share by which values differ that are not the same."""
@@ -31,6 +34,16 @@ def untold(units: Mapping[str, PlacedUnit]) -> str:
     robots = {"": "the robot's"} if "robot" in units else {f"_{r}": f"robot {r}'s" for r in ROBOTS}
     parts = [part for suffix, whose in robots.items() for part in _untold_of(units, suffix, whose)]
     return "".join(f"; {part}" for part in parts)
+
+
+def push_by_hand(signals: Signals) -> float:
+    """Return the force, N, with which somebody at a live page pushes the robot; 0 where nobody can."""
+    return max((math.hypot(*signals.plain(name)) for name in _PUSHES_BY_HAND if name in signals), default=0.0)
+
+
+def pushed_by_hand(greatest: float) -> str:
+    """Return that somebody pushed the robot, with so many N at most, as the end of a sentence; "" if nobody has."""
+    return f"; besides, somebody pushed the robot by hand, with up to {greatest:.1f} N" if greatest else ""
 
 
 def assumed_body(controller: PlacedUnit, otherwise: Body) -> Body:

@@ -82,6 +82,7 @@ class LivePage:
         self._viewers = Viewers(self.forget)
         self._pushes = BodyPushes()
         self._size: int | None = None  # how many numbers a frame has
+        self._ended: ShownRun | None = None  # what pages were told the end of
 
     def routes(self) -> Sequence[BaseRoute]:
         """Return what is served besides the page and its connection: what a webcam needs, where it is offered."""
@@ -139,6 +140,11 @@ class LivePage:
         """Tell a page that has connected what is shown."""
         await self._tell_scene(page)
         await self._tell_state(page)
+        if self.shown is not None and self._ended is self.shown:
+            if self.shown.scene is not None:
+                await self._send_frame()
+                await self._send_plots(page)
+            await self.send(page, {"ended": self.shown.run.verdict})
 
     def _push(self, page: WebSocket, value: Any) -> None:
         """Let a page push, or let go of what it has pushed."""
@@ -219,7 +225,7 @@ class LivePage:
     async def _show_scene(self, shown: ShownRun, scene: LiveScene) -> None:
         """Show the scene of another run than before."""
         self._pushes.release_all()
-        shown.scene, self.shown, self._size = scene, shown, None
+        shown.scene, self.shown, self._size, self._ended = scene, shown, None, None
         await self._tell_scene(*self._viewers.pages)
         await self._tell_states()
         await self.begun()
@@ -265,7 +271,7 @@ class LivePage:
             if before - last_plots >= PLOT_PERIOD:
                 last_plots = before
                 await self._send_plots(*self._viewers.ready)
-        await self.tell({"ended": past.run.verdict})
+        await self._tell_end(past)
 
     async def _tell_states(self) -> None:
         for page in self._viewers.pages:
@@ -283,6 +289,10 @@ class LivePage:
                 shown.scene.complete(record)
             await self._send_frame()
             await self._send_plots(*self._viewers.ready)
+        await self._tell_end(shown)
+
+    async def _tell_end(self, shown: ShownRun) -> None:
+        self._ended = shown
         await self.tell({"ended": shown.run.verdict})
 
     async def _tell_scene(self, *pages: WebSocket) -> None:

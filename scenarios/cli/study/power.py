@@ -10,7 +10,7 @@ from rich.table import Table
 from handover.scenarios.cli.console import open_console, print_json
 from handover.scenarios.cli.options import FiniteRange
 from handover.scenarios.cli.study.group import checked_plan
-from handover.scenarios.execution.errors import one_line_errors, require_extra
+from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 
 if TYPE_CHECKING:
     from handover.scenarios.study.statistics.power import Power, Share
@@ -93,8 +93,13 @@ def power(
         require_extra("study", "the simulation of a study")
         from handover.scenarios.study.statistics.power import PowerAssumptions, fewest_participants, simulated_power
 
+        people = participants or (plan.participants,)
+        if min(people) < 2:
+            raise UsageError(
+                f"{file}: of {min(people)} participant nothing can be found; --participants 10,12,18 tries others"
+            )
         assumed = PowerAssumptions(effect=effect, spread=spread, correlation=correlation, repeats=repeat, seed=seed)
-        found = [simulated_power(plan, n, assumed) for n in participants or (plan.participants,)]
+        found = [simulated_power(plan, n, assumed) for n in people]
     tests = len(plan.statements) * len(plan.tasks)
     least = fewest_participants(tests)
     if as_json:

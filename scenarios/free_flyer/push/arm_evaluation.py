@@ -37,7 +37,7 @@ from handover.scenarios.free_flyer.push.impedance_evaluation import (
     steps_of_period,
 )
 from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
-from handover.scenarios.free_flyer.untold import untold
+from handover.scenarios.free_flyer.untold import push_by_hand, pushed_by_hand, untold
 
 SIGNALS = (
     *(f"robot.{name}" for name in ("p_WG", "q_WG", "v_WG", "w_WG", "p_WB", "q_WB", "v_WB", "w_WB", "q_J", "v_J")),
@@ -122,7 +122,7 @@ class ArmImpedanceEvaluator(Evaluator):
         self._saturated, self._t, self._astray, self._spins = 0, 0.0, 0.0, False
         self._greatest = [0.0, 0.0]
         self._stability: dict[str, Metric] = {}
-        self._untold = ""
+        self._untold, self._by_hand = "", 0.0
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
         """Keep what the controllers do not know of the robot."""
@@ -134,6 +134,7 @@ class ArmImpedanceEvaluator(Evaluator):
             self._stability = stability_metrics(signals, ("impedance",))
         self._rows.append([t, *(signals[name] for name in SIGNALS)])
         self._saturated += bool(signals["thrusters.saturated"])
+        self._by_hand = max(self._by_hand, push_by_hand(signals))
         away = float(np.linalg.norm(signals["robot.p_WG"] - self._p_WG))
         cosine = (np.trace(np.transpose(self._R_WG) @ rotation_of(signals["robot.q_WG"])) - 1.0) / 2.0
         turned = math.acos(min(1.0, max(-1.0, float(cosine))))
@@ -171,7 +172,11 @@ class ArmImpedanceEvaluator(Evaluator):
         extent = f"{'within' if agrees else 'by'} {1000 * by[0]:.1f} mm and {math.degrees(by[1]):.2f}°"
         bound = "" if agrees else f", {agreement_bound()}"
         reason = f"{back}, {joined} {verb} the impedance model {extent}{bound}{self._stopped_joints(motion)}"
-        return Outcome(success=self._at_rest and agrees, reason=reason + self._untold, metrics=metrics)
+        return Outcome(
+            success=self._at_rest and agrees,
+            reason=reason + self._untold + pushed_by_hand(self._by_hand),
+            metrics=metrics,
+        )
 
     def _stopped_joints(self, motion: Columns) -> str:
         """Return which free joints were held away from where they began, as a clause; one that turns is never at 0."""

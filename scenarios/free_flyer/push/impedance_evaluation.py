@@ -20,7 +20,7 @@ from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Body, ImpedanceParameters
 from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
-from handover.scenarios.free_flyer.untold import assumed_body, untold
+from handover.scenarios.free_flyer.untold import assumed_body, push_by_hand, pushed_by_hand, untold
 
 REST_POSITION, REST_ANGLE = 0.010, 0.030
 """Errors below which the robot counts as at rest, m and rad: some three times the noise of its navigation (assumed)."""
@@ -217,7 +217,7 @@ class ImpedanceEvaluator(Evaluator):
         self._greatest = [0.0, 0.0]
         self._last = (0.0, 0.0)
         self._stability: dict[str, Metric] = {}
-        self._untold, self._model = "", parameters.model
+        self._untold, self._model, self._by_hand = "", parameters.model, 0.0
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
         """Keep what the controller takes the robot to be, and what it does not know of it."""
@@ -232,6 +232,7 @@ class ImpedanceEvaluator(Evaluator):
         seen = [signals[name] for name in MOTION_SIGNALS]
         self._rows.append([t, *seen])
         self._saturated += bool(signals["thrusters.saturated"])
+        self._by_hand = max(self._by_hand, push_by_hand(signals))
         away = math.dist(seen[0].tolist(), self._goal)
         turned = 2.0 * math.acos(min(1.0, abs(float(seen[2][0]))))
         self._t, self._last = t, (away, turned)
@@ -290,7 +291,8 @@ class ImpedanceEvaluator(Evaluator):
         )
         joined = "and" if agrees is self._at_rest else "but"
         thrust = f"; more was commanded than the thrusters give for {100 * share:.0f} % of the time" if share else ""
-        return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}{self._untold}"
+        besides = self._untold + pushed_by_hand(self._by_hand)
+        return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}{besides}"
 
     def _back(self) -> str:
         """Return whether the gripper came back to rest, as a clause of the reason."""

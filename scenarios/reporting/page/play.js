@@ -159,9 +159,9 @@
     }
     if (seed && !busy) seed.value = choice.seed ?? 0;
     if (push && !busy) push.checked = choice.push;
-    const general = byId("fault");
-    general.textContent = choice.faults[""] ?? "";
-    general.hidden = !choice.faults[""];
+    const general = byId("fault"), first = Object.entries(choice.faults)[0];
+    general.textContent = !first ? "" : first[0] ? `No run was begun: ${first[1]}` : first[1];
+    general.hidden = !first;
   });
 
   byId("again").addEventListener("click", again);

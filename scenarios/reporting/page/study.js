@@ -222,7 +222,18 @@
     main.focus({preventScroll: true});
     scrollTo(0, 0);
   }
-  byId("withdraw").addEventListener("click", () => confirm(word("withdraw_sure")) && act("withdraw"));
+  // Asked in the page: a question of the browser's own would stop the samples of the hand until it is answered.
+  byId("withdraw").addEventListener("click", () => {
+    byId("sure-text").textContent = word("withdraw_sure");
+    byId("sure-yes").textContent = word("withdraw");
+    byId("sure-no").textContent = word("withdraw_not");
+    byId("sure").showModal();
+  });
+  byId("sure-no").addEventListener("click", () => byId("sure").close());
+  byId("sure-yes").addEventListener("click", () => {
+    byId("sure").close();
+    act("withdraw");
+  });
 
   function tell(text) {
     byId("told").textContent = text;

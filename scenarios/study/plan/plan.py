@@ -31,6 +31,8 @@ DEVICES: Mapping[str, str] = {
 
 TRACKER = "tracker"
 """The device that sends its samples by a connection of its own."""
+SCRIPT = "script"
+"""The device of a scripted pilot."""
 WEBCAM = "webcam"
 """The device that is offered only where the lab gives the files that find a hand in pictures."""
 

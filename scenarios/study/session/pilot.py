@@ -15,7 +15,7 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.study.plan.plan import StudyPlan
+from handover.scenarios.study.plan.plan import SCRIPT, StudyPlan
 
 _SPEED = 0.35
 """How fast the hand is led, m/s."""
@@ -250,7 +250,8 @@ class ScriptedPilot:
             case "eligibility":
                 return "eligibility", [True] * len(shown["eligibility"])
             case "device":
-                return "device", {"device": next(iter(shown["devices"])), "settings": {}}
+                devices = list(shown["devices"])
+                return "device", {"device": SCRIPT if SCRIPT in devices else devices[0], "settings": {}}
             case "practice" | "instruction":
                 return "begin", None
             case "void":
@@ -298,7 +299,7 @@ class PilotRefused(RuntimeError):
 def hand_message(place: Floats, closed: bool, stamp: float) -> dict[str, Any]:
     """Return a sample of the hand as a page sends it."""
     pose = {"p_WH": place.tolist(), "q_WH": [1.0, 0.0, 0.0, 0.0], "closed": closed}
-    return {**pose, "stamp": stamp, "device": "script"}
+    return {**pose, "stamp": stamp, "device": SCRIPT}
 
 
 async def play_sessions(address: str, plan: StudyPlan, tell: Callable[[str], None]) -> None:

@@ -280,7 +280,7 @@ class StudySeat:
         trial.go()
         self._last_sample = time.monotonic()
         while trial.is_running:
-            if not self.is_taken:  # up to Python 3.11, wait_for may swallow that this was cancelled
+            if self._playing is not asyncio.current_task():  # wait_for of Python 3.11 may swallow its cancellation
                 raise asyncio.CancelledError
             began = time.monotonic()
             if began - self._last_sample > SILENCE:
@@ -325,6 +325,8 @@ class StudySeat:
         Where the disk is full or a file is damaged, the page says so, and it can be tried again.
         """
         protocol, planned, ended = self.protocol, self.protocol.round, fault or record or "the run has no record"
+        if protocol.screen not in ("round", "practising"):  # who played it has withdrawn meanwhile
+            return
         try:
             if not is_round:
                 if fault is None:

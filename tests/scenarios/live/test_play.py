@@ -132,6 +132,8 @@ def test_a_slider_begins_a_run_anew_and_each_run_is_that_of_its_command(browser:
             assert changed(page) == ["behaviour = compliant, force = 12", "force = 12", "nothing"]
             states = page.locator("#runs tbody tr").evaluate_all("rows => rows.map(row => row.dataset.state)")
             assert states[1:] == ["succeeded", "ended by a change"]
+            with shown(browser, address) as reopened:
+                wait_until(reopened, f"{LIVE}.dataset.ended && {LIVE}.dataset.frames > 0")
             errors = page.locator("#runs td[data-label='greatest position error']").all_inner_texts()
             assert float(errors[0].split()[0]) > 1.2 * float(errors[1].split()[0])  # the compliant robot yields more
         session.send_signal(signal.SIGINT)
@@ -153,6 +155,7 @@ def test_what_is_refused_is_told_beside_its_parameter_and_the_run_goes_on(browse
         fault = page.locator("[data-name=strength] .fault")
         fault.wait_for()
         assert fault.inner_text() == "strength: 50.0 is out of range: from 0.1 to 20 N"
+        assert page.locator("#fault").inner_text() == f"No run was begun: {fault.inner_text()}"
         frames = page.evaluate(f"Number({LIVE}.dataset.frames)")
         wait_until(page, f"{LIVE}.dataset.frames > {frames}")
         page.locator("[data-name=strength] .reset").click()
@@ -323,6 +326,7 @@ def test_a_push_moves_the_robot_a_compliant_one_farther_and_is_played_back(brows
         assert moved[1] > 1.2 * moved[0]
         page.locator("#stop").click()
         ended(page, 3)
+        assert "somebody pushed the robot by hand, with up to" in page.locator("#runs .reason").all_inner_texts()[0]
     rigid = Record(tmp_path / "runs/002/signals.parquet")
     force = np.linalg.norm(rigid["robot.f_P"], axis=1)
     assert 0.5 < force.max() <= 5.0

@@ -27,6 +27,14 @@ def test_the_t_test_agrees_with_the_noncentral_distribution(people: int, exact: 
     )  # ranks lose some 5 % of the efficiency
 
 
+def test_of_one_participant_nothing_can_be_found(tmp_path: Path):
+    plan = tmp_path / "plan.toml"
+    plan.write_text(default_plan().replace("participants = 18", "participants = 1"), encoding="utf-8")
+    refused = CliRunner().invoke(main, ["study", "power", str(plan)])
+    assert refused.exit_code == 2
+    assert "of 1 participant nothing can be found; --participants 10,12,18 tries others" in refused.output
+
+
 def test_ten_find_an_effect_of_08_in_one_half_and_eighteen_in_nine_tenths():
     """Any of nine ratings, all of which have the effect, after Holm: for correlated ratings that hardly tie."""
     assumed = PowerAssumptions(effect=0.8, spread=30.0, correlation=0.7, repeats=1000)

@@ -132,6 +132,27 @@ def test_the_practice_tells_how_far_the_hand_is_from_the_ball(browser: Browser, 
 
 
 @pytest.mark.slow
+def test_a_round_goes_on_while_the_page_asks_whether_to_stop(browser: Browser, tmp_path: Path):
+    plan = pilot_plan(tmp_path / "plan.toml", devices='["mouse"]', patience=15, practice=0, repetitions=1)
+    with served(plan, tmp_path / "out") as (address, _), browser.new_page() as page:
+        page.set_default_timeout(120_000)
+        page.goto(address)
+        to_round(page)
+        page.get_by_role("button", name="Begin").click()
+        wait_until(page, "study.play?.time > 0.5")
+        page.locator("#withdraw").click()
+        page.wait_for_timeout(4000)  # longer than a device may be silent
+        assert page.locator("#sure").inner_text().startswith("Do you want to stop taking part?")
+        page.locator("#sure-no").click()
+        assert page.evaluate("study.screen") == "round"
+        page.locator("#withdraw").click()
+        page.locator("#sure-yes").click()
+        at(page, "withdrawn")
+        page.wait_for_timeout(1500)
+        assert page.evaluate("study.screen") == "withdrawn"
+
+
+@pytest.mark.slow
 def test_a_page_in_german_tells_that_the_practice_is_over_and_why_a_round_is_void(browser: Browser, tmp_path: Path):
     plan = pilot_plan(tmp_path / "plan.toml", devices='["mouse"]', patience=15, practice=2, repetitions=1)
     main = "document.querySelector('main').innerText"
@@ -178,7 +199,7 @@ def test_a_phone_shows_the_view_from_the_side_below_that_of_the_eye_from_the_fir
 
 @pytest.mark.slow
 def test_a_scripted_pilot_plays_twelve_rounds_that_survive_a_kill_and_are_played_back(tmp_path: Path):
-    plan = pilot_plan(tmp_path / "plan.toml", devices='["script"]', patience=60, practice=5, repetitions=2)
+    plan = pilot_plan(tmp_path / "plan.toml", devices='["mouse", "script"]', patience=60, practice=5, repetitions=2)
     out = tmp_path / "study"
     command = [*HANDOVER, "study", "serve", str(plan), "--out", str(out), "--pilot", "--pace", "4"]
     killed = subprocess.Popen(command, start_new_session=True)
@@ -202,6 +223,7 @@ def test_a_scripted_pilot_plays_twelve_rounds_that_survive_a_kill_and_are_played
     assert rounds["success"].sum() >= 9, rounds[["task", "behaviour", "reason"]].to_string()
     assert pd.read_parquet(session_folder / "rounds.parquet")["latency_p95_ms"].notna().all()
     assert len(pd.read_csv(session_folder / "answers.csv")) == 36
+    assert StudyFolder.read(out).session(1).session.device == "script"
     planned = StudyFolder.read(out).session(1).rounds[0]
     given = [text for p in (*planned.condition.given, "hand=outside") for text in ("-p", p)]
     again = [*HANDOVER, "run", planned.condition.scenario, *given, "--seed", str(planned.seed), "--no-report"]

@@ -56,8 +56,8 @@ def test_a_hand_before_a_webcam_plays_a_round_whose_files_hashes_are_kept(tmp_pa
             page.keyboard.press(key)
         page.get_by_role("button", name="Send").click()
         at(page, "instruction")
-        page.on("dialog", lambda dialog: dialog.accept())
         page.get_by_role("button", name="Stop taking part").click()
+        page.locator("#sure-yes").click()
         at(page, "withdrawn")
         assert not page.locator("#video").is_visible()
         assert messages == []

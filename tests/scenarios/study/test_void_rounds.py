@@ -74,6 +74,24 @@ def test_a_page_that_is_closed_makes_its_round_void_and_it_is_played_again(tmp_p
     assert server.seat.protocol.screen == "void"
 
 
+def test_who_withdraws_in_a_round_sees_nothing_but_that_and_no_attempt_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(seat_module, "SILENCE", 0.2)  # which passes while the run is ended
+    with page_of(server_of(tmp_path / "study")) as page:
+        to_round(page)
+        page.send(json.dumps({"hand": {**HAND, "stamp": 1.0}}))
+        act(page, "withdraw")
+        assert told(page, "screen")["screen"] == "withdrawn"
+        page.send('{"clock": 1.0}')  # nothing else is shown after it
+        with contextlib.suppress(TimeoutError):
+            while message := page.recv(timeout=2):
+                assert not isinstance(message, str) or "screen" not in json.loads(message), message
+    session = StudyFolder.opened(tmp_path / "study", PLAN).session(1)
+    assert session.notes.withdrawn is not None
+    assert session.notes.void_attempts == []
+
+
 def test_a_device_that_falls_silent_makes_the_round_void(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(seat_module, "SILENCE", 0.5)
     with page_of(server_of(tmp_path / "study")) as page:
