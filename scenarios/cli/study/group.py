@@ -167,7 +167,7 @@ def _print_plan(data: dict[str, Any], plan: "StudyPlan") -> None:
     duration = session_duration(plan)
     rated = f"{len(plan.statements)} statements from {plan.scale[0]} to {plan.scale[1]} after each"
     length = (
-        f"{duration['together'] / 60:.0f} min at most: practice {duration['practice'] / 60:.0f}, rounds at most "
+        f"{duration['together'] / 60:.0f} min at most: practice {duration['practice'] / 60:.2g}, rounds at most "
         f"{duration['rounds'] / 60:.0f}, ratings some {duration['ratings'] / 60:.0f} (assumed)"
     )
     print_rows(

@@ -13,6 +13,7 @@
   const TURNS = {"+roll": "roll_right", "-roll": "roll_left", "+pitch": "fingers_down", "-pitch": "fingers_up",
     "+yaw": "fingers_left", "-yaw": "fingers_right"};
   const KEYS = {"+roll": "E", "-roll": "Q", "+pitch": "W", "-pitch": "S", "+yaw": "A", "-yaw": "D"};  // see hand_input.js
+  const hasKeys = () => device() !== "touch";
   const device = () => shown?.device ?? "";
 
   // A word of the page in the language of the study, with values in place of {names}.
@@ -85,7 +86,8 @@
     practice: s => [node("h1", {}, word("practice")), ...paragraphs(s.practice),
       ...(s.reason ? [node("p", {}, word("practice_again", {reason: reasonOf(s)}))] : []),
       node("p", {}, word(`help_${device()}`)),
-      node("p", {}, word("practice_for", {minutes: Number((s.seconds / 60).toFixed(1))})), ...deviceLines(),
+      node("p", {}, s.seconds < 90 ? word("practice_seconds", {seconds: Math.round(s.seconds)})
+        : word("practice_for", {minutes: Number((s.seconds / 60).toFixed(1)).toLocaleString(s.language)})), ...deviceLines(),
       actions(button("begin", () => act("begin"), {first: true}))],
     instruction: s => [...(s.practice_over ? [node("p", {class: "soft"}, word("practice_over"))] : []),
       node("h1", {}, s.name), ...paragraphs(s.instruction), node("p", {class: "soft"}, word(`help_${device()}`)), ...deviceLines(),
@@ -181,7 +183,8 @@
       if (!done.disabled) done.focus();
     };
     return [node("h1", {}, word("rating")),
-      node("p", {}, `${word("round_over")} ${word("rate_all", s.scale)}`), ...sets, actions(done)];
+      node("p", {}, [word("round_over"), word("rate_all", s.scale), ...(hasKeys() ? [word("rate_keys", s.scale)] : [])].join(" ")),
+      ...sets, actions(done)];
   }
 
   function questions(s) {
@@ -304,7 +307,9 @@
     if (play) play.sideShown = wantsSide();
     nameViews();
   }
-  const nameViews = () => { byId("views").textContent = word(wantsSide() ? "one_view" : "two_views"); };
+  const nameViews = () => {
+    byId("views").textContent = word(wantsSide() ? "one_view" : "two_views") + (hasKeys() ? " (V)" : "");
+  };
   byId("grasp").addEventListener("click", () => input?.grasp(!input.pose().closed));
   byId("views").addEventListener("click", () => { turnViews(); byId("pad").focus({preventScroll: true}); });
 

@@ -97,10 +97,11 @@ def balance(plan: StudyPlan, participants: int | None = None) -> str:
     """Return whether orders are balanced with so many participants, in a sentence; by default with those planned."""
     n, of = plan.participants if participants is None else participants, len(plan.conditions)
     multiples = f"{of}, {2 * of}, {3 * of} ..."
+    whose = "The order of one participant is" if n == 1 else f"The orders of {n} participants are"
     if n and n % of == 0:
-        return f"The orders of {n} participants are balanced: each condition follows each other equally often."
+        return f"{whose} balanced: each condition follows each other equally often."
     return (
-        f"The orders of {n} participants are not balanced: {of} conditions need {multiples} participants, so that each "
+        f"{whose} not balanced: {of} conditions need {multiples} participants, so that each "
         f"condition has each place, and follows each other, equally often."
     )
 

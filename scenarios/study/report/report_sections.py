@@ -115,7 +115,9 @@ def _failed_rounds(analysis: StudyAnalysis, words: Words) -> Markup:
     ]
     header = ("participant", "round", "task", "behaviour", "by the rule", "by ground truth")
     table = rows_table(header, rows, numbers=(1,))
-    return Markup("<details><summary>What happened in {} rounds</summary>{}</details>").format(len(failed), table)
+    return Markup("<details><summary>What happened in {} {}</summary>{}</details>").format(
+        len(failed), "round" if len(failed) == 1 else "rounds", table
+    )
 
 
 def published_section(analysis: StudyAnalysis, words: Words) -> Section | None:
