@@ -166,7 +166,11 @@ const live = (() => {
   }
 
   function choose(name) {
-    if (!api.run?.signals.includes(name) || chosen.includes(name)) return;
+    if (!name || !api.run) return;
+    const isThere = api.run.signals.includes(name);
+    byId("told").textContent = isThere ? `The plot of ${name} is the last one below.`
+      : `There is no signal ${name}; those of the run are offered as one types.`;
+    if (!isThere || chosen.includes(name)) return;
     chosen.push(name);
     const chip = document.createElement("button");
     chip.type = "button";

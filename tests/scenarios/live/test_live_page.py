@@ -65,6 +65,9 @@ def test_a_run_is_followed_paused_and_stepped_and_its_record_is_that_of_a_run_al
 
 def test_the_page_plots_what_it_is_asked_for_and_ends_the_run(browser: Browser, tmp_path: Path):
     with live_run(tmp_path / "live", "--pace", "0.5") as (address, run), shown(browser, address) as page:
+        page.locator("#signal").fill("nonsense")
+        page.locator("#signal").dispatch_event("change")
+        assert page.locator("#told").inner_text().startswith("There is no signal nonsense;")
         page.locator("#signal").fill("scene.p_WO")
         page.locator("#signal").dispatch_event("change")
         wait_until(page, "[...document.querySelectorAll('#plots h3')].some(h => h.textContent === 'scene.p_WO')")
