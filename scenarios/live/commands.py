@@ -29,7 +29,7 @@ from handover.scenarios.live.played_run import Choice
 
 COMMANDS = ("pace", "pause", "go", "step", "stop", "choose", "see", "push")
 LONGEST = 1000
-"""Bytes; no command of the page is longer."""
+"""Characters; no command of the page is longer."""
 _MOST_CHOSEN, _MOST_PLOTS = 6, 200
 _HIGHEST_PACE = 1000.0
 _FAR = 5.0
@@ -48,13 +48,13 @@ class Command(NamedTuple):
 
 
 def parse_command(text: str, longest: int = LONGEST) -> Command:
-    """Return a command of at most `longest` bytes.
+    """Return a command of at most `longest` characters.
 
     Raises:
         InvalidCommand: it is none.
     """
     if len(text) > longest:
-        raise InvalidCommand(f"a command has {longest} bytes at most, this one {len(text)}")
+        raise InvalidCommand(f"a command has {longest} characters at most, this one {len(text)}")
     try:
         content: Any = json.loads(text)
     except (ValueError, RecursionError) as e:  # the latter of brackets within brackets

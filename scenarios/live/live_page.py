@@ -73,7 +73,7 @@ class LivePage:
     """
 
     longest = LONGEST
-    """Bytes; no command of a page is longer."""
+    """Characters; no command of a page is longer."""
     commands: Sequence[str] = COMMANDS
 
     def __init__(self, webcam: WebcamFiles | None = None) -> None:

@@ -153,9 +153,11 @@ def controlled_from(
     control = LiveControl(folder / CONTROL_FILE)
     threading.Thread(target=_stop_with_standard_input, args=(control,), daemon=True).start()
     inputs = PageInputs.create(folder, pushes, hand)
-    yield control, inputs
-    inputs.close()
-    control.close()
+    try:
+        yield control, inputs
+    finally:
+        inputs.close()
+        control.close()
 
 
 def _stop_with_standard_input(control: LiveControl) -> None:

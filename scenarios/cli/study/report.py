@@ -45,7 +45,7 @@ def report(folder: Path, file: Path | None) -> None:
 @click.command("export", short_help="Write the tables of all participants.")
 @_FOLDER
 def export(folder: Path) -> None:
-    """Write the tables of all participants of the study in DIR: rounds, answers, questionnaire, sessions.
+    """Write all participants' tables of the study in DIR: rounds, answers, void attempts, questionnaire, sessions.
 
     Each as CSV and as Parquet; DIR/codebook.csv has the columns' types, units and meanings.
     """

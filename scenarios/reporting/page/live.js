@@ -1,5 +1,5 @@
 // Shows runs under way, one after the other, and controls their pace. live_page.py sends: texts with a JSON object that
-// has one of begun, state, time with phase, plots, ended, refused; and after each time the places of all that is drawn,
+// has one of begun, state, time with phase, plots, pictures, ended, refused; and after each time the places of all that is drawn,
 // as 64-bit floats. Other scripts of a page use:
 //   live.send(command, value)   sends a command
 //   live.on(name, act)          calls act(value) when an object comes that has the name; "shown" when a run's scene is there

@@ -1,6 +1,6 @@
 // The scene of a round as the person sees it, in one view or two, and how long it takes until a sample is drawn.
 // `photodiode` is an element that changes with each new sample, or null.
-//   const play = studyScene(content, {eye, side, photodiode, onDrawn})   null without WebGL; see Trial.scene in trial.py
+//   const play = studyScene(content, {eye, side, photodiode, onDrawn})   null without WebGL; see Trial.scene_content in trial.py
 //   play.take(buffer)       a state of the run: time, stamp of the sample that it shows, s, and the places of all
 //   play.target(place)      where the ball of the device's test is, [x, y, z] in W, m; null hides it
 //   play.sideShown = true   whether there is a second view

@@ -1,8 +1,9 @@
 """The folder of one participant's session, written so that a kill loses no round that was finished.
 
-session.json, rounds.csv, rounds.parquet, answers.csv, void_attempts.csv, questionnaire.csv, and rounds/01/, a run's
-folder as `handover run` writes it. What is known of a round is in rounds/01.json, one file that is replaced as a whole;
-rounds/01.begun says that the participant began it. The tables are made of these files.
+Kept are session.json, practice.json, void_attempts.json, questionnaire.json, withdrawn.json, and of each round
+rounds/01/, a run's folder as `handover run` writes it, rounds/01.json, which is replaced as a whole, and
+rounds/01.begun, which says that the participant began it. The tables rounds, answers, void_attempts and questionnaire
+are made of these.
 No name, no picture and no video of a person is kept.
 """
 
@@ -116,7 +117,7 @@ class SessionFolder:
 
     @classmethod
     def read(cls, path: Path, plan: StudyPlan) -> "SessionFolder":
-        """Return a session that has begun, its tables complete.
+        """Return the session in a folder, which has begun.
 
         Raises:
             InvalidRunFolder: there is none, or its session.json is damaged.

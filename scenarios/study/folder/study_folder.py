@@ -1,7 +1,8 @@
 """The folder of a study: its plan, the versions of what carries it out, the codebook, and the folders of sessions.
 
 OUT/plan.toml, versions.json, codebook.csv, codebook.md, and participants/P01/, P02/, ..., see `SessionFolder`. The
-tables of all participants, rounds, answers, questionnaire and sessions, are made of these when they are asked for.
+tables of all participants, rounds, answers, void_attempts, questionnaire and sessions, are made of these when they are
+asked for.
 """
 
 import contextlib

@@ -245,7 +245,7 @@ def _methods_section(analysis: StudyAnalysis) -> Section:
 def _files_section(analysis: StudyAnalysis) -> Section:
     tables = ", ".join(f"{name}.csv" for name in result_columns(analysis.plan))
     rows = [
-        ("rounds, answers, questionnaire, sessions", "all participants' tables, as .csv and .parquet"),
+        ("rounds, answers, void_attempts, questionnaire, sessions", "all participants' tables, as .csv and .parquet"),
         ("codebook.csv, codebook.md", "their columns, with types, units and meanings"),
         (f"results/{tables}", "what this page shows, with results/codebook.csv"),
         ("participants/P01/rounds/01", "the record of a round: `handover study replay` shows it"),

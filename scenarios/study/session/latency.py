@@ -18,9 +18,6 @@ class LatencyLog:
     def __init__(self) -> None:
         self._times: list[float] = []
 
-    def __len__(self) -> int:
-        return len(self._times)
-
     def add(self, values: Any) -> None:
         """Add times that a page has measured.
 

@@ -5,6 +5,7 @@ the object or puts it into the gripper, and answers what is asked. What it rates
 """
 
 import asyncio
+import base64
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -99,6 +100,7 @@ class ScriptedHand:
         self.place: Floats = self._rest.copy()
         self.closed = float(np.linalg.norm(scene.place("object") - self._rest)) < _FAR
         self._steps: list[Callable[[float], bool]] = []
+        self._retreat: Floats | None = None  # where it backs off to, once it has given the object
         self._saw_light, self._signalled, self._since, self._time = False, False, 0.0, scene.time
         self._gap = 0.0
 
@@ -114,6 +116,7 @@ class ScriptedHand:
         if self._signalled and not self._steps:
             self._since, self._signalled = 0.0, False
             self._gap = self._jaws_apart()
+            self._retreat = None
             self._steps = self._giving() if self.closed else self._taking()
         self._saw_light = light
         self._since += dt
@@ -139,7 +142,7 @@ class ScriptedHand:
             self._push,
             lambda _dt: self._since >= 2.0 * _CLOSING,
             lambda dt: self._close(dt, closed=False),
-            lambda dt: self._go(dt, self.place - np.array([_READY, 0.0, 0.0]), once=True),
+            self._back_off,
             lambda dt: self._go(dt, self._rest),
         ]
 
@@ -153,11 +156,14 @@ class ScriptedHand:
             if self._since > _CLOSING:
                 self.closed, self._since = not self.closed, 0.0
 
-    def _go(self, dt: float, goal: Floats, *, once: bool = False) -> bool:
-        """Lead the hand towards a place; return whether it is there."""
-        if once:
-            self._goal = getattr(self, "_goal", goal)
-            goal = self._goal
+    def _back_off(self, dt: float) -> bool:
+        """Lead the hand away from where it gave the object; return whether it is there."""
+        if self._retreat is None:
+            self._retreat = self.place - np.array([_READY, 0.0, 0.0])
+        return self._go(dt, self._retreat)
+
+    def _go(self, dt: float, goal: Floats) -> bool:
+        """Lead the hand towards a place, m, in W; return whether it is there."""
         way = goal - self.place
         far = float(np.linalg.norm(way))
         step = _SPEED * dt
@@ -328,8 +334,6 @@ async def play_sessions(address: str, plan: StudyPlan, tell: Callable[[str], Non
 
 
 def _unpacked(packed: Mapping[str, Any]) -> Floats:
-    """Return numbers of a scene; of packed places only how many there are is needed, and of meshes the numbers."""
-    import base64
-
+    """Return the numbers of a packed array, decoded to float64."""
     data = np.frombuffer(base64.b64decode(packed["bdata"]), dtype=f"<{packed['dtype']}").astype(np.float64)
     return packed["low"] + packed["step"] * data if "step" in packed else data

@@ -1,11 +1,12 @@
 """What a participant goes through, as a state machine: what the page shows next, and what may be done there.
 
-    (who ->) language -> consent -> eligibility -> device -> practice -> 12 x (instruction -> round -> rating)
-      -> questions -> thanks
+    (who ->) language -> consent -> eligibility -> device -> practice
+      -> for each round of the plan (instruction -> round -> rating) -> questions -> thanks
 
-after [Fernandes2020] sec. 5.7. All that is to be kept is written as it comes; a session that was broken off goes on at
-what was not finished, when whoever carries out the study says that it is the same person. Nothing is written of who
-does not agree, or may not take part.
+after [Fernandes2020] sec. 5.7. A round that does not count shows "void" first; who does not agree is shown "declined",
+and "withdraw" ends a session from any of its screens. All that is to be kept is written as it comes; a session that was
+broken off goes on at what was not finished, when whoever carries out the study says that it is the same person. Nothing
+is written of who does not agree, or may not take part.
 """
 
 import contextlib
@@ -86,11 +87,6 @@ class Protocol:
     def text(self) -> StudyText:
         """All that is read, in the language that was chosen."""
         return self.study.plan.texts[self._language]
-
-    @property
-    def language(self) -> str:
-        """The language that was chosen, such as "en"."""
-        return self._language
 
     @property
     def round(self) -> Round | None:

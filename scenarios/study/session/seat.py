@@ -61,6 +61,7 @@ class StudySeat:
 
     Attributes:
         on_run: is told where the hand is as a run begins; None without a tracker.
+        on_round_end: is given each round that has ended, with its record or why it does not count; None: nobody is.
     """
 
     def __init__(self, protocol: Protocol, pace: float = 1.0, webcam: Mapping[str, str] = MappingProxyType({})) -> None:
@@ -77,11 +78,6 @@ class StudySeat:
         self._has_tracker, self._page_clock, self._page_offset = False, DeviceClock(), math.nan
         self.on_run: Callable[[Mapping[str, Any]], Awaitable[None]] | None = None
         self.on_round_end: Callable[[Round, RoundRecord | str], None] | None = None
-
-    @property
-    def is_taken(self) -> bool:
-        """Whether a page has the seat."""
-        return self._page is not None
 
     @property
     def practice(self) -> Practice:

@@ -213,7 +213,7 @@ def test_the_readmes_command_refuses_who_is_not_the_page(tmp_path: Path):
                 '{"command": "pace", "value": NaN}': "pace takes",
                 '{"command": "choose", "value": ["secret"]}': "names of signals",
                 '{"command": "see", "value": "all"}': "numbers of plots",
-                " " * 1500: "1000 bytes",
+                " " * 1500: "1000 characters",
             }
             for text, why in wrong.items():
                 page.send(text)

@@ -1,11 +1,13 @@
 """What a participant goes through: screens, what may be done on them, and what is kept."""
 
+import re
 from pathlib import Path
 
 import pandas as pd
 import pytest
 from sample_study import PLAN, play, record, same, session
 
+from handover.scenarios.reporting.page import asset
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.session.device_test import DeviceTest
 from handover.scenarios.study.session.protocol import MOST_ATTEMPTS, SCREENS, InvalidAction, Protocol
@@ -193,4 +195,8 @@ def test_what_is_not_to_be_done_is_refused_and_changes_nothing(action: str, valu
 def test_when_all_participants_have_come_the_page_says_so(tmp_path: Path):
     protocol = Protocol(StudyFolder.opened(tmp_path / "study", PLAN), PLAN.devices, number=19)
     assert protocol.screen == "complete"
-    assert set(SCREENS) >= {protocol.screen}
+
+
+def test_the_page_draws_every_screen():
+    script = asset("study.js")
+    assert [name for name in SCREENS if not re.search(rf"^ {{4}}{name}(:|\(|,)", script, re.MULTILINE)] == []
