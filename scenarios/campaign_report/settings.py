@@ -48,7 +48,7 @@ def _fmus(units: Mapping[str, Mapping[str, str]]) -> Markup:
         )
         for name, u in units.items()
     ]
-    return Markup("<div><h3>FMUs</h3>{}</div>").format(rows_table(("unit", "file", "sha256"), rows))
+    return Markup("<div class='across'><h3>FMUs</h3>{}</div>").format(rows_table(("unit", "file", "sha256"), rows))
 
 
 def _value(results: CampaignResults, name: str, text: str) -> str:
