@@ -13,9 +13,9 @@ from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.handover.led_hand import end_of_track
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause, Miss, PersonsDeeds
 from handover.scenarios.free_flyer.handover.transfer import Approach, Transfer
+from handover.scenarios.free_flyer.model_mismatch import model_mismatch
 from handover.scenarios.free_flyer.parameters import HandoverParameters
 from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
-from handover.scenarios.free_flyer.untold import untold
 
 _GATE = ("gate_error", "tolerance", "gate_speed")
 """Parameters of the unit that decides: how near its place the gripper is there, m, when it is to yield, and otherwise;
@@ -100,11 +100,11 @@ class HandoverEvaluator(Evaluator):
         self._off: float | None = None  # of the object from the fingers that last closed on nothing, m
         self._undelivered = False
         self._empty = self._full = self._disturbed = 0
-        self._stability, self._untold = dict[str, Metric](), ""
+        self._stability, self._mismatch = dict[str, Metric](), ""
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
         """Read the limits of arrival of the unit that decides; one that has no such keeps those of `paper.toml`."""
-        self._untold = untold(units)
+        self._mismatch = model_mismatch(units)
         if "decision" in units:
             start = units["decision"].start
             self._gate = tuple(float(start.get(name, x)) for name, x in zip(_GATE, self._gate, strict=True))
@@ -252,7 +252,7 @@ class HandoverEvaluator(Evaluator):
             and self._failed_deliveries == self._full
         )
         cause, reason = (Cause.NONE, self._success()) if success else self._failure()
-        return Outcome(success=success, reason=reason + self._untold, metrics=self._metrics() | self._causes(cause))
+        return Outcome(success=success, reason=reason + self._mismatch, metrics=self._metrics() | self._causes(cause))
 
     def _metrics(self) -> dict[str, Metric]:
         handed = "1 if each receiver got the object in turn, never out of both hands, whatever the robot did after it"

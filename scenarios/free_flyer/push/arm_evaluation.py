@@ -25,6 +25,7 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.free_flyer.model_mismatch import model_mismatch, push_by_hand, pushed_by_hand
 from handover.scenarios.free_flyer.push.arm_parameters import ArmPushParameters, ArmTarget
 from handover.scenarios.free_flyer.push.impedance_evaluation import (
     REST_ANGLE,
@@ -37,7 +38,6 @@ from handover.scenarios.free_flyer.push.impedance_evaluation import (
     steps_of_period,
 )
 from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
-from handover.scenarios.free_flyer.untold import push_by_hand, pushed_by_hand, untold
 
 SIGNALS = (
     *(f"robot.{name}" for name in ("p_WG", "q_WG", "v_WG", "w_WG", "p_WB", "q_WB", "v_WB", "w_WB", "q_J", "v_J")),
@@ -122,11 +122,11 @@ class ArmImpedanceEvaluator(Evaluator):
         self._saturated, self._t, self._astray, self._spins = 0, 0.0, 0.0, False
         self._greatest = [0.0, 0.0]
         self._stability: dict[str, Metric] = {}
-        self._untold, self._by_hand = "", 0.0
+        self._mismatch, self._by_hand = "", 0.0
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
         """Keep what the controllers do not know of the robot."""
-        self._untold = untold(units)
+        self._mismatch = model_mismatch(units)
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Keep the motion and follow the errors."""
@@ -174,7 +174,7 @@ class ArmImpedanceEvaluator(Evaluator):
         reason = f"{back}, {joined} {verb} the impedance model {extent}{bound}{self._stopped_joints(motion)}"
         return Outcome(
             success=self._at_rest and agrees,
-            reason=reason + self._untold + pushed_by_hand(self._by_hand),
+            reason=reason + self._mismatch + pushed_by_hand(self._by_hand),
             metrics=metrics,
         )
 

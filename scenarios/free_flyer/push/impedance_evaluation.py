@@ -18,9 +18,9 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.free_flyer.model_mismatch import assumed_body, model_mismatch, push_by_hand, pushed_by_hand
 from handover.scenarios.free_flyer.parameters import Behaviour, Body, ImpedanceParameters
 from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
-from handover.scenarios.free_flyer.untold import assumed_body, push_by_hand, pushed_by_hand, untold
 
 REST_POSITION, REST_ANGLE = 0.010, 0.030
 """Errors below which the robot counts as at rest, m and rad: some three times the noise of its navigation (assumed)."""
@@ -217,11 +217,11 @@ class ImpedanceEvaluator(Evaluator):
         self._greatest = [0.0, 0.0]
         self._last = (0.0, 0.0)
         self._stability: dict[str, Metric] = {}
-        self._untold, self._model, self._by_hand = "", parameters.model, 0.0
+        self._mismatch, self._model, self._by_hand = "", parameters.model, 0.0
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
         """Keep what the controller takes the robot to be, and what it does not know of it."""
-        self._untold = untold(units)
+        self._mismatch = model_mismatch(units)
         if "impedance" in units:
             self._model = assumed_body(units["impedance"], self._model)
 
@@ -291,7 +291,7 @@ class ImpedanceEvaluator(Evaluator):
         )
         joined = "and" if agrees is self._at_rest else "but"
         thrust = f"; more was commanded than the thrusters give for {100 * share:.0f} % of the time" if share else ""
-        besides = self._untold + pushed_by_hand(self._by_hand)
+        besides = self._mismatch + pushed_by_hand(self._by_hand)
         return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}{besides}"
 
     def _back(self) -> str:

@@ -23,9 +23,9 @@ from handover.plants.free_flyer.hand.box import Box
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.handover.handover_evaluation import counted, not_over, within_patience
+from handover.scenarios.free_flyer.model_mismatch import model_mismatch
 from handover.scenarios.free_flyer.parameters import TeamParameters, TeamTask
 from handover.scenarios.free_flyer.two_robots.team_member import OneRobot, TeamCause
-from handover.scenarios.free_flyer.untold import untold
 
 _SETTLING = 1.0
 """How long the receiver must keep the object when the robots are done, s (assumed)."""
@@ -74,11 +74,11 @@ class TeamEvaluator(Evaluator):
         self._gap, self._clearance = 0.0, math.inf
         self._box = Box(scale(0.5, vector(np.array(large["object_size"]))))
         self._failed = 0
-        self._untold = ""
+        self._mismatch = ""
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
         """Keep what the controllers do not know of the robot."""
-        self._untold = untold(units)
+        self._mismatch = model_mismatch(units)
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Follow phases, who holds the object, forces and turns."""
@@ -206,7 +206,7 @@ class TeamEvaluator(Evaluator):
         metrics = self._metrics() | {
             "decided_by": Metric(int(cause), "1", f"why it failed, by number: {codes}"),
         }
-        return Outcome(success=success, reason=reason + self._untold, metrics=metrics)
+        return Outcome(success=success, reason=reason + self._mismatch, metrics=metrics)
 
     def _success(self) -> str:
         whom = "the person" if self.parameters.task is TeamTask.ROBOTS_TO_HUMAN else "both robots"

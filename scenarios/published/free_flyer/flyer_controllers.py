@@ -227,9 +227,9 @@ def _late(rows: ControllerRows) -> Claim:
     radius = linear_loop(Behaviour.RIGID, float(paper_values("free_flyer", "thrusters")["lag"]), delay).pole_radius
     note = (
         f"With this delay the rigid impedance loop has its largest pole at |z| = {radius:.3f}, so told of it the "
-        "controller does not start; untold, limits of thrust keep a growing oscillation small. Share of the run for "
-        f"which more was commanded than the rigid robot's thrusters give: {limited or 'not known'}; admittance and PID "
-        f"control clip their own commands. {unfinished_note(tried)}"
+        "controller does not start; where it is not told, limits of thrust keep a growing oscillation small. Share of "
+        "the run for which more was commanded than the rigid robot's thrusters give: "
+        f"{limited or 'not known'}; admittance and PID control clip their own commands. {unfinished_note(tried)}"
     )
     claim = f"With a {DISTURBANCES[0].label}, all controllers still hand over"
     return every_claim(claim, "", (0, 0), (succeeded(tried), len(tried)), note.strip())

@@ -15,10 +15,10 @@ from handover.scenarios.cli.command import main
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import experiment_system
 from handover.scenarios.experiment.parameters import InvalidParameter
+from handover.scenarios.free_flyer.model_mismatch import model_mismatch
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Propulsion
 from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 from handover.scenarios.free_flyer.robot_wiring import expected_lag, thruster_settings
-from handover.scenarios.free_flyer.untold import untold
 
 
 def test_a_pushed_robot_comes_back_and_moves_as_the_impedance_model_says(tmp_path: Path):
@@ -210,7 +210,7 @@ ASSUMED = "what its controllers assumed"
 def test_what_the_controllers_do_not_know_is_told_by_the_values_that_the_units_got(given: tuple[str, ...], told: str):
     task = RunRequest(subject="flyer_impedance", parameters=given).task(contextlib.ExitStack())
     system = experiment_system(task.experiment, task.parameters, task.seed, task.fmus, task.unit_values, task.options)
-    assert untold(system.units) == (f"; {told}" if told else "")
+    assert model_mismatch(system.units) == (f"; {told}" if told else "")
 
 
 def test_only_nozzles_can_be_stuck():

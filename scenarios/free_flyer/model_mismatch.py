@@ -26,13 +26,13 @@ _TIME = 1e-6
 """The same of times, s."""
 
 
-def untold(units: Mapping[str, PlacedUnit]) -> str:
+def model_mismatch(units: Mapping[str, PlacedUnit]) -> str:
     """Return what a robot's controllers do not know of it, as the end of a sentence; of each robot, if there are two.
 
     A unit of another kind, which has no such parameter, is left out.
     """
     robots = {"": "the robot's"} if "robot" in units else {f"_{r}": f"robot {r}'s" for r in ROBOTS}
-    parts = [part for suffix, whose in robots.items() for part in _untold_of(units, suffix, whose)]
+    parts = [part for suffix, whose in robots.items() for part in _mismatch_of(units, suffix, whose)]
     return "".join(f"; {part}" for part in parts)
 
 
@@ -54,7 +54,7 @@ def assumed_body(controller: PlacedUnit, otherwise: Body) -> Body:
     return Body(mass, given.get("I_B", otherwise.I_B), given.get("p_BG", otherwise.p_BG))
 
 
-def _untold_of(units: Mapping[str, PlacedUnit], suffix: str, whose: str) -> list[str]:
+def _mismatch_of(units: Mapping[str, PlacedUnit], suffix: str, whose: str) -> list[str]:
     robot, thrusters = units.get(f"robot{suffix}"), units.get(f"thrusters{suffix}")
     controllers = [c for name in _CONTROLLERS if (c := units.get(f"{name}{suffix}")) is not None]
     parts = _stuck(thrusters, whose if suffix else "")
