@@ -6,9 +6,11 @@ keep out the pages of other sites that a browser has open.
 
 import asyncio
 import contextlib
+import json
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -21,15 +23,17 @@ HEADERS = {
 """Of the pages themselves: they are not kept, not framed by another site's page, and taken for HTML alone."""
 POLICY_VIOLATION, TRY_AGAIN_LATER = 1008, 1013
 """Codes of WebSocket with which a connection is closed."""
-_SLOWEST = 2.0
-"""How long the other end may take to be told why its connection is closed, s."""
+PATIENCE = 2.0
+"""How long the other end may take to receive a message, s."""
+REFUSAL_PERIOD = 0.5
+"""Time between two refusals for one reason that a device is told, s: a flood is not answered with another one."""
 
 
-class NoText(ValueError):
-    """A binary message came where texts are taken."""
+class BinaryMessage(ValueError):
+    """A message came that is bytes, where texts are taken."""
 
 
-def same_origin(socket: WebSocket, *, browsers_only: bool = True) -> bool:
+def is_same_origin(socket: WebSocket, *, browsers_only: bool = True) -> bool:
     """Return whether a connection is from a page of this server, by its Origin header, which browsers always give.
 
     Args:
@@ -42,23 +46,35 @@ def same_origin(socket: WebSocket, *, browsers_only: bool = True) -> bool:
     return origin.partition("://")[2] == socket.headers.get("host")
 
 
-async def next_text(socket: WebSocket) -> str:
+async def receive_text(socket: WebSocket) -> str:
     """Return the next message of a connection.
 
     Raises:
-        NoText: it is binary.
+        BinaryMessage: it is bytes.
         WebSocketDisconnect: the connection has ended.
     """
     message = await socket.receive()
     if message["type"] == "websocket.disconnect":
-        raise WebSocketDisconnect(message.get("code", 1000), message.get("reason"))
+        raise WebSocketDisconnect(message.get("code", 1005), message.get("reason"))
     text = message.get("text")
     if text is None:
-        raise NoText("it is binary: texts of JSON are taken")
+        raise BinaryMessage("a message is a text, and not bytes")
     return str(text)
 
 
-async def close(socket: WebSocket, code: int, reason: str, patience: float = _SLOWEST) -> None:
+async def send(socket: WebSocket, message: str | bytes) -> None:
+    """Send a message; a connection that has ended, or does not take it in time, goes without."""
+    sending = socket.send_bytes(message) if isinstance(message, bytes) else socket.send_text(message)
+    with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError, asyncio.TimeoutError):
+        await asyncio.wait_for(sending, PATIENCE)
+
+
+async def send_json(socket: WebSocket, content: Mapping[str, Any]) -> None:
+    """Send content as JSON, see `send`."""
+    await send(socket, json.dumps(content))
+
+
+async def close(socket: WebSocket, code: int, reason: str = "", patience: float = PATIENCE) -> None:
     """Close a connection with a reason of at most 123 bytes; one that has ended already stays so.
 
     Args:
@@ -71,23 +87,26 @@ async def close(socket: WebSocket, code: int, reason: str, patience: float = _SL
         await asyncio.wait_for(socket.close(code, reason), patience)
 
 
-class FloodGuard:
-    """Tells when more messages come within a second than anybody sends who means it.
+class MessageRate:
+    """Counts the messages of a connection within the last second.
 
     Args:
-        most: messages within a second.
         clock: s.
     """
 
-    def __init__(self, most: int, clock: Callable[[], float] = time.monotonic) -> None:
-        self._arrivals: deque[float] = deque(maxlen=most)
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._arrivals: deque[float] = deque()
         self._clock = clock
-        self.reason = f"more than {most} messages in a second"
-        """Why a connection is closed that floods."""
 
-    def floods(self) -> bool:
-        """Take in a message that has come; return whether it is one too many."""
-        now, seen = self._clock(), self._arrivals
-        flooded = len(seen) == seen.maxlen and now - seen[0] < 1.0
-        seen.append(now)
-        return flooded
+    def count(self) -> int:
+        """Take in a message that has come; return how many came within the second before, with it."""
+        now, arrivals = self._clock(), self._arrivals
+        arrivals.append(now)
+        while now - arrivals[0] >= 1.0:
+            arrivals.popleft()
+        return len(arrivals)
+
+
+def too_many(most: int) -> str:
+    """Return why messages are refused, or a connection is closed, that are more than `most` in a second."""
+    return f"more than {most} messages in a second"

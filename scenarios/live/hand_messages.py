@@ -15,6 +15,8 @@ is a JSON object:
 
 The server answers first with `{"hand": {...}}`, where the hand is wanted as it stands, in the same members, and how far
 it goes (`centre`, `radius`, m); afterwards only with `{"refused": "why"}`, and the run goes on with the sample before.
+Of refusals for one reason, a device is told two a second at most; a run's folder counts all of them, in inputs.json.
+Where no hand of the run can be led, the first answer is `{"refused": "why"}`, and the connection ends with 1008.
 Whoever connects first leads the hand until the connection ends. A sample has 2000 characters at most. A message above
 the server's limit, 4 kB of `handover run --live`, 400 kB of `handover play` and 80 kB of a study, ends the connection
 with WebSocket's code 1009, whose reason says that limit; on live pages more than 2000 messages in a second end it with
@@ -58,6 +60,11 @@ class HandSample(NamedTuple):
     device: str = ""
     sent: float | None = None
 
+    @classmethod
+    def at_rest(cls, led: LedHand, stamp: float = 0.0) -> "HandSample":
+        """Return a hand where it rests, open, its axes those of W."""
+        return cls(led.p_WH_0, (1.0, 0.0, 0.0, 0.0), STRAIGHT, closed=False, stamp=stamp)
+
     def entries(self, led: LedHand) -> dict[str, Sequence[float]]:
         """Return what an `SharedInputs` takes of it."""
         values = {
@@ -67,6 +74,12 @@ class HandSample(NamedTuple):
             "closed_track": (float(self.closed),),
         }
         return {f"{led.unit}.{name}": entries for name, entries in values.items()}
+
+
+def hand_start(led: LedHand, wanted: HandSample) -> dict[str, Any]:
+    """Return, as JSON can hold it, where a hand is wanted as a device begins to lead it, and how far it goes."""
+    pose = {"p_WH": list(wanted.p_WH), "q_WH": list(wanted.q_WH), "angles": list(wanted.angles)}
+    return {**pose, "closed": wanted.closed, "centre": list(led.p_WH_0), "radius": led.reach}
 
 
 def parse_hand_message(text: str) -> HandSample:

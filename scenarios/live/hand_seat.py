@@ -1,7 +1,5 @@
 """The seat of the one device that leads a run's hand: takes its samples, and tells it which it cannot take."""
 
-import asyncio
-import contextlib
 import json
 import time
 from collections import Counter
@@ -16,25 +14,24 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live.connections import (
     POLICY_VIOLATION,
+    REFUSAL_PERIOD,
     TRY_AGAIN_LATER,
-    FloodGuard,
-    NoText,
+    BinaryMessage,
+    MessageRate,
     close,
-    next_text,
-    same_origin,
+    is_same_origin,
+    receive_text,
+    send_json,
+    too_many,
 )
-from handover.scenarios.live.hand_messages import HandSample, HandStream, InvalidHandMessage
+from handover.scenarios.live.hand_messages import HandSample, HandStream, InvalidHandMessage, hand_start
 from handover.scenarios.live.shared_inputs import SharedInputs
 from handover.scenarios.results.run_folder import write_whole
 
 INPUTS_FILE = "inputs.json"
 """Name of the file in a run's folder that says which devices led a hand, and how old samples were at their use."""
-_SLOWEST = 2.0
-"""How long a device may take to receive a message, s."""
 _MOST_MESSAGES = 2000
 """Messages of a device within a second; many more are far from any tracker, and keep the server from the page."""
-_BETWEEN = 0.5
-"""Time between two refusals for one reason that a device is told, s: who floods is not flooded."""
 
 
 class HandSeat:
@@ -61,17 +58,14 @@ class HandSeat:
 
     async def connection(self, device: WebSocket) -> None:
         """Serve one device until its connection ends."""
-        if not same_origin(device, browsers_only=False):
-            await device.close(POLICY_VIOLATION)
+        if not await accepted(device):
             return
-        await device.accept()
         if self._device is not None:
-            await _tell(device, {"refused": "another page or tracker leads the hand; it is free when that one goes"})
-            await device.close(TRY_AGAIN_LATER)
+            await refuse(device, "another page or tracker leads the hand; it is free when that one goes")
             return
         self._device = device
         try:
-            await _tell(device, {"hand": self._greeting()})
+            await send_json(device, {"hand": hand_start(self._led, self._now())})
             await self._follow(device)
         except (WebSocketDisconnect, RuntimeError):
             pass
@@ -79,43 +73,32 @@ class HandSeat:
             self._device = None
 
     async def _follow(self, device: WebSocket) -> None:
-        stream, name, told = HandStream(self._led), "", dict[str, float]()
-        guard = FloodGuard(_MOST_MESSAGES)
+        stream, name, last_told, rate = HandStream(self._led), "", dict[str, float](), MessageRate()
         while True:
             try:
-                text: str | NoText = await next_text(device)
-            except NoText as e:
-                text = e
-            if guard.floods():
-                self._refused[guard.reason] += 1
-                await close(device, POLICY_VIOLATION, guard.reason)
+                fault, text = "", await receive_text(device)
+            except BinaryMessage as e:
+                fault, text = str(e), ""
+            if rate.count() > _MOST_MESSAGES:
+                reason = too_many(_MOST_MESSAGES)
+                self._refused[reason] += 1
+                await close(device, POLICY_VIOLATION, reason)
                 return
             try:
-                if isinstance(text, NoText):
-                    raise InvalidHandMessage(str(text))
+                if fault:
+                    raise InvalidHandMessage(fault)
                 sample, stamp = stream.take(text)
             except InvalidHandMessage as e:
                 reason, now = str(e), time.monotonic()
                 kind = reason.partition(":")[0]
                 self._refused[kind] += 1
-                if now - told.get(kind, 0.0) >= _BETWEEN:
-                    told[kind] = now
-                    await _tell(device, {"refused": reason})
+                if now - last_told.get(kind, 0.0) >= REFUSAL_PERIOD:
+                    last_told[kind] = now
+                    await send_json(device, {"refused": reason})
                 continue
             name = sample.device or name
             self._samples[name or "unnamed"] += 1
             self._inputs.set(sample.entries(self._led), stamp)
-
-    def _greeting(self) -> dict[str, Any]:
-        now, led = self._now(), self._led
-        return {
-            "p_WH": list(now.p_WH),
-            "q_WH": list(now.q_WH),
-            "angles": list(now.angles),
-            "closed": now.closed,
-            "centre": list(led.p_WH_0),
-            "radius": led.reach,
-        }
 
     def report(self) -> Mapping[str, Any]:
         """Return by which devices the hand was led, what was refused, and how old samples were at their use."""
@@ -133,6 +116,16 @@ class HandSeat:
             write_whole(folder / INPUTS_FILE, json.dumps(self.report(), indent=2) + "\n")
 
 
-async def _tell(device: WebSocket, content: Mapping[str, Any]) -> None:
-    with contextlib.suppress(TimeoutError, asyncio.TimeoutError):
-        await asyncio.wait_for(device.send_text(json.dumps(content)), _SLOWEST)
+async def accepted(device: WebSocket) -> bool:
+    """Accept a device's connection; return whether that was done, and not refused as of another site's page."""
+    if not is_same_origin(device, browsers_only=False):
+        await device.close(POLICY_VIOLATION)
+        return False
+    await device.accept()
+    return True
+
+
+async def refuse(device: WebSocket, reason: str, code: int = TRY_AGAIN_LATER) -> None:
+    """Tell a device that was accepted why it cannot lead the hand, and close its connection."""
+    await send_json(device, {"refused": reason})
+    await close(device, code, reason)

@@ -19,7 +19,7 @@ from starlette.routing import BaseRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.exceptions import RecordNotWritten
+from handover.cosim.exceptions import RecordNotWritten, nearest
 from handover.cosim.master.live_control import LiveControl
 from handover.scenarios.experiment.time_plot import TimePlot
 from handover.scenarios.live.body_pushes import BodyPushes
@@ -37,12 +37,14 @@ from handover.scenarios.live.commands import (
 from handover.scenarios.live.connections import (
     HEADERS,
     POLICY_VIOLATION,
-    FloodGuard,
-    NoText,
+    BinaryMessage,
+    MessageRate,
     close,
-    next_text,
-    same_origin,
+    is_same_origin,
+    receive_text,
+    too_many,
 )
+from handover.scenarios.live.hand_seat import accepted, refuse
 from handover.scenarios.live.live_html import begun_content, figure_json, live_html
 from handover.scenarios.live.live_scene import LiveScene
 from handover.scenarios.live.shown_run import ShownRun
@@ -61,6 +63,8 @@ _PATIENCE = 120.0
 """How long a run may take until its first row, s."""
 _EARLY = 8.0
 """How long a device that leads a hand may come before the run's first row, s."""
+_NO_RUN = "no run has begun yet whose hand could be led"
+_NO_HAND = "nobody outside leads a hand in this run; -p hand=outside lets one, where the scenario has that parameter"
 _POLL = 0.02
 """How often a folder is looked at until its run has begun, s."""
 
@@ -98,7 +102,7 @@ class LivePage:
 
     async def connection(self, page: WebSocket) -> None:
         """Serve one page until it is closed."""
-        if not same_origin(page):
+        if not is_same_origin(page):
             await page.close(POLICY_VIOLATION)
             return
         await page.accept()
@@ -113,15 +117,15 @@ class LivePage:
 
     async def _listen(self, page: WebSocket) -> None:
         """Carry out a page's commands, until it is closed or floods."""
-        guard = FloodGuard(_MOST_MESSAGES)
+        rate = MessageRate()
         while True:
             try:
-                text = await next_text(page)
-            except NoText as e:
+                text = await receive_text(page)
+            except BinaryMessage as e:
                 text = None
                 await self.send(page, {"refused": str(e)})
-            if guard.floods():
-                await close(page, POLICY_VIOLATION, guard.reason)
+            if rate.count() > _MOST_MESSAGES:
+                await close(page, POLICY_VIOLATION, too_many(_MOST_MESSAGES))
                 return
             if text is not None:
                 await self._execute(page, text)
@@ -131,10 +135,10 @@ class LivePage:
         late = time.monotonic() + _EARLY
         while (self.shown is None or self.shown.scene is None) and time.monotonic() < late:
             await asyncio.sleep(_POLL)
-        if self.shown is None or self.shown.seat is None:
-            await device.close(POLICY_VIOLATION)
-        else:
+        if self.shown is not None and self.shown.seat is not None:
             await self.shown.seat.connection(device)
+        elif await accepted(device):
+            await refuse(device, _NO_RUN if self.shown is None else _NO_HAND, POLICY_VIOLATION)
 
     async def greet(self, page: WebSocket) -> None:
         """Tell a page that has connected what is shown."""
@@ -181,7 +185,7 @@ class LivePage:
             self._push(page, value)
             return
         if name not in self.commands:
-            raise InvalidCommand(f"no command {name!r}: {', '.join(self.commands)} are")
+            raise InvalidCommand(f"no command {name!r}: {nearest(name, self.commands)}")
         if name in ("choose", "see"):
             viewer = self._viewers.of(page)
             if name == "choose":
@@ -209,7 +213,7 @@ class LivePage:
         self.shown = self.shown or shown
         late = time.monotonic() + _PATIENCE
         while shown.scene is None:
-            if shown.run.is_over or failed() or time.monotonic() > late:
+            if shown.run.has_verdict or failed() or time.monotonic() > late:
                 break
             if scene := await asyncio.to_thread(shown.run.scene):
                 shown.begin(scene)
@@ -233,7 +237,7 @@ class LivePage:
     async def _follow(self, shown: ShownRun, scene: LiveScene, failed: Callable[[], bool]) -> None:
         loop = asyncio.get_running_loop()
         last_plots, last_pictures, started = 0.0, 0.0, False
-        while not shown.run.is_over and not failed():
+        while not shown.run.has_verdict and not failed():
             began = loop.time()
             if self._viewers.ready and began - last_pictures >= _PICTURE_PERIOD:
                 last_pictures = began
@@ -281,7 +285,7 @@ class LivePage:
         """Called when another run is shown."""
 
     async def _end(self, shown: ShownRun) -> None:
-        if shown.scene is None and not shown.run.is_over:  # it never began: whoever began it says why
+        if shown.scene is None and not shown.run.has_verdict:  # it never began: whoever began it says why
             return
         if shown.scene is not None:
             record = whole_record_of(shown.run.folder)
@@ -337,11 +341,11 @@ class LivePage:
             for page in pages:
                 viewer = self._viewers.of(page)
                 if viewer.ready and tuple(viewer.chosen) == chosen:
-                    told = [
+                    content = [
                         {"title": plot.title, "figure": figures.get(i, "") if i in viewer.seen else ""}
                         for i, plot in enumerate(plots)
                     ]
-                    await self.send(page, {"plots": told})
+                    await self.send(page, {"plots": content})
 
     async def tell(self, content: Any) -> None:
         """Send content to all pages."""

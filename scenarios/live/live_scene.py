@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.growing_record import GrowingRecord
 from handover.cosim.record.reader import Record
-from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.live_inputs import LedHand, Pushable
@@ -188,11 +187,9 @@ class LiveScene:
 
     def wanted_hand(self, led: LedHand) -> HandSample:
         """Return where a hand is wanted in the newest row; at its rest, open, where the record does not tell."""
-        q: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
-        now = HandSample(led.p_WH_0, q, STRAIGHT, closed=False, stamp=self.time)
         names = [f"{led.unit}.{name}" for name in ("p_WH_goal", "q_WH_goal", "finger_goal", "closed_goal")]
         if not all(name in self._record for name in names):
-            return now
+            return HandSample.at_rest(led, self.time)
         p, q_WH, angles = (tuple(self._record[name][-1].tolist()) for name in names[:3])
         return HandSample(p, q_WH, angles, closed=bool(self._record[names[3]][-1]), stamp=self.time)
 

@@ -194,10 +194,10 @@ def faults_by_name(request: RunRequest, names: Sequence[str]) -> dict[str, str]:
 
 
 def _by_name(faults: Sequence[str], names: Sequence[str]) -> dict[str, str]:
-    told: dict[str, list[str]] = {}
+    found: dict[str, list[str]] = {}
     for fault in faults:
-        told.setdefault(named_in(fault, names), []).append(fault)
-    return {name: "; ".join(texts) for name, texts in told.items()}
+        found.setdefault(named_in(fault, names), []).append(fault)
+    return {name: "; ".join(texts) for name, texts in found.items()}
 
 
 def named_in(fault: str, names: Sequence[str]) -> str:

@@ -126,7 +126,7 @@ class PlayPage(LivePage):
             self._wanted = choice_of(value, self._session.names, seeded=self._session.seeded)
             self._changed.set()
         elif name in ("show", "report"):
-            number = run_number(value, [run.number for run in self._runs if run.watched.is_over])
+            number = run_number(value, [run.number for run in self._runs if run.watched.has_verdict])
             run = next(run for run in self._runs if run.number == number)
             await (self._write_report(page, run) if name == "report" else self._show_again(run))
         else:
@@ -213,7 +213,7 @@ class PlayPage(LivePage):
         while not run.has_ended:
             await asyncio.sleep(_POLL)
         if run.is_refused:
-            self._faults = {named_in(run.told, self._session.names): run.told}
+            self._faults = {named_in(run.error, self._session.names): run.error}
             self._runs.remove(run)
             await self.tell(self._about_choice())
         self._release(run)

@@ -90,24 +90,24 @@ class PlayedRun:
         return f"handover run {shlex.join([*self._common, *folder])}"
 
     @property
-    def is_over(self) -> bool:
+    def has_exited(self) -> bool:
         """Whether its process has ended."""
-        return self._process.is_over
+        return self._process.has_exited
 
     @property
     def has_ended(self) -> bool:
         """Whether it has its verdict, or its process has ended without one."""
-        return self.watched.is_over or self.is_over
+        return self.watched.has_verdict or self.has_exited
 
     @property
     def is_refused(self) -> bool:
         """Whether its process has ended before there was anything of the run."""
-        return self.is_over and not self.watched.folder.is_there
+        return self.has_exited and not self.watched.folder.is_there
 
     @property
-    def told(self) -> str:
-        """What its process told last on standard error."""
-        return self._process.told.removeprefix("Error: ")
+    def error(self) -> str:
+        """The last error that its process wrote on standard error."""
+        return self._process.last_error.removeprefix("Error: ")
 
     def end(self) -> None:
         """Let it end after its step."""
@@ -142,13 +142,13 @@ class PlayedRun:
         }
         summary = _summary_of(self.watched.folder)
         if not summary:
-            state, reason = ("lost", self.watched.why_lost) if self.is_over else ("under way", "")
+            state, reason = ("lost", self.watched.why_lost) if self.has_exited else ("under way", "")
             return {**facts, "state": state, "reason": reason, "metrics": []}
         state = "succeeded" if summary.get("success") else "ended by a change" if self.superseded else "failed"
         metrics: Mapping[str, Any] = summary.get("metrics", {})
         shown = [(name, metrics[name]) for name in (headline or metrics) if name in metrics]
-        told = [{"name": name, "about": m.get("description", ""), "text": format_metric(m)} for name, m in shown]
-        return {**facts, "state": state, "reason": str(summary.get("reason", "")), "metrics": told}
+        metric_rows = [{"name": name, "about": m.get("description", ""), "text": format_metric(m)} for name, m in shown]
+        return {**facts, "state": state, "reason": str(summary.get("reason", "")), "metrics": metric_rows}
 
 
 def _summary_of(folder: RunFolder) -> dict[str, Any]:

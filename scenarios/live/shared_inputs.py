@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.exceptions import nearest
 from handover.cosim.system.time_series import ExternalSource
 
 Integers = NDArray[np.int64]
@@ -172,7 +173,7 @@ class SharedInputs:
 
     def _entries_of(self, name: str, value: Any) -> Floats:
         if name not in self.sizes:
-            raise UnknownInput(f"no input {name!r}: {', '.join(self.sizes)} are")
+            raise UnknownInput(f"no input {name!r}: {nearest(name, self.sizes)}")
         entries = np.asarray(value, dtype=np.float64).ravel()
         if len(entries) != self.sizes[name]:
             raise ValueError(f"{name} takes {self.sizes[name]} values, not {len(entries)}")

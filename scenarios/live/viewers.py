@@ -8,10 +8,7 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from handover.scenarios.live.connections import TRY_AGAIN_LATER, close
-
-_SLOWEST = 2.0
-"""How long a page may take to receive a message, s."""
+from handover.scenarios.live.connections import PATIENCE, TRY_AGAIN_LATER, close
 
 _THAWED = 60.0
 """How long a page that was too slow may take until it hears that, s; by then the server's pings have ended it."""
@@ -35,7 +32,7 @@ class Viewers:
             that it does not stand still as if nothing happened.
     """
 
-    def __init__(self, gone: Callable[[WebSocket], None], slowest: float = _SLOWEST) -> None:
+    def __init__(self, gone: Callable[[WebSocket], None], slowest: float = PATIENCE) -> None:
         self._gone, self._slowest = gone, slowest
         self._pages: dict[WebSocket, Viewer] = {}
         self._closing: set[asyncio.Task[None]] = set()

@@ -25,6 +25,8 @@ _PROGRAM = (
     "from handover.scenarios.live.waiting_command import wait_for_arguments; wait_for_arguments();"
     " from handover.scenarios.cli.entry import main; main()"
 )
+_ERRORS = "stderr"
+"""File of what such a process writes on standard error, in the folder that is shared with it."""
 _PATIENCE = 10.0
 """How long a process may take to end once its standard input is closed, s."""
 
@@ -40,17 +42,17 @@ class WaitingCommand:
         self._scratch = tempfile.TemporaryDirectory(prefix="handover-play-")
         self.folder = Path(self._scratch.name)
         """A folder for what this process and that one share."""
-        with open(self.folder / "told", "wb") as told:
+        with open(self.folder / _ERRORS, "wb") as errors:
             self.process = subprocess.Popen(
                 [sys.executable, "-c", _PROGRAM, scenario],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
-                stderr=told,
+                stderr=errors,
                 start_new_session=True,
             )
 
     def call(self, arguments: Sequence[str]) -> None:
-        """Let it be the command with these arguments; if its process has ended, `is_over` says so."""
+        """Let it be the command with these arguments; if its process has ended, `has_exited` says so."""
         assert self.process.stdin is not None
         try:
             self.process.stdin.write(json.dumps(list(arguments)).encode() + b"\n")
@@ -59,14 +61,14 @@ class WaitingCommand:
             self.process.kill()
 
     @property
-    def is_over(self) -> bool:
+    def has_exited(self) -> bool:
         """Whether its process has ended."""
         return self.process.poll() is not None
 
     @property
-    def told(self) -> str:
-        """The last line that it wrote on standard error."""
-        lines = (self.folder / "told").read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    def last_error(self) -> str:
+        """The last line that it wrote on standard error, "" if none."""
+        lines = (self.folder / _ERRORS).read_text(encoding="utf-8", errors="replace").strip().splitlines()
         return lines[-1] if lines else ""
 
     def close(self) -> None:

@@ -69,7 +69,7 @@ class WatchedRun:
         return ": ".join(str(run[key]) for key in ("scenario", "title") if run.get(key))
 
     @property
-    def is_over(self) -> bool:
+    def has_verdict(self) -> bool:
         """Whether the run has written its verdict."""
         return (self.folder.path / "summary.json").is_file()
 

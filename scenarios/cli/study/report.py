@@ -117,7 +117,7 @@ def withdraw(folder: Path, participant: str, *, delete: bool) -> None:
     """
     with one_line_errors(), _opened(folder) as study:
         from handover.scenarios.study.folder.session_folder import pseudonym_of
-        from handover.scenarios.study.session.protocol import now
+        from handover.scenarios.study.folder.session_notes import timestamp
 
         number = _number(study, participant)
         check_place(folder)
@@ -125,7 +125,7 @@ def withdraw(folder: Path, participant: str, *, delete: bool) -> None:
         if shown := page.exists() or (folder / "results").exists():
             require_extra("reports", "the page, which is written again without the participant")
         with study.held():
-            withdrawal = study.withdraw(number, now(), delete=delete)
+            withdrawal = study.withdraw(number, timestamp(), delete=delete)
             if shown:
                 from handover.scenarios.study.report.report_page import write_study_report
 

@@ -114,8 +114,8 @@ def questionnaire_columns(plan: StudyPlan) -> tuple[Column, ...]:
     for question in plan.questions:
         words = text.choices.get(question.name, ())
         meanings = "; ".join(f"{c}: {w}" for c, w in zip(question.choices, words, strict=True))
-        told = text.questions[question.name] + (f" ({meanings})" if meanings else "")
-        asked.append(Column(question.name, TEXT, "", told, optional=True))
+        meaning = text.questions[question.name] + (f" ({meanings})" if meanings else "")
+        asked.append(Column(question.name, TEXT, "", meaning, optional=True))
     return (*WHO, *asked)
 
 

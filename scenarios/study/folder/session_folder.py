@@ -14,11 +14,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from handover.scenarios.catalog import scenario_of
-from handover.scenarios.results.run_facts import whole_record_of
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
-    RunFolder,
     check_place,
     disk_errors_reported,
     read_object,
@@ -80,7 +77,7 @@ class RoundRecord:
     Attributes:
         ended: date and time by ISO 8601.
         success, reason: as the run's summary has them.
-        failed_by_rule: see `failed_by_rule`.
+        failed_by_rule: see `session.trial.failed_by_rule`.
         void, void_reason: whether the round does not count, and why.
         latency_median_ms, latency_p95_ms, latency_max_ms, age_at_use_ms, missed_deadlines: None if not measured.
     """
@@ -310,7 +307,7 @@ class SessionFolder:
         """Return the rows of `rounds.csv`."""
         records = self.records
         return [
-            {**self._of_round(planned), **asdict(record), "marked_over_limit": self._is_over(record)}
+            {**self._of_round(planned), **asdict(record), "marked_over_limit": self._is_late(record)}
             for planned in self.rounds
             if (record := records.get(planned.number)) is not None
         ]
@@ -367,7 +364,7 @@ class SessionFolder:
         what = {"round": r.number, "task": condition.task, "behaviour": condition.behaviour}
         return {**self._who, **what, "period": r.period, "scenario": condition.scenario, "seed": r.seed}
 
-    def _is_over(self, record: RoundRecord) -> bool | None:
+    def _is_late(self, record: RoundRecord) -> bool | None:
         p95 = record.latency_p95_ms
         return None if p95 is None else p95 > self.plan.latency_limit
 
@@ -375,26 +372,3 @@ class SessionFolder:
 def pseudonym_of(number: int) -> str:
     """Return the name of a participant in all files, such as P01."""
     return f"P{number:02d}"
-
-
-def failed_by_rule(run: RunFolder) -> bool | None:
-    """Return whether a round failed by the thesis's rule alone; None where its record does not say who held the object.
-
-    "It was considered a successful object handover when the object was transferred between the giver and the receiver
-    being always in contact with at least one of the agents", [Fernandes2020] sec. 5.6; once it was held at all. A robot
-    that does not notice, or gives up afterwards, has not failed by this rule.
-
-    Raises:
-        InvalidRunFolder: it is not the folder of a run, or damaged.
-    """
-    about = run.read_run()
-    record = whole_record_of(run)
-    receivers: Sequence[str] = getattr(scenario_of(about["scenario"], about.get("source", {})), "receivers", ())
-    if record is None or not receivers or "person.holder" not in record:
-        return None
-    names = record.items("person.holder")
-    holders = [names.get(int(code), "") for code in record["person.holder"]]
-    held = holders[next((k for k, holder in enumerate(holders) if holder != "FREE"), len(holders)) :]
-    rest = iter(held)
-    received = all(any(holder == receiver for holder in rest) for receiver in receivers)  # one after the other
-    return not received or "FREE" in held or held[-1] != receivers[-1]

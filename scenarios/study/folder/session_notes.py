@@ -4,6 +4,7 @@ import json
 import shutil
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,11 @@ class Withdrawal:
     ended: str
     during: bool = True
     deleted: str = ""
+
+
+def timestamp() -> str:
+    """Return the present date and time by ISO 8601."""
+    return datetime.now(timezone.utc).astimezone().isoformat(timespec="seconds")
 
 
 class SessionNotes:

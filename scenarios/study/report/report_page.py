@@ -78,12 +78,12 @@ def _header(analysis: StudyAnalysis) -> Markup:
         lines.append(Markup("<p class='verdict bad'><b>Scripted pilot</b>: no person took part.</p>"))
     who = _counted(n, PILOT if plan.pilot else "participant")
     counted, played = len(analysis.counted), len(analysis.rounds)
-    told = f"{plan.participants} are planned; {counted} of {played} rounds that were played count."
+    text = f"{plan.participants} are planned; {counted} of {played} rounds that were played count."
     if incomplete:
-        told += f" Not complete: {', '.join(incomplete)}."
+        text += f" Not complete: {', '.join(incomplete)}."
     if withdrawn := len(analysis.study.withdrawals):
-        told += f" {_counted(withdrawn, 'participant')} withdrew, and {'is' if withdrawn == 1 else 'are'} in no result."
-    lines.append(Markup("<p class='verdict'><b>{}</b>: {}</p>").format(who, told))
+        text += f" {_counted(withdrawn, 'participant')} withdrew, and {'is' if withdrawn == 1 else 'are'} in no result."
+    lines.append(Markup("<p class='verdict'><b>{}</b>: {}</p>").format(who, text))
     if n:
         lines.append(note(balance_of_complete(plan, [s.session.number for s in analysis.complete_sessions])))
     if 0 < n < MIN_PARTICIPANTS:

@@ -63,17 +63,17 @@ def failures_section(analysis: StudyAnalysis, words: Words) -> Section:
     header = ("task", "behaviour", "failed", "rounds", "failed, 95 %", "not successful")
     table = rows_table(header, rows, numbers=(2, 3, 4, 5), caption=f"Rounds that failed by the rule: {words.whose}")
     unjudged = sum(c.unjudged for c in analysis.failures)
-    told = (
+    text = (
         "The rule of [Fernandes2020] sec. 5.6: the object was not transferred, or was out of both hands in between. "
         "Intervals of Clopper and Pearson, which take rounds for independent, though two are of one participant. Not "
         "successful: as a run of the scenario is judged, which asks more than the rule."
     )
     if unjudged:
-        told += f" Rounds whose record does not say who held the object, and which are left out: {unjudged}."
+        text += f" Rounds whose record does not say who held the object, and which are left out: {unjudged}."
     return Section(
         anchor="failures",
         title="Failures",
-        html=table + note(told) + _failure_tests(analysis, words) + _failed_rounds(analysis, words),
+        html=table + note(text) + _failure_tests(analysis, words) + _failed_rounds(analysis, words),
     )
 
 
@@ -201,7 +201,7 @@ def tests_section(analysis: StudyAnalysis, words: Words) -> Section:
     header = ("statement", "task", "participants", words.first, words.second, "shift, 95 %", "p", "p, Holm")
     caption = f"{words.first} − {words.second}: {words.whose}"
     table = rows_table(header, rows, numbers=range(2, 8), caption=caption)
-    told = (
+    text = (
         "Means of the participants' means; shift of Hodges and Lehmann with its exact interval; p: exact Wilcoxon "
         f"signed-rank test, two-sided; Holm: corrected over the {analysis.tested} tests that "
         f"were made, of {len(rows)}."
@@ -212,7 +212,7 @@ def tests_section(analysis: StudyAnalysis, words: Words) -> Section:
         figure = shifts_figure(tested, words.text.task_names, f"{words.first} − {words.second}, points")
         plot = plot_html(figure, 90 + 42 * len(tested), "shifts with intervals")
     few = _too_few_note([t.participants for t in analysis.rating_tests])
-    return Section(anchor="tests", title="Tests of ratings", html=plot + table + note(told + few))
+    return Section(anchor="tests", title="Tests of ratings", html=plot + table + note(text + few))
 
 
 def _of_test(test: SignedRankTest | None) -> tuple[str, str]:
@@ -240,14 +240,14 @@ def order_section(analysis: StudyAnalysis, words: Words) -> Section:
     rows = [(meant[e.effect], e.measure, str(e.participants), *_of_test(e.test)) for e in analysis.order_effects]
     header = ("order", "measure", "participants", "shift, 95 %", "p")
     table = rows_table(header, rows, numbers=(2, 3, 4), caption=f"Order effects: {words.whose}")
-    told = (
+    text = (
         "Slopes within a participant's conditions by least squares, so that no effect of behaviour or task is in them. "
         "The round's number, or the period, is fitted together with the behaviour before, so that void "
         "rounds or unbalanced orders leave neither in the other; the first round, after nothing, is left out. Over "
         "participants by the exact signed-rank test, not corrected. Ratings in points, failures as 0 or 1."
     )
     few = _too_few_note([e.participants for e in analysis.order_effects])
-    return Section(anchor="order", title="Order effects", html=table + note(told + few))
+    return Section(anchor="order", title="Order effects", html=table + note(text + few))
 
 
 def model_section(analysis: StudyAnalysis, words: Words) -> Section:
@@ -256,14 +256,14 @@ def model_section(analysis: StudyAnalysis, words: Words) -> Section:
     header = ("statement", "effect", "log-odds, 95 %", "p")
     html = rows_table(header, rows, numbers=(2, 3), caption=f"Mixed ordinal model: {words.whose}")
     html += Markup().join(note(f"{m.statement}: no model, as {m.reason}.") for m in analysis.models if m.model is None)
-    told = (
+    text = (
         "A supplement: a cumulative logit model by maximum likelihood, in which each participant has an intercept and, "
         "in each task, a slope of the behaviour, as participants differ in how much it matters to them; their standard "
         "deviations are in the first lines of each statement. Wald intervals are approximate, the tests above are "
         "exact. Tasks and period have no slopes in the model, so that their intervals would be too narrow: estimates "
         f"alone are given. A positive effect of the behaviour: {words.first} is rated higher."
     )
-    return Section(anchor="model", title="Mixed ordinal model", html=html + note(told))
+    return Section(anchor="model", title="Mixed ordinal model", html=html + note(text))
 
 
 def _model_rows(m: StatementModel, analysis: StudyAnalysis, words: Words) -> list[tuple[str, ...]]:

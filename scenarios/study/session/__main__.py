@@ -32,13 +32,13 @@ if __name__ == "__main__":
     threading.Thread(target=_end_with_parent, daemon=True).start()
     spec = json.loads(sys.argv[1])
     inputs, control = SharedInputs(Path(spec["inputs"])), LiveControl(Path(spec["control"]))
-    with Interruption() as interruption, contextlib.ExitStack() as opened:
+    with Interruption() as interruption, contextlib.ExitStack() as resources:
         task = RunRequest(
             subject=spec["scenario"],
             parameters=spec["parameters"],
             seed=spec["seed"],
             out=Path(spec["out"]),
             presented=False,
-            sources=InputSources(inputs.sources(), spec["told"], where="the study's page", is_complete=True),
-        ).task(opened)
+            sources=InputSources(inputs.sources(), spec["led_by"], where="the study's page", is_complete=True),
+        ).task(resources)
         run_task(task, lambda _t, _end: None, interruption, control=control)

@@ -13,10 +13,10 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.live_inputs import LedHand
 
-_AT_REST = np.array([-0.40, 0.10, -0.05])
-"""Where the hand rests, in W, m: `p_WH_0` of the person's unit."""
 _ENDS = (("x", (0.18, 0.0, 0.0)), ("y", (0.0, 0.15, 0.0)), ("z", (0.0, 0.0, 0.12)))
+"""Ways along each axis of W from where the hand rests to the places to which it is moved, m (assumed)."""
 _TURNS = (("roll", (1.0, 0.0, 0.0)), ("pitch", (0.0, 1.0, 0.0)), ("yaw", (0.0, 0.0, 1.0)))
 """Axes in W, about which the hand is turned from where it rests: x away from the person, y to the left, z up."""
 _CLOSE, _ANGLE, _STAY = 0.03, 0.4, 0.3
@@ -44,14 +44,16 @@ class DeviceTest:
 
     Args:
         device: by which the hand is led.
+        led: the hand.
 
     Attributes:
         reached: what was done.
     """
 
-    def __init__(self, device: str) -> None:
+    def __init__(self, device: str, led: LedHand) -> None:
         turns = [(f"{sign}{axis}", None) for axis, _ in _TURNS for sign in "+-"] if device in TURNING else []
-        self._asked = [*_places(), *turns, *(("fist", None) for _ in range(_FISTS))]
+        self._unit = led.unit
+        self._asked = [*_places(np.array(led.p_WH_0)), *turns, *(("fist", None) for _ in range(_FISTS))]
         self.reached: list[Reached] = []
         self._since, self._there = 0.0, 0.0
         self._last: float | None = None
@@ -80,11 +82,11 @@ class DeviceTest:
         if len(self.reached) == len(self._asked):
             return first
         name, place = self._asked[len(self.reached)]
-        closed = bool(row["person.closed_goal"][0])
+        closed = bool(row[f"{self._unit}.closed_goal"][0])
         if name == "fist":
             is_done, self._was_closed = closed and not self._was_closed, closed
         else:
-            near = _is_turned(row, name) if place is None else _is_near(row, place)
+            near = self._is_near(row, place) if place is not None else _is_turned(row[f"{self._unit}.q_WH"][0], name)
             self._there = self._there + dt if near else 0.0
             is_done, self._was_closed = self._there >= _STAY, closed
         if not is_done:
@@ -93,21 +95,18 @@ class DeviceTest:
         self._since, self._there = t, 0.0
         return True
 
-
-def _places() -> list[tuple[str, Floats | None]]:
-    """Return the ends along each axis, in W, m."""
-    return [
-        (f"{sign}{axis}", _AT_REST + s * np.array(way)) for axis, way in _ENDS for sign, s in (("+", 1.0), ("-", -1.0))
-    ]
+    def _is_near(self, row: Record, place: Floats) -> bool:
+        return float(np.linalg.norm(row[f"{self._unit}.p_WH"][0] - place)) < _CLOSE
 
 
-def _is_near(row: Record, place: Floats) -> bool:
-    return float(np.linalg.norm(row["person.p_WH"][0] - place)) < _CLOSE
+def _places(rest: Floats) -> list[tuple[str, Floats | None]]:
+    """Return the ends along each axis from where the hand rests, in W, m."""
+    return [(f"{sign}{axis}", rest + s * np.array(way)) for axis, way in _ENDS for sign, s in (("+", 1.0), ("-", -1.0))]
 
 
-def _is_turned(row: Record, name: str) -> bool:
+def _is_turned(q_WH: Floats, name: str) -> bool:
     """Return whether the hand is turned from its rest, where its axes are those of W, as far as is asked for."""
-    w, *v = row["person.q_WH"][0].tolist()
+    w, *v = q_WH.tolist()
     sine = float(np.linalg.norm(v))
     angle = 2.0 * float(np.arctan2(sine, abs(w))) * (1.0 if w >= 0.0 else -1.0)
     turned = float(np.dot(v, dict(_TURNS)[name[1:]])) / sine * angle if sine > 0.0 else 0.0

@@ -226,16 +226,16 @@ class ScriptedPilot:
             if isinstance(message, bytes):
                 await self._see(message)
                 continue
-            told = json.loads(message)
-            if "refused" in told or "gone" in told:
-                raise PilotRefused(str(told.get("refused") or told.get("gone")))
-            if "scene" in told:
-                self._scene, self._hand = SeenScene(told["scene"]), None
+            content = json.loads(message)
+            if "refused" in content or "gone" in content:
+                raise PilotRefused(str(content.get("refused") or content.get("gone")))
+            if "scene" in content:
+                self._scene, self._hand = SeenScene(content["scene"]), None
                 await self._send({"ready": True})
-            elif "target" in told:
-                self._target = told["target"]
-            elif "screen" in told:
-                self.screen = told["screen"]
+            elif "target" in content:
+                self._target = content["target"]
+            elif "screen" in content:
+                self.screen = content["screen"]
                 if self.screen["screen"] != "practising":
                     self._target = None
                 if self.screen["screen"] in ("thanks", "complete", "withdrawn"):

@@ -4,6 +4,7 @@ import numpy as np
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.study.folder.session_folder import SessionFolder
+from handover.scenarios.study.plan.led_hands import led_hand_of
 from handover.scenarios.study.session.device_test import DeviceTest
 from handover.scenarios.study.session.trial import Trial
 
@@ -29,7 +30,7 @@ class Practice:
     def __init__(self, session: SessionFolder) -> None:
         self.session = session
         self.done = 0.0
-        self.test = DeviceTest(session.session.device)
+        self.test = DeviceTest(session.session.device, led_hand_of(PRACTICE, ()))
 
     @property
     def left(self) -> float:
@@ -65,4 +66,4 @@ def is_lost(trial: Trial) -> bool:
     row = trial.newest
     if row is None or trial.first_place is None:
         return False
-    return float(np.linalg.norm(row["person.p_WO"][0] - trial.first_place)) > _LOST_FROM
+    return float(np.linalg.norm(row[f"{trial.led.unit}.p_WO"][0] - trial.first_place)) > _LOST_FROM

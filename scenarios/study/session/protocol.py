@@ -12,12 +12,11 @@ is written of who does not agree, or may not take part.
 import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from datetime import datetime, timezone
 from typing import Any, cast
 
-from handover.cosim.exceptions import RecordNotWritten
+from handover.cosim.exceptions import RecordNotWritten, nearest
 from handover.scenarios.study.folder.session_folder import RoundRecord, Session, SessionFolder
-from handover.scenarios.study.folder.session_notes import VoidAttempt, Withdrawal
+from handover.scenarios.study.folder.session_notes import VoidAttempt, Withdrawal, timestamp
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.order import Round
 from handover.scenarios.study.plan.plan import DEVICES, StudyText
@@ -171,11 +170,11 @@ class Protocol:
         if attempt < MOST_ATTEMPTS:
             aside = session.clear_unfinished(planned.number)
             folder = "" if aside is None else aside.name
-            session.record_void_attempt(VoidAttempt(planned.number, attempt, now(), reason, folder))
+            session.record_void_attempt(VoidAttempt(planned.number, attempt, timestamp(), reason, folder))
         else:
             session.record_round(
                 planned.number,
-                RoundRecord(ended=now(), success=False, reason="not judged", void=True, void_reason=reason),
+                RoundRecord(ended=timestamp(), success=False, reason="not judged", void=True, void_reason=reason),
             )
         self.screen, self.void_reason = "void", reason
 
@@ -207,13 +206,13 @@ class Protocol:
     def _continue(self, value: Any) -> None:
         unfinished = {s.session.number: s.session.pseudonym for s in self._unfinished}
         if isinstance(value, bool) or not isinstance(value, int) or value not in unfinished:
-            right = ", ".join(f"{number} ({name})" for number, name in unfinished.items()) or "none"
-            raise InvalidAction(f"no unfinished session of number {value!r}: {right} are")
+            valid = ", ".join(f"{number} ({name})" for number, name in unfinished.items()) or "there is none"
+            raise InvalidAction(f"no unfinished session has the number {value!r}: {valid}")
         self._sit_down(value)
 
     def _choose_language(self, value: Any) -> None:
         if not isinstance(value, str) or value not in self.study.plan.texts:
-            raise InvalidAction(f"no language {value!r}: {', '.join(self.study.plan.texts)} are")
+            raise InvalidAction(f"no language {value!r}: {nearest(str(value), self.study.plan.texts)}")
         self._language, self.screen = value, "consent"
 
     def _consent(self, value: Any) -> None:
@@ -235,7 +234,7 @@ class Protocol:
             given = cast(dict[str, Any], value)
             value, settings = given.get("device"), given.get("settings", {})
         if value not in self._devices:
-            raise InvalidAction(f"no device {value!r}: {', '.join(self._devices)} are")
+            raise InvalidAction(f"no device {value!r}: {nearest(str(value), self._devices)}")
         session = Session(
             number=self.number,
             device=value,
@@ -244,7 +243,7 @@ class Protocol:
             consent=True,
             eligibility=self._eligibility,
             pilot=self.study.plan.pilot,
-            started=now(),
+            started=timestamp(),
         )
         self.session = self.study.begin(session)
         self.screen = self._next_of_session()
@@ -290,7 +289,7 @@ class Protocol:
         """End the session, as the participant wants; what was kept until then is in no result."""
         if self.session is None or self.screen in ("thanks", "withdrawn", "declined"):
             raise InvalidAction("no session is under way")
-        self.session.notes.keep_withdrawal(Withdrawal(now()))
+        self.session.notes.keep_withdrawal(Withdrawal(timestamp()))
         self.screen = "withdrawn"
 
     def _start_anew(self, _value: Any) -> None:
@@ -310,6 +309,11 @@ class Protocol:
         }
         return {**shown, **self._details(text)}
 
+    @property
+    def _void(self) -> dict[str, str]:
+        """Why the round does not count, or the practice begins again."""
+        return {"reason": self.void_reason, "cause": VoidCause.of(self.void_reason)}
+
     def _details(self, text: StudyText) -> dict[str, Any]:
         plan, planned = self.study.plan, self.round
         match self.screen:
@@ -324,14 +328,12 @@ class Protocol:
             case "device":
                 return {"devices": {name: DEVICES[name] for name in self._devices}}
             case "practice" | "practising":
-                told = {"reason": self.void_reason, "cause": VoidCause.of(self.void_reason)}
-                return {"practice": text.practice, "seconds": plan.practice, **told}
+                return {"practice": text.practice, "seconds": plan.practice, **self._void}
             case "instruction" | "round":
                 begins = {} if planned is None else round_to_play(plan, planned, text)
                 return {**begins, "practice_over": self._practice_over}
             case "void":
-                told = {"reason": self.void_reason, "cause": VoidCause.of(self.void_reason)}
-                return {**told, "again": planned is not None}
+                return {**self._void, "again": planned is not None}
             case "rating":
                 return rating(plan, self._begun.unrated_round, text)
             case "questions":
@@ -361,11 +363,6 @@ SCREENS = (
     "complete",
 )
 """What a page can show."""
-
-
-def now() -> str:
-    """Return date and time by ISO 8601."""
-    return datetime.now(timezone.utc).astimezone().isoformat(timespec="seconds")
 
 
 def _settings_of(given: Any) -> dict[str, Any]:

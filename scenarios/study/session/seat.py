@@ -16,7 +16,6 @@ Texts to the page are JSON objects with one of `screen`, `scene`, `target`, `aga
 
 import asyncio
 import contextlib
-import json
 import math
 import time
 import traceback
@@ -28,6 +27,16 @@ from typing import Any, cast
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.cosim.exceptions import RecordNotWritten
+from handover.scenarios.live.connections import (
+    REFUSAL_PERIOD,
+    BinaryMessage,
+    MessageRate,
+    close,
+    receive_text,
+    send,
+    send_json,
+    too_many,
+)
 from handover.scenarios.live.hand_messages import DeviceClock, InvalidHandMessage
 from handover.scenarios.results.run_folder import InvalidRunFolder
 from handover.scenarios.study.folder.session_folder import RoundRecord
@@ -35,11 +44,11 @@ from handover.scenarios.study.plan.led_hands import round_parameters
 from handover.scenarios.study.plan.order import Round
 from handover.scenarios.study.plan.plan import TRACKER, WEBCAM
 from handover.scenarios.study.session import page_messages
-from handover.scenarios.study.session.page_messages import MessageRate, parse_message, received_text
+from handover.scenarios.study.session.page_messages import SEAT_TAKEN, TOO_MANY, parse_message
 from handover.scenarios.study.session.practice import PRACTICE, Practice, is_lost
 from handover.scenarios.study.session.protocol import InvalidAction, Protocol
 from handover.scenarios.study.session.screen_content import VoidCause
-from handover.scenarios.study.session.trial import Trial, TrialFailed, Wanted
+from handover.scenarios.study.session.trial import Trial, TrialFailed, TrialRequest
 
 PERIOD = 1.0 / 60.0
 """Time between two states of the run that the page gets, s."""
@@ -47,8 +56,6 @@ SILENCE = 3.0
 """Time without a sample of the hand after which a device is lost, and the round void, s (assumed)."""
 _READY = 60.0
 """How long a page may take to draw the scene for the first time, s."""
-_SLOWEST = 2.0
-"""How long a page may take to receive a message, s."""
 
 
 class StudySeat:
@@ -91,15 +98,14 @@ class StudySeat:
     async def sit(self, page: WebSocket) -> None:
         """Let a page that was accepted have the seat until it goes; another one is told that it is taken."""
         if self._leaving.locked():
-            await self._within_time(page.send_text(json.dumps({"wait": "one_moment"})))
+            await send_json(page, {"wait": "one_moment"})
         async with self._leaving:
             is_free = self._page is None
             if is_free:
                 self._page, self._page_clock, self._page_offset = page, DeviceClock(), math.nan
         if not is_free:
-            await self._within_time(page.send_text(json.dumps({"gone": "seat_taken"})))
-            with contextlib.suppress(RuntimeError):
-                await page.close(code=4001)
+            await send_json(page, {"gone": "seat_taken"})
+            await close(page, SEAT_TAKEN)
             return
         try:
             await self._send({"tracker": self._has_tracker})
@@ -118,27 +124,32 @@ class StudySeat:
             await self._leave(VoidCause.SERVER_ENDED.value)
 
     async def _listen(self, page: WebSocket) -> None:
-        rate, told = MessageRate(), -1.0
+        rate, last_told = MessageRate(), 0.0
         while True:
-            text = await received_text(page)
-            rate.add()
-            if rate.is_flood:
+            try:
+                fault, text = "", await receive_text(page)
+            except BinaryMessage as e:
+                fault, text = str(e), ""
+            count = rate.count()
+            if count > page_messages.FLOOD:
                 await self._send({"gone": "flood"})
-                await page.close(code=4002)
+                await close(page, TOO_MANY)
                 return
-            if rate.count > page_messages.MOST_A_SECOND:
-                if time.monotonic() - told >= 1.0:
-                    told = time.monotonic()
-                    await self._send({"refused": f"more than {page_messages.MOST_A_SECOND} messages in a second"})
+            if count > page_messages.MOST_A_SECOND:
+                if time.monotonic() - last_told >= REFUSAL_PERIOD:
+                    last_told = time.monotonic()
+                    await self._send({"refused": too_many(page_messages.MOST_A_SECOND)})
                 continue
             try:
+                if fault:
+                    raise InvalidAction(fault)
                 await self._take(text)
             except (InvalidAction, ValueError) as e:
                 await self._send({"refused": str(e)})
             except (RecordNotWritten, InvalidRunFolder, OSError) as e:
                 await self._send({"refused": f"it could not be kept: {e}"})
 
-    async def _take(self, text: str | None) -> None:
+    async def _take(self, text: str) -> None:
         """Do what a message asks for.
 
         Raises:
@@ -208,7 +219,7 @@ class StudySeat:
         """Let the next run stand at its start, while the person reads what is to be done."""
         self._fault = ""
         try:
-            self._trial = trial = await Trial.opened(self._next_wanted())
+            self._trial = trial = await Trial.open(self._next_request())
             await asyncio.to_thread(trial.begin)
         except (TrialFailed, RecordNotWritten, InvalidRunFolder) as e:
             self._fault = str(e)
@@ -216,21 +227,22 @@ class StudySeat:
             traceback.print_exc()
             self._fault = f"{VoidCause.SERVER_FAILED.value}: {type(e).__name__}: {e}"
 
-    def _next_wanted(self) -> Wanted:
+    def _next_request(self) -> TrialRequest:
         session, protocol = self.protocol.session, self.protocol
         assert session is not None
-        told: dict[str, Any] = {"kind": session.session.kind, "device": session.session.device}
+        led_by: dict[str, Any] = {"kind": session.session.kind, "device": session.session.device}
         if session.session.device == WEBCAM:
-            told["webcam"] = {"sha256": dict(self._webcam)}
+            led_by["webcam"] = {"sha256": dict(self._webcam)}
         if protocol.screen in ("practice", "practising"):
             out = _free_folder(session.path / "practice")
-            return Wanted(PRACTICE, self.practice.parameters, 0, out, told, self._pace)
+            return TrialRequest(PRACTICE, self.practice.parameters, 0, out, led_by, self._pace)
         planned = protocol.round
         assert planned is not None
         session.clear_unfinished(planned.number)
         c = planned.condition
         given = round_parameters(c)
-        return Wanted(c.scenario, given, planned.seed, session.run_folder(planned.number), told, self._pace)
+        out = session.run_folder(planned.number)
+        return TrialRequest(c.scenario, given, planned.seed, out, led_by, self._pace)
 
     async def _play(self) -> None:
         """Carry out the round, or the practice, that is shown, to its end."""
@@ -369,17 +381,12 @@ class StudySeat:
         frame = trial.frame(always=always)
         page = self._page
         if frame is not None and page is not None:
-            await self._within_time(page.send_bytes(frame.packed()))
+            await send(page, frame.packed())
 
     async def _send(self, message: dict[str, Any]) -> None:
         page = self._page
         if page is not None:
-            await self._within_time(page.send_text(json.dumps(message)))
-
-    @staticmethod
-    async def _within_time(sending: Any) -> None:
-        with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError, asyncio.TimeoutError):
-            await asyncio.wait_for(sending, _SLOWEST)
+            await send_json(page, message)
 
 
 def _free_folder(path: Path) -> Path:

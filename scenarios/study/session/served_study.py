@@ -137,8 +137,8 @@ def line_of_round(plan: StudyPlan, number: int, planned: Round, ended: RoundReco
     if ended.latency_median_ms is None or ended.latency_p95_ms is None:
         return line
     line += f"; from the hand to the picture {ended.latency_median_ms:.0f} ms, at 95 % {ended.latency_p95_ms:.0f} ms"
-    is_over = ended.latency_p95_ms > plan.latency_limit
-    return line + (f", over the plan's {plan.latency_limit:g} ms: the round is marked" if is_over else "")
+    is_late = ended.latency_p95_ms > plan.latency_limit
+    return line + (f", over the plan's {plan.latency_limit:g} ms: the round is marked" if is_late else "")
 
 
 def address_of(listening: socket.socket, server: StudyServer) -> str:

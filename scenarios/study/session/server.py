@@ -23,7 +23,7 @@ from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from handover.scenarios.live.connections import HEADERS
+from handover.scenarios.live.connections import HEADERS, POLICY_VIOLATION, is_same_origin
 from handover.scenarios.live.webcam import WEBCAM_SCRIPTS, WebcamFiles
 from handover.scenarios.reporting.html import json_html
 from handover.scenarios.reporting.page import asset, plain_page_html, template
@@ -119,9 +119,8 @@ class StudyServer:
         return HTMLResponse(html, headers=HEADERS)
 
     async def _connection(self, page: WebSocket) -> None:
-        origin = page.headers.get("origin", "")
-        if origin.partition("://")[2] != page.headers.get("host"):
-            await page.close(code=1008)
+        if not is_same_origin(page):
+            await page.close(POLICY_VIOLATION)
             return
         await page.accept()
         await self.seat.sit(page)

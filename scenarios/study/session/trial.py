@@ -19,19 +19,21 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.record.reader import Record
+from handover.scenarios.catalog import scenario_of
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.replay import Line
-from handover.scenarios.live.hand_messages import HandStream, hand_sample
+from handover.scenarios.live.hand_messages import HandStream, hand_sample, hand_start
 from handover.scenarios.live.live_scene import LiveScene
 from handover.scenarios.live.shared_inputs import SharedInputs
 from handover.scenarios.live.watched_run import WatchedRun
+from handover.scenarios.results.run_facts import whole_record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
-from handover.scenarios.study.folder.session_folder import RoundRecord, failed_by_rule
+from handover.scenarios.study.folder.session_folder import RoundRecord
+from handover.scenarios.study.folder.session_notes import timestamp
 from handover.scenarios.study.plan.led_hands import led_hand_of
 from handover.scenarios.study.session.latency import LatencyLog, median_ms
-from handover.scenarios.study.session.protocol import now
 
 _POLL = 0.02
 """How often a run's folder is looked at until it stands at its start, s."""
@@ -52,7 +54,7 @@ class TrialFailed(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class TrialRequest:
     """What is to be run.
 
     Attributes:
@@ -60,7 +62,7 @@ class Wanted:
         parameters: texts `NAME=VALUE`.
         seed: of all random numbers.
         out: the run's folder.
-        told: what the run's folder is to say of who leads the hand.
+        led_by: what the run's folder is to say of who leads the hand.
         pace: simulated seconds per second of wall time.
     """
 
@@ -68,7 +70,7 @@ class Wanted:
     parameters: Sequence[str]
     seed: int
     out: Path
-    told: Mapping[str, Any]
+    led_by: Mapping[str, Any]
     pace: float = 1.0
 
 
@@ -93,7 +95,7 @@ class Trial:
     """A run that waits at its start until `go`; it is killed at `close` at the latest.
 
     Args:
-        wanted: what is to be run.
+        request: what is to be run.
 
     Raises:
         NoHand, InvalidParameter: nobody outside can lead its hand, or a parameter is invalid.
@@ -105,29 +107,29 @@ class Trial:
         first_place: of the object, in W, m; None before the run stands at its start.
     """
 
-    def __init__(self, wanted: Wanted) -> None:
-        self.wanted = wanted
+    def __init__(self, request: TrialRequest) -> None:
+        self.request = request
         self.latency = LatencyLog()
         self.scene: LiveScene | None = None
         self.first_place: Floats | None = None
-        self.led = led_hand_of(wanted.scenario, wanted.parameters)
-        with contextlib.ExitStack() as opened:  # what fails here leaves nothing behind
-            place = Path(opened.enter_context(tempfile.TemporaryDirectory(prefix="handover-study-")))
-            self._control = LiveControl.create(place / "control", wanted.pace, paused=True)
-            opened.callback(self._control.close)
+        self.led = led_hand_of(request.scenario, request.parameters)
+        with contextlib.ExitStack() as resources:  # what fails here leaves nothing behind
+            place = Path(resources.enter_context(tempfile.TemporaryDirectory(prefix="handover-study-")))
+            self._control = LiveControl.create(place / "control", request.pace, paused=True)
+            resources.callback(self._control.close)
             self._inputs = SharedInputs.create(place / "inputs", self.led.inputs, [self.led.age])
-            opened.callback(self._inputs.close)
-            self._told = opened.enter_context(open(place / "told", "w+b"))
+            resources.callback(self._inputs.close)
+            self._errors = resources.enter_context(open(place / "stderr", "w+b"))
             self._stream = HandStream(self.led)
             self._stamps: deque[tuple[int, float]] = deque(maxlen=_MOST_STAMPS)
-            self._process = self._started(place)
-            self._run = WatchedRun(wanted.out)
-            self._opened = opened.pop_all()
+            self._process = self._start_process(place)
+            self._run = WatchedRun(request.out)
+            self._resources = resources.pop_all()
 
     @classmethod
-    async def opened(cls, wanted: Wanted) -> "Trial":
-        """Return a trial that was opened in a thread; where nobody waits for it any more, it is closed again."""
-        opening = asyncio.ensure_future(asyncio.to_thread(cls, wanted))
+    async def open(cls, request: TrialRequest) -> "Trial":
+        """Open a trial in a thread; where nobody waits for it any more, it is closed again."""
+        opening = asyncio.ensure_future(asyncio.to_thread(cls, request))
         try:
             return await asyncio.shield(opening)
         except asyncio.CancelledError:
@@ -135,21 +137,21 @@ class Trial:
                 await asyncio.to_thread((await opening).close)
             raise
 
-    def _started(self, place: Path) -> "subprocess.Popen[bytes]":
-        """Return the process of the run."""
-        wanted = self.wanted
+    def _start_process(self, place: Path) -> "subprocess.Popen[bytes]":
+        """Start the process of the run."""
+        request = self.request
         spec = {
-            "scenario": wanted.scenario,
-            "parameters": list(wanted.parameters),
-            "seed": wanted.seed,
-            "out": str(wanted.out),
+            "scenario": request.scenario,
+            "parameters": list(request.parameters),
+            "seed": request.seed,
+            "out": str(request.out),
             "control": str(place / "control"),
             "inputs": str(place / "inputs"),
-            "told": {"from": "page", **wanted.told},
+            "led_by": {"from": "page", **request.led_by},
         }
         command = [sys.executable, "-m", "handover.scenarios.study.session", json.dumps(spec)]
         return subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=self._told, start_new_session=True
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=self._errors, start_new_session=True
         )
 
     def begin(self) -> None:
@@ -192,16 +194,16 @@ class Trial:
         plumbs = [Line(label=PLUMB, colour=colour, points=hidden, width=_WIDTH) for colour in (_HAND, _OBJECT)]
         content = self.scene.content_for_person([ball, *plumbs])
         if content is None:
-            raise TrialFailed(f"nothing can be seen of {self.wanted.scenario}: {self._no_scene()}")
+            raise TrialFailed(f"nothing can be seen of {self.request.scenario}: {self._no_scene()}")
         return content
 
     def _no_scene(self) -> str:
         """Return why nothing of the run can be drawn."""
         assert self.scene is not None
-        kind = find_scenario(self.wanted.scenario)
+        kind = find_scenario(self.request.scenario)
         faults = ToleratedFaults()
         with faults.tolerated("the scene"):
-            kind().replay(parse_parameters(kind, self.wanted.parameters), self.scene.newest)
+            kind().replay(parse_parameters(kind, self.request.parameters), self.scene.newest)
         return "; ".join(faults.lines) or "the scenario has no scene"
 
     def go(self) -> None:
@@ -236,10 +238,7 @@ class Trial:
     def hand(self) -> dict[str, Any]:
         """Where the hand is wanted as it stands, and how far it goes, as `handInput` takes it."""
         assert self.scene is not None
-        wanted = self.scene.wanted_hand(self.led)
-        pose = {"p_WH": list(wanted.p_WH), "q_WH": list(wanted.q_WH), "angles": list(wanted.angles)}
-        reach = {"centre": list(self.led.p_WH_0), "radius": self.led.reach}
-        return {**pose, "closed": wanted.closed, **reach}
+        return hand_start(self.led, self.scene.wanted_hand(self.led))
 
     def frame(self, *, always: bool = False) -> Frame | None:
         """Return what is there to be seen, None if nothing is new; `always`: also then."""
@@ -266,7 +265,7 @@ class Trial:
             TrialFailed: it has not, or its folder is damaged.
         """
         self._process.wait(_GRACE)
-        run = RunFolder.of_run(self.wanted.out)
+        run = RunFolder.of_run(self.request.out)
         try:
             summary = run.read_summary()
             rule = failed_by_rule(run)
@@ -278,7 +277,7 @@ class Trial:
             raise TrialFailed(f"the run did not come to its end: {summary.get('reason', '')}")
         pace: Mapping[str, Any] = summary.get("pace") or {}
         return RoundRecord(
-            ended=now(),
+            ended=timestamp(),
             success=bool(summary.get("success")),
             reason=str(summary.get("reason", "")),
             failed_by_rule=rule,
@@ -294,8 +293,8 @@ class Trial:
         status = self._process.poll()
         if status is None:
             return f"the simulation did not begin within {_PATIENCE:.0f} s"
-        self._told.seek(0)
-        lines = self._told.read().decode(errors="replace").strip().splitlines()
+        self._errors.seek(0)
+        lines = self._errors.read().decode(errors="replace").strip().splitlines()
         how = f"killed by signal {-status}" if status < 0 else f"status {status}"
         return f"the simulation's process ended ({how})" + (f": {lines[-1][:300]}" if lines else "")
 
@@ -309,4 +308,27 @@ class Trial:
         self._process.wait()
         if self._process.stdin is not None:
             self._process.stdin.close()
-        self._opened.close()
+        self._resources.close()
+
+
+def failed_by_rule(run: RunFolder) -> bool | None:
+    """Return whether a round failed by the thesis's rule alone; None where its record does not say who held the object.
+
+    "It was considered a successful object handover when the object was transferred between the giver and the receiver
+    being always in contact with at least one of the agents", [Fernandes2020] sec. 5.6; once it was held at all. A robot
+    that does not notice, or gives up afterwards, has not failed by this rule.
+
+    Raises:
+        InvalidRunFolder: it is not the folder of a run, or damaged.
+    """
+    about = run.read_run()
+    record = whole_record_of(run)
+    receivers: Sequence[str] = getattr(scenario_of(about["scenario"], about.get("source", {})), "receivers", ())
+    if record is None or not receivers or "person.holder" not in record:
+        return None
+    names = record.items("person.holder")
+    holders = [names.get(int(code), "") for code in record["person.holder"]]
+    held = holders[next((k for k, holder in enumerate(holders) if holder != "FREE"), len(holders)) :]
+    rest = iter(held)
+    received = all(any(holder == receiver for holder in rest) for receiver in receivers)  # one after the other
+    return not received or "FREE" in held or held[-1] != receivers[-1]

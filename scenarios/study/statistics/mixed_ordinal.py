@@ -40,7 +40,14 @@ _MAX_ERROR = 50.0
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect on the log-odds of a higher rating, with its Wald interval at 95 % and p-value, by Student's t."""
+    """An effect on the log-odds of a higher rating.
+
+    Attributes:
+        estimate: by maximum likelihood.
+        error: its standard error.
+        low, high: its Wald interval at 95 %.
+        p: of Wald's test that there is no effect.
+    """
 
     estimate: float
     error: float
@@ -54,10 +61,10 @@ class MixedModel:
     """A fitted model.
 
     Attributes:
-        effects: of the columns of x, in order.
-        thresholds: between the categories that were used, in order.
-        deviation: of the participants' intercepts.
-        slope_deviation: of their slopes; None of a model without them.
+        effects: beta, of the columns of x, in order.
+        thresholds: theta, between the categories that were used, in order.
+        deviation: standard deviation sigma of the participants' intercepts, on the scale of log-odds.
+        slope_deviation: tau, likewise of their slopes; None of a model without them.
         log_likelihood: at its maximum.
     """
 
@@ -77,11 +84,11 @@ class Slopes:
     """Random slopes of groups.
 
     Attributes:
-        of: what a slope is of, for each rating, such as 0.5 and -0.5 of two behaviours.
+        covariate: z of each rating, such as 0.5 and -0.5 of two behaviours.
         block: in which block a rating is, such as its task: a group has a slope of its own in each.
     """
 
-    of: Sequence[float]
+    covariate: Sequence[float]
     block: Sequence[object]
 
 
@@ -149,7 +156,7 @@ class _Likelihood:
             raise NotFitted("the data do not tell its effects apart")
         self.thresholds, self.has_slopes = len(used) - 1, slopes is not None
         self._shares = np.bincount(of) / len(of)
-        z = np.zeros(len(of)) if slopes is None else np.asarray(slopes.of, dtype=np.float64)
+        z = np.zeros(len(of)) if slopes is None else np.asarray(slopes.covariate, dtype=np.float64)
         kinds, kind = np.unique(np.column_stack([of, x, z]), axis=0, return_inverse=True)
         self.y: NDArray[np.int64] = kinds[:, 0].astype(np.int64)
         self.x, self._z = kinds[:, 1:-1], kinds[:, -1]

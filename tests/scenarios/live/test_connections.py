@@ -17,7 +17,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live.commands import InvalidCommand, parse_command
-from handover.scenarios.live.connections import HEADERS, FloodGuard
+from handover.scenarios.live.connections import HEADERS, MessageRate
 from handover.scenarios.live.hand_messages import HandSample
 from handover.scenarios.live.hand_seat import HandSeat
 from handover.scenarios.live.live_page import LivePage
@@ -93,14 +93,14 @@ def test_a_binary_message_and_deep_json_are_refused_and_the_connection_goes_on(t
         page.longest = 100_000
         async with opened(host, "run") as browser, opened(host, "hand") as tracker:
             await browser.send(b"\x00")
-            assert "binary" in (await answer(browser))["refused"]
+            assert "not bytes" in (await answer(browser))["refused"]
             await browser.send("[" * 50_000)
             assert "not JSON" in (await answer(browser))["refused"]
             await browser.send('{"command": "fly"}')
             assert "no command 'fly'" in (await answer(browser))["refused"]
             await answer(tracker)
             await tracker.send(b"\x00")
-            assert "binary" in (await answer(tracker))["refused"]
+            assert "not bytes" in (await answer(tracker))["refused"]
             sample = {"p_WH": LED.p_WH_0, "q_WH": [1, 0, 0, 0], "closed": False, "stamp": 1.0}
             await tracker.send(json.dumps(sample))
             while page.inputs.read() is None:
@@ -155,10 +155,12 @@ def test_a_page_that_is_too_slow_is_closed_with_the_reason(tmp_path: Path):
 
 def test_messages_are_counted_over_a_second():
     now = [0.0]
-    guard = FloodGuard(3, lambda: now[0])
-    assert [guard.floods() for _ in range(4)] == [False, False, False, True]
+    rate = MessageRate(lambda: now[0])
+    assert [rate.count() for _ in range(3)] == [1, 2, 3]
+    now[0] = 0.5
+    assert rate.count() == 4
     now[0] = 1.0
-    assert not guard.floods()
+    assert rate.count() == 2
 
 
 def test_deep_json_is_no_command():

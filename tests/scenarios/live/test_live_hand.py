@@ -9,7 +9,7 @@ import pytest
 from live_runs import LIVE, TOLD, live_run, shown
 from opened_page import wait_until
 from playwright.sync_api import Browser, Page
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 import handover
@@ -139,5 +139,9 @@ def test_a_tracker_leads_the_hand_and_what_it_may_not_send_is_refused(tmp_path: 
 def test_a_run_whose_hand_nobody_leads_from_outside_has_no_seat_for_one(tmp_path: Path):
     with live_run(tmp_path / "led", scenario="flyer_human_to_robot") as (address, _):
         host = address.removeprefix("http://").rstrip("/")
-        with pytest.raises(InvalidStatus, match="403"):
-            connect(f"ws://{host}/hand")
+        with connect(f"ws://{host}/hand", open_timeout=60.0) as device:
+            assert "hand=outside" in json.loads(device.recv())["refused"]
+            with pytest.raises(ConnectionClosed) as closed:
+                device.recv()
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1008

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.study.session.device_test import DeviceTest
 
+REST = (-0.4, 0.1, -0.05)
+LED = LedHand("person", REST, 0.8)
 ANGLES = {"roll": 0, "pitch": 1, "yaw": 2}
 
 
@@ -28,29 +31,29 @@ def stays(test: DeviceTest, t: float, shown: Record) -> float:
 
 
 def test_places_turns_and_fists_are_asked_for_one_after_the_other():
-    test, t, rest = DeviceTest("mouse"), 0.0, [-0.4, 0.1, -0.05]
+    test, t = DeviceTest("mouse", LED), 0.0
     while len(test.reached) < 6:
         t = stays(test, t, row(test.target["place"]))
     for name in ("+roll", "-roll", "+pitch", "-pitch", "+yaw", "-yaw"):
         assert (test.target["name"], test.target["place"]) == (name, None)
         axis, sign = ANGLES[name[1:]], 1.0 if name[0] == "+" else -1.0
         for wrong in ((axis, -sign * 0.6), (axis, sign * 0.3), ((axis + 1) % 3, sign * 0.6)):
-            t = stays(test, t, row(rest, wrong))
+            t = stays(test, t, row(REST, wrong))
         assert test.target["name"] == name
-        t = stays(test, t, row(rest, (axis, sign * 0.45)))
+        t = stays(test, t, row(REST, (axis, sign * 0.45)))
     for _ in range(2):
         assert test.target["name"] == "fist"
-        t = stays(test, t, row(rest))
-        t = stays(test, t, row(rest, closed=True))
+        t = stays(test, t, row(REST))
+        t = stays(test, t, row(REST, closed=True))
     assert test.target == {"name": "", "place": None, "done": 14, "of": 14}
     assert [r["name"] for r in test.shown["reached"]] == test.shown["asked"]
 
 
 def test_the_same_turn_by_the_other_quaternion_counts():
-    test, t = DeviceTest("tracker"), 0.0
+    test, t = DeviceTest("tracker", LED), 0.0
     while len(test.reached) < 6:
         t = stays(test, t, row(test.target["place"]))
-    shown = cast(dict[str, Any], row([-0.4, 0.1, -0.05], (0, 0.5)))
+    shown = cast(dict[str, Any], row(REST, (0, 0.5)))
     shown["person.q_WH"] = -shown["person.q_WH"]
     stays(test, t, cast(Record, shown))
     assert test.target["name"] == "-roll"
@@ -58,4 +61,4 @@ def test_the_same_turn_by_the_other_quaternion_counts():
 
 @pytest.mark.parametrize("device", ["touch", "script"])
 def test_devices_that_do_not_turn_the_hand_are_not_asked_to(device: str):
-    assert DeviceTest(device).shown["asked"] == ["+x", "-x", "+y", "-y", "+z", "-z", "fist", "fist"]
+    assert DeviceTest(device, LED).shown["asked"] == ["+x", "-x", "+y", "-y", "+z", "-z", "fist", "fist"]

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from sample_study import PLAN, play, record, same, session
 
+from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.reporting.page import asset
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.session.device_test import DeviceTest
@@ -14,6 +15,7 @@ from handover.scenarios.study.session.protocol import MOST_ATTEMPTS, SCREENS, In
 from handover.scenarios.study.session.screen_content import VoidCause
 from handover.scenarios.study.session.server import page_words
 
+PRACTISED = DeviceTest("mouse", LedHand("person", (0.0, 0.0, 0.0), 0.8)).shown
 RATINGS = {"S1": 7, "S2": 8, "S3": 9}
 
 
@@ -30,7 +32,7 @@ def begun(path: Path) -> Protocol:
 def practised(path: Path) -> Protocol:
     protocol = begun(path)
     protocol.act("begin")
-    protocol.end_practice(DeviceTest("mouse").shown)
+    protocol.end_practice(PRACTISED)
     return protocol
 
 
@@ -39,7 +41,7 @@ def test_a_session_goes_from_consent_to_thanks_and_all_of_it_is_kept(tmp_path: P
     seen = [protocol.screen]
     protocol.act("begin")
     seen.append(protocol.screen)
-    protocol.end_practice(DeviceTest("mouse").shown)
+    protocol.end_practice(PRACTISED)
     for planned in list(protocol.study.session(1).rounds):
         seen.append(protocol.screen)
         assert protocol.content()["task"] == planned.condition.task
@@ -96,7 +98,7 @@ def test_an_unfinished_session_is_not_another_persons(tmp_path: Path):
     assert (shown["participant"], shown["new"]) == (None, "P02")
     refused: list[object] = [2, True, "1", {}, None]
     for wrong in refused:
-        with pytest.raises(InvalidAction, match=r"1 \(P01\) are"):
+        with pytest.raises(InvalidAction, match=r": 1 \(P01\)$"):
             protocol.act("continue", wrong)
     protocol.act("new")
     assert (protocol.number, protocol.screen) == (2, "language")
@@ -110,7 +112,7 @@ def test_after_a_participant_who_was_named_it_is_asked_who_comes_next(tmp_path: 
     practised(tmp_path / "study")
     study = StudyFolder.opened(tmp_path / "study", PLAN)
     begun = study.begin(session(5))
-    begun.notes.keep_practice(DeviceTest("mouse").shown)
+    begun.notes.keep_practice(PRACTISED)
     play(begun, same)
     protocol = Protocol(study, PLAN.devices, number=5)
     assert protocol.screen == "thanks"

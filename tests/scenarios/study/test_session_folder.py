@@ -18,10 +18,11 @@ from sample_study import PILOT_PLAN, PLAN, play, record, same, session, write_st
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.study.folder.codebook import PILOT
-from handover.scenarios.study.folder.session_folder import SessionFolder, failed_by_rule
+from handover.scenarios.study.folder.session_folder import SessionFolder
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.order import rounds_of
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
+from handover.scenarios.study.session.trial import failed_by_rule
 
 _TYPES = {"text": "string", "whole number": "Int64", "number": "Float64", "true or false": "boolean"}
 
