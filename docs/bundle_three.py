@@ -1,4 +1,4 @@
-"""Make `scenarios/reporting/page/three.min.js` anew: the parts of three.js that `scene.js` uses, in one file.
+"""Make `scenarios/reporting/page/three.min.js` anew: the parts of three.js that our scripts use, in one file.
 
 Needs npm. The version is pinned below; the licence is copied beside the file.
 
@@ -13,6 +13,7 @@ from pathlib import Path
 
 THREE, ESBUILD = "0.187.0", "0.28.1"
 PAGE = Path(__file__).parents[1] / "scenarios" / "reporting" / "page"
+SCRIPTS = ("scene_objects.js", "scene.js")
 ADDONS = {
     "OrbitControls": "controls/OrbitControls.js",
     "LineSegments2": "lines/LineSegments2.js",
@@ -22,8 +23,8 @@ ADDONS = {
 
 
 def main() -> None:
-    """Bundle what `scene.js` names after `THREE.`."""
-    names = set(re.findall(r"\bTHREE\.(\w+)", (PAGE / "scene.js").read_text(encoding="utf-8")))
+    """Bundle what the `SCRIPTS` name after `THREE.`."""
+    names = {name for script in SCRIPTS for name in re.findall(r"\bTHREE\.(\w+)", (PAGE / script).read_text("utf-8"))}
     core = ", ".join(sorted(names - set(ADDONS)))
     lines = [f'export {{ {core} }} from "three";']
     lines += [f'export {{ {name} }} from "three/addons/{path}";' for name, path in ADDONS.items() if name in names]

@@ -40,7 +40,7 @@ def phase_changes(record: Record, phases: str | Sequence[Phase]) -> list[tuple[f
     return [(p.begin, p.name) for p in phases]
 
 
-SCENE_SCRIPTS = ("three.min.js", "replay_shapes.js", "scene.js", "viewport.js", "recorder.js")
+SCENE_SCRIPTS = ("three.min.js", "replay_shapes.js", "scene_objects.js", "scene.js", "viewport.js", "recorder.js")
 """What a page needs to draw a scene."""
 _MARGIN = 0.04
 """Margin around what is drawn, as a share of its longest side."""
@@ -262,7 +262,7 @@ VIEWPORT_HTML = Markup(
     '<button type="button" class="replay-wake"><span>Tap to turn and zoom</span></button></div>'
 )
 """Where a scene is drawn."""
-FILM_HTML = Markup('<button type="button" class="replay-film" hidden>save as film</button>')
+FILM_HTML = Markup('<button type="button" class="replay-film" hidden>record a video</button>')
 """The button that records a scene, where the browser can."""
 
 

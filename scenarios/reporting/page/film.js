@@ -1,21 +1,22 @@
-// Shows one moment of a run after another, for who films it from outside (scenarios/film):
-//   film.show(t)   everything at t, s; the promise is kept when it is seen
+// Shows one frame of a film after another, for who takes them from outside (scenarios/film):
+//   film.show(t)   everything at t, s; the promise is kept when it has been rendered
 // What is shown depends on t alone, not on what was shown before.
 "use strict";
 const film = (() => {
   const root = document.querySelector(".film"), content = page.data(root);
-  const told = root.querySelector(".film-told"), run = content.scene;
-  const DASHES = {dash: "dashed", longdash: "dashed", longdashdot: "dashed", dot: "dotted"};
+  const readout = root.querySelector(".film-time"), run = content.scene;
+  const DASHES = {dash: "6 3", longdash: "10 4", longdashdot: "10 3 2 3", dot: "2 3"};  // px
   let scene = null, time = null;
 
   // Names of curves by samples of their lines, which take less room than Plotly's.
-  function legendOf({data, layout}) {
+  function createLegend({data, layout}) {
     const legend = document.createElement("div");
     legend.className = "film-legend";
     for (const {name, line} of layout.showlegend ? data : []) {
-      const sample = document.createElement("i"), entry = document.createElement("span");
-      sample.style.borderTop = `2px ${DASHES[line.dash] ?? "solid"} ${line.color}`;
-      entry.append(sample, name);
+      const entry = document.createElement("span");
+      entry.textContent = name;
+      entry.insertAdjacentHTML("afterbegin", '<svg viewBox="0 0 24 8"><path d="M0 4H24" fill="none" stroke-width="2"/></svg>');
+      Object.assign(entry.querySelector("path").style, {stroke: line.color, strokeDasharray: DASHES[line.dash] ?? "none"});
       legend.append(entry);
     }
     return legend;
@@ -25,7 +26,7 @@ const film = (() => {
   async function fill(divs) {
     const plots = divs.map(div => {
       const figure = page.data(div), last = div === divs.at(-1), {layout} = figure;
-      div.after(legendOf(figure));
+      div.after(createLegend(figure));
       const margin = {t: layout.meta.phases ? 30 : 12, ...last ? {} : {b: 26}};
       Object.assign(layout, {showlegend: false, margin, xaxis: {...layout.xaxis, ...last ? {} : {title: null}}});
       return {div, figure, high: 0, more: 0};
@@ -51,15 +52,15 @@ const film = (() => {
     if (!run) return;
     time = page.array(run.time);
     replayShapes.unpack(run);
-    scene = sceneIn(root.querySelector(".replay-scene"), run);
+    scene = createScene(root.querySelector(".replay-scene"), run);
     if (!scene) throw new Error("this browser does not offer WebGL");
     if (content.view === "follow") scene.follows = true;
-    else scene.turn(content.view);
+    else scene.setView(content.view);
   });
 
   return {
     async show(t) {
-      told.value = replayShapes.momentText(content, t);
+      readout.value = replayShapes.timeText(content, t);
       scene?.show(replayShapes.frameAt(time, t));
       page.setTime(t, root);
       for (let k = 0; k < 2; k++) await new Promise(done => requestAnimationFrame(done));

@@ -32,13 +32,13 @@ const live = (() => {
     if (run.scene) {
       host.append(byId("scene-of-run").content.cloneNode(true));
       for (const part of ["views", "legend"]) host.querySelector(".replay-" + part).outerHTML = run[part];
-      viewport = viewportIn(root, {...run.scene, live: true});
-      if (viewport) recorderIn(viewport, () => told.value);
-      if (before) viewport?.scene.lookAs(before);
+      viewport = createViewport(root, {...run.scene, live: true});
+      if (viewport) createRecorder(viewport, () => told.value);
+      if (before) viewport?.scene.setViewpoint(before);
     }
     const isLed = run.hand && viewport;
-    lead = isLed ? leadHandIn(viewport.element, viewport.scene.camera) : null;
-    side = isLed ? sideViewIn(viewport.element.parentElement, viewport.scene, {...run.scene, live: true}, "hand") : null;
+    lead = isLed ? createHandControl(viewport.element, viewport.scene.camera) : null;
+    side = isLed ? createSideView(viewport.element.parentElement, viewport.scene, {...run.scene, live: true}, "hand") : null;
     if (side) side.shown = byId("hand-side-view").checked;
     byId("hand").hidden = byId("hand-help").hidden = !lead;
     Object.assign(api, {run, scene: viewport?.scene ?? null});
@@ -72,7 +72,7 @@ const live = (() => {
     side?.show();
   }
   function grown(points, more) {
-    if (points.length + 3 > 3 * sceneIn.longestTrail) points = points.filter((_, i) => Math.floor(i / 3) % 2 === 0);
+    if (points.length + 3 > 3 * sceneObjects.maxTrailPoints) points = points.filter((_, i) => Math.floor(i / 3) % 2 === 0);
     const all = new Float64Array(points.length + 3);
     all.set(points);
     all.set(more, points.length);

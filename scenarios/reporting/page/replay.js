@@ -4,7 +4,7 @@
 const replays = [];  // {element, scene} of each, for who looks from outside
 for (const replay of document.querySelectorAll(".replay")) {
   const element = replay.querySelector(".replay-scene");
-  const [play, slider, told, speed] = ["play", "time", "told", "speed"]
+  const [play, slider, readout, speed] = ["play", "time", "told", "speed"]
     .map(name => replay.querySelector(".replay-" + name));
   const run = page.data(replay);
   const time = page.array(run.time);
@@ -12,8 +12,8 @@ for (const replay of document.querySelectorAll(".replay")) {
   const last = time.length - 1;
   let scene = null;
   let u = 0;            // frames after the first
-  let playing = 0;      // the request of the next picture
-  let recorder = null;  // of a film, which lasts as long as it plays
+  let playing = 0;      // the request of the next frame of the animation
+  let recorder = null;  // of a video, which lasts as long as it plays
 
   function timeAt(frame) {
     const k = Math.min(Math.floor(frame), last), f = frame - k;
@@ -22,9 +22,9 @@ for (const replay of document.querySelectorAll(".replay")) {
 
   function show() {
     const t = timeAt(u);
-    told.value = replayShapes.momentText(run, t);
+    readout.value = replayShapes.timeText(run, t);
     slider.value = Math.round(u);
-    slider.setAttribute("aria-valuetext", told.value);
+    slider.setAttribute("aria-valuetext", readout.value);
     scene.show(u);
     element.dataset.frame = u;
     page.setTime(t, replay);
@@ -54,11 +54,11 @@ for (const replay of document.querySelectorAll(".replay")) {
     playing = requestAnimationFrame(step);
   }
 
-  const viewport = viewportIn(replay, run);
+  const viewport = createViewport(replay, run);
   if (!viewport) continue;
   scene = viewport.scene;
   viewport.onFollow = show;
-  recorder = recorderIn(viewport, () => told.value, {
+  recorder = createRecorder(viewport, () => readout.value, {
     begin() {
       cancelAnimationFrame(playing);
       u = 0;

@@ -3,7 +3,9 @@
 //   replayShapes.unpack(run)         makes arrays of what replay_section.py has packed; returns those that hold places, in
 //                                    the order of the scene: [{of, key}, ...]
 //   replayShapes.frameAt(time, t)    the frame at time t, s, of frames at those times
-//   replayShapes.momentText(run, t)  time and phase
+//   replayShapes.timeText(run, t)    time and phase
+//   replayShapes.interpolate(track, width, u)   a row of `width` numbers between the rows of a track
+//   replayShapes.writeTube(part, u, positions)  writes the points of a tube's surface; false where it is hidden
 "use strict";
 const replayShapes = (() => {
   const sides = 16;
@@ -11,14 +13,14 @@ const replayShapes = (() => {
 
   function unpack(run) {
     const places = [];
-    const open = (of, key) => {
+    const unpackArray = (of, key) => {
       if (!of[key]) return;
       of[key] = page.array(of[key]);
       if (["points", "p", "q"].includes(key)) places.push({of, key});
     };
     for (const trace of run.traces) {
-      open(trace, "points");
-      for (const part of trace.parts ?? []) for (const key of ["points", "vertices", "triangles", "p", "q"]) open(part, key);
+      unpackArray(trace, "points");
+      for (const part of trace.parts ?? []) for (const key of ["points", "vertices", "triangles", "p", "q"]) unpackArray(part, key);
     }
     return places;
   }
@@ -34,13 +36,12 @@ const replayShapes = (() => {
     return Math.min(last, low + (t - time[low]) / (time[high] - time[low]));
   }
 
-  function momentText(run, t) {
+  function timeText(run, t) {
     const phase = run.phases.filter(([begin]) => begin <= t + 1e-6).at(-1)?.[1];
     return `${t.toFixed(1)} s${phase ? ", " + phase : ""}`;
   }
 
-  // A row of `width` numbers between the rows of a track.
-  function between(track, width, u) {
+  function interpolate(track, width, u) {
     const rows = track.length / width;
     const k = Math.min(Math.floor(u), rows - 1), f = k + 1 < rows ? u - k : 0;
     const row = new Float64Array(width);
@@ -60,8 +61,8 @@ const replayShapes = (() => {
 
   // Writes rings about each point, square to the tube, that do not twist, and at both ends those that round it off;
   // returns false, and writes nothing, where a point is not finite.
-  function tube(part, u, to) {
-    const n = part.radii.length, row = between(part.points, 3 * n, u);
+  function writeTube(part, u, positions) {
+    const n = part.radii.length, row = interpolate(part.points, 3 * n, u);
     if (!row.every(Number.isFinite)) return false;
     const points = Array.from({length: n}, (_, i) => [row[3 * i], row[3 * i + 1], row[3 * i + 2]]);
     let at = 0, along = [0, 0, 1], across = null;
@@ -78,7 +79,7 @@ const replayShapes = (() => {
       for (const [ahead, wide] of here) {
         for (let s = 0; s < sides; s++) {
           const a = 2 * Math.PI * s / sides, c = r * wide * Math.cos(a), d = r * wide * Math.sin(a);
-          for (let k = 0; k < 3; k++) to[at++] = points[i][k] + r * ahead * along[k] + c * across[k] + d * left[k];
+          for (let k = 0; k < 3; k++) positions[at++] = points[i][k] + r * ahead * along[k] + c * across[k] + d * left[k];
         }
       }
     }
@@ -88,8 +89,8 @@ const replayShapes = (() => {
   const rings = part => part.radii.length + 2 * caps.length;
 
   // How many points a tube's surface has, and its triangles.
-  const count = part => rings(part) * sides;
-  function triangles(part) {
+  const tubePointCount = part => rings(part) * sides;
+  function tubeTriangles(part) {
     const found = [];
     for (let i = 0; i + 1 < rings(part); i++) {
       for (let s = 0; s < sides; s++) {
@@ -102,10 +103,10 @@ const replayShapes = (() => {
 
   // The points of a line, x, y, z after each other; of a trail, the way of its point until u.
   function linePoints(trace, u) {
-    if (!trace.trail) return between(trace.points, 3 * trace.n, u);
+    if (!trace.trail) return interpolate(trace.points, 3 * trace.n, u);
     const end = Math.min(Math.floor(u), trace.points.length / 3 - 1);
-    return Float64Array.from([...trace.points.slice(0, 3 * (end + 1)), ...between(trace.points, 3, u)]);
+    return Float64Array.from([...trace.points.slice(0, 3 * (end + 1)), ...interpolate(trace.points, 3, u)]);
   }
 
-  return {unpack, frameAt, momentText, between, caps: caps.length, sides, count, triangles, tube, linePoints};
+  return {unpack, frameAt, timeText, interpolate, tubePointCount, tubeTriangles, writeTube, linePoints};
 })();

@@ -1,20 +1,21 @@
 // A second, smaller view of a scene, across the first one's, which shows how far away things are.
-//   const side = sideViewIn(element, scene, content, label)   element holds both; see sceneIn for the content, which scene
-//                         has, too; it is seen from that side on which what the label names is, lest others hide that
+//   const side = createSideView(element, scene, content, label)
+//     element, scene      what holds both views, and the first, of that content; see createScene
+//     label               of what is to be seen: the side is that on which this is, lest others hide it
 //   side.show()           takes where everything is
 //   side.shown = true     whether it is seen
 //   side.close()          ends it
 "use strict";
-const sideViewIn = (element, first, content, label) => {
+const createSideView = (element, first, content, label) => {
   const LEVEL = 0.12;  // how far the eye is above what it looks at, over how far it is from there
-  const TURNED = 0.01;  // rad between two pictures from which on it turns with the first view
+  const TURNED = 0.01;  // rad between two frames from which on it turns with the first view
   const ROOM = 0.08;  // on each side, as a share of the longest
   const inset = document.createElement("div"), name = document.createElement("span");
   inset.className = "replay-inset";
   inset.setAttribute("aria-hidden", "true");  // it shows nothing that the first view does not
   name.textContent = "from the side";
   inset.append(name);
-  const PERIOD = 100;  // ms between two pictures at least: the first view's, and a camera's, come before
+  const PERIOD = 100;  // ms between two frames at least: the first view's, and a camera's, come before
   let scene = null, azimuth = NaN, shownAt = 0;
 
   // Corners of a box around all that is drawn now, with some room: things move.
@@ -27,10 +28,10 @@ const sideViewIn = (element, first, content, label) => {
 
   // Looks from the first view's right or left, whose azimuth is a quarter turn from its eye's.
   function follow() {
-    const now = first.view().azimuth;
+    const now = first.spherical().azimuth;
     if (!scene || Math.abs(now - azimuth) < TURNED) return;
     azimuth = now;
-    const right = [-Math.sin(azimuth), Math.cos(azimuth)], middle = first.looksAt();
+    const right = [-Math.sin(azimuth), Math.cos(azimuth)], middle = first.viewpoint().target;
     const away = first.points(label).reduce((sum, p) => sum + right[0] * (p[0] - middle[0]) + right[1] * (p[1] - middle[1]), 0);
     const to = away < 0 ? -1 : 1;
     scene.lookFrom([to * right[0], to * right[1], LEVEL]);
@@ -46,7 +47,7 @@ const sideViewIn = (element, first, content, label) => {
       if (yes === api.shown) return;
       if (yes) {
         element.append(inset);
-        scene = sceneIn(inset, {...content, held: around()});
+        scene = createScene(inset, {...content, held: around()});
         azimuth = NaN;
         follow();
         api.show();
@@ -58,11 +59,11 @@ const sideViewIn = (element, first, content, label) => {
       }
     },
     close() {
-      first.beforePicture = () => {};
+      first.onBeforeRender = () => {};
       api.shown = false;
     },
   };
-  first.beforePicture = follow;
+  first.onBeforeRender = follow;
   api.shown = true;
   return api;
 };

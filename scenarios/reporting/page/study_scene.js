@@ -42,23 +42,23 @@ const studyScene = (content, {eye, side, photodiode, onDrawn}) => {
     if (target) target.parts[0].points = asked;
   }
   function add(element) {
-    const scene = sceneIn(element, content);
+    const scene = createScene(element, content);
     if (!scene) return;
     scenes.push(scene);
-    scene.beforePicture = () => {
+    scene.onBeforeRender = () => {
       if (!stale.delete(scene)) return;
       adopt();
-      scene.place(0);
+      scene.setFrame(0);
     };
     wake();
   }
-  const wake = () => scenes.forEach(scene => { stale.add(scene); scene.wake(); });
+  const wake = () => scenes.forEach(scene => { stale.add(scene); scene.requestRender(); });
   const ball = p => Float64Array.from(p ? [...p, p[0], p[1], p[2] + 1e-4] : new Array(6).fill(NaN));
 
   asked = ball(null);
   add(eye);
   if (!scenes.length) return null;
-  scenes[0].onPicture = () => {
+  scenes[0].onAfterRender = () => {
     if (!Number.isFinite(stamp) || stamp === drawn) return;
     drawn = stamp;
     photodiode?.classList.toggle("lit");
@@ -82,7 +82,7 @@ const studyScene = (content, {eye, side, photodiode, onDrawn}) => {
       side.hidden = !yes;
       if (yes && scenes.length === 1) {
         add(side);
-        scenes[1].turn("front");
+        scenes[1].setView("front");
       } else if (!yes && scenes.length > 1) {
         scenes.pop().dispose();
         side.querySelectorAll("canvas, svg").forEach(node => node.remove());

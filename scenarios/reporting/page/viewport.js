@@ -1,13 +1,13 @@
 // A scene with what belongs to it on a page: views, legend, full screen, and the touch that wakes it.
-//   const viewport = viewportIn(root, content)   null without WebGL, after the page has said so; see sceneIn for the content
-//   viewport.scene, viewport.button   the scene, and the button that records it
+//   const viewport = createViewport(root, content)   null without WebGL, after the page has said so; see createScene for the content
+//   viewport.scene, viewport.button   the scene, and the button that records a video of it
 //   viewport.close()                  ends the scene, before its elements are taken out of the page
 //   viewport.onFollow = act           is called when the view begins or ceases to follow
 "use strict";
-const viewportIn = (root, content) => {
+const createViewport = (root, content) => {
   const part = name => root.querySelector(".replay-" + name);
   const element = part("scene"), wake = part("wake"), full = part("full");
-  const scene = sceneIn(element, content);
+  const scene = createScene(element, content);
   if (!scene) {
     part("missing").hidden = false;
     part("shown").hidden = true;
@@ -30,7 +30,7 @@ const viewportIn = (root, content) => {
     const button = target.closest("button");
     if (!button) return;
     if (button.dataset.view !== "follow") {
-      scene.turn(button.dataset.view);
+      scene.setView(button.dataset.view);
       return;
     }
     scene.follows = button.getAttribute("aria-pressed") !== "true";
@@ -47,6 +47,6 @@ const viewportIn = (root, content) => {
   full.hidden = !document.fullscreenEnabled;
   full.addEventListener("click", () => document.fullscreenElement ? document.exitFullscreen()
     : part("shown").requestFullscreen());
-  page.onColours(() => life.signal.aborted || scene.recolour());
+  page.onColours(() => life.signal.aborted || scene.updateColours());
   return viewport;
 };

@@ -97,7 +97,7 @@ def test_play_goes_on_until_it_is_paused_and_leaves_the_view_as_it_is(page: Page
 
 def view(page: Page) -> dict[str, float]:
     """Return from where the scene is seen: azimuth and elevation (rad), and distance (m)."""
-    return page.evaluate("replays[0].scene.view()")
+    return page.evaluate("replays[0].scene.spherical()")
 
 
 @pytest.mark.parametrize(
@@ -139,12 +139,12 @@ def test_what_is_drawn_as_dots_is_as_large_on_a_screen_of_small_pixels(browser: 
             "<div id='at' style='width: 200px; height: 200px; background: #fff'></div>"
             "<style>#at canvas { display: block; width: 100%; height: 100% }</style>"
         )
-        for script in ("three.min.js", "replay_shapes.js", "scene.js"):
+        for script in ("three.min.js", "replay_shapes.js", "scene_objects.js", "scene.js"):
             page.add_script_tag(content=asset(script))
         page.evaluate(
             """() => {
                 const trace = {label: "dot", colour: "#000000", opacity: 1, width: 20, n: 1, points: [0, 0, 0]};
-                window.scene = sceneIn(document.getElementById("at"),
+                window.scene = createScene(document.getElementById("at"),
                   {traces: [trace], low: [-1, -1, -1], high: [1, 1, 1], eye: [1, 1, 1], floor: -5});
             }"""
         )
@@ -164,7 +164,7 @@ def test_the_view_follows_the_palm_and_keeps_its_distance(page: Page):
     move(page, 120)
     assert np.linalg.norm(points(page, "palm").mean(axis=0) - before[1]) > 0.02
     assert view(page) == pytest.approx(before[0])
-    looked_at = page.evaluate("replays[0].scene.looksAt()")
+    looked_at = page.evaluate("replays[0].scene.viewpoint().target")
     np.testing.assert_allclose(looked_at, points(page, "palm").mean(axis=0), atol=EXACT)
     button.click()
     assert button.get_attribute("aria-pressed") == "false"
@@ -280,7 +280,8 @@ def test_a_body_turns_as_its_quaternion_says_and_vanishes_without_a_place(page: 
             const element = document.createElement("div");
             document.body.append(element);
             const trace = {{label: "b", colour: "#123456", opacity: 1, parts: [{{...part, p: [{numbers}]}}]}};
-            window.tumbling = sceneIn(element, {{traces: [trace], low: [-1, -1, -1], high: [1, 1, 1], eye: [1, 1, 1]}});
+            const box = {{low: [-1, -1, -1], high: [1, 1, 1], eye: [1, 1, 1]}};
+            window.tumbling = createScene(element, {{traces: [trace], ...box}});
         }}""",
         part,
     )
