@@ -1,45 +1,57 @@
 // Leads a hand by a webcam; pictures go to a thread of this page and nowhere else, and none is kept.
-//   const watched = handCamera({video, axes, start, right, onSample, onTold})
+//   const camera = handCamera({video, axes, start, right, onSample, onStatus})
 //     video        the element that shows what the camera sees
 //     axes         returns the directions of the view in W: to its right, up, towards the eye; null while nothing is led
 //     start        {p_WH, closed, centre, radius}, see handInput
 //     right        whether the right hand is to be seen
 //     onSample     is called with a sample for each picture with a hand; where none is seen, the sample before ages
-//     onTold       is called with how it is: "asks" for the camera, "loads" MediaPipe, "seeks" a hand, "sees" one, or
-//                  "fails", and then with the name of the fault, which the page has words for, and what is known besides:
-//                  refused, absent, busy, unfit, no_access, no_times, unplugged, unloaded, failed, unknown
-//   watched.restart(start)   leads another hand from now on
-//   watched.end()            lets go of the camera
+//     onStatus     is called with the status: "asks" for the camera, "loads" MediaPipe, "seeks" a hand, "sees" one, or
+//                  "fails", and then with the fault: its name, one of FAULT_TEXTS, the detail that is known besides, and its
+//                  text in English; a page in other languages has translations by the name
+//   camera.restart(start)    leads another hand from now on
+//   camera.end()             lets go of the camera
 "use strict";
-const handCamera = ({video, axes, start, right, onSample, onTold}) => {
+const handCamera = ({video, axes, start, right, onSample, onStatus}) => {
   const FAULTS = {NotAllowedError: "refused", NotFoundError: "absent", NotReadableError: "busy", OverconstrainedError: "unfit"};
+  const FAULT_TEXTS = {
+    refused: () => "the browser was not allowed to use the camera; allow it beside the page's address, then try again",
+    absent: () => "no camera is connected",
+    busy: () => "the camera cannot be read; another program may be using it",
+    unfit: () => "the camera gives no picture of 640 by 480 or so",
+    no_access: () => "this browser gives pages at this address no camera",
+    no_times: () => "this browser does not tell when pictures were taken",
+    unplugged: () => "the camera was taken away",
+    unloaded: detail => `the program that finds a hand could not be loaded${detail && `: ${detail}`}`,
+    failed: detail => `MediaPipe, which finds a hand, has failed: ${detail}`,
+    unknown: detail => `the browser says ${detail}`,
+  };
   let guide = handLandmarks.guide({start, right});
   let worker = null, stream = null, over = false, busy = false, sees = null;
 
   function fail(fault, detail = "") {
     if (over) return;
     end();
-    onTold("fails", fault, detail);
+    onStatus("fails", {name: fault, detail, text: FAULT_TEXTS[fault](detail)});
   }
 
-  // Tells once that a hand comes into the picture or leaves it.
-  function tellSeen(seen) {
+  // Reports once that a hand comes into the picture or leaves it.
+  function reportSeen(seen) {
     if (seen === sees) return;
     sees = seen;
-    onTold(seen ? "sees" : "seeks");
+    onStatus(seen ? "sees" : "seeks");
   }
 
   function take({data}) {
     if (data.failed) fail("failed", data.failed.split("\n")[0].slice(0, 300));
     else if (data.ready) {
-      tellSeen(false);
+      reportSeen(false);
       follow();
     } else if (!over) {
       busy = false;
       const size = {width: video.videoWidth, height: video.videoHeight}, t = data.at / 1000;
       const view = axes();
       const hand = data.landmarks ? guide.take(t, data.landmarks, data.world, size, view ?? handLandmarks.AXES) : null;
-      tellSeen(hand !== null);
+      reportSeen(hand !== null);
       if (hand && view) onSample({...hand, stamp: t, sent: performance.now() / 1000, device: right ? "webcam" : "webcam, left hand"});
     }
   }
@@ -63,7 +75,7 @@ const handCamera = ({video, axes, start, right, onSample, onTold}) => {
   async function begin() {
     if (!navigator.mediaDevices?.getUserMedia) return fail("no_access");
     if (!video.requestVideoFrameCallback) return fail("no_times");
-    onTold("asks");
+    onStatus("asks");
     try {
       const wish = {width: {ideal: 640}, height: {ideal: 480}, frameRate: {ideal: 60}, facingMode: "user"};
       stream = await navigator.mediaDevices.getUserMedia({audio: false, video: wish});
@@ -74,7 +86,7 @@ const handCamera = ({video, axes, start, right, onSample, onTold}) => {
     stream.getVideoTracks()[0].addEventListener("ended", () => fail("unplugged"));
     video.srcObject = stream;
     video.hidden = false;
-    onTold("loads");
+    onStatus("loads");
     worker = new Worker("webcam/worker.js", {type: "module"});
     worker.addEventListener("message", take);
     worker.addEventListener("error", event => fail("unloaded", event.message ?? ""));

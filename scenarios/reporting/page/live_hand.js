@@ -1,9 +1,9 @@
 // Lets the page lead the hand of a run under way; hand_messages.py says what is sent.
-//   const lead = leadHandIn(element, camera)
+//   const lead = createHandControl(element, eye)   eye: three.js's camera
 //   lead.hand      see handInput; null until the server has told where the hand is
 //   lead.close()   leads it no more
 "use strict";
-const leadHandIn = (element, camera) => {
+const createHandControl = (element, eye) => {
   const part = name => document.getElementById("hand-" + name);
   const HELP = {
     pointer: "The hand is where the mouse is. The wheel moves it towards you and away; a click, or the space bar, closes and opens it. Q and E "
@@ -15,87 +15,76 @@ const leadHandIn = (element, camera) => {
       + "page. Where the hand is first seen, it goes on from where it stands; take it out of the picture for a moment to begin elsewhere.",
     nothing: "Nothing leads the hand: it stops, and keeps what it holds.",
   };
-  const CAMERA = {
+  const CAMERA_STATUS = {
     asks: () => "The browser asks whether the camera may be used.",
     loads: () => "MediaPipe's files are loaded.",
     seeks: () => "Show your hand to the camera: until it sees one, the hand stops.",
     sees: () => "The camera sees the hand.",
-    fails: (fault, detail) => `The webcam cannot lead the hand: ${FAULTS[fault](detail)}. Another device may be chosen.`,
-  };
-  const FAULTS = {
-    refused: () => "the browser was not allowed to use the camera; allow it beside the page's address and choose it again",
-    absent: () => "no camera is connected",
-    busy: () => "the camera cannot be read; another program may be using it",
-    unfit: () => "the camera gives no picture of 640 by 480 or so",
-    no_access: () => "this browser gives pages at this address no camera",
-    no_times: () => "this browser does not tell when pictures were taken",
-    unplugged: () => "the camera was taken away",
-    unloaded: detail => `its program could not be loaded${detail ? `: ${detail}` : ""}`,
-    failed: detail => `MediaPipe failed: ${detail}`,
-    unknown: detail => detail,
+    fails: fault => `The webcam cannot lead the hand: ${fault.text}. Another device may be chosen.`,
   };
   const lead = {hand: null, close}, closed = new AbortController();
-  let link = null, told = 0, watched = null, cameraTold = "";
+  let link = null, timer = 0, camera = null, cameraStatus = "";
 
-  // Tells for a while what was refused, then again how it is with the camera, where it leads the hand.
-  function tell(text) {
+  // Shows for a while what was refused, then again the camera's status, where it leads the hand.
+  function showMessage(text) {
     part("told").value = text;
-    clearTimeout(told);
-    told = setTimeout(() => { part("told").value = cameraTold; }, 4000);
+    clearTimeout(timer);
+    timer = setTimeout(() => { part("told").value = cameraStatus; }, 4000);
   }
-  function tellOfCamera(text) {
-    part("told").value = cameraTold = text;
-    clearTimeout(told);
+  function showCameraStatus(text) {
+    part("told").value = cameraStatus = text;
+    clearTimeout(timer);
   }
 
   function connect() {
     const ours = link = new WebSocket(`ws://${location.host}/hand`);
     ours.addEventListener("message", ({data}) => {
       const message = JSON.parse(data);
-      if (message.refused) tell(`not taken: ${message.refused}`);
+      if (message.refused) showMessage(`not taken: ${message.refused}`);
       if (message.hand) begin(message.hand);
     });
     ours.addEventListener("close", ({code, reason}) => {
-      if (code === 1009) tell(`the connection has ended: ${reason}`);  // a message that is too long
+      if (code === 1009) showMessage(`the connection has ended: ${reason}`);  // a message that is too long
       lead.hand?.choose("nothing");
       if (link !== ours) return;
-      leaveCamera();
+      stopCamera();
       part("grasp").disabled = true;
     });
   }
 
   function begin(start) {
     lead.hand?.end();
-    lead.hand = handInput({element, camera, start, onSample: send, onChange: show});
+    lead.hand = handInput({element, camera: eye, start, onSample: send, onChange: showGrasp});
     use(part("device").value);
     part("grasp").disabled = false;
-    show(start.closed);
+    showGrasp(start.closed);
   }
 
   function use(device) {
-    leaveCamera();
+    stopCamera();
     lead.hand?.choose(device);
-    if (device === "webcam" && lead.hand) watch();
+    if (device === "webcam" && lead.hand) startCamera();
   }
 
   // The webcam's samples go the way of others', and are where the hand is for the device after it.
-  function watch() {
+  function startCamera() {
     const onSample = sample => {
       lead.hand.place(sample);
       send(sample);
     };
     const start = {...lead.hand.start, ...lead.hand.pose()}, right = part("side").value === "right";
-    watched = handCamera({video: part("video"), axes: lead.hand.axes, start, right, onSample, onTold: (how, ...why) => tellOfCamera(CAMERA[how](...why))});
+    const onStatus = (status, fault) => showCameraStatus(CAMERA_STATUS[status](fault));
+    camera = handCamera({video: part("video"), axes: lead.hand.axes, start, right, onSample, onStatus});
   }
-  function leaveCamera() {
-    watched?.end();
-    watched = null;
-    if (cameraTold) tellOfCamera("");
+  function stopCamera() {
+    camera?.end();
+    camera = null;
+    if (cameraStatus) showCameraStatus("");
   }
 
   const send = sample => link?.readyState === WebSocket.OPEN && link.bufferedAmount < 4000 && link.send(JSON.stringify(sample));
 
-  function show(closed) {
+  function showGrasp(closed) {
     part("grasp").setAttribute("aria-pressed", closed);
     part("grasp").textContent = closed ? "open the hand" : "close the hand";
   }
@@ -108,7 +97,7 @@ const leadHandIn = (element, camera) => {
     if (part("which")) part("which").hidden = device !== "webcam";
     element.closest(".replay").classList.toggle("awake", device === "pointer");  // the wheel is the hand's, not the page's
     if (device === "tracker") {
-      leaveCamera();
+      stopCamera();
       const leaves = link;
       link = null;
       leaves?.close();
@@ -118,7 +107,7 @@ const leadHandIn = (element, camera) => {
 
   function close() {
     closed.abort();
-    leaveCamera();
+    stopCamera();
     lead.hand?.end();
     link?.close();
   }

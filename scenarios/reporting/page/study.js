@@ -7,7 +7,7 @@
   const main = byId("screen");
   let shown = null, play = null, input = null, test = null, named = 0, over = false, ready = false, drawn = [], hasTracker = false, held = [];
   let still = {pose: "", since: 0, told: false};  // since when the hand has been where it is, and whether the page says so
-  let watched = null, camera = {how: "", fault: "", detail: ""};  // by the webcam, and how it is with it, see hand_camera.js
+  let camera = null, cameraStatus = "", cameraFault = null;  // the webcam's, see hand_camera.js
   const STILL = 30000;  // ms
   const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
   const TURNS = {"+roll": "roll_right", "-roll": "roll_left", "+pitch": "fingers_down", "-pitch": "fingers_up",
@@ -16,10 +16,10 @@
   const hasKeys = () => device() !== "touch";
   const device = () => shown?.device ?? "";
 
-  // A word of the page in the language of the study, with values in place of {names}.
-  function word(name, values = {}) {
+  // A word of the page in the language of the study, else `otherwise`, with values in place of {names}.
+  function word(name, values = {}, otherwise = name) {
     const said = words[shown?.language] ?? Object.values(words)[0];
-    return (said[name] ?? name).replace(/\{(\w+)\}/g, (_, key) => values[key] ?? "");
+    return (said[name] ?? otherwise).replace(/\{(\w+)\}/g, (_, key) => values[key] ?? "");
   }
 
   function node(name, attributes = {}, ...children) {
@@ -109,7 +109,7 @@
 
   // A tracker connects by itself: before it is there, nothing begins.
   const trackerLine = () => device() === "tracker" ? [node("p", {id: "tracker", role: "status"})] : [];
-  function nameTracker() {
+  function showTrackerStatus() {
     const line = byId("tracker");
     if (!line) return;
     const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${location.pathname}hand`;
@@ -122,40 +122,40 @@
   const NOWHERE = {p_WH: [0, 0, 0], closed: false, centre: [0, 0, 0], radius: 1};
   function useCamera() {
     const isWanted = device() === "webcam" && WATCHED.has(shown.screen);
-    if (isWanted && !watched) watch();
-    else if (!isWanted) leaveCamera();
+    if (isWanted && !camera) startCamera();
+    else if (!isWanted) stopCamera();
   }
-  function watch() {
-    leaveCamera();
-    if (!byId("video")) return tellOfCamera("fails", "not_offered");
+  function startCamera() {
+    stopCamera();
+    if (!byId("video")) return onCameraStatus("fails", {name: "not_offered"});
     byId("video").setAttribute("aria-label", word("camera_mirror"));
     const axes = () => input?.axes() ?? null;
-    watched = handCamera({video: byId("video"), axes, start: NOWHERE, right: true, onSample: lead, onTold: tellOfCamera});
+    camera = handCamera({video: byId("video"), axes, start: NOWHERE, right: true, onSample: lead, onStatus: onCameraStatus});
   }
-  function leaveCamera() {
-    watched?.end();
-    watched = null;
+  function stopCamera() {
+    camera?.end();
+    camera = null;
   }
-  function tellOfCamera(how, fault = "", detail = "") {
-    camera = {how, fault, detail};
-    nameCamera();
-    if (how === "sees") letGo();
+  function onCameraStatus(status, fault = null) {
+    [cameraStatus, cameraFault] = [status, fault];
+    showCameraStatus();
+    if (status === "sees") letGo();
   }
-  function nameCamera() {
+  function showCameraStatus() {
     if (device() !== "webcam") return;
-    const why = camera.fault && word(`camera_${camera.fault}`, camera);
-    const told = word(`camera_${camera.how}`, {why}), isReady = ["seeks", "sees"].includes(camera.how);
-    byId("help").textContent = camera.how === "sees" ? word("help_webcam") : told;
+    const why = cameraFault && word(`camera_${cameraFault.name}`, cameraFault, cameraFault.text);
+    const text = word(`camera_${cameraStatus}`, {why}), isReady = ["seeks", "sees"].includes(cameraStatus);
+    byId("help").textContent = cameraStatus === "sees" ? word("help_webcam") : text;
     const line = byId("camera");
     if (!line) return;
-    line.textContent = told;
-    byId("camera-again").hidden = camera.how !== "fails";
+    line.textContent = text;
+    byId("camera-again").hidden = cameraStatus !== "fails";
     main.querySelectorAll("button.first").forEach(b => { b.disabled = !isReady; });
   }
   const cameraLines = () => device() !== "webcam" ? [] : [node("p", {id: "camera", role: "status"}),
-    node("button", {type: "button", id: "camera-again", hidden: true, onclick: watch}, word("camera_again"))];
+    node("button", {type: "button", id: "camera-again", hidden: true, onclick: startCamera}, word("camera_again"))];
   const deviceLines = () => [...trackerLine(), ...cameraLines()];
-  const nameDevice = () => { nameTracker(); nameCamera(); };
+  const showDeviceStatus = () => { showTrackerStatus(); showCameraStatus(); };
   const waiting = () => [node("p", {class: "study-wait"}, node("span", {}, word("getting_ready")))];
   const settings = () => ({width: innerWidth, height: innerHeight, pixel_ratio: devicePixelRatio});
 
@@ -220,7 +220,7 @@
     main.replaceChildren(...screens[screen.screen](screen));
     main.hidden = false;
     useCamera();
-    nameDevice();
+    showDeviceStatus();
     root.dataset.screen = screen.screen;
     main.focus({preventScroll: true});
     scrollTo(0, 0);
@@ -256,8 +256,8 @@
     play.sideShown = wantsSide();
     nameViews();
     byId("help").textContent = word(`help_${device()}`);
-    watched?.restart(start);
-    nameCamera();
+    camera?.restart(start);
+    showCameraStatus();
     byId("task").textContent = shown.name ?? word("free_play");
     for (const id of ["eye", "side"]) byId(id).setAttribute("aria-label", word(id === "eye" ? "view_eye" : "view_side"));
     const onChange = closed => { byId("grasp").textContent = word(closed ? "open_hand" : "close_hand"); };
@@ -287,7 +287,7 @@
 
   // A run begins when its scene has been drawn and, with a webcam, a hand is seen: until then nothing would lead it.
   function letGo() {
-    if (!ready || (device() === "webcam" && camera.how !== "sees")) return;
+    if (!ready || (device() === "webcam" && cameraStatus !== "sees")) return;
     ready = false;
     still.since = performance.now();
     send({ready: true});
@@ -355,17 +355,17 @@
     else if (message.again) byId("task").textContent = word("object_comes_back");
     else if ("tracker" in message) {
       hasTracker = message.tracker;
-      nameTracker();
+      showTrackerStatus();
     } else if (message.wait) tell(word(message.wait));
     else if (message.refused) {
       tell(message.refused);
       release();
-      nameDevice();
+      showDeviceStatus();
     }
     else if (message.gone) {
       over = true;
       endPlay();
-      leaveCamera();
+      stopCamera();
       main.replaceChildren(node("h1", {}, word("not_here")), node("p", {}, word(message.gone)),
         actions(button("reload", () => location.reload(), {first: true})));
       main.hidden = false;
@@ -374,7 +374,7 @@
   });
   setInterval(() => device() === "tracker" && send({clock: performance.now() / 1000}), 500);
   link.addEventListener("close", ({reason}) => {
-    leaveCamera();
+    stopCamera();
     if (over) return;
     root.querySelectorAll("button").forEach(b => { b.disabled = true; });  // nobody is there who would do it
     tell(word("lost_connection") + (reason && ` (${reason})`));

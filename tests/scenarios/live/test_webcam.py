@@ -243,7 +243,7 @@ def test_a_model_that_does_not_load_is_told(tmp_path: Path):
     ):
         wait_until(page, "live.hand")
         page.locator("#hand-device").select_option("webcam")
-        wait_until(page, f'{TOLD}.includes("MediaPipe failed: the model\'s graph has no landmarks")')
+        wait_until(page, f'{TOLD}.includes("has failed: the model\'s graph has no landmarks")')
         assert not page.locator("#hand-video").is_visible()
 
 
