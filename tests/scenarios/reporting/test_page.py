@@ -1,5 +1,7 @@
 """A page: what it is given cannot break out of it, and Plotly comes along only where something is drawn."""
 
+import re
+from html.parser import HTMLParser
 from pathlib import Path
 
 import plotly.graph_objects as go
@@ -7,9 +9,11 @@ import pytest
 from markupsafe import Markup
 
 from handover.cosim.exceptions import RecordNotWritten
+from handover.scenarios.reporting import page as page_module
 from handover.scenarios.reporting.html import plot_html
-from handover.scenarios.reporting.page import Section, write_page
+from handover.scenarios.reporting.page import Section, asset, write_page
 
+PAGE = Path(page_module.__file__).with_name("page")
 EVIL = "</script><script>alert(1)</script>"
 
 
@@ -38,3 +42,27 @@ def test_a_page_that_cannot_be_written_leaves_nothing(tmp_path: Path):
     with pytest.raises(RecordNotWritten, match="cannot be written"):
         page_of(tmp_path / "missing", Markup(""))
     assert list(tmp_path.iterdir()) == []
+
+
+class OpenElements(HTMLParser):
+    """Keeps the names of the elements that are open; an end that is not of the innermost one is a fault."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open = list[str]()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:  # noqa: ARG002
+        if tag not in {"br", "hr", "img", "input", "link", "meta"}:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open, f"</{tag}> ends nothing"
+        assert self.open.pop() == tag
+
+
+@pytest.mark.parametrize("name", sorted(p.name for p in PAGE.glob("*.html")))
+def test_a_template_ends_what_it_begins(name: str):
+    elements = OpenElements()
+    elements.feed(re.sub(r"\{%.*?%\}|\{\{.*?\}\}", "", asset(name), flags=re.DOTALL))
+    elements.close()
+    assert elements.open == []
