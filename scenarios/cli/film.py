@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 _HELP = """Make a film of the run in DIR: its scene, and beside it plots over time with a cursor that moves.
 
 The suffix of FILE says what it is: .mp4, .webm or .gif. It is drawn without a window in Chromium, by software, which
-takes some seconds for each second of the film; on the report's page, "save as film" records the scene alone.
+takes some seconds for each second of the film; on the report's page, "record a video" records the scene alone.
 """
 _SUFFIXES = (".mp4", ".webm", ".gif")
 _VIEWS = ("start", "front", "side", "top", "follow")
-_GIF_RATE, _RATE, _FASTEST_GIF = 15.0, 30.0, 50.0
+_GIF_FPS, _FPS, _FASTEST_GIF = 15.0, 30.0, 50.0
 _SMALLEST, _LARGEST = 240, 7680
 
 
@@ -78,7 +78,7 @@ class Size(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (gene
     "--fps",
     type=FiniteRange(min=1, max=120),
     metavar="N",
-    help=f"Pictures a second.  [default: {_RATE:g}; of a GIF {_GIF_RATE:g}]",
+    help=f"Frames per second.  [default: {_FPS:g}; of a GIF {_GIF_FPS:g}]",
 )
 @click.option("--dark", is_flag=True, help="In the report's dark colours.")
 def film(
@@ -103,11 +103,11 @@ def film(
         _check(path, plots, fps, force=force, no_plots=no_plots)
         from handover.scenarios.film.film import FilmSettings  # a browser's library takes long to load
 
-        rate = fps or (_GIF_RATE if path.suffix.lower() == ".gif" else _RATE)
-        settings = FilmSettings(size=size, pace=pace, rate=rate, view=view, dark=dark)
+        fps = fps or (_GIF_FPS if path.suffix.lower() == ".gif" else _FPS)
+        settings = FilmSettings(size=size, pace=pace, fps=fps, view=view, dark=dark)
         with Interruption():
-            pictures = _film(run, path, None if no_plots else plots, settings)
-    click.echo(f"film: {path}, {pictures} pictures, {pictures / rate:.1f} s")
+            frames = _film(run, path, None if no_plots else plots, settings)
+    click.echo(f"film: {path}, {frames} frames, {frames / fps:.1f} s at {fps:g} fps")
 
 
 def _run(folder: Path) -> RunFolder:
@@ -140,12 +140,12 @@ def _check(path: Path, plots: Sequence[str], fps: float | None, *, force: bool, 
     if plots and no_plots:
         raise UsageError("--plot and --no-plots contradict each other")
     if suffix == ".gif" and fps and fps > _FASTEST_GIF:
-        raise UsageError(f"--fps {fps:g}: viewers slow down a GIF of more than {_FASTEST_GIF:g} pictures a second")
+        raise UsageError(f"--fps {fps:g}: viewers slow down a GIF of more than {_FASTEST_GIF:g} frames per second")
     check_place(path.parent)
 
 
 def _film(run: RunFolder, path: Path, plots: Sequence[str] | None, settings: "FilmSettings") -> int:
-    """Write the film; return how many pictures it has.
+    """Write the film; return how many frames it has.
 
     Raises:
         UsageError: there is no browser, or nothing to be shown.
@@ -164,8 +164,8 @@ def _film(run: RunFolder, path: Path, plots: Sequence[str] | None, settings: "Fi
         content = film_content(run, plots, window_of(settings.size)[0][1])
         for line in content.notes:
             click.echo(line, err=True)
-        with _progress(sys.stderr) as tell:
-            return write_film(content, path, settings, tell)
+        with _progress(sys.stderr) as report:
+            return write_film(content, path, settings, report)
     except (NotFilmed, NoBrowser) as e:
         raise UsageError(str(e)) from e
     except BrowserFailed as e:
@@ -174,9 +174,9 @@ def _film(run: RunFolder, path: Path, plots: Sequence[str] | None, settings: "Fi
 
 @contextmanager
 def _progress(stream: TextIO) -> Generator[Callable[[int, int], None], None, None]:
-    """Show a bar where the stream is a terminal; give the function that takes how many of all pictures are taken."""
+    """Show a bar where the stream is a terminal; give what takes how many frames are done, and of how many."""
     columns = (
-        TextColumn("{task.completed:.0f} of {task.total:.0f} pictures"),
+        TextColumn("frame {task.completed:.0f} of {task.total:.0f}"),
         BarColumn(bar_width=30),
         TimeElapsedColumn(),
         TextColumn("left"),
@@ -186,7 +186,7 @@ def _progress(stream: TextIO) -> Generator[Callable[[int, int], None], None, Non
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("film", total=1.0)
 
-        def tell(taken: int, of: int) -> None:
-            progress.update(task, completed=taken, total=of)
+        def report(done: int, of: int) -> None:
+            progress.update(task, completed=done, total=of)
 
-        yield tell
+        yield report

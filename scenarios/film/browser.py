@@ -1,4 +1,4 @@
-"""Draws a film's page in Chromium without a window, by Playwright, and takes a picture of each of its moments."""
+"""Draws a film's page in Chromium without a window, by Playwright, and takes a screenshot of each frame."""
 
 import base64
 import shutil
@@ -19,7 +19,7 @@ _FLAGS = (
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge", "microsoft-edge")
 """Of the system's own browsers."""
 _PATIENCE = 300_000
-"""How long the page may take to be drawn, or a moment of it, ms."""
+"""How long the page may take to be drawn, or a frame of it, ms."""
 _SCALES = (4.0, 3.0, 2.5, 2.0, 1.5, 1.25)
 _DESIGN = (1280, 720)
 """Width and height that letters and lines are made for, px: what is larger by one of the scales is enlarged."""
@@ -34,7 +34,7 @@ class BrowserFailed(RuntimeError):
 
 
 class Camera(Protocol):
-    """Takes pictures of a film's page."""
+    """Takes screenshots of a film's page."""
 
     def __call__(self, t: float) -> bytes:
         """Return what is seen at t, s, as PNG.
@@ -56,7 +56,7 @@ def window_of(size: tuple[int, int]) -> tuple[tuple[int, int], float]:
 
 @contextmanager
 def open_camera(html: str, size: tuple[int, int], *, dark: bool) -> Generator[Camera, None, None]:
-    """Open a film's page, and give what takes pictures of it, of so many pixels.
+    """Open a film's page, and give what takes screenshots of it, of so many pixels.
 
     Raises:
         NoBrowser: there is no Chromium.
@@ -83,7 +83,7 @@ def open_camera(html: str, size: tuple[int, int], *, dark: bool) -> Generator[Ca
 
 
 def _camera(page: Page, errors: Sequence[str], window: tuple[int, int], scale: float) -> Camera:
-    """Return a camera that asks the browser itself, which takes less than half of what Playwright's pictures take."""
+    """Return a camera that asks the browser itself, in less than half of the time of Playwright's screenshots."""
     session = page.context.new_cdp_session(page)
     whole = {"x": 0, "y": 0, "width": window[0], "height": window[1], "scale": scale}
     asked = {"format": "png", "optimizeForSpeed": True, "clip": whole}

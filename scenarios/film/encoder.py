@@ -1,4 +1,4 @@
-"""Makes a film of pictures by ffmpeg, which imageio-ffmpeg brings: MP4 (H.264), WebM (VP9) or GIF."""
+"""Encodes frames as a film by ffmpeg, which imageio-ffmpeg brings: MP4 (H.264), WebM (VP9) or GIF."""
 
 import subprocess
 import tempfile
@@ -25,16 +25,16 @@ _AS_ON_SCREENS = (
 
 
 Film = Callable[[bytes], object]
-"""A film in the making: takes a picture, a PNG; raises BrokenPipeError where `film_to` then says why."""
+"""A film in the making: takes a frame, a PNG; raises BrokenPipeError where `film_to` then says why."""
 
 
 @contextmanager
-def film_to(path: Path, rate: float) -> Generator[Film, None, None]:
-    """Give what takes the pictures of a film; it has its name when it is complete, and else it is not there.
+def film_to(path: Path, fps: float) -> Generator[Film, None, None]:
+    """Give what takes the frames of a film; it has its name when it is complete, and else it is not there.
 
     Args:
         path: one that ends with one of the `CODECS`; a file of that name is replaced in the end.
-        rate: pictures a second.
+        fps: frames per second.
 
     Raises:
         RecordNotWritten: it cannot be written.
@@ -44,8 +44,8 @@ def film_to(path: Path, rate: float) -> Generator[Film, None, None]:
         raw = Path(folder) / "film.mkv" if suffix == ".gif" else unfinished
         try:
             look = () if suffix == ".gif" else _AS_ON_SCREENS
-            pictures = ("-f", "image2pipe", "-c:v", "png", "-framerate", f"{rate:.6g}", "-i", "-")
-            with _running(path, (*pictures, *look, *CODECS[suffix], str(raw))) as film:
+            frames = ("-f", "image2pipe", "-c:v", "png", "-framerate", f"{fps:.6g}", "-i", "-")
+            with _running(path, (*frames, *look, *CODECS[suffix], str(raw))) as film:
                 yield film
             if suffix == ".gif":
                 _colour(path, raw, Path(folder) / "colours.png", unfinished)

@@ -1,4 +1,4 @@
-"""Films a run: its moments one after another, each drawn and taken, at a pace of simulated seconds a second."""
+"""Films a run: frame after frame is drawn and encoded, at a pace of simulated seconds a second."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,44 +19,44 @@ class FilmSettings:
     Attributes:
         size: width and height, px; even numbers.
         pace: simulated seconds in a second of the film.
-        rate: pictures a second.
+        fps: frames per second.
         view: one of `VIEWS`.
         dark: whether the page has its dark colours.
     """
 
     size: tuple[int, int] = (1280, 720)
     pace: float = 1.0
-    rate: float = 30.0
+    fps: float = 30.0
     view: str = "start"
     dark: bool = False
 
 
-def film_times(begin: float, end: float, settings: FilmSettings) -> Floats:
-    """Return the simulated times of a film's pictures, s: evenly spaced from the first, and the last moment."""
-    steps = (end - begin) * settings.rate / settings.pace
+def frame_times(begin: float, end: float, settings: FilmSettings) -> Floats:
+    """Return the simulated times of a film's frames, s: evenly spaced from the record's begin, and its end."""
+    steps = (end - begin) * settings.fps / settings.pace
     whole = int(steps * (1.0 + 1e-9))
-    times: Floats = begin + np.arange(whole + 1, dtype=np.float64) * (settings.pace / settings.rate)
+    times: Floats = begin + np.arange(whole + 1, dtype=np.float64) * (settings.pace / settings.fps)
     return times if steps - whole < 1e-6 * max(steps, 1.0) else np.append(times, end)
 
 
-def write_film(content: FilmContent, path: Path, settings: FilmSettings, tell: Callable[[int, int], None]) -> int:
-    """Write a film; return how many pictures it has. A file of its name is replaced when the film is complete.
+def write_film(content: FilmContent, path: Path, settings: FilmSettings, report: Callable[[int, int], None]) -> int:
+    """Write a film; return how many frames it has. A file of its name is replaced when the film is complete.
 
     Args:
         content: what it shows.
         path: see `film_to`.
         settings: how it is filmed.
-        tell: is told how many of all pictures are taken.
+        report: is called with how many frames are done, and of how many.
 
     Raises:
         NotFilmed: what it shows does not fit.
         NoBrowser, BrowserFailed: it cannot be drawn.
         RecordNotWritten: it cannot be written.
     """
-    times = film_times(*content.span, settings)
+    times = frame_times(*content.span, settings)
     html = film_html(content, window_of(settings.size)[0], settings.view)
-    with open_camera(html, settings.size, dark=settings.dark) as camera, film_to(path, settings.rate) as film:
+    with open_camera(html, settings.size, dark=settings.dark) as camera, film_to(path, settings.fps) as film:
         for k, t in enumerate(times.tolist()):
-            tell(k, len(times))
+            report(k, len(times))
             film(camera(min(t, content.span[1])))
     return len(times)

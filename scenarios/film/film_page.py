@@ -1,4 +1,4 @@
-"""The page that a film is made of: a run's scene beside plots over time, at the moment that `film.js` is told."""
+"""The page that a film is made of: a run's scene beside plots over time, at the time that `film.js` is called with."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
 VIEWS = ("start", "front", "side", "top", "follow")
 MAX_FRAMES = 3000
-"""Moments of the record that a film shows; between them it interpolates."""
+"""Rows of the record that a film shows; between them it interpolates."""
 _LEAST_HEIGHT = 130
 """Of a plot with its title, px."""
 _TWO_PLOTS = 520

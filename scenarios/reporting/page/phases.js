@@ -1,6 +1,7 @@
 // Shades the phases of time plots and names them: `layout.meta.phases` is a list of {from, to, name}. Names are level
 // where they fit; a name that fits nowhere stands once, upright, over its longest phase (as in plotting.py). In a plot with
-// data-brief names are level or missing, as it has neither height to spare nor buttons.
+// data-brief, which has neither height to spare nor buttons, such a name is level where it is not much wider than its phase
+// and meets no other, and else missing.
 "use strict";
 (() => {
   const LETTER = 6.6, UPRIGHT = 15, MARGINS = 70, BUTTONS = 150, HIGH = 22;  // px
@@ -15,7 +16,14 @@
     let up = 0, right = 0;  // px that the longest upright name takes, and from the left how far names reach
     const brief = "brief" in div.dataset;
     const {level, upright} = named(spans, low, high, pixels);
-    if (brief) upright.length = 0;
+    if (brief) {
+      const reach = p => LETTER * p.name.length / 2 + 3;  // to either side of its middle
+      for (const p of upright.splice(0)) {
+        const [from, to] = [p.middle * pixels - reach(p), p.middle * pixels + reach(p)];
+        const isFree = level.every(other => Math.abs(other.middle - p.middle) * pixels >= reach(other) + reach(p));
+        if (reach(p) <= p.long * pixels && from >= 0 && to <= (high - low) * pixels && isFree) level.push(p);
+      }
+    }
     const put = (p, angle, wide) => {
       right = Math.max(right, p.middle * pixels + wide / 2);
       return name(p, low + p.middle, angle);

@@ -1,4 +1,4 @@
-"""`handover film`: its pictures are a run's moments, as asked for; what cannot be filmed is refused."""
+"""`handover film`: its frames show the run at their times, as asked for; what cannot be filmed is refused."""
 
 import os
 import shutil
@@ -20,7 +20,7 @@ from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
 from handover.scenarios.cli.command import main
 from handover.scenarios.film.browser import open_camera, window_of
-from handover.scenarios.film.film import FilmSettings, film_times
+from handover.scenarios.film.film import FilmSettings, frame_times
 from handover.scenarios.film.film_page import film_content, film_html
 from handover.scenarios.results.run_folder import RunFolder
 
@@ -42,15 +42,15 @@ def film(*arguments: object) -> tuple[int, str]:
     return done.exit_code, done.output
 
 
-def pictures(file: Path) -> list[Pixels]:
-    """Return a film's pictures in shades of grey."""
+def frames(file: Path) -> list[Pixels]:
+    """Return a film's frames in shades of grey."""
     video = cv2.VideoCapture(str(file))
     found: list[Pixels] = []
     while True:
-        there, picture = video.read()
+        there, frame = video.read()
         if not there:
             return found
-        found.append(np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8))
+        found.append(np.asarray(cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY), np.uint8))
 
 
 def cursor(picture: Pixels) -> float:
@@ -70,37 +70,37 @@ def mp4(grasp: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_a_film_has_the_runs_moments_in_its_size(mp4: Path, grasp: Path):
+def test_a_film_has_a_frame_for_each_of_its_times_in_its_size(mp4: Path, grasp: Path):
     time = Record(grasp / "signals.parquet").time
-    shown = pictures(mp4)
+    shown = frames(mp4)
     assert len(shown) == int((time[-1] - time[0]) / 2.5 * 4) + 2  # the first, each 0.625 s after it, and the last
     assert {p.shape for p in shown} == {(HIGH, WIDE)}
     assert cv2.VideoCapture(str(mp4)).get(cv2.CAP_PROP_FPS) == pytest.approx(4.0)
 
 
 def test_the_scene_moves_and_the_cursor_with_the_time(mp4: Path):
-    shown = pictures(mp4)
+    shown = frames(mp4)
     scene = [p[60:300, 20:350].astype(float) for p in shown]
     assert np.abs(scene[len(scene) // 2] - scene[0]).max() > 60.0
     assert np.abs(scene[-1] - scene[0]).max() > 60.0
     places = np.array([cursor(p) for p in shown[1:-1]])
     order = np.arange(len(places))
-    per_picture, first = np.polyfit(order, places, 1)
-    np.testing.assert_allclose(places, first + per_picture * order, atol=2.0)
-    assert per_picture * len(shown) > 0.2 * WIDE
+    per_frame, first = np.polyfit(order, places, 1)
+    np.testing.assert_allclose(places, first + per_frame * order, atol=2.0)
+    assert per_frame * len(shown) > 0.2 * WIDE
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".gif", ".webm"])
-def test_a_gif_and_a_webm_have_the_same_moments(grasp: Path, tmp_path: Path, suffix: str):
+def test_a_gif_and_a_webm_have_the_same_frames(grasp: Path, tmp_path: Path, suffix: str):
     out = tmp_path / f"film{suffix}"
     status, told = film(
         grasp, "--out", out, "--size", "320x240", "--no-plots", "--pace", 5, "--fps", 4, "--view", "top"
     )
     assert status == 0, told
-    expected = len(film_times(0.0, float(Record(grasp / "signals.parquet").time[-1]), FilmSettings(pace=5.0, rate=4.0)))
+    expected = len(frame_times(0.0, float(Record(grasp / "signals.parquet").time[-1]), FilmSettings(pace=5.0, fps=4.0)))
     if suffix == ".webm":
-        assert [p.shape for p in pictures(out)] == expected * [(240, 320)]
+        assert [p.shape for p in frames(out)] == expected * [(240, 320)]
         return
     gif = Image.open(out)
     shown: list[Pixels] = []
@@ -115,7 +115,7 @@ def test_a_gif_and_a_webm_have_the_same_moments(grasp: Path, tmp_path: Path, suf
 
 
 @pytest.mark.slow
-def test_a_moment_looks_the_same_whatever_was_shown_before(grasp: Path):
+def test_a_frame_looks_the_same_whatever_was_shown_before(grasp: Path):
     content = film_content(RunFolder.of_run(grasp), (), 720)
     with open_camera(film_html(content, (1280, 720), "follow"), (1920, 1080), dark=True) as camera:
         first, other, again = (camera(t) for t in (3.0, 8.0, 3.0))
@@ -125,11 +125,11 @@ def test_a_moment_looks_the_same_whatever_was_shown_before(grasp: Path):
     assert picture.mean() < 80.0  # it is dark
 
 
-def test_the_pictures_times_are_even_and_end_with_the_run():
-    settings = FilmSettings(pace=2.0, rate=10.0)
-    np.testing.assert_allclose(film_times(1.0, 2.0, settings), [1.0, 1.2, 1.4, 1.6, 1.8, 2.0])
-    np.testing.assert_allclose(film_times(1.0, 1.7, settings), [1.0, 1.2, 1.4, 1.6, 1.7])
-    np.testing.assert_allclose(film_times(0.0, 0.3, FilmSettings(pace=1.0, rate=10.0)), [0.0, 0.1, 0.2, 0.3])
+def test_the_frames_times_are_even_and_end_with_the_run():
+    settings = FilmSettings(pace=2.0, fps=10.0)
+    np.testing.assert_allclose(frame_times(1.0, 2.0, settings), [1.0, 1.2, 1.4, 1.6, 1.8, 2.0])
+    np.testing.assert_allclose(frame_times(1.0, 1.7, settings), [1.0, 1.2, 1.4, 1.6, 1.7])
+    np.testing.assert_allclose(frame_times(0.0, 0.3, FilmSettings(pace=1.0, fps=10.0)), [0.0, 0.1, 0.2, 0.3])
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,7 @@ def test_a_run_without_a_scene_is_filmed_by_its_plots(tmp_path: Path):
     status, told = film(tmp_path / "run", "--size", "480x320", "--fps", 10)
     assert status == 0, told
     assert "has no scene: the film has plots only" in told
-    assert len(pictures(tmp_path / "run" / "film.mp4")) == 4  # it ends a step after 0.2 s
+    assert len(frames(tmp_path / "run" / "film.mp4")) == 4  # it ends a step after 0.2 s
     assert film(tmp_path / "run", "--force", "--no-plots")[0] == 2
 
 
@@ -161,7 +161,7 @@ def test_a_run_without_a_scene_is_filmed_by_its_plots(tmp_path: Path):
         (["--size", "641x360"], "'641x360' is no size, such as 1280x720"),
         (["--size", "wide"], "'wide' is no size"),
         (["--out", "x.avi"], "x.avi: a film's name ends with .mp4, .webm or .gif"),
-        (["--out", "x.gif", "--fps", "60"], "more than 50 pictures a second"),
+        (["--out", "x.gif", "--fps", "60"], "more than 50 frames per second"),
         (["--out", "folder.mp4"], "there is a folder of that name"),
         (["--out", "there.mp4"], "it is there already; --force replaces it"),
         (["--out", "there.mp4/x.mp4"], "is a file, so no folder can be made in it"),

@@ -81,16 +81,16 @@ def test_the_page_plots_what_it_is_asked_for_and_ends_the_run(browser: Browser, 
 
 
 @pytest.mark.slow
-def test_a_run_under_way_is_saved_as_a_film(browser: Browser, tmp_path: Path):
+def test_a_run_under_way_is_recorded_as_a_video(browser: Browser, tmp_path: Path):
     with live_run(tmp_path / "live") as (address, _), shown(browser, address) as page:
-        page.get_by_role("button", name="save as film").click()
+        page.get_by_role("button", name="record a video").click()
         before = page.evaluate(f"Number({LIVE}.dataset.frames)")
         wait_until(page, f"{LIVE}.dataset.frames > {before + 10}")
         with page.expect_download() as saved:
-            page.get_by_role("button", name="save film").click()
-        saved.value.save_as(tmp_path / "film")
+            page.get_by_role("button", name="stop and save").click()
+        saved.value.save_as(tmp_path / "video")
         assert saved.value.suggested_filename.startswith("ir_grasp.")
-        video = cv2.VideoCapture(str(tmp_path / "film"))
+        video = cv2.VideoCapture(str(tmp_path / "video"))
         assert sum(video.read()[0] for _ in range(10)) > 5
 
 

@@ -1,4 +1,4 @@
-"""The button "save as film" of a replay: the scene as it plays, as a file, where the browser can record one."""
+"""The button "record a video" of a replay: the scene as it plays, as a file, where the browser can record one."""
 
 from collections.abc import Generator
 from pathlib import Path
@@ -19,14 +19,14 @@ def page(browser: Browser, grasp: Path) -> Generator[Page, None, None]:
         yield page
 
 
-def pictures(file: Path) -> list[NDArray[np.uint8]]:
+def frames(file: Path) -> list[NDArray[np.uint8]]:
     video = cv2.VideoCapture(str(file))
     found: list[NDArray[np.uint8]] = []
     while True:
-        there, picture = video.read()
+        there, frame = video.read()
         if not there:
             return found
-        found.append(np.asarray(picture, np.uint8))
+        found.append(np.asarray(frame, np.uint8))
 
 
 def test_the_button_saves_the_replay_from_its_beginning_to_its_end(page: Page, grasp: Path, tmp_path: Path):
@@ -34,13 +34,13 @@ def test_the_button_saves_the_replay_from_its_beginning_to_its_end(page: Page, g
     page.locator(".replay-time").fill("100")
     page.locator(".replay-speed").select_option("5")
     with page.expect_download() as saved:
-        page.get_by_role("button", name="save as film").click()
-        assert page.get_by_role("button", name="end film").is_visible()
+        page.get_by_role("button", name="record a video").click()
+        assert page.get_by_role("button", name="stop and save").is_visible()
     assert page.locator(".replay-told").inner_text().startswith(f"{last:.1f} s")
     assert saved.value.suggested_filename.split(".") in (["ir_grasp", "mp4"], ["ir_grasp", "webm"])
     file = tmp_path / saved.value.suggested_filename
     saved.value.save_as(file)
-    shown = pictures(file)
+    shown = frames(file)
     wide, high = page.evaluate("[replays[0].scene.canvas.width & ~1, replays[0].scene.canvas.height & ~1]")
     assert {p.shape for p in shown} == {(high, wide, 3)}
     assert len(shown) > 5
@@ -48,17 +48,17 @@ def test_the_button_saves_the_replay_from_its_beginning_to_its_end(page: Page, g
     assert shown[0].mean() > 180.0  # it has the page's background
 
 
-def test_a_film_that_is_ended_early_is_saved_and_another_can_begin(page: Page, tmp_path: Path):
+def test_a_video_that_is_ended_early_is_saved_and_another_can_begin(page: Page, tmp_path: Path):
     page.locator(".replay-speed").select_option("1")
     for _ in range(2):
         with page.expect_download() as saved:
-            page.get_by_role("button", name="save as film").click()
+            page.get_by_role("button", name="record a video").click()
             wait_until(page, "replays[0].element.dataset.frame > 10")
-            page.get_by_role("button", name="end film").click()
-        saved.value.save_as(tmp_path / "film")
-        assert len(pictures(tmp_path / "film")) > 2
+            page.get_by_role("button", name="stop and save").click()
+        saved.value.save_as(tmp_path / "video")
+        assert len(frames(tmp_path / "video")) > 2
         assert float(page.evaluate("replays[0].element.dataset.frame")) < 200
-        page.get_by_role("button", name="save as film").wait_for()
+        page.get_by_role("button", name="record a video").wait_for()
 
 
 @pytest.mark.slow
