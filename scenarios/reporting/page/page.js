@@ -120,6 +120,8 @@ const page = (() => {
     redraw(figure => figure.layout.meta?.time);
   }
 
+  const ROW = 66;  // height that a row of a list has at least with its name above it, pixels
+
   // On a phone: few ticks, small margins, and the names of a list above its rows instead of beside them.
   function narrow(div, layout) {
     for (const key of Object.keys(layout).filter(k => /^[xy]axis\d*$/.test(k)))
@@ -129,12 +131,24 @@ const page = (() => {
     if (layout.meta?.list) {
       const {tickvals, ticktext} = layout.yaxis;
       layout.annotations = tickvals.map((y, k) => ({
-        text: ticktext[k], x: 0, xref: "paper", xanchor: "left", y, yanchor: "bottom", yshift: 10, align: "left", showarrow: false,
+        text: wrapped(ticktext[k].replaceAll("<br>", " "), div.clientWidth / 7),
+        x: 0, xref: "paper", xanchor: "left", y, yanchor: "bottom", yshift: 13, align: "left", showarrow: false,
       }));
       layout.yaxis = {...layout.yaxis, showticklabels: false};
       layout.margin.l = 6;
-      div.dataset.more = 18 * tickvals.length;
+      div.dataset.more = Math.max(0, ROW * tickvals.length - parseFloat(div.dataset.height ?? div.style.height));
     }
+  }
+
+  // Returns a text in lines of so many characters at most, where its words allow it.
+  function wrapped(text, most) {
+    const lines = [""];
+    for (const word of text.split(" ")) {
+      const last = lines.at(-1);
+      if (!last || last.length + word.length < most) lines[lines.length - 1] = last ? `${last} ${word}` : word;
+      else lines.push(word);
+    }
+    return lines.join("<br>");
   }
 
   // Makes room below a figure for its legend, so that the axes keep their height.

@@ -81,7 +81,9 @@ def test_a_list_has_its_names_above_its_rows_on_a_phone_and_beside_them_elsewher
     beside = "document.querySelectorAll('.plot .ytick').length"
     width = "document.querySelector('.plot')._fullLayout.xaxis._length"
     with opened(browser, folder.report, width=400) as page:
-        assert page.evaluate(names)[0] == "forward 10 mm,<br>standoff 60 mm, Reflex"
+        assert page.evaluate(names)[0] == "forward 10 mm, standoff 60 mm, Reflex"
+        rows = "document.querySelector('.plot')._fullLayout.yaxis"
+        assert page.evaluate(f"Math.abs({rows}.l2p(1) - {rows}.l2p(0))") > 40
         assert (page.evaluate(f"{names}.length"), page.evaluate(beside)) == (len(points), 0)
         assert page.evaluate(width) > 300
         assert overflow(page) <= 0
