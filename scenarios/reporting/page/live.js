@@ -18,9 +18,9 @@ const live = (() => {
   };
   let viewport = null, slots = [], size = 0, paused = true, link = null, over = false, lead = null, side = null;
 
-  // Puts the scene of a run in the place of the one before, seen from where that was seen.
+  // Puts the scene of a run in the place of the one before, seen from where that was seen, unless a hand is led only now.
   function begin(run) {
-    const before = viewport?.scene.viewpoint();
+    const before = lead || !run.hand ? viewport?.scene.viewpoint() : null;
     side?.close();
     viewport?.close();
     viewport = null;
@@ -32,7 +32,8 @@ const live = (() => {
     if (run.scene) {
       host.append(byId("scene-of-run").content.cloneNode(true));
       for (const part of ["views", "legend"]) host.querySelector(".replay-" + part).outerHTML = run[part];
-      viewport = createViewport(root, {...run.scene, live: true});
+      viewport = createViewport(root, {...run.scene, live: true, ghost: run.hand ? "hand" : ""});
+      if (run.hand) viewport?.scene.setStart(eyeOnHandAndGripper(viewport.scene));
       if (viewport) createRecorder(viewport, () => told.value);
       if (before) viewport?.scene.setViewpoint(before);
     }

@@ -1,13 +1,15 @@
 // Shows bodies, tubes and lines in space, with three.js; what they are comes from replay_section.py, scene_objects.js makes them.
-//   const scene = createScene(element, {traces, low, high, held, eye, weightless, floor, follow, played, live})
+//   const scene = createScene(element, {traces, low, high, held, eye, weightless, floor, follow, played, live, ghost})
 //                                 held: [[x, y, z], ...], m, what a view just shows; without it, the box from low to high
 //                                 played: a person acts in it, so that frames come fast also where no graphics card
 //                                 draws them, and shadows fall straight down
 //                                 live: frames follow a run under way: those that come late are drawn with fewer pixels,
 //                                 then without shadows (data-coarse of the element counts the steps)
+//                                 ghost: label of what shines through what hides it
 //   scene.show(u)                 everything u frames after the first; u may lie between two
 //   scene.setView(name)           looks from one of scene.views: "start", "front", "side", "top";
 //                                 side is from that end of x which the eye is nearer to at the start
+//   scene.setStart([x, y, z])     lets "start" be that direction, and looks so; null changes nothing
 //   scene.lookFrom([x, y, z])     looks from that side, along a vector of W that points to the eye
 //   scene.follows = true          the view moves with the body of that label from now on
 //   scene.setVisible(label, yes), scene.visible(label)
@@ -113,7 +115,8 @@ const createScene = (() => {
   }
 
   return (element, content) => {
-    const {traces, low, high, held, eye, weightless = false, floor = low[2], follow = "", played = false, live = false} = content;
+    const {traces, low, high, held, eye, weightless = false, floor = low[2], follow = ""} = content;
+    const {played = false, live = false, ghost = ""} = content;
     if (!hasWebGl()) return null;
     const sides = high.map((x, i) => x - low[i]), centre = high.map((x, i) => (x + low[i]) / 2);
     const reach = Math.hypot(...sides) / 2;
@@ -139,7 +142,7 @@ const createScene = (() => {
     const ground = weightless ? null
       : sceneObjects.createFloor(floor - reach / 500, centre, reach, round125(Math.max(...sides) / 6));
     scene.add(ground ? ground.group : sceneObjects.createStars(50 * reach, dot));
-    const drawn = traces.flatMap(trace => sceneObjects.createTrace(trace, dot));
+    const drawn = traces.flatMap(trace => sceneObjects.createTrace(trace, dot, trace.label === ghost));
     for (const {object} of drawn) scene.add(object);
     const labelled = label => drawn.filter(d => d.label === label);
     const points = label => labelled(label).flatMap(d => d.worldPoints());
@@ -157,7 +160,7 @@ const createScene = (() => {
       () => setPixelRatio(0.5),
     ]);
 
-    let request = 0, requestedAt = 0, follows = false;
+    let request = 0, requestedAt = 0, follows = false, start = eye;
     const pixelsPerMetre = () => element.clientHeight / (2 * Math.tan(FIELD / 2) * camera.position.distanceTo(controls.target));
     function render() {
       request = 0;
@@ -230,7 +233,10 @@ const createScene = (() => {
         requestRender();
       },
       lookFrom,
-      setView: name => lookFrom(VIEWS[name]?.(eye) ?? eye),
+      setView: name => lookFrom(VIEWS[name]?.(eye) ?? start),
+      setStart(towards) {
+        if (towards) lookFrom(start = towards);
+      },
       get follows() { return follows; },
       set follows(yes) { follows = Boolean(yes && follow); },
       setVisible(label, yes) {

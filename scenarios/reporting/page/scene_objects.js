@@ -1,6 +1,6 @@
 // Makes what a scene draws, as three.js objects; scene.js shows them.
-//   sceneObjects.createTrace(trace, dot)   [{label, object, setFrame, worldPoints}, ...]: the bodies and tubes of a trace of
-//                                          replay_section.py, or its line
+//   sceneObjects.createTrace(trace, dot, hasGhost)   [{label, object, setFrame, worldPoints}, ...]: the bodies and tubes of a
+//                                          trace of replay_section.py, which may shine through what hides them, or its line
 //     object             of three.js, to be added to a scene
 //     setFrame(u)        moves it to where it is u frames after the first
 //     worldPoints()      [[x, y, z], ...] of its points in W, m
@@ -13,12 +13,21 @@
 "use strict";
 const sceneObjects = (() => {
   const MAX_TRAIL_POINTS = 4000;
+  const GREATER_DEPTH = 6;  // THREE.GreaterDepth, which three.min.js has without its name
   const SHARP = Math.cos(35 * Math.PI / 180);  // of the angle between two faces from which on their edge is drawn
 
   function createSolidMaterial({colour, opacity}) {
     return new THREE.MeshStandardMaterial({
       color: colour, transparent: opacity < 1, opacity, roughness: 0.62, metalness: 0.02, side: THREE.DoubleSide,
     });
+  }
+
+  // The same surface once more, faint, where something lies before it.
+  function createGhost({geometry}, {colour}) {
+    const material = createSolidMaterial({colour, opacity: 0.35});
+    const ghost = new THREE.Mesh(geometry, Object.assign(material, {depthFunc: GREATER_DEPTH, depthWrite: false}));
+    ghost.frustumCulled = false;
+    return ghost;
   }
 
   // A body keeps its geometry and is moved; p_WB that is not finite hides it.
@@ -214,10 +223,11 @@ const sceneObjects = (() => {
     return points;
   }
 
-  function createTrace(trace, dot) {
+  function createTrace(trace, dot, hasGhost) {
     const objects = trace.parts
       ? trace.parts.map(part => (part.radii ? createTube : createBody)(part, createSolidMaterial(trace)))
       : [createLine(trace, dot)];
+    if (hasGhost && trace.parts) for (const {object} of objects) object.add(createGhost(object, trace));
     return objects.map(made => ({label: trace.label, ...made}));
   }
 

@@ -25,6 +25,16 @@ SEEN = """(() => {
     return [box.left + x, box.top + y, position.clone().sub(hand).dot(back)];
 })()"""
 """Where the hand is seen, in pixels of the window, and how deep below the eye, m."""
+SEEN_SHARE = """label => {
+    const points = live.scene.points(label), few = points.filter((_, k) => k % Math.ceil(points.length / 40) === 0);
+    const middle = [0, 1, 2].map(i => points.reduce((sum, p) => sum + p[i], 0) / points.length);
+    const box = document.querySelector(".replay-scene canvas").getBoundingClientRect();
+    return few.filter(p => {
+        const [x, y] = live.scene.toPixels(p.map((at, i) => 0.9 * at + 0.1 * middle[i]));
+        return live.scene.pick(box.left + x, box.top + y, [label]);
+    }).length / few.length;
+}"""
+"""Which share of a label's points is seen at its pixel: nothing lies before it, and it is within the view."""
 NO_PAD = """
     window.pad = null;
     Object.defineProperty(navigator, "getGamepads", {value: () => [null, window.pad]});
@@ -150,6 +160,23 @@ def test_keys_turn_the_hand_as_they_lie_on_the_keyboard(browser: Browser, tmp_pa
                     page.wait_for_timeout(200)
                     page.keyboard.up(key)
                     assert sign * turned_about(page, q, axis) > 0.02, key
+            end_run(page)
+        run.wait(timeout=120)
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (400, 800)])
+def test_hand_and_gripper_are_both_seen_at_first(browser: Browser, tmp_path: Path, size: tuple[int, int]):
+    with live_run(tmp_path / "led", *GIVEN, scenario=SCENARIO) as (address, run):
+        with shown(browser, address) as page:
+            page.set_viewport_size({"width": size[0], "height": size[1]})
+            wait_until(page, "live.hand")
+            page.locator("[data-view=start]").click()
+            assert page.evaluate(SEEN_SHARE, "hand") > 0.9
+            assert page.evaluate(SEEN_SHARE, "gripper") > 0.4  # the rest is behind its own jaws
+            azimuth = page.evaluate("live.scene.spherical().azimuth")
+            assert azimuth == pytest.approx(
+                0.75 * np.pi, abs=0.05
+            )  # the gripper opens to -x, and the hand is at its +y
             end_run(page)
         run.wait(timeout=120)
 
