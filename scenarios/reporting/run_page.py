@@ -163,7 +163,7 @@ def _duration(facts: RunFacts) -> str:
     simulated, wall = (facts.summary.get(f"{name}_seconds") for name in ("simulated", "wall"))
     if simulated is None:
         return ""
-    return f"{simulated:.1f} s simulated" + ("" if wall is None else f" in {wall:.1f} s")
+    return f"{simulated:.1f} s simulated" + ("" if wall is None else f" in {wall:.1f} s of wall time")
 
 
 _IN_TABLES = ("cpu_", "pace_", "iterations", "rollbacks")

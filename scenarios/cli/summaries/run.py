@@ -40,7 +40,7 @@ def print_summary(result: RunResult, headline: Sequence[str], folder: RunFolder)
     metrics = summary["metrics"]
     first = headline or result.outcome.metrics
     rows = [(metrics[n]["description"] or n, format_metric(metrics[n])) for n in first if n in metrics]
-    rows.append(("simulated", f"{summary['simulated_seconds']:.1f} s in {summary['wall_seconds']:.1f} s"))
+    rows.append(("simulated", f"{summary['simulated_seconds']:.1f} s in {summary['wall_seconds']:.1f} s of wall time"))
     rows += pace_rows(summary)
     rows += _conversion_rows(folder)
     print_rows(console, rows)
