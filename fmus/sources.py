@@ -44,11 +44,16 @@ class Carried:
 
     Attributes:
         files: sources by their paths in the FMU, such as `handover/plants/helix/arm/tendon_arm.py`.
-        modules: top-level modules of the environment that they import, sorted.
+        imported: names that they import from the environment's packages, sorted: modules, and what is in them.
     """
 
     files: dict[str, Path]
-    modules: tuple[str, ...]
+    imported: tuple[str, ...]
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """Top-level modules of the environment that they import, sorted."""
+        return tuple(sorted({name.partition(".")[0] for name in self.imported}))
 
     def packages(self) -> list[Package]:
         """Return the environment's packages with their versions; modules of no distribution are left out."""
@@ -83,10 +88,11 @@ def closure(block: str) -> Carried:
         raise UnknownBlock(block, f"module {module!r} cannot be found as Python source")
     carried_tops = {OWN_PACKAGE, module.partition(".")[0]}
     files: dict[str, Path] = {}
-    environment: set[str] = set()
+    imported: set[str] = set()
     waiting = [module, *SLAVE_SIDE]
     while waiting:
-        for part in _with_packages(waiting.pop()):
+        dotted = waiting.pop()
+        for part in _with_packages(dotted):
             top = part.partition(".")[0]
             if top in sys.stdlib_module_names:
                 break
@@ -94,7 +100,7 @@ def closure(block: str) -> Carried:
             if spec is None:
                 break
             if top not in carried_tops and (_is_installed(spec) or spec.origin in ("built-in", "frozen")):
-                environment.add(top)
+                imported.add(dotted)
                 break
             path = _path_in_fmu(part, spec)
             if _is_source(spec) and path not in files:
@@ -102,7 +108,7 @@ def closure(block: str) -> Carried:
                 is_package = spec.submodule_search_locations is not None
                 package = part if is_package else part.rpartition(".")[0]
                 waiting += _imports(files[path].read_bytes(), package, str(files[path]))
-    return Carried(dict(sorted(files.items())), tuple(sorted(environment)))
+    return Carried(dict(sorted(files.items())), tuple(sorted(imported)))
 
 
 class FileElsewhere(ValueError):

@@ -177,7 +177,10 @@ def _judge(name: str, found: Mapping[str, Any], resources: Path) -> None:
 
 
 def _imported(block: str, carried: Carried) -> list[str]:
-    """Return the names of the modules that a block imports, but for those that its FMU contains as sources."""
+    """Return the names of the modules that a block imports, but for those that its FMU contains as sources.
+
+    Those count, too, that a function imports as it is called: its sources name them.
+    """
     command = [sys.executable, "-c", _IMPORTED, block, json.dumps(sys.path)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
@@ -185,6 +188,7 @@ def _imported(block: str, carried: Carried) -> list[str]:
     tops = {path.partition("/")[0].removesuffix(".py") for path in carried.files}
     modules: list[str] = json.loads(done.stdout.splitlines()[-1])
     own = {*tops, "__main__"}
+    modules += [name for name in carried.imported if _findable(name)]
     names = {*_STANDARD, *(name for name in modules if name.partition(".")[0] not in own)}
     return sorted(name for name in names if not (name.startswith("_") and name in sys.stdlib_module_names))
 

@@ -114,6 +114,12 @@ def test_imports_are_followed_but_those_for_type_checkers(tmp_path: Path, monkey
     assert "cv2" not in carried.modules
 
 
+def test_imports_within_a_function_are_followed_too():
+    carried = closure(UNITS["Thrusters"].block)
+    assert "scipy.optimize" in carried.imported
+    assert {"numpy", "scipy"} <= set(carried.modules)
+
+
 def test_a_new_token_for_new_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.syspath_prepend(tmp_path)
     tokens: list[str] = []
