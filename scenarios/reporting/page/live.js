@@ -10,7 +10,7 @@
 const live = (() => {
   const root = document.querySelector(".live"), host = document.getElementById("scene");
   const byId = id => document.getElementById(id);
-  const told = root.querySelector(".replay-told"), plots = byId("plots");
+  const readout = root.querySelector(".replay-told"), plots = byId("plots");
   const ASKING = "#pause, #step, #stop, #pace, #signal, #chosen button, .play :is(button, input, select), #runs button";
   const chosen = [], listeners = {};
   const api = {
@@ -19,27 +19,28 @@ const live = (() => {
   let viewport = null, slots = [], size = 0, paused = true, link = null, over = false, lead = null, side = null;
 
   // Puts the scene of a run in the place of the one before, seen from where that was seen, unless a hand is led only now.
-  function begin(run) {
+  function beginRun(run) {
     const before = lead || !run.hand ? viewport?.scene.viewpoint() : null;
     side?.close();
     viewport?.close();
     viewport = null;
     lead?.close();
     over = false;
+    const content = {...run.scene, live: true, ghost: run.hand ? "hand" : ""};
     slots = run.scene ? replayShapes.unpack(run.scene) : [];
     size = slots.reduce((sum, {of, key}) => sum + (of.trail ? 3 : of[key].length), 0);
     host.replaceChildren();
     if (run.scene) {
       host.append(byId("scene-of-run").content.cloneNode(true));
       for (const part of ["views", "legend"]) host.querySelector(".replay-" + part).outerHTML = run[part];
-      viewport = createViewport(root, {...run.scene, live: true, ghost: run.hand ? "hand" : ""});
+      viewport = createViewport(root, content);
       if (run.hand) viewport?.scene.setStart(eyeOnHandAndGripper(viewport.scene));
-      if (viewport) createRecorder(viewport, () => told.value);
+      if (viewport) createRecorder(viewport, () => readout.value);
       if (before) viewport?.scene.setViewpoint(before);
     }
     const isLed = run.hand && viewport;
     lead = isLed ? createHandControl(viewport.element, viewport.scene.camera) : null;
-    side = isLed ? createSideView(viewport.element.parentElement, viewport.scene, {...run.scene, live: true}, "hand") : null;
+    side = isLed ? createSideView(viewport.element.parentElement, viewport.scene, content, sidesOfHandover(viewport.scene)) : null;
     if (side) side.shown = byId("hand-side-view").checked;
     byId("hand").hidden = byId("hand-help").hidden = !lead;
     Object.assign(api, {run, scene: viewport?.scene ?? null});
@@ -60,19 +61,19 @@ const live = (() => {
   }
 
   // Takes where everything is; the point of a trail is added to its way.
-  function place(numbers) {
+  function setPlaces(numbers) {
     if (numbers.length !== size) return;
     let at = 0;
     for (const {of, key} of slots) {
       const size = of.trail ? 3 : of[key].length, values = numbers.subarray(at, at + size);
       at += size;
-      if (of.trail) of.points = grown(of.points, values);
+      if (of.trail) of.points = extended(of.points, values);
       else of[key] = Float64Array.from(values);
     }
     api.scene?.show(Infinity);
     side?.show();
   }
-  function grown(points, more) {
+  function extended(points, more) {
     if (points.length + 3 > 3 * sceneObjects.maxTrailPoints) points = points.filter((_, i) => Math.floor(i / 3) % 2 === 0);
     const all = new Float64Array(points.length + 3);
     all.set(points);
@@ -84,10 +85,10 @@ const live = (() => {
     if (link?.readyState === WebSocket.OPEN) link.send(JSON.stringify({command, value}));
   }
 
-  function tell(message) {
+  function receive(message) {
     for (const name of Object.keys(message)) for (const act of listeners[name] ?? []) act(message[name]);
     if (message.begun) {
-      begin(message.begun);
+      beginRun(message.begun);
       for (const act of listeners.shown ?? []) act();
     }
     else if (message.state) {
@@ -98,10 +99,10 @@ const live = (() => {
       if (![...select.options].some(o => o.value === pace)) select.add(new Option(`${pace}\u00d7`, pace), 0);
       select.value = pace;
     } else if ("time" in message) {
-      told.value = `${message.time.toFixed(2)} s${message.phase ? ", " + message.phase : ""}`;
-    } else if (message.plots) draw(message.plots);
+      readout.value = `${message.time.toFixed(2)} s${message.phase ? ", " + message.phase : ""}`;
+    } else if (message.plots) drawPlots(message.plots);
     else if (message.pictures) showPictures(message.pictures);
-    else if (message.ended) end(message.ended);
+    else if (message.ended) endRun(message.ended);
     else if (message.refused) byId("told").textContent = message.refused;
   }
 
@@ -127,7 +128,7 @@ const live = (() => {
   }
 
   // Draws those plots that are seen; the server sends no others, since drawing takes long.
-  function draw(figures) {
+  function drawPlots(figures) {
     figures.forEach(({title, figure}, i) => {
       let part = plots.children[i];
       if (!part) {
@@ -151,7 +152,7 @@ const live = (() => {
     send("see", [...shown].map(part => [...plots.children].indexOf(part)).filter(i => i >= 0));
   });
 
-  function end({judged, success, reason, report}) {
+  function endRun({judged, success, reason, report}) {
     over = true;
     const verdict = byId("verdict");
     verdict.hidden = false;
@@ -166,7 +167,7 @@ const live = (() => {
     root.dataset.ended = success;
   }
 
-  function choose(name) {
+  function chooseSignal(name) {
     if (!name || !api.run) return;
     const isThere = api.run.signals.includes(name);
     byId("told").textContent = isThere ? `The plot of ${name} is the last one below.`
@@ -187,7 +188,7 @@ const live = (() => {
   }
 
   byId("hand-side-view").addEventListener("change", ({target}) => { if (side) side.shown = target.checked; });
-  byId("signal").addEventListener("change", ({target}) => choose(target.value));
+  byId("signal").addEventListener("change", ({target}) => chooseSignal(target.value));
   byId("pause").addEventListener("click", () => send(paused ? "go" : "pause"));
   byId("step").addEventListener("click", () => send("step"));
   byId("stop").addEventListener("click", () => send("stop"));
@@ -196,9 +197,9 @@ const live = (() => {
   link = new WebSocket(`ws://${location.host}/run`);
   link.binaryType = "arraybuffer";
   link.addEventListener("message", ({data}) => {
-    if (typeof data === "string") tell(JSON.parse(data));
+    if (typeof data === "string") receive(JSON.parse(data));
     else {
-      place(new Float64Array(data));
+      setPlaces(new Float64Array(data));
       root.dataset.frames = Number(root.dataset.frames ?? 0) + 1;
     }
   });

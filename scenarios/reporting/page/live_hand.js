@@ -2,8 +2,11 @@
 //   const lead = createHandControl(element, eye)   eye: three.js's camera
 //   lead.hand      see handInput; null until the server has told where the hand is
 //   lead.close()   leads it no more
+//   sidesOfHandover(scene)       labels of what a view from the side shows before the other
 //   eyeOnHandAndGripper(scene)   from where to look first at a scene in which a hand is led; null where it has no gripper
 "use strict";
+const sidesOfHandover = scene => scene.points("gripper").length ? ["gripper", "robot"] : ["hand", "object"];
+
 // Aslant at the gripper's opening, so that hand and jaws lie beside each other, from that side on which the hand is: it is
 // nearer than the robot then, which does not hide it.
 const eyeOnHandAndGripper = scene => {

@@ -7,7 +7,7 @@
   const fields = new Map();  // by name: {field, root, entries, set(text), text()}
   let seed = null, push = null, waiting = 0, busy = false;
 
-  const made = (name, properties = {}, ...children) => {
+  const createElement = (name, properties = {}, ...children) => {
     const node = Object.assign(document.createElement(name), properties);
     node.append(...children);
     return node;
@@ -20,13 +20,13 @@
     return one.length === other.length && one.every((x, i) => x === other[i]);
   };
 
-  function ask() {
+  function scheduleRun() {
     clearTimeout(waiting);
     busy = true;
-    waiting = setTimeout(again, PAUSE);
+    waiting = setTimeout(requestRun, PAUSE);
   }
 
-  function again() {
+  function requestRun() {
     clearTimeout(waiting);
     if (seed && (!seed.validity.valid || seed.value === "")) return;
     busy = false;
@@ -36,9 +36,9 @@
   }
 
   // A slider with a number field beside it.
-  function numberEntry(field, [low, high, step], label) {
-    const slider = made("input", {type: "range", min: low, max: high, step: step || "any", disabled: !(high > low)});
-    const box = made("input", {type: "number", step: field.kind === "whole" ? 1 : "any"});
+  function createNumberEntry(field, [low, high, step], label) {
+    const slider = createElement("input", {type: "range", min: low, max: high, step: step || "any", disabled: !(high > low)});
+    const box = createElement("input", {type: "number", step: field.kind === "whole" ? 1 : "any"});
     slider.setAttribute("aria-label", `${label}, slider`);
     box.setAttribute("aria-label", label);
     slider.addEventListener("input", () => { box.value = short(slider.value); change(field.name); });
@@ -50,36 +50,36 @@
     };
   }
 
-  function plainEntry(field) {
+  function createPlainEntry(field) {
     if (field.kind === "choice") {
-      const select = made("select", {}, ...field.items.map(item => new Option(item, item)));
+      const select = createElement("select", {}, ...field.items.map(item => new Option(item, item)));
       return {nodes: [select], on: "change", get: () => select.value, set(text) { select.value = text; }};
     }
     if (field.kind === "switch") {
-      const box = made("input", {type: "checkbox"});
+      const box = createElement("input", {type: "checkbox"});
       return {nodes: [box], on: "change", get: () => String(box.checked), set(text) { box.checked = text === "true"; }};
     }
-    const box = made("input", {type: "text", spellcheck: false});
+    const box = createElement("input", {type: "text", spellcheck: false});
     return {nodes: [box], on: "change", get: () => box.value, set(text) { box.value = text; }};
   }
 
-  function fieldOf(field) {
+  function createField(field) {
     const axes = field.sliders.length > 1 ? [..."xyzw"].slice(0, field.sliders.length) : [""];
     const entries = field.sliders.length
-      ? field.sliders.map((range, i) => numberEntry(field, range, `${field.name} ${field.sliders.length > 1 ? i + 1 : ""}`.trim()))
-      : [plainEntry(field)];
-    const reset = made("button", {type: "button", className: "reset", textContent: "default"});
-    const label = made("label", {textContent: field.name.split(".").at(-1)});
-    const fault = made("p", {className: "fault", hidden: true});
-    const rows = entries.map(entry => made("div", {className: "entry"}, ...entry.nodes,
-      ...(field.unit ? [made("span", {className: "unit", textContent: field.unit})] : [])));
-    const head = made("div", {className: "field-head"}, label);
+      ? field.sliders.map((range, i) => createNumberEntry(field, range, `${field.name} ${field.sliders.length > 1 ? i + 1 : ""}`.trim()))
+      : [createPlainEntry(field)];
+    const reset = createElement("button", {type: "button", className: "reset", textContent: "default"});
+    const label = createElement("label", {textContent: field.name.split(".").at(-1)});
+    const fault = createElement("p", {className: "fault", hidden: true});
+    const rows = entries.map(entry => createElement("div", {className: "entry"}, ...entry.nodes,
+      ...(field.unit ? [createElement("span", {className: "unit", textContent: field.unit})] : [])));
+    const head = createElement("div", {className: "field-head"}, label);
     const inline = ["choice", "switch"].includes(field.kind);
     if (inline) head.append(...entries[0].nodes);
     head.append(reset);
     const about = [field.description, field.range].filter(Boolean).join("; ");
-    const root = made("div", {className: "field"}, head, ...(inline ? [] : rows),
-      ...(about ? [made("p", {className: "field-about", textContent: about})] : []), fault);
+    const root = createElement("div", {className: "field"}, head, ...(inline ? [] : rows),
+      ...(about ? [createElement("p", {className: "field-about", textContent: about})] : []), fault);
     root.dataset.name = field.name;
     const first = entries[0].nodes.at(-1);
     first.id = `field-${field.name}`;
@@ -104,7 +104,7 @@
       },
     };
     for (const entry of entries) if (entry.on) entry.nodes[0].addEventListener(entry.on, () => change(field.name));
-    reset.addEventListener("click", () => { it.set(field.default); ask(); });
+    reset.addEventListener("click", () => { it.set(field.default); scheduleRun(); });
     it.set(field.default);
     return it;
   }
@@ -112,7 +112,7 @@
 
   function change(name) {
     fields.get(name).mark();
-    ask();
+    scheduleRun();
   }
 
   live.session = true;
@@ -120,35 +120,35 @@
     if (fields.size) return;
     const host = byId("groups");
     for (const group of groups) {
-      const part = made("details", {open: group.open}, made("summary", {textContent: group.title}));
+      const part = createElement("details", {open: group.open}, createElement("summary", {textContent: group.title}));
       for (const field of group.fields) {
-        const it = fieldOf(field);
+        const it = createField(field);
         fields.set(field.name, it);
         part.append(it.root);
       }
       host.append(part);
     }
     if (seeded) {
-      seed = made("input", {type: "number", min: 0, step: 1, id: "seed", value: 0});
-      const fault = made("p", {className: "fault", hidden: true, textContent: "a whole number from 0 is right"});
+      seed = createElement("input", {type: "number", min: 0, step: 1, id: "seed", value: 0});
+      const fault = createElement("p", {className: "fault", hidden: true, textContent: "a whole number from 0 is right"});
       seed.addEventListener("input", () => {
         fault.hidden = seed.validity.valid && seed.value !== "";
-        if (fault.hidden) ask();
+        if (fault.hidden) scheduleRun();
       });
-      const next = made("button", {type: "button", textContent: "another"});
+      const next = createElement("button", {type: "button", textContent: "another"});
       next.addEventListener("click", () => {
         seed.value = Math.max(0, Math.floor(Number(seed.value))) + 1;
         fault.hidden = true;
-        ask();
+        scheduleRun();
       });
-      host.prepend(made("div", {className: "field"}, made("div", {className: "field-head"},
-        made("label", {textContent: "seed of all random numbers", htmlFor: "seed"}), seed, next), fault));
+      host.prepend(createElement("div", {className: "field"}, createElement("div", {className: "field-head"},
+        createElement("label", {textContent: "seed of all random numbers", htmlFor: "seed"}), seed, next), fault));
     }
     if (pushable) {
-      push = made("input", {type: "checkbox", id: "push"});
-      push.addEventListener("change", ask);
-      host.prepend(made("div", {className: "field"}, made("div", {className: "field-head"},
-        made("label", {textContent: "push by hand, in the scene", htmlFor: "push"}), push)));
+      push = createElement("input", {type: "checkbox", id: "push"});
+      push.addEventListener("change", scheduleRun);
+      host.prepend(createElement("div", {className: "field"}, createElement("div", {className: "field-head"},
+        createElement("label", {textContent: "push by hand, in the scene", htmlFor: "push"}), push)));
     }
   });
 
@@ -164,14 +164,14 @@
     general.hidden = !first;
   });
 
-  byId("again").addEventListener("click", again);
+  byId("again").addEventListener("click", requestRun);
   byId("defaults").addEventListener("click", () => {
     for (const it of fields.values()) it.set(it.field.default);
     if (seed) {
       seed.value = 0;
       seed.dispatchEvent(new Event("input"));  // what was wrong with it is so no more
     }
-    again();
+    requestRun();
   });
   byId("search").addEventListener("input", ({target}) => {
     const words = target.value.toLowerCase().split(/\s+/).filter(Boolean);
@@ -189,7 +189,7 @@
     }
   });
 
-  const SAID = {"under way": "", succeeded: "good", failed: "bad", lost: "bad", "ended by a change": "soft"};
+  const STATE_CLASSES = {"under way": "", succeeded: "good", failed: "bad", lost: "bad", "ended by a change": "soft"};
   live.on("runs", ({rows, seen}) => {
     const names = [...new Map(rows.flatMap(row => row.metrics.map(m => [m.name, m.about])))];
     byId("runs").hidden = byId("runs-heading").hidden = !rows.length;
@@ -198,36 +198,36 @@
     if (shown) byId("command").querySelector("code").textContent = shown.command;
     const seeds = new Set(rows.map(row => row.seed)).size > 1;
     const heads = ["run", "changed", ...(seeds ? ["seed"] : []), "verdict", "", ...names.map(([name]) => name.replaceAll("_", " "))];
-    byId("runs").tHead.replaceChildren(made("tr", {}, ...heads.map((text, i) => {
+    byId("runs").tHead.replaceChildren(createElement("tr", {}, ...heads.map((text, i) => {
       const about = names[i - heads.length + names.length]?.[1];
-      return made("th", {scope: "col", textContent: text, title: about ?? ""});
+      return createElement("th", {scope: "col", textContent: text, title: about ?? ""});
     })));
     byId("runs").tBodies[0].replaceChildren(...rows.toReversed().map(row => {
       const changed = Object.entries(row.parameters).map(([name, text]) => `${name} = ${text}`);
       if (row.pushed) changed.push("pushed by hand");
       const cells = [
-        made("td", {textContent: row.number}),
-        made("td", {className: "set", textContent: changed.join(", ") || "nothing"}),
-        ...(seeds ? [made("td", {textContent: row.seed ?? ""})] : []),
-        made("td", {className: "reason"}, made("b", {className: SAID[row.state], textContent: row.state}),
+        createElement("td", {textContent: row.number}),
+        createElement("td", {className: "set", textContent: changed.join(", ") || "nothing"}),
+        ...(seeds ? [createElement("td", {textContent: row.seed ?? ""})] : []),
+        createElement("td", {className: "reason"}, createElement("b", {className: STATE_CLASSES[row.state], textContent: row.state}),
           row.reason ? `: ${row.reason}` : ""),
-        made("td", {className: "acts"}, ...acts(row, seen)),
-        ...names.map(([name]) => made("td", {className: "number", textContent: row.metrics.find(m => m.name === name)?.text ?? ""})),
+        createElement("td", {className: "acts"}, ...createActions(row, seen)),
+        ...names.map(([name]) => createElement("td", {className: "number", textContent: row.metrics.find(m => m.name === name)?.text ?? ""})),
       ];
       cells.forEach((cell, i) => { cell.dataset.label = heads[i]; });
-      const line = made("tr", {className: row.number === seen ? "seen" : ""}, ...cells);
+      const line = createElement("tr", {className: row.number === seen ? "seen" : ""}, ...cells);
       line.dataset.state = row.state;
       return line;
     }));
   });
 
-  function acts(row, seen) {
+  function createActions(row, seen) {
     if (["under way", "lost"].includes(row.state)) return [];
-    const show = made("button", {type: "button", textContent: row.number === seen ? "show again" : "show it"});
+    const show = createElement("button", {type: "button", textContent: row.number === seen ? "show again" : "show it"});
     show.addEventListener("click", () => { live.send("show", row.number); scrollTo({top: 0, behavior: "smooth"}); });
     if (row.report)
-      return [show, " ", made("a", {href: `/report/${row.number}`, target: "_blank", textContent: "open the report"})];
-    const write = made("button", {type: "button", textContent: "write a report"});
+      return [show, " ", createElement("a", {href: `/report/${row.number}`, target: "_blank", textContent: "open the report"})];
+    const write = createElement("button", {type: "button", textContent: "write a report"});
     write.addEventListener("click", () => {
       write.disabled = true;
       write.textContent = "being written";

@@ -23,13 +23,13 @@
     return null;
   }
 
-  function forceOf({from, to, greatest}, high) {
+  function forceOfDrag({from, to, greatest}, high) {
     const [right, down] = [to[0] - from[0], to[1] - from[1]];
     const long = Math.hypot(right, down), newtons = Math.min(greatest, greatest * long / (FULL * high));
     return long ? live.scene.acrossView(newtons * right / long, -newtons * down / long) : [0, 0, 0];
   }
 
-  function draw() {
+  function drawArrow() {
     if (!pushed || pushed.scene !== live.scene) return;
     const {frame, point, force, drawing} = pushed, scene = live.scene;
     const [x, y] = scene.toPixels(scene.toWorld(frame, point));
@@ -44,10 +44,10 @@
     text.setAttribute("x", tx + 10);
     text.setAttribute("y", ty - 10);
     text.textContent = `${newtons.toFixed(1)} N`;
-    requestAnimationFrame(draw);
+    requestAnimationFrame(drawArrow);
   }
 
-  function tell() {
+  function sendPush() {
     sent = performance.now();
     live.send("push", {body: pushed.label, point: pushed.point, force: pushed.force});
   }
@@ -75,7 +75,7 @@
       pushed = {...body, scene: live.scene, point: live.scene.toBody(body.frame, body.point), force: [0, 0, 0], from: at, to: at, drawing};
       root.dataset.pushed = body.label;
       event.target.setPointerCapture(event.pointerId);
-      draw();
+      drawArrow();
     }, true);
     element.addEventListener("pointermove", event => {
       if (!pushed) {
@@ -84,13 +84,13 @@
       }
       event.stopPropagation();
       pushed.to = [event.clientX, event.clientY];
-      pushed.force = forceOf(pushed, element.clientHeight);
-      if (performance.now() - sent >= PERIOD) tell();
+      pushed.force = forceOfDrag(pushed, element.clientHeight);
+      if (performance.now() - sent >= PERIOD) sendPush();
     }, true);
     for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) element.addEventListener(name, release, true);
   });
   // The last move of a drag counts, too.
-  setInterval(() => { if (pushed && performance.now() - sent >= PERIOD) tell(); }, PERIOD);
+  setInterval(() => { if (pushed && performance.now() - sent >= PERIOD) sendPush(); }, PERIOD);
   addEventListener("blur", release);
   addEventListener("keydown", ({key}) => { if (key === "Escape") release(); });
 })();

@@ -220,7 +220,7 @@ const createScene = (() => {
       camera,
       onBeforeRender() {},
       onAfterRender() {},
-      setFrame(u) { for (const made of drawn) made.setFrame(u); },
+      setFrame(u) { for (const shown of drawn) shown.setFrame(u); },
       requestRender,
       show(u) {
         api.setFrame(u);

@@ -228,7 +228,7 @@ const sceneObjects = (() => {
       ? trace.parts.map(part => (part.radii ? createTube : createBody)(part, createSolidMaterial(trace)))
       : [createLine(trace, dot)];
     if (hasGhost && trace.parts) for (const {object} of objects) object.add(createGhost(object, trace));
-    return objects.map(made => ({label: trace.label, ...made}));
+    return objects.map(of => ({label: trace.label, ...of}));
   }
 
   return {createTrace, createFloor, createStars, createDotTexture, distanceAlong, maxTrailPoints: MAX_TRAIL_POINTS - 1};

@@ -1,12 +1,12 @@
 // A second, smaller view of a scene, across the first one's, which shows how far away things are.
-//   const side = createSideView(element, scene, content, label)
+//   const side = createSideView(element, scene, content, [front, back])
 //     element, scene      what holds both views, and the first, of that content; see createScene
-//     label               of what is to be seen: the side is that on which this is, lest others hide it
+//     front, back         labels: the side is that on which the one is, from the other, lest this hides it
 //   side.show()           takes where everything is
 //   side.shown = true     whether it is seen
 //   side.close()          ends it
 "use strict";
-const createSideView = (element, first, content, label) => {
+const createSideView = (element, first, content, [front, back]) => {
   const LEVEL = 0.12;  // how far the eye is above what it looks at, over how far it is from there
   const TURNED = 0.01;  // rad between two frames from which on it turns with the first view
   const ROOM = 0.08;  // on each side, as a share of the longest
@@ -31,9 +31,9 @@ const createSideView = (element, first, content, label) => {
     const now = first.spherical().azimuth;
     if (!scene || Math.abs(now - azimuth) < TURNED) return;
     azimuth = now;
-    const right = [-Math.sin(azimuth), Math.cos(azimuth)], middle = first.viewpoint().target;
-    const away = first.points(label).reduce((sum, p) => sum + right[0] * (p[0] - middle[0]) + right[1] * (p[1] - middle[1]), 0);
-    const to = away < 0 ? -1 : 1;
+    const right = [-Math.sin(azimuth), Math.cos(azimuth)];
+    const meanOf = label => first.points(label).reduce((sum, p, _, all) => sum + (right[0] * p[0] + right[1] * p[1]) / all.length, 0);
+    const to = meanOf(front) < meanOf(back) ? -1 : 1;
     scene.lookFrom([to * right[0], to * right[1], LEVEL]);
   }
   const api = {

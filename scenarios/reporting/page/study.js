@@ -5,8 +5,8 @@
   const root = document.querySelector(".study"), {words} = page.data(root);
   const byId = id => document.getElementById(id);
   const main = byId("screen");
-  let shown = null, play = null, input = null, test = null, named = 0, over = false, ready = false, drawn = [], hasTracker = false, held = [];
-  let still = {pose: "", since: 0, told: false};  // since when the hand has been where it is, and whether the page says so
+  let shown = null, play = null, input = null, test = null, taskShownAt = 0, over = false, ready = false, drawn = [], hasTracker = false, held = [];
+  let still = {pose: "", since: 0, isMentioned: false};  // since when the hand has been where it is, and whether the page says so
   let camera = null, cameraStatus = "", cameraFault = null;  // the webcam's, see hand_camera.js
   const STILL = 30000;  // ms
   const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
@@ -18,19 +18,19 @@
 
   // A word of the page in the language of the study, else `otherwise`, with values in place of {names}.
   function word(name, values = {}, otherwise = name) {
-    const said = words[shown?.language] ?? Object.values(words)[0];
-    return (said[name] ?? otherwise).replace(/\{(\w+)\}/g, (_, key) => values[key] ?? "");
+    const ofLanguage = words[shown?.language] ?? Object.values(words)[0];
+    return (ofLanguage[name] ?? otherwise).replace(/\{(\w+)\}/g, (_, key) => values[key] ?? "");
   }
 
   function node(name, attributes = {}, ...children) {
-    const made = document.createElement(name);
+    const element = document.createElement(name);
     for (const [key, value] of Object.entries(attributes)) {
-      if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
-      else if (key in made && typeof value === "boolean") made[key] = value;
-      else made.setAttribute(key, value);
+      if (key.startsWith("on")) element.addEventListener(key.slice(2), value);
+      else if (key in element && typeof value === "boolean") element[key] = value;
+      else element.setAttribute(key, value);
     }
-    made.append(...children);
-    return made;
+    element.append(...children);
+    return element;
   }
   const paragraphs = text => text.trim().split(/\n\s*\n/).map(part => node("p", {}, part.replace(/\s*\n\s*/g, " ")));
 
@@ -40,9 +40,9 @@
   const act = (action, value = null) => send({act: {action, value}});
 
   function button(name, action, {first = false, values = {}} = {}) {
-    const made = node("button", {type: "button", ...(first ? {class: "first"} : {})}, word(name, values));
-    made.addEventListener("click", once(action));
-    return made;
+    const element = node("button", {type: "button", ...(first ? {class: "first"} : {})}, word(name, values));
+    element.addEventListener("click", once(action));
+    return element;
   }
   // What a screen asks for is done once: its buttons wait for the next screen, or for the refusal.
   const once = action => () => {
@@ -120,7 +120,7 @@
   // The webcam is on from the practice to the last round; it leads the hand while a run goes on.
   const WATCHED = new Set(["practice", "practising", "instruction", "round", "void", "rating"]);
   const NOWHERE = {p_WH: [0, 0, 0], closed: false, centre: [0, 0, 0], radius: 1};
-  function useCamera() {
+  function updateCamera() {
     const isWanted = device() === "webcam" && WATCHED.has(shown.screen);
     if (isWanted && !camera) startCamera();
     else if (!isWanted) stopCamera();
@@ -209,7 +209,7 @@
     held = [];
     document.documentElement.lang = screen.language;
     document.title = screen.title;
-    tell("");
+    showMessage("");
     const playing = screen.screen === "round" || screen.screen === "practising";
     if (!playing) endPlay();
     byId("who").textContent = screen.participant ? word("participant", screen) : "";
@@ -219,7 +219,7 @@
     byId("withdraw").textContent = word("withdraw");
     main.replaceChildren(...screens[screen.screen](screen));
     main.hidden = false;
-    useCamera();
+    updateCamera();
     showDeviceStatus();
     root.dataset.screen = screen.screen;
     main.focus({preventScroll: true});
@@ -238,7 +238,7 @@
     act("withdraw");
   });
 
-  function tell(text) {
+  function showMessage(text) {
     byId("told").textContent = text;
     byId("told").hidden = !text;
   }
@@ -248,13 +248,13 @@
     endPlay();
     main.hidden = true;
     byId("play").hidden = false;
-    play = studyScene(content, {eye: byId("eye"), side: byId("side"), photodiode: byId("photodiode"), onDrawn: note});
+    play = studyScene(content, {eye: byId("eye"), side: byId("side"), photodiode: byId("photodiode"), onDrawn: recordLatency});
     if (!play) {
-      tell(word("no_webgl"));
+      showMessage(word("no_webgl"));
       return;
     }
     play.sideShown = wantsSide();
-    nameViews();
+    showViewsButton();
     byId("help").textContent = word(`help_${device()}`);
     camera?.restart(start);
     showCameraStatus();
@@ -277,11 +277,11 @@
     if (link.bufferedAmount < 4000) send({hand});
     const pose = JSON.stringify([hand.p_WH, hand.closed]), now = performance.now();
     if (pose !== still.pose) {
-      if (still.told) tell("");
-      still = {pose, since: now, told: false};
-    } else if (!still.told && now - still.since > STILL) {
-      still.told = true;
-      tell(word("hand_still"));
+      if (still.isMentioned) showMessage("");
+      still = {pose, since: now, isMentioned: false};
+    } else if (!still.isMentioned && now - still.since > STILL) {
+      still.isMentioned = true;
+      showMessage(word("hand_still"));
     }
   }
 
@@ -295,7 +295,7 @@
 
   function endPlay() {
     ready = false;
-    flush();
+    sendLatencies();
     input?.end();
     play?.dispose();
     input = play = null;
@@ -305,60 +305,60 @@
   function turnViews() {
     sessionStorage.setItem("views", wantsSide() ? "1" : "2");
     if (play) play.sideShown = wantsSide();
-    nameViews();
+    showViewsButton();
   }
-  const nameViews = () => {
+  const showViewsButton = () => {
     byId("views").textContent = word(wantsSide() ? "one_view" : "two_views") + (hasKeys() ? " (V)" : "");
   };
   byId("grasp").addEventListener("click", () => input?.grasp(!input.pose().closed));
   byId("views").addEventListener("click", () => { turnViews(); byId("pad").focus({preventScroll: true}); });
 
   // Times from samples to pictures, which the server keeps with the round.
-  function note(ms) {
+  function recordLatency(ms) {
     drawn.push(Math.round(100 * Math.max(0, ms)) / 100);
     root.dataset.drawn = Number(root.dataset.drawn ?? 0) + 1;
-    if (drawn.length >= 30) flush();
+    if (drawn.length >= 30) sendLatencies();
   }
-  function flush() {
+  function sendLatencies() {
     if (drawn.length) send({drawn});
     drawn = [];
   }
 
-  function ask(asked) {
+  function showTarget(asked) {
     test = asked;
     play?.target(test.place);
-    nameTask();
+    showTask();
   }
 
   // What is asked for; of a place also how far the hand still is from it, since one hides the other.
-  function nameTask() {
-    named = performance.now();
+  function showTask() {
+    taskShownAt = performance.now();
     const name = test.place ? "place_to_go" : TURNS[test.name] ?? (test.name ? "make_fist" : "free_play");
     const at = play?.hand().p_WH ?? [];
     const far = test.place && at.length ? Math.hypot(...at.map((x, i) => x - test.place[i])) : NaN;
-    const told = [word(name, test)];
-    if (Number.isFinite(far)) told.push(word("still_away", {distance: Math.round(100 * far)}));
-    if (KEYS[test.name] && device() === "mouse") told.push(word("by_key", {key: KEYS[test.name]}));
-    byId("task").textContent = told.join(" ");
+    const texts = [word(name, test)];
+    if (Number.isFinite(far)) texts.push(word("still_away", {distance: Math.round(100 * far)}));
+    if (KEYS[test.name] && device() === "mouse") texts.push(word("by_key", {key: KEYS[test.name]}));
+    byId("task").textContent = texts.join(" ");
   }
 
   link.addEventListener("message", ({data}) => {
     if (typeof data !== "string") {
       play?.take(data);
-      if (test?.place && shown.screen === "practising" && performance.now() - named > 200) nameTask();
+      if (test?.place && shown.screen === "practising" && performance.now() - taskShownAt > 200) showTask();
       return;
     }
     const message = JSON.parse(data);
     if (message.screen) show(message.screen);
     else if (message.scene) beginPlay(message.scene, message.hand);
-    else if (message.target) ask(message.target);
+    else if (message.target) showTarget(message.target);
     else if (message.again) byId("task").textContent = word("object_comes_back");
     else if ("tracker" in message) {
       hasTracker = message.tracker;
       showTrackerStatus();
-    } else if (message.wait) tell(word(message.wait));
+    } else if (message.wait) showMessage(word(message.wait));
     else if (message.refused) {
-      tell(message.refused);
+      showMessage(message.refused);
       release();
       showDeviceStatus();
     }
@@ -377,7 +377,7 @@
     stopCamera();
     if (over) return;
     root.querySelectorAll("button").forEach(b => { b.disabled = true; });  // nobody is there who would do it
-    tell(word("lost_connection") + (reason && ` (${reason})`));
+    showMessage(word("lost_connection") + (reason && ` (${reason})`));
   });
   window.study = {send, get play() { return play; }, get screen() { return shown?.screen; }};
 })();

@@ -21,12 +21,12 @@ const studyScene = (content, {eye, side, photodiode, onDrawn}) => {
   const stale = new Set();
 
   // A line from what floats down to the floor: with its shadow it tells how far away that is.
-  function plumb(line, p) {
+  function setPlumbLine(line, p) {
     if (line && p) line.points = Float64Array.from([...p, p[0], p[1], floor]);
   }
 
   // States come faster than slow computers draw: only the one is unpacked that is drawn.
-  function adopt() {
+  function unpackNewest() {
     if (newest) {
       const numbers = new Float64Array(newest);
       let at = 2;
@@ -34,29 +34,29 @@ const studyScene = (content, {eye, side, photodiode, onDrawn}) => {
         const size = of.trail ? 3 : of[key].length;
         of[key] = numbers.subarray(at, at += size);
       }
-      plumb(plumbs[0], part("hand", "p"));
-      plumb(plumbs[1], part("object", "p"));
+      setPlumbLine(plumbs[0], part("hand", "p"));
+      setPlumbLine(plumbs[1], part("object", "p"));
       stamp = numbers[1];
       newest = null;
     }
     if (target) target.parts[0].points = asked;
   }
-  function add(element) {
+  function addView(element) {
     const scene = createScene(element, content);
     if (!scene) return;
     scenes.push(scene);
     scene.onBeforeRender = () => {
       if (!stale.delete(scene)) return;
-      adopt();
+      unpackNewest();
       scene.setFrame(0);
     };
-    wake();
+    requestRender();
   }
-  const wake = () => scenes.forEach(scene => { stale.add(scene); scene.requestRender(); });
+  const requestRender = () => scenes.forEach(scene => { stale.add(scene); scene.requestRender(); });
   const ball = p => Float64Array.from(p ? [...p, p[0], p[1], p[2] + 1e-4] : new Array(6).fill(NaN));
 
   asked = ball(null);
-  add(eye);
+  addView(eye);
   if (!scenes.length) return null;
   scenes[0].onAfterRender = () => {
     if (!Number.isFinite(stamp) || stamp === drawn) return;
@@ -71,17 +71,17 @@ const studyScene = (content, {eye, side, photodiode, onDrawn}) => {
     take(buffer) {
       newest = buffer;
       this.time = new Float64Array(buffer, 0, 1)[0];
-      wake();
+      requestRender();
     },
     target(place) {
       asked = ball(place);
-      wake();
+      requestRender();
     },
     get sideShown() { return scenes.length > 1; },
     set sideShown(yes) {
       side.hidden = !yes;
       if (yes && scenes.length === 1) {
-        add(side);
+        addView(side);
         scenes[1].setView("front");
       } else if (!yes && scenes.length > 1) {
         scenes.pop().dispose();
