@@ -56,6 +56,8 @@ class GrowingRecord(Record):
         self._about = dict(column_metadata(self._schema))
         self.newest: list[NDArray[Any]] = []
         """The values of the newest row, in the block's parts."""
+        self.unseen: list[tuple[float, list[NDArray[Any]]]] = []
+        """Times, s, and values of the rows that came between the last two calls of `refresh`, the newest one last."""
         self.count = 0
         """Rows of the record until the one that is shown."""
         self.time = np.zeros(0)
@@ -63,16 +65,20 @@ class GrowingRecord(Record):
             raise NoRows
 
     def refresh(self) -> bool:
-        """Read the newest row; return whether there is one that was not seen before."""
-        for _ in range(_TRIES):
+        """Read the newest row; return whether there is one that was not seen before.
+
+        Of the rows before it that came meanwhile, those are in `unseen` which the run still has in memory.
+        """
+        for tried in range(_TRIES):
             filled, first = (int(n) for n in self._counters)
             if not filled or filled + first == self.count:
                 return False
-            i = filled - 1
-            row = [rows[i].copy() for rows in self._rows]
-            time = float(self._times[i])
+            begin = max(self.count - first, 0) if 2 * tried < _TRIES else filled - 1  # in haste: the newest alone
+            parts = [np.array(rows[begin:filled]) for rows in self._rows]
+            times = np.array(self._times[begin:filled], dtype=np.float64)
             if int(self._counters[1]) == first and int(self._counters[0]) >= filled:
-                self.newest, self.time, self.count = row, np.array([time]), filled + first
+                self.unseen = [(t, [part[k] for part in parts]) for k, t in enumerate(times.tolist())]
+                self.newest, self.time, self.count = self.unseen[-1][1], times[-1:], filled + first
                 return True
         return False
 

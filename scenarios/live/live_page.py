@@ -292,7 +292,7 @@ class LivePage:
             if record is not None:  # its last rows were never in the file of the newest ones
                 shown.scene.complete(record)
             await self._send_frame()
-            await self._send_plots(*self._viewers.ready)
+            await self._send_plots(*self._viewers.ready, unseen=True)
         await self._tell_end(shown)
 
     async def _tell_end(self, shown: ShownRun) -> None:
@@ -321,10 +321,14 @@ class LivePage:
             await self._viewers.send(page, head)
             await self._viewers.send(page, data.astype("<f8").tobytes())
 
-    async def _send_plots(self, *pages: WebSocket) -> None:
+    async def _send_plots(self, *pages: WebSocket, unseen: bool = False) -> None:
         """Send plots to pages that have a scene; each is drawn once for all that chose the same signals.
 
         They are drawn in a thread: that takes long, and samples of a hand come meanwhile.
+
+        Args:
+            pages: these pages.
+            unseen: whether those, too, that are not seen at present, as where no further ones come.
         """
         scene = self.shown.scene if self.shown is not None else None
         if scene is None:
@@ -335,6 +339,7 @@ class LivePage:
                 seen.setdefault(tuple(viewer.chosen), set()).update(viewer.seen)
         for chosen, numbers in seen.items():
             time_of_rows, plots = scene.history.time, scene.plots(chosen)
+            numbers = set(range(len(plots))) if unseen else numbers
             figures = await asyncio.to_thread(_figures, plots, time_of_rows, frozenset(numbers))
             if self.shown is None or self.shown.scene is not scene:
                 return
@@ -342,7 +347,7 @@ class LivePage:
                 viewer = self._viewers.of(page)
                 if viewer.ready and tuple(viewer.chosen) == chosen:
                     content = [
-                        {"title": plot.title, "figure": figures.get(i, "") if i in viewer.seen else ""}
+                        {"title": plot.title, "figure": figures.get(i, "") if unseen or i in viewer.seen else ""}
                         for i, plot in enumerate(plots)
                     ]
                     await self.send(page, {"plots": content})

@@ -33,24 +33,25 @@ _AROUND = 0.25
 _MAX_CURVES = 9
 
 
-_MAX_ROWS = 4000
-"""Rows of the past that are kept; where there are more, every second is dropped."""
+_MAX_ROWS = 8000
+"""Rows of the past that are kept; where there are more, every second is dropped: what was computed of one row and the
+one before it, as the mean of a step, then has errors."""
 
 
 class History(Record):
-    """The rows of a growing record that were seen, as a record over time: plots are made of them."""
+    """The rows of a growing record until now, as a record over time: plots are made of them."""
 
     def __init__(self, record: GrowingRecord) -> None:
         vars(self).update(vars(record))
-        self._record, self._seen = record, [(float(record.time[0]), record.newest)]
+        self._record, self._seen = record, list(record.unseen)
         self._stacked: dict[str, NDArray[Any]] = {}
-        self.time = np.array([self._seen[0][0]])
+        self.time = np.array([t for t, _ in self._seen])
 
     def add(self) -> None:
-        """Add the growing record's newest row."""
-        if len(self._seen) >= _MAX_ROWS:
+        """Add the growing record's newest row, and those that came since the one before."""
+        self._seen += self._record.unseen
+        while len(self._seen) > _MAX_ROWS:
             self._seen = self._seen[::2]
-        self._seen.append((float(self._record.time[0]), self._record.newest))
         self._stacked.clear()
         self.time = np.array([t for t, _ in self._seen])
 

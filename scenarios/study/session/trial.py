@@ -180,7 +180,7 @@ class Trial:
         return None if self.scene is None else self.scene.newest
 
     def scene_content(self) -> dict[str, Any]:
-        """Return the scene as the person sees it and `sceneIn` takes it.
+        """Return the scene as the person sees it and `createScene` takes it.
 
         Its last traces are moved by the page, and hidden at first: a ball at `TARGET`, then two `PLUMB` lines, of the
         hand and of the object, which help to see how far away these are.

@@ -35,10 +35,17 @@ def test_the_newest_row_is_what_was_recorded_last(tmp_path: Path):
         assert growing.refresh()
         assert growing["unit.x"].tolist() == [[4.0, 4.0, 4.0]]
         assert growing.count == 2
+        for k in range(3):
+            x[:] = 5.0 + k
+            recorder(1.5 + 0.5 * k, signals)
+        assert growing.refresh()
+        assert [t for t, _ in growing.unseen] == [1.5, 2.0, 2.5]
+        part, index = next(place for name, place in growing.places.items() if name.startswith("unit.x"))
+        assert [row[part][index] for _, row in growing.unseen] == [5.0, 6.0, 7.0]
     complete = Record(file)
     assert growing.signals == complete.signals
     assert {s: growing.unit(s) for s in growing.signals} == {s: complete.unit(s) for s in complete.signals}
-    assert growing["unit.x"].tolist() == [[4.0, 4.0, 4.0]], "what was read stays"
+    assert growing["unit.x"].tolist() == [[7.0, 7.0, 7.0]], "what was read stays"
     with pytest.raises(NoRows):
         GrowingRecord(file)
 
@@ -68,7 +75,8 @@ def test_no_row_is_torn_while_blocks_are_flushed(tmp_path: Path):
             if growing.refresh():
                 row = growing["unit.x"][0]
                 assert row.min() == row.max() == growing.time[0]
-                seen.append(float(growing.time[0]))
+                assert all(values.min() == values.max() == t for t, (values, *_) in growing.unseen)
+                seen += [t for t, _ in growing.unseen]
         writer.join()
     assert len(seen) > 100
-    assert seen == sorted(seen)
+    assert seen == sorted(set(seen))

@@ -75,6 +75,9 @@ def test_the_page_plots_what_it_is_asked_for_and_ends_the_run(browser: Browser, 
         wait_until(page, f"{LIVE}.dataset.ended")
         run.wait(timeout=120)
         assert run.returncode != 0
+        drawn = "[...document.querySelectorAll('#plots > *')].map(part => part.querySelector('.main-svg') !== null)"
+        assert page.evaluate(f"{drawn}.length") > 2
+        assert all(page.evaluate(drawn)), "also those below what the page shows"
     summary = json.loads((tmp_path / "live" / "summary.json").read_text(encoding="utf-8"))
     assert summary["reason"].startswith("interrupted")
     assert len(Record(tmp_path / "live" / "signals.parquet").time) > 10
