@@ -68,7 +68,7 @@ const page = (() => {
     const {data, layout, config} = coloured(figure, colours());
     const shown = {...layout, template: template(), autosize: true};
     if (figure.layout.meta?.time) asOthers(shown);
-    if (div.clientWidth < 560) narrow(div, shown);
+    if (div.clientWidth < 560) narrow(div, data, shown);
     else if (layout.meta?.list) delete div.dataset.more;
     for (const change of changes) change(div, shown);
     div.dataset.height ??= parseFloat(div.style.height);
@@ -120,23 +120,25 @@ const page = (() => {
     redraw(figure => figure.layout.meta?.time);
   }
 
-  const ROW = 66;  // height that a row of a list has at least with its name above it, pixels
+  const LEAST_ROW = 66, MOST_ROW = 96, NAME = 38;  // heights of a list's row with its name above it, and of a name, pixels
 
   // On a phone: few ticks, small margins, and the names of a list above its rows instead of beside them.
-  function narrow(div, layout) {
+  function narrow(div, data, layout) {
     for (const key of Object.keys(layout).filter(k => /^[xy]axis\d*$/.test(k)))
       layout[key] = {nticks: key[0] === "x" ? 5 : 6, ...layout[key]};
     layout.margin = {l: 44, r: 6, t: 30, b: 40, ...layout.margin};
     layout.font = {size: 12, ...layout.font};
     if (layout.meta?.list) {
       const {tickvals, ticktext} = layout.yaxis;
+      const spread = Math.max(0, ...data.flatMap(({y = []}) => Array.from(array(y), v => Math.abs(v - Math.round(v)))));
+      const row = Math.min(MOST_ROW, Math.max(LEAST_ROW, NAME / Math.max(1 - 2 * spread, 0.01)));
       layout.annotations = tickvals.map((y, k) => ({
         text: wrapped(ticktext[k].replaceAll("<br>", " "), div.clientWidth / 7),
-        x: 0, xref: "paper", xanchor: "left", y, yanchor: "bottom", yshift: 13, align: "left", showarrow: false,
+        x: 0, xref: "paper", xanchor: "left", y, yanchor: "bottom", yshift: spread * row + 4, align: "left", showarrow: false,
       }));
       layout.yaxis = {...layout.yaxis, showticklabels: false};
       layout.margin.l = 6;
-      div.dataset.more = Math.max(0, ROW * tickvals.length - parseFloat(div.dataset.height ?? div.style.height));
+      div.dataset.more = Math.max(0, row * tickvals.length - parseFloat(div.dataset.height ?? div.style.height));
     }
   }
 
