@@ -1,5 +1,6 @@
 """Films a run: frame after frame is drawn and encoded, at a pace of simulated seconds a second."""
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,7 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.film.browser import open_camera, window_of
 from handover.scenarios.film.encoder import film_to
-from handover.scenarios.film.film_page import FilmContent, film_html
+from handover.scenarios.film.film_page import FilmContent, NotFilmed, film_html, most_plots
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,10 +50,11 @@ def write_film(content: FilmContent, path: Path, settings: FilmSettings, report:
         report: is called with how many frames are done, and of how many.
 
     Raises:
-        NotFilmed: what it shows does not fit.
+        NotFilmed: its plots do not fit, or its scene follows nothing.
         NoBrowser, BrowserFailed: it cannot be drawn.
         RecordNotWritten: it cannot be written.
     """
+    _check_room(content, settings.size)
     times = frame_times(*content.span, settings)
     html = film_html(content, window_of(settings.size)[0], settings.view)
     with open_camera(html, settings.size, dark=settings.dark) as camera, film_to(path, settings.fps) as film:
@@ -60,3 +62,26 @@ def write_film(content: FilmContent, path: Path, settings: FilmSettings, report:
             report(k, len(times))
             film(camera(min(t, content.span[1])))
     return len(times)
+
+
+def _check_room(content: FilmContent, size: tuple[int, int]) -> None:
+    """Check that the plots fit into a film of a size, px.
+
+    Raises:
+        NotFilmed: they do not; the message names the height from which they do.
+    """
+    count, scene = len(content.plots), content.replay is not None
+    (window, scale), (width, height) = window_of(size), size
+    most = most_plots(window, scene=scene)
+    if count <= most:
+        return
+    for enough in itertools.count(height, 2):  # a film's sizes are even
+        larger, its_scale = window_of((width, enough))
+        if its_scale >= scale and most_plots(larger, scene=scene) >= count:  # letters are as large as in the size given
+            break
+    size_cure = f"--size {width}x{enough} has room for {'it' if count == 1 else 'them'}"
+    if most == 0:
+        fault = "1 plot does not" if count == 1 else f"{count} plots do not"
+        raise NotFilmed(f"{fault} fit into {width}x{height} pixels; {size_cure}, --no-plots shows the scene alone")
+    fit = f"{most} {'does' if most == 1 else 'do'}"
+    raise NotFilmed(f"{count} plots do not fit into {width}x{height} pixels, {fit}; {size_cure}")

@@ -34,6 +34,8 @@ _HEAD = 48
 """Height of a film's heading, px."""
 _SCENE_SHARE = 0.5
 """Height of the scene where plots are below it, as a share of the film's."""
+_NUMBERS = "fiub"
+"""Kinds of arrays that can be plotted."""
 
 
 class NotFilmed(ValueError):
@@ -116,15 +118,27 @@ def _chosen(own: Sequence[TimePlot], record: Record, names: Sequence[str]) -> li
     by_title = {plot.title.casefold(): plot for plot in own}
     found = {name: by_title.get(name.casefold()) or _of_signal(record, name) for name in dict.fromkeys(names)}
     if unknown := [name for name, plot in found.items() if plot is None]:
-        valid = [*(plot.title for plot in own), *record.signals]
-        raise NotFilmed("; ".join(f"--plot {n}: no plot or signal of that name; {nearest(n, valid)}" for n in unknown))
+        raise NotFilmed("; ".join(f"--plot {name}: {_why_not(own, record, name)}" for name in unknown))
     return [plot for plot in found.values() if plot is not None]
+
+
+def _why_not(own: Sequence[TimePlot], record: Record, name: str) -> str:
+    """Return why a name is of no plot, and which names are right."""
+    signal = name if name in record.signals else name.rpartition("[")[0]
+    if signal not in record.signals:
+        return f"no plot or signal of that name; {nearest(name, [*(plot.title for plot in own), *record.signals])}"
+    if record[signal].dtype.kind not in _NUMBERS:
+        return f"{signal} has no numbers to plot"
+    elements = list(elements_of(signal, record[signal]))
+    if elements == [signal]:
+        return f"{signal} is a single number, without elements"
+    return f"{signal} has the elements {elements[0]} to {elements[-1]}"
 
 
 def _of_signal(record: Record, name: str) -> TimePlot | None:
     """Return a plot of a signal or of one of its elements; None if there are no such numbers."""
     signal = name if name in record.signals else name.rpartition("[")[0]
-    if signal not in record.signals or record[signal].dtype.kind not in "fiub":
+    if signal not in record.signals or record[signal].dtype.kind not in _NUMBERS:
         return None
     elements = elements_of(signal, record[signal])
     if name != signal:
@@ -141,6 +155,18 @@ def _of_signal(record: Record, name: str) -> TimePlot | None:
     return TimePlot(title=name, quantity=quantity, unit=unit.symbol, curves=curves, phases=phases)
 
 
+def most_plots(size: tuple[int, int], *, scene: bool) -> int:
+    """Return how many plots fit into a page of a size, px, with or without a scene."""
+    height = size[1]
+    room = height - _HEAD if _is_wide(size) or not scene else _SCENE_SHARE * height
+    return int(room // _LEAST_HEIGHT)
+
+
+def _is_wide(size: tuple[int, int]) -> bool:
+    """Return whether plots stand beside the scene, and not below it."""
+    return size[0] > 1.2 * size[1]
+
+
 def film_html(content: FilmContent, size: tuple[int, int], view: str) -> str:
     """Return the page of a film, as large as its window.
 
@@ -150,14 +176,8 @@ def film_html(content: FilmContent, size: tuple[int, int], view: str) -> str:
         view: one of `VIEWS`.
 
     Raises:
-        NotFilmed: the plots do not fit, or the scene follows nothing.
+        NotFilmed: the scene follows nothing.
     """
-    width, height = size
-    wide = width > 1.2 * height
-    room = height - _HEAD if wide or content.replay is None else _SCENE_SHARE * height
-    most = int(room // _LEAST_HEIGHT)
-    if len(content.plots) > most:
-        raise NotFilmed(f"{len(content.plots)} plots do not fit into {width}x{height} pixels; {most} do")
     replay, record = content.replay, content.record
     if view == "follow" and replay is not None and not replay.follow:
         raise NotFilmed(f"--view follow: this scene has nothing to follow; {', '.join(VIEWS[:-1])} are right")
@@ -167,6 +187,7 @@ def film_html(content: FilmContent, size: tuple[int, int], view: str) -> str:
         scene = scene_content(replay, record, frames=MAX_FRAMES)
         data |= {"scene": scene, "phases": scene["phases"]}
         legend = legend_html([d for group in drawn_groups(replay, record) for d in group])
+    wide = _is_wide(size)
     shape = "scene-only" if not content.plots else "plots-only" if replay is None else "beside" if wide else "below"
     html = template("film.html").render(
         shape=shape,

@@ -155,9 +155,10 @@ def test_a_run_without_a_scene_is_filmed_by_its_plots(tmp_path: Path):
     ("arguments", "told"),
     [
         (["--plot", "scene.p_WZ"], "--plot scene.p_WZ: no plot or signal of that name; did you mean scene.p_W"),
-        (["--plot", "cost", "--plot", "scene.q[9]"], "--plot scene.q[9]: no plot or signal"),
+        (["--plot", "cost", "--plot", "scene.q[99]"], "; --plot scene.q[99]: scene.q has the elements scene.q[1] to"),
         (["--plot", "scene.q", "--no-plots"], "--plot and --no-plots contradict each other"),
-        (["--size", "320x240", *(f"--plot=scene.q[{k}]" for k in (1, 2, 3))], "3 plots do not fit into 320x240"),
+        (["--size", "320x240", *(f"--plot=scene.q[{k}]" for k in (1, 2, 3))], "1 does; --size 320x780 has room for"),
+        (["--size", "240x240", "--plot=scene.q[1]"], "1 plot does not fit into 240x240 pixels; --size 240x260 has"),
         (["--size", "641x360"], "'641x360' is no size, such as 1280x720"),
         (["--size", "wide"], "'wide' is no size"),
         (["--out", "x.avi"], "x.avi: a film's name ends with .mp4, .webm or .gif"),
@@ -165,6 +166,7 @@ def test_a_run_without_a_scene_is_filmed_by_its_plots(tmp_path: Path):
         (["--out", "folder.mp4"], "there is a folder of that name"),
         (["--out", "there.mp4"], "it is there already; --force replaces it"),
         (["--out", "there.mp4/x.mp4"], "is a file, so no folder can be made in it"),
+        (["--out", "none/x.mp4"], "--out none/x.mp4: there is no folder none"),
         (["--pace", "0"], "0"),
     ],
 )
