@@ -70,18 +70,21 @@ def _check_room(content: FilmContent, size: tuple[int, int]) -> None:
     Raises:
         NotFilmed: they do not; the message names the height from which they do.
     """
-    count, scene = len(content.plots), content.replay is not None
-    (window, scale), (width, height) = window_of(size), size
-    most = most_plots(window, scene=scene)
+    count, scene, (width, height) = len(content.plots), content.replay is not None, size
+    most = most_plots(window_of(size)[0], scene=scene)
     if count <= most:
         return
-    for enough in itertools.count(height, 2):  # a film's sizes are even
-        larger, its_scale = window_of((width, enough))
-        if its_scale >= scale and most_plots(larger, scene=scene) >= count:  # letters are as large as in the size given
-            break
-    size_cure = f"--size {width}x{enough} has room for {'it' if count == 1 else 'them'}"
+    cure = f"--size {width}x{_height_for(count, size, scene=scene)} has room for {'it' if count == 1 else 'them'}"
     if most == 0:
         fault = "1 plot does not" if count == 1 else f"{count} plots do not"
-        raise NotFilmed(f"{fault} fit into {width}x{height} pixels; {size_cure}, --no-plots shows the scene alone")
+        raise NotFilmed(f"{fault} fit into {width}x{height} pixels; {cure}, --no-plots shows the scene alone")
     fit = f"{most} {'does' if most == 1 else 'do'}"
-    raise NotFilmed(f"{count} plots do not fit into {width}x{height} pixels, {fit}; {size_cure}")
+    raise NotFilmed(f"{count} plots do not fit into {width}x{height} pixels, {fit}; {cure}")
+
+
+def _height_for(count: int, size: tuple[int, int], *, scene: bool) -> int:
+    """Return the least height with room for some plots, px, if the size's width and scale of letters are kept."""
+    scale = window_of(size)[1]
+    heights = itertools.count(size[1], 2)  # a film's sizes are even
+    windows = ((height, *window_of((size[0], height))) for height in heights)
+    return next(h for h, window, its in windows if its >= scale and most_plots(window, scene=scene) >= count)
