@@ -23,6 +23,8 @@ HEADERS = {
 """Of the pages themselves: they are not kept, not framed by another site's page, and taken for HTML alone."""
 POLICY_VIOLATION, TRY_AGAIN_LATER = 1008, 1013
 """Codes of WebSocket with which a connection is closed."""
+LONGEST_REASON = 123
+"""Bytes that the reason has at most with which a connection is closed."""
 PATIENCE = 2.0
 """How long the other end may take to receive a message, s."""
 REFUSAL_PERIOD = 0.5
@@ -75,7 +77,7 @@ async def send_json(socket: WebSocket, content: Mapping[str, Any]) -> None:
 
 
 async def close(socket: WebSocket, code: int, reason: str = "", patience: float = PATIENCE) -> None:
-    """Close a connection with a reason of at most 123 bytes; one that has ended already stays so.
+    """Close a connection with a reason of at most `LONGEST_REASON` bytes; one that has ended already stays so.
 
     Args:
         socket: the connection.

@@ -41,6 +41,8 @@ _ROUNDING = 1e-6
 _UNIT = 0.01
 """How far a quaternion's norm may be from 1."""
 _LONGEST_NAME = 60
+_MOST_AHEAD = 10.0
+"""How much more a device's clock may have gone on than this computer's since the sample before, s (assumed)."""
 _WINDOW = 600
 """Over how many samples the clock of a device is compared with this computer's."""
 
@@ -111,7 +113,8 @@ def hand_sample(content: Any) -> HandSample:
         given: Any = members.get(name)
         values = [_number(x) for x in cast(list[Any], given)] if isinstance(given, list) else []
         if len(values) != size or not all(map(math.isfinite, values)):
-            faults.append(f"{name}: {size} finite numbers are right")
+            wrong = "" if given is None else f", not {_shown(given)}"
+            faults.append(f"{name}: {size} finite numbers are right{wrong}")
             return (math.nan,) * size
         return tuple(values)
 
@@ -132,8 +135,9 @@ def hand_sample(content: Any) -> HandSample:
         faults.append(f"device: a name of up to {_LONGEST_NAME} characters is right")
     if "angles" in members:
         angles = numbers("angles", JOINTS)
-        if any(angle < -_ROUNDING or angle > JOINT_MAX + _ROUNDING for angle in angles):
-            faults.append(f"angles: joints are within 0 and {JOINT_MAX:.4f} rad")
+        beyond = [f"[{k}] is {a:.4g}" for k, a in enumerate(angles) if not -_ROUNDING <= a <= JOINT_MAX + _ROUNDING]
+        if beyond and all(map(math.isfinite, angles)):
+            faults.append(f"angles: joints are within 0 and {JOINT_MAX:.4f} rad, {', '.join(beyond)}")
         closed = _grasps(angles) if closed is None else closed
     else:
         if closed is None:
@@ -143,6 +147,12 @@ def hand_sample(content: Any) -> HandSample:
         raise InvalidHandMessage("; ".join(faults))
     q = tuple(x / norm for x in q)
     return HandSample(p, q, tuple(min(max(a, 0.0), JOINT_MAX) for a in angles), bool(closed), stamp, str(device), sent)
+
+
+def _shown(given: Any) -> str:
+    """Return what was given, of a length that a message can have."""
+    text = repr(given)
+    return text if len(text) <= _LONGEST_NAME else f"{text[:_LONGEST_NAME]}..."
 
 
 def _number(value: Any) -> float:
@@ -195,7 +205,7 @@ class HandStream:
     def __init__(self, led: LedHand, clock: Callable[[], float] = time.monotonic) -> None:
         self._led, self._clock = led, clock
         self._device_clock = DeviceClock()
-        self._last = -math.inf
+        self._last, self._last_arrival = -math.inf, -math.inf
         self._arrivals: list[float] = []
 
     def take(self, text: str) -> tuple[HandSample, float]:
@@ -215,7 +225,7 @@ class HandStream:
         """Return a sample that arrived at the monotonic time `arrival`, s, and its stamp by this computer's clock, s.
 
         Raises:
-            InvalidHandMessage: it is wanted beyond reach, or is older than the one before.
+            InvalidHandMessage: it is wanted beyond reach, is older than the one before, or far ahead of it.
         """
         far = math.dist(sample.p_WH, self._led.p_WH_0)
         if far > self._led.reach + _ROUNDING:
@@ -223,5 +233,11 @@ class HandStream:
             raise InvalidHandMessage(f"p_WH: {far:.3g} m from where the hand rests, {rest} m; it reaches {reach:g} m")
         if sample.stamp <= self._last:
             raise InvalidHandMessage(f"stamp: {sample.stamp:.6g} s is not after the one before, {self._last:.6g} s")
-        self._last = sample.stamp
+        ahead = (sample.stamp - self._last) - (arrival - self._last_arrival)
+        if math.isfinite(self._last) and ahead > _MOST_AHEAD:
+            raise InvalidHandMessage(
+                f"stamp: {sample.stamp:.6g} s is {sample.stamp - self._last:.3g} s after the one before, which came "
+                f"{arrival - self._last_arrival:.3g} s ago"
+            )
+        self._last, self._last_arrival = sample.stamp, arrival
         return sample, self._device_clock.monotonic(sample.stamp, arrival, sample.sent)

@@ -13,6 +13,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live.connections import (
+    LONGEST_REASON,
     POLICY_VIOLATION,
     REFUSAL_PERIOD,
     TRY_AGAIN_LATER,
@@ -32,6 +33,12 @@ INPUTS_FILE = "inputs.json"
 """Name of the file in a run's folder that says which devices led a hand, and how old samples were at their use."""
 _MOST_MESSAGES = 2000
 """Messages of a device within a second; many more are far from any tracker, and keep the server from the page."""
+
+
+_IS_LED = (
+    "another page or tracker leads the hand; it is free when that one goes, or, on a live page, once that says: lead "
+    "the hand by a tracker of one's own"
+)
 
 
 class HandSeat:
@@ -61,7 +68,7 @@ class HandSeat:
         if not await accepted(device):
             return
         if self._device is not None:
-            await refuse(device, "another page or tracker leads the hand; it is free when that one goes")
+            await refuse(device, _IS_LED)
             return
         self._device = device
         try:
@@ -128,4 +135,4 @@ async def accepted(device: WebSocket) -> bool:
 async def refuse(device: WebSocket, reason: str, code: int = TRY_AGAIN_LATER) -> None:
     """Tell a device that was accepted why it cannot lead the hand, and close its connection."""
     await send_json(device, {"refused": reason})
-    await close(device, code, reason)
+    await close(device, code, reason if len(reason.encode()) <= LONGEST_REASON else "")

@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 _LOADED = (
-    "pandas",
     "handover.scenarios.cli.command",
     "handover.scenarios.cli.run",
     "handover.scenarios.execution.runner",
@@ -99,6 +98,8 @@ def wait_for_arguments() -> None:
     """Load what a run needs, and wait; then `sys.argv` is the command's."""
     from handover.scenarios.execution.selection import load_units  # of the process that waits alone
 
+    with contextlib.suppress(ImportError):  # nothing needs it; where it is installed, pyarrow imports it in the run
+        importlib.import_module("pandas")
     for module in _LOADED:
         importlib.import_module(module)
     load_units(sys.argv[1])

@@ -159,9 +159,10 @@
     }
     if (seed && !busy) seed.value = choice.seed ?? 0;
     if (push && !busy) push.checked = choice.push;
-    const general = byId("fault"), first = Object.entries(choice.faults)[0];
-    general.textContent = !first ? "" : first[0] ? `No run was begun: ${first[1]}` : first[1];
-    general.hidden = !first;
+    const general = byId("fault"), faults = Object.entries(choice.faults);
+    general.textContent = faults.some(([name]) => name) ? `No run was begun: ${faults.map(([, text]) => text).join("; ")}`
+      : faults.map(([, text]) => text).join("; ");
+    general.hidden = !faults.length;
   });
 
   byId("again").addEventListener("click", requestRun);

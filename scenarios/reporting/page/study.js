@@ -8,7 +8,7 @@
   let shown = null, play = null, input = null, test = null, taskShownAt = 0, over = false, ready = false, drawn = [], hasTracker = false, held = [];
   let still = {pose: "", since: 0, isMentioned: false};  // since when the hand has been where it is, and whether the page says so
   let camera = null, cameraStatus = "", cameraFault = null;  // the webcam's, see hand_camera.js
-  const STILL = 30000;  // ms
+  const STILL = 30000, SETTLING = 1200;  // ms until a hand counts as still; and until a rating is taken
   const INPUTS = {mouse: "pointer", touch: "pointer", gamepad: "gamepad"};  // the others send samples by themselves
   const TURNS = {"+roll": "roll_right", "-roll": "roll_left", "+pitch": "fingers_down", "-pitch": "fingers_up",
     "+yaw": "fingers_left", "-yaw": "fingers_right"};
@@ -88,7 +88,7 @@
       node("p", {}, word(`help_${device()}`)),
       node("p", {}, s.seconds < 90 ? word("practice_seconds", {seconds: Math.round(s.seconds)})
         : word("practice_for", {minutes: Number((s.seconds / 60).toFixed(1)).toLocaleString(s.language)})), ...deviceLines(),
-      actions(button("begin", () => act("begin"), {first: true}))],
+      actions(button("begin", () => act("begin"), {first: true}), button("other_device", () => act("other_device")))],
     instruction: s => [...(s.practice_over ? [node("p", {class: "soft"}, word("practice_over"))] : []),
       node("h1", {}, s.name), ...paragraphs(s.instruction), node("p", {class: "soft"}, word(`help_${device()}`)), ...deviceLines(),
       actions(button("begin", () => act("begin"), {first: true}))],
@@ -173,10 +173,12 @@
     const allow = () => { done.disabled = !sets.every(set => Number.isFinite(value(set))); };
     sets.forEach(set => set.addEventListener("change", allow));
     allow();
+    sets.forEach(set => { set.disabled = true; });  // lest a click or a key that was meant for the hand rates
+    setTimeout(() => sets.forEach(set => { set.disabled = false; }), SETTLING);
     keys = event => {
       const set = sets.find(of => !Number.isFinite(value(of)));
       const box = set?.querySelector(`input[value="${event.key}"]`);
-      if (!box || event.target.closest?.("textarea")) return;
+      if (!box || set.disabled || event.target.closest?.("textarea")) return;
       box.checked = true;
       box.focus();
       allow();
@@ -281,7 +283,7 @@
       still = {pose, since: now, isMentioned: false};
     } else if (!still.isMentioned && now - still.since > STILL) {
       still.isMentioned = true;
-      showMessage(word("hand_still"));
+      showMessage(word(shown.screen === "practising" ? "hand_still_practice" : "hand_still"));
     }
   }
 

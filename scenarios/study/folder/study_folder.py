@@ -146,8 +146,25 @@ class StudyFolder:
             RecordNotWritten: it cannot be written.
         """
         path = self.participants / session.pseudonym
-        if faults := _faults_of(session, self.plan, path):
+        begun = any((path / name).exists() for name in ("session.json", "withdrawn.json"))
+        if faults := [*(["a session has begun in it"] if begun else []), *_faults_of(session, self.plan)]:
             raise InvalidRunFolder(path, "; ".join(faults))
+        return self._write(session)
+
+    def begin_anew(self, folder: "SessionFolder", session: Session) -> "SessionFolder":
+        """Write a session's first file anew, as of another device, while nothing has been played in it.
+
+        Raises:
+            InvalidRunFolder: it has practised or played, or the plan does not allow it, with all reasons.
+            RecordNotWritten: it cannot be written.
+        """
+        played = folder.notes.practice is not None or folder.next_round != folder.rounds[0]
+        if faults := [*(["the session is under way"] if played else []), *_faults_of(session, self.plan)]:
+            raise InvalidRunFolder(folder.path, "; ".join(faults))
+        return self._write(session)
+
+    def _write(self, session: Session) -> "SessionFolder":
+        path = self.participants / session.pseudonym
         data = {
             "participant": session.pseudonym,
             "kind": session.kind,
@@ -191,12 +208,9 @@ class StudyFolder:
             yield
 
 
-def _faults_of(session: Session, plan: StudyPlan, path: Path) -> list[str]:
+def _faults_of(session: Session, plan: StudyPlan) -> list[str]:
     """Return why a session cannot begin; a person who may not take part leaves nothing."""
-    begun = any((path / name).exists() for name in ("session.json", "withdrawn.json"))
-    faults = ["a session has begun in it"] if begun else []
-    if not session.pilot:
-        faults += _not_confirmed(session, plan)
+    faults = [] if session.pilot else _not_confirmed(session, plan)
     if session.device not in plan.devices:
         faults.append(f"the plan has no device {session.device!r}; it has {', '.join(plan.devices)}")
     if session.language not in plan.texts:

@@ -117,7 +117,7 @@ class Protocol:
             "eligibility": {"eligibility": self._confirm},
             "declined": {"next": self._start_anew},
             "device": {"device": self._choose_device},
-            "practice": {"begin": self._begin_practice},
+            "practice": {"begin": self._begin_practice, "other_device": self._choose_another},
             "practising": {},
             "instruction": {"begin": self._begin_round},
             "round": {},
@@ -245,8 +245,12 @@ class Protocol:
             pilot=self.study.plan.pilot,
             started=timestamp(),
         )
-        self.session = self.study.begin(session)
+        begun = self.session
+        self.session = self.study.begin(session) if begun is None else self.study.begin_anew(begun, session)
         self.screen = self._next_of_session()
+
+    def _choose_another(self, _value: Any) -> None:
+        self.screen, self.void_reason = "device", ""
 
     def _begin_practice(self, _value: Any) -> None:
         self.screen = "practising"

@@ -168,7 +168,7 @@ class StudySeat:
         else:
             of = cast(dict[str, Any], value) if isinstance(value, dict) else {}
             self.protocol.act(str(of.get("action")), of.get("value"))
-            if of.get("action") == "withdraw":
+            if of.get("action") in ("withdraw", "other_device"):
                 await self._drop_trial()
             await self._show()
 

@@ -53,7 +53,7 @@ def test_joints_say_whether_a_hand_grasps_unless_it_is_said():
         ("[]", "no object"),
         ("{}", "p_WH: 3 finite numbers are right; q_WH: 4 finite numbers are right; stamp: "),
         (" " * (LONGEST + 1), f"{LONGEST} characters at most"),
-        (text(p_WH=[0.0, 0.0]), "p_WH: 3 finite numbers"),
+        (text(p_WH=[0.0, 0.0]), r"p_WH: 3 finite numbers are right, not \[0\.0, 0\.0\]"),
         (text(p_WH=[0.0, 0.0, float("nan")]), "p_WH: 3 finite numbers"),
         (text(p_WH=[0.0, 0.0, 10**400]), "p_WH: 3 finite numbers"),
         (text(p_WH=[0.0, 0.0, True]), "p_WH: 3 finite numbers"),
@@ -63,6 +63,7 @@ def test_joints_say_whether_a_hand_grasps_unless_it_is_said():
         (text(closed=None), "closed or angles: one of them"),
         (text(angles=[0.0] * 13), "angles: 14 finite numbers"),
         (text(angles=[2.0] * 14), r"angles: joints are within 0 and 1\.5708"),
+        (text(angles=[0.0] * 3 + [2.0] + [0.0] * 10), r"angles: joints are within .* rad, \[3\] is 2$"),
         (text(device="m" * 61), "device: a name of up to 60"),
     ],
 )
@@ -82,15 +83,27 @@ def test_a_hand_wanted_beyond_reach_or_before_is_refused_and_the_next_one_taken(
     stream.take(text(stamp=5.1))
 
 
+def test_a_stamp_far_ahead_is_refused_and_the_next_one_taken():
+    now = [100.0]
+    stream = HandStream(LED, lambda: now[0])
+    stream.take(text(stamp=5))
+    now[0] += 0.5
+    with pytest.raises(InvalidHandMessage, match=r"stamp: 1e\+300 s is 1e\+300 s after .*, which came 0\.5 s ago"):
+        stream.take(text(stamp=1e300))
+    stream.take(text(stamp=5.5))
+    now[0] += 120.0  # a device that was silent for so long
+    stream.take(text(stamp=125.5))
+
+
 def test_a_flood_is_refused_until_it_ebbs():
     now = [100.0]
     stream = HandStream(LED, lambda: now[0])
     for k in range(MOST_A_SECOND):
-        stream.take(text(stamp=k))
+        stream.take(text(stamp=k / MOST_A_SECOND))
     with pytest.raises(InvalidHandMessage, match="250 samples a second"):
-        stream.take(text(stamp=300))
+        stream.take(text(stamp=1.0))
     now[0] += 1.1
-    stream.take(text(stamp=301))
+    stream.take(text(stamp=1.1))
 
 
 def test_stamps_of_another_clock_are_told_by_this_ones():

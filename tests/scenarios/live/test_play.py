@@ -320,12 +320,14 @@ def test_a_push_moves_the_robot_a_compliant_one_farther_and_is_played_back(brows
             page.locator("#push").check()
             begun(page, number)
             wait_until(page, f"{LIVE}.dataset.frames > 3")
+            assert page.locator("#push-help").is_visible()
             moved.append(dragged(page))
             passed(page, 0.3)
         assert moved[0] > 0.01
         assert moved[1] > 1.2 * moved[0]
         page.locator("#stop").click()
         ended(page, 3)
+        assert page.locator("#push-help").is_hidden()
         assert "somebody pushed the robot by hand, with up to" in page.locator("#runs .reason").all_inner_texts()[0]
     rigid = Record(tmp_path / "runs/002/signals.parquet")
     force = np.linalg.norm(rigid["robot.f_P"], axis=1)

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from flyer_runs import task_of
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.cosim.system.time_series import TimeSeries
 from handover.scenarios.catalog import SCENARIOS
+from handover.scenarios.cli.command import main
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.results.task import InputSources
@@ -64,6 +66,13 @@ def test_each_of_its_bodies_yields_to_a_push_and_the_scene_shows_it(
         assert set(push.labels) <= {body.label for body in scene.bodies}
         arrows = [line.points[-1] for line in scene.lines if line.label == "push by hand"]
         assert sum(bool(np.isfinite(points).all()) for points in arrows) == 1
+
+
+def test_where_nothing_can_be_pushed_that_is_told_before_anything_runs(tmp_path: Path):
+    done = CliRunner().invoke(main, ["run", "ir_grasp", "--live", "--push", "--out", str(tmp_path / "run")])
+    assert done.exit_code == 2
+    assert "--push: nothing can be pushed in ir_grasp" in done.output
+    assert not (tmp_path / "run").exists()
 
 
 def test_the_pushed_gripper_of_a_robot_with_an_arm_leads_its_base(tmp_path: Path):

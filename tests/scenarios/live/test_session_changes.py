@@ -3,6 +3,8 @@
 import asyncio
 from pathlib import Path
 
+import pytest
+
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.live.play_page import PlayPage, Session
 from handover.scenarios.live.played_run import Choice, PlayedRun
@@ -35,6 +37,15 @@ class Counted(PlayPage):
     async def ask_at_once(self, run: PlayedRun) -> None:
         await asyncio.gather(*(self._show_again(run) for _ in range(3)))
         await asyncio.sleep(0.05)
+
+
+def test_a_command_waits_where_pandas_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "pandas.py").write_text("raise ModuleNotFoundError('not installed', name='pandas')\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    waiting = WaitingCommand(SCENARIO)
+    waiting.call(["list", "--help"])
+    assert waiting.process.wait(60.0) == 0, waiting.last_error
+    waiting.close()
 
 
 def test_of_several_runs_that_are_shown_again_at_once_the_last_one_is_shown_alone(tmp_path: Path):

@@ -26,6 +26,7 @@ def take_part(page: Page, hand: MouseHand) -> list[str]:
                 hand.act()
                 continue
             case "rating":
+                wait_until(page, "!document.querySelector('.study-rating').disabled")
                 for rating in "739":
                     page.keyboard.press(rating)
                 page.get_by_role("button", name="Send").click()

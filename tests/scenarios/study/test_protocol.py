@@ -77,6 +77,21 @@ def test_who_does_not_agree_or_may_not_take_part_leaves_nothing(action: str, val
     assert (protocol.number, protocol.screen) == (1, "language")
 
 
+def test_another_device_is_chosen_until_the_practice_is_over(tmp_path: Path):
+    protocol = begun(tmp_path / "study")
+    assert protocol.screen == "practice"
+    protocol.act("other_device")
+    assert protocol.screen == "device"
+    protocol.act("device", "gamepad")
+    assert protocol.screen == "practice"
+    assert protocol.content()["device"] == "gamepad"
+    assert StudyFolder.opened(tmp_path / "study", PLAN).session(1).session.device == "gamepad"
+    protocol.act("begin")
+    protocol.end_practice(PRACTISED)
+    with pytest.raises(InvalidAction, match="other_device"):
+        protocol.act("other_device")
+
+
 def test_a_session_that_was_broken_off_goes_on_at_what_was_not_finished(tmp_path: Path):
     protocol = practised(tmp_path / "study")
     protocol.act("begin")

@@ -22,6 +22,12 @@ SEEN_AT = """(() => {
 })()"""
 """Where the hand is seen in the view from the person's eye, in pixels of the page."""
 
+NOTE_FIRST_RATING = """new MutationObserver(() => {
+    const set = document.querySelector(".study-rating");
+    if (set) window.firstRating ??= set.disabled;
+}).observe(document.body, {childList: true, subtree: true})"""
+"""Notes whether statements cannot be rated yet as they appear."""
+
 
 @pytest.mark.slow
 def test_a_round_is_played_with_the_mouse_and_rated_by_keys(browser: Browser, tmp_path: Path):
@@ -52,7 +58,10 @@ def test_a_round_is_played_with_the_mouse_and_rated_by_keys(browser: Browser, tm
         wait_until(page, f"{notch} > 0.01")
         page.wait_for_timeout(500)
         assert page.evaluate(notch) < 0.03  # a notch goes 15 mm
+        page.evaluate(NOTE_FIRST_RATING)
         at(page, "rating")
+        assert page.evaluate("window.firstRating"), "what was meant for the hand rates nothing"
+        wait_until(page, "!document.querySelector('.study-rating').disabled")
         for key in "739":
             page.keyboard.press(key)
         page.get_by_role("button", name="Send").click()
