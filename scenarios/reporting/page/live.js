@@ -156,7 +156,7 @@ const live = (() => {
     over = true;
     const verdict = byId("verdict");
     verdict.hidden = false;
-    byId("waiting").hidden = true;
+    byId("waiting").hidden = byId("push-help").hidden = true;
     verdict.className = `verdict ${success ? "good" : "bad"}`;
     verdict.innerHTML = "<b></b> ";
     verdict.firstChild.textContent = success ? "Succeeded:" : judged ? "Failed:" : "No verdict:";
@@ -212,7 +212,7 @@ const live = (() => {
     verdict.hidden = false;
     verdict.className = "verdict bad";
     verdict.textContent = `The connection to the ${of} is lost: ${reason || why}.`;
-    byId("waiting").hidden = true;
+    byId("waiting").hidden = byId("push-help").hidden = true;
     byId("told").textContent = "";
     for (const entry of document.querySelectorAll(ASKING)) entry.disabled = true;  // nobody is there who would do it
   });

@@ -60,7 +60,7 @@
     live.send("push", null);
   }
 
-  live.on("begun", release);
+  for (const name of ["begun", "ended"]) live.on(name, release);
   live.on("shown", () => {
     const element = root.querySelector(".replay-scene");
     if (!element || !live.run.pushes.length) return;
@@ -79,7 +79,8 @@
     }, true);
     element.addEventListener("pointermove", event => {
       if (!pushed) {
-        element.classList.toggle("can-push", event.pointerType === "mouse" && !event.buttons && Boolean(bodyAt(event)));
+        const isOffered = event.pointerType === "mouse" && !event.buttons && !root.dataset.ended;
+        element.classList.toggle("can-push", isOffered && Boolean(bodyAt(event)));
         return;
       }
       event.stopPropagation();
