@@ -16,7 +16,14 @@ from handover.scenarios.experiment.replay import Body, Line, Mesh, Replay, ball,
 
 _ARM, _PLATE, _COLLAR, _METAL, _FINGER = "#9aa7b5", "#5f6b7a", "#e2e6e8", "#77736f", "#3f74c8"
 _BOWL, _TABLE = "#c9b28a", "#8d8478"
-_SKIN, _SLEEVE, _BALL, _CAMERA, _ESTIMATE = "#dba98a", "#54708f", "#3fb54a", "#8357a8", "#d1602b"
+_SKIN, _SLEEVE, _BALL, _CAMERA = "#dba98a", "#54708f", "#3fb54a", "#7d5a3c"
+_ESTIMATES = (
+    ("ball, estimated", "servo.p_WO_est", "#c2487f"),
+    ("gripper, estimated", "servo.p_WG_est", "#d1602b"),
+)
+"""Label, signal and colour of what the controller estimates: with a red-green deficiency, too, each colour differs from
+that of what it lies on, and from those of the cameras and of a push."""
+_NOTE = "Where things were; pink and orange: where the controller took ball and gripper to be."
 
 _PLATE_THICKNESS, _PLATE_RADIUS = 0.008, 1.15
 """Thickness, m, and radius over that of the arm (assumed)."""
@@ -47,7 +54,7 @@ def replay_handover(record: Record, watching: Iterable[Pinhole] = (), bowl: Bowl
         eye=(-0.35, -1.25, 0.35),
         phases="servo.phase" if "servo.phase" in record else "",
         follow="gripper",
-        notes=("Where things were; orange: where the controller took ball and gripper to be.",) if estimates else (),
+        notes=(_NOTE,) if estimates else (),
         window=_window(record, cameras, [body.p_WB + p for body in table for p in body.mesh.vertices]),
     )
 
@@ -149,10 +156,9 @@ def _forearm(record: Record) -> list[Line]:
 def _estimates(record: Record) -> list[Line]:
     """Return those estimates of ball and gripper that the controller gives, from when it has them."""
     known = (record["servo.phase"] > 0 if "servo.phase" in record else np.full(len(record.time), True))[:, None]
-    named = (("ball, estimated", "servo.p_WO_est"), ("gripper, estimated", "servo.p_WG_est"))
     return [
-        Line(label=label, colour=_ESTIMATE, points=np.where(known, record[signal], np.nan)[:, None], width=5.0)
-        for label, signal in named
+        Line(label=label, colour=colour, points=np.where(known, record[signal], np.nan)[:, None], width=5.0)
+        for label, signal, colour in _ESTIMATES
         if signal in record
     ]
 

@@ -18,6 +18,7 @@ from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import main
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.runner import run_task
+from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.results.task import InputSources
 
 _STOP = 0.4
@@ -66,6 +67,15 @@ def test_each_of_its_bodies_yields_to_a_push_and_the_scene_shows_it(
         assert set(push.labels) <= {body.label for body in scene.bodies}
         arrows = [line.points[-1] for line in scene.lines if line.label == "push by hand"]
         assert sum(bool(np.isfinite(points).all()) for points in arrows) == 1
+
+
+def test_lines_and_points_of_a_pushed_helix_are_told_apart_by_their_colours(tmp_path: Path):
+    record = pushed_run("helix_handover", tmp_path / "run", {"arm.f_P": [0.0, 0.5, 0.0]})
+    scene = SCENARIOS["helix_handover"]().replay(parse_parameters(SCENARIOS["helix_handover"], ()), record)
+    assert scene is not None
+    colours = {line.label: line.colour for line in (*scene.lines, *scene.fixed) if line.radii is None}
+    assert colours.keys() == {"ball, estimated", "gripper, estimated", "push by hand", "cameras"}
+    assert len(set(colours.values())) == len(colours)
 
 
 def test_where_nothing_can_be_pushed_that_is_told_before_anything_runs(tmp_path: Path):
