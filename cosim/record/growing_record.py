@@ -77,7 +77,7 @@ class GrowingRecord(Record):
             parts = [np.array(rows[begin:filled]) for rows in self._rows]
             times = np.array(self._times[begin:filled], dtype=np.float64)
             if int(self._counters[1]) == first and int(self._counters[0]) >= filled:
-                self.unseen = [(t, [part[k] for part in parts]) for k, t in enumerate(times.tolist())]
+                self.unseen = [(t, [part[k].copy() for part in parts]) for k, t in enumerate(times.tolist())]
                 self.newest, self.time, self.count = self.unseen[-1][1], times[-1:], filled + first
                 return True
         return False

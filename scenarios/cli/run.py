@@ -224,7 +224,7 @@ def _live(
     scenario, free = task.experiment, task.inputs is None
     pushes: Mapping[str, int] = inputs_of_pushes(scenario.pushes(task.parameters)) if task.pushed and free else {}
     if task.pushed and free and not pushes:
-        raise UsageError(f"--push: nothing can be pushed in {scenario.name}; a free-flyer and the Helix's gripper can")
+        raise UsageError(f"--push: nothing can be pushed in {scenario.name}")
     hand = scenario.led_hand(task.parameters) if free else None
     if webcam is not None and hand is None:
         raise UsageError(

@@ -35,10 +35,7 @@ _MOST_MESSAGES = 2000
 """Messages of a device within a second; many more are far from any tracker, and keep the server from the page."""
 
 
-_IS_LED = (
-    "another page or tracker leads the hand; it is free when that one goes, or, on a live page, once that says: lead "
-    "the hand by a tracker of one's own"
-)
+_IS_LED = 'another page or tracker leads the hand; a page leaves it to "a tracker of one\'s own" that is chosen there'
 
 
 class HandSeat:
@@ -65,7 +62,7 @@ class HandSeat:
 
     async def connection(self, device: WebSocket) -> None:
         """Serve one device until its connection ends."""
-        if not await accepted(device):
+        if not await accept(device):
             return
         if self._device is not None:
             await refuse(device, _IS_LED)
@@ -123,8 +120,8 @@ class HandSeat:
             write_whole(folder / INPUTS_FILE, json.dumps(self.report(), indent=2) + "\n")
 
 
-async def accepted(device: WebSocket) -> bool:
-    """Accept a device's connection; return whether that was done, and not refused as of another site's page."""
+async def accept(device: WebSocket) -> bool:
+    """Accept a device's connection, but for that of another site's page; return whether it was accepted."""
     if not is_same_origin(device, browsers_only=False):
         await device.close(POLICY_VIOLATION)
         return False

@@ -44,7 +44,7 @@ from handover.scenarios.live.connections import (
     receive_text,
     too_many,
 )
-from handover.scenarios.live.hand_seat import accepted, refuse
+from handover.scenarios.live.hand_seat import accept, refuse
 from handover.scenarios.live.live_html import begun_content, figure_json, live_html
 from handover.scenarios.live.live_scene import LiveScene
 from handover.scenarios.live.shown_run import ShownRun
@@ -137,8 +137,9 @@ class LivePage:
             await asyncio.sleep(_POLL)
         if self.shown is not None and self.shown.seat is not None:
             await self.shown.seat.connection(device)
-        elif await accepted(device):
-            await refuse(device, _NO_RUN if self.shown is None else _NO_HAND, POLICY_VIOLATION)
+        elif await accept(device):
+            has_begun = self.shown is not None and self.shown.scene is not None
+            await refuse(device, _NO_HAND if has_begun else _NO_RUN, POLICY_VIOLATION)
 
     async def greet(self, page: WebSocket) -> None:
         """Tell a page that has connected what is shown."""
@@ -292,8 +293,9 @@ class LivePage:
             if record is not None:  # its last rows were never in the file of the newest ones
                 shown.scene.complete(record)
             await self._send_frame()
-            await self._send_plots(*self._viewers.ready, unseen=True)
+            await self._send_plots(*self._viewers.ready)
         await self._tell_end(shown)
+        await self._send_plots(*self._viewers.ready, unseen=True)
 
     async def _tell_end(self, shown: ShownRun) -> None:
         self._ended = shown

@@ -33,13 +33,16 @@ _AROUND = 0.25
 _MAX_CURVES = 9
 
 
-_MAX_ROWS = 8000
+_MAX_ROWS = 4000
 """Rows of the past that are kept; where there are more, every second is dropped: what was computed of one row and the
 one before it, as the mean of a step, then has errors."""
 
 
 class History(Record):
-    """The rows of a growing record until now, as a record over time: plots are made of them."""
+    """The rows of a growing record until now, as a record over time: plots are made of them.
+
+    Those are left out that came while nobody looked, and were flushed to the disk meanwhile.
+    """
 
     def __init__(self, record: GrowingRecord) -> None:
         vars(self).update(vars(record))
@@ -51,7 +54,7 @@ class History(Record):
         """Add the growing record's newest row, and those that came since the one before."""
         self._seen += self._record.unseen
         while len(self._seen) > _MAX_ROWS:
-            self._seen = self._seen[::2]
+            self._seen = self._seen[::-2][::-1]
         self._stacked.clear()
         self.time = np.array([t for t, _ in self._seen])
 

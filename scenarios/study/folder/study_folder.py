@@ -151,7 +151,7 @@ class StudyFolder:
             raise InvalidRunFolder(path, "; ".join(faults))
         return self._write(session)
 
-    def begin_anew(self, folder: "SessionFolder", session: Session) -> "SessionFolder":
+    def replace_session(self, folder: "SessionFolder", session: Session) -> "SessionFolder":
         """Write a session's first file anew, as of another device, while nothing has been played in it.
 
         Raises:

@@ -12,6 +12,7 @@ is written of who does not agree, or may not take part.
 import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, cast
 
 from handover.cosim.exceptions import RecordNotWritten, nearest
@@ -235,18 +236,20 @@ class Protocol:
             value, settings = given.get("device"), given.get("settings", {})
         if value not in self._devices:
             raise InvalidAction(f"no device {value!r}: {nearest(str(value), self._devices)}")
-        session = Session(
-            number=self.number,
-            device=value,
-            device_settings=_settings_of(settings),
-            language=self._language,
-            consent=True,
-            eligibility=self._eligibility,
-            pilot=self.study.plan.pilot,
-            started=timestamp(),
-        )
-        begun = self.session
-        self.session = self.study.begin(session) if begun is None else self.study.begin_anew(begun, session)
+        device: dict[str, Any] = {"device": value, "device_settings": _settings_of(settings)}
+        if self.session is not None:
+            self.session = self.study.replace_session(self.session, replace(self.session.session, **device))
+        else:
+            session = Session(
+                number=self.number,
+                language=self._language,
+                consent=True,
+                eligibility=self._eligibility,
+                pilot=self.study.plan.pilot,
+                started=timestamp(),
+                **device,
+            )
+            self.session = self.study.begin(session)
         self.screen = self._next_of_session()
 
     def _choose_another(self, _value: Any) -> None:

@@ -18,7 +18,7 @@ from handover.scenarios.live.connections import (
     too_many,
 )
 from handover.scenarios.live.hand_messages import HandSample, InvalidHandMessage, hand_start
-from handover.scenarios.live.hand_seat import accepted, refuse
+from handover.scenarios.live.hand_seat import accept, refuse
 from handover.scenarios.study.plan.led_hands import led_hand_of, round_parameters
 from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session.seat import StudySeat
@@ -37,7 +37,7 @@ class TrackerSeat:
 
     async def connection(self, tracker: WebSocket) -> None:
         """Serve one tracker until its connection ends."""
-        if not await accepted(tracker):
+        if not await accept(tracker):
             return
         if self._tracker is not None:
             await refuse(tracker, "another tracker leads the hand; it is free when that one goes")

@@ -170,13 +170,12 @@ def test_hand_and_gripper_are_both_seen_at_first(browser: Browser, tmp_path: Pat
         with shown(browser, address) as page:
             page.set_viewport_size({"width": size[0], "height": size[1]})
             wait_until(page, "live.hand")
-            page.locator("[data-view=start]").click()
+            if size[0] < 1000:  # the page was opened as a wider one
+                page.locator("[data-view=start]").click()
             assert page.evaluate(SEEN_SHARE, "hand") > 0.9
             assert page.evaluate(SEEN_SHARE, "gripper") > 0.4  # the rest is behind its own jaws
-            azimuth = page.evaluate("live.scene.spherical().azimuth")
-            assert azimuth == pytest.approx(
-                0.75 * np.pi, abs=0.05
-            )  # the gripper opens to -x, and the hand is at its +y
+            azimuth = page.evaluate("live.scene.spherical().azimuth")  # the gripper opens to -x, the hand is at its +y
+            assert azimuth == pytest.approx(0.75 * np.pi, abs=0.05)
             end_run(page)
         run.wait(timeout=120)
 

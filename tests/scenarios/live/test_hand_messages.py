@@ -95,6 +95,19 @@ def test_a_stamp_far_ahead_is_refused_and_the_next_one_taken():
     stream.take(text(stamp=125.5))
 
 
+def test_a_device_whose_clock_is_set_is_refused_once():
+    now = [100.0]
+    stream = HandStream(LED, lambda: now[0])
+    stream.take(text(stamp=5))
+    now[0] += 0.1
+    with pytest.raises(InvalidHandMessage, match="stamp"):
+        stream.take(text(stamp=3605))
+    for k in range(1, 4):
+        now[0] += 0.1
+        _, at = stream.take(text(stamp=3605 + 0.1 * k))
+        assert at == pytest.approx(now[0])
+
+
 def test_a_flood_is_refused_until_it_ebbs():
     now = [100.0]
     stream = HandStream(LED, lambda: now[0])

@@ -1,6 +1,7 @@
 """What a participant goes through: screens, what may be done on them, and what is kept."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -77,7 +78,7 @@ def test_who_does_not_agree_or_may_not_take_part_leaves_nothing(action: str, val
     assert (protocol.number, protocol.screen) == (1, "language")
 
 
-def test_another_device_is_chosen_until_the_practice_is_over(tmp_path: Path):
+def test_another_device_is_chosen_until_the_practice_begins(tmp_path: Path):
     protocol = begun(tmp_path / "study")
     assert protocol.screen == "practice"
     protocol.act("other_device")
@@ -85,8 +86,16 @@ def test_another_device_is_chosen_until_the_practice_is_over(tmp_path: Path):
     protocol.act("device", "gamepad")
     assert protocol.screen == "practice"
     assert protocol.content()["device"] == "gamepad"
-    assert StudyFolder.opened(tmp_path / "study", PLAN).session(1).session.device == "gamepad"
+    again = Protocol(StudyFolder.opened(tmp_path / "study", PLAN), PLAN.devices, number=1)
+    assert again.content()["device"] == "gamepad"
+    again.act("other_device")
+    again.act("device", "tracker")
+    kept = StudyFolder.opened(tmp_path / "study", PLAN).session(1).session
+    assert kept == replace(protocol.study.session(1).session, device="tracker")
+    assert kept.eligibility == [True] * 3
     protocol.act("begin")
+    with pytest.raises(InvalidAction, match="other_device"):
+        protocol.act("other_device")
     protocol.end_practice(PRACTISED)
     with pytest.raises(InvalidAction, match="other_device"):
         protocol.act("other_device")

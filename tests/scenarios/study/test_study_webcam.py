@@ -52,6 +52,7 @@ def test_a_hand_before_a_webcam_plays_a_round_whose_files_hashes_are_kept(tmp_pa
         begin(page)
         at(page, "rating")
         assert page.locator("#video").is_visible()  # it goes on to the next round
+        wait_until(page, "!document.querySelector('.study-rating').disabled")
         for key in "739":
             page.keyboard.press(key)
         page.get_by_role("button", name="Send").click()
