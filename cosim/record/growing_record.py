@@ -70,7 +70,7 @@ class GrowingRecord(Record):
         Of the rows before it that came meanwhile, those are in `unseen` which the run still has in memory.
         """
         for tried in range(_TRIES):
-            filled, first = (int(n) for n in self._counters)
+            first, filled = int(self._counters[1]), int(self._counters[0])  # in this order, lest a flush comes between
             if not filled or filled + first == self.count:
                 return False
             begin = max(self.count - first, 0) if 2 * tried < _TRIES else filled - 1  # in haste: the newest alone
