@@ -13,7 +13,7 @@ from pathlib import Path
 
 THREE, ESBUILD = "0.187.0", "0.28.1"
 PAGE = Path(__file__).parents[1] / "scenarios" / "reporting" / "page"
-SCRIPTS = ("scene_objects.js", "scene.js")
+SCRIPTS = ("scene_objects.js", "scene.js", "hand_input.js")
 ADDONS = {
     "OrbitControls": "controls/OrbitControls.js",
     "LineSegments2": "lines/LineSegments2.js",
@@ -24,7 +24,8 @@ ADDONS = {
 
 def main() -> None:
     """Bundle what the `SCRIPTS` name after `THREE.`."""
-    names = {name for script in SCRIPTS for name in re.findall(r"\bTHREE\.(\w+)", (PAGE / script).read_text("utf-8"))}
+    code = "".join(re.sub(r"//.*", "", (PAGE / script).read_text("utf-8")) for script in SCRIPTS)
+    names = set(re.findall(r"\bTHREE\.(\w+)", code))
     core = ", ".join(sorted(names - set(ADDONS)))
     lines = [f'export {{ {core} }} from "three";']
     lines += [f'export {{ {name} }} from "three/addons/{path}";' for name, path in ADDONS.items() if name in names]
@@ -36,7 +37,7 @@ def main() -> None:
         subprocess.run(run, cwd=there, check=True)
         bundle = ["npx", "esbuild", "entry.js", "--bundle", "--minify", "--format=iife", "--global-name=THREE"]
         subprocess.run([*bundle, "--legal-comments=none", "--outfile=three.min.js"], cwd=there, check=True)
-        told = f"/* three.js {THREE}, MIT licence: see three.LICENSE.txt. The parts that scene.js uses. */\n"
+        told = f"/* three.js {THREE}, MIT licence: see three.LICENSE.txt. The parts that our scripts use. */\n"
         (PAGE / "three.min.js").write_text(told + (there / "three.min.js").read_text(encoding="utf-8"), "utf-8")
         shutil.copyfile(there / "node_modules" / "three" / "LICENSE", PAGE / "three.LICENSE.txt")
 

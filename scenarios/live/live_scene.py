@@ -168,13 +168,13 @@ class LiveScene:
         return begun[-1].name if begun else ""
 
     def plots(self, chosen: Sequence[str] = ()) -> list[TimePlot]:
-        """Return the scenario's plots of what was seen until now, and those of chosen signals."""
+        """Return plots of what was seen until now: those of chosen signals, then the scenario's."""
         if len(self._history.time) < 2:
             return []
         own: list[TimePlot] = []
         with self._faults.tolerated("plots"):  # some need more than what was seen until now
             own += self._own_plots()
-        return own + [self._plot_of(signal) for signal in chosen if signal in self._history]
+        return [self._plot_of(signal) for signal in chosen if signal in self._history] + own
 
     def _own_plots(self) -> Sequence[TimePlot]:
         """Return the scenario's plots; where it has none, or there is no scenario, those of the units' outputs."""

@@ -127,30 +127,41 @@ const live = (() => {
     host.dataset.pictures = Number(host.dataset.pictures ?? 0) + 1;
   }
 
+  function createPlot(title) {
+    const part = document.createElement("div"), heading = document.createElement("h3"), plot = document.createElement("div");
+    heading.textContent = title;
+    plot.className = "plot";
+    plot.style.height = "280px";
+    part.append(heading, plot);
+    seen.observe(part);
+    return part;
+  }
+
   // Draws those plots that are seen; the server sends no others, since drawing takes long.
   function drawPlots(figures) {
+    let moved = false;
     figures.forEach(({title, figure}, i) => {
-      let part = plots.children[i];
-      if (!part) {
-        part = document.createElement("div");
-        part.append(document.createElement("h3"), document.createElement("div"));
-        part.lastChild.className = "plot";
-        part.lastChild.style.height = "280px";
-        plots.append(part);
-        seen.observe(part);
+      const left = [...plots.children].slice(i);
+      const part = left.find(({firstChild}) => firstChild.textContent === title) ?? createPlot(title);
+      if (part !== left[0]) {
+        plots.insertBefore(part, left[0] ?? null);
+        moved = true;
       }
-      part.firstChild.textContent = title;
-      if (!figure) return;
-      page.draw(part.lastChild, JSON.parse(figure));
+      if (figure) page.draw(part.lastChild, JSON.parse(figure));
     });
     while (plots.children.length > figures.length) plots.lastChild.remove();
+    if (moved) sendSeen();
   }
 
   const shown = new Set();
   const seen = new IntersectionObserver(entries => {
     for (const {target, isIntersecting} of entries) shown[isIntersecting ? "add" : "delete"](target);
-    send("see", [...shown].map(part => [...plots.children].indexOf(part)).filter(i => i >= 0));
+    sendSeen();
   });
+
+  function sendSeen() {
+    send("see", [...shown].map(part => [...plots.children].indexOf(part)).filter(i => i >= 0));
+  }
 
   function endRun({judged, success, reason, report}) {
     over = true;
@@ -170,10 +181,10 @@ const live = (() => {
   function chooseSignal(name) {
     if (!name || !api.run) return;
     const isThere = api.run.signals.includes(name);
-    byId("told").textContent = isThere ? `The plot of ${name} is the last one below.`
+    byId("told").textContent = isThere ? `The plot of ${name} is the first one below.`
       : `There is no signal ${name}; those of the run are offered as one types.`;
     if (!isThere || chosen.includes(name)) return;
-    chosen.push(name);
+    chosen.unshift(name);
     const chip = document.createElement("button");
     chip.type = "button";
     chip.textContent = `${name} \u00d7`;
@@ -182,7 +193,7 @@ const live = (() => {
       chip.remove();
       send("choose", chosen);
     });
-    byId("chosen").append(chip);
+    byId("chosen").prepend(chip);
     byId("signal").value = "";
     send("choose", chosen);
   }

@@ -164,7 +164,6 @@ def test_keys_turn_the_hand_as_they_lie_on_the_keyboard(browser: Browser, tmp_pa
         run.wait(timeout=120)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("size", [(1280, 800), (400, 800)])
 def test_hand_and_gripper_are_both_seen_at_first(browser: Browser, tmp_path: Path, size: tuple[int, int]):
     with live_run(tmp_path / "led", *GIVEN, scenario=SCENARIO) as (address, run):

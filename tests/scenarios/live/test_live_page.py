@@ -68,9 +68,14 @@ def test_the_page_plots_what_it_is_asked_for_and_ends_the_run(browser: Browser, 
         page.locator("#signal").fill("nonsense")
         page.locator("#signal").dispatch_event("change")
         assert page.locator("#told").inner_text().startswith("There is no signal nonsense;")
-        page.locator("#signal").fill("scene.p_WO")
-        page.locator("#signal").dispatch_event("change")
-        wait_until(page, "[...document.querySelectorAll('#plots h3')].some(h => h.textContent === 'scene.p_WO')")
+        titles = "[...document.querySelectorAll('#plots h3')].map(heading => heading.textContent)"
+        wait_until(page, f"{titles}.length")
+        own = page.evaluate(titles)
+        for signal in ("scene.p_WO", "reflex.cost"):
+            page.locator("#signal").fill(signal)
+            page.locator("#signal").dispatch_event("change")
+        wait_until(page, f"{titles}.includes('reflex.cost')")
+        assert page.evaluate(titles) == ["reflex.cost", "scene.p_WO", *own], "the last chosen one is seen at once"
         page.locator("#stop").click()
         wait_until(page, f"{LIVE}.dataset.ended")
         run.wait(timeout=120)
