@@ -1,4 +1,4 @@
-"""Make `scenarios/reporting/page/three.min.js` anew: the parts of three.js that our scripts use, in one file.
+"""Make `scenarios/reporting/page/scene/three.min.js` anew: the parts of three.js that our scripts use, in one file.
 
 Needs npm. The version is pinned below; the licence is copied beside the file.
 
@@ -13,7 +13,7 @@ from pathlib import Path
 
 THREE, ESBUILD = "0.187.0", "0.28.1"
 PAGE = Path(__file__).parents[1] / "scenarios" / "reporting" / "page"
-SCRIPTS = ("scene_objects.js", "scene.js", "hand_input.js")
+SCRIPTS = ("scene/scene_objects.js", "scene/scene.js", "hand/hand_input.js")
 ADDONS = {
     "OrbitControls": "controls/OrbitControls.js",
     "LineSegments2": "lines/LineSegments2.js",
@@ -29,6 +29,7 @@ def main() -> None:
     core = ", ".join(sorted(names - set(ADDONS)))
     lines = [f'export {{ {core} }} from "three";']
     lines += [f'export {{ {name} }} from "three/addons/{path}";' for name, path in ADDONS.items() if name in names]
+    scene = PAGE / "scene"
     with tempfile.TemporaryDirectory() as folder:
         there = Path(folder)
         (there / "entry.js").write_text("\n".join(lines), encoding="utf-8")
@@ -38,8 +39,8 @@ def main() -> None:
         bundle = ["npx", "esbuild", "entry.js", "--bundle", "--minify", "--format=iife", "--global-name=THREE"]
         subprocess.run([*bundle, "--legal-comments=none", "--outfile=three.min.js"], cwd=there, check=True)
         told = f"/* three.js {THREE}, MIT licence: see three.LICENSE.txt. The parts that our scripts use. */\n"
-        (PAGE / "three.min.js").write_text(told + (there / "three.min.js").read_text(encoding="utf-8"), "utf-8")
-        shutil.copyfile(there / "node_modules" / "three" / "LICENSE", PAGE / "three.LICENSE.txt")
+        (scene / "three.min.js").write_text(told + (there / "three.min.js").read_text(encoding="utf-8"), "utf-8")
+        shutil.copyfile(there / "node_modules" / "three" / "LICENSE", scene / "three.LICENSE.txt")
 
 
 if __name__ == "__main__":

@@ -189,15 +189,15 @@ def film_html(content: FilmContent, size: tuple[int, int], view: str) -> str:
         legend = legend_html([d for group in drawn_groups(replay, record) for d in group])
     wide = _is_wide(size)
     shape = "scene-only" if not content.plots else "plots-only" if replay is None else "beside" if wide else "below"
-    html = template("film.html").render(
+    html = template("film/film.html").render(
         shape=shape,
         title=content.title,
         data=json_html(data),
         legend=legend,
         plots=[(p.title, json_html(time_figure(p, record.time).to_dict())) for p in content.plots],
     )
-    style = Markup(f"<style>{asset('replay.css')}{asset('film.css')}</style>")
-    scripts = (*SCENE_SCRIPTS, "phases.js", "film.js")
+    style = Markup(f"<style>{asset('scene/replay.css')}{asset('film/film.css')}</style>")
+    scripts = (*SCENE_SCRIPTS, "phases.js", "film/film.js")
     return page_html(
         content.title, Markup(""), [Section(anchor="film", title="Film", html=style + Markup(html), scripts=scripts)]
     )

@@ -47,17 +47,20 @@ def live_html(
         styles: names of further styles.
         webcam: whether one is offered to lead a hand.
     """
-    hand = Markup(template("live_hand.html").render(webcam=webcam))
-    html = template("live.html").render(viewport=VIEWPORT_HTML, film=FILM_HTML, hand=hand, beside=beside or Markup())
-    style = Markup("<style>{}</style>").format(Markup("\n".join(map(asset, ("replay.css", "live.css", *styles)))))
+    hand = Markup(template("live/live_hand.html").render(webcam=webcam))
+    html = template("live/live.html").render(
+        viewport=VIEWPORT_HTML, film=FILM_HTML, hand=hand, beside=beside or Markup()
+    )
+    sheets = map(asset, ("scene/replay.css", "live/live.css", *styles))
+    style = Markup("<style>{}</style>").format(Markup("\n".join(sheets)))
     section = Section(
         anchor="live",
         title="Live",
         html=style + Markup(html),
         scripts=(
-            *(*SCENE_SCRIPTS, "phases.js", "side_view.js", "hand_input.js"),
+            *(*SCENE_SCRIPTS, "phases.js", "scene/side_view.js", "hand/hand_input.js"),
             *(WEBCAM_SCRIPTS if webcam else ()),
-            *("live_hand.js", "live.js", "push.js", *scripts),
+            *("live/live_hand.js", "live/live.js", "live/push.js", *scripts),
         ),
     )
     return page_html(title, Markup(""), [section], connects=True, works=webcam)

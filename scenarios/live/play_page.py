@@ -101,8 +101,8 @@ class PlayPage(LivePage):
 
     def html(self) -> str:
         """Return the page."""
-        beside = Markup(template("play.html").render())
-        return live_html(self._session.title, beside, scripts=["play.js"], styles=["play.css"])
+        beside = Markup(template("live/play.html").render())
+        return live_html(self._session.title, beside, scripts=["live/play.js"], styles=["live/play.css"])
 
     async def greet(self, page: WebSocket) -> None:
         """Tell a page that has connected what there is to set, and what is shown."""

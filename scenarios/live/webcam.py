@@ -24,7 +24,7 @@ from starlette.routing import Route
 
 from handover.scenarios.reporting.page import asset
 
-WEBCAM_SCRIPTS = ("hand_landmarks.js", "hand_camera.js")
+WEBCAM_SCRIPTS = ("hand/hand_landmarks.js", "hand/hand_camera.js")
 """Scripts of a page that offers a webcam."""
 BUNDLE, MODEL = "vision_bundle.mjs", "hand_landmarker.task"
 LOADER, WASM = "wasm/vision_wasm_module_internal.js", "wasm/vision_wasm_module_internal.wasm"
@@ -91,7 +91,7 @@ class WebcamFiles:
             below: path of the page.
         """
         served = {Path(name).name: content for name, content in self.contents.items()}
-        served["worker.js"] = asset("hand_worker.js").encode()
+        served["worker.js"] = asset("hand/hand_worker.js").encode()
         return [Route(f"{below}webcam/{name}", _served(name, content)) for name, content in served.items()]
 
 

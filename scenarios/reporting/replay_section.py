@@ -40,7 +40,10 @@ def phase_changes(record: Record, phases: str | Sequence[Phase]) -> list[tuple[f
     return [(p.begin, p.name) for p in phases]
 
 
-SCENE_SCRIPTS = ("three.min.js", "replay_shapes.js", "scene_objects.js", "scene.js", "viewport.js", "recorder.js")
+SCENE_SCRIPTS = tuple(
+    f"scene/{name}"
+    for name in ("three.min.js", "replay_shapes.js", "scene_objects.js", "scene.js", "viewport.js", "recorder.js")
+)
 """What a page needs to draw a scene."""
 _MARGIN = 0.04
 """Margin around what is drawn, as a share of its longest side."""
@@ -69,7 +72,7 @@ def replay_section(replay: Replay, record: Record) -> Section:
         anchor="replay",
         title="Replay",
         html=_html(json_html(scene_content(replay, record)), drawn, len(rows), replay),
-        scripts=(*SCENE_SCRIPTS, "replay.js"),
+        scripts=(*SCENE_SCRIPTS, "scene/replay.js"),
     )
 
 
@@ -270,7 +273,7 @@ def _html(data: Markup, drawn: Sequence[Drawn], frames: int, replay: Replay) -> 
     speeds = [f'<option value="{s}"{" selected" if s == "1" else ""}>{s}&times;</option>' for s in _SPEEDS]
     paragraphs = [f'<p class="soft">{escape(note)}</p>' for note in replay.notes]
     return Markup(
-        f"<style>{asset('replay.css')}</style>"
+        f"<style>{asset('scene/replay.css')}</style>"
         f'<div class="replay">{data}'
         '<p class="replay-missing" hidden>The replay needs WebGL, which this browser does not offer.</p>'
         f'<div class="replay-shown">{VIEWPORT_HTML}'

@@ -238,7 +238,7 @@ def _between(numbers: Sequence[int]) -> str:
 
 
 def _methods_section(analysis: StudyAnalysis) -> Section:
-    html = template("study_methods.html").render(plan=analysis.plan, tested=analysis.tested)
+    html = template("study/study_methods.html").render(plan=analysis.plan, tested=analysis.tested)
     return Section(anchor="methods", title="Methods", html=Markup(html))
 
 

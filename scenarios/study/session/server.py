@@ -36,7 +36,7 @@ from handover.scenarios.study.session.tracker import TrackerSeat
 _GRACE = 30
 """Time for a run under way to end when the server does, s."""
 LOOPBACK = ("127.0.0.1", "localhost")
-_SCRIPTS = ("page.js", *SCENE_SCRIPTS, "hand_input.js", "study_scene.js")
+_SCRIPTS = ("page.js", *SCENE_SCRIPTS, "hand/hand_input.js", "study/study_scene.js")
 _PILOT = "Pilot"
 """What heads the page in a plan of pilots: a script opens no page, so that whoever sees it is a person."""
 _FALLBACK = "en"
@@ -63,9 +63,11 @@ def study_html(plan: StudyPlan, *, webcam: bool = False, photodiode: bool = Fals
         "words": {name: {**words[_FALLBACK], **words.get(name, {})} for name in plan.texts},
     }
     pilot = _PILOT if plan.pilot else ""
-    html = template("study.html").render(data=json_html(content), pilot=pilot, webcam=webcam, photodiode=photodiode)
-    styles = (asset("page.css"), asset("replay.css"), asset("study.css"))
-    scripts = (*_SCRIPTS, *(WEBCAM_SCRIPTS if webcam else ()), "study.js")
+    html = template("study/study.html").render(
+        data=json_html(content), pilot=pilot, webcam=webcam, photodiode=photodiode
+    )
+    styles = (asset("page.css"), asset("scene/replay.css"), asset("study/study.css"))
+    scripts = (*_SCRIPTS, *(WEBCAM_SCRIPTS if webcam else ()), "study/study.js")
     return plain_page_html(plan.title, html, styles, scripts, works=webcam)
 
 

@@ -28,7 +28,7 @@ AXES = np.eye(3).tolist()
 @pytest.fixture(scope="module")
 def page(browser: Browser) -> Generator[Page, None, None]:
     made = browser.new_page()
-    made.add_script_tag(content=asset("hand_landmarks.js") + ";window.handLandmarks = handLandmarks;")
+    made.add_script_tag(content=asset("hand/hand_landmarks.js") + ";window.handLandmarks = handLandmarks;")
     yield made
     made.close()
 

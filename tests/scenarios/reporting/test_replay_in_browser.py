@@ -139,7 +139,7 @@ def test_what_is_drawn_as_dots_is_as_large_on_a_screen_of_small_pixels(browser: 
             "<div id='at' style='width: 200px; height: 200px; background: #fff'></div>"
             "<style>#at canvas { display: block; width: 100%; height: 100% }</style>"
         )
-        for script in ("three.min.js", "replay_shapes.js", "scene_objects.js", "scene.js"):
+        for script in ("scene/three.min.js", "scene/replay_shapes.js", "scene/scene_objects.js", "scene/scene.js"):
             page.add_script_tag(content=asset(script))
         page.evaluate(
             """() => {

@@ -224,5 +224,5 @@ def test_when_all_participants_have_come_the_page_says_so(tmp_path: Path):
 
 
 def test_the_page_draws_every_screen():
-    script = asset("study.js")
+    script = asset("study/study.js")
     assert [name for name in SCREENS if not re.search(rf"^ {{4}}{name}(:|\(|,)", script, re.MULTILINE)] == []

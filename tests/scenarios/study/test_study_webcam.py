@@ -137,7 +137,7 @@ def test_why_a_camera_cannot_lead_is_told_in_the_language_of_the_participant(tmp
 
 
 def test_every_fault_of_a_camera_has_a_text_in_english_and_in_every_other_language():
-    script = asset("hand_camera.js")
+    script = asset("hand/hand_camera.js")
     of_errors = re.search(r"const FAULTS = \{(.*?)\};", script)
     texts = re.search(r"const FAULT_TEXTS = \{(.*?)\};", script, re.DOTALL)
     assert of_errors
