@@ -209,7 +209,8 @@ def test_a_finger_outside_the_cost_is_not_waited_for():
     assert x[3] == pytest.approx(Params().waited_closings * Params().recovery_closing)
 
 
-@pytest.mark.parametrize("literal", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("literal", [False, True])
 @pytest.mark.parametrize("p_x", [-0.16, -0.11])  # far off, and so near that the index sees past the object
 def test_it_goes_on_from_any_state_bit_for_bit(literal: bool, p_x: float):
     params = pregrasp(p_x, 0.0, literal=literal)

@@ -209,6 +209,7 @@ def test_open_fingers_are_felt_by_the_gripper():
     assert np.linalg.norm(y.f_G) <= LED.arm_force_max + 1e-9
 
 
+@pytest.mark.slow
 def test_goes_on_bit_for_bit_after_a_state_is_restored():
     params = replace(LED, object_with=StartHolder.FREE)
 

@@ -108,6 +108,7 @@ def test_a_bias_is_constant_in_a_run_and_gaussian_over_the_seeds():
     assert np.max(np.abs(np.corrcoef(np.transpose(normal)) - np.eye(12))) < 0.1
 
 
+@pytest.mark.slow
 def test_drift_is_stationary_from_the_start_and_forgets_in_its_correlation_time():
     steps, lag = 125, 62  # 2 s, and some half of the correlation time
     runs = np.array([errors(replace(DRIFTING, seed=n), steps) for n in range(400)]) / each_axis(UNLIKE_EACH_OTHER)
@@ -119,6 +120,7 @@ def test_drift_is_stationary_from_the_start_and_forgets_in_its_correlation_time(
     assert np.std(steps_of_it) == pytest.approx(np.sqrt(2.0 * (1.0 - np.exp(-DT / 2.0))), rel=0.02)
 
 
+@pytest.mark.slow
 def test_drifts_statistics_do_not_depend_on_the_steps():
     long, short = (
         np.array([errors(replace(DRIFTING, seed=n), round(0.8 / dt), dt)[[0, -1], :3] for n in range(1500)])

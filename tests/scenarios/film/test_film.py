@@ -199,6 +199,7 @@ def test_without_a_browser_the_way_to_one_is_told(grasp: Path, tmp_path: Path, m
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_film_that_cannot_be_written_leaves_nothing(grasp: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", shutil.which("false") or "")
     status, told = film(grasp, "--out", tmp_path / "x.mp4", "--pace", 10)

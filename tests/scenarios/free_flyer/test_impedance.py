@@ -68,6 +68,7 @@ def test_a_known_delay_that_makes_the_loop_unstable_is_refused_before_anything_i
     assert not (tmp_path / "r").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delays", [("navigation_delay=0.032",), ("delay=0.016", "navigation_delay=0.016")])
 def test_the_controller_expects_both_delays_together(delays: tuple[str, ...], tmp_path: Path):
     with pytest.raises(InitializationError, match=r"unstable at 62\.5 Hz with a delay of 0\.032 s"):
@@ -75,6 +76,7 @@ def test_the_controller_expects_both_delays_together(delays: tuple[str, ...], tm
     assert not (tmp_path / "r").exists()
 
 
+@pytest.mark.slow
 def test_a_late_estimate_counts_as_much_as_late_thrust(tmp_path: Path):
     poles = ("pole_margin_impedance", "damping_ratio_impedance", "frequency_impedance")
     given = {"on_time": (), "thrust": ("delay=0.016",), "estimate": ("navigation_delay=0.016",)}
