@@ -20,7 +20,7 @@ from typing import Any
 
 from handover.cosim.blocks.description import describe, with_start_values
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmu.archive import FmuArchive, write_archive
+from handover.cosim.fmu.file.archive import FmuArchive, write_archive
 from handover.fmus import interpreter
 from handover.fmus.binaries import binaries
 from handover.fmus.catalog import Entry, find_unit, import_class

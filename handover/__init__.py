@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from handover.cosim.exceptions import RecordNotWritten, UnitFailure
-    from handover.cosim.fmu.description import FmuDescription
+    from handover.cosim.fmu.file.description import FmuDescription
     from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
     from handover.cosim.system.system import System
     from handover.scenarios.api.arguments import InvalidInput
@@ -38,7 +38,7 @@ _EXPORTS = {
     "Campaign": "scenarios.api.campaign_result",
     "ClusterLost": "scenarios.execution.errors",
     "Extrapolation": "cosim.stepping.options",
-    "FmuDescription": "cosim.fmu.description",
+    "FmuDescription": "cosim.fmu.file.description",
     "InvalidInput": "scenarios.api.arguments",
     "MasterOptions": "cosim.stepping.options",
     "Page": "scenarios.api.pages",

@@ -17,9 +17,9 @@ from handover.cosim.check.description_checks import description_findings, interf
 from handover.cosim.check.finding import CheckReport, Finding, Level, Section, fault, warning
 from handover.cosim.check.isolated_process import run_isolated
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmu.archive import DESCRIPTION, FmuArchive
-from handover.cosim.fmu.default_experiment import default_experiment, proposed_step
-from handover.cosim.fmu.fmpy_edge import (
+from handover.cosim.fmu.file.archive import DESCRIPTION, FmuArchive
+from handover.cosim.fmu.file.default_experiment import default_experiment, proposed_step
+from handover.cosim.fmu.file.fmpy_edge import (
     checked_xml,
     libraries_in,
     library_path,
@@ -31,8 +31,8 @@ from handover.cosim.fmu.fmpy_edge import (
     required_functions,
     version_of,
 )
-from handover.cosim.fmu.library_format import HEAD, platforms_of, shortage
-from handover.cosim.fmu.xml import XmlElement
+from handover.cosim.fmu.file.library_format import HEAD, platforms_of, shortage
+from handover.cosim.fmu.file.xml import XmlElement
 
 _SCHEMA = re.compile(
     r"^(?:Fatal )?(?:ERROR|Error|WARNING) \(line (\d+), column \d+\): (.*)$", re.DOTALL | re.IGNORECASE

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from handover.cosim.fmu.xml import XmlElement
+from handover.cosim.fmu.file.xml import XmlElement
 
 REALS = ("Real", "Float32", "Float64")
 _SIGNED = {"Integer": 32, "Int8": 8, "Int16": 16, "Int32": 32, "Int64": 64, "Enumeration": 64}

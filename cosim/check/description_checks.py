@@ -12,9 +12,9 @@ from itertools import pairwise
 
 from handover.cosim.check.described_variable import REALS, DescribedVariable
 from handover.cosim.check.finding import Finding, fault, note, warning
-from handover.cosim.fmu.default_experiment import default_experiment
-from handover.cosim.fmu.model_structure import lost_references
-from handover.cosim.fmu.xml import XmlElement
+from handover.cosim.fmu.file.default_experiment import default_experiment
+from handover.cosim.fmu.file.model_structure import lost_references
+from handover.cosim.fmu.file.xml import XmlElement
 
 _KINDS = {
     "ModelExchange": "model exchange",

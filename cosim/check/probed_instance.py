@@ -11,7 +11,7 @@ import numpy as np
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.check.isolated_process import Journal
 from handover.cosim.fmu.buffers import SignalBuffer
-from handover.cosim.fmu.description import FmuDescription, FmuPort
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.fmu.instance import Instance
 
 _WITHOUT_NUMBERS = (Kind.STRING, Kind.BINARY)

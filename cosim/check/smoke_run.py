@@ -18,9 +18,9 @@ from handover.cosim.check.finding import Finding, fault, note, warning
 from handover.cosim.check.isolated_process import Journal
 from handover.cosim.check.probed_instance import ProbedInstance
 from handover.cosim.exceptions import InvalidFmu, UnitFailure, log_lines
-from handover.cosim.fmu.archive import DESCRIPTION
-from handover.cosim.fmu.description import KINDS, FmuDescription, FmuPort, describe_fmu
-from handover.cosim.fmu.xml import parse_xml
+from handover.cosim.fmu.file.archive import DESCRIPTION
+from handover.cosim.fmu.file.description import KINDS, FmuDescription, FmuPort, describe_fmu
+from handover.cosim.fmu.file.xml import parse_xml
 
 STEPS = 10
 _MAX_LINES = 24  # of a unit's log

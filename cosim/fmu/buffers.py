@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 
 _POINTER: Callable[[Any], Any] = ctypes.POINTER
 

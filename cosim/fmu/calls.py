@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.fmu.description import FmuDescription, FmuPort
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 
 State = ctypes.c_void_p
 """A saved state of one instance: a pointer whose meaning only the unit knows."""

@@ -12,8 +12,8 @@ from typing import Any, ClassVar
 
 from handover.cosim.exceptions import InvalidFmu, last_line
 from handover.cosim.fmu.buffers import SUCCEEDED
-from handover.cosim.fmu.description import FmuDescription
 from handover.cosim.fmu.failures import STATUS, failure_of
+from handover.cosim.fmu.file.description import FmuDescription
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.instance_process import InstanceProcess
 from handover.cosim.fmu.loading import LOADING, UNLOADING, load_unit

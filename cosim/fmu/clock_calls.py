@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import Any
 
 from handover.cosim.fmu.calls import Call
-from handover.cosim.fmu.clocks import FmuClock
+from handover.cosim.fmu.file.clocks import FmuClock
 
 
 class Qualifier(enum.IntEnum):

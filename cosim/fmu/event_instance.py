@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.buffers import SignalBuffer, Views, content_of
 from handover.cosim.fmu.clock_calls import ClockCalls, ClockTimer
-from handover.cosim.fmu.description import FmuDescription, FmuPort
 from handover.cosim.fmu.failures import UnitTerminated
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.cosim.fmu.instance import Instance
 

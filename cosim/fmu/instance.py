@@ -23,8 +23,8 @@ from handover.cosim.fmu.calls import (
     is_rounding,
 )
 from handover.cosim.fmu.checked_calls import CheckedCalls
-from handover.cosim.fmu.description import FmuDescription, FmuPort
 from handover.cosim.fmu.failures import InvalidReturn, StepDiscarded, UnitError, UnitTerminated
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.fmu.heartbeat import Heartbeat
 
 _WARNING, _DISCARD, _FATAL, _PENDING = 1, 2, 4, 5

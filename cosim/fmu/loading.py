@@ -18,8 +18,8 @@ import fmpy.fmi2
 import fmpy.fmi3
 
 from handover.cosim.exceptions import InvalidFmu, one_line
-from handover.cosim.fmu.description import FmuDescription
-from handover.cosim.fmu.fmpy_edge import library_path
+from handover.cosim.fmu.file.description import FmuDescription
+from handover.cosim.fmu.file.fmpy_edge import library_path
 from handover.cosim.isolation.unit_process import UnitProcess
 
 

@@ -14,7 +14,7 @@ from handover.cosim.blocks.declarations import short_repr
 from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.buffers import SignalBuffer, Views, content_of
-from handover.cosim.fmu.description import FmuDescription, FmuPort, indices_of
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort, indices_of
 
 _BOOLEANS = {"true": 1, "1": 1, "false": 0, "0": 0}
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from handover.cosim.exceptions import InvalidOptions
-from handover.cosim.fmu.archive import is_of_this_project
+from handover.cosim.fmu.file.archive import is_of_this_project
 from handover.cosim.isolation.unit_process import unavailable
 from handover.cosim.native_libraries import CompilationError
 from handover.cosim.system.system import System

@@ -10,9 +10,9 @@ from typing import TypeVar
 
 from handover.cosim.check.run_faults import execution_tools, run_faults
 from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure
-from handover.cosim.fmu.archive import DESCRIPTION
 from handover.cosim.fmu.calls import is_rounding
 from handover.cosim.fmu.failures import UnitCrashed, UnitHung, UnitTerminated
+from handover.cosim.fmu.file.archive import DESCRIPTION
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.host_process import mark_as_host
 from handover.cosim.fmu.unit_warnings import UnitWarnings

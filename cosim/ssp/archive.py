@@ -8,7 +8,7 @@ from typing import ClassVar
 from urllib.parse import unquote, urlsplit
 
 from handover.cosim.exceptions import InvalidFmu, InvalidSsp, nearest
-from handover.cosim.fmu.archive import FmuArchive
+from handover.cosim.fmu.file.archive import FmuArchive
 from handover.cosim.ssp.xml import STRUCTURE
 
 

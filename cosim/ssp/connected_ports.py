@@ -4,7 +4,7 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
-from handover.cosim.fmu.description import FmuDescription, FmuPort, indices_of
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort, indices_of
 
 _SUBSCRIPT = re.compile(r"(?P<base>.+)\[(?P<indices>\d+(,\d+)*)\]$")
 

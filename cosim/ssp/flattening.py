@@ -12,7 +12,7 @@ from types import MappingProxyType
 from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import nearest
-from handover.cosim.fmu.description import FmuDescription, FmuPort
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.ssp.connected_ports import find_entry, ports_of, settable_names, unfed, variable_names
 from handover.cosim.ssp.given_parameters import put
 from handover.cosim.ssp.parameter_set import SspValue

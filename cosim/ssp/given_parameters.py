@@ -14,7 +14,7 @@ import numpy as np
 from handover.cosim.blocks.units import UNKNOWN
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import nearest
-from handover.cosim.fmu.description import FmuDescription, FmuPort
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.ssp.connected_ports import Entry, entry_names, find_entry, unfed
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.ssp.start_values import Given

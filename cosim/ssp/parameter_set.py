@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
 from handover.cosim.exceptions import nearest
-from handover.cosim.fmu.xml import XmlElement
+from handover.cosim.fmu.file.xml import XmlElement
 from handover.cosim.ssp.xml import SspPart, local, short_name
 from handover.cosim.system.conversion import LinearTransformation
 

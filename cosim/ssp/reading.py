@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
 from handover.cosim.blocks.units import UNKNOWN, Unit
-from handover.cosim.fmu.default_experiment import INVALID_STEP, SHORTEST_STEP, proposed_step
-from handover.cosim.fmu.xml import XmlElement
+from handover.cosim.fmu.file.default_experiment import INVALID_STEP, SHORTEST_STEP, proposed_step
+from handover.cosim.fmu.file.xml import XmlElement
 from handover.cosim.ssp.archive import SspArchive
 from handover.cosim.ssp.parameter_set import (
     SspValue,

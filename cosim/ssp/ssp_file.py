@@ -13,8 +13,8 @@ from types import MappingProxyType, TracebackType
 from typing import Any
 
 from handover.cosim.exceptions import InvalidFmu, InvalidSsp, WiringError
-from handover.cosim.fmu.default_experiment import exact_seconds, proposed_step
-from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
+from handover.cosim.fmu.file.default_experiment import exact_seconds, proposed_step
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.ssp.archive import SspArchive
 from handover.cosim.ssp.connected_ports import entry_names, find_entry, split_arrays
 from handover.cosim.ssp.flattening import FlatConnection, FlatSystem, Node, components_of, flatten

@@ -8,7 +8,7 @@ import numpy as np
 
 from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.ssp.connected_ports import Entry, entry_names
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.system.conversion import LinearTransformation, conversion, needs_no_conversion

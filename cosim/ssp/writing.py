@@ -11,9 +11,9 @@ from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import NotExportable
-from handover.cosim.fmu.archive import write_archive
-from handover.cosim.fmu.default_experiment import proposed_step
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.archive import write_archive
+from handover.cosim.fmu.file.default_experiment import proposed_step
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.ssp.connected_ports import entry_names
 from handover.cosim.ssp.xml import (
     OMS_ANNOTATION,

@@ -15,7 +15,7 @@ from typing import Any
 import fmpy
 
 from handover.cosim.exceptions import InvalidSsp
-from handover.cosim.fmu.xml import UnsafeXml, XmlElement, parse_xml
+from handover.cosim.fmu.file.xml import UnsafeXml, XmlElement, parse_xml
 
 NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",

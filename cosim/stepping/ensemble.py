@@ -17,7 +17,7 @@ from pathlib import Path
 from handover.cosim.exceptions import CosimError, InvalidFmu
 from handover.cosim.fmu.calls import State
 from handover.cosim.fmu.failures import StartValuesLost, UnitTerminated
-from handover.cosim.fmu.fmpy_edge import unpack
+from handover.cosim.fmu.file.fmpy_edge import unpack
 from handover.cosim.fmu.heartbeat import Abandoned, Heartbeat
 from handover.cosim.fmu.host_process import HostProcess
 from handover.cosim.fmu.instance import Instance

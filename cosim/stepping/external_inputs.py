@@ -14,7 +14,7 @@ from handover.cosim.blocks.declarations import short_repr
 from handover.cosim.blocks.start_values import fault_of
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import UnitFailure
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.instance import Instance
 from handover.cosim.fmu.start_values import entries_of
 from handover.cosim.system.system import System

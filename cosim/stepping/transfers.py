@@ -16,8 +16,8 @@ from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.buffers import Copy, Views, joined
-from handover.cosim.fmu.description import FmuPort, indices_of
 from handover.cosim.fmu.failures import NotFinite
+from handover.cosim.fmu.file.description import FmuPort, indices_of
 from handover.cosim.fmu.instance import Instance
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import PortName, System

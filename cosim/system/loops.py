@@ -13,7 +13,7 @@ from fractions import Fraction
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import ScheduleError
-from handover.cosim.fmu.description import FmuDescription
+from handover.cosim.fmu.file.description import FmuDescription
 from handover.cosim.system.ordering import DescribeWait, Needs, ordered, strongly_connected
 from handover.cosim.system.system import Connection, PortName, System
 

@@ -16,7 +16,7 @@ from handover.cosim.blocks.ports import Raster
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.buffers import Views
-from handover.cosim.fmu.description import FmuPort, indices_of
+from handover.cosim.fmu.file.description import FmuPort, indices_of
 
 
 @dataclass(frozen=True)

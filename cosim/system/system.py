@@ -14,9 +14,9 @@ from typing import Any, overload
 
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import WiringError, nearest
-from handover.cosim.fmu.clocks import FmuClock
-from handover.cosim.fmu.default_experiment import NO_STEP, DefaultExperiment, NoStep, proposed_step
-from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
+from handover.cosim.fmu.file.clocks import FmuClock
+from handover.cosim.fmu.file.default_experiment import NO_STEP, DefaultExperiment, NoStep, proposed_step
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.system.conversion import LinearTransformation, conversion
 from handover.cosim.system.port_names import MatchedPorts, PortName, PortNames, ambiguity, matched_ports, unit_of
 from handover.cosim.system.time_series import ExternalSource, NoSource, TimeSeries, external_fault
@@ -55,7 +55,7 @@ class PlacedUnit:
         return PortNames(self.name, Causality.OUTPUT)
 
     def _repr_html_(self) -> str:
-        from handover.cosim.fmu.port_table import description_html  # of notebooks alone
+        from handover.cosim.fmu.file.port_table import description_html  # of notebooks alone
 
         return description_html(self.description)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 
 SETTABLE_KINDS = (Kind.REAL, Kind.INTEGER, Kind.BOOLEAN, Kind.ENUMERATION)
 """Kinds of inputs that can follow values over time, or come from outside."""

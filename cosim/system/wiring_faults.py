@@ -9,8 +9,8 @@ from handover.cosim.blocks.start_values import fault_of
 from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import nearest
-from handover.cosim.fmu.clocks import FmuClock
-from handover.cosim.fmu.description import FmuDescription, FmuPort
+from handover.cosim.fmu.file.clocks import FmuClock
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.system.conversion import LinearTransformation, needs_no_conversion
 
 

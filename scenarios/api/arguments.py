@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from handover.cosim.exceptions import CosimError, UnitFailure, nearest
-from handover.cosim.fmu.default_experiment import exact_seconds
+from handover.cosim.fmu.file.default_experiment import exact_seconds
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import CALL_LIMIT, Algorithm, MasterOptions
 from handover.scenarios.execution.errors import (

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from handover.cosim.fmu.description import FmuDescription, describe_fmu
+from handover.cosim.fmu.file.description import FmuDescription, describe_fmu
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.fmus.catalog import UnknownBlock, UnknownUnit

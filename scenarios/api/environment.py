@@ -19,7 +19,7 @@ except ImportError as e:
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import UnitFailure, nearest
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.system import System
 from handover.scenarios.api.arguments import (
     InvalidInput,

@@ -15,7 +15,7 @@ from handover.cosim.blocks.start_values import fault_of, numbers_of
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.buffers import Views
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.start_values import entries_of
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import Connection, PlacedUnit, PortName, System

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.block import InvalidState
 from handover.cosim.blocks.start_values import fault_of
 from handover.cosim.exceptions import nearest
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.master.checkpoint import Checkpoint, check_states, take_checkpoint
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions

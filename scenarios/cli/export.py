@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.ssp.writing import bound_enumerations, write_ssp
 from handover.cosim.system.system import System
 from handover.fmus.build import cached

@@ -6,9 +6,9 @@ from typing import Any
 
 import click
 
-from handover.cosim.fmu.archive import FmuArchive
-from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu
-from handover.cosim.fmu.fmpy_edge import platforms_in
+from handover.cosim.fmu.file.archive import FmuArchive
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
+from handover.cosim.fmu.file.fmpy_edge import platforms_in
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.system import System
 from handover.scenarios.cli.console import open_console, print_json, print_rows

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.exceptions import WiringError
-from handover.cosim.fmu.default_experiment import DefaultExperiment, exact_seconds
+from handover.cosim.fmu.file.default_experiment import DefaultExperiment, exact_seconds
 from handover.cosim.system.system import PortName, System
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.input_file import read_inputs

@@ -17,7 +17,7 @@ import numpy as np
 from handover.cosim.blocks.start_values import range_of
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import nearest
-from handover.cosim.fmu.description import FmuPort, indices_of
+from handover.cosim.fmu.file.description import FmuPort, indices_of
 from handover.cosim.fmu.start_values import entries_of, parsed_number
 from handover.cosim.system.time_series import TimeSeries
 from handover.scenarios.execution.errors import UsageError

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from handover.cosim.exceptions import InvalidSsp
-from handover.cosim.fmu.default_experiment import NoStep
+from handover.cosim.fmu.file.default_experiment import NoStep
 from handover.cosim.record.reader import Record
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.signals import Signals

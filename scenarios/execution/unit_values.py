@@ -13,7 +13,7 @@ import numpy as np
 
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import CosimError, nearest
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.start_values import entries_of
 from handover.cosim.system.system import PlacedUnit, System
 from handover.scenarios.execution.input_file import columns_of, value_of

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import did_you_mean, suggestion
-from handover.cosim.fmu.description import FmuDescription, FmuPort
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.system.conversion import needs_no_conversion
 from handover.cosim.system.system import PlacedUnit, PortName, System
 from handover.fmus.catalog import Entry, find_unit, import_class

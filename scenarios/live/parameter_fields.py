@@ -12,7 +12,7 @@ from typing import Any
 
 from handover.cosim.blocks.start_values import range_of
 from handover.cosim.blocks.variable import Declared, Kind
-from handover.cosim.fmu.description import FmuPort, describe_fmu
+from handover.cosim.fmu.file.description import FmuPort, describe_fmu
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.fmu_run import is_fmu

@@ -10,7 +10,7 @@ from typing import Any, cast
 from numpy.typing import NDArray
 
 from handover.cosim.exceptions import one_line
-from handover.cosim.fmu.description import indices_of
+from handover.cosim.fmu.file.description import indices_of
 from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import scenario_of
 from handover.scenarios.experiment.experiment import Experiment

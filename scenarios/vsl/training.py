@@ -27,7 +27,7 @@ from handover.controllers.vsl.learned_model import (
 )
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.scenarios.vsl.data_file import links_of
 from handover.scenarios.vsl.model_file import content_key
 from handover.scenarios.vsl.training_data import STRETCH, Dataset, Measured, collect, describe_arm, parameters_of

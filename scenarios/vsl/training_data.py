@@ -14,8 +14,8 @@ from handover.controllers.vsl.kinematics import VslKinematics
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure
-from handover.cosim.fmu.description import FmuDescription, describe_fmu
-from handover.cosim.fmu.fmpy_edge import unpack
+from handover.cosim.fmu.file.description import FmuDescription, describe_fmu
+from handover.cosim.fmu.file.fmpy_edge import unpack
 from handover.cosim.fmu.instance import Instance
 
 SPLIT = (0.70, 0.15, 0.15)

@@ -24,8 +24,8 @@ import json, resource, sys, time
 from fractions import Fraction
 from pathlib import Path
 import fmpy
-from handover.cosim.fmu import fmpy_edge
-from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.fmu.file import fmpy_edge
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.scenarios.results.system_facts import peak_memory

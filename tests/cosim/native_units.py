@@ -18,7 +18,7 @@ import fmpy
 from native_declaration import Declaration, read_declarations
 from native_description import description2, description3
 
-from handover.cosim.fmu.fmpy_edge import library_path
+from handover.cosim.fmu.file.fmpy_edge import library_path
 from handover.fmus.compile import TARGETS, cache_folder, host_platform, zig_cc
 
 SOURCES = Path(__file__).with_name("native")

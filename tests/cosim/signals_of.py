@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.signals import Signals
 
 _KINDS = {"f": Kind.REAL, "i": Kind.INTEGER, "u": Kind.INTEGER, "b": Kind.BOOLEAN}

@@ -13,7 +13,7 @@ from own_master import Placed
 from systems import Wired
 
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu, indices_of
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu, indices_of
 
 LIMIT = 120.0
 """Seconds after which building is given up."""

@@ -8,7 +8,7 @@ import fmpy
 import numpy as np
 
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu.description import FmuPort, describe_fmu, indices_of
+from handover.cosim.fmu.file.description import FmuPort, describe_fmu, indices_of
 
 HOST: Any = fmpy
 

@@ -17,7 +17,7 @@ import pytest
 from own_master import Connections, Placed
 from reference import Record
 
-from handover.cosim.fmu.description import FmuDescription, FmuPort, describe_fmu, indices_of
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu, indices_of
 
 LIMIT = 120.0
 """Seconds after which a run is ended."""

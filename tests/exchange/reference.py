@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.description import Description, describe
 from handover.cosim.blocks.variable import Kind, Variable
-from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu.description import FmuPort, indices_of
+from handover.cosim.fmu.file.description import FmuPort, indices_of
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals

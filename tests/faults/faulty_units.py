@@ -12,7 +12,7 @@ from native_declaration import Declaration, read_declarations
 from native_description import description2, description3
 from native_units import HEADERS, SOURCES
 
-from handover.cosim.fmu.fmpy_edge import library_path
+from handover.cosim.fmu.file.fmpy_edge import library_path
 from handover.fmus.compile import TARGETS, cache_folder, host_platform, zig_cc
 
 _SOURCE = Path(__file__).with_name("units") / "by_name" / "faults.c"

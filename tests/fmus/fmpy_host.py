@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu.description import FmuPort, describe_fmu
-from handover.cosim.fmu.fmpy_edge import unpack
+from handover.cosim.fmu.file.description import FmuPort, describe_fmu
+from handover.cosim.fmu.file.fmpy_edge import unpack
 from handover.cosim.fmu.loading import load_unit
 
 Digests = dict[str, str]

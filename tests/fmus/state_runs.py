@@ -8,7 +8,7 @@ import numpy as np
 from fmpy_host import Digests, FmpyHost
 
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu.description import FmuDescription, FmuPort
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.plants.helix.cameras.stereo_camera import Inputs, Outputs, Params, StereoCamera
 
 STEPS = 12

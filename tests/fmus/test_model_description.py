@@ -18,7 +18,7 @@ from workshop import Workshop
 from handover.cosim.blocks.description import Description, describe
 from handover.cosim.blocks.ports import parameter
 from handover.cosim.blocks.units import Number
-from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus.fmi2_description import fmi2_description
 from handover.fmus.fmi3_description import fmi3_description
 from handover.fmus.layout import DuplicateName, Form, Layout

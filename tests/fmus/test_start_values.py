@@ -12,7 +12,7 @@ from fmpy_host import Digests, FmpyHost
 from workshop import Workshop
 
 from handover.cosim.blocks.declarations import DeclarationError
-from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus.build import build_block, cached
 
 HOST: Any = fmpy

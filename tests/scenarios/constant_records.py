@@ -7,7 +7,7 @@ import numpy as np
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.buffers import Views
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import Signals

@@ -7,7 +7,7 @@ import numpy as np
 
 from handover.cosim.blocks.start_values import range_of
 from handover.cosim.blocks.variable import Causality, Declared, Kind, Variable
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 
 _MAX_START = 40  # characters
 

@@ -11,7 +11,7 @@ from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.finding import CheckReport, Level
 from handover.cosim.check.load_probe import load_fault
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmu.fmpy_edge import unpack
+from handover.cosim.fmu.file.fmpy_edge import unpack
 from handover.fmus.compile import host_platform
 
 pytestmark = pytest.mark.skipif(not host_platform().endswith("linux"), reason="signals and messages of Linux")

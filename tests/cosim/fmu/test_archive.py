@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from native_units import native_fmu
 
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmu.archive import FmuArchive, archive_faults
-from handover.cosim.fmu.fmpy_edge import problems_of
+from handover.cosim.fmu.file.archive import FmuArchive, archive_faults
+from handover.cosim.fmu.file.fmpy_edge import problems_of
 from handover.cosim.master.master import Master
 from handover.cosim.system.system import System
 

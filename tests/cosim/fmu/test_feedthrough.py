@@ -8,7 +8,7 @@ import pytest
 from native_units import Edited, native_fmu
 
 from handover.cosim.exceptions import InitializationError
-from handover.cosim.fmu.description import FmuDescription, describe_fmu
+from handover.cosim.fmu.file.description import FmuDescription, describe_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.system import System

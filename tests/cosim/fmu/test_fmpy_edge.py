@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from handover.cosim.fmu.description import describe_fmu
-from handover.cosim.fmu.fmpy_edge import unpack
+from handover.cosim.fmu.file.description import describe_fmu
+from handover.cosim.fmu.file.fmpy_edge import unpack
 from handover.cosim.fmu.loading import load_unit
 
 

@@ -4,7 +4,7 @@ import struct
 
 import pytest
 
-from handover.cosim.fmu.library_format import shortage
+from handover.cosim.fmu.file.library_format import shortage
 
 SEGMENT_64 = struct.pack("<II16s4Q", 0x19, 72, b"__TEXT", 0, 0x9000, 4096, 5000) + bytes(16)
 

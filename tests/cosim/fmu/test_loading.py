@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from native_units import native_fmu
 
-from handover.cosim.fmu.description import FmuDescription, describe_fmu
-from handover.cosim.fmu.fmpy_edge import unpack
+from handover.cosim.fmu.file.description import FmuDescription, describe_fmu
+from handover.cosim.fmu.file.fmpy_edge import unpack
 from handover.cosim.fmu.loading import load_unit
 
 

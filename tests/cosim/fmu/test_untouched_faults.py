@@ -12,7 +12,7 @@ from native_units import Edited, native_fmu
 
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.exceptions import InvalidFmu, WiringError
-from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.system import System

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from handover.cosim.fmu.archive import write_archive
+from handover.cosim.fmu.file.archive import write_archive
 
 FILES = {"a.txt": b"a" * 100, "binaries/b": b"b" * 100, "empty": b"", "größe.txt": bytes(range(256)) * 300}
 PLACES = ("archive.py", "zipfile.py", "zipfile/__init__.py")

@@ -12,7 +12,7 @@ import pytest
 from native_units import native_fmu
 
 from handover.cosim.exceptions import ScheduleError
-from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.options import Algorithm, MasterOptions

@@ -7,7 +7,7 @@ import pytest
 from native_units import native_fmu
 
 from handover.cosim.exceptions import InvalidFmu, NotExportable, ScheduleError, WiringError
-from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.stepping.options import AdaptiveStep, Extrapolation, MasterOptions

@@ -6,7 +6,7 @@ import pytest
 
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import ScheduleError
-from handover.cosim.fmu.description import FmuDescription, FmuPort
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.system.schedule import Schedule
 from handover.cosim.system.system import PlacedUnit, PortName, System
 

@@ -9,7 +9,7 @@ from fmu_of import FmuOf
 from native_units import native_fmu
 
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.signals import Signals

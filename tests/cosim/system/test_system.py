@@ -10,8 +10,8 @@ from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
 from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import InvalidFmu, WiringError
-from handover.cosim.fmu.default_experiment import proposed_step
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.default_experiment import proposed_step
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.system import System
 from handover.cosim.system.wiring_faults import mismatch
 

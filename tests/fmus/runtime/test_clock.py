@@ -16,7 +16,7 @@ from workshop import Workshop
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS, import_class
 from handover.fmus.layout import DuplicateName, Layout

@@ -11,7 +11,7 @@ from gymnasium import spaces
 from gymnasium.utils.env_checker import check_env
 
 import handover
-from handover.cosim.fmu.description import describe_fmu
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.scenarios.api.environment import ScenarioEnvironment, space_of
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters

@@ -20,7 +20,7 @@ from native_units import native_fmu
 from ssp_of import component, described, pack_ssp, system
 
 from handover.cosim.exceptions import InvalidSsp
-from handover.cosim.fmu.default_experiment import NoStep
+from handover.cosim.fmu.file.default_experiment import NoStep
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.scenarios.cli.command import main

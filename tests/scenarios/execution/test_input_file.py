@@ -10,7 +10,7 @@ from native_units import native_fmu
 
 from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.fmu.description import FmuPort, describe_fmu
+from handover.cosim.fmu.file.description import FmuPort, describe_fmu
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.input_file import read_inputs
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from handover.controllers.free_flyer.handover_state_machine import HandoverPhase as Phase
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.plants.free_flyer.hand.hand_and_object import Holder
 from handover.scenarios.free_flyer.handover.handover_evaluation import HandoverEvaluator

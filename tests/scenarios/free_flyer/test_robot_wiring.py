@@ -9,7 +9,7 @@ from flyer_runs import run
 
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import InitializationError
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter

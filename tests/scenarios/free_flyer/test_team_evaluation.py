@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from handover.controllers.free_flyer.handover_state_machine import HandoverPhase as Phase
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.free_flyer.parameters import TeamParameters

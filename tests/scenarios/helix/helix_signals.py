@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from handover.controllers.helix.servo.visual_servo import Phase
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.plants.helix.hand.partner_parameters import Holder
 
 PICTURE = np.zeros(720 * 1280 * 3, dtype=np.uint8)

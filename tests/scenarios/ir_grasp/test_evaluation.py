@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from handover.controllers.ir_grasp.ir_reflex import Phase, Stop
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.scenarios.ir_grasp.evaluation import GraspEvaluator
 from handover.scenarios.ir_grasp.parameters import Parameters

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.fmu.description import FmuPort
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.scenarios.vsl.evaluation import PathEvaluator, distance_to_path
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters

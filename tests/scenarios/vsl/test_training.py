@@ -12,7 +12,7 @@ from handover.controllers.vsl.hybrid_kinematics import HybridKinematics, Inputs,
 from handover.controllers.vsl.learned_model import ForwardInput, Learned
 from handover.controllers.vsl.model_text import model_text, parse_model, read_model
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmu.archive import write_archive
+from handover.cosim.fmu.file.archive import write_archive
 from handover.fmus.build import cached
 from handover.scenarios.vsl.model_file import content_key
 from handover.scenarios.vsl.training import VslTraining

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from handover.cosim.blocks.start_values import range_of
 
 if TYPE_CHECKING:
-    from handover.cosim.fmu.description import FmuDescription, FmuPort
+    from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 
 _COLUMNS = ("name", "type", "unit", "range", "start", "description")
 _MAX_START = 40

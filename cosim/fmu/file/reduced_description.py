@@ -11,8 +11,8 @@ import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from handover.cosim.fmu.archive import DESCRIPTION
-from handover.cosim.fmu.default_experiment import is_finite
+from handover.cosim.fmu.file.archive import DESCRIPTION
+from handover.cosim.fmu.file.default_experiment import is_finite
 
 _etree: Any = importlib.import_module("lxml.etree")  # neither it nor its classes have types
 

@@ -15,11 +15,11 @@ from fmpy.model_description import ValidationError
 from fmpy.validation import validate_model_description
 
 from handover.cosim.exceptions import InvalidFmu, one_line
-from handover.cosim.fmu.archive import DESCRIPTION, FmuArchive
-from handover.cosim.fmu.library_format import HEAD, shortage
-from handover.cosim.fmu.model_structure import lost_references
-from handover.cosim.fmu.reduced_description import reduced_fmu
-from handover.cosim.fmu.xml import UnsafeXml, XmlElement, check_xml, parse_xml
+from handover.cosim.fmu.file.archive import DESCRIPTION, FmuArchive
+from handover.cosim.fmu.file.library_format import HEAD, shortage
+from handover.cosim.fmu.file.model_structure import lost_references
+from handover.cosim.fmu.file.reduced_description import reduced_fmu
+from handover.cosim.fmu.file.xml import UnsafeXml, XmlElement, check_xml, parse_xml
 
 _BUILD_DESCRIPTION = "sources/buildDescription.xml"
 _MAX_PROBLEMS = 3

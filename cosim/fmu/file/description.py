@@ -17,13 +17,13 @@ from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
 from handover.cosim.blocks.variable import Causality, Declared, Kind
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmu.clocks import FmuClock, clocks_of, without_clocks
-from handover.cosim.fmu.default_experiment import DefaultExperiment, default_experiment
-from handover.cosim.fmu.feedthrough import feedthrough_of
-from handover.cosim.fmu.xml import XmlElement, collection_paused
+from handover.cosim.fmu.file.clocks import FmuClock, clocks_of, without_clocks
+from handover.cosim.fmu.file.default_experiment import DefaultExperiment, default_experiment
+from handover.cosim.fmu.file.feedthrough import feedthrough_of
+from handover.cosim.fmu.file.xml import XmlElement, collection_paused
 
 if TYPE_CHECKING:
-    from handover.cosim.fmu.fmpy_edge import ModelVariable
+    from handover.cosim.fmu.file.fmpy_edge import ModelVariable
 
 
 KINDS = {
@@ -182,7 +182,7 @@ class FmuDescription:
         return {**self.parameters, **self.inputs, **self.initial}
 
     def _repr_html_(self) -> str:
-        from handover.cosim.fmu.port_table import description_html  # of notebooks alone
+        from handover.cosim.fmu.file.port_table import description_html  # of notebooks alone
 
         return description_html(self)
 
@@ -195,7 +195,7 @@ def describe_fmu(path: Path) -> FmuDescription:
         InvalidFmu: the file is missing, not an FMU, of another standard, has no co-simulation interface, a fault in
             what co-simulation reads of its description, or a clock with an invalid interval.
     """
-    from handover.cosim.fmu.fmpy_edge import mime_types, read_description  # FMPy takes long to import
+    from handover.cosim.fmu.file.fmpy_edge import mime_types, read_description  # FMPy takes long to import
 
     md, root, untouched_fault = read_description(path)
     experiment = default_experiment(root)
@@ -261,7 +261,7 @@ def _unit(u: Any) -> Unit:
 
 def _port(v: "ModelVariable", units: Mapping[str, Unit], mimes: Mapping[str, str]) -> FmuPort | None:
     kind = KINDS.get(v.type)
-    if kind is None:  # clocks, see `handover.cosim.fmu.clocks`, and types of later standards
+    if kind is None:  # clocks, see `handover.cosim.fmu.file.clocks`, and types of later standards
         return None
     declared = v.declaredType
     unit = v.unit or (declared.unit if declared is not None else None)

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from handover.cosim.blocks.variable import Causality
 
 if TYPE_CHECKING:
-    from handover.cosim.fmu.description import FmuPort
-    from handover.cosim.fmu.fmpy_edge import ModelDescription, ModelVariable
+    from handover.cosim.fmu.file.description import FmuPort
+    from handover.cosim.fmu.file.fmpy_edge import ModelDescription, ModelVariable
 
 _Dependencies = dict[str, tuple[str, ...]]
 _Key = tuple[str, int]

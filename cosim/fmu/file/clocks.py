@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from handover.cosim.fmu.xml import XmlElement
+from handover.cosim.fmu.file.xml import XmlElement
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from handover.cosim.fmu.xml import XmlElement
+from handover.cosim.fmu.file.xml import XmlElement
 
 SHORTEST_STEP = 1e-12
 """Seconds; a shorter step would be lost in the rounding of times, which doubles hold to some 1e-16 of their size."""

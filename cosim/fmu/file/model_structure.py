@@ -7,7 +7,7 @@ that follows such a reference fails, or finds another variable; so a run and a c
 from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
-from handover.cosim.fmu.xml import XmlElement
+from handover.cosim.fmu.file.xml import XmlElement
 
 _FMI3_UNKNOWNS = ("Output", "ContinuousStateDerivative", "ClockedState", "InitialUnknown", "EventIndicator")
 
