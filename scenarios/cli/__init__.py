@@ -1,1 +1,1 @@
-"""The command `handover`: a file a command; what they print is in `summaries`."""
+"""The command `handover`: a file a command, those of units or one robot in folders; what they print: `summaries`."""

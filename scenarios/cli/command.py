@@ -112,12 +112,12 @@ class DeferringGroup(click.Group):
 COMMANDS = (
     DeferredCommand(
         "build",
-        "handover.scenarios.cli.build:build_command",
+        "handover.scenarios.cli.units.build:build_command",
         help="Build UNITs (all by default) as FMUs for other tools.",
     ),
     DeferredCommand(
         "check",
-        "handover.scenarios.cli.check:check",
+        "handover.scenarios.cli.units.check:check",
         short_help="Find what is wrong with FMUs and SSPs, whoever made them.",
     ),
     DeferredCommand(
@@ -135,11 +135,11 @@ COMMANDS = (
     ),
     DeferredCommand(
         "flyer-track",
-        "handover.scenarios.cli.flyer_track:flyer_track",
+        "handover.scenarios.cli.robots.flyer_track:flyer_track",
         help="Write the track of the hand in a handover of the free-flyer, of the run in DIR.",
     ),
     DeferredCommand(
-        "info", "handover.scenarios.cli.info:info", short_help="Tell what is in an FMU or an SSP, from any tool."
+        "info", "handover.scenarios.cli.units.info:info", short_help="Tell what is in an FMU or an SSP, from any tool."
     ),
     DeferredCommand(
         "list",
@@ -148,7 +148,7 @@ COMMANDS = (
     ),
     DeferredCommand(
         "new",
-        "handover.scenarios.cli.new:new",
+        "handover.scenarios.cli.units.new:new",
         short_help="Write a start for a unit, a controller or a scenario of your own.",
     ),
     DeferredCommand(
@@ -184,7 +184,7 @@ COMMANDS = (
     ),
     DeferredCommand(
         "vsl-train",
-        "handover.scenarios.cli.vsl_train:vsl_train",
+        "handover.scenarios.cli.robots.vsl_train:vsl_train",
         help="Train the kinematics of the arm with variable-stiffness links on the arm's own FMU.",
     ),
 )

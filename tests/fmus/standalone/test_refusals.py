@@ -14,7 +14,7 @@ from handover.fmus.catalog import UNITS, own_unit
 from handover.fmus.compile import TARGETS, host_platform
 from handover.fmus.sources import FileElsewhere
 from handover.fmus.standalone import CannotFreeze
-from handover.scenarios.cli.build import build_command
+from handover.scenarios.cli.units.build import build_command
 
 READER = '''"""A gain out of a table."""
 import csv

@@ -13,7 +13,7 @@ from flyer_runs import metric, run
 from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
 from handover.plants.free_flyer.hand.hand_track import HandPose, write_track
-from handover.scenarios.cli.flyer_track import flyer_track
+from handover.scenarios.cli.robots.flyer_track import flyer_track
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
 from handover.scenarios.free_flyer.handover.handovers import (
     Collaborative,

@@ -15,7 +15,7 @@ from handover.cosim.blocks.variable import Causality, Kind
 from handover.fmus.catalog import find_unit, import_class
 from handover.scenarios.catalog import SCENARIOS, named_scenario
 from handover.scenarios.cli.command import main
-from handover.scenarios.cli.place_start import start_for
+from handover.scenarios.cli.units.place_start import start_for
 from handover.scenarios.experiment.places import ports_of_place
 
 
@@ -71,7 +71,7 @@ def test_how_to_run_its_test_is_told_also_without_pytest(there: bool, tmp_path: 
     def find_spec(name: str) -> bool | None:
         return there if name == "pytest" else None
 
-    monkeypatch.setattr("handover.scenarios.cli.new.find_spec", find_spec)
+    monkeypatch.setattr("handover.scenarios.cli.units.new.find_spec", find_spec)
     told = CliRunner().invoke(main, ["new", "controller", "Quick", "--out", str(tmp_path)]).stderr
     assert ("its test: python -m pytest test_quick.py" in told) is there
     assert ("its test: python -m pip install pytest, then python -m pytest test_quick.py" in told) is not there

@@ -19,7 +19,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Causality
 from handover.plants.vsl.parameters import Params as ArmParams
 from handover.plants.vsl.vacuum_gripper import Params as GripperParams
-from handover.scenarios.cli.vsl_train import vsl_train
+from handover.scenarios.cli.robots.vsl_train import vsl_train
 from handover.scenarios.vsl import training_data
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
 from handover.scenarios.vsl.path_experiments import ELECTRONICS

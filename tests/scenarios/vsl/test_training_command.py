@@ -22,7 +22,7 @@ from handover.controllers.vsl.kinematics import Elbow
 from handover.controllers.vsl.learned_model import ForwardInput, VslModel
 from handover.controllers.vsl.model_text import parse_model, read_model
 from handover.fmus.build import build_block
-from handover.scenarios.cli import vsl_train as vsl_train_command
+from handover.scenarios.cli.robots import vsl_train as vsl_train_command
 from handover.scenarios.vsl import learning_curve as curve_module
 from handover.scenarios.vsl.data_file import write_data
 from handover.scenarios.vsl.learning_curve import curve_table, learning_curve

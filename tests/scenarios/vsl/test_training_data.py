@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from vsl_training_points import ARM, call, key_of_made_up, made_up
 
-from handover.scenarios.cli import vsl_train as vsl_train_command
+from handover.scenarios.cli.robots import vsl_train as vsl_train_command
 from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
 
 

@@ -11,7 +11,7 @@ from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import VslModel
 from handover.controllers.vsl.model_text import parse_model
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.cli.vsl_train import vsl_train
+from handover.scenarios.cli.robots.vsl_train import vsl_train
 from handover.scenarios.vsl.training import VslTraining
 from handover.scenarios.vsl.training_data import Dataset, Measured
 

@@ -11,7 +11,7 @@ import click
 
 from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.cli.place_start import start_for
+from handover.scenarios.cli.units.place_start import start_for
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.results.run_folder import check_place, disk_errors_reported
 

@@ -1,0 +1,1 @@
+"""Commands for one robot each; all others are for any."""
