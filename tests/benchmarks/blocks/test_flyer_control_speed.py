@@ -1,6 +1,6 @@
 """CPU time of a step of the free-flyer's controllers, with a robot that moves.
 
-Run with `pytest tests/benchmarks/test_flyer_control_speed.py --benchmark-enable -s`.
+Run with `pytest tests/benchmarks/blocks/test_flyer_control_speed.py --benchmark-enable -s`.
 """
 
 import time

@@ -1,6 +1,6 @@
 """CPU time of a control cycle of the visual servo: filters, state optimisation, Jacobian control.
 
-Run with `pytest tests/benchmarks/test_servo_speed.py --benchmark-enable -s`.
+Run with `pytest tests/benchmarks/blocks/test_servo_speed.py --benchmark-enable -s`.
 """
 
 import math

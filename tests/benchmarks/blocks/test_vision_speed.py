@@ -1,6 +1,6 @@
 """CPU time of a picture pair, of finding ball and wrist in it, and the errors made.
 
-Run with `pytest tests/benchmarks/test_vision_speed.py --benchmark-enable -s -m "slow or not slow"`.
+Run with `pytest tests/benchmarks/blocks/test_vision_speed.py --benchmark-enable -s -m "slow or not slow"`.
 """
 
 import time

@@ -1,6 +1,6 @@
 """CPU time of the grasp scene through a grasp: reach, close, pull and shake, in steps of 15 ms.
 
-Run with `pytest tests/benchmarks/test_grasp_speed.py --benchmark-enable -s`.
+Run with `pytest tests/benchmarks/blocks/test_grasp_speed.py --benchmark-enable -s`.
 """
 
 import math

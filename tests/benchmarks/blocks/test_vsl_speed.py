@@ -1,6 +1,6 @@
 """CPU time of a step of the arm with variable-stiffness links, at rest at every instant and swinging.
 
-Run with `pytest tests/benchmarks/test_vsl_speed.py --benchmark-enable -s`.
+Run with `pytest tests/benchmarks/blocks/test_vsl_speed.py --benchmark-enable -s`.
 """
 
 import math

@@ -1,6 +1,6 @@
 """CPU time of a step of 16 ms of the free-flyer's plants.
 
-Run with `pytest tests/benchmarks/test_free_flyer_speed.py --benchmark-enable -s`.
+Run with `pytest tests/benchmarks/blocks/test_free_flyer_speed.py --benchmark-enable -s`.
 """
 
 import itertools
