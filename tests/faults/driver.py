@@ -15,7 +15,7 @@ from pathlib import Path
 
 from call_ring import CallRing
 from foreign_unit import ForeignUnit
-from illegal_calls import IllegalCalls
+from illegal.calls import IllegalCalls
 from legal_calls import Effort, LegalCalls, performance
 from subject import Fault, Saved, Subject
 

@@ -4,28 +4,24 @@ import random
 from collections.abc import Callable
 
 import derivatives
-import illegal_clocks
-import illegal_instances
-import illegal_states
-import illegal_times
-import illegal_variables
 from event_mode import advance, enter_event_mode, to_step_mode
+from illegal import clocks, instances, states, times, variables
 from legal_calls import Effort, LegalCalls
 from subject import Fault, Saved, Subject
 
 Offence = Callable[[Subject, random.Random], None]
 
 REFUSALS: tuple[Offence, ...] = (
-    *illegal_variables.REFUSALS,
-    *illegal_times.REFUSALS,
-    *illegal_states.REFUSALS,
-    *illegal_instances.REFUSALS,
-    *illegal_clocks.REFUSALS,
+    *variables.REFUSALS,
+    *times.REFUSALS,
+    *states.REFUSALS,
+    *instances.REFUSALS,
+    *clocks.REFUSALS,
     *derivatives.REFUSALS,
 )
 """Calls that are rejected immediately."""
 
-POISONS: tuple[Offence, ...] = (*illegal_variables.POISONS, *illegal_times.POISONS)
+POISONS: tuple[Offence, ...] = (*variables.POISONS, *times.POISONS)
 """Values that may be set, but with which the unit rejects the next step."""
 
 
@@ -49,9 +45,9 @@ class IllegalCalls:
         before = s.serialised(place) if rng.random() < self.effort.bytes else None
         for _ in range(rng.randint(3, 8)):
             rng.choice(REFUSALS)(s, rng)
-        illegal_states.refuse_foreign_state(s, self.foreign)
+        states.refuse_foreign_state(s, self.foreign)
         if before is not None:
-            illegal_states.refuse_corrupted_state(s, before, rng)
+            states.refuse_corrupted_state(s, before, rng)
             self._expect_unchanged(before)
         if rng.random() < max(0.05, 0.5 * self.effort.from_scratch):
             rng.choice(POISONS)(s, rng)
