@@ -10,7 +10,6 @@ import os
 import queue
 import shutil
 import subprocess
-import sys
 import tempfile
 import threading
 import uuid
@@ -22,6 +21,7 @@ from distributed import get_worker
 
 from handover.cosim.blocks.block import InvalidState
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, read_message, write_message
+from handover.scenarios.execution.python_process import module_command
 from handover.scenarios.results.run_folder import version_differences, versions
 
 _POLL_INTERVAL = 0.5
@@ -50,13 +50,12 @@ class ServerProcess:
 
     def __init__(self) -> None:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (as long as the process)
-        same_path = {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "PYTHONSAFEPATH": "1"}
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "handover.scenarios.campaign.run_server"],
+            module_command("handover.scenarios.campaign.run_server"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
-            env={**os.environ, **same_path, **dict.fromkeys(_ONE_THREAD, "1")},
+            env={**os.environ, **dict.fromkeys(_ONE_THREAD, "1")},
             start_new_session=True,
         )
         self._results: queue.SimpleQueue[Any] = queue.SimpleQueue()

@@ -7,7 +7,6 @@ however that is, the run ends after its step.
 import json
 import shlex
 import subprocess
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 
 from handover.cosim.master.live_control import LiveControl
 from handover.scenarios.execution.input_sources import recorded_input_names
+from handover.scenarios.execution.python_process import code_command
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.live.process import CONTROL_FILE
 from handover.scenarios.live.waiting_command import WaitingCommand
@@ -124,7 +124,7 @@ class PlayedRun:
 
     def write_report(self) -> str:
         """Write its page; return why that failed, "" if it did not."""
-        given = [sys.executable, "-c", _ENTRY, "report", str(self.watched.folder.path)]
+        given = code_command(_ENTRY, "report", str(self.watched.folder.path))
         done = subprocess.run(given, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
         self.has_report = done.returncode == 0
         return "" if self.has_report else (done.stderr.strip().splitlines() or ["it could not be written"])[-1]

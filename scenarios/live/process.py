@@ -14,6 +14,7 @@ from pathlib import Path
 
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.system.time_series import ExternalSource
+from handover.scenarios.execution.python_process import module_command
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live.shared_inputs import SharedInputs
 from handover.scenarios.live.shared_pictures import PictureWriter
@@ -112,8 +113,8 @@ def live_page(
         opened.callback(inputs.close)
         listening = opened.enter_context(socket.create_server((HOST, 0)))
         number = listening.fileno()
-        command = [sys.executable, "-m", "handover.scenarios.live", str(folder), str(scratch), str(number)]
-        command += [] if webcam is None else [str(webcam)]
+        given = [str(folder), str(scratch), str(number), *([] if webcam is None else [str(webcam)])]
+        command = module_command("handover.scenarios.live", *given)
         server = subprocess.Popen(command, pass_fds=(number,), stdin=subprocess.PIPE)  # by its end it sees this one's
         assert server.stdin is not None
         opened.callback(server.stdin.close)

@@ -14,6 +14,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from handover.scenarios.execution.python_process import code_command
+
 _LOADED = (
     "handover.scenarios.cli.command",
     "handover.scenarios.cli.run",
@@ -43,7 +45,7 @@ class WaitingCommand:
         """A folder for what this process and that one share."""
         with open(self.folder / _ERRORS, "wb") as errors:
             self.process = subprocess.Popen(
-                [sys.executable, "-c", _PROGRAM, scenario],
+                code_command(_PROGRAM, scenario),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=errors,

@@ -5,7 +5,6 @@ import contextlib
 import json
 import math
 import subprocess
-import sys
 import tempfile
 import time
 from collections import deque
@@ -20,6 +19,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import scenario_of
+from handover.scenarios.execution.python_process import module_command
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.replay import Line
@@ -149,7 +149,7 @@ class Trial:
             "inputs": str(place / "inputs"),
             "led_by": {"from": "page", **request.led_by},
         }
-        command = [sys.executable, "-m", "handover.scenarios.study.session", json.dumps(spec)]
+        command = module_command("handover.scenarios.study.session", json.dumps(spec))
         return subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=self._errors, start_new_session=True
         )
