@@ -170,6 +170,10 @@ def run(
             require_extra("live", "--live")
         if webcam is not None:
             _check_webcam(webcam, live=live)
+        if push and not (live or controls or inputs_from):
+            raise UsageError(
+                "--push: it is the page of --live that pushes; --inputs-from makes a run that was pushed once more"
+            )
         request = RunRequest(
             subject=scenario,
             parameters=parameters,
@@ -192,6 +196,8 @@ def run(
         observer: Observer | None = None
         if live or controls:
             task, control, observer = opened.enter_context(_live(task, pace, controls, webcam))
+        elif task.inputs is None and task.experiment.led_hand(task.parameters) is not None:
+            click.echo("nobody leads the hand, which stays where it is: --live lets a page lead it", err=True)
         with progress_bar(sys.stderr) as progress:
             result = run_task(task, progress, interruption, control=control, observer=observer)
     exit_with(result, task, json_to=json_to)

@@ -4,10 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from flyer_runs import metric, run
 
 from handover.cosim.record.reader import Record
 from handover.fmus.build import cached
+from handover.scenarios.cli.command import main
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
 from handover.scenarios.free_flyer.handover.handovers import (
     Collaborative,
@@ -44,6 +46,13 @@ def test_a_hand_that_nothing_leads_rests_and_the_verdict_blames_no_simulated_per
     assert (record["person.age"] > 0.2).all()
     assert np.ptp(record["person.p_WH"], axis=0).max() == 0.0
     assert record["person.activity"].max() == 0
+
+
+def test_the_command_says_that_nobody_leads_it(tmp_path: Path):
+    for led, told in (("simulated", False), ("outside", True)):
+        given = ["run", "flyer_robot_to_human", "-p", f"hand={led}", "--stop", "0.1", "--no-report"]
+        done = CliRunner().invoke(main, [*given, "--out", str(tmp_path / led)])
+        assert ("nobody leads the hand" in done.output) is told, done.output
 
 
 def test_an_object_in_a_hand_that_nothing_leads_stays_in_it(tmp_path: Path):

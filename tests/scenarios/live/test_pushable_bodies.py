@@ -91,3 +91,10 @@ def test_the_pushed_gripper_of_a_robot_with_an_arm_leads_its_base(tmp_path: Path
     moved = {name: np.linalg.norm(np.ptp(record[f"robot.{name}"], axis=0)) for name in ("p_WG", "p_WB")}
     assert moved["p_WG"] > 2.0 * moved["p_WB"]
     assert np.abs(record["robot.q_J"][-1] - record["robot.q_J"][0]).max() > 0.01
+
+
+def test_a_run_without_a_page_does_not_take_pushes(tmp_path: Path):
+    done = CliRunner().invoke(main, ["run", "flyer_impedance", "--push", "--out", str(tmp_path / "run")])
+    assert done.exit_code == 2
+    assert "--push: it is the page of --live that pushes" in done.output
+    assert not (tmp_path / "run").exists()
