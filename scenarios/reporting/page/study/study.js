@@ -238,6 +238,7 @@
   byId("sure-yes").addEventListener("click", () => {
     byId("sure").close();
     act("withdraw");
+    showMessage(word("one_moment"));  // a run that is under way takes a second or two to end
   });
 
   function showMessage(text) {
