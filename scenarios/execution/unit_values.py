@@ -65,7 +65,7 @@ def _set(start: dict[str, Any], port: FmuPort, k: int | None, text: str) -> None
         start[port.name] = text if port.kind is Kind.STRING else bytes.fromhex(text)
         return
     if k is None:
-        values = [value_of(port, part) for part in text.split(",")]
+        values = _entries(port, text.split(","))
         if len(values) != port.size:
             raise ValueError(f"{len(values)} values where {port.size} {'is' if port.size == 1 else 'are'} right")
     else:
@@ -74,6 +74,16 @@ def _set(start: dict[str, Any], port: FmuPort, k: int | None, text: str) -> None
     if port.kind is Kind.BOOLEAN:
         values = [bool(value) for value in values]
     start[port.name] = np.array(values).reshape(port.shape) if port.shape else values[0]
+
+
+def _entries(port: FmuPort, parts: Sequence[str]) -> list[Any]:
+    values: list[Any] = []
+    for part in parts:
+        try:
+            values.append(value_of(port, part))
+        except ValueError as e:
+            raise ValueError(f"{part!r}: {e}" if len(parts) > 1 else str(e)) from None
+    return values
 
 
 def is_unit_value(text: str) -> bool:

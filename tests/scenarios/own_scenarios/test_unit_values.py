@@ -68,6 +68,8 @@ def test_all_faults_are_told_at_once_and_nothing_is_written(here: Path):
     assert "unit controller: no parameter 'stif'; did you mean stiffness?" in line
     assert "unit arm: mass = '-1': it is out of range: at least 0.01 kg" in line
     assert "p_WG = '1,2,3': 3 values where 2 are right" in line
+    line = refused(here, "run", SCENE, "-p", "controller.p_WG=1,east")
+    assert "p_WG = '1,east': 'east': a number is right" in line
     line = refused(here, "sweep", SCENE, "controller.stiffness=3,-4", "arm.mass=x,1", "--out", "swept")
     assert "stiffness = '-4': it is out of range" in line
     assert "mass = 'x': a number is right" in line
