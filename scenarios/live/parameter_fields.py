@@ -28,6 +28,10 @@ _REACH = 3.0
 """How far such a slider reaches from its default on either side, times the largest magnitude of its entries."""
 _STEPS = 200
 """A slider's steps, at least."""
+_OF_JACOBI = "parallel_step"
+"""A parameter that acts under an algorithm alone which no run of a session has; shown where it is given."""
+_CALL = re.compile(r" \(fmi\d\w+ answered \w+\)")
+"""By which call of the standard a unit refused something."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,19 +92,21 @@ def field_of(declared: Declared, default: str) -> ParameterField:
         entries = []
     if not 0 < len(entries) <= _SLIDERS or not all(map(math.isfinite, entries)):
         return replace(field, kind="text")
-    return replace(field, sliders=tuple(slider(declared, entry, max(map(abs, entries))) for entry in entries))
+    return replace(field, sliders=tuple(slider(declared, entry, entries) for entry in entries))
 
 
-def slider(declared: Declared, default: float, far: float) -> tuple[float, float, float]:
+def slider(declared: Declared, default: float, defaults: Sequence[float]) -> tuple[float, float, float]:
     """Return lowest value, highest value and step of a slider: the declared range, or some of it around the default.
+
+    Without a declared minimum, what is positive by default has a slider from 0: a mass is more likely than a shift.
 
     Args:
         declared: the parameter.
         default: the value of one entry.
-        far: the largest magnitude among the entries' defaults.
+        defaults: those of all entries.
     """
-    far = far or 1.0
-    low = -math.inf if declared.minimum is None else declared.minimum
+    far = max(map(abs, defaults)) or 1.0
+    low = declared.minimum if declared.minimum is not None else 0.0 if min(defaults) > 0.0 else -math.inf
     high = math.inf if declared.maximum is None else declared.maximum
     least, most = low, high
     if not high - low <= _WIDEST * far:
@@ -131,7 +137,9 @@ def field_groups(request: RunRequest) -> list[FieldGroup]:
             return [FieldGroup(d.name, [_of_port(p.name, p, p.start) for p in d.settable.values() if _is_shown(p)])]
         asked = request.open(opened)
         kind = type(asked.experiment)
-        own = [field_of(v, text_of(v, v.start)) for v in kind.parameters() if v.kind is not Kind.BINARY]
+        hidden = {_OF_JACOBI} - {text.partition("=")[0] for text in request.parameters}
+        shown = [v for v in kind.parameters() if v.kind is not Kind.BINARY and v.name not in hidden]
+        own = [field_of(v, text_of(v, v.start)) for v in shown]
         system = request.system(asked, request.seed, request.fmus(asked.experiment))
     ports = {
         f"{unit.name}.{name}": replace(port, start=_start_text(unit.start[name]) if name in unit.start else port.start)
@@ -196,8 +204,13 @@ def faults_by_name(request: RunRequest, names: Sequence[str]) -> dict[str, str]:
 def _by_name(faults: Sequence[str], names: Sequence[str]) -> dict[str, str]:
     found: dict[str, list[str]] = {}
     for fault in faults:
-        found.setdefault(named_in(fault, names), []).append(fault)
+        found.setdefault(named_in(fault, names), []).append(without_call(fault))
     return {name: "; ".join(texts) for name, texts in found.items()}
+
+
+def without_call(fault: str) -> str:
+    """Return a fault without the call of the standard that a unit refused it by, which tells a user nothing."""
+    return _CALL.sub("", fault)
 
 
 def named_in(fault: str, names: Sequence[str]) -> str:

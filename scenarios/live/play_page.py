@@ -23,7 +23,7 @@ from handover.scenarios.live.commands import COMMANDS, Command, choice_of, pace_
 from handover.scenarios.live.connections import HEADERS
 from handover.scenarios.live.live_html import live_html
 from handover.scenarios.live.live_page import LivePage
-from handover.scenarios.live.parameter_fields import FieldGroup, faults_by_name, named_in
+from handover.scenarios.live.parameter_fields import FieldGroup, faults_by_name, named_in, without_call
 from handover.scenarios.live.played_run import Choice, PlayedRun
 from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.waiting_command import WaitingCommand
@@ -213,7 +213,7 @@ class PlayPage(LivePage):
         while not run.has_ended:
             await asyncio.sleep(_POLL)
         if run.is_refused:
-            self._faults = {named_in(run.error, self._session.names): run.error}
+            self._faults = {named_in(run.error, self._session.names): without_call(run.error)}
             self._runs.remove(run)
             await self.tell(self._about_choice())
         self._release(run)
