@@ -12,6 +12,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from handover.cosim.master.live_control import LiveControl
 from handover.scenarios.execution.input_sources import recorded_input_names
 from handover.scenarios.execution.python_process import code_command
@@ -19,6 +21,7 @@ from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.live.process import CONTROL_FILE
 from handover.scenarios.live.waiting_command import WaitingCommand
 from handover.scenarios.live.watched_run import WatchedRun
+from handover.scenarios.results.run_facts import whole_record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.tables import format_metric
 
@@ -75,19 +78,24 @@ class PlayedRun:
         self.superseded = False
         """Whether it was ended since another one was asked for."""
         self.has_report = False
-        self._common = [subject, *choice.arguments(), *options]
+        self._was_pushed: bool | None = None  # not known before it has ended
+        self._subject, self._options = subject, options
         controls = ["--no-report", "--out", str(folder), "--controls", str(waiting.folder)]
-        waiting.call(["run", *self._common, *controls])
+        waiting.call(["run", subject, *choice.arguments(), *options, *controls])
 
     @property
     def command(self) -> str:
         """The command that makes the same run."""
-        try:
-            has_inputs = bool(recorded_input_names(self.watched.folder))
-        except InvalidRunFolder:  # it has not begun
-            has_inputs = False
-        folder = ["--inputs-from", str(self.watched.folder.shown)] if has_inputs else []
-        return f"handover run {shlex.join([*self._common, *folder])}"
+        given = replace(self.choice, pushed=self.was_pushed).arguments()
+        folder = ["--inputs-from", str(self.watched.folder.shown)] if self.was_pushed else []
+        return f"handover run {shlex.join([self._subject, *given, *self._options, *folder])}"
+
+    @property
+    def was_pushed(self) -> bool:
+        """Whether somebody has pushed in it; False as long as it goes on."""
+        if self._was_pushed is None and self.has_ended:
+            self._was_pushed = self.choice.pushed and _has_force_from_outside(self.watched.folder)
+        return bool(self._was_pushed)
 
     @property
     def has_exited(self) -> bool:
@@ -135,7 +143,7 @@ class PlayedRun:
             "number": self.number,
             "parameters": dict(self.choice.parameters),
             "seed": self.choice.seed,
-            "pushed": self.choice.pushed,
+            "pushed": self.was_pushed,
             "command": self.command,
             "folder": str(self.watched.folder.shown),
             "report": self.has_report,
@@ -149,6 +157,16 @@ class PlayedRun:
         shown = [(name, metrics[name]) for name in (headline or metrics) if name in metrics]
         metric_rows = [{"name": name, "about": m.get("description", ""), "text": format_metric(m)} for name, m in shown]
         return {**facts, "state": state, "reason": str(summary.get("reason", "")), "metrics": metric_rows}
+
+
+def _has_force_from_outside(folder: RunFolder) -> bool:
+    """Return whether a force came from outside in a run, as its record says, that was not zero all along."""
+    try:
+        names, record = recorded_input_names(folder), whole_record_of(folder)
+    except InvalidRunFolder:
+        return False
+    forces = [] if record is None else [record[n] for n in names if n in record and record.unit(n) == "N"]
+    return any(bool(np.any(force)) for force in forces)
 
 
 def _summary_of(folder: RunFolder) -> dict[str, Any]:
