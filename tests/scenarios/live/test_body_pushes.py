@@ -1,6 +1,7 @@
 """Pushes of several pages: each ends with its page, or as that is silent."""
 
 import asyncio
+import json
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from typing import Any
@@ -81,3 +82,21 @@ def test_a_force_is_limited_by_its_body_and_a_point_by_its_distance():
     for force, point in ((41.0, 0.1), (30.0, 6.0)):
         with pytest.raises(InvalidCommand, match="40 N at most, and of point, 5 m at most"):
             push_of(asked(force, point), strong)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        '{"body": "object", "point": [0, 0, 0], "force": [1, 0, 0]}',
+        '{"body": "robot", "point": [0, 0, 0], "force": [4, 4, 0]}',
+        '{"body": "robot", "point": [0, 0, 0], "force": [NaN, 0, 0]}',
+        '{"body": "robot", "point": [0, 0], "force": [1, 0, 0]}',
+        '{"body": "robot", "point": [0, 0, 1e300], "force": [1, 0, 0]}',
+        '"robot"',
+    ],
+)
+def test_a_push_that_cannot_be_is_refused(value: str):
+    with pytest.raises(InvalidCommand, match="push takes"):
+        push_of(json.loads(value), PUSHES)
+    with pytest.raises(InvalidCommand, match="nothing can be pushed"):
+        push_of(json.loads(value), ())

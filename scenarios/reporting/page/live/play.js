@@ -3,9 +3,11 @@
 "use strict";
 (() => {
   const PAUSE = 350;  // ms after the last change until a run is asked for
+  const GREATEST_SEED = Number.MAX_SAFE_INTEGER;  // a larger one would be sent as another number
   const byId = id => document.getElementById(id);
   const fields = new Map();  // by name: {field, root, entries, set(text), text()}
   let seed = null, push = null, waiting = 0, busy = false;
+  let told = {};  // what the session says is wrong, by the parameter's name
 
   const createElement = (name, properties = {}, ...children) => {
     const node = Object.assign(document.createElement(name), properties);
@@ -28,11 +30,37 @@
 
   function requestRun() {
     clearTimeout(waiting);
-    if (seed && (!seed.validity.valid || seed.value === "")) return;
-    busy = false;
+    busy = Boolean(seedFault());
+    showFaults();
+    if (busy) return;
     const set = [...fields.values()].filter(f => !f.isDefault()).map(f => [f.field.name, f.text()]);
     live.send("set", {parameters: Object.fromEntries(set), seed: seed ? Number(seed.value) || 0 : null,
       push: Boolean(push?.checked)});
+  }
+
+  function seedFault() {
+    if (!seed) return "";
+    const range = `from 0 to ${GREATEST_SEED}`, number = Number(seed.value);
+    if (seed.value === "") return `seed: it is no number: a whole number ${range} is right`;
+    if (!Number.isInteger(number)) return `seed: ${seed.value} is no whole number: one ${range} is right`;
+    return number >= 0 && number <= GREATEST_SEED ? "" : `seed: ${seed.value} is out of range: a whole number ${range}`;
+  }
+
+  // What is wrong stands beside its field; on top, which fields these are, and what is no field's.
+  function showFaults() {
+    for (const [name, it] of fields) it.blame(told[name]);
+    const wrong = Object.keys(told).filter(name => fields.has(name)).map(name => [name, `field-${name}`]);
+    if (seed) {
+      const fault = byId("seed-fault");
+      fault.textContent = seedFault();
+      fault.hidden = !fault.textContent;
+      seed.closest(".field").classList.toggle("wrong", !fault.hidden);
+      if (!fault.hidden) wrong.push(["seed", "seed"]);
+    }
+    const links = wrong.flatMap(([name, id], i) => [i ? ", " : "", createElement("a", {href: `#${id}`, textContent: name})]);
+    const others = Object.entries(told).filter(([name]) => !fields.has(name)).map(([, text]) => text).join("; ");
+    byId("fault").replaceChildren(...(wrong.length ? ["No run was begun: see ", ...links] : []), wrong.length && others ? "; " : "", others);
+    byId("fault").hidden = !wrong.length && !others;
   }
 
   // A slider with a number field beside it.
@@ -130,15 +158,11 @@
     }
     if (seeded) {
       seed = createElement("input", {type: "number", min: 0, step: 1, id: "seed", value: 0});
-      const fault = createElement("p", {className: "fault", hidden: true, textContent: "a whole number from 0 is right"});
-      seed.addEventListener("input", () => {
-        fault.hidden = seed.validity.valid && seed.value !== "";
-        if (fault.hidden) scheduleRun();
-      });
-      const next = createElement("button", {type: "button", textContent: "another"});
+      const fault = createElement("p", {className: "fault", id: "seed-fault", hidden: true});
+      seed.addEventListener("input", scheduleRun);
+      const next = createElement("button", {type: "button", textContent: "another seed"});
       next.addEventListener("click", () => {
-        seed.value = Math.max(0, Math.floor(Number(seed.value))) + 1;
-        fault.hidden = true;
+        seed.value = seedFault() ? 1 : (Number(seed.value) + 1) % GREATEST_SEED;
         scheduleRun();
       });
       host.prepend(createElement("div", {className: "field"}, createElement("div", {className: "field-head"},
@@ -153,25 +177,17 @@
   });
 
   live.on("choice", choice => {
-    for (const [name, it] of fields) {
-      if (!busy) it.set(choice.parameters[name] ?? it.field.default);
-      it.blame(choice.faults[name]);
-    }
+    if (!busy) for (const [name, it] of fields) it.set(choice.parameters[name] ?? it.field.default);
     if (seed && !busy) seed.value = choice.seed ?? 0;
     if (push && !busy) push.checked = choice.push;
-    const general = byId("fault"), faults = Object.entries(choice.faults);
-    general.textContent = faults.some(([name]) => name) ? `No run was begun: ${faults.map(([, text]) => text).join("; ")}`
-      : faults.map(([, text]) => text).join("; ");
-    general.hidden = !faults.length;
+    told = choice.faults;
+    showFaults();
   });
 
   byId("again").addEventListener("click", requestRun);
   byId("defaults").addEventListener("click", () => {
     for (const it of fields.values()) it.set(it.field.default);
-    if (seed) {
-      seed.value = 0;
-      seed.dispatchEvent(new Event("input"));  // what was wrong with it is so no more
-    }
+    if (seed) seed.value = 0;
     requestRun();
   });
   byId("search").addEventListener("input", ({target}) => {
