@@ -9,12 +9,13 @@ import math
 import mmap
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from handover.cosim.master.pacing import Pacer
+from handover.cosim.master.pacing import Pacer, PaceReport
 
 _FIELDS = np.dtype(
     [("pace", "<f8"), ("paused", "<i8"), ("steps_asked", "<i8"), ("steps_taken", "<i8"), ("stop", "<i8")]
@@ -125,8 +126,17 @@ class ControlledPacer(Pacer):
     def __init__(self, control: LiveControl) -> None:
         super().__init__(_finite(control.pace))
         self._control = control
+        self._first: float = control.pace
         self._current: float = control.pace
+        self._changed = False
         self._last = 0.0
+
+    @property
+    def report(self) -> PaceReport:
+        """The report since the last change of pace, or the last pause."""
+        if not self._changed:
+            return super().report
+        return replace(super().report, pace=_told(self._current), changed=True, first=_told(self._first))
 
     def wait(self, t: float, ended: Callable[[], bool]) -> None:
         """Wait until simulated time t in seconds is due by the controls, or until `ended()` says that the run ends."""
@@ -142,7 +152,7 @@ class ControlledPacer(Pacer):
             if waited:
                 break
             if control.pace != self._current:
-                self._current = control.pace
+                self._current, self._changed = control.pace, True
                 self.restart(_finite(self._current), self._last)
             if math.isinf(self._current) or self._is_due(t, ended):
                 break
@@ -165,6 +175,10 @@ def _positive(pace: float) -> float:
     if not pace > 0.0:
         raise ValueError(f"the pace must be positive, not {pace}: simulated seconds per second of wall time")
     return pace
+
+
+def _told(pace: float) -> float | None:
+    return pace if math.isfinite(pace) else None
 
 
 def _finite(pace: float) -> float:

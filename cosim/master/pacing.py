@@ -19,14 +19,20 @@ class PaceReport:
         largest_lateness: seconds of wall time by which the worst of them was late; 0 where none was.
         latest_at: simulated time of that deadline in seconds; None where none was late.
         reached: simulated seconds per second of wall time until the last deadline; None before the first.
+        changed: whether the pace was changed on the way. Then `pace` is the last one, and all but `first` count from
+            the last change, or from a pause after it.
+        first: simulated seconds per second of wall time before the first change; None for as fast as it goes, as may
+            be `pace`. It says nothing where nothing was changed.
     """
 
-    pace: float
+    pace: float | None
     deadlines: int
     missed: int
     largest_lateness: float
     latest_at: float | None
     reached: float | None = None
+    changed: bool = False
+    first: float | None = None
 
     @property
     def share(self) -> float:
@@ -35,7 +41,8 @@ class PaceReport:
 
     def as_data(self) -> dict[str, Any]:
         """Return the report as JSON can hold it."""
-        return {**asdict(self), "share": self.share}
+        data = {**asdict(self), "share": self.share}
+        return data if self.changed else {k: v for k, v in data.items() if k not in ("changed", "first")}
 
     def __str__(self) -> str:
         if not self.missed:

@@ -56,11 +56,13 @@ class LedHand:
         unit: whose inputs they are: `p_WH_track`, `q_WH_track`, `finger_track`, `closed_track`, `age`.
         p_WH_0: where it rests, in W, m.
         reach: how far from there it may be wanted, m.
+        task: what is asked of who leads it, in a few sentences.
     """
 
     unit: str
     p_WH_0: tuple[float, float, float]
     reach: float
+    task: str = ""
 
     @property
     def inputs(self) -> Mapping[str, int]:

@@ -39,8 +39,15 @@ def pace_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     if not summary.get("pace"):
         return []
     report = PaceReport(**{k: v for k, v in summary["pace"].items() if k != "share"})
+    if report.changed:
+        rows = [("pace", f"changed on the way, {_pace(report.first)} at first, {_pace(report.pace)} at last")]
+        return [*rows, ("deadlines missed at the last pace", str(report))] if report.deadlines else rows
     reached = "" if report.reached is None else f" asked for, {report.reached:.3g} x reached"
-    return [("pace", f"{report.pace:g} x real time{reached}"), ("deadlines missed", str(report))]
+    return [("pace", f"{_pace(report.pace)}{reached}"), ("deadlines missed", str(report))]
+
+
+def _pace(pace: float | None) -> str:
+    return "as fast as it goes" if pace is None else f"{pace:g} x real time"
 
 
 def warning_lines(summary: Mapping[str, Any]) -> list[str]:

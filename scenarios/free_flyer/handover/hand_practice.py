@@ -21,6 +21,7 @@ from handover.scenarios.free_flyer.handover.led_hand import NEVER_TRACKED
 _FAR = np.array([50.0, 0.0, 0.0])
 """Where the gripper is that nobody sees, in W, m."""
 _AXES = ("x", "y", "z")
+_TASK = "Practise with the hand: lead it to the object that floats before it, and close it on the object."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +107,7 @@ class HandPractice(Experiment[PracticeEvaluator]):
         """Return the person's hand."""
         person = paper_values("free_flyer", "person")
         x, y, z = (float(n) for n in person["p_WH_0"])
-        return LedHand("person", (x, y, z), float(person["arm_reach"]))
+        return LedHand("person", (x, y, z), float(person["arm_reach"]), _TASK)
 
     def stop_time(self, parameters: PracticeParameters) -> Fraction:
         """Return the duration of the practice."""

@@ -43,6 +43,15 @@ from handover.scenarios.free_flyer.robot_wiring import (
 
 _FLIGHT = 120
 """Time for flying, fetching and retreating, without the waiting for the person, s (assumed)."""
+_TAKE = (
+    "The robot fetches an object and holds it out to you. Once its signal light has flashed yellow, close your hand on "
+    "the object and pull until the gripper opens. "
+)
+_FLASH = "You hold an object, and the robot comes to take it. Once its signal light has flashed yellow, "
+_GIVE = (
+    "put the object between its fingers and press it against the gripper until that closes. Then open your hand and "
+    "draw it back."
+)
 
 
 class FlyerHandover(Experiment[HandoverEvaluator]):
@@ -81,6 +90,8 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
     """What the person does and holds, by the parameters of the person's unit."""
     receivers: ClassVar[tuple[str, ...]]
     """Who is to have the object after each transfer, `HAND` or `GRIPPER`."""
+    asked: ClassVar[str]
+    """What is asked of who leads the hand."""
     failures: ClassVar[int] = 0
     """How many receptions the person is to feign."""
 
@@ -141,7 +152,7 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
             return None
         person = paper_values("free_flyer", "person")
         x, y, z = (float(n) for n in person["p_WH_0"])
-        return LedHand("person", (x, y, z), float(person["arm_reach"]))
+        return LedHand("person", (x, y, z), float(person["arm_reach"]), self.asked)
 
     def evaluator(self, parameters: HandoverParameters) -> HandoverEvaluator:
         """Return the evaluator of one handover."""
@@ -187,6 +198,7 @@ class Collaborative(FlyerHandover):
     title: ClassVar[str] = "a free-flyer gives an object to a person, waits, and takes it back"
     task: ClassVar[str] = "collaborative"
     person: ClassVar[Mapping[str, Any]] = {"motion": "take", "motion_again": "give", "object_with": "free"}
+    asked: ClassVar[str] = f"{_TAKE}The robot waits. Once its light has flashed again, {_GIVE}"
     receivers: ClassVar[tuple[str, ...]] = ("HAND", "GRIPPER")
 
 
@@ -197,6 +209,10 @@ class FailedReception(FlyerHandover):
     title: ClassVar[str] = "a free-flyer closes its gripper on nothing, notices, and asks again"
     task: ClassVar[str] = "human_to_robot"
     person: ClassVar[Mapping[str, Any]] = {"motion": "push", "motion_again": "give", "object_with": "hand"}
+    asked: ClassVar[str] = (
+        f"{_FLASH}push its gripper without the object between its fingers: it closes on nothing. Once the light has "
+        f"flashed again, {_GIVE}"
+    )
     receivers: ClassVar[tuple[str, ...]] = ("GRIPPER",)
     failures: ClassVar[int] = 1
 
@@ -208,6 +224,7 @@ class HumanToRobot(FlyerHandover):
     title: ClassVar[str] = "a person gives an object to a free-flyer"
     task: ClassVar[str] = "human_to_robot"
     person: ClassVar[Mapping[str, Any]] = {"motion": "give", "object_with": "hand"}
+    asked: ClassVar[str] = f"{_FLASH}{_GIVE}"
     receivers: ClassVar[tuple[str, ...]] = ("GRIPPER",)
 
     def published(self, parameters: HandoverParameters) -> Sequence[PublishedValue]:
@@ -222,6 +239,7 @@ class RobotToHuman(FlyerHandover):
     title: ClassVar[str] = "a free-flyer fetches an object and gives it to a person"
     task: ClassVar[str] = "robot_to_human"
     person: ClassVar[Mapping[str, Any]] = {"motion": "take", "motion_again": "take", "object_with": "free"}
+    asked: ClassVar[str] = f"{_TAKE}Then draw your hand back with the object."
     receivers: ClassVar[tuple[str, ...]] = ("HAND",)
 
     def published(self, parameters: HandoverParameters) -> Sequence[PublishedValue]:
@@ -255,6 +273,10 @@ class HandoverOfTask(FlyerHandover):
     def stop_time(self, parameters: HandoverParameters) -> Fraction:
         """Return that of the task's scenario."""
         return _of_task(parameters).stop_time(parameters)
+
+    def led_hand(self, parameters: HandoverParameters) -> LedHand | None:
+        """Return that of the task's scenario."""
+        return _of_task(parameters).led_hand(parameters)
 
     def evaluator(self, parameters: HandoverParameters) -> HandoverEvaluator:
         """Return that of the task's scenario."""

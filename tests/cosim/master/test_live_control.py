@@ -164,3 +164,20 @@ def test_controls_in_memory_are_not_paused():
     control = LiveControl.in_memory(2.0)
     control.ask_for_step()
     assert (control.pace, control.paused, control.stop, control.take_step()) == (2.0, True, False, True)
+
+
+def test_the_report_of_a_pace_that_was_changed_says_so_and_what_it_was_at_first():
+    control = LiveControl.in_memory(50.0)
+    pacer = ControlledPacer(control)
+    pacer.start(0.0)
+    pacer.wait(0.01, lambda: False)
+    unchanged = pacer.report.as_data()
+    assert (unchanged["pace"], unchanged["deadlines"]) == (50.0, 1)
+    assert not {"changed", "first"} & unchanged.keys(), "what summaries of such runs always held"
+    control.pace = math.inf
+    pacer.wait(0.02, lambda: False)
+    fast = pacer.report.as_data()
+    assert (fast["changed"], fast["first"], fast["pace"], fast["deadlines"]) == (True, 50.0, None, 0)
+    control.pace = 100.0
+    pacer.wait(0.03, lambda: False)
+    assert (pacer.report.first, pacer.report.pace, pacer.report.deadlines) == (50.0, 100.0, 1)

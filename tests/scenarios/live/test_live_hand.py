@@ -69,8 +69,10 @@ def take_object(page: Page) -> None:
 def test_the_pages_hand_takes_the_object_and_its_record_is_played_back_byte_for_byte(browser: Browser, tmp_path: Path):
     given = ("-p", "hand=outside", "--pace", "4")
     with live_run(tmp_path / "led", *given, scenario=SCENARIO) as (address, run), shown(browser, address) as page:
+        page.get_by_text("Once its signal light has flashed yellow, close your hand on the object").wait_for()
         take_object(page)
         wait_until(page, f"{LIVE}.dataset.ended")
+        assert page.locator("#task").is_hidden()
         assert page.locator(".verdict").inner_text().startswith("Succeeded: ")
         run.wait(timeout=120)
         assert run.returncode == 0

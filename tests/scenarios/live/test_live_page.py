@@ -118,6 +118,38 @@ def test_pictures_that_come_late_are_drawn_with_fewer_pixels_and_without_shadows
         assert wide == pytest.approx(0.5 * shown_wide, abs=1.0)
         pictures = page.evaluate("Number(document.querySelector('.replay-scene').dataset.pictures)")
         wait_until(page, f"Number(document.querySelector('.replay-scene').dataset.pictures) > {pictures + 2}")
+        page.get_by_label("pause").click()
+        wait_until(page, "document.querySelector('.replay-scene').hasAttribute('data-sharp')")
+        wide, shown_wide = page.evaluate("[live.scene.canvas.width, live.scene.canvas.clientWidth]")
+        assert wide >= shown_wide, "there is time for a sharp picture"
+        page.get_by_label("go on").click()
+        wait_until(page, f"live.scene.canvas.width < {0.6 * shown_wide}")
+        page.locator("#stop").click()
+        wait_until(page, f"{LIVE}.dataset.ended")
+        wait_until(page, f"live.scene.canvas.width >= {shown_wide}")
+
+
+@pytest.mark.slow
+def test_the_page_tells_the_pace_that_is_reached_where_it_is_less_than_the_wanted_one(browser: Browser, tmp_path: Path):
+    reached = "document.getElementById('reached').value"
+    with live_run(tmp_path / "live", "--pace", "0.1") as (address, run), shown(browser, address) as page:
+        wait_until(page, f"parseFloat({TOLD}) > 0.25")
+        assert page.evaluate(reached) == ""
+        page.evaluate("""() => {
+            const now = performance.now.bind(performance);
+            performance.now = () => 2 * now();
+        }""")
+        wait_until(page, f"{reached} === 'reached 0.05\u00d7'")
+        page.get_by_label("pause").click()
+        wait_until(page, f"{reached} === ''")
+        page.get_by_label("go on").click()
+        page.locator("#pace").select_option("0")
+        wait_until(page, f"{LIVE}.dataset.ended")
+        shown_text, _ = run.communicate(timeout=120)
+    assert "changed on the way, 0.1 x real time at first, as fast as it goes at last" in shown_text
+    assert "deadlines missed" not in shown_text
+    pace = json.loads((tmp_path / "live" / "summary.json").read_text(encoding="utf-8"))["pace"]
+    assert (pace["first"], pace["pace"], pace["deadlines"]) == (0.1, None, 0)
 
 
 @pytest.mark.slow

@@ -43,6 +43,8 @@ const live = (() => {
     side = isLed ? createSideView(viewport.element.parentElement, viewport.scene, content, sidesOfHandover(viewport.scene)) : null;
     if (side) side.shown = byId("hand-side-view").checked;
     byId("hand").hidden = byId("hand-help").hidden = !lead;
+    byId("task").hidden = !lead || !run.task;
+    byId("task").textContent = run.task;
     Object.assign(api, {run, scene: viewport?.scene ?? null});
     if (run.title) document.title = document.querySelector("h1").textContent = run.title;
     byId("signals").replaceChildren(...run.signals.map(name => Object.assign(document.createElement("option"), {value: name})));
@@ -53,6 +55,7 @@ const live = (() => {
       `Press on ${bodies.join(" or ")} and drag to push, with up to ${greatest} N.`).join(" ");
     byId("verdict").hidden = byId("waiting").hidden = true;
     byId("told").textContent = "";
+    progress.restart();
     for (const id of ["pause", "step", "stop", "pace", "signal"]) byId(id).disabled = false;
     delete root.dataset.ended;
     root.dataset.frames = 0;
@@ -81,6 +84,29 @@ const live = (() => {
     return all;
   }
 
+  // Tells beside the wanted pace which one is reached, where that is less. Times come late now and then, as behind a plot:
+  // the pace is that between the least late ones of two halves of the last seconds.
+  const progress = (() => {
+    const SPAN = 4000, SHARE = 0.95;  // ms; of the wanted pace, from which on nothing is said
+    const told = byId("reached");
+    let times = [];
+    const leastLate = (some, pace) => some.reduce((a, b) => pace * (b.now - a.now) > 1000 * (b.t - a.t) ? a : b);
+    return {
+      restart() {
+        times = [];
+        told.value = "";
+      },
+      add(t) {
+        const now = performance.now(), pace = Number(byId("pace").value);
+        times = [...times.filter((one, i) => now - one.now < SPAN || i === times.length - 1), {now, t}];
+        if (!pace || paused || now - times[0].now < SPAN / 2) return;
+        const [early, late] = [true, false].map(first => times.filter(one => (one.now < (times[0].now + now) / 2) === first));
+        const [a, b] = [early, late].map(some => leastLate(some, pace)), reached = 1000 * (b.t - a.t) / (b.now - a.now);
+        told.value = reached < SHARE * pace ? `reached ${Number(reached.toPrecision(2))}\u00d7` : "";
+      },
+    };
+  })();
+
   function send(command, value) {
     if (link?.readyState === WebSocket.OPEN) link.send(JSON.stringify({command, value}));
   }
@@ -92,6 +118,7 @@ const live = (() => {
       for (const act of listeners.shown ?? []) act();
     }
     else if (message.state) {
+      if (message.state.paused !== paused || message.state.pace !== Number(byId("pace").value)) progress.restart();
       paused = message.state.paused;
       byId("pause").textContent = paused ? "\u25b6\ufe0e" : "\u275a\u275a";
       byId("pause").setAttribute("aria-label", paused ? "go on" : "pause");
@@ -99,6 +126,7 @@ const live = (() => {
       if (![...select.options].some(o => o.value === pace)) select.add(new Option(`${pace}\u00d7`, pace), 0);
       select.value = pace;
     } else if ("time" in message) {
+      progress.add(message.time);
       readout.value = `${message.time.toFixed(2)} s${message.phase ? ", " + message.phase : ""}`;
     } else if (message.plots) drawPlots(message.plots);
     else if (message.pictures) showPictures(message.pictures);
@@ -167,7 +195,8 @@ const live = (() => {
     over = true;
     const verdict = byId("verdict");
     verdict.hidden = false;
-    byId("waiting").hidden = byId("push-help").hidden = true;
+    byId("waiting").hidden = byId("push-help").hidden = byId("task").hidden = true;
+    progress.restart();
     verdict.className = `verdict ${success ? "good" : "bad"}`;
     verdict.innerHTML = "<b></b> ";
     verdict.firstChild.textContent = success ? "Succeeded:" : judged ? "Failed:" : "No verdict:";
@@ -223,7 +252,8 @@ const live = (() => {
     verdict.hidden = false;
     verdict.className = "verdict bad";
     verdict.textContent = `The connection to the ${of} is lost: ${reason || why}.`;
-    byId("waiting").hidden = byId("push-help").hidden = true;
+    byId("waiting").hidden = byId("push-help").hidden = byId("task").hidden = true;
+    progress.restart();
     byId("told").textContent = "";
     for (const entry of document.querySelectorAll(ASKING)) entry.disabled = true;  // nobody is there who would do it
   });

@@ -5,6 +5,8 @@
 //                                 draws them, and shadows fall straight down
 //                                 live: frames follow a run under way: those that come late are drawn with fewer pixels,
 //                                 then without shadows (data-coarse of the element counts the steps)
+//                                 What was drawn coarsely in a scene that is played or live, is drawn once more in full as soon
+//                                 as nothing has moved for a while (data-sharp of the element is there until something moves)
 //                                 ghost: label of what shines through what hides it
 //   scene.show(u)                 everything u frames after the first; u may lie between two
 //   scene.setView(name)           looks from one of scene.views: "start", "front", "side", "top";
@@ -32,6 +34,7 @@
 const createScene = (() => {
   const FIELD = 36 * Math.PI / 180, ROOM = 0.94;  // of the view from top to bottom, and the share of it for the box
   const LATE = 50, NOT_SEEN = 3000;  // ms from a request until its render: too long; so long that the page was not seen
+  const STILL = 500;  // ms without a request from which on there is time for a sharp picture
   const VIEWS = {front: () => [0, -1, 0.12], side: ([x]) => [x < 0 ? -1 : 1, 0, 0.12], top: () => [0, -0.001, 1]};
   const hasWebGl = () => Boolean(document.createElement("canvas").getContext("webgl2"));
   function rendersInSoftware() {
@@ -125,7 +128,10 @@ const createScene = (() => {
     camera.up.set(0, 0, 1);
     const coarse = (played || live) && rendersInSoftware();
     const renderer = new THREE.WebGLRenderer({antialias: !coarse, alpha: true});
-    renderer.setPixelRatio(coarse ? 0.75 : Math.min(devicePixelRatio, 2));
+    // How it is drawn at rest, and while something moves; without smooth edges, twice as many pixels take their place.
+    const sharp = {ratio: coarse ? 2 : Math.min(devicePixelRatio, 2), shadows: true};
+    const moving = {...sharp, ratio: coarse ? 0.75 : sharp.ratio};
+    renderer.setPixelRatio(moving.ratio);
     renderer.shadowMap.enabled = true;
     renderer.shadowMap.type = THREE.PCFShadowMap;
     element.append(renderer.domElement);
@@ -147,24 +153,37 @@ const createScene = (() => {
     const labelled = label => drawn.filter(d => d.label === label);
     const points = label => labelled(label).flatMap(d => d.worldPoints());
 
-    function setPixelRatio(ratio) {
-      renderer.setPixelRatio(ratio);
-      renderer.setSize(element.clientWidth, element.clientHeight, false);
-    }
     const controlQuality = createQualityControl(element, !live ? [] : [
-      () => setPixelRatio(Math.min(renderer.getPixelRatio(), 0.75)),
-      () => {
-        sun.castShadow = false;
-        if (ground) ground.plane.visible = false;
-      },
-      () => setPixelRatio(0.5),
+      () => { moving.ratio = Math.min(moving.ratio, 0.75); },
+      () => { moving.shadows = false; },
+      () => { moving.ratio = 0.5; },
     ]);
 
-    let request = 0, requestedAt = 0, follows = false, start = eye;
+    let request = 0, requestedAt = 0, rest = 0, follows = false, start = eye;
     const pixelsPerMetre = () => element.clientHeight / (2 * Math.tan(FIELD / 2) * camera.position.distanceTo(controls.target));
     function render() {
       request = 0;
+      clearTimeout(rest);
       controlQuality(performance.now() - requestedAt);
+      draw(moving);
+      if (moving.ratio < sharp.ratio || !moving.shadows) rest = setTimeout(renderSharp, STILL);
+    }
+    function renderSharp() {
+      if (request) return;
+      request = requestAnimationFrame(() => {
+        request = 0;
+        draw(sharp);
+      });
+    }
+    function draw(quality) {
+      const {ratio, shadows} = quality;
+      if (renderer.getPixelRatio() !== ratio) {  // which empties the canvas
+        renderer.setPixelRatio(ratio);
+        renderer.setSize(element.clientWidth, element.clientHeight, false);
+      }
+      sun.castShadow = shadows;
+      if (ground) ground.plane.visible = shadows;
+      element.toggleAttribute("data-sharp", quality === sharp);
       api.onBeforeRender();
       renderer.render(scene, camera);
       updateAxesAndScaleBar(camera, pixelsPerMetre());
@@ -285,6 +304,7 @@ const createScene = (() => {
       },
       dispose() {
         cancelAnimationFrame(request);
+        clearTimeout(rest);
         sizes.disconnect();
         controls.dispose();
         renderer.dispose();
