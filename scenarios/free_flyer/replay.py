@@ -143,7 +143,7 @@ def hand_pushes(record: Record, robot: str = "robot") -> list[Line]:
         p_WP = record[f"{robot}.p_W{frame}"] + np.einsum("rij,rj->ri", R_WF, record[f"{robot}.{point}"])
         along = _PER_NEWTON * record[f"{robot}.{force}"]
         shown = np.where(np.any(along != 0.0, axis=1, keepdims=True), along, np.nan)
-        arrows.append(_arrow_at("push by hand", _TWIST, p_WP, shown))
+        arrows.append(_arrow_at("force of the push", _TWIST, p_WP, shown))
     return arrows
 
 

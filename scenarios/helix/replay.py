@@ -65,7 +65,7 @@ def _hand_push(record: Record) -> list[Line]:
         return []
     p_WG, along = record["arm.p_WG"], _PER_NEWTON * record["arm.f_P"]
     shown = np.where(np.any(along != 0.0, axis=1, keepdims=True), along, np.nan)
-    return [Line(label="push by hand", colour=_PUSH, points=np.stack([p_WG, p_WG + shown], axis=1), width=6.0)]
+    return [Line(label="force of the push", colour=_PUSH, points=np.stack([p_WG, p_WG + shown], axis=1), width=6.0)]
 
 
 def _ball(record: Record) -> Body:

@@ -65,7 +65,7 @@ def test_each_of_its_bodies_yields_to_a_push_and_the_scene_shows_it(
         scene = experiment.replay(parameters, record)
         assert scene is not None
         assert set(push.labels) <= {body.label for body in scene.bodies}
-        arrows = [line.points[-1] for line in scene.lines if line.label == "push by hand"]
+        arrows = [line.points[-1] for line in scene.lines if line.label == "force of the push"]
         assert sum(bool(np.isfinite(points).all()) for points in arrows) == 1
 
 
@@ -74,7 +74,7 @@ def test_lines_and_points_of_a_pushed_helix_are_told_apart_by_their_colours(tmp_
     scene = SCENARIOS["helix_handover"]().replay(parse_parameters(SCENARIOS["helix_handover"], ()), record)
     assert scene is not None
     colours = {line.label: line.colour for line in (*scene.lines, *scene.fixed) if line.radii is None}
-    assert colours.keys() == {"ball, estimated", "gripper, estimated", "push by hand", "cameras"}
+    assert colours.keys() == {"ball, estimated", "gripper, estimated", "force of the push", "cameras"}
     assert len(set(colours.values())) == len(colours)
 
 
