@@ -14,6 +14,8 @@ from websockets.sync.client import ClientConnection, connect
 
 import handover
 from handover.cosim.record.reader import Record
+from handover.scenarios.execution.selection import find_scenario
+from handover.scenarios.experiment.parameters import parse_parameters
 
 SCENARIO = "flyer_robot_to_human"
 SAMPLE = {"p_WH": [-0.3, 0.1, 0.0], "q_WH": [1, 0, 0, 0], "closed": False}
@@ -136,6 +138,24 @@ def test_a_tracker_leads_the_hand_and_what_it_may_not_send_is_refused(tmp_path: 
     told = json.loads((tmp_path / "led" / "inputs.json").read_text(encoding="utf-8"))
     assert told["samples"]["test"] >= 150
     assert sum(told["refused"].values()) >= 6
+
+
+@pytest.mark.parametrize(
+    ("scenario", "given", "asked"),
+    [
+        ("flyer_robot_to_human", ("hand=outside",), "pull until the gripper opens"),
+        ("flyer_human_to_robot", ("hand=outside",), "press it against the gripper until that closes"),
+        ("flyer_failed_reception", ("hand=outside",), "it closes on nothing"),
+        ("flyer_collaborative", ("hand=outside",), "Once its light has flashed again"),
+        ("flyer_handover", ("hand=outside", "task=human_to_robot"), "press it against the gripper until that closes"),
+        ("handover.scenarios.free_flyer.handover.hand_practice:HandPractice", (), "close it on the object"),
+    ],
+)
+def test_who_leads_a_hand_is_told_what_to_do(scenario: str, given: tuple[str, ...], asked: str):
+    kind = find_scenario(scenario)
+    led = kind().led_hand(parse_parameters(kind, given))
+    assert led is not None
+    assert asked in led.task
 
 
 def test_a_run_whose_hand_nobody_leads_from_outside_has_no_seat_for_one(tmp_path: Path):

@@ -2,7 +2,6 @@
 
 import base64
 import json
-import os
 import re
 import signal
 import subprocess
@@ -210,24 +209,24 @@ def test_the_page_of_a_killed_run_says_what_is_left_of_it(
         assert told == f"No verdict: its process has ended; {left.format(out)}"
 
 
+def server_of(run: "subprocess.Popen[str]") -> psutil.Process:
+    begun = psutil.Process(run.pid).children(recursive=True)
+    (server,) = [process for process in begun if any("'handover.scenarios.live'" in part for part in process.cmdline())]
+    return server
+
+
 @pytest.mark.slow
 def test_a_page_whose_server_ends_says_that_the_run_goes_on_and_offers_nothing(browser: Browser, tmp_path: Path):
     with live_run(tmp_path / "live", "--pace", "1") as (address, run), shown(browser, address) as page:
         wait_until(page, f"{LIVE}.dataset.frames > 3")
-        begun = psutil.Process(run.pid).children(recursive=True)
-        (server,) = [process for process in begun if "handover.scenarios.live" in process.cmdline()]
-        server.kill()
+        server_of(run).kill()
         page.get_by_text("is lost: what serves this page has ended, and the run goes on without it.").wait_for()
         assert page.locator("#pace").is_disabled()
 
 
 def test_a_run_goes_on_without_its_page_if_the_pages_server_ends(tmp_path: Path):
     with live_run(tmp_path / "live", "--pace", "100") as (_, run):
-        servers = subprocess.run(
-            ["pgrep", "-f", f"scenarios.live {tmp_path}"], capture_output=True, text=True, check=True
-        )
-        for number in servers.stdout.split():
-            os.kill(int(number), signal.SIGKILL)
+        server_of(run).kill()
         _, told = run.communicate(timeout=120)
         assert "the run goes on without it" in told
         assert run.returncode == 0

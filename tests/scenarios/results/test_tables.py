@@ -17,7 +17,7 @@ from handover.scenarios.cli.command import main
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.summary import Summary
-from handover.scenarios.results.tables import master_rows
+from handover.scenarios.results.tables import master_rows, pace_rows
 
 
 class Page(HTMLParser):
@@ -101,6 +101,17 @@ def test_the_report_says_how_units_were_coupled(tmp_path: Path):
     assert f"of {summary['pace']['deadlines']}" in rows["deadlines missed"]
     assert "Parameters" not in page.headings
     assert any(row[2:3] == ["varies"] for row in page.rows)
+
+
+def test_a_pace_that_was_changed_on_the_way_is_told_so_with_deadlines_only_where_there_were_some():
+    pace = {"largest_lateness": 0.0, "latest_at": None, "missed": 0, "reached": None, "share": 0.0, "changed": True}
+    fast = {"pace": {**pace, "pace": None, "deadlines": 0, "first": 1.0}}
+    assert pace_rows(fast) == [("pace", "changed on the way, 1 x real time at first, as fast as it goes at last")]
+    five = {"pace": {**pace, "pace": 5.0, "deadlines": 7, "first": None, "reached": 5.0}}
+    assert pace_rows(five) == [
+        ("pace", "changed on the way, as fast as it goes at first, 5 x real time at last"),
+        ("deadlines missed at the last pace", "none of 7"),
+    ]
 
 
 def test_warnings_of_units_are_reported_in_summary_json_terminal_report_and_python(tmp_path: Path):
