@@ -8,13 +8,13 @@ the installed ones. The folders from which this process imports are therefore ha
 import sys
 from collections.abc import Sequence
 
-_MODULE = "import sys; sys.path[:] = {path!r}; import runpy; runpy.run_module({name!r}, None, '__main__', True)"
+_MODULE = "import runpy; runpy.run_module(sys.argv.pop(1), None, '__main__', True)"
 _CODE = "import sys; sys.path[:] = {path!r}; {code}"
 
 
 def module_command(name: str, *arguments: str) -> Sequence[str]:
     """Return the command that runs a module as `python -m NAME ARGUMENTS` does, from this process's modules."""
-    return [sys.executable, "-c", _MODULE.format(path=sys.path, name=name), *arguments]
+    return code_command(_MODULE, name, *arguments)
 
 
 def code_command(code: str, *arguments: str) -> Sequence[str]:
