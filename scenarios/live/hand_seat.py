@@ -56,6 +56,8 @@ class HandSeat:
         webcam: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self._led, self._inputs, self._now, self._webcam = led, inputs, now, webcam
+        self.task = led.task
+        """What is asked of who leads it."""
         self._device: WebSocket | None = None
         self._samples: Counter[str] = Counter()
         self._refused: Counter[str] = Counter()

@@ -27,7 +27,8 @@ def begun_content(shown: ShownRun) -> dict[str, Any]:
     surroundings = {name: str(html) for name, html in scene.surroundings().items()}
     pushes = [{"bodies": push.labels, "greatest": push.greatest} for push in shown.pushes]
     told = {"title": shown.run.title, "scene": scene.content(), "signals": list(scene.signals), "pushes": pushes}
-    return {**told, **surroundings, "hand": shown.seat is not None}
+    task = "" if shown.seat is None else shown.seat.task
+    return {**told, **surroundings, "hand": shown.seat is not None, "task": task}
 
 
 def live_html(

@@ -305,7 +305,7 @@ class LivePage:
         """Send the scene of the run that is shown, where there is one."""
         if self.shown is None or self.shown.scene is None:
             return
-        begun = packed_json({"begun": {**begun_content(self.shown), "task": self.shown.run.task}})
+        begun = packed_json({"begun": begun_content(self.shown)})
         for page in pages:
             await self._viewers.send(page, begun)
             self._viewers.of(page).ready = True

@@ -60,13 +60,6 @@ class WatchedRun:
         return None if kind is None else kind().led_hand(parameters_of(kind, run["parameters"]))
 
     @property
-    def task(self) -> str:
-        """What is asked of who leads its hand; empty where nobody outside does."""
-        scenario, parameters = self._scenario()
-        led = None if scenario is None else scenario.led_hand(parameters)
-        return "" if led is None else led.task
-
-    @property
     def title(self) -> str:
         """The scenario's name and what it does."""
         try:
