@@ -8,6 +8,7 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
+from disturbed_grasp import DISTURBED, OFF
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.file.description import FmuPort, indices_of
@@ -24,24 +25,6 @@ pytestmark = pytest.mark.slow
 
 HOST: Any = fmpy
 SEED = 3
-DISTURBED = (
-    "correction=fast",
-    "thing=polygon",
-    "carried_speed=0.01",
-    "nudge=0.01,0.005",
-    "nudge_time=1",
-    "other_radius=0.02",
-    "other_place=0.02,0.11",
-)
-OFF = {
-    "scene.sensor_tolerance": "0.05",
-    "scene.ambient": "10",
-    "scene.active": "2",
-    "scene.crosstalk": "0.02",
-    "scene.gloss": "0.2",
-    "scene.fingers_seen": "true",
-    "scene.wrist_noise": "0.0002",
-}
 
 
 class FmpyUnit:
