@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 from handover.plants.ir_grasp.shapes import Point
 
@@ -28,24 +29,22 @@ class MovingGround:
     @property
     def ever_moves(self) -> bool:
         """Whether it moves at any time."""
-        return any(math.hypot(*v) > 0.0 and self._first(start) < self._first(end) for start, end, v in self.spans)
+        return any(math.hypot(*v) > 0.0 and first < end for first, end, v in self._in_steps)
 
     def velocity(self, step: int) -> Point:
         """Return its velocity in m/s during a step; 0 is the first."""
-        active = [v for start, end, v in self.spans if self._first(start) <= step < self._first(end)]
+        active = [v for first, end, v in self._in_steps if first <= step < end]
         return sum(v[0] for v in active), sum(v[1] for v in active)
 
     def way(self, step: int) -> Point:
         """Return how far it has moved before a step, in m."""
-        spent = [
-            (self.dt * min(max(step - self._first(start), 0), max(self._first(end) - self._first(start), 0)), v)
-            for start, end, v in self.spans
-        ]
+        spent = [(self.dt * min(max(step - first, 0), max(end - first, 0)), v) for first, end, v in self._in_steps]
         return sum(t * v[0] for t, v in spent), sum(t * v[1] for t, v in spent)
 
-    def _first(self, t: float) -> int:
-        """Return the step that begins nearest to a time."""
-        return round(t / self.dt)
+    @cached_property
+    def _in_steps(self) -> tuple[tuple[int, int, Point], ...]:
+        """The spans by the steps that begin nearest to their times: the first, and the first after them."""
+        return tuple((round(start / self.dt), round(end / self.dt), v) for start, end, v in self.spans)
 
 
 def bump(way: Point, start: float, speed: float) -> Span:

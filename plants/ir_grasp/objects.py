@@ -3,6 +3,7 @@
 import enum
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -74,7 +75,7 @@ class Solid:
             return 2.0 * body.radius / 3.0
         return 2.0 / 3.0 * math.sqrt(body.area / math.pi)
 
-    @property
+    @cached_property
     def reach(self) -> float:
         """Largest distance of a point of it from the origin of O, in m."""
         return max(p.reach for p in self.parts)

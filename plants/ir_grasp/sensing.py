@@ -16,9 +16,38 @@ _SLOT: Final = 5  # internal steps for which a sensor is active
 _SENSORS: Final = len(FINGERS)
 _MIDDLE = ((1.0, 0.0),)
 _PALM = Slab(low=PALM[0], high=PALM[2])
+_PHALANGES = [
+    (owner, length, radius)
+    for owner, f in enumerate(FINGERS)
+    for length, radius in zip(f.lengths, f.radii, strict=True)
+]
+
+
+def _may_hide(finger: int) -> list[tuple[int, float, float, float]]:
+    """Return number, length, radius and largest radius of each phalanx that a finger's beam may meet, all in m.
+
+    These are those of the other side and its own but the distal one. Index and ring, which are beside each other in
+    space, do not hide each other.
+    """
+    found = [
+        (i, length, radius, length / 2.0 + radius)
+        for i, (owner, length, radius) in enumerate(_PHALANGES)
+        if owner == finger or FINGERS[owner].flexion != FINGERS[finger].flexion
+    ]
+    distal = max(i for i, (owner, _, _) in enumerate(_PHALANGES) if owner == finger)
+    return [phalanx for phalanx in found if phalanx[0] != distal]
+
+
+_BEFORE: Final = [_may_hide(finger) for finger in range(_SENSORS)]
 
 Capsule = tuple[Point, Point, float]
 """Middles of its ends and radius, in m."""
+
+Pose = tuple[float, float, float]
+"""Position in m, and orientation in rad."""
+
+PalmInView = tuple[float, float, float, float]
+"""Position of a sensor's window from the wrist, in the palm's axes, in m; cosine and sine of the palm's orientation."""
 
 Kept = tuple[int, list[float], list[float], tuple[Any, Any]]
 """Time into the scan, readings, the encoders' errors, and two states of random numbers."""
@@ -43,6 +72,7 @@ class Sensing:
         self._solid = p.solid
         angles = (0.0, -p.beam, p.beam)
         self._rays = [(math.cos(a), math.sin(a)) for a in angles]
+        self._widening = math.tan(p.beam)
         self._disc = Disc(radius=p.other_radius)
         self._noise = math.hypot(p.noise, p.ambient_noise)
         self._rng = np.random.default_rng(p.seed)
@@ -89,14 +119,15 @@ class Sensing:
     def _read(self, slot: int, world: GraspWorld) -> None:
         p = self._params
         active = [(slot * p.active + k) % _SENSORS for k in range(p.active)]
-        own = [self._own_light(finger, world) for finger in active]
+        phalanges = world.phalanges() if p.fingers_seen else []
+        own = [self._own_light(finger, world, phalanges) for finger in active]
         for k, finger in enumerate(active):
             others = sum(own[:k]) + sum(own[k + 1 :])
             x = own[k] + p.crosstalk * others + p.ambient
             x += self._noise * float(self._rng.standard_normal())
             self.ticks[finger] = self._sensors[finger].reading(x)
 
-    def _own_light(self, finger: int, world: GraspWorld) -> float:
+    def _own_light(self, finger: int, world: GraspWorld, phalanges: Sequence[Pose]) -> float:
         """Return the ticks that a sensor's own light makes, before rounding."""
         p, solid, sensor = self._params, self._solid, self._sensors[finger]
         met = world.cast_rays(finger, self._rays, p.farthest)
@@ -107,11 +138,15 @@ class Sensing:
                 if h is not None
             ) / len(self._rays)
         window, looks = world.sensor(finger)
-        before = _hand_before(finger, world, window, looks, p.beam, p.farthest) if p.fingers_seen else []
+        at = world.other
+        other = None if at is None else (window[0] - at[0], window[1] - at[1])
+        before = _hand_before(finger, phalanges, window, looks, self._widening, p.farthest) if phalanges else []
+        palm = _palm_before(world, window, p.farthest) if phalanges else None
         total = 0.0
         for (c, s), hit in zip(self._rays, met, strict=True):
             ray = c * looks[0] - s * looks[1], s * looks[0] + c * looks[1]
-            nearer = self._hidden_by(world, before, window, ray, p.farthest if hit is None else hit[0])
+            reach = p.farthest if hit is None else hit[0]
+            nearer = self._hidden_by(before, palm, other, window, ray, reach)
             if nearer is not None:
                 total += sensor.ticks(*nearer)
             elif hit is not None:
@@ -120,25 +155,34 @@ class Sensing:
         return total / len(self._rays)
 
     def _hidden_by(
-        self, world: GraspWorld, before: Sequence[Capsule], window: Point, ray: Point, reach: float
+        self,
+        before: Sequence[Capsule],
+        palm: PalmInView | None,
+        other: Point | None,
+        window: Point,
+        ray: Point,
+        reach: float,
     ) -> tuple[float, float, float] | None:
         """Return what a ray meets before `reach` of second object and hand: distance, cosine, reflectivity."""
         p = self._params
         met: list[tuple[float, float, float]] = []
-        if world.other is not None:
-            x, y = window[0] - world.other[0], window[1] - world.other[1]
-            hit = self._disc.intersect(x, y, *ray)
+        if other is not None:
+            hit = self._disc.intersect(*other, *ray)
             if hit is not None:
                 met.append((hit.distance, hit.cosine, p.other_reflectivity))
         for a, b, radius in before:
             on_finger = capsule_hit(a, b, radius, window, ray)
             if on_finger is not None:
                 met.append((*on_finger, p.finger_reflectivity))
-        if p.fingers_seen:
-            on_palm = _palm_hit(world, window, ray, reach)
+        if palm is not None:
+            x, y, cos, sin = palm
+            d_x, d_y = cos * ray[0] + sin * ray[1], cos * ray[1] - sin * ray[0]
+            leads_away = x * d_x + y * d_y > _PALM.reach
+            on_palm = None if leads_away else _PALM.intersect(x, y, d_x, d_y)
             if on_palm is not None:
-                met.append((*on_palm, p.finger_reflectivity))
-        return min((m for m in met if m[0] < reach), default=None)
+                met.append((on_palm.distance, on_palm.cosine, p.finger_reflectivity))
+        nearest = min(met, default=None)
+        return None if nearest is None or nearest[0] >= reach else nearest
 
     def _encoder_errors(self) -> list[float]:
         """Return new errors of the encoders; without noise no random numbers are drawn."""
@@ -148,13 +192,13 @@ class Sensing:
 
 
 def _hand_before(
-    finger: int, world: GraspWorld, window: Point, looks: Point, beam: float, reach: float
+    finger: int, phalanges: Sequence[Pose], window: Point, looks: Point, widening: float, reach: float
 ) -> list[Capsule]:
-    """Return the phalanges that a sensor's beam may meet within reach."""
+    """Return the phalanges that a sensor's beam, which widens so much on each side, may meet within reach."""
     found: list[Capsule] = []
-    widening = math.tan(beam)
-    for length, radius, (x, y, angle) in world.phalanges_before(finger):
-        v_x, v_y, size = x - window[0], y - window[1], length / 2.0 + radius
+    for i, length, radius, size in _BEFORE[finger]:
+        x, y, angle = phalanges[i]
+        v_x, v_y = x - window[0], y - window[1]
         ahead, aside = v_x * looks[0] + v_y * looks[1], abs(v_x * looks[1] - v_y * looks[0])
         if -size < ahead < reach + size and aside < 1.5 * size + widening * (ahead + size):
             e_x, e_y = length / 2.0 * math.cos(angle), length / 2.0 * math.sin(angle)
@@ -162,12 +206,11 @@ def _hand_before(
     return found
 
 
-def _palm_hit(world: GraspWorld, window: Point, ray: Point, reach: float) -> tuple[float, float] | None:
-    """Return the distance and the cosine at which a ray meets the palm, None if it does not within reach."""
+def _palm_before(world: GraspWorld, window: Point, reach: float) -> PalmInView | None:
+    """Return where a sensor is from the palm, None if no ray of its reaches it."""
     x, y, yaw = world.wrist
     r_x, r_y = window[0] - x, window[1] - y
-    if r_x * ray[0] + r_y * ray[1] > _PALM.reach or math.hypot(r_x, r_y) > reach + _PALM.reach:
+    if math.hypot(r_x, r_y) > reach + _PALM.reach:
         return None
     c, s = math.cos(yaw), math.sin(yaw)
-    hit = _PALM.intersect(c * r_x + s * r_y, c * r_y - s * r_x, c * ray[0] + s * ray[1], c * ray[1] - s * ray[0])
-    return None if hit is None else (hit.distance, hit.cosine)
+    return c * r_x + s * r_y, c * r_y - s * r_x, c, s

@@ -79,7 +79,7 @@ class Slab:
         (x_0, y_0), (x_1, y_1) = self.low, self.high
         return [(x_0, y_0), (x_1, y_0), (x_1, y_1), (x_0, y_1)]
 
-    @property
+    @cached_property
     def reach(self) -> float:
         """Largest distance of a point of it from the origin of O, in m."""
         return max(math.hypot(x, y) for x, y in self.corners)
@@ -123,7 +123,7 @@ class Polygon:
 
     corners: tuple[Point, ...]
 
-    @property
+    @cached_property
     def reach(self) -> float:
         """Largest distance of a point of it from the origin of O, in m."""
         return max(math.hypot(x, y) for x, y in self.corners)

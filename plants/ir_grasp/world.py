@@ -1,7 +1,7 @@
 """Hand, objects and table of the grasp scene as bodies in contact, advanced by 1 ms at a time."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import accumulate, pairwise
 from typing import Final
 
@@ -29,8 +29,6 @@ Ray = tuple[float, float]
 _ITERATIONS = 10
 _HAND, _OBJECT, _OTHER = 1, 2, 3  # groups whose own shapes do not collide
 _NAMED_FINGERS = tuple(zip(("thumb", "index", "ring"), FINGERS, strict=True))
-_SIZES = tuple(size for f in FINGERS for size in zip(f.lengths, f.radii, strict=True))
-_OWNER = tuple(i for i, f in enumerate(FINGERS) for _ in f.lengths)
 _DISTAL = tuple(int(i) - 1 for i in accumulate(len(f.lengths) for f in FINGERS))  # among the phalanges
 _STILL = (0.0, 0.0, 0.0)
 
@@ -119,10 +117,11 @@ class GraspWorld:
     @property
     def thing(self) -> tuple[float, float, float]:
         """Position of O in m and orientation in rad of the object."""
+        position, yaw = self._thing.position, self._thing.angle
         if self._centre == (0.0, 0.0):
-            return (*self._thing.position, self._thing.angle)
+            return (*position, yaw)
         x, y = self._centre
-        return (*_moved((-x, -y), self._thing.position, self._thing.angle), self._thing.angle)
+        return (*_moved((-x, -y), position, yaw), yaw)
 
     @property
     def other(self) -> Point | None:
@@ -217,21 +216,15 @@ class GraspWorld:
     def sensor(self, finger: int) -> tuple[Point, Point]:
         """Return where a finger's sensor sits, in m, and the unit vector in which it looks, in W."""
         f, body = FINGERS[finger], self._phalanges[_DISTAL[finger]]
-        (x, y), c, s = body.position, math.cos(body.angle), math.sin(body.angle)
+        (x, y), angle = body.position, body.angle
+        c, s = math.cos(angle), math.sin(angle)
         n_x, n_y = -f.flexion * s, f.flexion * c
         along, r = (SENSOR_PLACE - 0.5) * f.lengths[-1], f.radii[-1]
         return (x + along * c + r * n_x, y + along * s + r * n_y), (n_x, n_y)
 
-    def phalanges_before(self, finger: int) -> Iterator[tuple[float, float, tuple[float, float, float]]]:
-        """Return length and radius in m, and middle and orientation of each phalanx that a finger's beam may meet.
-
-        These are those of the other side and its own but the distal one. Index and ring, which are beside each other
-        in space, do not hide each other.
-        """
-        for i, (body, (length, radius)) in enumerate(zip(self._phalanges, _SIZES, strict=True)):
-            owner = _OWNER[i]
-            if i != _DISTAL[finger] and (owner == finger or FINGERS[owner].flexion != FINGERS[finger].flexion):
-                yield length, radius, (*body.position, body.angle)
+    def phalanges(self) -> list[tuple[float, float, float]]:
+        """Return the middle, in m, and the orientation of each phalanx, in rad."""
+        return self._edge.poses(self._first_phalanx)
 
     def _tension(self, angles: list[float]) -> float:
         p = self._params
