@@ -68,7 +68,7 @@ def test_native_units_at_three_rates(options: dict[str, Any], tmp_path: Path):
 
 
 @plain
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3])
 def test_every_kind_of_port_sampled_and_pictures(fmu: FmuOf, fmi: int, options: dict[str, Any], tmp_path: Path):
     def build() -> System:
         s = System()
@@ -85,7 +85,7 @@ def test_every_kind_of_port_sampled_and_pictures(fmu: FmuOf, fmi: int, options: 
 
 
 @plain
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3])
 def test_texts_that_become_longer(fmu: FmuOf, fmi: int, options: dict[str, Any], tmp_path: Path):
     def build() -> System:
         s = System()

@@ -44,6 +44,7 @@ def test_the_object_changes_hands_of_compliant_robots(task: str, propulsion: str
     assert done.summary["success"], done.summary["reason"]
 
 
+@pytest.mark.slow
 def test_by_themselves_grippers_let_go_one_after_the_other(tmp_path: Path):
     """A hand at one end draws one gripper sooner than the other; the team's mean decides for both."""
     gaps = [
@@ -54,6 +55,7 @@ def test_by_themselves_grippers_let_go_one_after_the_other(tmp_path: Path):
     assert gaps[1] > 0.1
 
 
+@pytest.mark.slow
 def test_one_hand_at_an_end_fills_one_gripper_first(tmp_path: Path):
     """Together, both open again and ask once more; each for itself, the one that has it keeps it."""
     given = ("task=human_to_robots", "hands=one_at_end", "patience=20")

@@ -178,6 +178,7 @@ def test_the_page_shows_what_the_cameras_see_and_the_run_is_the_same(browser: Br
     assert a == b
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_the_run_and_the_page_is_told_how(browser: Browser, tmp_path: Path):
     with live_run(tmp_path / "live", "--pace", "0.5") as (address, run), shown(browser, address) as page:
         wait_until(page, f"{LIVE}.dataset.frames > 3")

@@ -114,6 +114,7 @@ def test_the_hybrid_knows_where_the_tip_is(finished: Finished):
     assert metrics["outside"].value < 0.1
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_signals_and_another_seed_others(finished: Finished, tmp_path: Path):
     for seed in (0, 1):
         (tmp_path / str(seed)).mkdir()
@@ -147,6 +148,7 @@ def test_the_hybrid_errs_less_than_rigid_links_and_they_less_than_the_model_base
     assert hybrid < rigid < model_based
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "parameters", [("path=linear",), ("path=square",), ("motion=dynamic",), ("load=0", "pressure=2e5")]
 )

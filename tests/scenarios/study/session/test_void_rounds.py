@@ -60,6 +60,7 @@ def time_seen(page: ClientConnection) -> float:
     return float(np.frombuffer(message, dtype="<f8")[0])
 
 
+@pytest.mark.slow
 def test_a_page_that_is_closed_makes_its_round_void_and_it_is_played_again(tmp_path: Path):
     server = server_of(tmp_path / "study")
     with served(server) as where:
@@ -74,6 +75,7 @@ def test_a_page_that_is_closed_makes_its_round_void_and_it_is_played_again(tmp_p
     assert server.seat.protocol.screen == "void"
 
 
+@pytest.mark.slow
 def test_who_withdraws_in_a_round_sees_nothing_but_that_and_no_attempt_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -92,6 +94,7 @@ def test_who_withdraws_in_a_round_sees_nothing_but_that_and_no_attempt_is_kept(
     assert session.notes.void_attempts == []
 
 
+@pytest.mark.slow
 def test_a_device_that_falls_silent_makes_the_round_void(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(seat_module, "SILENCE", 0.5)
     with page_of(server_of(tmp_path / "study")) as page:
