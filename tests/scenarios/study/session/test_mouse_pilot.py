@@ -12,6 +12,8 @@ from opened_page import wait_until
 from playwright.sync_api import Browser, Page
 from served_page import HANDOVER, at, pilot_plan, served, to_round
 
+FIGURES = ["round", "success", "latency_median_ms", "latency_p95_ms", "missed_deadlines"]
+"""Of the rounds: what is printed."""
 SCREEN = "document.querySelector('.study').dataset.screen"
 
 
@@ -58,6 +60,7 @@ def test_a_person_with_a_mouse_gets_through_the_study_by_what_the_page_shows(bro
 
     session = out / "participants" / "P01"
     rounds: Any = pd.read_csv(session / "rounds.csv")
+    print(f"\n{rounds[FIGURES].to_string(index=False)}")
     assert rounds["round"].tolist() == list(range(1, 7))
     assert set(rounds["kind"]) == {"scripted pilot"}
     assert rounds["success"].sum() >= 4, rounds[["task", "behaviour", "reason"]].to_string()
