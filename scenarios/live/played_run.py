@@ -86,9 +86,18 @@ class PlayedRun:
     @property
     def command(self) -> str:
         """The command that makes the same run."""
-        given = replace(self.choice, pushed=self.was_pushed).arguments()
-        folder = ["--inputs-from", str(self.watched.folder.shown)] if self.was_pushed else []
-        return f"handover run {shlex.join([self._subject, *given, *self._options, *folder])}"
+        choice, folder = replace(self.choice, pushed=False), list[str]()
+        if self.was_pushed or self._is_led:
+            choice, folder = self.choice, ["--inputs-from", str(self.watched.folder.shown)]
+        return f"handover run {shlex.join([self._subject, *choice.arguments(), *self._options, *folder])}"
+
+    @property
+    def _is_led(self) -> bool:
+        """Whether a hand's inputs come from outside in it."""
+        try:
+            return self.watched.led_hand() is not None
+        except InvalidRunFolder:  # it has not begun
+            return False
 
     @property
     def was_pushed(self) -> bool:

@@ -367,6 +367,14 @@ def passed(page: Page, seconds: float) -> None:
     wait_until(page, f"{now} > {since + seconds}")
 
 
+@pytest.mark.slow
+def test_the_command_of_a_run_whose_hand_is_led_plays_its_inputs_back(browser: Browser, tmp_path: Path):
+    given = ("-p", "hand=outside", "--stop", "1", "--pace", "2")
+    with played("flyer_robot_to_human", tmp_path / "runs", *given) as (address, _), shown(browser, address) as page:
+        ended(page, 1)
+        assert page.locator("#command code").inner_text().endswith(f"--inputs-from {tmp_path}/runs/001")
+
+
 def dragged(page: Page) -> float:
     """Press on the robot and drag; return how far it has moved until it is released, m."""
     x, y = page.evaluate(
