@@ -34,7 +34,7 @@ PULLEYS: Final = np.array([r for f in FINGERS for r in f.pulleys])
 """Radii r at which the tendon passes the joints, (8,), in m."""
 
 STIFFNESS: Final = np.array([k for f in FINGERS for k in f.stiffness])
-"""Stiffness K of the joints, (8,), in N m/rad."""
+"""Stiffness K of the joints by design, (8,), in N m/rad."""
 
 GEARS: Final = tuple(
     f.flexion * (r - after) for f in FINGERS for r, after in zip(f.pulleys, (*f.pulleys[1:], 0.0), strict=True)
@@ -50,7 +50,7 @@ def tendon_excursion(angles: list[float], yaw: float) -> float:
     return sum(map(mul, GEARS, angles)) - _PALM_GEAR * yaw - _RELAXED
 
 
-def resting_posture(sigma: float, stiffness: float, travel: float) -> Floats:
+def resting_posture(sigma: float, stiffness: float, travel: float, joint_stiffness: Floats = STIFFNESS) -> Floats:
     """Return the joint angles, (8,), in rad, of the hand at rest in free space.
 
     There K q = r T at each joint between its limits, and sum r q + T / k = sigma L, whose left side rises with T.
@@ -59,10 +59,11 @@ def resting_posture(sigma: float, stiffness: float, travel: float) -> Floats:
         sigma: closure, 0 to 1.
         stiffness: k of the tendon, in N/m.
         travel: L, what the motor takes up at closure 1, in m.
+        joint_stiffness: K of the joints, (8,), in N m/rad.
     """
 
     def posture(T: float) -> Floats:
-        return np.clip(PULLEYS * T / STIFFNESS, MIN_ANGLE, MAX_ANGLE)
+        return np.clip(PULLEYS * T / joint_stiffness, MIN_ANGLE, MAX_ANGLE)
 
     low, high = 0.0, stiffness * sigma * travel
     for _ in range(80):

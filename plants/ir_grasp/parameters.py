@@ -14,6 +14,7 @@ from handover.cosim.blocks.units import (
     Metre,
     MetrePerSecond,
     MetrePerSecond2,
+    Newton,
     NewtonMetreSecondPerRadian,
     NewtonPerMetre,
     Number,
@@ -26,6 +27,7 @@ from handover.cosim.blocks.units import (
     Tick,
 )
 from handover.plants.infrared_sensor import InfraredSensor, InvalidSensorParameters, ToleratedSensor
+from handover.plants.ir_grasp.actuation import STIFFNESS
 from handover.plants.ir_grasp.ground import Span, bump
 from handover.plants.ir_grasp.objects import Solid, Thing, placed, polygon_corners, solid_of, with_own
 from handover.plants.ir_grasp.shapes import Disc, polygon_faults
@@ -125,6 +127,9 @@ class Params:
     )
     joint_damping: NewtonMetreSecondPerRadian = parameter(6e-3, "damping of a joint", minimum=0.0, maximum=1.0)
     phalanx_mass: Kilogram = parameter(0.02, "mass of a phalanx", minimum=5e-3, maximum=1.0)
+    stiffness_tolerance: Number = parameter(
+        0.0, "largest part by which each joint's stiffness is off its design's, drawn", minimum=0.0, maximum=0.9
+    )
     a: Metre = parameter(0.062, "a of the characteristic y = a exp(b x) + c exp(d x)", minimum=-1.0, maximum=1.0)
     b: PerTick = parameter(-0.0030, "b of the characteristic", minimum=-0.1, maximum=0.1)
     c: Metre = parameter(0.022, "c of the characteristic", minimum=-1.0, maximum=1.0)
@@ -170,6 +175,8 @@ class Params:
     wrist_noise: Metre = parameter(0.0, "standard deviation of the measured wrist, by axis", minimum=0.0, maximum=0.05)
     heading_noise: Radian = parameter(0.0, "standard deviation of the measured heading", minimum=0.0, maximum=0.5)
     closure_noise: Number = parameter(0.0, "standard deviation of the measured closure", minimum=0.0, maximum=0.5)
+    joint_noise: Radian = parameter(0.0, "standard deviation of each measured joint angle", minimum=0.0, maximum=0.5)
+    tension_noise: Newton = parameter(0.0, "standard deviation of the measured tension", minimum=0.0, maximum=10.0)
     other_radius: Metre = parameter(0.0, "radius of a second object, a disc; 0: none", minimum=0.0, maximum=0.1)
     p_WX_0: Vector2[Metre] = parameter(
         np.array([0.0, 0.12]), "where the second object stands at the start", minimum=-2.0, maximum=2.0
@@ -197,6 +204,12 @@ class Params:
         x, y = self.nudge.tolist()
         v_x, v_y = self.carry_velocity.tolist()
         return (self.carry_from, self.carry_until, (v_x, v_y)), bump((x, y), self.nudge_time, self.nudge_speed)
+
+    @property
+    def joint_stiffness(self) -> Floats:
+        """Stiffness of the joints, (8,), in N m/rad: that of the hand's design, each off by the tolerance."""
+        rng = np.random.default_rng([self.seed, 0x571FF])
+        return STIFFNESS * (1.0 + self.stiffness_tolerance * rng.uniform(-1.0, 1.0, STIFFNESS.shape))
 
     def sensor(self) -> InfraredSensor:
         """Return one of the sensors.

@@ -61,6 +61,8 @@ class Outputs:
     ticks: Vector3[Tick] = output("last readings of the sensors")
     q: Vector8[Radian] = output("joint angles: thumb 2, index 3, ring 3")
     tension: Newton = output("tension of the tendon")
+    q_meas: Vector8[Radian] = output("joint angles by their encoders: thumb 2, index 3, ring 3")
+    tension_meas: Newton = output("tension of the tendon by the motor's current")
     p_WO: Vector2[Metre] = output("position of the object, in the world")
     yaw_O: Radian = output("orientation of the object, that of its reference pose included")
     p_WG: Vector2[Metre] = output("how far the ground under the object has carried it, or what stands still on it")
@@ -116,6 +118,8 @@ class GraspScene:
         x, y, yaw = w.wrist
         x_O, y_O, yaw_O = w.thing
         x_meas, y_meas, yaw_meas, sigma_meas = self._sensing.measured(w)
+        q, tension = w.joints, w.tension
+        q_meas, tension_meas = self._sensing.measured_joints(q, tension)
         return Outputs(
             p_WH=np.array([x, y]),
             yaw=yaw,
@@ -124,8 +128,10 @@ class GraspScene:
             yaw_meas=yaw_meas,
             sigma_meas=sigma_meas,
             ticks=np.array(self._sensing.ticks),
-            q=np.array(w.joints),
-            tension=w.tension,
+            q=np.array(q),
+            tension=tension,
+            q_meas=np.array(q_meas),
+            tension_meas=tension_meas,
             p_WO=np.array([x_O, y_O]),
             yaw_O=yaw_O,
             p_WG=np.array(w.ground),

@@ -1,4 +1,4 @@
-"""What the hand measures: infrared readings of the fingers in turn, and the encoders of wrist and closure."""
+"""What the hand measures: infrared readings of the fingers in turn, encoders, and the tendon's tension."""
 
 import math
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.ir_grasp.hand import FINGERS, PALM
+from handover.plants.ir_grasp.hand import FINGERS, JOINTS, PALM
 from handover.plants.ir_grasp.parameters import OUT_OF_RANGE, Params
 from handover.plants.ir_grasp.shapes import Disc, Point, Slab, capsule_hit
 from handover.plants.ir_grasp.world import GraspWorld
@@ -49,8 +49,8 @@ Pose = tuple[float, float, float]
 PalmInView = tuple[float, float, float, float]
 """Position of a sensor's window from the wrist, in the palm's axes, in m; cosine and sine of the palm's orientation."""
 
-Kept = tuple[int, list[float], list[float], tuple[Any, Any]]
-"""Time into the scan, readings, the encoders' errors, and two states of random numbers."""
+Kept = tuple[int, list[float], tuple[list[float], list[float]], tuple[Any, Any, Any]]
+"""Time into the scan, readings, errors of wrist and closure and of joints and tension, and states of random numbers."""
 
 
 class Sensing:
@@ -58,8 +58,8 @@ class Sensing:
 
     Sensors are active in turn for 5 ms each, thumb, index, ring, `active` of them at once; each is read at the end of
     its time. A reading is the mean over three rays of the beam of `InfraredSensor.ticks`, and `crosstalk` of what
-    each other active sensor reads of its own light, plus ambient light and noise, rounded. The encoders are read every
-    5 ms.
+    each other active sensor reads of its own light, plus ambient light and noise, rounded. The encoders and the
+    tension are read every 5 ms.
 
     Args:
         params: of the scene.
@@ -78,12 +78,13 @@ class Sensing:
         self._rng = np.random.default_rng(p.seed)
         self._encoder_rng = np.random.default_rng([p.seed, 0xE2C0DE2])
         self._encoder_noise: Floats = np.array([p.wrist_noise, p.wrist_noise, p.heading_noise, p.closure_noise])
-        self._encoders_err = bool(np.any(self._encoder_noise))
+        self._joint_rng = np.random.default_rng([p.seed, 0x70147])
+        self._joint_noise: Floats = np.array([p.joint_noise] * JOINTS + [p.tension_noise])
         self._clock = 0  # internal steps into the scan of the sensors
         self.ticks = [0.0] * _SENSORS
         for slot in range(_SENSORS):
             self._read(slot, world)
-        self._errors = self._encoder_errors()
+        self._draw_errors()
 
     @property
     def until_reading(self) -> int:
@@ -95,12 +96,17 @@ class Sensing:
         self._clock = (self._clock + steps) % (_SLOT * _SENSORS)
         if self._clock % _SLOT == 0:
             self._read((self._clock // _SLOT - 1) % _SENSORS, world)
-            self._errors = self._encoder_errors()
+            self._draw_errors()
 
     def measured(self, world: GraspWorld) -> tuple[float, float, float, float]:
         """Return what the encoders say of the wrist's position (m) and orientation (rad), and of the closure."""
         (x, y, yaw), (e_x, e_y, e_yaw, e_sigma) = world.wrist, self._errors
         return x + e_x, y + e_y, yaw + e_yaw, world.sigma + e_sigma
+
+    def measured_joints(self, q: Sequence[float], tension: float) -> tuple[list[float], float]:
+        """Return what encoders say of joint angles, 8, in rad, and the motor's current of the tension, in N."""
+        *of_joints, of_tension = self._joint_errors
+        return [angle + e for angle, e in zip(q, of_joints, strict=True)], tension + of_tension
 
     def ranges(self, world: GraspWorld) -> list[float]:
         """Return how far the object is along the middle of each beam, whatever hides it, in m."""
@@ -109,12 +115,14 @@ class Sensing:
 
     def get_state(self) -> Kept:
         """Return the time into the scan, readings, errors and the random numbers' states."""
-        return self._clock, self.ticks, self._errors, (self._rng.bit_generator, self._encoder_rng.bit_generator)
+        generators = (self._rng.bit_generator, self._encoder_rng.bit_generator, self._joint_rng.bit_generator)
+        return self._clock, self.ticks, (self._errors, self._joint_errors), generators
 
     def set_state(self, state: Kept) -> None:
         """Restore a state that `get_state` gave, once packed and unpacked."""
-        self._clock, self.ticks, self._errors, (rng, encoder_rng) = state
-        self._rng.bit_generator.state, self._encoder_rng.bit_generator.state = rng, encoder_rng
+        self._clock, self.ticks, (self._errors, self._joint_errors), states = state
+        for rng, kept in zip((self._rng, self._encoder_rng, self._joint_rng), states, strict=True):
+            rng.bit_generator.state = kept
 
     def _read(self, slot: int, world: GraspWorld) -> None:
         p = self._params
@@ -184,11 +192,15 @@ class Sensing:
         nearest = min(met, default=None)
         return None if nearest is None or nearest[0] >= reach else nearest
 
-    def _encoder_errors(self) -> list[float]:
-        """Return new errors of the encoders; without noise no random numbers are drawn."""
-        if not self._encoders_err:
-            return [0.0] * 4
-        return (self._encoder_noise * self._encoder_rng.standard_normal(4)).tolist()
+    def _draw_errors(self) -> None:
+        """Draw new errors of encoders and tension."""
+        self._errors = _errors(self._encoder_noise, self._encoder_rng)
+        self._joint_errors = _errors(self._joint_noise, self._joint_rng)
+
+
+def _errors(noise: Floats, rng: np.random.Generator) -> list[float]:
+    """Return new errors of these standard deviations; without noise no random numbers are drawn."""
+    return (noise * rng.standard_normal(noise.size)).tolist() if noise.any() else [0.0] * noise.size
 
 
 def _hand_before(

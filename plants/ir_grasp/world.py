@@ -35,7 +35,7 @@ _STILL = (0.0, 0.0, 0.0)
 
 def initial_snapshot(p: Params) -> Snapshot:
     """Return the scene at the start: everything at rest, the fingers as the tendon has them in free space."""
-    q = resting_posture(p.sigma_0, p.tendon_stiffness, p.tendon_travel)
+    q = resting_posture(p.sigma_0, p.tendon_stiffness, p.tendon_travel, p.joint_stiffness)
     palm = (float(p.p_WH_0[0]), float(p.p_WH_0[1]), p.yaw_H_0, *_STILL)
     solid = p.solid
     yaw = solid.yaw + p.yaw_O_0
@@ -94,8 +94,10 @@ class GraspWorld:
         self._other = self._add_other(rest.pop(0)) if params.other_radius > 0.0 else None
         self._first_phalanx = sum(b is not None for b in (self._palm, self._ground_body, self._thing, self._other))
         self._phalanges: list[PymunkBody] = []
+        stiffness = params.joint_stiffness.tolist()
         for f in FINGERS:
-            self._add_finger(f, rest[len(self._phalanges) :][: len(f.lengths)])
+            those = slice(len(self._phalanges), len(self._phalanges) + len(f.lengths))
+            self._add_finger(f, rest[those], stiffness[those])
 
     @property
     def snapshot(self) -> Snapshot:
@@ -267,10 +269,10 @@ class GraspWorld:
         self._edge.add_ground_friction(other, weight, weight * 2.0 * disc.radius / 3.0)
         return other
 
-    def _add_finger(self, f: Finger, motions: Sequence[Motion]) -> None:
+    def _add_finger(self, f: Finger, motions: Sequence[Motion], stiffnesses: Sequence[float]) -> None:
         p = self._params
         before, joint, rest = self._palm, f.base, f.spread
-        for motion, length, radius, stiffness in zip(motions, f.lengths, f.radii, f.stiffness, strict=True):
+        for motion, length, radius, stiffness in zip(motions, f.lengths, f.radii, stiffnesses, strict=True):
             inertia = p.phalanx_mass * (length**2 / 12.0 + radius**2 / 4.0)
             body = self._edge.add_body(p.phalanx_mass, inertia, motion)
             ends = ((-length / 2.0, 0.0), (length / 2.0, 0.0))

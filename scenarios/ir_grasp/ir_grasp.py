@@ -135,9 +135,7 @@ class IrGrasp(Experiment[GraspEvaluator]):
             yaw_pregrasp=drawn.yaw,
         )
         s.connect(scene.y.ticks, reflex.u.ticks)
-        s.connect(scene.y.tension, reflex.u.tension)
-        s.connect(scene.y.q, reflex.u.q)
-        for name in ("p_WH", "yaw", "sigma"):
+        for name in ("p_WH", "yaw", "sigma", "q", "tension"):
             s.connect(getattr(scene.y, f"{name}_meas"), getattr(reflex.u, name))
         for name in ("p_WH_cmd", "yaw_cmd", "sigma_cmd"):
             s.connect(getattr(reflex.y, name), getattr(scene.u, name))

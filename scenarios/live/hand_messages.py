@@ -41,8 +41,8 @@ _ROUNDING = 1e-6
 _UNIT = 0.01
 """How far a quaternion's norm may be from 1."""
 _LONGEST_NAME = 60
-_MOST_AHEAD = 10.0
-"""How much more a device's clock may have gone on than this computer's since the sample before, s (assumed)."""
+_CLOCK_JUMP = 10.0
+"""How much more or less a device's clock may have gone on than this computer's since the sample before, s (assumed)."""
 _WINDOW = 600
 """Over how many samples the clock of a device is compared with this computer's."""
 
@@ -205,8 +205,8 @@ class HandStream:
     def __init__(self, led: LedHand, clock: Callable[[], float] = time.monotonic) -> None:
         self._led, self._clock = led, clock
         self._device_clock = DeviceClock()
-        self._last, self._last_arrival = -math.inf, -math.inf
-        self._doubted = (math.inf, 0.0)  # stamp and arrival of a sample that was far ahead
+        self._last: tuple[float, float] | None = None  # stamp and arrival
+        self._after_jump: tuple[float, float] | None = None  # stamp and arrival of a sample far from the one before
         self._arrivals: list[float] = []
 
     def take(self, text: str) -> tuple[HandSample, float]:
@@ -226,22 +226,33 @@ class HandStream:
         """Return a sample that arrived at the monotonic time `arrival`, s, and its stamp by this computer's clock, s.
 
         Raises:
-            InvalidHandMessage: it is wanted beyond reach, is older than the one before, or far ahead of it.
+            InvalidHandMessage: it is wanted beyond reach, is not after the one before, or far ahead of it.
         """
         far = math.dist(sample.p_WH, self._led.p_WH_0)
         if far > self._led.reach + _ROUNDING:
             rest, reach = list(self._led.p_WH_0), self._led.reach
             raise InvalidHandMessage(f"p_WH: {far:.3g} m from where the hand rests, {rest} m; it reaches {reach:g} m")
-        if sample.stamp <= self._last:
-            raise InvalidHandMessage(f"stamp: {sample.stamp:.6g} s is not after the one before, {self._last:.6g} s")
-        since, passed = sample.stamp - self._last, arrival - self._last_arrival
-        if math.isfinite(self._last) and since - passed > _MOST_AHEAD:
-            doubted, came = self._doubted
-            self._doubted = sample.stamp, arrival
-            if not 0.0 < sample.stamp - doubted <= arrival - came + _MOST_AHEAD:
-                raise InvalidHandMessage(
-                    f"stamp: {sample.stamp:.6g} s is {since:.3g} s after the one before, which came {passed:.3g} s ago"
-                )
-            self._device_clock = DeviceClock()  # two that agree: its clock was set, or this computer slept
-        self._last, self._last_arrival = sample.stamp, arrival
+        if self._last is not None:
+            self._check_stamp(sample.stamp, arrival, *self._last)
+        self._last, self._after_jump = (sample.stamp, arrival), None
         return sample, self._device_clock.monotonic(sample.stamp, arrival, sample.sent)
+
+    def _check_stamp(self, stamp: float, arrival: float, last: float, last_arrival: float) -> None:
+        """Raise InvalidHandMessage for a stamp that does not follow the last one.
+
+        Two in succession that follow each other, though far from the last one, show that the device's clock was set
+        or this computer slept: then its clock is measured anew.
+        """
+        since, passed = stamp - last, arrival - last_arrival
+        jumped = abs(since - passed) > _CLOCK_JUMP
+        if since > 0.0 and since - passed <= _CLOCK_JUMP:
+            return
+        before, self._after_jump = self._after_jump, (stamp, arrival) if jumped else None
+        if jumped and before is not None and 0.0 < stamp - before[0] <= arrival - before[1] + _CLOCK_JUMP:
+            self._device_clock = DeviceClock()
+            return
+        if since <= 0.0:
+            raise InvalidHandMessage(f"stamp: {stamp:.6g} s is not after the one before, {last:.6g} s")
+        raise InvalidHandMessage(
+            f"stamp: {stamp:.6g} s is {since:.3g} s after the one before, which came {passed:.3g} s ago"
+        )

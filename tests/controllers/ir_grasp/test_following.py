@@ -31,7 +31,9 @@ def scene(p_WO: tuple[float, float] = (0.0, 0.0), **more: Any) -> GraspScene:
 
 
 def read(y: Sensed) -> Inputs:
-    return Inputs(ticks=y.ticks, p_WH=y.p_WH_meas, yaw=y.yaw_meas, sigma=y.sigma_meas, tension=y.tension, q=y.q)
+    return Inputs(
+        ticks=y.ticks, p_WH=y.p_WH_meas, yaw=y.yaw_meas, sigma=y.sigma_meas, tension=y.tension_meas, q=y.q_meas
+    )
 
 
 def grasp(controller: IrReflex, plant: GraspScene, until: Phase = Phase.CLOSE) -> list[tuple[Outputs, Sensed]]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from handover.cosim.blocks.ports import Floats
+from handover.plants.ir_grasp.actuation import PULLEYS, STIFFNESS
 from handover.plants.ir_grasp.hand import sensor_rays
 from handover.plants.ir_grasp.objects import Thing
 from handover.plants.ir_grasp.parameters import InvalidSceneParameters, Params
@@ -163,6 +164,32 @@ def test_encoders_have_noise_and_the_truth_has_none():
         assert (z.yaw_meas, z.sigma_meas) == (z.yaw, z.sigma)
 
 
+def test_joints_and_tension_are_measured_with_noise_of_their_own():
+    p = replace(QUIET, joint_noise=0.02, tension_noise=0.3, wrist_noise=1e-3, mass_O=5.0)
+    ys = course(p, 9.0)
+    errors = np.array([[*(y.q_meas - y.q), y.tension_meas - y.tension] for y in ys])
+    np.testing.assert_allclose(np.std(errors, axis=0), [0.02] * 8 + [0.3], rtol=0.12)
+    np.testing.assert_allclose(np.mean(errors, axis=0), 0.0, atol=0.03)
+    assert np.max(np.abs(np.corrcoef(errors.T) - np.eye(9))) < 0.2
+    plain = course(replace(QUIET, wrist_noise=1e-3, mass_O=5.0), 9.0)
+    for y, z in zip(ys, plain, strict=True):
+        np.testing.assert_array_equal(y.p_WH_meas, z.p_WH_meas)  # no other random numbers for the wrist
+        np.testing.assert_array_equal(y.q, z.q)
+        np.testing.assert_array_equal(z.q_meas, z.q)
+        assert z.tension_meas == z.tension
+
+
+def test_joints_are_off_their_design_by_a_tolerance_drawn_once():
+    p = replace(QUIET, stiffness_tolerance=0.3, seed=3)
+    off = p.joint_stiffness / STIFFNESS - 1.0
+    assert 0.15 < np.max(np.abs(off)) <= 0.3
+    np.testing.assert_array_equal(p.joint_stiffness, replace(p, noise=9.0).joint_stiffness)
+    assert np.any(p.joint_stiffness != replace(p, seed=4).joint_stiffness)
+    np.testing.assert_array_equal(replace(p, stiffness_tolerance=0.0).joint_stiffness, STIFFNESS)
+    y = course(replace(p, p_WO_0=np.array([0.5, 0.3])), 1.5)[-1]  # at rest, in free space
+    np.testing.assert_allclose(p.joint_stiffness * y.q, PULLEYS * y.tension, atol=2e-4)
+
+
 def test_a_state_with_all_that_moves_and_disturbs_is_complete():
     p = replace(
         QUIET, thing=Thing.BAR, bar_size=np.array([0.03, 0.11]), noise=5.0, ambient_noise=3.0, ambient=40.0, active=2
@@ -170,6 +197,7 @@ def test_a_state_with_all_that_moves_and_disturbs_is_complete():
     p = replace(p, p_WH_0=np.array([-0.27, 0.0]), other_radius=0.02, p_WX_0=np.array([0.0, 0.085]))
     p = replace(p, carry_velocity=np.array([-0.01, 0.02]), carry_until=1.5, nudge=np.array([0.0, 0.02]), nudge_time=0.9)
     p = replace(p, wrist_noise=1e-3, heading_noise=0.01, closure_noise=0.01, fingers_seen=True, sensor_tolerance=0.1)
+    p = replace(p, joint_noise=0.01, tension_noise=0.1, stiffness_tolerance=0.02)
     scene, other = GraspScene(p), GraspScene(p)
 
     def command(k: int) -> Inputs:

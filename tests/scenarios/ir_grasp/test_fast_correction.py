@@ -47,8 +47,8 @@ class Shadow:
             p_WH=signals["scene.p_WH_meas"],
             yaw=float(signals["scene.yaw_meas"]),
             sigma=float(signals["scene.sigma_meas"]),
-            tension=float(signals["scene.tension"]),
-            q=signals["scene.q"],
+            tension=float(signals["scene.tension_meas"]),
+            q=signals["scene.q_meas"],
         )
         y = self._block.step(t, 0.015, u)
         self.own.append(np.concatenate([np.atleast_1d(getattr(y, name)) for name in _COMMANDS]))
