@@ -109,6 +109,41 @@ class MessageRate:
         return len(arrivals)
 
 
+class RefusalTimer:
+    """Says which refusals a device is told: two a second at most of those for one reason.
+
+    Args:
+        clock: s.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._last: dict[str, float] = {}
+        self._clock = clock
+
+    def is_due(self, kind: str) -> bool:
+        """Return whether a refusal of this kind is told now; it then counts as told."""
+        now = self._clock()
+        if now - self._last.get(kind, -REFUSAL_PERIOD) < REFUSAL_PERIOD:
+            return False
+        self._last[kind] = now
+        return True
+
+
+async def accept(device: WebSocket) -> bool:
+    """Accept a device's connection, but for that of another site's page; return whether it was accepted."""
+    if not is_same_origin(device, browsers_only=False):
+        await device.close(POLICY_VIOLATION)
+        return False
+    await device.accept()
+    return True
+
+
+async def refuse(device: WebSocket, reason: str, code: int = TRY_AGAIN_LATER) -> None:
+    """Tell a device that was accepted why it cannot lead the hand, and close its connection."""
+    await send_json(device, {"refused": reason})
+    await close(device, code, reason if len(reason.encode()) <= LONGEST_REASON else "")
+
+
 def too_many(most: int) -> str:
     """Return why messages are refused, or a connection is closed, that are more than `most` in a second."""
     return f"more than {most} messages in a second"

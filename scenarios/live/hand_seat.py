@@ -1,7 +1,6 @@
 """The seat of the one device that leads a run's hand: takes its samples, and tells it which it cannot take."""
 
 import json
-import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -13,15 +12,14 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live.connections import (
-    LONGEST_REASON,
     POLICY_VIOLATION,
-    REFUSAL_PERIOD,
-    TRY_AGAIN_LATER,
     BinaryMessage,
     MessageRate,
+    RefusalTimer,
+    accept,
     close,
-    is_same_origin,
     receive_text,
+    refuse,
     send_json,
     too_many,
 )
@@ -33,9 +31,8 @@ INPUTS_FILE = "inputs.json"
 """Name of the file in a run's folder that says which devices led a hand, and how old samples were at their use."""
 _MOST_MESSAGES = 2000
 """Messages of a device within a second; many more are far from any tracker, and keep the server from the page."""
-
-
 _IS_LED = 'another page or tracker leads the hand; a page leaves it to "a tracker of one\'s own" that is chosen there'
+"""Why another device has to wait."""
 
 
 class HandSeat:
@@ -79,7 +76,7 @@ class HandSeat:
             self._device = None
 
     async def _follow(self, device: WebSocket) -> None:
-        stream, name, last_told, rate = HandStream(self._led), "", dict[str, float](), MessageRate()
+        stream, name, timer, rate = HandStream(self._led), "", RefusalTimer(), MessageRate()
         while True:
             try:
                 fault, text = "", await receive_text(device)
@@ -95,12 +92,10 @@ class HandSeat:
                     raise InvalidHandMessage(fault)
                 sample, stamp = stream.take(text)
             except InvalidHandMessage as e:
-                reason, now = str(e), time.monotonic()
-                kind = reason.partition(":")[0]
+                kind = str(e).partition(":")[0]
                 self._refused[kind] += 1
-                if now - last_told.get(kind, 0.0) >= REFUSAL_PERIOD:
-                    last_told[kind] = now
-                    await send_json(device, {"refused": reason})
+                if timer.is_due(kind):
+                    await send_json(device, {"refused": str(e)})
                 continue
             name = sample.device or name
             self._samples[name or "unnamed"] += 1
@@ -120,18 +115,3 @@ class HandSeat:
         """Leave the report in the run's folder, if anything came."""
         if self._samples or self._refused:
             write_whole(folder / INPUTS_FILE, json.dumps(self.report(), indent=2) + "\n")
-
-
-async def accept(device: WebSocket) -> bool:
-    """Accept a device's connection, but for that of another site's page; return whether it was accepted."""
-    if not is_same_origin(device, browsers_only=False):
-        await device.close(POLICY_VIOLATION)
-        return False
-    await device.accept()
-    return True
-
-
-async def refuse(device: WebSocket, reason: str, code: int = TRY_AGAIN_LATER) -> None:
-    """Tell a device that was accepted why it cannot lead the hand, and close its connection."""
-    await send_json(device, {"refused": reason})
-    await close(device, code, reason if len(reason.encode()) <= LONGEST_REASON else "")

@@ -138,8 +138,10 @@ class LivePage:
         if self.shown is not None and self.shown.seat is not None:
             await self.shown.seat.connection(device)
         elif await accept(device):
-            has_begun = self.shown is not None and self.shown.scene is not None
-            await refuse(device, _NO_HAND if has_begun else _NO_RUN, POLICY_VIOLATION)
+            if self.shown is not None and self.shown.scene is not None:
+                await refuse(device, _NO_HAND, POLICY_VIOLATION)
+            else:
+                await refuse(device, _NO_RUN)
 
     async def greet(self, page: WebSocket) -> None:
         """Tell a page that has connected what is shown."""

@@ -28,9 +28,9 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.cosim.exceptions import RecordNotWritten
 from handover.scenarios.live.connections import (
-    REFUSAL_PERIOD,
     BinaryMessage,
     MessageRate,
+    RefusalTimer,
     close,
     receive_text,
     send,
@@ -124,7 +124,7 @@ class StudySeat:
             await self._leave(VoidCause.SERVER_ENDED.value)
 
     async def _listen(self, page: WebSocket) -> None:
-        rate, last_told = MessageRate(), 0.0
+        rate, timer = MessageRate(), RefusalTimer()
         while True:
             try:
                 fault, text = "", await receive_text(page)
@@ -136,8 +136,7 @@ class StudySeat:
                 await close(page, TOO_MANY)
                 return
             if count > page_messages.MOST_A_SECOND:
-                if time.monotonic() - last_told >= REFUSAL_PERIOD:
-                    last_told = time.monotonic()
+                if timer.is_due("rate"):
                     await self._send({"refused": too_many(page_messages.MOST_A_SECOND)})
                 continue
             try:

@@ -4,21 +4,20 @@ With a token the path is below it, as the page's is. One tracker at a time leads
 has chosen it; its samples between two runs are passed over. At each run's start it is told where the hand is.
 """
 
-import time
-
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.scenarios.live.connections import (
     POLICY_VIOLATION,
-    REFUSAL_PERIOD,
     BinaryMessage,
     MessageRate,
+    RefusalTimer,
+    accept,
     receive_text,
+    refuse,
     send_json,
     too_many,
 )
 from handover.scenarios.live.hand_messages import HandSample, InvalidHandMessage, hand_start
-from handover.scenarios.live.hand_seat import accept, refuse
 from handover.scenarios.study.plan.led_hands import led_hand_of, round_parameters
 from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session.seat import StudySeat
@@ -57,7 +56,7 @@ class TrackerSeat:
             await self._seat.tracker_came(there=False)
 
     async def _follow(self, tracker: WebSocket) -> None:
-        rate, last_told = MessageRate(), 0.0
+        rate, timer = MessageRate(), RefusalTimer()
         while True:
             try:
                 fault, text = "", await receive_text(tracker)
@@ -71,6 +70,5 @@ class TrackerSeat:
                     raise InvalidHandMessage(fault)
                 self._seat.lead_by_tracker(text)
             except InvalidHandMessage as e:
-                if time.monotonic() - last_told >= REFUSAL_PERIOD:
-                    last_told = time.monotonic()
+                if timer.is_due(str(e).partition(":")[0]):
                     await send_json(tracker, {"refused": str(e)})

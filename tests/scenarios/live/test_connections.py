@@ -17,7 +17,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live.commands import InvalidCommand, parse_command
-from handover.scenarios.live.connections import HEADERS, MessageRate
+from handover.scenarios.live.connections import HEADERS, MessageRate, RefusalTimer
 from handover.scenarios.live.hand_messages import HandSample
 from handover.scenarios.live.hand_seat import HandSeat
 from handover.scenarios.live.live_page import LivePage
@@ -166,3 +166,14 @@ def test_messages_are_counted_over_a_second():
 def test_deep_json_is_no_command():
     with pytest.raises(InvalidCommand, match="not JSON"):
         parse_command('{"command":' + "[" * 90_000, 100_000)
+
+
+def test_of_refusals_of_one_kind_two_a_second_are_told_and_those_of_another_besides():
+    now = [3.0]
+    timer = RefusalTimer(lambda: now[0])
+    told: list[tuple[float, str]] = []
+    for k in range(20):
+        now[0] = 3.0 + 0.1 * k
+        told += [(round(0.1 * k, 1), kind) for kind in ("stamp", "p_WH")[: 1 + (k % 4 == 3)] if timer.is_due(kind)]
+    assert [t for t, kind in told if kind == "stamp"] == [0.0, 0.5, 1.0, 1.5]
+    assert [t for t, kind in told if kind == "p_WH"] == [0.3, 1.1, 1.9]

@@ -95,17 +95,40 @@ def test_a_stamp_far_ahead_is_refused_and_the_next_one_taken():
     stream.take(text(stamp=125.5))
 
 
-def test_a_device_whose_clock_is_set_is_refused_once():
+@pytest.mark.parametrize(("first", "then"), [(5.0, 3605.0), (3605.0, 5.0), (1e12, 5.0)])
+def test_a_device_whose_clock_is_set_is_refused_once(first: float, then: float):
+    now = [100.0]
+    stream = HandStream(LED, lambda: now[0])
+    stream.take(text(stamp=first))
+    now[0] += 0.1
+    with pytest.raises(InvalidHandMessage, match="stamp"):
+        stream.take(text(stamp=then))
+    for k in range(1, 4):
+        now[0] += 0.1
+        _, at = stream.take(text(stamp=then + 0.1 * k))
+        assert at == pytest.approx(now[0])
+
+
+def test_stamps_that_stray_one_at_a_time_are_refused_and_all_others_taken():
+    now = [100.0]
+    stream = HandStream(LED, lambda: now[0])
+    for k in range(40):
+        now[0] += 1.0
+        if k % 9 == 8:
+            with pytest.raises(InvalidHandMessage, match="stamp"):
+                stream.take(text(stamp=5e5 + k))
+        else:
+            stream.take(text(stamp=float(k)))
+
+
+def test_samples_that_come_again_are_refused_however_many():
     now = [100.0]
     stream = HandStream(LED, lambda: now[0])
     stream.take(text(stamp=5))
-    now[0] += 0.1
-    with pytest.raises(InvalidHandMessage, match="stamp"):
-        stream.take(text(stamp=3605))
-    for k in range(1, 4):
+    for stamp in (4.8, 4.9, 5.0):
         now[0] += 0.1
-        _, at = stream.take(text(stamp=3605 + 0.1 * k))
-        assert at == pytest.approx(now[0])
+        with pytest.raises(InvalidHandMessage, match="is not after the one before, 5 s"):
+            stream.take(text(stamp=stamp))
 
 
 def test_a_flood_is_refused_until_it_ebbs():
