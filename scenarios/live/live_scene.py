@@ -31,32 +31,63 @@ from handover.scenarios.results.tolerated_faults import ToleratedFaults
 _AROUND = 0.25
 """Room around what is drawn at first, as a share of its longest side: things move."""
 _MAX_CURVES = 9
-
-
 _MAX_ROWS = 4000
-"""Rows of the past that are kept; where there are more, every second is dropped: what was computed of one row and the
-one before it, as the mean of a step, then has errors."""
+"""Rows of the past that are kept: what is computed of one row and the one before it, as the mean of a step, has errors
+where rows between them are left out."""
+
+Row = tuple[float, list[NDArray[Any]]]
+"""Time in s, and the values of a row of a growing record."""
+
+
+class ThinnedRows:
+    """Of rows that come one after the other every n-th and the newest, n such that they are no more than so many.
+
+    Args:
+        most: rows that are kept, and the newest besides.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most, self._every, self._count = most, 1, 0
+        self._kept: list[Row] = []
+        self._newest: list[Row] = []
+
+    def add(self, rows: Sequence[Row]) -> None:
+        """Add the rows that have come."""
+        for row in rows:
+            self._newest = [row]
+            if self._count % self._every == 0:
+                self._kept.append(row)
+                self._newest = []
+                if len(self._kept) > self._most:
+                    self._newest = self._kept[-1:] if len(self._kept) % 2 == 0 else []
+                    del self._kept[1::2]
+                    self._every *= 2
+            self._count += 1
+
+    @property
+    def rows(self) -> Sequence[Row]:
+        """What is kept, in the order in which it came."""
+        return [*self._kept, *self._newest]
 
 
 class History(Record):
-    """The rows of a growing record until now, as a record over time: plots are made of them.
+    """The rows of a growing record until now, evenly thinned, as a record over time: plots are made of them.
 
     Those are left out that came while nobody looked, and were flushed to the disk meanwhile.
     """
 
     def __init__(self, record: GrowingRecord) -> None:
         vars(self).update(vars(record))
-        self._record, self._seen = record, list(record.unseen)
+        self._record, self._thinned = record, ThinnedRows(_MAX_ROWS)
         self._stacked: dict[str, NDArray[Any]] = {}
-        self.time = np.array([t for t, _ in self._seen])
+        self.add()
 
     def add(self) -> None:
         """Add the growing record's newest row, and those that came since the one before."""
-        self._seen += self._record.unseen
-        while len(self._seen) > _MAX_ROWS:
-            self._seen = self._seen[::-2][::-1]
+        self._thinned.add(self._record.unseen)
+        self._rows = self._thinned.rows
         self._stacked.clear()
-        self.time = np.array([t for t, _ in self._seen])
+        self.time = np.array([t for t, _ in self._rows])
 
     def _metadata(self, signal: str) -> dict[bytes, bytes]:
         return self._record.metadata(signal)
@@ -66,7 +97,7 @@ class History(Record):
             return self.time
         if name not in self._stacked:
             part, index = self._record.places[name]
-            self._stacked[name] = np.array([row[part][index] for _, row in self._seen])
+            self._stacked[name] = np.array([row[part][index] for _, row in self._rows])
         return self._stacked[name]
 
 

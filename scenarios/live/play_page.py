@@ -213,7 +213,8 @@ class PlayPage(LivePage):
         while not run.has_ended:
             await asyncio.sleep(_POLL)
         if run.is_refused:
-            self._faults = {named_in(run.error, self._session.names): without_call(run.error)}
+            # what is wrong with what was changed since then is told besides
+            self._faults = {named_in(run.error, self._session.names): without_call(run.error), **self._faults}
             self._runs.remove(run)
             await self.tell(self._about_choice())
         self._release(run)

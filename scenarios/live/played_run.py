@@ -18,6 +18,7 @@ from handover.cosim.master.live_control import LiveControl
 from handover.scenarios.execution.input_sources import recorded_input_names
 from handover.scenarios.execution.python_process import code_command
 from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.live.process import CONTROL_FILE
 from handover.scenarios.live.waiting_command import WaitingCommand
 from handover.scenarios.live.watched_run import WatchedRun
@@ -96,7 +97,7 @@ class PlayedRun:
         """Whether a hand's inputs come from outside in it."""
         try:
             return self.watched.led_hand() is not None
-        except InvalidRunFolder:  # it has not begun
+        except (InvalidRunFolder, InvalidParameter):  # it has not begun, or was made by other units
             return False
 
     @property

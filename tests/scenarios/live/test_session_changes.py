@@ -1,10 +1,12 @@
 """What a session shows changes one after the other, by however many pages it is asked at once."""
 
 import asyncio
+import subprocess
 from pathlib import Path
 
 import pytest
 
+from handover.scenarios.execution.python_process import code_command
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.live.play_page import PlayPage, Session
 from handover.scenarios.live.played_run import Choice, PlayedRun
@@ -34,6 +36,13 @@ class Counted(PlayPage):
         await asyncio.sleep(0.05)  # as a run takes time to end
         await super()._end_last()
 
+    async def refuse_late(self, run: PlayedRun, later: dict[str, str]) -> dict[str, str]:
+        """Show a run that was refused, once a later choice has faults; return all that is told."""
+        self._runs.append(run)
+        self._faults = later
+        await self._show_run(run)
+        return self._faults
+
     async def ask_at_once(self, run: PlayedRun) -> None:
         await asyncio.gather(*(self._show_again(run) for _ in range(3)))
         await asyncio.sleep(0.05)
@@ -41,7 +50,8 @@ class Counted(PlayPage):
 
 def test_a_command_waits_where_pandas_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "pandas.py").write_text("raise ModuleNotFoundError('not installed', name='pandas')\n")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.syspath_prepend(tmp_path)
+    assert subprocess.run(code_command("import pandas"), capture_output=True, check=False).returncode == 1
     waiting = WaitingCommand(SCENARIO)
     waiting.call(["list", "--help"])
     assert waiting.process.wait(60.0) == 0, waiting.last_error
@@ -64,3 +74,21 @@ def test_of_several_runs_that_are_shown_again_at_once_the_last_one_is_shown_alon
         assert not run.controls.exists()
 
     asyncio.run(work())
+
+
+def test_what_a_run_was_refused_for_is_told_beside_what_is_wrong_with_a_later_choice(tmp_path: Path):
+    session = Session("", RunRequest(subject=SCENARIO), [], ["noise", "shift"], False, False, [], tmp_path, 2.0)
+
+    async def work() -> dict[str, str]:
+        page = Counted(session)
+        waiting = WaitingCommand(SCENARIO)
+        run = PlayedRun(1, Choice(parameters={"no_such": "1"}), SCENARIO, [], tmp_path / "001", 1.0, waiting)
+        faults = await page.refuse_late(run, {"shift": "later"})
+        run.close()
+        page.end()
+        await page.work()
+        return faults
+
+    faults = asyncio.run(work())
+    assert faults.pop("shift") == "later"
+    assert ["no_such" in text for text in faults.values()] == [True]

@@ -2,7 +2,9 @@
 // has one of begun, state, time with phase, plots, pictures, ended, refused; and after each time the places of all that is drawn,
 // as 64-bit floats. Other scripts of a page use:
 //   live.send(command, value)   sends a command
-//   live.on(name, act)          calls act(value) when an object comes that has the name; "shown" when a run's scene is there
+//   live.on(name, act)          calls act(value) when an object comes that has the name; "shown" when a run's scene is there,
+//                               "lost" when the connection has ended
+//   live.isUnderWay             whether a run goes on, as far as is known here
 //   live.scene, live.run        of the run that is shown: its scene, and what was told as it began
 //   live.session                set by the page of a session of runs, whose connection outlasts them
 //   live.hand                   the hand that is led in it, see handInput; null or undefined where none is
@@ -15,8 +17,9 @@ const live = (() => {
   const chosen = [], listeners = {};
   const api = {
     scene: null, run: null, session: false, send, on(name, act) { (listeners[name] ??= []).push(act); }, get hand() { return lead?.hand; },
+    get isUnderWay() { return Boolean(api.run) && !over && !isLost; },
   };
-  let viewport = null, slots = [], size = 0, paused = true, link = null, over = false, lead = null, side = null;
+  let viewport = null, slots = [], size = 0, paused = true, link = null, over = false, isLost = false, lead = null, side = null;
 
   // Puts the scene of a run in the place of the one before, seen from where that was seen, unless a hand is led only now.
   function beginRun(run) {
@@ -245,6 +248,8 @@ const live = (() => {
   });
   // The server of a single run ends with it; that of a session goes on until somebody ends it.
   link.addEventListener("close", ({code, reason}) => {
+    isLost = true;
+    for (const act of listeners.lost ?? []) act();
     if (over && !api.session && code !== 1013) return;
     const [of, why] = api.session ? ["session", "its command has ended, and what its runs recorded is in their folders"]
       : ["run", "what serves this page has ended, and the run goes on without it"];

@@ -60,13 +60,13 @@
     live.send("push", null);
   }
 
-  for (const name of ["begun", "ended"]) live.on(name, release);
+  for (const name of ["begun", "ended", "lost"]) live.on(name, release);
   live.on("shown", () => {
     const element = root.querySelector(".replay-scene");
     if (!element || !live.run.pushes.length) return;
     // Before the scene's own controls, which else turn the view.
     element.addEventListener("pointerdown", event => {
-      const body = event.isPrimary && event.button === 0 && !root.dataset.ended && bodyAt(event);
+      const body = event.isPrimary && event.button === 0 && live.isUnderWay && bodyAt(event);
       if (!body) return;
       event.stopPropagation();
       const at = [event.clientX, event.clientY], drawing = svg("svg", {class: "push-arrow"});
@@ -79,7 +79,7 @@
     }, true);
     element.addEventListener("pointermove", event => {
       if (!pushed) {
-        const isOffered = event.pointerType === "mouse" && !event.buttons && !root.dataset.ended;
+        const isOffered = event.pointerType === "mouse" && !event.buttons && live.isUnderWay;
         element.classList.toggle("can-push", isOffered && Boolean(bodyAt(event)));
         return;
       }
