@@ -129,6 +129,7 @@ class ControlledPacer(Pacer):
         self._first: float = control.pace
         self._current: float = control.pace
         self._changed = False
+        self._has_begun = False  # whether a deadline has been waited for
         self._last = 0.0
 
     @property
@@ -136,7 +137,9 @@ class ControlledPacer(Pacer):
         """The report since the last change of pace, or the last pause."""
         if not self._changed:
             return super().report
-        return replace(super().report, pace=_told(self._current), changed=True, first=_told(self._first))
+        return replace(
+            super().report, pace=_finite_or_none(self._current), changed=True, first=_finite_or_none(self._first)
+        )
 
     def wait(self, t: float, ended: Callable[[], bool]) -> None:
         """Wait until simulated time t in seconds is due by the controls, or until `ended()` says that the run ends."""
@@ -152,13 +155,17 @@ class ControlledPacer(Pacer):
             if waited:
                 break
             if control.pace != self._current:
-                self._current, self._changed = control.pace, True
+                self._current = control.pace
+                if self._has_begun:
+                    self._changed = True
+                else:  # set before the run has waited for anything: it never went at another one
+                    self._first = self._current
                 self.restart(_finite(self._current), self._last)
             if math.isinf(self._current) or self._is_due(t, ended):
                 break
         if waited:
             self.restart(_finite(self._current), t)
-        self._last = t
+        self._last, self._has_begun = t, True
 
     def _is_due(self, t: float, ended: Callable[[], bool]) -> bool:
         """Wait until t is due; return whether it is, and not paused or at another pace before."""
@@ -177,7 +184,7 @@ def _positive(pace: float) -> float:
     return pace
 
 
-def _told(pace: float) -> float | None:
+def _finite_or_none(pace: float) -> float | None:
     return pace if math.isfinite(pace) else None
 
 

@@ -181,3 +181,15 @@ def test_the_report_of_a_pace_that_was_changed_says_so_and_what_it_was_at_first(
     control.pace = 100.0
     pacer.wait(0.03, lambda: False)
     assert (pacer.report.first, pacer.report.pace, pacer.report.deadlines) == (50.0, 100.0, 1)
+
+
+def test_a_pace_that_is_set_before_the_run_begins_is_no_change_on_the_way():
+    control = LiveControl.in_memory(1.0)
+    pacer = ControlledPacer(control)
+    pacer.start(0.0)
+    control.pace = 50.0
+    pacer.wait(0.01, lambda: False)
+    assert (pacer.report.pace, pacer.report.deadlines, pacer.report.changed) == (50.0, 1, False)
+    control.pace = 100.0
+    pacer.wait(0.02, lambda: False)
+    assert (pacer.report.first, pacer.report.pace, pacer.report.changed) == (50.0, 100.0, True)
