@@ -61,10 +61,14 @@ def _mismatch_of(units: Mapping[str, PlacedUnit], suffix: str, whose: str) -> li
     if robot is not None:
         parts += [f"{whose} {text}" for controller in controllers for text in _unlike(robot, controller)]
     late = sum(_number(u, "delay") for u in (thrusters, units.get(f"navigation{suffix}")))
+    knew: dict[float, list[str]] = {}
+    for c in controllers:
+        if "delay" in c.description.parameters and abs((known := _number(c, "delay")) - late) > _TIME:
+            knew.setdefault(known, []).append(c.name)
     parts += [
-        f"{whose} thrust followed its state {1000.0 * late:.3g} ms late, of which {c.name} knew {1000.0 * known:.3g} ms"
-        for c in controllers
-        if "delay" in c.description.parameters and abs((known := _number(c, "delay")) - late) > _TIME
+        f"{whose} thrust followed its state {1000.0 * late:.3g} ms late, of which {' and '.join(names)} knew "
+        f"{1000.0 * known:.3g} ms"
+        for known, names in knew.items()
     ]
     return list(dict.fromkeys(parts))
 

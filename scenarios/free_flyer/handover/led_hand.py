@@ -19,6 +19,8 @@ NEVER_TRACKED = 1e6
 _OF_SIMULATED_PERSON = ("skill", "sight_error", "depth_error", "interface_delay")
 """Parameters that only a simulated person has; strength is also the force at which any arm yields."""
 _PERSON = ("person", "PERSON", int(Driver.PERSON))
+_FASTEST = 10.0
+"""Speed of a hand, m/s, above which its track is taken for broken (assumed): a fast reach makes about 5 m/s."""
 _MILLIMETRES = 10.0
 """Metres from which positions are taken for millimetres, if they are within reach as such (assumed)."""
 
@@ -108,10 +110,13 @@ def _faults(track: HandTrack, stop: float) -> list[str]:
         else:
             unit = ""
         faults.append(f"{text} and an arm reaches {reach:g} m from there{unit}")
-    steps = np.linalg.norm(np.diff(p_WH, axis=0), axis=1)
-    if len(steps) and (far := float(np.max(steps))) > 2.0 * reach:
-        t = track.times[int(np.argmax(steps)) + 1]
-        faults.append(f"the hand jumps by {far:.3g} m to its place at {t:g} s, and an arm reaches {reach:g} m")
+    ways, times = np.linalg.norm(np.diff(p_WH, axis=0), axis=1), np.array(track.times)
+    for k in np.flatnonzero(ways > _FASTEST * np.diff(times))[:1].tolist():
+        way, dt, t = float(ways[k]), float(times[k + 1] - times[k]), float(times[k + 1])
+        faults.append(
+            f"the hand jumps by {way:.3g} m within {dt:.3g} s to its place at {t:g} s: no hand is faster than "
+            f"{_FASTEST:g} m/s"
+        )
     if not any(pose.closed for pose in track.poses):
         faults.append("closed is 1 in none of its rows: the hand never holds anything")
     return faults
