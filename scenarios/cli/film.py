@@ -15,6 +15,7 @@ from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.cli.options import FiniteRange
 from handover.scenarios.execution.errors import FilmFailed, UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.film import LARGEST, SMALLEST
 from handover.scenarios.results.run_folder import RunFolder, check_place
 
 if TYPE_CHECKING:
@@ -28,7 +29,6 @@ takes some seconds for each second of the film; on the report's page, "record a 
 _SUFFIXES = (".mp4", ".webm", ".gif")
 _VIEWS = ("start", "front", "side", "top", "follow")
 _GIF_FPS, _FPS, _FASTEST_GIF = 15.0, 30.0, 50.0
-_SMALLEST, _LARGEST = 240, 7680
 
 
 class Size(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (generic in newer versions only)
@@ -40,9 +40,9 @@ class Size(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (gene
         """Return width and height."""
         found = re.fullmatch(r"(\d{1,5})[x×](\d{1,5})", str(value))
         size = (int(found[1]), int(found[2])) if found else (0, 0)
-        if any(n % 2 or not _SMALLEST <= n <= _LARGEST for n in size):
+        if any(n % 2 or not SMALLEST <= n <= LARGEST for n in size):
             self.fail(
-                f"{value!r} is no size, such as 1280x720: two even numbers from {_SMALLEST} to {_LARGEST}", param, ctx
+                f"{value!r} is no size, such as 1280x720: two even numbers from {SMALLEST} to {LARGEST}", param, ctx
             )
         return size
 

@@ -35,6 +35,8 @@ from handover.scenarios.execution.progress import log_told, progress_bar
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.experiment.live_inputs import inputs_of_pushes
+from handover.scenarios.results.run_facts import whole_record_of
+from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.task import InputSources, Task
 
 _option = partial(click.option, cls=HeadedOption, heading="Of FILE.ssp and FILE.fmu")
@@ -200,7 +202,20 @@ def run(
             click.echo("nobody leads the hand, which stays where it is: --live lets a page lead it", err=True)
         with progress_bar(sys.stderr) as progress:
             result = run_task(task, progress, interruption, control=control, observer=observer)
+        if request.sources is not None:
+            _tell_end_of_inputs(task.folder, float(request.sources.told["until"]))
     exit_with(result, task, json_to=json_to)
+
+
+def _tell_end_of_inputs(folder: RunFolder, until: float) -> None:
+    """Say so if a run went on after the end of the inputs that it was given, at `until`, s."""
+    record = whole_record_of(folder)
+    if record is not None and len(record.time) and float(record.time[-1]) > until:
+        click.echo(
+            f"the recorded inputs end at {until:.6g} s, and the run went on until {float(record.time[-1]):.6g} s: "
+            "from then on they stayed as they were",
+            err=True,
+        )
 
 
 def _check_webcam(folder: Path, *, live: bool) -> None:

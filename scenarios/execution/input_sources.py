@@ -32,7 +32,8 @@ def played_back(path: Path) -> InputSources:
         raise InvalidRunFolder(path, "it has no record of its inputs from outside")
     if lacking := [name for name in names if name not in record]:
         raise InvalidRunFolder(path, f"its record lacks inputs from outside: {', '.join(lacking)}")
-    told = {"from": "run", "folder": str(folder.path), "sha256": sha256_of(folder.signals)}
+    until = float(record.time[-1])
+    told = {"from": "run", "folder": str(folder.path), "sha256": sha256_of(folder.signals), "until": until}
     series = {name: record.series(name) for name in names}
     return InputSources(series, told, where=f"inputs from {path}", is_complete=True)
 
@@ -84,7 +85,7 @@ def resumed_inputs(
         instead = f"begin it once more with --inputs-from {folder.path}, which gives it those that it recorded"
         raise InvalidRunFolder(folder.path, f"{text}; {instead}")
     sources = played_back(Path(told["folder"]))
-    if sources.told != told:
+    if sources.told != {**sources.told, **told}:
         raise InvalidRunFolder(folder.path, f"the record of {told['folder']}, whose inputs it took, is another one")
     return sources
 
@@ -119,7 +120,9 @@ def give_inputs(system: System, inputs: InputSources | None) -> None:
     if inputs is None:
         return
     own = external_inputs(system)
-    faults = [fault for name, source in inputs.sources.items() if (fault := _fault(system, own, name, source))]
+    unknown = [name for name in inputs.sources if name not in own]
+    faults = [_fault_of_unknown(unknown, own, inputs.told)] if unknown else []
+    faults += [fault for name, end in own.items() if (fault := _fault(system, end, inputs.sources.get(name)))]
     if inputs.is_complete:
         lacking = [name for name in own if name not in inputs.sources]
         faults += [f"{name}: comes from outside in this run, and did not in the recorded one" for name in lacking]
@@ -134,11 +137,18 @@ def external_inputs(system: System) -> dict[str, PortName]:
     return {f"{unit}.{name}": PortName(unit, name) for unit, names in system.externals.items() for name in names}
 
 
-def _fault(system: System, own: Mapping[str, PortName], name: str, source: ExternalSource) -> str | None:
-    """Return why an input of a system does not take values from a source, or None."""
-    if name not in own:
-        return f"{name}: this run takes no values from outside for it" + (f"; {nearest(name, own)}" if own else "")
-    end = own[name]
+def _fault_of_unknown(names: Sequence[str], own: Mapping[str, PortName], told: Mapping[str, Any]) -> str:
+    """Return what is wrong with values for inputs that do not come from outside, and what would be right."""
+    parts = [f"{', '.join(names)}: this run takes no values from outside for {'it' if len(names) == 1 else 'them'}"]
+    if own:
+        parts += [nearest(name, own) for name in names]
+    if told.get("from") == "run":
+        parts.append(f"with which parameters the recorded run takes them is in {Path(told['folder']) / 'run.json'}")
+    return "; ".join(parts)
+
+
+def _fault(system: System, end: PortName, source: ExternalSource | None) -> str | None:
+    """Return why an input from outside does not take values from a source, if it is given one."""
     port = system.units[end.unit].description.inputs.get(end.port)
     fault = source.fault(port) if isinstance(source, TimeSeries) and port is not None else None
-    return None if fault is None else f"{name}: {fault}"
+    return None if fault is None else f"{end.unit}.{end.port}: {fault}"

@@ -1,6 +1,5 @@
 """Films a run: frame after frame is drawn and encoded, at a pace of simulated seconds a second."""
 
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.scenarios.film import LARGEST
 from handover.scenarios.film.browser import open_camera, window_of
 from handover.scenarios.film.encoder import film_to
 from handover.scenarios.film.film_page import FilmContent, NotFilmed, film_html, most_plots
@@ -74,7 +74,13 @@ def _check_room(content: FilmContent, size: tuple[int, int]) -> None:
     most = most_plots(window_of(size)[0], scene=scene)
     if count <= most:
         return
-    cure = f"--size {width}x{_height_for(count, size, scene=scene)} has room for {'it' if count == 1 else 'them'}"
+    needed = _height_for(count, size, scene=scene)
+    if needed is None:
+        raise NotFilmed(
+            f"{count} plots do not fit into {width} pixels of width at any height up to {LARGEST}; choose fewer by "
+            "--plot"
+        )
+    cure = f"--size {width}x{needed} has room for {'it' if count == 1 else 'them'}"
     if most == 0:
         fault = "1 plot does not" if count == 1 else f"{count} plots do not"
         raise NotFilmed(f"{fault} fit into {width}x{height} pixels; {cure}, --no-plots shows the scene alone")
@@ -82,9 +88,13 @@ def _check_room(content: FilmContent, size: tuple[int, int]) -> None:
     raise NotFilmed(f"{count} plots do not fit into {width}x{height} pixels, {fit}; {cure}")
 
 
-def _height_for(count: int, size: tuple[int, int], *, scene: bool) -> int:
-    """Return the least height with room for some plots, px, if the size's width and scale of letters are kept."""
+def _height_for(count: int, size: tuple[int, int], *, scene: bool) -> int | None:
+    """Return the least height with room for some plots, px, if the size's width and scale of letters are kept.
+
+    None if no film is as high.
+    """
     scale = window_of(size)[1]
-    heights = itertools.count(size[1], 2)  # a film's sizes are even
+    heights = range(size[1], LARGEST + 1, 2)  # a film's sizes are even
     windows = ((height, *window_of((size[0], height))) for height in heights)
-    return next(h for h, window, its in windows if its >= scale and most_plots(window, scene=scene) >= count)
+    fitting = (h for h, window, its in windows if its >= scale and most_plots(window, scene=scene) >= count)
+    return next(fitting, None)

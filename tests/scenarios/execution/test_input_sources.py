@@ -130,7 +130,10 @@ def test_a_system_wired_in_python_is_played_back(tmp_path: Path):
             ["flyer_robot_to_human", "-p", "hand=outside"],
             "person.age: comes from outside in this run, and did not in the recorded one",
         ),
-        (["flyer_robot_to_human"], "mass.f: this run takes no values from outside for it"),
+        (
+            ["flyer_robot_to_human"],
+            "mass.f: this run takes no values from outside for it; with which parameters the recorded run takes them",
+        ),
     ],
 )
 def test_a_run_that_lacks_inputs_is_refused_before_anything_is_written(tmp_path: Path, given: list[str], why: str):
@@ -140,6 +143,15 @@ def test_a_run_that_lacks_inputs_is_refused_before_anything_is_written(tmp_path:
     assert told.exit_code == 2
     assert why in told.output
     assert not out.exists()
+
+
+def test_a_run_that_goes_on_after_its_recorded_inputs_says_when_they_end(tmp_path: Path):
+    given = ["flyer_robot_to_human", "-p", "hand=outside", "--no-report", "--stop"]
+    assert CliRunner().invoke(run_command, [*given, "0.4", "--out", str(tmp_path / "led")]).exit_code == 1
+    for stop, goes_on in (("0.4", False), ("0.8", True)):
+        again = [*given, stop, "--inputs-from", str(tmp_path / "led"), "--out", str(tmp_path / f"until {stop}")]
+        output = CliRunner().invoke(run_command, again).output
+        assert ("the recorded inputs end at 0.4 s, and the run went on until 0.8 s" in output) is goes_on
 
 
 def test_a_folder_without_inputs_from_outside_is_refused(tmp_path: Path):

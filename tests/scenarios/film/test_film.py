@@ -159,6 +159,10 @@ def test_a_run_without_a_scene_is_filmed_by_its_plots(tmp_path: Path):
         (["--plot", "scene.q", "--no-plots"], "--plot and --no-plots contradict each other"),
         (["--size", "320x240", *(f"--plot=scene.q[{k}]" for k in (1, 2, 3))], "1 does; --size 320x780 has room for"),
         (["--size", "240x240", "--plot=scene.q[1]"], "1 plot does not fit into 240x240 pixels; --size 240x260 has"),
+        (
+            ["--size", "3840x2160", *(f"--plot=scene.{q}[{k}]" for q in ("q", "q_meas") for k in range(1, 9))],
+            "16 plots do not fit into 3840 pixels of width at any height up to 7680; choose fewer by --plot",
+        ),
         (["--size", "641x360"], "'641x360' is no size, such as 1280x720"),
         (["--size", "wide"], "'wide' is no size"),
         (["--out", "x.avi"], "x.avi: a film's name ends with .mp4, .webm or .gif"),
