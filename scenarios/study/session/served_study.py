@@ -66,24 +66,22 @@ async def serve_study(
     devices = devices_here(plan, webcam)
     if not devices:
         raise NotServed("the plan has no device but a webcam, which needs --webcam FOLDER")
-    study = StudyFolder.opened(out, plan)
-    with study.held():
+    try:
+        listening = listening_socket(host, port)
+    except OSError as e:
+        raise NotServed(f"--host {host} --port {port}: it cannot listen there: {e.strerror or e}") from e
+    with listening, (study := StudyFolder.opened(out, plan)).held():
         seat = StudySeat(Protocol(study, devices, number), pace, {} if webcam is None else webcam.hashes())
         server = StudyServer(seat, host, webcam, photodiode=photodiode)
-        try:
-            listening = listening_socket(host, port)
-        except OSError as e:
-            raise NotServed(f"--host {host} --port {port}: it cannot listen there: {e.strerror or e}") from e
         seat.on_round_end = lambda planned, ended: tell(line_of_round(plan, seat.protocol.number, planned, ended))
-        with listening:
-            address = address_of(listening, server)
-            tell(f"study: {address}  (results in {out}; Ctrl-C ends it)")
-            if TRACKER in plan.devices:
-                tell(f"a hand tracker connects to {address.replace('http', 'ws', 1)}hand")
-            if pilot:
-                await _with_pilots(server, listening, address, tell)
-            else:
-                await uvicorn_server(server).serve(sockets=[listening])
+        address = address_of(listening, server)
+        tell(f"study: {address}  (results in {out}; Ctrl-C ends it)")
+        if TRACKER in plan.devices:
+            tell(f"a hand tracker connects to {address.replace('http', 'ws', 1)}hand")
+        if pilot:
+            await _with_pilots(server, listening, address, tell)
+        else:
+            await uvicorn_server(server).serve(sockets=[listening])
 
 
 async def _with_pilots(
