@@ -167,10 +167,11 @@ def test_encoders_have_noise_and_the_truth_has_none():
 def test_joints_and_tension_are_measured_with_noise_of_their_own():
     p = replace(QUIET, joint_noise=0.02, tension_noise=0.3, wrist_noise=1e-3, mass_O=5.0)
     ys = course(p, 9.0)
-    errors = np.array([[*(y.q_meas - y.q), y.tension_meas - y.tension] for y in ys])
+    errors: Floats = np.array([np.append(y.q_meas - y.q, y.tension_meas - y.tension) for y in ys])
     np.testing.assert_allclose(np.std(errors, axis=0), [0.02] * 8 + [0.3], rtol=0.12)
     np.testing.assert_allclose(np.mean(errors, axis=0), 0.0, atol=0.03)
-    assert np.max(np.abs(np.corrcoef(errors.T) - np.eye(9))) < 0.2
+    shares = errors / np.std(errors, axis=0)
+    assert np.max(np.abs(shares.T @ shares / len(ys) - np.eye(9))) < 0.2
     plain = course(replace(QUIET, wrist_noise=1e-3, mass_O=5.0), 9.0)
     for y, z in zip(ys, plain, strict=True):
         np.testing.assert_array_equal(y.p_WH_meas, z.p_WH_meas)  # no other random numbers for the wrist

@@ -60,7 +60,7 @@ class OpenElements(HTMLParser):
         assert self.open.pop() == tag
 
 
-@pytest.mark.parametrize("name", sorted(p.name for p in PAGE.glob("*.html")))
+@pytest.mark.parametrize("name", sorted(p.relative_to(PAGE).as_posix() for p in PAGE.rglob("*.html")))
 def test_a_template_ends_what_it_begins(name: str):
     elements = OpenElements()
     elements.feed(re.sub(r"\{%.*?%\}|\{\{.*?\}\}", "", asset(name), flags=re.DOTALL))

@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import subprocess
 import sys
 import time
 import zipfile
@@ -24,6 +25,7 @@ from handover.scenarios.campaign.run_server import load_modules
 from handover.scenarios.campaign.table import row_of
 from handover.scenarios.campaign.worker import NotWanted, ServerLost, ServerProcess
 from handover.scenarios.cli.command import main
+from handover.scenarios.execution.python_process import code_command
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.run_folder import RunFolder
 
@@ -211,7 +213,8 @@ def test_runs_are_served_where_pandas_is_not_installed(tmp_path: Path, monkeypat
     absent = tmp_path / "absent"
     absent.mkdir()
     (absent / "pandas.py").write_text("raise ModuleNotFoundError(\"No module named 'pandas'\")\n")
-    monkeypatch.setenv("PYTHONPATH", str(absent))
+    monkeypatch.syspath_prepend(absent)
+    assert subprocess.run(code_command("import pandas"), capture_output=True, check=False).returncode == 1
     server = ServerProcess()
     try:
         assert server.run_job(job(tmp_path / "runs", "run", scenario="ir_grasp"), yes).lost == ""
