@@ -4,6 +4,7 @@ In the hand's frame H: origin at the wrist, x ahead, y to the left. The values a
 free: what they touch bends them otherwise.
 """
 
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -34,14 +35,18 @@ class SensorPoses(NamedTuple):
     slope: Floats
 
 
+@lru_cache(maxsize=8)  # asked several times in a round, at one closure
 def sensor_poses(sigma: float) -> SensorPoses:
-    """Return the poses of thumb's, index's and ring's sensor at a closure, by linear interpolation."""
+    """Return the poses of thumb's, index's and ring's sensor at a closure, by linear interpolation; read-only."""
     at = min(max(sigma / _STEP, 0.0), len(_TABLE) - 1.001)
     row = int(at)
     slope = _TABLE[row + 1] - _TABLE[row]
     pose = _TABLE[row] + (at - row) * slope
     n = np.column_stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])])
-    return SensorPoses(pose[:, :2], n, slope[:, :2] / _STEP)
+    poses = SensorPoses(pose[:, :2], n, slope[:, :2] / _STEP)
+    for values in poses:
+        values.flags.writeable = False
+    return poses
 
 
 def nominal_jacobian(sigma: float) -> Floats:

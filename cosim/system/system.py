@@ -147,9 +147,12 @@ class System:
         several units match, and two units of which nothing matches.
 
         Raises:
-            TypeError: an end is not a port, or not the outputs or inputs of a unit.
+            TypeError: an end is not a port, or not the outputs or inputs of a unit, or units are connected with a
+                transformation, which is for one connection.
         """
         if isinstance(source, PortNames) or isinstance(target, PortNames):
+            if transformation is not None:
+                raise TypeError("a transformation is for one connection: give unit.y.NAME and unit.u.NAME")
             return self._connect_matching(source, target)
         for end in (source, target):
             if not isinstance(end, PortName):  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -176,19 +179,22 @@ class System:
                 f"{a}.y -> {b}.u: no output has the name of an input; {a} has {', '.join(outputs) or 'no outputs'}, "
                 f"{b} {', '.join(inputs) or 'no inputs'}"
             )
+        left = dict(matched.left)
         for port in matched.connected:
             matches = self._matches[PortName(b, port)]
             if PortName(a, port) not in matches:
                 matches.append(PortName(a, port))
                 if len(matches) == 1:
                     self._connect(matches[0], PortName(b, port))
-        return matched
+            if matches[0] != PortName(a, port):
+                left[port] = f"{matches[0]} matches it, too"
+        return replace(matched, connected=tuple(port for port in matched.connected if port not in left), left=left)
 
     def _forget_matches(self, target: PortName) -> None:
         """Take back that an input was connected by its match, as something else is said of it."""
         if self._matches.pop(target, None):
             self.connections = [c for c in self.connections if c.target != target]
-            del self._sources[target.unit][target.port]
+            self._sources[target.unit].pop(target.port, None)  # several matches may be left, and none connected
 
     def disconnect(self, end: PortName) -> None:
         """Remove the connections of a port, and what it is set to or follows."""

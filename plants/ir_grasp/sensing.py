@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, Final
+from itertools import zip_longest
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -45,6 +46,9 @@ Capsule = tuple[Point, Point, float]
 
 Pose = tuple[float, float, float]
 """Position in m, and orientation in rad."""
+
+Reflection = tuple[float, float, float]
+"""What returns light to a sensor: distance in m, cosine of the angle of incidence, reflectivity."""
 
 PalmInView = tuple[float, float, float, float]
 """Position of a sensor's window from the wrist, in the palm's axes, in m; cosine and sine of the palm's orientation."""
@@ -139,28 +143,37 @@ class Sensing:
         """Return the ticks that a sensor's own light makes, before rounding."""
         p, solid, sensor = self._params, self._solid, self._sensors[finger]
         met = world.cast_rays(finger, self._rays, p.farthest)
-        if p.other_radius == 0.0 and not p.fingers_seen:
-            return sum(
-                sensor.ticks(h[0], h[1], solid.reflectivity * solid.faces[h[2]], p.gloss, p.gloss_exponent)
-                for h in met
-                if h is not None
-            ) / len(self._rays)
-        window, looks = world.sensor(finger)
-        at = world.other
-        other = None if at is None else (window[0] - at[0], window[1] - at[1])
-        before = _hand_before(finger, phalanges, window, looks, self._widening, p.farthest) if phalanges else []
-        palm = _palm_before(world, window, p.farthest) if phalanges else None
+        nearer: Sequence[Reflection | None] = ()
+        if p.other_radius > 0.0 or p.fingers_seen:
+            nearer = self._before_object(finger, world, phalanges, [p.farthest if h is None else h[0] for h in met])
         total = 0.0
-        for (c, s), hit in zip(self._rays, met, strict=True):
-            ray = c * looks[0] - s * looks[1], s * looks[0] + c * looks[1]
-            reach = p.farthest if hit is None else hit[0]
-            nearer = self._hidden_by(before, palm, other, window, ray, reach)
-            if nearer is not None:
-                total += sensor.ticks(*nearer)
+        for hit, hidden_by in zip_longest(met, nearer):
+            if hidden_by is not None:
+                total += sensor.ticks(*hidden_by)
             elif hit is not None:
-                rho = solid.reflectivity * solid.faces[hit[2]]
-                total += sensor.ticks(hit[0], hit[1], rho, p.gloss, p.gloss_exponent)
+                total += sensor.ticks(
+                    hit[0], hit[1], solid.reflectivity * solid.faces[hit[2]], p.gloss, p.gloss_exponent
+                )
         return total / len(self._rays)
+
+    def _before_object(
+        self, finger: int, world: GraspWorld, phalanges: Sequence[Pose], reaches: Sequence[float]
+    ) -> Sequence[Reflection | None]:
+        """Return what of second object and hand each ray of a sensor meets before its reach; nothing if none can."""
+        p = self._params
+        window, looks = world.sensor(finger)
+        beam = Beam(window, looks, self._widening, p.farthest)
+        at = world.other
+        other = None if at is None or not beam.may_meet(at, p.other_radius) else (window[0] - at[0], window[1] - at[1])
+        before = _hand_before(finger, phalanges, beam) if phalanges else []
+        palm = _palm_before(world, window, p.farthest) if phalanges else None
+        if other is None and palm is None and not before:
+            return ()
+        directions = [(c * looks[0] - s * looks[1], s * looks[0] + c * looks[1]) for c, s in self._rays]
+        return [
+            self._hidden_by(before, palm, other, window, ray, reach)
+            for ray, reach in zip(directions, reaches, strict=True)
+        ]
 
     def _hidden_by(
         self,
@@ -170,10 +183,10 @@ class Sensing:
         window: Point,
         ray: Point,
         reach: float,
-    ) -> tuple[float, float, float] | None:
-        """Return what a ray meets before `reach` of second object and hand: distance, cosine, reflectivity."""
+    ) -> Reflection | None:
+        """Return what a ray meets before `reach` of second object and hand."""
         p = self._params
-        met: list[tuple[float, float, float]] = []
+        met: list[Reflection] = []
         if other is not None:
             hit = self._disc.intersect(*other, *ray)
             if hit is not None:
@@ -203,16 +216,27 @@ def _errors(noise: Floats, rng: np.random.Generator) -> list[float]:
     return (noise * rng.standard_normal(noise.size)).tolist() if noise.any() else [0.0] * noise.size
 
 
-def _hand_before(
-    finger: int, phalanges: Sequence[Pose], window: Point, looks: Point, widening: float, reach: float
-) -> list[Capsule]:
-    """Return the phalanges that a sensor's beam, which widens so much on each side, may meet within reach."""
+class Beam(NamedTuple):
+    """A sensor's beam: window in m, unit vector in which it looks, tangent of half its angle, and reach in m."""
+
+    window: Point
+    looks: Point
+    widening: float
+    reach: float
+
+    def may_meet(self, middle: Point, size: float) -> bool:
+        """Return whether a ray of it may meet what is within `size` of a point, in m."""
+        v_x, v_y = middle[0] - self.window[0], middle[1] - self.window[1]
+        ahead, aside = v_x * self.looks[0] + v_y * self.looks[1], abs(v_x * self.looks[1] - v_y * self.looks[0])
+        return -size < ahead < self.reach + size and aside < 1.5 * size + self.widening * (ahead + size)
+
+
+def _hand_before(finger: int, phalanges: Sequence[Pose], beam: Beam) -> list[Capsule]:
+    """Return the phalanges that a finger's beam may meet."""
     found: list[Capsule] = []
     for i, length, radius, size in _BEFORE[finger]:
         x, y, angle = phalanges[i]
-        v_x, v_y = x - window[0], y - window[1]
-        ahead, aside = v_x * looks[0] + v_y * looks[1], abs(v_x * looks[1] - v_y * looks[0])
-        if -size < ahead < reach + size and aside < 1.5 * size + widening * (ahead + size):
+        if beam.may_meet((x, y), size):
             e_x, e_y = length / 2.0 * math.cos(angle), length / 2.0 * math.sin(angle)
             found.append(((x - e_x, y - e_y), (x + e_x, y + e_y), radius))
     return found

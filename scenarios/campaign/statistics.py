@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.stats import beta, binomtest, bootstrap, fisher_exact, wilcoxon
 
+from handover.cosim.blocks.ports import Floats
+
 LEVEL = 0.05
 """Of all tests; intervals are at 1 - LEVEL."""
 
@@ -126,6 +128,20 @@ def paired_test(first: Sequence[bool], second: Sequence[bool]) -> PairedTest:
     only_second = sum(b and not a for a, b in pairs)
     differ = only_first + only_second
     return PairedTest(only_first, only_second, float(binomtest(only_first, differ).pvalue) if differ else 1.0)
+
+
+def sign_flip_test(differences: Sequence[int]) -> float:
+    """Return the exact p-value, two-sided, that whole differences of independent pairs have a sum so far from 0.
+
+    If neither of two ways does better, each difference is as likely to have the other sign. What makes up a difference,
+    as several runs of one scene or one participant, may depend on each other as it likes. Where all are -1, 0 or 1,
+    this is McNemar's exact test.
+    """
+    shares: Floats = np.ones(1)  # probabilities of the sums, from the least on
+    for x in (abs(x) for x in differences if x):
+        shares = 0.5 * (np.pad(shares, (0, 2 * x)) + np.pad(shares, (2 * x, 0)))
+    sums = np.arange(len(shares)) - len(shares) // 2
+    return float(shares[np.abs(sums) >= abs(sum(differences))].sum())
 
 
 def two_proportions(successes: int, n: int, others: int, n_others: int) -> float:

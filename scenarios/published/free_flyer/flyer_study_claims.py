@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from handover.scenarios.campaign.statistics import LEVEL, success_interval, two_proportions
+from handover.scenarios.campaign.statistics import LEVEL, sign_flip_test, success_interval, two_proportions
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.parameters import Behaviour, Task
 from handover.scenarios.published.free_flyer.study_runs import (
@@ -15,7 +15,6 @@ from handover.scenarios.published.free_flyer.study_runs import (
     failures,
     interval_by_person,
     paired,
-    sign_flip_test,
 )
 from handover.scenarios.published.free_flyer.variations import TASKS, unfinished_note
 from handover.scenarios.published.published_experiment import Claim

@@ -119,18 +119,6 @@ def _succeeded(row: Row) -> bool:
     return succeeded([row]) == 1
 
 
-def sign_flip_test(differences: Sequence[int]) -> float:
-    """Return the exact p-value, two-sided, that differences of independent persons have a sum so far from 0.
-
-    If neither of two ways does better, each person's difference is as likely to have the other sign. Trials of one
-    person may depend on each other as they like: the persons are what is drawn.
-    """
-    sums: Floats = np.zeros(1)
-    for x in differences:
-        sums = np.concatenate([sums + x, sums - x])
-    return float(np.mean(np.abs(sums) >= abs(sum(differences))))
-
-
 def interval_by_person(by_person: Mapping[int, Sequence[Row]]) -> tuple[float, float]:
     """Return the interval of a rate of failure by bootstrap, in which whole persons with all their trials are drawn."""
     counts: Floats = np.array([failures(rows) for rows in by_person.values()], dtype=np.float64)

@@ -101,7 +101,8 @@ def judge_descents(descents: Sequence[Descent], perturbed: bool) -> Claim:
         verdict=verdict_of(interval.high < FEW, could_be_either=n >= least),
         reason="The norm is that of thumb's and ring's distances, before the first Gauss-Newton step and after the "
         "last. Reproduced if the interval (Clopper-Pearson) of how often it does not fall lies below "
-        f"{format_share(FEW)}, of the runs that made a step and saw the object with both fingers.{short}",
+        f"{format_share(FEW)}, of the runs that made a step and saw the object with both fingers at their end: "
+        f"{len(descents) - n} of {len(descents)} runs did not, and are left out.{short}",
         where=where,
     )
 

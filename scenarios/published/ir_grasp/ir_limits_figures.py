@@ -40,8 +40,8 @@ def _rates(runs: LimitRuns, shown: Sequence[Axis], folder: Path) -> Figure:
             _levels(axes, axis)
         _finish(panels, len(shown), "objects held (%)", ARMS)
     caption = (
-        "Objects held by what goes amiss, further to the right, of each way to grasp; intervals by Clopper and "
-        "Pearson, 95 %. Leftmost, nothing is amiss yet, but for the bars. All but the last three start from the "
+        "Objects held by each way to grasp, the more disturbed the further to the right; intervals by Clopper and "
+        "Pearson, 95 %. Leftmost there is no disturbance yet, but for the bars. All but the last three start from the "
         "nominal pose; in those objects are moved as in the paper's perturbed poses."
     )
     return Figure("limits", caption)

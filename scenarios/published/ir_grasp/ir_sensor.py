@@ -28,9 +28,6 @@ _LAST = {Finger.THUMB: "0.003", Finger.INDEX: "0.010", Finger.RING: "0.003"}
 """Ends of the approaches, m: below the range, but for the index, before which the ring finger would touch the box."""
 
 _REPETITIONS = 3
-_MIN_RANKS = 0.99
-"""Rank correlation from which on distances by the curve count as in the order of the true ones."""
-
 _SPAN = (0.5, 1.5)
 """Reflectivities about 1 between which one curve is asked to be good enough."""
 
@@ -148,7 +145,7 @@ def _largest_error(fits: Sequence[Fit]) -> float:
 
 
 def _in_order(runs: SensorRuns) -> Claim:
-    """Judge what of a relative measure the readings can show: that nearer reads as nearer."""
+    """Return what of a relative measure the readings can show: that nearer reads as nearer."""
     sentence = "A relative estimate of the distance is enough, which one curve gives for all materials."
     where = "sec. V-B"
     ranks = {rho: runs.values(Case(reflectivity=rho), "rank_correlation") for rho in REFLECTIVITIES}
@@ -161,11 +158,11 @@ def _in_order(runs: SensorRuns) -> Claim:
         claim=sentence,
         published="enough",
         measured=f"rank correlation {least[worst]:.4f} at least (reflectivity {worst:g})",
-        verdict=verdict_of(least[worst] >= _MIN_RANKS),
-        reason="Reproduced, as far as the sensors go, if in each run, of reflectivities from "
-        f"{min(ranks):g} to {max(ranks):g}, the rank correlation of distances by the controller's curve with the true "
-        f"ones is at least {_MIN_RANKS} from the target of 10 mm to 60 mm, as far as the face is seen. What it does to "
-        "grasps is judged by the experiment ir-limits.",
+        verdict=Verdict.NOT_COMPARABLE,
+        reason="By construction: readings of the scene's sensors are the reflectivity times one falling curve, so that "
+        "nearer reads as nearer but for noise. The rank correlation is that of distances by the controller's curve "
+        f"with the true ones from 10 mm to 60 mm, as far as the face is seen, of reflectivities from {min(ranks):g} to "
+        f"{max(ranks):g}. What one curve does to grasps is judged by the experiment ir-limits.",
         where=where,
     )
 

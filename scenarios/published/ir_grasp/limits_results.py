@@ -11,7 +11,7 @@ import numpy as np
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.plants.ir_grasp.parameters import Params as SceneParams
-from handover.scenarios.campaign.statistics import LEVEL, holm, paired_test
+from handover.scenarios.campaign.statistics import LEVEL, holm, sign_flip_test
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.ir_grasp.parameters import Parameters
 from handover.scenarios.published.ir_grasp.limits_axes import AXES, PARAMETERS, Axis, LimitArm, Point, settings_of
@@ -30,6 +30,8 @@ _DEFAULTS = {"": Parameters(), "scene": SceneParams(), "reflex": ReflexParams()}
 
 
 _BOOLEANS = {"true": 1.0, "false": 0.0}
+Levels = Sequence[tuple[Axis, Sequence[float]]]
+"""Levels of some axes."""
 
 
 def _is_unset(value: Any) -> bool:
@@ -45,9 +47,7 @@ def _canonical(name: str, value: Any) -> object:
         return value.name.lower()
     if isinstance(value, str):
         try:
-            value = [
-                {"true": 1.0, "false": 0.0}.get(x) if x in ("true", "false") else float(x) for x in value.split(",")
-            ]
+            value = [_BOOLEANS[x] if x in _BOOLEANS else float(x) for x in value.split(",")]
         except ValueError:
             return value
     return tuple(np.round(np.atleast_1d(np.asarray(value, dtype=np.float64)), 9).tolist())
@@ -71,9 +71,9 @@ class Comparison:
         first: counts of the first arm.
         best: which of the others held most.
         second: its counts.
-        only_first: pairs that only the first arm held.
-        only_second: pairs that only the other held.
-        p: McNemar's exact p-value, corrected by Holm over the axes.
+        only_first: scenes of which the first arm held more.
+        only_second: scenes of which the other held more.
+        p: of the exact sign-flip test over scenes, corrected by Holm over the axes.
     """
 
     axis: Axis
@@ -92,9 +92,10 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """Whether looking is worth something, costs something, or neither is shown."""
-        if self.p < LEVEL and self.gain >= WORTH:
+        gain = round(self.gain, 9)  # 57 of 60 less 48 of 60 is 15 points
+        if self.p < LEVEL and gain >= WORTH:
             return "worth it"
-        if self.p < LEVEL and self.gain <= -WORTH:
+        if self.p < LEVEL and gain <= -WORTH:
             return "costs"
         return "no difference shown" if self.p >= LEVEL else "slightly better" if self.gain > 0.0 else "slightly worse"
 
@@ -109,31 +110,42 @@ class LimitRuns:
         self.unfinished = sum(row["status"] != "done" for row in table.rows)
 
     def rows(self, arm: LimitArm, axis: Axis, levels: Sequence[float]) -> list[Row]:
-        """Return the runs of an arm at levels of an axis."""
-        return [row for level in levels for p in settings_of(arm, axis, level) for row in self._rows.get(_key(p), ())]
+        """Return the runs of an arm at levels of an axis, each once, of however many levels it is."""
+        points = [p for level in levels for p in settings_of(arm, axis, level)]
+        return list({row["run"]: row for p in points for row in self._rows.get(_key(p), ())}.values())
 
     def count(self, arm: LimitArm, axis: Axis, levels: Sequence[float]) -> Count:
         """Return successes and trials."""
         rows = self.rows(arm, axis, levels)
         return sum(_held(row) for row in rows), len(rows)
 
-    def pairs(self, first: LimitArm, second: LimitArm, axis: Axis) -> tuple[list[bool], list[bool]]:
-        """Return successes of two arms at all levels beyond the start, in the same scenes and the same order."""
-        a, b = (self._by_scene(arm, axis, axis.levels) for arm in (first, second))
-        scenes = [scene for scene in a if scene in b]
-        return [a[s] for s in scenes], [b[s] for s in scenes]
+    def differences(self, first: LimitArm, second: LimitArm, axis: Axis) -> list[int]:
+        """Return, by scene, how many levels beyond the start the first arm held more than the second."""
+        sums: dict[Scene, int] = {}
+        for level in axis.levels:
+            a, b = (self._by_scene(arm, axis, level) for arm in (first, second))
+            for scene in a.keys() & b.keys():
+                sums[scene] = sums.get(scene, 0) + a[scene] - b[scene]
+        return list(sums.values())
 
-    def from_start(self, arm: LimitArm, axis: Axis, levels: Sequence[float]) -> tuple[list[bool], list[bool]]:
-        """Return successes at levels, and of the same scenes at the axis's start."""
-        found, started = self._by_scene(arm, axis, levels), self._by_scene(arm, axis, axis.all_levels[:1])
-        kept = [(held, started[0, n]) for (_, n), held in found.items() if (0, n) in started]
-        return [x for x, _ in kept], [x for _, x in kept]
+    def from_start(self, arm: LimitArm, levels: Levels) -> tuple[list[float], list[bool]]:
+        """Return, by scene, the share of levels that was held, and whether the axis's start was.
 
-    def _by_scene(self, arm: LimitArm, axis: Axis, levels: Sequence[float]) -> dict[tuple[int, Scene], bool]:
-        """Return successes by number of the level and scene: object, its mass and the seed."""
+        The axes are `blind_alike`, with one start: their levels are of the same scenes.
+        """
+        started = self._by_scene(arm, levels[0][0], levels[0][0].all_levels[0])
+        found: dict[Scene, list[bool]] = {}
+        for axis, tried in levels:
+            for level in tried:
+                for scene, held in self._by_scene(arm, axis, level).items():
+                    found.setdefault(scene, []).append(held)
+        kept = [scene for scene in found if scene in started]
+        return [float(np.mean(found[scene])) for scene in kept], [started[scene] for scene in kept]
+
+    def _by_scene(self, arm: LimitArm, axis: Axis, level: float) -> dict[Scene, bool]:
+        """Return successes at a level by scene: object and seed."""
         return {
-            (k, (row["thing"], _of(row, "scene.mass_O"), row["seed"])): _held(row)
-            for k, level in enumerate(levels)
+            (*(_of(row, name) for name in ("thing", "thing_seed", "scene.mass_O")), row["seed"]): _held(row)
             for row in self.rows(arm, axis, (level,))
         }
 
@@ -145,10 +157,10 @@ class LimitRuns:
     def half(self, arm: LimitArm, axis: Axis) -> str:
         """Return where an arm's rate first is below one half along an axis, interpolated between levels.
 
-        It is "" if the arm was not tried to the axis's end.
+        It is "" if the arm was not tried at all of the axis's levels.
         """
         rates = [(level, k / n) for level in axis.all_levels for k, n in [self.count(arm, axis, (level,))] if n]
-        if not self.count(arm, axis, axis.levels[-1:])[1]:
+        if len(rates) < len(axis.all_levels):
             return ""
         below = next((i for i, (_, rate) in enumerate(rates) if rate < _HALF), None)
         if below is None:
@@ -167,9 +179,10 @@ class LimitRuns:
             if not counts[first.title][1] or not tried:
                 continue
             best = max(tried, key=lambda arm: counts[arm.title][0] / counts[arm.title][1])
-            test = paired_test(*self.pairs(first, best, axis))
+            differences = self.differences(first, best, axis)
+            more, less = sum(d > 0 for d in differences), sum(d < 0 for d in differences)
             sums = counts[first.title], best, counts[best.title]
-            found.append(Comparison(axis, *sums, test.only_first, test.only_second, test.p))
+            found.append(Comparison(axis, *sums, more, less, sign_flip_test(differences)))
         corrected = holm([c.p for c in found])
         return [replace(c, p=p) for c, p in zip(found, corrected, strict=True)]
 

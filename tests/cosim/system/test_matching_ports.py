@@ -3,11 +3,13 @@
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.master.master import Master
+from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import Connection, PortName, System
 from handover.cosim.system.time_series import TimeSeries
@@ -113,6 +115,30 @@ def test_an_input_that_two_units_match_is_refused_until_one_is_named(fmu: FmuOf)
     s.connect(mass.y, spring.u)
     s.connect(other.y.x, spring.u.x)
     s.check()
+
+
+def test_of_three_units_that_match_one_is_named_when_another_was_taken_back(fmu: FmuOf):
+    s = pair(fmu)
+    mass, spring = s.units["mass"], s.units["spring"]
+    others = [s.add(name, fmu("Mass")) for name in ("second", "third")]
+    assert s.connect(mass.y, spring.u).connected == ("x",)
+    for other in others:
+        told = s.connect(other.y, spring.u)
+        assert (told.connected, dict(told.left)) == ((), {"x": "mass.x matches it, too"})
+    s.disconnect(mass.y.x)
+    with pytest.raises(WiringError, match=r"second\.y\.x and third\.y\.x match it by name"):
+        s.check()
+    s.connect(others[1].y.x, spring.u.x)
+    s.check()
+    assert s.sources_of("spring") == {"x": PortName("third", "x")}
+
+
+def test_a_transformation_of_whole_units_is_refused(fmu: FmuOf):
+    s = pair(fmu)
+    mass, spring = s.units["mass"], s.units["spring"]
+    given: Any = (mass.y, spring.u, LinearTransformation(2.0))
+    with pytest.raises(TypeError, match=r"a transformation is for one connection: give unit\.y\.NAME"):
+        s.connect(*given)
 
 
 def test_units_of_which_nothing_matches_are_refused(fmu: FmuOf):

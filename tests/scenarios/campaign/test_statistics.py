@@ -1,5 +1,7 @@
 """Intervals and tests give what textbooks and closed forms say."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.stats import binomtest
@@ -9,6 +11,7 @@ from handover.scenarios.campaign.statistics import (
     holm,
     paired_difference,
     paired_test,
+    sign_flip_test,
     success_interval,
     time_interval,
     two_proportions,
@@ -135,3 +138,22 @@ def test_holms_correction():  # [Holm1979], each p times the number of those not
     assert holm([0.04, 0.01, 0.03]) == pytest.approx([0.06, 0.03, 0.06])
     assert holm([0.9, 0.8]) == [1.0, 1.0]
     assert holm([]) == []
+
+
+def test_signs_flipped_are_counted_as_by_brute_force():
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        differences = rng.integers(-4, 5, 9).tolist()
+        flipped = [
+            abs(sum(s * d for s, d in zip(signs, differences, strict=True))) for signs in product((-1, 1), repeat=9)
+        ]
+        p = np.mean([total >= abs(sum(differences)) for total in flipped])
+        assert sign_flip_test(differences) == pytest.approx(p, abs=1e-12)
+    assert sign_flip_test([]) == 1.0
+
+
+@pytest.mark.parametrize(("more", "less"), [(10, 0), (7, 2), (60, 31)])
+def test_flipped_signs_of_pairs_are_mcnemars_exact_test(more: int, less: int):
+    pairs = [(True, False)] * more + [(False, True)] * less + [(True, True)] * 5
+    differences = [int(a) - int(b) for a, b in pairs]
+    assert sign_flip_test(differences) == pytest.approx(paired_test(*map(list, zip(*pairs, strict=True))).p, rel=1e-9)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.published.free_flyer.study_runs import sign_flip_test as flips_of_simulated_persons
+from handover.scenarios.campaign.statistics import sign_flip_test as flips_of_simulated_persons
 from handover.scenarios.study.statistics.exact_tests import (
     pair_means,
     shift_interval,

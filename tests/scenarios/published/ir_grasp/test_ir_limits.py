@@ -6,6 +6,10 @@ from pathlib import Path
 import pytest
 from limits_table import limits_table
 
+from handover.controllers.ir_grasp.ir_reflex import IrReflex
+from handover.cosim.blocks.description import describe
+from handover.plants.ir_grasp.objects import is_held_out
+from handover.plants.ir_grasp.scene import GraspScene
 from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.parameters import parse_parameters
@@ -19,10 +23,11 @@ from handover.scenarios.published.ir_grasp.limits_axes import (
     FORWARD_35,
     FORWARD_55,
     PAPER,
+    PARAMETERS,
     REFLEX,
     Axis,
 )
-from handover.scenarios.published.ir_grasp.limits_results import LimitRuns, sentence_of_worth
+from handover.scenarios.published.ir_grasp.limits_results import Comparison, LimitRuns, sentence_of_worth
 from handover.scenarios.published.published_experiment import Claim, Verdict
 
 WITHOUT = tuple(arm for arm in ARMS if not arm.looks)
@@ -32,7 +37,7 @@ def axis(key: str) -> Axis:
     return next(axis for axis in AXES if axis.key == key)
 
 
-def has_summary(run: PlannedRun) -> bool:
+def succeeds(run: PlannedRun) -> bool:
     """The reflex holds all; hands that do not look hold what is nominal, or moved away by less than 60 mm.
 
     The paper's algorithm fails in the dark.
@@ -45,7 +50,7 @@ def has_summary(run: PlannedRun) -> bool:
 
 @pytest.fixture(scope="module")
 def table() -> CampaignTable:
-    return limits_table(has_summary)
+    return limits_table(succeeds)
 
 
 @pytest.fixture(scope="module")
@@ -72,16 +77,35 @@ def test_every_point_is_one_that_the_scenario_takes():
     points = [point for axis in AXES for level in axis.all_levels for point in axis.settings(level)]
     texts = {tuple(f"{name}={value}" for name, value in point.items() if "." not in name) for point in points}
     assert all(not parse_parameters(IrGrasp, given).faults() for given in texts)
-    assert all(not parse_parameters(IrGrasp, [f"{n}={v}" for n, v in arm.parameters.items()]).faults() for arm in ARMS)
+    of_units = {name for name in PARAMETERS if "." in name}
+    units = {"scene": describe(GraspScene), "reflex": describe(IrReflex)}
+    own = {f"{unit}.{variable.name}" for unit, description in units.items() for variable in description.parameters}
+    assert of_units <= own
+    assert all(
+        not parse_parameters(IrGrasp, [f"{n}={v}" for n, v in arm.parameters.items() if "." not in n]).faults()
+        for arm in ARMS
+    )
 
 
-def test_ways_share_their_scenes_and_objects_do_not():
+def test_ways_share_their_scenes_and_objects_and_levels_do_not():
     plan = IrLimits().plan(quick=False)
-    seeds: dict[tuple[str, str | None], set[int]] = {}
+    of_arms = {name for arm in ARMS for name in arm.parameters}
+    of_sensors = {"scene.reflectivity", "scene.sensor_tolerance"}  # their levels share scenes
+    scenes: dict[int, set[frozenset[tuple[str, str]]]] = {}
+    arms: dict[int, set[str]] = {}
     for run in plan.runs():
-        seeds.setdefault((run.parameters["thing"], run.parameters.get("scene.mass_O")), set()).add(run.seed)
-    assert {len(of_object) for of_object in seeds.values()} == {plan.repetitions}
-    assert len({seed for of_object in seeds.values() for seed in of_object}) == len(seeds) * plan.repetitions
+        scene = frozenset((n, v) for n, v in run.parameters.items() if n not in of_arms | of_sensors)
+        scenes.setdefault(run.seed, set()).add(scene)
+        arms.setdefault(run.seed, set()).add(run.parameters["strategy"])
+    assert all(len(found) == 1 for found in scenes.values())
+    assert all(found >= {"reflex", "forward", "contact"} for found in arms.values())
+    assert len(scenes) == plan.repetitions * len(set.union(*scenes.values()))
+
+
+def test_objects_that_are_held_out_are_drawn_alone():
+    drawn = [point for axis in AXES for point in axis.scenes if point["thing"] == "drawn"]
+    assert drawn
+    assert all(is_held_out(int(point["thing_seed"])) for point in drawn)
 
 
 def test_every_arm_has_runs_at_every_level_of_its_axes(runs: LimitRuns):
@@ -89,6 +113,7 @@ def test_every_arm_has_runs_at_every_level_of_its_axes(runs: LimitRuns):
         for level in along.all_levels:
             counts = {runs.count(arm, along, (level,))[1] for arm in ARMS if arm.meets(along)}
             assert counts == {3 * len(along.scenes)}, (along.key, level)
+    assert {len(along.scenes) for along in AXES if along.blind_alike or along.key == "speed"} == {12}
     assert {axis.key for axis in AXES if not BLIND.meets(axis)} == {axis.key for axis in AXES} - set(BLIND.axes)
     assert {key for arm in ARMS for key in arm.axes} <= {axis.key for axis in AXES}
 
@@ -100,7 +125,7 @@ def test_light_makes_no_difference_to_hands_that_do_not_look(runs: LimitRuns):
 
 
 def test_the_quick_plan_tries_every_arm_at_the_hardest_level_of_every_axis():
-    found = LimitRuns(limits_table(has_summary, quick=True))
+    found = LimitRuns(limits_table(succeeds, quick=True))
     tried = [(arm, along) for arm in ARMS for along in AXES if arm.meets(along)]
     assert all(found.count(arm, along, along.levels[-1:])[1] == 1 for arm, along in tried)
 
@@ -128,6 +153,7 @@ def test_looking_is_worth_it_where_pairs_differ_by_enough_and_costs_where_they_d
     worth = {c.axis.key: c for c in runs.compared(REFLEX, WITHOUT)}
     assert (worth["towards"].verdict, worth["towards"].gain) == ("worth it", 1.0)
     assert (worth["towards"].only_first, worth["towards"].only_second) == (60, 0)
+    assert worth["towards"].p == pytest.approx(len(worth) * 2.0**-59, rel=1e-6)  # as McNemar's of 60 pairs, by Holm
     assert worth["turn"].verdict == "no difference shown"
     worse = LimitRuns(limits_table(lambda run: run.parameters["strategy"] == "forward"))
     found = worse.compared(REFLEX, (FORWARD_35, FORWARD_55))
@@ -144,6 +170,29 @@ def test_the_sentence_names_the_axes_from_the_greatest_gain_on(runs: LimitRuns):
     assert sentence_of_worth([]) == "No axis was tried both with and without looking."
 
 
+def test_levels_of_one_scene_are_not_taken_for_independent():
+    """A hand that does not look fails in three scenes, at whose six levels the reflex holds all."""
+    curve = axis("curve")
+
+    def held(run: PlannedRun) -> bool:
+        p = run.parameters
+        fails = p["thing"] == "cylinder" and p["perturbed"] == "true" and "shift_least" not in p
+        return p["strategy"] == "reflex" or not fails
+
+    found = LimitRuns(limits_table(held))
+    (compared,) = (c for c in found.compared(REFLEX, WITHOUT) if c.axis is curve)
+    assert compared.first == (6 * 36, 6 * 36)
+    assert compared.second == (33, 36)  # each run once
+    assert (compared.only_first, compared.only_second) == (3, 0)
+    assert compared.verdict == "no difference shown"
+
+
+def test_fifteen_points_count_as_such():
+    """57 of 60 less 48 of 60, in which binary fractions differ from 0.15."""
+    c = Comparison(axis("away"), (57, 60), CONTACT, (48, 60), 9, 0, 0.001)
+    assert c.verdict == "worth it"
+
+
 def test_that_looking_is_worth_it_takes_four_axes(claims: Sequence[Claim]):
     assert one(claims, "On at least 4 axes").verdict is Verdict.REPRODUCED
     alike = IrLimits().claims(limits_table(lambda _run: True))
@@ -158,7 +207,7 @@ def test_one_curve_for_all_materials_is_refuted_by_grasps_that_fail_in_the_dark(
 
 @pytest.mark.parametrize(("pushed", "holds"), [(0.004, True), (0.016, False)])
 def test_pushing_is_judged_by_median_and_most(pushed: float, holds: bool):
-    claim = one(IrLimits().claims(limits_table(has_summary, displacement=pushed)), "Before it closes")
+    claim = one(IrLimits().claims(limits_table(succeeds, displacement=pushed)), "Before it closes")
     assert (claim.verdict is Verdict.REPRODUCED) is holds
 
 
