@@ -138,7 +138,7 @@ class PymunkEdge:
 
     def poses(self, first: int) -> list[tuple[float, float, float]]:
         """Return positions in m and orientations in rad of the bodies from the first-th added on."""
-        return [(*b.position, b.angle) for b in self._bodies[first:]]
+        return [(x, y, b.angle) for b in self._bodies[first:] for x, y in [b.position]]
 
     def angles(self, first: int) -> list[float]:
         """Return the orientations of the bodies from the first-th added on, in rad."""
