@@ -207,6 +207,8 @@ class IrReflex:
         """Return the command on the way to the pre-grasp pose: slow on its last part, where an object may stand."""
         p, goal = self.params, self._pregrasp
         left, commanded = math.dist(x[:2], goal[:2]), math.dist(self._move.goal[:2], goal[:2])
+        if left == 0.0:
+            return goal
         if left > p.arrival_way + 0.008 or p.arrival_way == 0.0:
             share = min(1.0, p.arrival_way / left)
         else:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from handover.controllers.ir_grasp.sensor_geometry import LARGEST_CLOSURE
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector2, Vector3, Vector4, parameter
 from handover.cosim.blocks.start_values import parameter_faults
@@ -245,8 +246,26 @@ class Params:
     def check(self) -> None:
         """Raise InvalidReflexParameters, with all faults, if the reflex cannot work with these values."""
         faults = parameter_faults(self) or [*self.calibration.faults(), *self._input_faults(), *self._range_faults()]
+        if not faults and self.strategy is Strategy.REFLEX and self.correction is Correction.FAST:
+            faults = self._fast_faults()
         if faults:
             raise InvalidReflexParameters(faults)
+
+    def _fast_faults(self) -> list[str]:
+        """Return what the correction on the move cannot work with."""
+        faults: list[str] = []
+        if self.literal:
+            faults.append("literal takes the equations of correction PAPER as printed: it contradicts FAST")
+        if not self.feed > 0.0:
+            faults.append("feed must be above 0, or the hand never gets as far as the object")
+        if not (self.weight[0] > 0.0 and self.weight[2] > 0.0):
+            faults.append("weight: thumb and ring must be in the cost of FAST, which centres the object between them")
+        if self.sigma_limit > LARGEST_CLOSURE:
+            faults.append(
+                f"sigma_limit {self.sigma_limit:g} must not exceed {LARGEST_CLOSURE:g}, up to which FAST knows where "
+                "the sensors are"
+            )
+        return faults
 
     def _input_faults(self) -> list[str]:
         faults: list[str] = []

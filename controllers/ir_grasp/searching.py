@@ -45,8 +45,9 @@ class Search:
         x, y, way = command[0], command[1], p.search_speed * dt
         while way > 0.0 and not self.over:
             ahead, left = self._ends[self._next]
-            goal_x = float(p.p_WH_pregrasp[0]) + c * ahead - s * left
-            goal_y = float(p.p_WH_pregrasp[1]) + s * ahead + c * left
+            corner_x = float(p.p_WH_pregrasp[0]) + c * ahead - s * left
+            corner_y = float(p.p_WH_pregrasp[1]) + s * ahead + c * left
+            goal_x, goal_y = np.clip([corner_x, corner_y], self._low[:2], self._high[:2]).tolist()
             away = math.hypot(goal_x - x, goal_y - y)
             if away <= way:
                 x, y, way, self._next = goal_x, goal_y, way - away, self._next + 1

@@ -26,6 +26,9 @@ _TABLE: Final = np.array(
 """Window of the sensor, x and y in m, and direction in which it looks, in rad from x to y: closure 0 to 0.6, then
 thumb, index, ring."""
 
+LARGEST_CLOSURE: Final = _STEP * (len(_TABLE) - 1)
+"""Closure up to which the table goes."""
+
 
 class SensorPoses(NamedTuple):
     """Windows p (3, 2) in m, directions n (3, 2), unit vectors, and dp/dsigma (3, 2) in m, all in H."""

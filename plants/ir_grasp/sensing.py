@@ -62,8 +62,8 @@ class Sensing:
 
     Sensors are active in turn for 5 ms each, thumb, index, ring, `active` of them at once; each is read at the end of
     its time. A reading is the mean over three rays of the beam of `InfraredSensor.ticks`, and `crosstalk` of what
-    each other active sensor reads of its own light, plus ambient light and noise, rounded. The encoders and the
-    tension are read every 5 ms.
+    each other active sensor reads of its own light, plus ambient light and noise, rounded. Errors of
+    encoders and tension are drawn anew every 5 ms.
 
     Args:
         params: of the scene.

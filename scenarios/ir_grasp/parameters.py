@@ -111,6 +111,8 @@ class Parameters:
         faults: list[str] = []
         if self.shift_least > self.shift_most:
             faults.append(f"shift_least {self.shift_least:g} m must be at most shift_most {self.shift_most:g} m")
+        if self.literal and self.correction is Correction.FAST:
+            faults.append("literal: takes the paper's equations as printed, which correction=paper alone uses")
         if self.thing is Thing.POLYGON:
             faults.extend(polygon_faults(polygon_corners(self.corners, self.corner_count), "corners"))
         return faults

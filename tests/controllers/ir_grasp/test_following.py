@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from handover.controllers.ir_grasp.ir_reflex import Inputs, IrReflex, Outputs, Params, Phase, Stop, Strategy
-from handover.controllers.ir_grasp.parameters import Correction
+from handover.controllers.ir_grasp.parameters import Correction, InvalidReflexParameters
 from handover.controllers.ir_grasp.visibility import Visibility
 from handover.cosim.blocks.ports import Floats
 from handover.plants.ir_grasp.objects import Thing
@@ -19,6 +19,9 @@ from handover.plants.ir_grasp.scene import Params as SceneParams
 
 DT = 0.015
 START, PREGRASP = (-0.279, 0.0), (-0.159, 0.0)
+SMALL: dict[str, Any] = {"thing": Thing.DISC, "disc_radius": 0.015, "mass_O": 0.25}
+QUICK: dict[str, Any] = {"search_speed": 0.28, "arrival_way": 0.0, "touch_most": 0}
+"""A search so fast that a small heavy disc stands before the index's tip."""
 
 
 def reflex(**more: Any) -> IrReflex:
@@ -150,11 +153,11 @@ def test_what_one_side_sees_as_far_off_on_the_way_ahead_is_gone_around(seer: Vis
 
 def test_an_object_before_a_fingertip_is_pushed_less_than_half_as_far():
     """A small heavy disc, met by a search so fast that it stands before the index's tip."""
-    p_WO, quick = (0.0, 0.006), {"search_speed": 0.28, "arrival_way": 0.0, "touch_most": 0}
+    p_WO = (0.0, 0.006)
 
     def pushed(along_most: int) -> float:
-        small = scene(p_WO, thing=Thing.DISC, disc_radius=0.015, mass_O=0.25)
-        return float(np.linalg.norm(grasp(reflex(along_most=along_most, **quick), small)[-1][1].p_WO - p_WO))
+        small = scene(p_WO, **SMALL)
+        return float(np.linalg.norm(grasp(reflex(along_most=along_most, **QUICK), small)[-1][1].p_WO - p_WO))
 
     straight, around = pushed(0), pushed(3)
     assert straight > 0.06
@@ -246,25 +249,66 @@ def test_contact_closes_when_the_tendon_is_not_as_tight_as_that_of_a_free_hand()
     assert apart[-1][0].p_WH_cmd[0] - PREGRASP[0] >= Params().reach[0] - 1e-3
 
 
-@pytest.mark.parametrize("strategy", [Strategy.REFLEX, Strategy.CONTACT])
-def test_it_goes_on_from_any_state_bit_for_bit(strategy: Strategy):
-    one, other, plant = (
-        reflex(strategy=strategy),
-        reflex(strategy=strategy),
-        scene((0.045, 0.075), thing=Thing.CYLINDER),
-    )
+@pytest.mark.parametrize(
+    ("strategy", "given", "p_WO", "thing", "met_before"),
+    [
+        (Strategy.REFLEX, {}, (0.045, 0.075), {}, {Phase.SEARCH, Phase.RECOVER, Phase.TRACK}),
+        (Strategy.REFLEX, {}, (0.0, 0.09), {}, {Phase.RECOVER, Phase.TRACK}),  # it is touched, and gone around
+        (Strategy.REFLEX, QUICK, (0.0, 0.006), SMALL, {Phase.SEARCH, Phase.RECOVER}),  # pushed along, and gone around
+        (Strategy.CONTACT, {}, (0.045, 0.075), {}, {Phase.APPROACH}),
+    ],
+)
+def test_it_goes_on_from_any_state_bit_for_bit(
+    strategy: Strategy,
+    given: dict[str, Any],
+    p_WO: tuple[float, float],
+    thing: dict[str, Any],
+    met_before: set[Phase],
+):
+    one, other = (reflex(strategy=strategy, **given) for _ in range(2))
+    plant = scene(p_WO, **thing)
     y, met = plant.outputs(0.0, Commands(p_WH_cmd=np.array(START))), set[Phase]()
     for k in range(1000):
         if k % 5 == 0:
-            state, other = other.get_state(), reflex(strategy=strategy)
+            state, other = other.get_state(), reflex(strategy=strategy, **given)
             other.set_state(state)
         u = read(y)
         o, again = one.step(k * DT, DT, u), other.step(k * DT, DT, u)
         assert pickle.dumps(o) == pickle.dumps(again)
+        assert one.get_state() == other.get_state()
         met.add(o.phase)
         if o.phase is Phase.DONE:
             break
         y = plant.step(k * DT, DT, Commands(p_WH_cmd=o.p_WH_cmd, yaw_cmd=o.yaw_cmd, sigma_cmd=o.sigma_cmd))
-    assert {Phase.CLOSE, Phase.PULL, Phase.SHAKE, Phase.DONE} <= met
-    if strategy is Strategy.REFLEX:
-        assert {Phase.SEARCH, Phase.RECOVER, Phase.TRACK} <= met
+    assert {*met_before, Phase.CLOSE, Phase.PULL, Phase.SHAKE, Phase.DONE} <= met
+
+
+@pytest.mark.parametrize("reach", [0.05, 0.08])
+def test_a_search_that_is_wider_than_the_reach_ends(reach: float):
+    seen = grasp(
+        reflex(fast_reach=np.array([reach, reach, 0.9]), search_width=np.array([0.2, 0.2])), scene((0.5, 0.35))
+    )
+    assert seen[-1][0].stop is Stop.OUT_OF_SIGHT
+    commands = np.array([o.p_WH_cmd for o, _ in seen if o.phase is Phase.SEARCH]) - PREGRASP
+    assert np.max(np.abs(commands)) == pytest.approx(reach)
+
+
+def test_a_wrist_at_the_pre_grasp_pose_waits_for_the_closure():
+    controller = reflex(sigma_pregrasp=0.1, arrival_way=0.0)
+    o = controller.step(0.0, DT, Inputs(p_WH=np.array(PREGRASP)))
+    assert (o.phase, o.p_WH_cmd.tolist(), o.sigma_cmd) == (Phase.REACH, list(PREGRASP), 0.1)
+
+
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        ({"literal": True}, "literal takes the equations of correction PAPER as printed: it contradicts FAST"),
+        ({"feed": 0.0}, "feed must be above 0"),
+        ({"weight": np.array([1.0, 1.0, 0.0])}, "weight: thumb and ring must be in the cost of FAST"),
+        ({"sigma_limit": 0.8}, r"sigma_limit 0\.8 must not exceed 0\.6, up to which FAST knows where the"),
+    ],
+)
+def test_what_the_correction_on_the_move_cannot_work_with_is_refused(given: dict[str, Any], why: str):
+    with pytest.raises(InvalidReflexParameters, match=why):
+        reflex(**given)
+    reflex(correction=Correction.PAPER, **given)

@@ -58,6 +58,12 @@ def test_a_hand_that_touches_nothing_feels_nothing(velocity: tuple[float, float]
     assert not any(touch.touches for touch in feel(drive(plant, velocity, 60, rate)))
 
 
+def test_torques_of_a_free_hand_that_closes_balance_by_the_controllers_model_of_it():
+    """With a stiffness or a pulley of any joint 10 % off, or without dampers, 1.6 to 5 mN m would be left."""
+    plant = GraspScene(SceneParams(p_WO_0=np.array([0.5, 0.35]), p_WH_0=START))
+    assert np.max(np.abs(feel(drive(plant, (0.0, 0.0), 60, 0.6))[-1].torque)) < 1.2e-3
+
+
 @pytest.mark.parametrize(("left", "finger"), [(-0.080, 0), (0.092, 1)])
 def test_a_fingertip_that_pushes_an_object_ahead_is_felt_within_fifteen_millimetres(left: float, finger: int):
     """A light disc whose middle is before the tip, met at the speed of arrival."""

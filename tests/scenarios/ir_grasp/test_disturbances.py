@@ -8,8 +8,10 @@ import pytest
 from flyer_runs import metric, run
 
 from handover.controllers.ir_grasp.ir_reflex import Phase
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import CosimError
 from handover.cosim.record.reader import Record
+from handover.plants.ir_grasp.hand import RING, THUMB, Finger, finger_points
 from handover.plants.ir_grasp.objects import SOLIDS, Thing, outlines
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp, published_values
@@ -38,13 +40,20 @@ def test_what_the_ground_carries_and_bumps_is_no_push(tmp_path: Path):
     assert metric(ended, "displacement") < 4e-4
 
 
-def test_the_offset_at_the_grasp_is_that_of_the_pads_middle(tmp_path: Path):
-    ended, _ = grasp(tmp_path, *BLIND, "standoff=0.03")
-    other, _ = grasp(tmp_path / "aside", *BLIND, "standoff=0.03", "shift=0,0.02")
-    along = metric(ended, "offset_at_grasp")
-    assert metric(other, "moved") == pytest.approx(0.02)
-    asymmetry = 0.01  # thumb and ring do not mirror each other
-    assert abs(metric(other, "offset_at_grasp") ** 2 - along**2 - 0.02**2) < 2.0 * 0.02 * asymmetry
+def pad(f: Finger, points: Floats) -> Floats:
+    """Return the middle of a fingertip's pad, (2,) in W, m, by its finger's joints and tip."""
+    along = (points[-1] - points[-2]) / f.lengths[-1]
+    return 0.5 * (points[-1] + points[-2]) + f.radii[-1] * f.flexion * np.array([-along[1], along[0]])
+
+
+@pytest.mark.parametrize("shift", ["0,0", "0,0.02"])
+def test_the_offset_at_the_grasp_is_that_of_the_pads_middle(tmp_path: Path, shift: str):
+    ended, record = grasp(tmp_path, *BLIND, "standoff=0.03", f"shift={shift}")
+    k = closing(record)
+    points = finger_points(record["scene.p_WH"][k], float(record["scene.yaw"][k]), record["scene.q"][k])
+    middle = np.mean([pad(THUMB, points[0]), pad(RING, points[2])], axis=0)
+    offset = float(np.linalg.norm(record["scene.p_WO"][k] - middle))
+    assert metric(ended, "offset_at_grasp") == pytest.approx(offset, abs=1e-6)
 
 
 def test_the_controller_hears_the_encoders_with_their_noise_and_the_verdict_the_truth(tmp_path: Path):

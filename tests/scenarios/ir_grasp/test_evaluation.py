@@ -78,16 +78,14 @@ def test_an_object_that_comes_along_and_stays_is_held():
     assert evaluator.moments == {"start": 0.0, "before closing": 3.0, "end": 7.4}
 
 
-@pytest.mark.parametrize(
-    ("phase", "stop_reasons"), [(Phase.PULL, "during the pull"), (Phase.SHAKE, "during the shake")]
-)
-def test_an_object_that_slipped_out_is_not_held_and_it_is_reported_when(phase: Phase, stop_reasons: str):
+@pytest.mark.parametrize(("phase", "when"), [(Phase.PULL, "during the pull"), (Phase.SHAKE, "during the shake")])
+def test_an_object_that_slipped_out_is_not_held_and_it_is_reported_when(phase: Phase, when: str):
     lost: dict[str, Any] = {"p_HO": (0.2, 0.0), "touching": 0}
     between = [(5.0, signals(Phase.SHAKE))] if phase is Phase.SHAKE else []
     evaluator = grasp(*between, (5.5, signals(phase, **lost)), *((t, signals(Phase.DONE, **lost)) for t in (7.0, 7.4)))
     assert evaluator.over
     assert not evaluator.outcome().success
-    assert f"slipped out of the closed hand {stop_reasons}" in evaluator.outcome().reason
+    assert f"slipped out of the closed hand {when}" in evaluator.outcome().reason
 
 
 def test_a_hand_that_closed_beside_the_object_says_where_it_is():
@@ -114,15 +112,15 @@ def test_a_controller_without_a_phase_of_closing_is_judged_by_the_pull():
 
 
 def test_a_finger_that_sees_nothing_is_distinguished_from_one_at_the_end_of_its_range():
-    def stop_reasons(seen: float, true: float) -> list[str]:
+    def descriptions(seen: float, true: float) -> list[str]:
         closing = signals(Phase.CLOSE, index=(seen, true))
         metrics = follow((0.0, signals(Phase.REACH)), (1.0, closing)).outcome().metrics
         return [metrics[f"{kind}_distance_index"].description for kind in ("final", "true")]
 
-    assert stop_reasons(0.065, 0.2)[0].endswith("by [Luberto] eq. (11) (sees nothing)")
-    assert stop_reasons(0.065, 0.2)[1].endswith("along the beam (meets nothing)")
-    assert stop_reasons(0.06, 0.07)[0].endswith("by [Luberto] eq. (11)")
-    assert stop_reasons(0.06, 0.07)[1].endswith("along the beam")
+    assert descriptions(0.065, 0.2)[0].endswith("by [Luberto] eq. (11) (sees nothing)")
+    assert descriptions(0.065, 0.2)[1].endswith("along the beam (meets nothing)")
+    assert descriptions(0.06, 0.07)[0].endswith("by [Luberto] eq. (11)")
+    assert descriptions(0.06, 0.07)[1].endswith("along the beam")
 
 
 def test_what_a_finger_does_not_see_is_no_number():

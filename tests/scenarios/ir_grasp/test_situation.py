@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.controllers.ir_grasp.parameters import Strategy
+from handover.controllers.ir_grasp.parameters import Correction, Strategy
 from handover.plants.ir_grasp.hand import PALM
 from handover.plants.ir_grasp.objects import SOLIDS, Thing, outlines
 from handover.scenarios.ir_grasp.parameters import Expected, Parameters, Situation
@@ -90,3 +90,9 @@ def test_contradictions_are_told_together():
     shift, crossing = p.faults()
     assert shift == "shift_least 0.06 m must be at most shift_most 0.05 m"
     assert crossing.startswith("corners: edge 0 from (0, 0) mm to (40, 40) mm and edge 2")
+
+
+def test_equations_as_printed_are_refused_of_a_correction_that_does_not_use_them():
+    (fault,) = Parameters(literal=True, correction=Correction.FAST).faults()
+    assert fault == "literal: takes the paper's equations as printed, which correction=paper alone uses"
+    assert Parameters(literal=True, correction=Correction.PAPER).faults() == []

@@ -22,7 +22,7 @@ TUNED = range(1000, 1008)
 """Seeds with which the scenario was tuned."""
 
 
-def has_summary(run: PlannedRun) -> bool:
+def succeeds(run: PlannedRun) -> bool:
     """All hold but the blind hand, and the one that goes 35 mm forward to moved objects."""
     short = run.parameters.get("forward") == "0.035" and run.parameters["perturbed"] == "true"
     return run.parameters["strategy"] != "blind" and not short
@@ -30,7 +30,7 @@ def has_summary(run: PlannedRun) -> bool:
 
 @pytest.fixture(scope="module")
 def table() -> CampaignTable:
-    return grasp_table(has_summary)
+    return grasp_table(succeeds)
 
 
 @pytest.fixture(scope="module")
@@ -115,11 +115,11 @@ def test_more_successes_than_published_are_told_as_an_easier_task(claims: Sequen
 
 
 def test_a_distance_beyond_the_range_is_told_as_not_seen():
-    index = grasp_table(has_summary, final_distance_index=lambda run: nan if run.repetition < 5 else 0.04)
+    index = grasp_table(succeeds, final_distance_index=lambda run: nan if run.repetition < 5 else 0.04)
     table = next(t for t in IrTable().tables(index) if t.title.startswith("Table II, nominal"))
     cell = dict(zip(table.header, table.rows[0], strict=True))["index, ours"]
     assert cell == "40.0 (40.0 to 40.0); not seen in 5"
-    none = grasp_table(has_summary, final_distance_index=lambda _run: nan)
+    none = grasp_table(succeeds, final_distance_index=lambda _run: nan)
     table = next(t for t in IrTable().tables(none) if t.title.startswith("Table II, nominal"))
     assert dict(zip(table.header, table.rows[0], strict=True))["index, ours"] == "not seen in 16"
 
@@ -130,7 +130,7 @@ def test_what_was_chosen_to_fit_the_table_is_not_comparable(claims: Sequence[Cla
 
 
 def test_a_hand_that_fails_as_often_as_theirs_reproduces_their_rate():
-    table = grasp_table(lambda run: has_summary(run) and run.repetition % 4 != 0)
+    table = grasp_table(lambda run: succeeds(run) and run.repetition % 4 != 0)
     claim = one(rate_claims(IrTableRuns(table)), "The IR-guided hand holds 11 of 15")
     assert (claim.measured, claim.verdict) == ("60/80 (75 %)", Verdict.REPRODUCED)
 
@@ -149,14 +149,14 @@ def test_distances_that_no_run_of_ours_has_are_not_reproduced(claims: Sequence[C
     def spread(run: PlannedRun) -> float:
         return 0.010 + 0.001 * run.repetition
 
-    spread_out = grasp_table(has_summary, final_distance_thumb=spread, final_distance_ring=spread)
+    spread_out = grasp_table(succeeds, final_distance_thumb=spread, final_distance_ring=spread)
     assert one(distance_claims(IrTableRuns(spread_out)), begin).verdict is Verdict.REPRODUCED
 
 
 def test_objects_pushed_before_closing_refute_that_there_is_no_premature_contact(claims: Sequence[Claim]):
     begin = "The IR-guided hand does not touch"
     assert one(claims, begin).verdict is Verdict.REPRODUCED
-    pushed = grasp_table(has_summary, displacement=lambda run: 0.002 if run.repetition < 2 else 0.0)
+    pushed = grasp_table(succeeds, displacement=lambda run: 0.002 if run.repetition < 2 else 0.0)
     assert one(closing_claims(IrTableRuns(pushed)), begin).verdict is Verdict.NOT_REPRODUCED
 
 
@@ -172,13 +172,13 @@ def test_table_1_puts_counts_beside_the_published_and_stars_those_that_differ(ta
 
 
 def test_runs_that_did_not_come_to_their_end_do_not_count():
-    table = grasp_table(has_summary, status=lambda run: "failed" if run.repetition == 0 else "done")
+    table = grasp_table(succeeds, status=lambda run: "failed" if run.repetition == 0 else "done")
     assert IrTableRuns(table).count(REFLEX, False) == (75, 75)
     assert "40 runs did not come to their end" in IrTable().tables(table)[0].note
 
 
 def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(tmp_path: Path):
-    table = grasp_table(has_summary, quick=True, status=lambda _run: "lost")
+    table = grasp_table(succeeds, quick=True, status=lambda _run: "lost")
     assert {claim.verdict for claim in IrTable().claims(table)} == {Verdict.NOT_COMPARABLE}
     assert IrTable().tables(table)
     assert IrTable().draw(table, tmp_path, tmp_path)
