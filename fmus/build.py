@@ -190,7 +190,7 @@ def build(
         "packages": [asdict(package) for package in packages],
     }
     files = {
-        "modelDescription.xml": describe_in_xml(model),
+        "modelDescription.xml": describe_in_xml(replace(model, needs_python=not standalone)),
         "documentation/index.html": page(model, packages, host_platform() if standalone else ""),
         "resources/unit.json": json.dumps(unit, indent=2).encode() + b"\n",
         **{f"resources/sources/{path}": content for path, content in sources.items()},

@@ -53,7 +53,7 @@ def fmi2_description(model: Model) -> bytes:
         root,
         "CoSimulation",
         modelIdentifier=model.name,
-        needsExecutionTool="true",  # Python
+        needsExecutionTool=boolean(model.needs_python),
         canHandleVariableCommunicationStepSize=boolean(model.variable_step),
         canNotUseMemoryManagementFunctions="true",
         canGetAndSetFMUstate="true",

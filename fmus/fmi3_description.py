@@ -69,7 +69,7 @@ def _add_interface(root: ET.Element, model: Model) -> None:
         root,
         "CoSimulation",
         modelIdentifier=model.name,
-        needsExecutionTool="true",  # Python
+        needsExecutionTool=boolean(model.needs_python),
         canGetAndSetFMUState="true",
         canSerializeFMUState="true",
         canHandleVariableCommunicationStepSize=boolean(model.variable_step),

@@ -53,6 +53,7 @@ class Model:
         layout: its variables' places.
         form: how the variables are shown; with the layout it gives the value references.
         variable_step: whether a step may have any size.
+        needs_python: whether a Python must be installed where it is used.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Model:
     layout: Layout
     form: Form
     variable_step: bool
+    needs_python: bool = True
 
 
 def to_xml(root: ET.Element) -> bytes:

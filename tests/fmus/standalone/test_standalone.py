@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from bare_folder import BareFolder, can_be_entered
 
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus.build import build, cached
 from handover.fmus.catalog import UNITS
 
@@ -17,6 +18,8 @@ OF_EACH_SYSTEM = ("TendonArm", "StereoCamera", "VslArm", "FreeFlyer", "GraspScen
 STEPS = 5
 ELSEWHERE = {"PYTHONHOME": "/nowhere", "PYTHONPATH": "/nowhere", "LD_LIBRARY_PATH": "/nowhere", "PATH": "/nowhere"}
 """What of the host's environment must not reach the interpreter in the FMU."""
+LARGEST = 100e6
+"""Bytes of a file."""
 OTHER_WAYS = {"FMU_PYTHON": "/nowhere/python3", "FMU_LIBPYTHON": "/nowhere/libpython.so", "FMU_PYTHON_PROCESS": "0"}
 """Settings of which an FMU with an interpreter takes no note."""
 
@@ -37,12 +40,14 @@ def units() -> list[object]:
 @pytest.mark.parametrize("name", units())
 def test_a_unit_steps_without_python_as_it_does_with_it(name: str, root: BareFolder, tmp_path: Path):
     entry = UNITS[name]
-    brought = root.unpack(build(entry, 3, tmp_path, standalone=True))
-    plain = root.unpack(cached(name, 3))
-    inside = root.step(brought, float(entry.step), STEPS, inside=True, environment=ELSEWHERE | OTHER_WAYS)
+    built = build(entry, 3, tmp_path, standalone=True)
+    assert not describe_fmu(built).capabilities.needs_tool
+    assert built.stat().st_size <= LARGEST
+    standalone, plain = root.unpack(built), root.unpack(cached(name, 3))
+    inside = root.step(standalone, float(entry.step), STEPS, inside=True, environment=ELSEWHERE | OTHER_WAYS)
     assert len(inside.outputs) == STEPS
     assert len(set(inside.outputs)) == 1 or inside.outputs[0] != inside.outputs[-1]
     assert inside.outputs == root.step(plain, float(entry.step), STEPS, inside=False).outputs
     if name == "TendonArm":
-        alike = root.step(brought, float(entry.step), STEPS, 3, inside=True)
+        alike = root.step(standalone, float(entry.step), STEPS, 3, inside=True)
         assert alike.outputs == [line for line in inside.outputs for _ in range(3)]
