@@ -210,7 +210,7 @@ def _entering(analysis: StudyAnalysis, words: Words) -> Markup:
         ("tests of ratings", f"{pairs}, and were rated", _between([t.participants for t in ratings])),
         (
             "order effects",
-            "complete sessions, without void rounds and the first, of which enough are left for a slope",
+            "complete sessions, without void rounds and the first",
             _between([e.participants for e in analysis.order_effects]),
         ),
         (
