@@ -27,6 +27,17 @@ def family(process: int) -> list[int]:
     return [below for child in children(process) for below in (child, *family(child))]
 
 
+def with_argument(process: int, argument: str) -> list[int]:
+    """Return the processes below a process that were called with an argument; of a zombie none is known."""
+
+    def has(process: int) -> bool:
+        with contextlib.suppress(ProcessLookupError, FileNotFoundError):
+            return argument.encode() in Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
+        return False
+
+    return [below for below in family(process) if has(below)]
+
+
 def servers(process: int) -> list[int]:
     """Return the run servers below a process; the runs that they have forked have the same command line."""
 

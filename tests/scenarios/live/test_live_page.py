@@ -17,6 +17,7 @@ import pytest
 from live_runs import HANDOVER, LIVE, TOLD, live_run, shown
 from opened_page import wait_until
 from playwright.sync_api import Browser
+from processes import with_argument
 from scipy.spatial.transform import Rotation
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
@@ -211,9 +212,8 @@ def test_the_page_of_a_killed_run_says_what_is_left_of_it(
 
 
 def server_of(run: "subprocess.Popen[str]") -> psutil.Process:
-    begun = psutil.Process(run.pid).children(recursive=True)
-    (server,) = [process for process in begun if "handover.scenarios.live" in process.cmdline()]
-    return server
+    (server,) = with_argument(run.pid, "handover.scenarios.live")
+    return psutil.Process(server)
 
 
 @pytest.mark.slow

@@ -2,13 +2,15 @@
 
 import contextlib
 import json
+import os
+import signal
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import psutil
 import pytest
+from processes import with_argument
 from sample_study import record
 from study_server import (
     HAND,
@@ -112,8 +114,8 @@ def test_a_run_that_is_killed_makes_its_round_void(tmp_path: Path):
         to_round(page)
         page.send(json.dumps({"hand": {**HAND, "stamp": 1.0}}))
         assert time_seen(page) >= 0.0
-        (trial,) = [p for p in psutil.Process().children() if "handover.scenarios.study.session" in p.cmdline()]
-        trial.kill()
+        (trial,) = with_argument(os.getpid(), "handover.scenarios.study.session")
+        os.kill(trial, signal.SIGKILL)
         shown = told(page, "screen")
         assert (shown["screen"], shown["again"]) == ("void", True)
         assert "the simulation's process ended (killed by signal 9)" in shown["reason"]
