@@ -24,6 +24,7 @@ import math
 from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple, cast
 
+from handover.cosim.master.live_control import LiveControl
 from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.live.played_run import Choice
 
@@ -76,6 +77,25 @@ def pace_of(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value <= _HIGHEST_PACE:
         raise InvalidCommand(f"pace takes simulated seconds per second, up to {_HIGHEST_PACE:g}; 0: as fast as it goes")
     return float(value) or math.inf
+
+
+def control_run(control: LiveControl, command: Command) -> None:
+    """Carry out a command that controls a run.
+
+    Raises:
+        InvalidCommand: its value is not right.
+    """
+    name, value = command
+    if name == "pace":
+        control.pace = pace_of(value)
+    elif name == "pause":
+        control.paused = True
+    elif name == "go":
+        control.paused = False
+    elif name == "step":
+        control.ask_for_step()
+    elif name == "stop":
+        control.stop, control.paused = True, False
 
 
 def signal_names(value: Any, known: Collection[str]) -> list[str]:

@@ -20,7 +20,6 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import RecordNotWritten, nearest
-from handover.cosim.master.live_control import LiveControl
 from handover.scenarios.experiment.time_plot import TimePlot
 from handover.scenarios.live.body_pushes import BodyPushes
 from handover.scenarios.live.commands import (
@@ -28,7 +27,7 @@ from handover.scenarios.live.commands import (
     LONGEST,
     Command,
     InvalidCommand,
-    pace_of,
+    control_run,
     parse_command,
     plot_numbers,
     push_of,
@@ -380,22 +379,3 @@ def _leave_report(shown: ShownRun) -> None:
         shown.end()
     except RecordNotWritten as e:
         print(f"the live page: {e}", file=sys.stderr)
-
-
-def control_run(control: LiveControl, command: Command) -> None:
-    """Carry out a command that controls a run.
-
-    Raises:
-        InvalidCommand: its value is not right.
-    """
-    name, value = command
-    if name == "pace":
-        control.pace = pace_of(value)
-    elif name == "pause":
-        control.paused = True
-    elif name == "go":
-        control.paused = False
-    elif name == "step":
-        control.ask_for_step()
-    elif name == "stop":
-        control.stop, control.paused = True, False
