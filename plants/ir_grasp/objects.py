@@ -69,11 +69,11 @@ class Solid:
 
     @property
     def friction_arm(self) -> float:
-        """Lever arm of table friction that turns: 2 R / 3 of a disc with the first part's area, in m."""
-        body = self.parts[0]
-        if isinstance(body, Disc):
-            return 2.0 * body.radius / 3.0
-        return 2.0 / 3.0 * math.sqrt(body.area / math.pi)
+        """Lever arm of table friction about the vertical, in m: the mean distance of the first part's points.
+
+        So the torque is that of even pressure on an object that turns about the middle of its first part.
+        """
+        return self.parts[0].mean_distance
 
     @cached_property
     def reach(self) -> float:

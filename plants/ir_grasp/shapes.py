@@ -49,6 +49,11 @@ class Disc:
         """Squared radius of gyration about its centroid, in m2."""
         return self.radius**2 / 2.0
 
+    @property
+    def mean_distance(self) -> float:
+        """Mean distance of its points from its centroid, in m."""
+        return 2.0 * self.radius / 3.0
+
     def intersect(self, x: float, y: float, d_x: float, d_y: float) -> Hit | None:
         """Return where a ray from (x, y) in O along the unit vector d enters."""
         middle = -(x * d_x + y * d_y)
@@ -98,6 +103,11 @@ class Slab:
     def gyration(self) -> float:
         """Squared radius of gyration about its centroid, in m2."""
         return sum((high - low) ** 2 for low, high in zip(self.low, self.high, strict=True)) / 12.0
+
+    @property
+    def mean_distance(self) -> float:
+        """Mean distance of its points from its centroid, in m."""
+        return Polygon(corners=tuple(self.corners)).mean_distance
 
     def intersect(self, x: float, y: float, d_x: float, d_y: float) -> Hit | None:
         """Return where a ray from (x, y) in O along the unit vector d enters."""
@@ -149,6 +159,13 @@ class Polygon:
         x, y = self.centroid
         return about_origin / (12.0 * self.area) - x * x - y * y
 
+    @property
+    def mean_distance(self) -> float:
+        """Mean distance of its points from its centroid, in m."""
+        x, y = self.centroid
+        triangles = (_distance_integral((a[0] - x, a[1] - y), (b[0] - x, b[1] - y)) for a, b in self._edges)
+        return sum(triangles) / self.area
+
     def intersect(self, x: float, y: float, d_x: float, d_y: float) -> Hit | None:
         """Return where a ray from (x, y) in O, outside, along the unit vector d enters."""
         nearest: Hit | None = None
@@ -173,6 +190,21 @@ class Polygon:
 
 
 Shape = Disc | Slab | Polygon
+
+
+def _distance_integral(a: Point, b: Point) -> float:
+    """Return the integral of the distance from the origin over the triangle from there to an edge, in m3.
+
+    With h the edge's signed distance from the origin, s a place along it from the foot and r = sqrt(s^2 + h^2), it is
+    h / 6 (s r + h^2 asinh(s / |h|)) between the ends; negative where the edge goes clockwise.
+    """
+    length = math.dist(a, b)
+    h = _cross(a, b) / length
+    if h == 0.0:
+        return 0.0
+    ends = ((p[0] * (b[0] - a[0]) + p[1] * (b[1] - a[1])) / length for p in (a, b))
+    start, end = (s * math.hypot(s, h) + h * h * math.asinh(s / abs(h)) for s in ends)
+    return h / 6.0 * (end - start)
 
 
 def capsule_hit(a: Point, b: Point, radius: float, origin: Point, direction: Point) -> tuple[float, float] | None:

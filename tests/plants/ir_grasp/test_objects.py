@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.ir_grasp.objects import SOLIDS, Solid, Thing, outlines
-from handover.plants.ir_grasp.shapes import Disc, Slab
+from handover.plants.ir_grasp.shapes import Disc, Polygon, Slab
 
 
 def met_of_polygons(thing: Thing, start: tuple[float, float], heading: float) -> float | None:
@@ -99,4 +99,21 @@ def test_gyration_and_friction_arm_are_the_integrals_over_the_shape():
     box = Solid(parts=(Slab(low=(-0.04, -0.025), high=(0.04, 0.025)),), yaw=0.0, mass=1.0, reflectivity=1.0)
     inside = (np.abs(p[:, 0]) < 0.04) & (np.abs(p[:, 1]) < 0.025)
     assert box.gyration == pytest.approx(mean(distance[inside] ** 2), rel=0.01)
-    assert box.friction_arm == pytest.approx(mean(distance[inside]), rel=0.08)  # of a disc as large
+    assert box.friction_arm == pytest.approx(mean(distance[inside]), rel=0.01)
+
+
+def test_a_slender_bar_and_a_dented_polygon_have_the_friction_arm_of_their_area():
+    bar = Slab(low=(0.03, -0.005), high=(0.13, 0.005))
+    assert bar.mean_distance == pytest.approx(0.025, rel=0.03)  # a quarter of the length, and a little
+    dented = Polygon(corners=((0.04, 0.0), (0.008, 0.006), (0.0, 0.04), (-0.03, 0.0), (0.0, -0.04)))
+    corners = dented.corners
+    edges = list(zip(corners, (*corners[1:], corners[0]), strict=True))
+    p = np.random.default_rng(0).uniform(-0.05, 0.05, (100000, 2))
+    inside = np.array([sum(_crosses(x, y, a, b) for a, b in edges) % 2 for x, y in p.tolist()], dtype=bool)
+    distance: Floats = np.linalg.norm(p - np.array(dented.centroid), axis=1)
+    assert dented.mean_distance == pytest.approx(mean(distance[inside]), rel=0.01)
+
+
+def _crosses(x: float, y: float, a: tuple[float, float], b: tuple[float, float]) -> bool:
+    """Return whether a ray from a point along x crosses an edge."""
+    return (a[1] > y) != (b[1] > y) and x < a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
