@@ -73,8 +73,17 @@ class Params:
     tolerance: Number = parameter(
         0.05, "standard deviation of a sensor's gain from that of the characteristic", minimum=0.0, maximum=0.5
     )
+    range_tolerance: Number = parameter(
+        0.05,
+        "standard deviation of the distance at which a sensor reads what the characteristic says, as a part of it",
+        minimum=0.0,
+        maximum=0.3,
+    )
+    mounting_tolerance: Radian = parameter(
+        0.03, "standard deviation of a beam's direction, along the finger and to its side", minimum=0.0, maximum=0.3
+    )
     noise: Tick = parameter(4.0, "standard deviation of a reading", minimum=0.0, maximum=1000.0)
-    seed: int = parameter(0, "seed of gains and noise", minimum=0)
+    seed: int = parameter(0, "seed of gains, ranges, mounting and noise", minimum=0)
 
     def sensor(self) -> InfraredSensor:
         """Return one of the sensors, with the characteristic's own gain.
@@ -123,8 +132,10 @@ class FingerInfrared:
     A sensor's beam is a bundle of rays about an axis that is fixed in the finger's last link, so that it turns as the
     finger closes. A ray meets the ball, the palm (a disc that faces up), or nothing; fingers do not see each other.
     The reading is the mean over the rays of `InfraredSensor.ticks`, since returned intensities add up, times the
-    sensor's own gain, plus noise, rounded. All are read in one round, one being active at a time ([Luberto] sec.
-    V-B); that gripper and ball move within the round, which takes 30 ms, is left out.
+    sensor's own gain, plus noise, rounded. Each sensor differs from the design by its gain, its range and the way it
+    is mounted: s being its range, it reads at s y what the characteristic says of y. All are read in one round, one
+    being active at a time ([Luberto] sec. V-B); that gripper and ball move within the round, which takes 30 ms, is
+    left out.
 
     Raises:
         InvalidInfraredParameters: by the constructor, for parameters out of range or a characteristic that does not
@@ -140,6 +151,9 @@ class FingerInfrared:
         self._sensor = params.sensor()
         self._rng = np.random.default_rng(params.seed)
         self._gain = np.maximum(1.0 + params.tolerance * self._rng.standard_normal(2 * FINGERS), 0.0)
+        build = np.random.default_rng([params.seed, 0xB01D])
+        self._range = np.maximum(1.0 + params.range_tolerance * build.standard_normal(2 * FINGERS), 0.1)
+        self._turned = params.mounting_tolerance * build.standard_normal((2 * FINGERS, 2))
         self._noise = self._draw()
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
@@ -167,12 +181,12 @@ class FingerInfrared:
     def _ideal(self, u: Inputs) -> Floats:
         """Return noise-free, unrounded ticks of sensors with the characteristic's gain, shape (6,)."""
         p = self._params
-        window, rays = beams(u.p_WG, rotation_of(u.q_WG), u.grip, (p.across, p.ahead), p.beam)
+        window, rays = beams(u.p_WG, rotation_of(u.q_WG), u.grip, (p.across, p.ahead), p.beam, self._turned)
         ball, ball_cosine = _distance_of_ball(window, rays, u.p_WO, p.ball_radius)
         palm, palm_cosine = _distance_of_palm(window, rays, u.p_WH + np.array([0.0, 0.0, p.palm_height]), p.palm_radius)
         is_ball = ball <= palm
         met = (
-            np.where(is_ball, ball, palm),
+            np.where(is_ball, ball, palm) / self._range[:, None],
             np.where(is_ball, ball_cosine, palm_cosine),
             np.where(is_ball, p.ball_reflectivity, p.palm_reflectivity),
         )
@@ -183,7 +197,12 @@ class FingerInfrared:
 
 
 def beams(
-    p_WG: Floats, R_WG: Floats, grip: float, angles: tuple[float, float], half_angle: float
+    p_WG: Floats,
+    R_WG: Floats,
+    grip: float,
+    angles: tuple[float, float],
+    half_angle: float,
+    turned: Floats | None = None,
 ) -> tuple[Floats, Floats]:
     """Return windows, shape (6, 1, 3), m, and rays, unit vectors of shape (6, rays, 3), of all sensors in W.
 
@@ -193,14 +212,21 @@ def beams(
         grip: its closure.
         angles: of the beams that look across and ahead, from the normal of the last link towards its tip, rad.
         half_angle: half the opening angle of a beam, rad.
+        turned: how far each beam is turned from there, shape (6, 2), rad: towards the tip, then to the finger's side;
+            None: not at all.
     """
+    turned = np.zeros((2 * FINGERS, 2)) if turned is None else turned
     _, middle, tip = np.moveaxis(finger_joints(p_WG, R_WG, grip), 1, 0)
     along = _unit(tip - middle)
     z = R_WG[:, 2]
     outwards = _unit((tip - p_WG) - ((tip - p_WG) @ z)[:, None] * z)
     normal = -_unit(outwards - np.sum(outwards * along, axis=1, keepdims=True) * along)
-    axis = np.concatenate([np.cos(a) * normal + np.sin(a) * along for a in angles])
+    design = np.repeat(angles, FINGERS)
+    c, s = np.cos(design + turned[:, 0])[:, None], np.sin(design + turned[:, 0])[:, None]
+    axis = c * np.tile(normal, (2, 1)) + s * np.tile(along, (2, 1))
     side = np.tile(np.cross(along, normal), (2, 1))
+    c, s = np.cos(turned[:, 1])[:, None], np.sin(turned[:, 1])[:, None]
+    axis, side = c * axis + s * side, c * side - s * axis
     up = np.cross(axis, side)
     rays: list[Floats] = []
     for part, count in _RINGS:

@@ -67,10 +67,20 @@ class HelixReflexGrasp(HelixHandover):
             "fingers",
             fmu("fingers"),
             ball_reflectivity=p.reflectivity,
+            palm_reflectivity=p.palm_reflectivity,
             tolerance=p.sensor_tolerance,
+            range_tolerance=p.range_tolerance,
+            mounting_tolerance=p.mounting_tolerance,
             seed=sensor_seed,
         )
-        reflex = s.add("reflex", fmu("reflex"), period=handover.picture_period, sampled=True, feels=p.reflex)
+        reflex = s.add(
+            "reflex",
+            fmu("reflex"),
+            period=handover.picture_period,
+            sampled=True,
+            feels=p.reflex,
+            ball_radius=p.expected_radius,
+        )
         vision, servo, arm, hand = (s.units[name] for name in ("vision", "servo", "arm", "hand"))
         for name in ("p_WG", "q_WG", "grip"):
             s.connect(getattr(arm.y, name), getattr(fingers.u, name))

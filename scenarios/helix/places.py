@@ -184,7 +184,10 @@ _FINGERS = {
     "p_WO": "in W",
     "p_WH": "in W",
     "ball_reflectivity": "the scenario's reflectivity",
+    "palm_reflectivity": "the scenario's",
     "tolerance": "the scenario's sensor_tolerance",
+    "range_tolerance": "the scenario's",
+    "mounting_tolerance": "the scenario's",
     "seed": "follows from the run's seed",
 }
 _CORRECTED = {
@@ -228,6 +231,7 @@ REFLEX_PLACES = {
             "reflectivity": "shown as a signal",
             "sensors": "shown as a signal",
             "feels": "the scenario's reflex",
+            "ball_radius": "the scenario's expected_radius",
         },
         remarks=(_BASE,),
     ),

@@ -58,6 +58,21 @@ class ReflexGraspParameters:
     sensor_tolerance: Number = parameter(
         0.05, "standard deviation of a sensor's gain from the characteristic's", minimum=0.0, maximum=0.5
     )
+    range_tolerance: Number = parameter(
+        0.05,
+        "standard deviation of a sensor's range from the characteristic's, as a part of it",
+        minimum=0.0,
+        maximum=0.3,
+    )
+    mounting_tolerance: Radian = parameter(
+        0.03, "standard deviation of a sensor's direction from the design's, in each of two", minimum=0.0, maximum=0.3
+    )
+    palm_reflectivity: Number = parameter(
+        0.6, "reflectivity of the palm likewise; the reflex expects 0.6", minimum=0.0, maximum=2.0
+    )
+    expected_radius: Metre = parameter(
+        0.025, "radius of the ball that the reflex expects; it has 25 mm", minimum=0.005, maximum=0.1
+    )
 
     @property
     def handover(self) -> Parameters:

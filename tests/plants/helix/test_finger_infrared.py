@@ -12,12 +12,13 @@ DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 R_DOWN = np.diag([1.0, -1.0, -1.0])
 P_WG = np.array([0.1, 0.05, -0.6])
 FAR = np.array([0.0, 0.0, -5.0])
+IDEAL: dict[str, Any] = {"tolerance": 0.0, "range_tolerance": 0.0, "mounting_tolerance": 0.0}
 P = Params()
 
 
 def read(p_GO: Any, p_GH: Any = FAR, grip: float = 0.0, **values: Any) -> Floats:
     """Return ideal sensors' readings of a ball and a palm at places in a gripper's frame that points down."""
-    settings: dict[str, Any] = {"noise": 0.0, "tolerance": 0.0, **values}
+    settings: dict[str, Any] = {**IDEAL, "noise": 0.0, **values}
     unit = FingerInfrared(Params(**settings))
     ball, palm = (P_WG + R_DOWN @ np.asarray(p, dtype=np.float64) for p in (p_GO, p_GH))
     return unit.outputs(0.0, Inputs(p_WG=P_WG, q_WG=DOWN, grip=grip, p_WO=ball, p_WH=palm)).ticks
@@ -88,8 +89,41 @@ def test_reflectivity_and_gain_scale_a_reading():
     assert np.mean(gains) == pytest.approx(1.0, abs=0.02)
 
 
+def test_a_sensor_of_more_range_reads_from_farther_what_the_characteristic_says():
+    window, rays = beams(np.zeros(3), np.eye(3), 0.0, (P.across, P.ahead), 0.0)
+    ranges: list[float] = []
+    for seed in range(100):
+        for sensor in range(6):
+            ball = window[sensor, 0] + (0.02 + P.ball_radius) * rays[sensor, 0]
+            ticks = read(ball, beam=0.0, range_tolerance=0.1, seed=seed)[sensor]
+            ranges.append(0.02 / P.sensor().distance(ticks))
+    assert np.std(ranges) == pytest.approx(0.1, abs=0.01)
+    assert np.mean(ranges) == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_beam_that_is_mounted_askew_is_turned_along_the_finger_and_to_its_side():
+    _, straight = beams(np.zeros(3), np.eye(3), 0.0, (P.across, P.ahead), 0.2)
+    turned = np.zeros((6, 2))
+    turned[1], turned[3] = (0.1, 0.0), (0.0, 0.1)
+    _, askew = beams(np.zeros(3), np.eye(3), 0.0, (P.across, P.ahead), 0.2, turned)
+    angles = np.arccos(np.clip(np.sum(straight[:, 0] * askew[:, 0], axis=1), -1.0, 1.0))
+    np.testing.assert_allclose(angles, [0.0, 0.1, 0.0, 0.1, 0.0, 0.0], atol=1e-7)
+    assert askew[1, 0] @ straight[4, 0] > straight[1, 0] @ straight[4, 0]  # towards the tip, where the other looks
+    assert askew[3, 0] @ straight[0, 0] < straight[3, 0] @ straight[0, 0]
+    np.testing.assert_allclose(np.linalg.norm(askew, axis=2), 1.0)
+    np.testing.assert_allclose(askew @ np.swapaxes(askew, 1, 2), straight @ np.swapaxes(straight, 1, 2), atol=1e-12)
+
+
+def test_each_sensor_is_mounted_its_own_way_by_the_seed():
+    usual = read([0.005, 0.0, 0.02])
+    askew = [read([0.005, 0.0, 0.02], mounting_tolerance=0.1, seed=k) for k in range(3)]
+    assert all(np.count_nonzero(a != usual) >= 5 for a in askew)
+    assert not np.array_equal(askew[0], askew[1])
+    np.testing.assert_array_equal(askew[2], read([0.005, 0.0, 0.02], mounting_tolerance=0.1, seed=2))
+
+
 def test_readings_are_whole_numbers_with_the_noise_that_is_set():
-    unit = FingerInfrared(Params(tolerance=0.0, noise=6.0))
+    unit = FingerInfrared(Params(noise=6.0, **IDEAL))
     u = Inputs(p_WG=P_WG, q_WG=DOWN, p_WO=P_WG, p_WH=FAR)
     readings = np.array([unit.step(0.03 * k, 0.03, u).ticks[0] for k in range(400)])
     assert np.array_equal(readings, np.rint(readings))
