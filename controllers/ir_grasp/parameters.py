@@ -174,7 +174,7 @@ class Params:
     shake_frequency: Hertz = parameter(1.5, "frequency of the shake", minimum=0.01, maximum=10.0)
     shake_cycles: int = parameter(3, "cycles of the shake", minimum=0, maximum=1000)
     contact_speed: MetrePerSecond = parameter(0.04, "speed ahead of the strategy CONTACT", minimum=1e-3, maximum=0.3)
-    contact_closing: PerSecond = parameter(0.2, "its rate of closing on the way", minimum=0.0, maximum=1.0)
+    contact_closing: PerSecond = parameter(0.05, "its rate of closing on the way", minimum=0.0, maximum=1.0)
     contact_tension: Newton = parameter(0.5, "tension off that of the free hand that shows contact", minimum=1e-3)
     free_tension: Newton = parameter(6.51, "tension of the free hand's tendon by closure, of its design", minimum=0.0)
     feed: MetrePerSecond = parameter(0.06, "speed ahead, of FAST", minimum=0.0, maximum=1.0)

@@ -1,5 +1,6 @@
 """Where infrared sensing wins and where it does not: ways to grasp along many axes, beyond Luberto et al."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
@@ -59,14 +60,22 @@ class IrLimits(PublishedExperiment):
 
     def claims(self, table: CampaignTable) -> Sequence[Claim]:
         """Judge that one curve is enough, and what looking is worth."""
-        runs = LimitRuns(table)
+        runs, unpushed = LimitRuns(table), LimitRuns(table, _PUSHED_MOST)
         paper = [_one_curve(runs, PAPER), _alike(runs, PAPER)]
-        return [*paper, _worth(runs), _holds(runs), _carried(runs), _pushes(runs), _quick_enough(runs)]
+        return [
+            *paper,
+            _worth(runs),
+            _worth(unpushed),
+            _holds(runs),
+            _carried(runs),
+            _pushes(runs),
+            _quick_enough(runs),
+        ]
 
     def tables(self, table: CampaignTable) -> Sequence[ComparisonTable]:
         """Return what looking is worth, where each arm falls below one half, all rates, and what was pushed."""
-        runs = LimitRuns(table)
-        return [_worth_table(runs), _halves(runs), _rates(runs), _pushed_table(runs)]
+        runs, unpushed = LimitRuns(table), LimitRuns(table, _PUSHED_MOST)
+        return [_worth_table(runs), _worth_table(unpushed), _halves(runs), _rates(runs), _pushed_table(runs)]
 
     def draw(self, table: CampaignTable, runs: Path, folder: Path) -> Sequence[Figure]:  # noqa: ARG002 (its figures need the table alone)
         """Draw rates and displacement by level, a panel for each axis."""
@@ -118,7 +127,7 @@ def _no_worse(sentence: str, where: str, printed: str, held: Sequence[float], st
 def _worth(runs: LimitRuns) -> Claim:
     sentence = (
         f"On at least {_MIN_AXES} axes the reflex holds {format_share(WORTH)} of the objects more than the best way "
-        "that does not look."
+        f"that does not look{_unpushed(runs)}."
     )
     compared = runs.compared(REFLEX, _WITHOUT)
     if not compared:
@@ -231,15 +240,27 @@ def _worth_table(runs: LimitRuns) -> ComparisonTable:
     ]
     of_scenes = "scenes: it held more, the other"
     header = ["axis", "reflex", "best without looking", "it holds", "points", of_scenes, "p", "looking"]
+    why = _WHY_UNPUSHED if _unpushed(runs) else ""
     note = (
-        f"{sentence_of_worth(compared)} All levels beyond the start together, in the same scenes; p by the exact "
+        f"{why}{sentence_of_worth(compared)} All levels beyond the start together, in the same scenes; p by the exact "
         "sign-flip test over scenes, corrected by Holm over the axes. On the last three axes the levels are of the "
         "same scenes, and a hand that does not look met each once. The best way without looking is chosen by these "
         "runs themselves, which favours it."
     )
     if runs.unfinished:
         note += f" {runs.unfinished} runs did not come to their end, and count as failures."
-    return ComparisonTable(title="What looking is worth", header=header, rows=rows, note=note)
+    return ComparisonTable(title=f"What looking is worth{_unpushed(runs)}", header=header, rows=rows, note=note)
+
+
+_WHY_UNPUSHED = (
+    f"Held, and pushed by at most {1e3 * _PUSHED_MOST:.0f} mm before the hand closed: what slides on this table may be "
+    "knocked over on another. "
+)
+
+
+def _unpushed(runs: LimitRuns) -> str:
+    """Return words for what counts as held."""
+    return "" if runs.pushed_most == math.inf else f", pushed by at most {1e3 * runs.pushed_most:.0f} mm"
 
 
 def _with_interval(count: tuple[int, int]) -> str:

@@ -1,6 +1,7 @@
 """Results of `ir-limits`: counts by arm, axis and level, paired tests, and what follows from them by rule."""
 
 import enum
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -101,9 +102,15 @@ class Comparison:
 
 
 class LimitRuns:
-    """The rows of a campaign's table by what they are of; a run that did not come to its end has failed."""
+    """The rows of a campaign's table by what they are of; a run that did not come to its end has failed.
 
-    def __init__(self, table: CampaignTable) -> None:
+    Args:
+        table: of the campaign.
+        pushed_most: how far an object may have been pushed before the hand closes to count as held, m.
+    """
+
+    def __init__(self, table: CampaignTable, pushed_most: float = math.inf) -> None:
+        self.pushed_most = pushed_most
         self._rows: dict[tuple[object, ...], list[Row]] = {}
         for row in table.rows:
             self._rows.setdefault(_key(row), []).append(row)
@@ -117,7 +124,7 @@ class LimitRuns:
     def count(self, arm: LimitArm, axis: Axis, levels: Sequence[float]) -> Count:
         """Return successes and trials."""
         rows = self.rows(arm, axis, levels)
-        return sum(_held(row) for row in rows), len(rows)
+        return sum(self._held(row) for row in rows), len(rows)
 
     def differences(self, first: LimitArm, second: LimitArm, axis: Axis) -> list[int]:
         """Return, by scene, how many levels beyond the start the first arm held more than the second."""
@@ -145,9 +152,15 @@ class LimitRuns:
     def _by_scene(self, arm: LimitArm, axis: Axis, level: float) -> dict[Scene, bool]:
         """Return successes at a level by scene: object and seed."""
         return {
-            (*(_of(row, name) for name in ("thing", "thing_seed", "scene.mass_O")), row["seed"]): _held(row)
+            (*(_of(row, name) for name in ("thing", "thing_seed", "scene.mass_O")), row["seed"]): self._held(row)
             for row in self.rows(arm, axis, (level,))
         }
+
+    def _held(self, row: Row) -> bool:
+        if row["status"] != "done" or not row["success"]:
+            return False
+        pushed = row.get("displacement")
+        return self.pushed_most == math.inf or (pushed is not None and pushed <= self.pushed_most)
 
     def values(self, metric: str, arm: LimitArm, axis: Axis, levels: Sequence[float]) -> Floats:
         """Return a metric of runs, without those that have none."""
@@ -185,10 +198,6 @@ class LimitRuns:
             found.append(Comparison(axis, *sums, more, less, sign_flip_test(differences)))
         corrected = holm([c.p for c in found])
         return [replace(c, p=p) for c, p in zip(found, corrected, strict=True)]
-
-
-def _held(row: Row) -> bool:
-    return row["status"] == "done" and bool(row["success"])
 
 
 def sentence_of_worth(compared: Sequence[Comparison]) -> str:

@@ -194,10 +194,28 @@ def test_fifteen_points_count_as_such():
     assert c.verdict == "worth it"
 
 
+def worth_claims(claims: Sequence[Claim]) -> list[Verdict]:
+    """Return the verdicts on what looking is worth: by success, and by success without a push."""
+    both = [c for c in claims if c.claim.startswith("On at least 4 axes")]
+    assert [c.claim.endswith("does not look, pushed by at most 15 mm.") for c in both] == [False, True]
+    return [c.verdict for c in both]
+
+
 def test_that_looking_is_worth_it_takes_four_axes(claims: Sequence[Claim]):
-    assert one(claims, "On at least 4 axes").verdict is Verdict.REPRODUCED
+    assert worth_claims(claims) == [Verdict.REPRODUCED, Verdict.REPRODUCED]
     alike = IrLimits().claims(limits_table(lambda _run: True))
-    assert one(alike, "On at least 4 axes").verdict is Verdict.NOT_REPRODUCED
+    assert worth_claims(alike) == [Verdict.NOT_REPRODUCED, Verdict.NOT_REPRODUCED]
+
+
+@pytest.mark.parametrize(("push", "verdict"), [(0.014, Verdict.NOT_REPRODUCED), (0.016, Verdict.REPRODUCED)])
+def test_a_hand_that_pushes_what_it_takes_is_outdone_where_that_counts(push: float, verdict: Verdict):
+    pushing = limits_table(
+        lambda _run: True, pushed=lambda run: 0.001 if run.parameters["strategy"] == "reflex" else push
+    )
+    assert worth_claims(IrLimits().claims(pushing)) == [Verdict.NOT_REPRODUCED, verdict]
+    runs = LimitRuns(pushing, pushed_most=0.015)
+    assert runs.count(REFLEX, axis("away"), axis("away").levels) == (60, 60)
+    assert runs.count(CONTACT, axis("away"), axis("away").levels) == (60 if push < 0.015 else 0, 60)
 
 
 def test_one_curve_for_all_materials_is_refuted_by_grasps_that_fail_in_the_dark(claims: Sequence[Claim]):
@@ -222,5 +240,5 @@ def test_figures_are_left_as_png_and_svg(table: CampaignTable, tmp_path: Path):
 def test_without_runs_there_are_neither_verdicts_nor_figures(table: CampaignTable, tmp_path: Path):
     empty = CampaignTable(table.table.slice(0, 0))
     assert {c.verdict for c in IrLimits().claims(empty)} == {Verdict.NOT_COMPARABLE}
-    assert [len(t.rows) for t in IrLimits().tables(empty)] == [0, 0, 0, 0]
+    assert [len(t.rows) for t in IrLimits().tables(empty)] == [0, 0, 0, 0, 0]
     assert IrLimits().draw(empty, tmp_path, tmp_path) == []
