@@ -58,11 +58,15 @@ def _success(results: CampaignResults, layout: PointLayout, folder: Path) -> Fig
         for k, point in enumerate(results.points):
             span = point.interval
             if span is not None:
-                low, middle, high = 100 * span.low, 100 * point.rate, 100 * span.high
+                alone = len(point.done) == 1  # the interval of one run says nothing
+                low, middle, high = (100 * x for x in (span.low, point.rate, span.high))
+                low, high = (middle, middle) if alone else (low, high)
                 _bar(axes, layout, float(layout.places[k]), (low, middle, high), COLOURS[layout.groups[k]])
         _set_point_axis(axes, layout)
         _set_value_axis(axes, layout, "success rate (%)", (-3.0, 103.0))
-    caption = "Share of the runs done that succeeded, with 95 % intervals of Clopper and Pearson."
+    repeated = any(len(point.done) > 1 for point in results.points)
+    bars = "with 95 % intervals of Clopper and Pearson" if repeated else "one run at each point"
+    caption = f"Share of the runs done that succeeded, {bars}."
     return Figure("success_by_point", caption)
 
 

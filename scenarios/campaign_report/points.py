@@ -108,7 +108,9 @@ def success_section(results: CampaignResults, layout: PointLayout) -> Section | 
     place_axis(figure, layout)
     rate_axis = "xaxis" if layout.listed else "yaxis"
     figure.update_layout({rate_axis: {"title": {"text": "success rate (%)"}, "range": [-4, 104], "dtick": 25}})
-    note = Markup("<p class='soft'>Of the runs done; bars: 95 % intervals of Clopper and Pearson.</p>")
+    repeated = any(len(p.done) > 1 for p in results.points)
+    bars = "bars: 95 % intervals of Clopper and Pearson" if repeated else "one at each point"
+    note = Markup("<p class='soft'>Of the runs done; {}.</p>").format(bars)
     return Section(
         anchor="success",
         title="Success",
@@ -127,7 +129,11 @@ def _rates(results: CampaignResults, layout: PointLayout, group: int, name: str)
         [results.label(p), f"{p.successes} of {len(p.done)}", f"{a:.0f} to {b:.0f} %"]
         for p, a, b in zip(points, low, high, strict=True)
     ]
-    bar = {"type": "data", "array": high - rates, "arrayminus": rates - low, "thickness": 1.6, "width": 4}
+    up, down = (  # the interval of one run says nothing
+        [float(x) if len(p.done) > 1 else None for p, x in zip(points, reach, strict=True)]
+        for reach in (high - rates, rates - low)
+    )
+    bar = {"type": "data", "array": up, "arrayminus": down, "thickness": 1.6, "width": 4}
     along, across = ("y", "x") if layout.listed else ("x", "y")
     return go.Scatter(
         {along: layout.places[chosen], across: rates, f"error_{across}": bar},

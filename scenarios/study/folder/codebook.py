@@ -16,6 +16,9 @@ PERSON, PILOT = "person", "scripted pilot"
 TEXT, WHOLE, NUMBER, FLAG = "text", "whole number", "number", "true or false"
 """Types of columns; pandas calls them string, Int64, Float64 and boolean."""
 
+_FORMULA = ("=", "+", "-", "@")
+"""What spreadsheets take for the beginning of a formula."""
+
 Row = Mapping[str, Any]
 
 
@@ -29,6 +32,7 @@ class Column:
         unit: "1" of numbers without one, "" of what is no number.
         meaning: in a sentence without its full stop.
         optional: whether it may be empty.
+        free: whether it is text that a person typed.
     """
 
     name: str
@@ -36,6 +40,7 @@ class Column:
     unit: str
     meaning: str
     optional: bool = False
+    free: bool = False
 
 
 WHO = (
@@ -115,7 +120,9 @@ def questionnaire_columns(plan: StudyPlan) -> tuple[Column, ...]:
         words = text.choices.get(question.name, ())
         meanings = "; ".join(f"{c}: {w}" for c, w in zip(question.choices, words, strict=True))
         meaning = text.questions[question.name] + (f" ({meanings})" if meanings else "")
-        asked.append(Column(question.name, TEXT, "", meaning, optional=True))
+        free = not question.choices
+        meaning += "; in CSV after an apostrophe where a spreadsheet would take it for a formula" if free else ""
+        asked.append(Column(question.name, TEXT, "", meaning, optional=True, free=free))
     return (*WHO, *asked)
 
 
@@ -173,10 +180,14 @@ def write_codebook(folder: Path, plan: StudyPlan, tables: Mapping[str, Sequence[
 def write_csv(path: Path, columns: Sequence[Column], rows: Sequence[Row]) -> None:
     """Write a table as CSV, whole or not at all: UTF-8, a comma between, empty where there is no value.
 
+    What a person typed has an apostrophe before it if it begins like a formula, which a spreadsheet would carry out.
+
     Raises:
         RecordNotWritten: it cannot be written.
     """
-    write_whole(path, csv_text([c.name for c in columns], [[_csv(row.get(c.name)) for c in columns] for row in rows]))
+    write_whole(
+        path, csv_text([c.name for c in columns], [[_csv(row.get(c.name), c.free) for c in columns] for row in rows])
+    )
 
 
 def write_parquet(path: Path, columns: Sequence[Column], rows: Sequence[Row]) -> None:
@@ -202,9 +213,11 @@ def csv_text(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     return text.getvalue()
 
 
-def _csv(value: Any) -> Any:
+def _csv(value: Any, free: bool) -> Any:
     if value is None:
         return ""
+    if free and isinstance(value, str) and value.lstrip().startswith(_FORMULA):
+        return f"'{value}"
     return str(value).lower() if isinstance(value, bool) else value
 
 

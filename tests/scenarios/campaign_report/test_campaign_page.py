@@ -105,6 +105,15 @@ def test_more_points_than_a_list_has_room_for_are_in_the_table_alone(tmp_path: P
     assert (f"{n} points are too many for plots" in html) == (n > 200)
 
 
+@pytest.mark.parametrize("n", [1, 2])
+def test_a_point_of_one_run_has_no_interval_in_the_plot(tmp_path: Path, n: int):
+    html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS, repetitions=n), table_of(POINTS, repetitions=n))
+    part = html[html.index('id="success"') : html.index('id="runs"')]
+    assert ("one at each point." in part) is (n == 1)
+    assert ("bars: 95 % intervals" in part) is (n > 1)
+    assert ('"array":[null,null]' in part) is (n == 1)
+
+
 def test_points_of_a_paired_campaign_are_compared(tmp_path: Path):
     table = replaced(table_of(POINTS, repetitions=6), "success", [True] * 6 + [False] * 6)
     html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS, repetitions=6, paired=True), table)

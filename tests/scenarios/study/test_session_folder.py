@@ -17,7 +17,7 @@ from sample_study import PILOT_PLAN, PLAN, play, record, same, session, write_st
 
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
-from handover.scenarios.study.folder.codebook import PILOT
+from handover.scenarios.study.folder.codebook import PILOT, questionnaire_columns, write_csv
 from handover.scenarios.study.folder.session_folder import SessionFolder
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.order import rounds_of
@@ -59,6 +59,17 @@ def test_pandas_reads_every_table_by_the_codebook(tmp_path: Path):
     asked = read_by_codebook(study.path, "questionnaire", folder.path / "questionnaire.csv")
     assert asked["comments"][0] == 'a "quoted", text\n2'
     assert asked["age_group"][0] == "21-30"
+
+
+@pytest.mark.parametrize("typed", ["=HYPERLINK(1)", "+1", "- nothing", " @you", "'so'", "fine = good"])
+def test_what_a_person_typed_is_no_formula_of_a_spreadsheet(tmp_path: Path, typed: str):
+    columns = questionnaire_columns(PLAN)
+    assert [c.name for c in columns if c.free] == [q.name for q in PLAN.questions if not q.choices]
+    assert any("apostrophe" in c.meaning for c in columns)
+    write_csv(tmp_path / "asked.csv", columns, [{"comments": typed, "age_group": "-20"}])
+    written = csv_of(tmp_path / "asked.csv", dtype=str)
+    assert written["comments"][0] == (f"'{typed}" if typed[0] in "=+- " else typed)
+    assert written["age_group"][0] == "-20"
 
 
 def test_the_codebook_tells_every_column_with_its_unit(tmp_path: Path):
