@@ -12,9 +12,8 @@ from handover.scenarios.campaign.statistics import success_interval
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
-from handover.scenarios.published.ir_grasp.convergence_curves import Descent, descents_of
+from handover.scenarios.published.ir_grasp.convergence_curves import Descent, descents_of, draw_convergence
 from handover.scenarios.published.ir_grasp.grasp_drawings import draw_cases, draw_poses, draw_sequences
-from handover.scenarios.published.ir_grasp.ir_convergence_figures import draw_convergence
 from handover.scenarios.published.ir_grasp.ir_table_claims import distance_claims
 from handover.scenarios.published.ir_grasp.ir_table_runs import OBJECTS, POSES, REFLEX, IrTableRuns
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, PublishedExperiment
