@@ -41,6 +41,11 @@ def find_scenario(name: str) -> type[Experiment[Any]]:
         valid = [*SCENARIOS, *installed_scenarios()]
         if name in UNITS:
             raise UsageError(f"{name} is a unit, not a scenario: {', '.join(valid)}") from None
+        if Path(name).suffix == ".toml":
+            raise UsageError(
+                f"{name} is a file, not a scenario: a study's plan is opened by handover study serve {name}, "
+                f"values of options by --config {name}"
+            ) from None
         own = "" if name in "".join(valid) else "; a scenario of your own is named MODULE:CLASS"
         raise UsageError(f"no scenario {name!r}: {nearest(name, valid)}{own}") from None
 

@@ -170,6 +170,10 @@ def test_workers_that_cannot_be_had_leave_nothing(here: Path, monkeypatch: pytes
     ("call", "sentence"),
     [
         (["ir_gasp"], "no scenario 'ir_gasp': did you mean ir_grasp?"),
+        (
+            ["my_plan.toml"],
+            "a study's plan is opened by handover study serve my_plan.toml, values of options by --config",
+        ),
         (["x.ssp"], "x.ssp: a scenario can be swept, an SSP cannot"),
         (["x.fmu"], "x.fmu: a scenario can be swept, an FMU can be run by itself"),
         (["ir_grasp", "thing=cylindr"], "thing: 'cylindr' is none of cylinder, baby_cup_a"),
