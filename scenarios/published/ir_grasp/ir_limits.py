@@ -136,7 +136,8 @@ def _worth(runs: LimitRuns) -> Claim:
     return Claim(
         claim=sentence,
         published="",
-        measured=f"on {len(worth)} of {len(compared)}. {sentence_of_worth(compared)}",
+        measured=f"on {len(worth)} of {len(compared)}"
+        + "".join(f"; {c.axis.title} ({100 * c.gain:+.0f})" for c in sorted(worth, key=lambda c: -c.gain)),
         verdict=verdict_of(len(worth) >= _MIN_AXES, could_be_either=all(c.first[1] >= _MIN_RUNS for c in compared)),
         reason="Of each axis all levels beyond its start count, and the best of the others is that which held most of "
         "them. An axis counts if the difference is as large and the exact sign-flip test over scenes, which is "
@@ -260,7 +261,9 @@ _WHY_UNPUSHED = (
 
 def _unpushed(runs: LimitRuns) -> str:
     """Return words for what counts as held."""
-    return "" if runs.pushed_most == math.inf else f", pushed by at most {1e3 * runs.pushed_most:.0f} mm"
+    return (
+        "" if runs.pushed_most == math.inf else f", counting what was pushed by at most {1e3 * runs.pushed_most:.0f} mm"
+    )
 
 
 def _with_interval(count: tuple[int, int]) -> str:

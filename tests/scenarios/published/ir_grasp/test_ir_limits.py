@@ -197,7 +197,10 @@ def test_fifteen_points_count_as_such():
 def worth_claims(claims: Sequence[Claim]) -> list[Verdict]:
     """Return the verdicts on what looking is worth: by success, and by success without a push."""
     both = [c for c in claims if c.claim.startswith("On at least 4 axes")]
-    assert [c.claim.endswith("does not look, pushed by at most 15 mm.") for c in both] == [False, True]
+    assert [c.claim.endswith("does not look, counting what was pushed by at most 15 mm.") for c in both] == [
+        False,
+        True,
+    ]
     return [c.verdict for c in both]
 
 
