@@ -29,11 +29,12 @@ Q_HANGING = np.array([0.0, 0.0, 0.12, 0.0, 0.0, 0.24, 0.0, 0.0, 0.24])
 P_WG = np.array([0.0, 0.0, -0.7])
 UP = np.array([0.0, 0.0, 1.0])
 KNOWN = 1e-8 * np.eye(3)
+IDEAL = {"tolerance": 0.0, "range_tolerance": 0.0, "mounting_tolerance": 0.0}
 
 
 def ticks_of(p_GO: Any, grip: float = 0.0, palm: bool = False, **values: Any) -> Floats:
     """Return what the plant's sensors read of a ball in a gripper that points down."""
-    settings: dict[str, Any] = {"noise": 0.0, "tolerance": 0.0, **values}
+    settings: dict[str, Any] = {**IDEAL, "noise": 0.0, **values}
     unit = FingerInfrared(FingerParams(**settings))
     ball = P_WG + R_DOWN @ np.asarray(p_GO, dtype=np.float64)
     u = FingerInputs(p_WG=P_WG, q_WG=DOWN, grip=grip, p_WO=ball, p_WH=ball - (0.04 if palm else 5.0) * UP)
