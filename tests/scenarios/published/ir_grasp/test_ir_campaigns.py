@@ -74,4 +74,4 @@ def test_runs_of_the_limits_are_found_by_what_they_are_of(tmp_path: Path):
         "limits",
         "limits_displacement",
     }
-    assert [len(t.rows) for t in IrLimits().tables(table)] == [1, 1, 1, 1]
+    assert [len(t.rows) for t in IrLimits().tables(table)] == [1, 1, 1, 1, 1]
