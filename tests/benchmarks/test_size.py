@@ -83,8 +83,9 @@ def test_cpu_time_and_memory_of_large_systems(benchmark: BenchmarkFixture, tmp_p
     power = growth(least, most)
     print(f"grows with the size to the power of {power:.2f}")
     assert power < 1.5
-    assert most < SECONDS
     assert found[SIZES[-1]][1] < BYTES
+    if benchmark.enabled:  # else other tests run beside it
+        assert most < SECONDS
 
 
 @pytest.mark.slow
