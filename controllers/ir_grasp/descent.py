@@ -15,6 +15,10 @@ from handover.controllers.ir_grasp.parameters import Params
 from handover.cosim.blocks.ports import Floats
 
 _RANK_TOLERANCE = 1e-12
+_GROWTH, _SHRINKAGE = (
+    2.0,
+    0.5,
+)  # of the factor on alpha, after a step that lessened the cost and one that did not (assumed)
 
 
 def cost(r: Floats) -> float:
@@ -175,7 +179,7 @@ class Descent:
         self.steps += 1
         self._since_probing += 1
         self._stalled = 0 if f < (1.0 - p.progress) * before else self._stalled + 1
-        self._trust = min(1.0, 2.0 * self._trust) if f < before else 0.5 * self._trust
+        self._trust = min(1.0, _GROWTH * self._trust) if f < before else _SHRINKAGE * self._trust
         if self.reached:
             return Verdict.REACHED
         if self._stalled >= p.stalled_steps:

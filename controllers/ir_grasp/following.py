@@ -2,7 +2,7 @@
 
 import enum
 import math
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -15,8 +15,18 @@ from handover.controllers.ir_grasp.sensor_geometry import surface_points
 from handover.controllers.ir_grasp.touch import Touch
 from handover.cosim.blocks.ports import Floats
 
+_DISTANCE_NOISE: Final = 2e-4  # m; of a distance, besides that of the ticks
+_LEAST_FEED: Final = 0.03  # m/s; at which the hand goes ahead when it is nearly there
+_STUCK: Final = (0.02, 0.1)  # m/s, of the wanted way ahead; share of it that a hand at the end of its reach makes
+_EARLY_CLOSING: Final = 0.01  # m; by how much the fingers may come nearer before the object is deep enough
+_PREFERENCE: Final = np.array([0.1, 1.0, 0.2, 1.0])  # of moves ahead, left, in yaw and closing, to center
+_ACROSS_SPEED: Final = 0.1  # m/s; at which the hand no longer goes ahead while it goes to a side
+_ONE_SIDED_CLOSING: Final = 0.3  # 1/s; once the object is deep enough and one side sees it
+_EFFECT: Final = (1e-3, 2e-3)  # m; change of the offset that is an effect, and offset that needs none
+"""Assumed, as the parameters are: tuned on seeds below 1000."""
 
-class Doing(enum.IntEnum):
+
+class Mode(enum.IntEnum):
     """What the hand does on the move."""
 
     SEARCH = 0
@@ -24,7 +34,7 @@ class Doing(enum.IntEnum):
     TRACK = 2
 
 
-class Ending(enum.IntEnum):
+class Termination(enum.IntEnum):
     """What ends the correction."""
 
     NONE = 0
@@ -51,7 +61,7 @@ class Following:
     where it was seen, then searched.
 
     Attributes:
-        doing: what the last round did.
+        mode: of the last round.
         rounds: control periods with both fingers of the cost in sight.
     """
 
@@ -65,11 +75,11 @@ class Following:
         self._weight = params.weight[self._in_cost]
         pregrasp = np.array([*params.p_WH_pregrasp, params.yaw_pregrasp])
         self._low, self._high = pregrasp - params.fast_reach, pregrasp + params.fast_reach
-        self.doing: Doing = Doing.SEARCH
+        self.mode: Mode = Mode.SEARCH
         self.rounds = 0
         self._front: X = ()  # nearest point that was seen, in W
         self._off, self._beside = math.inf, 0.0
-        self._before: Doing = Doing.SEARCH
+        self._before: Mode = Mode.SEARCH
         self._settled, self._lost, self._pushed, self._path = 0.0, 0.0, 0.0, 0.0
         self._saw = [False] * 3
         self._along, self._then = 0.0, math.nan  # way ahead since the distance of the side that sees was another
@@ -84,6 +94,11 @@ class Following:
         """Estimated velocity of the object, (2,) in W, in m/s."""
         return self._filter.velocity if self._front else np.zeros(2)
 
+    @property
+    def jacobian_offset(self) -> Floats:
+        """Estimated d(distance)/d[ahead, left, yaw, sigma], (3, 4), less that of the hand's design."""
+        return self._filter.jacobian_offset
+
     def look(self, x: X, ticks: X) -> bool:
         """Take a round's readings; return whether any finger sees the object."""
         p = self._params
@@ -92,7 +107,7 @@ class Following:
         self._saw = [
             v >= (self._ticks_lost if saw else self._ticks_seen) for v, saw in zip(ticks, self._saw, strict=True)
         ]
-        noise = [p.tick_noise * -self._calibration.slope(v) + 2e-4 for v in ticks]
+        noise = [p.tick_noise * -self._calibration.slope(v) + _DISTANCE_NOISE for v in ticks]
         self._filter.advance(x, distances, self._saw, noise)
         self._remember(x, np.array(distances))
         return any(self._saw)
@@ -119,33 +134,33 @@ class Following:
         """Return how far ahead of the wrist the nearest point is, in m."""
         return math.cos(x[2]) * (self._front[0] - x[0]) + math.sin(x[2]) * (self._front[1] - x[1])
 
-    def advance(self, x: X, command: X) -> tuple[X, Ending]:
+    def advance(self, x: X, command: X) -> tuple[X, Termination]:
         """Return the command of the coming period, and whether the correction ends here."""
         p = self._params
         if self._searches_ahead and len(self._around) == 1 and (self._touching or any(self._saw)):
             self._around = []
         if self._around:
-            return self._go_around(command), Ending.NONE
+            return self._go_around(command), Termination.NONE
         if self._touching:
             if self._is_gripped(x):
-                return command, Ending.CONTACT
+                return command, Termination.CONTACT
             if self._meets():
                 self._begin_around_touched(x)
-                return self._go_around(x), Ending.NONE
+                return self._go_around(x), Termination.NONE
         if not any(self._saw) and (not self._front or self._lost > p.lost_time):
-            self.doing = Doing.SEARCH
+            self.mode = Mode.SEARCH
             goal = self._search.advance(command, self._dt)
-            return goal, Ending.LOST if self._search.over else Ending.NONE
+            return goal, Termination.LOST if self._search.over else Termination.NONE
         left = self.ahead(x) - p.depth
         deep = left <= 0.0
         self._lost = 0.0 if any(self._saw) else self._lost + self._dt
-        feed = 0.0 if deep else min(p.feed, p.rate * left + 0.03)
+        feed = 0.0 if deep else min(p.feed, p.rate * left + _LEAST_FEED)
         both = self._sees_both
-        self.doing = Doing.TRACK if both else Doing.ONE_SIDED
+        self.mode = Mode.TRACK if both else Mode.ONE_SIDED
         self.rounds += both
         if not both and not deep and self._goes_along(x):
             self._begin_around(x)
-            return self._go_around(command), Ending.NONE
+            return self._go_around(command), Termination.NONE
         u = self._centering(feed, deep) if both else self._one_sided(feed, deep)
         over = float(np.max(np.abs(u) / p.speed_limit))
         u = u / over if over > 1.0 else u
@@ -155,8 +170,8 @@ class Following:
         rates = np.array([c * u[0] - s * u[1] + v[0], s * u[0] + c * u[1] + v[1], u[2]])
         goal = np.clip(np.array(command[:3]) + self._dt * rates, self._low, self._high)
         made = c * (goal[0] - command[0]) + s * (goal[1] - command[1])
-        stuck = float(u[0]) > 0.02 and made < 0.1 * self._dt * float(u[0])
-        return (*goal.tolist(), sigma), self._ending(u, left, stuck)
+        stuck = float(u[0]) > _STUCK[0] and made < _STUCK[1] * self._dt * float(u[0])
+        return (*goal.tolist(), sigma), self._termination(u, left, stuck)
 
     @property
     def _sees_both(self) -> bool:
@@ -218,7 +233,7 @@ class Following:
         """Return the command of the coming period on that way."""
         goal, way = self._around[0], self._params.search_speed * self._dt
         away = math.dist(goal, command[:2])
-        self.doing = Doing.ONE_SIDED
+        self.mode = Mode.ONE_SIDED
         if away <= way:
             self._around.pop(0)
             return (*goal, *command[2:])
@@ -231,26 +246,28 @@ class Following:
     def _centering(self, feed: float, deep: bool) -> Floats:
         """Return rates of [ahead, left, yaw, sigma] that bring both fingers of the cost to one distance.
 
-        It is the target's once the object is deep enough; before, their mean, if that is more: who closes so early
-        meets the object with the fingertips.
+        It is the target once the object is deep enough; before, nearly their mean, if that is more: fingers that close
+        earlier meet the object with their tips.
         """
         p, d = self._params, self._filter.distances[self._in_cost]
-        target = p.target if deep else max(p.target, float(np.mean(d)) - 0.01)
+        target = p.target if deep else max(p.target, float(np.mean(d)) - _EARLY_CLOSING)
         r = self._weight * (d - target)
         ahead = np.array([feed * max(0.0, 1.0 - abs(self.offset) / p.one_sided[0]), 0.0, 0.0, 0.0])
         rows = self._filter.jacobian[self._in_cost] * self._weight[:, None]
-        scale = p.scale * [0.1, 1.0, 0.2, 1.0]
-        return ahead + minimum_norm_step(rows, p.rate * r + rows @ ahead, scale, p.damping)
+        return ahead + minimum_norm_step(rows, p.rate * r + rows @ ahead, p.scale * _PREFERENCE, p.damping)
 
     def _one_sided(self, feed: float, deep: bool) -> Floats:
-        """Return rates that bring the hand to the side of the finger that sees the object near it (fig. 9)."""
+        """Return rates that bring the hand to the side of the finger that sees the object near it (fig. 9).
+
+        Across by `rate` times the distance that is left to `one_sided`, and the slower ahead the faster it is.
+        """
         p, d = self._params, self._filter.distances
         near = p.one_sided - np.nan_to_num(d, nan=1.0)
         to_fingers, to_thumb = max(0.0, float(near[1]), float(near[2])), max(0.0, float(near[0]))
         self._beside = max(to_fingers, to_thumb)
         across = p.rate * (to_fingers - to_thumb)
-        ahead = feed * max(0.0, 1.0 - abs(across) / 0.1)
-        return np.array([ahead, across, 0.0, 0.3 if deep and any(self._saw) else 0.0])
+        ahead = feed * max(0.0, 1.0 - abs(across) / _ACROSS_SPEED)
+        return np.array([ahead, across, 0.0, _ONE_SIDED_CLOSING if deep and any(self._saw) else 0.0])
 
     @property
     def offset(self) -> float:
@@ -258,53 +275,53 @@ class Following:
         d = self._filter.distances
         return 0.5 * float(d[0] - d[2])
 
-    def _ending(self, u: Floats, left: float, stuck: bool) -> Ending:
+    def _termination(self, u: Floats, left: float, stuck: bool) -> Termination:
         p = self._params
         self._path += self._dt * max(0.0, float(u[0]))
         if self._is_without_effect(u, left):
-            return Ending.PUSHED if self._touching or not self._touch.measured else Ending.SETTLED
+            return Termination.PUSHED if self._touching or not self._touch.measured else Termination.SETTLED
         if self._path > p.path_limit:
-            return Ending.USED_UP
+            return Termination.USED_UP
         if left > 0.0:
-            return Ending.USED_UP if stuck else Ending.NONE
+            return Termination.USED_UP if stuck else Termination.NONE
         d = self._filter.distances[self._in_cost]
         if cost(self._weight * (d - p.target)) <= p.threshold:
-            return Ending.REACHED
+            return Termination.REACHED
         if abs(self.offset) <= p.balance:
-            return Ending.CENTRED
+            return Termination.CENTRED
         if self._lost >= p.lost_deep:
-            return Ending.LOST
+            return Termination.LOST
         self._settled += self._dt
         if self._settled < p.settling:
-            return Ending.NONE
-        return Ending.SETTLED if any(self._saw) else Ending.LOST
+            return Termination.NONE
+        return Termination.SETTLED if any(self._saw) else Termination.LOST
 
     def _is_without_effect(self, u: Floats, left: float) -> bool:
         """Whether ways across no longer change what is seen: the object goes along, or the estimate is at its end."""
         p = self._params
-        off = abs(self.offset) if self.doing is Doing.TRACK else self._beside
-        if left > p.push_depth or off < self._off - 1e-3 or off < 2e-3 or self.doing is not self._before:
-            self._pushed, self._off, self._before = 0.0, off, self.doing
+        off = abs(self.offset) if self.mode is Mode.TRACK else self._beside
+        if left > p.push_depth or off < self._off - _EFFECT[0] or off < _EFFECT[1] or self.mode is not self._before:
+            self._pushed, self._off, self._before = 0.0, off, self.mode
         else:
             self._pushed += self._dt * abs(float(u[1]))
         return self._pushed > p.push_limit
 
     def get_state(self) -> tuple[object, ...]:
         """Return estimates, search, what was seen, and counters."""
-        did = (int(self.doing), int(self._before), self.rounds)
+        modes = (int(self.mode), int(self._before), self.rounds)
         saw = (self._saw, self._front, self._beside)
         around = (self._along, self._then, list(self._around), self._rounded, self._searches_ahead)
         touch = (self._touch.get_state(), self._touched)
         counters = (self._off, self._settled, self._lost, self._pushed, self._path)
-        return self._filter.get_state(), self._search.get_state(), did, saw, counters, around, touch
+        return self._filter.get_state(), self._search.get_state(), modes, saw, counters, around, touch
 
     def set_state(self, state: tuple[Any, ...]) -> None:
         """Restore a state that `get_state` gave."""
-        estimates, searched, (doing, before, self.rounds), saw, counters, around, (touch, self._touched) = state
+        estimates, searched, (mode, before, self.rounds), saw, counters, around, (touch, self._touched) = state
         self._touch.set_state(touch)
         self._filter.set_state(estimates)
         self._search.set_state(searched)
-        self.doing, self._before = Doing(doing), Doing(before)
+        self.mode, self._before = Mode(mode), Mode(before)
         seen, self._front, self._beside = saw
         self._saw = list(seen)
         self._along, self._then, corners, self._rounded, self._searches_ahead = around

@@ -9,13 +9,14 @@ from typing import ClassVar
 import numpy as np
 
 from handover.controllers.ir_grasp.descent import Descent, Verdict
-from handover.controllers.ir_grasp.following import Ending, Following
+from handover.controllers.ir_grasp.following import Following, Termination
 from handover.controllers.ir_grasp.moves import Move, Probing, Reading, X
 from handover.controllers.ir_grasp.parameters import Correction, InvalidReflexParameters, Params, Strategy
-from handover.controllers.ir_grasp.phases import DOING, ENDINGS, STOPS, Phase, Stop
+from handover.controllers.ir_grasp.phases import PHASES, STOPS, TERMINATIONS, Phase, Stop
+from handover.controllers.ir_grasp.touch import Touch
 from handover.controllers.ir_grasp.visibility import Recovery, Visibility, displaced
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.ports import Floats, Vector2, Vector3, Vector8, output, port
+from handover.cosim.blocks.ports import Floats, Matrix3x4, Vector2, Vector3, Vector8, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Metre, Newton, Number, Radian, SquareMetre, Tick
 
@@ -33,6 +34,7 @@ __all__ = [
 ]
 
 _PERIOD = Fraction(3, 200)  # one round of the three sensors, at 5 ms each (assumed)
+_BRAKING = 0.008  # m; before the slow part of the way to the pre-grasp pose (assumed)
 
 
 class InvalidReading(InvalidParameters):
@@ -50,7 +52,9 @@ class Inputs:
     yaw: Radian = port(0.0, "heading of the hand")
     sigma: Number = port(0.0, "closure of the hand: 0 open, 1 closed")
     tension: Newton = port(0.0, "tension of the tendon, by the motor's current; read by CONTACT and FAST")
-    q: Vector8[Radian] = port(np.zeros(8), "joint angles: thumb 2, index 3, ring 3; all 0: not measured; read by FAST")
+    q: Vector8[Radian] = port(
+        np.zeros(8), "joint angles: thumb 2, index 3, ring 3; all 0: not measured; read by CONTACT and FAST"
+    )
 
 
 @dataclass(kw_only=True)
@@ -66,6 +70,9 @@ class Outputs:
     distance: Vector3[Metre] = output("distance of thumb, index and ring by eq. (11)")
     steps: int = output("Gauss-Newton steps made")
     stop: Stop = output("why the refinement ended")
+    jacobian_offset: Matrix3x4[Number] = output(
+        "FAST: estimated Jacobian of the distances by ahead, left, yaw, sigma less the design's; else 0"
+    )
 
 
 class IrReflex:
@@ -86,8 +93,8 @@ class IrReflex:
 
     That is the correction PAPER; FAST comes slowly to the pre-grasp pose and corrects on the move (`Following`):
     SEARCH, RECOVER and TRACK follow each other by what is seen, CLOSE goes along with the object, and `steps` are
-    control periods in TRACK. The strategies BLIND, FORWARD and CONTACT (ahead and slowly closing until the tendon
-    tightens) do not look.
+    control periods in TRACK. The strategies BLIND, FORWARD and CONTACT (ahead and slowly closing until joints or tendon
+    feel the object between the fingers, or as far as `reach`) do not look.
 
     The residuals are r_i = weight_i (d_i - target) over fingers with a weight: with the printed r_i = d_i the least
     cost is at contact, where the fingers push the object away.
@@ -116,6 +123,7 @@ class IrReflex:
         self._probing = Probing(tuple(p.probe.tolist()))
         self._descent = Descent(p)
         self._following = Following(p, float(_PERIOD))
+        self._touch = Touch(p, float(_PERIOD))
         self._fast = p.strategy is Strategy.REFLEX and p.correction is Correction.FAST
         self._stop = Stop.RUNNING
         self._recoveries, self._closings, self._shaken = 0, 0, 0
@@ -137,6 +145,7 @@ class IrReflex:
             distance=np.array(distances),
             steps=self._following.rounds if self._fast else self._descent.steps,
             stop=self._stop,
+            jacobian_offset=self._following.jacobian_offset if self._fast else np.zeros((3, 4)),
         )
 
     def step(self, t: float, dt: float, u: Inputs) -> Outputs:
@@ -147,7 +156,7 @@ class IrReflex:
         if self._phase is Phase.SHAKE:
             self._shake()
         elif self._phase is Phase.APPROACH and self.params.strategy is Strategy.CONTACT:
-            self._feel(u.sigma, u.tension)
+            self._feel((*u.p_WH.tolist(), u.yaw, u.sigma), u.q, u.tension)
         elif self._phase is not Phase.DONE and not self._on_the_move:
             reading = self._move.advance((*u.p_WH.tolist(), u.yaw, u.sigma), tuple(u.ticks.tolist()))
             if reading is not None:
@@ -159,11 +168,12 @@ class IrReflex:
         parts = [part.get_state() for part in (self._move, self._recovery, self._probing, self._descent)]
         counters = (self._recoveries, self._closings, self._shaken)
         following = self._following.get_state() if self._fast else None
-        return pack_state((int(self._phase), int(self._stop), parts, counters, following))
+        return pack_state((int(self._phase), int(self._stop), parts, counters, following, self._touch.get_state()))
 
     def set_state(self, state: bytes) -> None:
         """Restore a state that `get_state` gave."""
-        phase, stop, parts, (self._recoveries, self._closings, self._shaken), following = unpack_state(state)
+        phase, stop, parts, (self._recoveries, self._closings, self._shaken), following, touch = unpack_state(state)
+        self._touch.set_state(touch)
         if self._fast:
             self._following.set_state(following)
         self._phase, self._stop = Phase(phase), Stop(stop)
@@ -174,14 +184,20 @@ class IrReflex:
     def _on_the_move(self) -> bool:
         return self._fast and self._phase in (Phase.SEARCH, Phase.TRACK, Phase.RECOVER)
 
-    def _feel(self, sigma: float, tension: float) -> None:
-        """Go ahead while slowly closing, until the tendon is not as tight as that of a free hand, or the reach ends."""
+    def _feel(self, now: X, q: Floats, tension: float) -> None:
+        """Go ahead while slowly closing, until something presses a finger outwards near its root, or the reach ends.
+
+        Where no joint is measured, or none feels it, the tendon may, by not being as tight as that of a free hand.
+        """
         p = self.params
         x, step = self._ahead(p.contact_speed * float(_PERIOD)), p.contact_closing * float(_PERIOD)
         self._move.goal = (*x[:3], min(x[3] + step, p.sigma_limit))
         way = math.dist(x[:2], p.p_WH_pregrasp.tolist())
-        if abs(tension - p.free_tension * sigma) > p.contact_tension or way >= float(p.reach[0]):
+        self._touch.advance(now, q, tension)
+        if self._touch.presses_outwards or abs(tension - p.free_tension * now[3]) > p.contact_tension:
             self._close(Stop.CONTACT)
+        elif way >= float(p.reach[0]):
+            self._close(Stop.REACH)
 
     def _follow(self, x: X, ticks: X, q: Floats, tension: float) -> None:
         """Correct on the move; while closing, go along with the object."""
@@ -198,10 +214,10 @@ class IrReflex:
             self._move.goal = self._arriving(x)
             return
         goal, ending = following.advance(x, self._move.goal if arrived else x)
-        self._phase = DOING[following.doing]
+        self._phase = PHASES[following.mode]
         self._move.goal = goal
-        if ending is not Ending.NONE:
-            self._close(ENDINGS[ending])
+        if ending is not Termination.NONE:
+            self._close(TERMINATIONS[ending])
 
     def _arriving(self, x: X) -> X:
         """Return the command on the way to the pre-grasp pose: slow on its last part, where an object may stand."""
@@ -209,7 +225,7 @@ class IrReflex:
         left, commanded = math.dist(x[:2], goal[:2]), math.dist(self._move.goal[:2], goal[:2])
         if left == 0.0:
             return goal
-        if left > p.arrival_way + 0.008 or p.arrival_way == 0.0:
+        if left > p.arrival_way + _BRAKING or p.arrival_way == 0.0:
             share = min(1.0, p.arrival_way / left)
         else:
             share = max(0.0, min(commanded, p.arrival_way) - p.arrival_speed * float(_PERIOD)) / max(left, 1e-9)

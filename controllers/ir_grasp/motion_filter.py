@@ -21,6 +21,12 @@ _FINGERS: Final = 3
 _ROW: Final = 5  # distance, then its derivatives by [ahead, left, yaw, sigma]
 _DIAGONAL: Final = np.arange(_ROW)
 
+_DEVIATIONS: Final = 5.0  # by which a reading may be off what is predicted, besides `jump`
+_MIDDLE_JUMP: Final = 2.0  # in `jump`, of the middle
+_MIDDLE_SPREAD: Final = 2e-3  # m; standard deviation of the middle when it is first seen
+_MIDDLE_NOISE: Final = 5e-4  # m; of a reading of the middle
+"""Assumed, as the parameters are: tuned on seeds below 1000."""
+
 _AGES: Final = (2.0 / 3.0, 1.0 / 3.0, 0.0)
 """Age of each sensor's reading, in rounds: they are read one after the other (sec. V-B), the ring's last."""
 
@@ -56,10 +62,15 @@ class MotionFilter:
         return np.array(self._m[:, 1:])
 
     @property
+    def jacobian_offset(self) -> Floats:
+        """What was learnt: the estimated Jacobian less that of the hand's design at the last closure, (3, 4)."""
+        return self.jacobian - nominal_jacobian(self._x[3]) if self._x else np.array(self._params.jacobian_offset_0)
+
+    @property
     def velocity(self) -> Floats:
         """Estimated velocity of the object across the pre-grasp heading, (2,) in W, in m/s.
 
-        The estimate times v^2 / (v^2 + variance): what may be noise is not followed.
+        The estimate times v^2 / (v^2 + variance + rest_speed^2): what may be noise is not followed.
         """
         p, v = self._params, float(self._middle[2])
         if self._rounds * self._dt < p.velocity_after:
@@ -76,6 +87,8 @@ class MotionFilter:
             seen: which of them are of the object.
             noise: standard deviation of each, in m.
         """
+        if not self._x:
+            self._m[:, 1:] = self._first_jacobian(x[3])
         before = self._x or x
         self._x = x
         d_W = np.array([x[0] - before[0], x[1] - before[1]])
@@ -97,10 +110,10 @@ class MotionFilter:
         self.seen = tuple(bool(v) for v in seen)
 
     def _predict(self, moved: Floats, sigma: float) -> None:
-        """Advance by one round; what was learnt of the Jacobian fades towards that of the design."""
-        p, nominal = self._params, nominal_jacobian(sigma)
+        """Advance by one round; what was learnt of the Jacobian fades towards that to begin with."""
+        p, first = self._params, self._first_jacobian(sigma)
         keep = 1.0 - self._dt / p.jacobian_memory
-        self._m[:, 1:] = nominal + keep * (self._m[:, 1:] - nominal)
+        self._m[:, 1:] = first + keep * (self._m[:, 1:] - first)
         F: Floats = np.diag([1.0, keep, keep, keep, keep])
         F[0, 1:] = keep * moved
         self._m[:, 0] += self._m[:, 1:] @ moved
@@ -113,19 +126,26 @@ class MotionFilter:
         innovation = distance - float(h @ self._m[i])
         Ph = self._cov[i] @ h
         variance = float(h @ Ph) + noise**2
-        if innovation**2 > self._params.jump**2 + 25.0 * variance:
+        if innovation**2 > self._params.jump**2 + _DEVIATIONS**2 * variance:
             return False
         self._m[i] += Ph * (innovation / variance)
         self._cov[i] -= np.outer(Ph, Ph) / variance
         return True
 
     def _begin(self, i: int, sigma: float, distance: float, noise: float) -> None:
-        """Begin a finger's row by what is known without a move: the Jacobian of the hand's design."""
-        self._m[i] = np.concatenate([[distance], nominal_jacobian(sigma)[i]])
+        """Begin a finger's row by what is known without a move."""
+        self._m[i] = np.concatenate([[distance], self._first_jacobian(sigma)[i]])
         self._cov[i] = np.diag(np.concatenate([[noise], self._params.jacobian_spread]) ** 2)
 
+    def _first_jacobian(self, sigma: float) -> Floats:
+        """Return the Jacobian of the hand's design, with what an earlier grasp found it to be off by."""
+        return nominal_jacobian(sigma) + self._params.jacobian_offset_0
+
     def _follow_middle(self, x: X, ahead: float, distances: Floats, seen: Sequence[bool]) -> None:
-        """Take the middle between thumb's and ring's surface as a place across, y' = slope (way ahead)' + v."""
+        """Take the middle between thumb's and ring's surface as a place across, y' = slope (way ahead)' + v.
+
+        Both readings are taken for present ones: a hand at 0.1 m/s across shifts the middle by 0.5 mm, as by its noise.
+        """
         p = self._params
         F: Floats = np.array([[1.0, ahead, self._dt], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
         self._middle = np.dot(F, self._middle)
@@ -137,8 +157,8 @@ class MotionFilter:
         a, b = 0.5 * (points[0] + points[2])
         c, s = math.cos(x[2]), math.sin(x[2])
         y = float(self._left @ np.array([x[0] + c * a - s * b, x[1] + s * a + c * b]))
-        if not self._rounds or abs(y - self._middle[0]) > 2.0 * p.jump:
-            spread = [2e-3, p.slope_spread, p.velocity_spread]
+        if not self._rounds or abs(y - self._middle[0]) > _MIDDLE_JUMP * p.jump:
+            spread = [_MIDDLE_SPREAD, p.slope_spread, p.velocity_spread]
             if not self._rounds:
                 self._middle, self._spread = np.array([y, 0.0, 0.0]), np.diag(np.array(spread) ** 2)
             else:
@@ -146,7 +166,7 @@ class MotionFilter:
                 self._spread[0, :], self._spread[:, 0] = 0.0, 0.0
                 self._spread[0, 0] = spread[0] ** 2
         self._rounds += 1
-        gain = self._spread[:, 0] / (self._spread[0, 0] + 5e-4**2)
+        gain = self._spread[:, 0] / (self._spread[0, 0] + _MIDDLE_NOISE**2)
         self._middle += gain * (y - self._middle[0])
         self._spread -= np.outer(gain, self._spread[0, :])
 

@@ -6,6 +6,8 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 
+_MADE = 0.5  # share of a probing move that the encoders must show (assumed)
+
 X = tuple[float, ...]
 """Control inputs [p_x, p_y, yaw, sigma]: m, m, rad, 1."""
 
@@ -117,7 +119,7 @@ class Probing:
         j = self._input
         moved = x[j] - self._x[j]
         for i, is_open in enumerate(self._open):
-            if is_open and seen[i] and abs(moved) > 0.5 * abs(self._sizes[j]):
+            if is_open and seen[i] and abs(moved) > _MADE * abs(self._sizes[j]):
                 self.jacobian[i, j] = (r[i] - self._r[i]) / moved
                 self._open[i] = False
         if any(self._open) and self._sign > 0.0:

@@ -8,7 +8,7 @@ import numpy as np
 
 from handover.controllers.ir_grasp.sensor_geometry import LARGEST_CLOSURE
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.ports import Vector2, Vector3, Vector4, parameter
+from handover.cosim.blocks.ports import Matrix3x4, Vector2, Vector3, Vector4, parameter
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import (
     Hertz,
@@ -87,7 +87,7 @@ class InvalidReflexParameters(InvalidParameters):
 class Strategy(enum.IntEnum):
     """What is done between the pre-grasp pose and closing.
 
-    A correction by the sensors, nothing, a given way forward, or forward and slowly closing until the tendon tightens.
+    A correction by the sensors, nothing, a given way forward, or forward and slowly closing until contact.
     """
 
     REFLEX = 0
@@ -225,13 +225,19 @@ class Params:
     tick_noise: Tick = parameter(4.0, "standard deviation of a reading", minimum=0.0)
     jump: Metre = parameter(0.006, "change of a distance that no smooth surface explains", minimum=0.0)
     distance_drift: Metre = parameter(3e-4, "random change of a distance in a round", minimum=0.0)
+    jacobian_offset_0: Matrix3x4[Number] = parameter(
+        np.zeros((3, 4)),
+        "what the Jacobian to begin with adds to the design's: output jacobian_offset of the last grasp; 0: the design",
+        minimum=-10.0,
+        maximum=10.0,
+    )
     jacobian_spread: Vector4[Number] = parameter(
         np.array([0.6, 0.2, 0.05, 0.06]), "how far off the Jacobian to begin with may be, by input", minimum=0.0
     )
     jacobian_drift: Vector4[Number] = parameter(
         np.array([0.05, 0.02, 0.004, 0.006]), "random change of the Jacobian in a round, by input", minimum=0.0
     )
-    jacobian_memory: Second = parameter(0.5, "time after which what was learnt of it fades", minimum=0.1)
+    jacobian_memory: Second = parameter(0.5, "time in which what was learnt of it fades to that", minimum=0.1)
     slope_spread: Number = parameter(0.1, "how far the middle moves across by way ahead, one deviation", minimum=0.0)
     slope_drift: Number = parameter(0.01, "random change of that in a round", minimum=0.0)
     velocity_spread: MetrePerSecond = parameter(0.012, "speed of an object, one standard deviation", minimum=0.0)

@@ -3,7 +3,7 @@
 import enum
 
 from handover.controllers.ir_grasp.descent import Verdict
-from handover.controllers.ir_grasp.following import Doing, Ending
+from handover.controllers.ir_grasp.following import Mode, Termination
 
 
 class Phase(enum.IntEnum):
@@ -29,8 +29,8 @@ class Stop(enum.IntEnum):
     The cost is small, steps, recoveries, reach or way are used up, there is no progress, no finger sees the object, or
     the strategy has no refinement. Of the correction on the move: ways across change nothing of what is seen while a
     finger touches the object, which so goes along (PUSHED; also where no joint is measured); the object is deep between
-    two fingers that are equally far from it, or presses a finger outwards there (CONTACT). Of the strategy CONTACT: the
-    tendon tightened.
+    two fingers that are equally far from it, or presses a finger outwards there (CONTACT). Of the strategy CONTACT: it
+    felt the object between the fingers, or its way ahead was at its end before (REACH).
     """
 
     RUNNING = 0
@@ -43,16 +43,17 @@ class Stop(enum.IntEnum):
     PUSHED = 7
     CONTACT = 8
     CENTRED = 9
+    REACH = 10
 
 
 STOPS = {Verdict.REACHED: Stop.THRESHOLD, Verdict.STALLED: Stop.STALLED, Verdict.USED_UP: Stop.PATIENCE}
-ENDINGS = {
-    Ending.REACHED: Stop.THRESHOLD,
-    Ending.SETTLED: Stop.STALLED,
-    Ending.LOST: Stop.OUT_OF_SIGHT,
-    Ending.USED_UP: Stop.PATIENCE,
-    Ending.PUSHED: Stop.PUSHED,
-    Ending.CENTRED: Stop.CENTRED,
-    Ending.CONTACT: Stop.CONTACT,
+TERMINATIONS = {
+    Termination.REACHED: Stop.THRESHOLD,
+    Termination.SETTLED: Stop.STALLED,
+    Termination.LOST: Stop.OUT_OF_SIGHT,
+    Termination.USED_UP: Stop.PATIENCE,
+    Termination.PUSHED: Stop.PUSHED,
+    Termination.CENTRED: Stop.CENTRED,
+    Termination.CONTACT: Stop.CONTACT,
 }
-DOING = {Doing.SEARCH: Phase.SEARCH, Doing.ONE_SIDED: Phase.RECOVER, Doing.TRACK: Phase.TRACK}
+PHASES = {Mode.SEARCH: Phase.SEARCH, Mode.ONE_SIDED: Phase.RECOVER, Mode.TRACK: Phase.TRACK}

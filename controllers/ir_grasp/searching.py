@@ -7,15 +7,18 @@ import numpy as np
 from handover.controllers.ir_grasp.moves import X
 from handover.controllers.ir_grasp.parameters import Params
 
+_ELLIPSE = 1.25  # half axis ahead of the searched ellipse, in `search_ahead` (assumed)
+
 
 class Search:
     """A zig-zag about the pre-grasp pose: a step back, then rows across, each farther ahead, then a guess.
 
     The fingers look inwards: an object beside the hand is not seen, and an open hand that goes ahead pushes it. So the
     rows begin a step behind, where the fingers pass before what was moved to the side. Together they fill half an
-    ellipse before the pre-grasp pose. If nothing was seen, the hand goes where the object would be had it not been
-    moved (`search_guess` ahead). It goes farther to the right: the two fingers on the left look farther ahead than the
-    thumb, and see what the hand has passed.
+    ellipse before the pre-grasp pose, of half axes `search_width` and 1.25 `search_ahead`, cut off at `search_ahead`.
+    If nothing was seen, the hand goes where the object would be had it not been moved (`search_guess` ahead). It goes
+    farther to the right: the two fingers on the left look farther ahead than the thumb, and see what the hand has
+    passed.
     """
 
     def __init__(self, params: Params) -> None:
@@ -25,7 +28,7 @@ class Search:
         self._ends = [(-p.search_back, 0.0)]
         side, ahead = 1.0, -p.search_back
         while ahead <= p.search_ahead:
-            share = math.sqrt(max(0.0, 1.0 - (max(ahead, 0.0) / (1.25 * p.search_ahead)) ** 2))
+            share = math.sqrt(max(0.0, 1.0 - (max(ahead, 0.0) / (_ELLIPSE * p.search_ahead)) ** 2))
             left, right = float(p.search_width[0]), -float(p.search_width[1])
             ends = [(ahead, share * left), (ahead, share * right)]
             self._ends += ends if side > 0.0 else ends[::-1]

@@ -1,7 +1,7 @@
 """Where the hand's sensors are by its closure, and the Jacobian of their distances that follows before any is measured.
 
-In the hand's frame H: origin at the wrist, x ahead, y to the left. The values are of the hand's design, its fingers
-free: what they touch bends them otherwise.
+In the hand's frame H: origin at the wrist, x ahead, y to the left. The values are of the hand's design (assumed, as
+the plant's), its fingers free: what they touch bends them otherwise.
 """
 
 from functools import lru_cache

@@ -23,15 +23,17 @@ _PULLEYS: Final = np.array([0.010, 0.007, 0.010, 0.008, 0.006, 0.010, 0.008, 0.0
 _STIFFNESS: Final = np.array([0.040, 0.040, 0.064, 0.064, 0.060, 0.040, 0.040, 0.038])  # N m/rad
 _DAMPING: Final = 0.006  # N m s/rad
 _MASS: Final = 0.020  # of a phalanx, kg
-"""The hand's design, in the order of its joints: thumb 2, index 3, ring 3."""
+"""The hand's design (assumed, as the plant's), in the order of its joints: thumb 2, index 3, ring 3."""
 
 _ALIKE: Final = _FINGER[:, None] == _FINGER
 _HEADING: Final = np.tril(_ALIKE) * _FLEXION  # orientation of a phalanx, by the joints before it
 _BEYOND: Final = np.array([n - 1 - k for n in _COUNTS for k in range(n)])
 _LEVERS: Final = np.triu(_ALIKE) * (0.5 + _BEYOND)  # of all phalanges beyond a joint, by the links that lead to them
 
-_START: Final = 6  # rounds in which the wrist sets off, faster than the encoders' rounds resolve
-_TIP: Final = 0.12  # share of the largest torque that the distal joint has at least where the distal phalanx is touched
+_START: Final = 6  # rounds in which the wrist sets off, faster than the encoders' rounds resolve (assumed)
+_TIP: Final = (
+    0.12  # share of the largest torque that the distal joint has at least where the distal phalanx is touched (assumed)
+)
 
 
 def inertia_levers(q: Floats) -> Floats:
@@ -55,6 +57,8 @@ class TouchedPlace(NamedTuple):
 
 class Touch:
     """Estimates the torque of contacts on the joints, tau = c q' + K q - r T + b a, as a mean over `touch_time`.
+
+    The terms I q'' of the phalanges and of the hand's yaw acceleration are left out.
 
     Positive ones bend inwards. It counts as a contact if it exceeds `touch_torque` by the share `touch_inertia` of the
     mean torque of inertia, which the wrist's encoders give less exactly. Joint angles that are all exactly 0 are taken
@@ -87,6 +91,11 @@ class Touch:
         """Whether the torque of any joint is that of a contact."""
         limit = self._params.touch_torque + self._params.touch_inertia * self._mean(1)
         return bool(np.any(np.abs(self.torque) > limit))
+
+    @property
+    def presses_outwards(self) -> bool:
+        """Whether something presses a finger outwards near its root: it is between the fingers."""
+        return self.touches and self.place.outwards and not self.place.distal
 
     @property
     def place(self) -> TouchedPlace:

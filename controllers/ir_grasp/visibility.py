@@ -87,21 +87,19 @@ class Recovery:
     Args:
         step: first step of the linear motions, m.
         closing: step of sigma.
-        least: linear step that is not worth making, m.
+        least: smallest linear step, m.
     """
 
     def __init__(self, step: float, closing: float, least: float) -> None:
         self._step, self._closing, self._least = step, closing, least
         self._sizes = {"along": step, "across": step}
         self._last: dict[str, int] = {}
-        self.reversals = 0
 
     def motion(self, case: Visibility, *, may_close: bool) -> Motion:
         """Return the next motion for a case other than ALL_SEEN; `may_close` says whether sigma has room to grow."""
         action = RECOVERY[case]
         axis = _AXIS[action]
         if action in _OPPOSITE and self._last.get(axis) == _OPPOSITE[action]:
-            self.reversals += 1
             self._sizes[axis] = max(self._sizes[axis] / 2.0, self._least)
             self._last[axis] = int(action)
             action = SECOND[case]
@@ -114,13 +112,13 @@ class Recovery:
         nearing = action is Action.FORWARD and (case is Visibility.NONE or RECOVERY[case] is not action)
         return Motion(action, self._step if nearing else self._sizes[_AXIS[action]])
 
-    def get_state(self) -> tuple[dict[str, float], dict[str, int], int]:
-        """Return steps, last actions and the count of reversals."""
-        return dict(self._sizes), dict(self._last), self.reversals
+    def get_state(self) -> tuple[dict[str, float], dict[str, int]]:
+        """Return steps and last actions."""
+        return dict(self._sizes), dict(self._last)
 
-    def set_state(self, state: tuple[dict[str, float], dict[str, int], int]) -> None:
+    def set_state(self, state: tuple[dict[str, float], dict[str, int]]) -> None:
         """Restore a state that `get_state` gave."""
-        sizes, last, self.reversals = state
+        sizes, last = state
         self._sizes, self._last = dict(sizes), dict(last)
 
 

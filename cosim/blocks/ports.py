@@ -121,6 +121,7 @@ Vector9 = TypeAliasType("Vector9", Annotated[Floats, Shape((9,))], type_params=(
 Vector12 = TypeAliasType("Vector12", Annotated[Floats, Shape((12,))], type_params=(U,))
 Vector14 = TypeAliasType("Vector14", Annotated[Floats, Shape((14,))], type_params=(U,))
 Matrix3 = TypeAliasType("Matrix3", Annotated[Floats, Shape((3, 3))], type_params=(U,))
+Matrix3x4 = TypeAliasType("Matrix3x4", Annotated[Floats, Shape((3, 4))], type_params=(U,))
 Corners8 = TypeAliasType("Corners8", Annotated[Floats, Shape((8, 2))], type_params=(U,))
 Polyline25 = TypeAliasType("Polyline25", Annotated[Floats, Shape((25, 3))], type_params=(U,))
 

@@ -74,10 +74,11 @@ MIN_ANGLE, MAX_ANGLE = -0.2, 1.6
 """Limits of the joint angles, in rad; assumed."""
 
 PALM: Final = ((0.0, -0.044), (0.056, -0.044), (0.056, 0.044), (0.0, 0.044))
-"""Corners of the palm in H, in m, counter-clockwise."""
+"""Corners of the palm in H, in m, counter-clockwise; assumed."""
 
 SENSOR_PLACE: Final = 0.5
-"""Where on the distal phalanx the sensor sits, flush with the pad: 0 its joint, 1 its end. It looks square to it."""
+"""Where on the distal phalanx the sensor sits, flush with the pad: 0 its joint, 1 its end; assumed. It looks square to
+it."""
 
 
 def finger_points(p_WH: Floats, yaw: float, q: Floats) -> list[Floats]:

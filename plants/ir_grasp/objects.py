@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.ir_grasp.shapes import Disc, Hit, Point, Polygon, Shape, Slab
+from handover.plants.ir_grasp.shapes import Disc, Hit, Point, Polygon, Rectangle, Shape
 
 MAX_CORNERS: Final = 8
 """Corners of a polygon at most, and faces of an object."""
@@ -63,9 +63,9 @@ class Solid:
         return x + self.mass_offset[0], y + self.mass_offset[1]
 
     @property
-    def gyration(self) -> float:
+    def radius_of_gyration_squared(self) -> float:
         """Squared radius of gyration about the centre of mass, in m2: that of the first part, if it were uniform."""
-        return self.parts[0].gyration
+        return self.parts[0].radius_of_gyration_squared
 
     @property
     def friction_arm(self) -> float:
@@ -97,8 +97,8 @@ class Solid:
         return nearest
 
 
-_CUP: Final = (Disc(radius=0.035), Slab(low=(0.030, -0.006), high=(0.054, 0.006)))
-_BOX: Final = (Slab(low=(-0.0375, -0.025), high=(0.0375, 0.025)),)
+_CUP: Final = (Disc(radius=0.035), Rectangle(low=(0.030, -0.006), high=(0.054, 0.006)))
+_BOX: Final = (Rectangle(low=(-0.0375, -0.025), high=(0.0375, 0.025)),)
 
 SOLIDS: Final = {
     Thing.CYLINDER: Solid(parts=(Disc(radius=0.033),), yaw=0.0, mass=0.15, reflectivity=0.9),
@@ -143,7 +143,7 @@ def solid_of(
         return _plain(Disc(radius=disc_radius))
     if thing is Thing.BAR:
         length, width = (0.11, 0.03) if bar_size is None else bar_size.tolist()
-        return _plain(Slab(low=(-length / 2.0, -width / 2.0), high=(length / 2.0, width / 2.0)))
+        return _plain(Rectangle(low=(-length / 2.0, -width / 2.0), high=(length / 2.0, width / 2.0)))
     if thing is Thing.POLYGON:
         return _plain(Polygon(corners=polygon_corners(np.zeros((0, 2)) if corners is None else corners, corner_count)))
     return drawn_solid(thing_seed) if thing is Thing.DRAWN else SOLIDS[thing]
@@ -159,7 +159,8 @@ def drawn_solid(seed: int) -> Solid:
 
     A disc of 15 to 47 mm radius, a bar of 50 to 110 mm by 20 to 50 mm, or a polygon of 5 to 8 corners that are 20 to 45
     mm from its middle and may be dents, each with a probability of 1/3; turned by any angle; of 0.05 to 0.3 kg, its
-    centre of mass up to 5 mm off in each axis; of reflectivity 0.3 to 1.5, by face 0.7 to 1.3 times that. All uniform.
+    centre of mass up to 5 mm off in each axis; of reflectivity 0.3 to 1.5, by face 0.7 to 1.3 times that. All uniform,
+    and all assumed.
 
     Objects of odd seeds are kept from all tuning (`is_held_out`).
     """
@@ -170,7 +171,7 @@ def drawn_solid(seed: int) -> Solid:
         shape = Disc(radius=float(rng.uniform(0.015, 0.047)))
     elif kind == 1:
         half_length, half_width = float(rng.uniform(0.025, 0.055)), float(rng.uniform(0.010, 0.025))
-        shape = Slab(low=(-half_length, -half_width), high=(half_length, half_width))
+        shape = Rectangle(low=(-half_length, -half_width), high=(half_length, half_width))
     else:
         n = int(rng.integers(5, MAX_CORNERS + 1))
         angles = 2.0 * math.pi * (np.arange(n) + rng.uniform(-0.25, 0.25, n)) / n

@@ -36,7 +36,7 @@ OUT_OF_RANGE = 0.2
 """Value of the output `range` where a sensor's ray meets no object, in m."""
 
 _MIN_MASS = 1e-3
-"""Least mass of an object, kg: contacts with much heavier phalanges would throw a lighter one off."""
+"""Least mass of an object, kg: contacts with much heavier phalanges would throw a lighter one off (assumed)."""
 
 PENTAGON = np.array(
     [
@@ -286,9 +286,10 @@ class Params:
         outline: Floats = np.vstack(placed(solid, self.p_WO_0, solid.yaw + self.yaw_O_0))
         named = [(f"p_WO_0 {self.p_WO_0.tolist()} m: the {self.thing.name.lower()}", outline)]
         if np.any(self.carry_velocity) or np.any(self.nudge):
-            way = (self.carry_until - self.carry_from) * self.carry_velocity + self.nudge
-            x, y = self.p_WO_0 + way
-            named.append((f"carried to [{x:.3f}, {y:.3f}] m: the {self.thing.name.lower()}", outline + way))
+            carried = (self.carry_until - self.carry_from) * self.carry_velocity
+            for way in (carried, self.nudge, carried + self.nudge):  # straight lines between these places
+                x, y = self.p_WO_0 + way
+                named.append((f"carried to [{x:.3f}, {y:.3f}] m: the {self.thing.name.lower()}", outline + way))
         if self.other_radius > 0.0:
             edge = self.other_radius * np.array([[1.0, 1.0], [-1.0, -1.0]])
             named.append((f"p_WX_0 {self.p_WX_0.tolist()} m: the second object", self.p_WX_0 + edge))

@@ -15,7 +15,7 @@ Motion = tuple[float, float, float, float, float, float]
 """Of a body: position of its centre of mass in m, orientation in rad, velocity in m/s, angular velocity in rad/s."""
 
 _TORQUE = batch.BodyFields.TORQUE
-_SLOP = 1e-4  # m; overlap that contacts keep, so that they persist
+_SLOP = 1e-4  # m; overlap that contacts keep, so that they persist (assumed)
 
 
 def convex_parts(corners: Sequence[Point]) -> list[list[Point]]:
@@ -126,7 +126,8 @@ class PymunkEdge:
     ) -> None:
         """Let the ground resist a body's sliding and turning with at most a force in N and a torque in N m.
 
-        The ground is at rest, or a driven body without shapes.
+        The two limits are independent (assumed): on a real table a body that slides turns more easily, its limits
+        being about an ellipse of force and torque. The ground is at rest, or a driven body without shapes.
         """
         ground = self._space.static_body if ground_body is None else ground_body.body
         slide = PivotJoint(ground, body.body, (0.0, 0.0), (0.0, 0.0))

@@ -10,13 +10,13 @@ import numpy as np
 from handover.cosim.blocks.ports import Floats
 from handover.plants.ir_grasp.hand import FINGERS, JOINTS, PALM
 from handover.plants.ir_grasp.parameters import OUT_OF_RANGE, Params
-from handover.plants.ir_grasp.shapes import Disc, Point, Slab, capsule_hit
+from handover.plants.ir_grasp.shapes import Disc, Point, Rectangle, capsule_hit
 from handover.plants.ir_grasp.world import GraspWorld
 
-_SLOT: Final = 5  # internal steps for which a sensor is active
+_SLOT: Final = 5  # internal steps, 5 ms, for which a sensor is active (assumed)
 _SENSORS: Final = len(FINGERS)
 _MIDDLE = ((1.0, 0.0),)
-_PALM = Slab(low=PALM[0], high=PALM[2])
+_PALM = Rectangle(low=PALM[0], high=PALM[2])
 _PHALANGES = [
     (owner, length, radius)
     for owner, f in enumerate(FINGERS)

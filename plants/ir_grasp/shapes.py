@@ -12,7 +12,7 @@ Point = tuple[float, float]
 _SECTORS = 8
 """Faces of a disc: eighths of its circumference, the first from x to 45 degrees towards y."""
 
-_SHORTEST_EDGE, _LEAST_AREA = 2e-3, 1e-4  # m, m2; smaller ones slip through contacts and between rays
+_SHORTEST_EDGE, _LEAST_AREA = 2e-3, 1e-4  # m, m2 (assumed); smaller ones slip through contacts and between rays
 
 
 class Hit(NamedTuple):
@@ -45,7 +45,7 @@ class Disc:
         return (0.0, 0.0)
 
     @property
-    def gyration(self) -> float:
+    def radius_of_gyration_squared(self) -> float:
         """Squared radius of gyration about its centroid, in m2."""
         return self.radius**2 / 2.0
 
@@ -69,7 +69,7 @@ class Disc:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Slab:
+class Rectangle:
     """A rectangle along the axes of O: from `low` to `high`, in m. Its faces are those at -y, x, y and -x, as corners.
 
     Face i is the edge from corner i to the next one.
@@ -100,7 +100,7 @@ class Slab:
         return ((self.low[0] + self.high[0]) / 2.0, (self.low[1] + self.high[1]) / 2.0)
 
     @property
-    def gyration(self) -> float:
+    def radius_of_gyration_squared(self) -> float:
         """Squared radius of gyration about its centroid, in m2."""
         return sum((high - low) ** 2 for low, high in zip(self.low, self.high, strict=True)) / 12.0
 
@@ -151,7 +151,7 @@ class Polygon:
         return x, share * sum((a[1] + b[1]) * _cross(a, b) for a, b in self._edges)
 
     @property
-    def gyration(self) -> float:
+    def radius_of_gyration_squared(self) -> float:
         """Squared radius of gyration about its centroid, in m2."""
         about_origin = sum(
             _cross(a, b) * sum(p * p + p * q + q * q for p, q in zip(a, b, strict=True)) for a, b in self._edges
@@ -189,7 +189,7 @@ class Polygon:
         return tuple((a[0], a[1], b[0] - a[0], b[1] - a[1], math.dist(a, b)) for a, b in self._edges)
 
 
-Shape = Disc | Slab | Polygon
+Shape = Disc | Rectangle | Polygon
 
 
 def _distance_integral(a: Point, b: Point) -> float:
@@ -251,14 +251,12 @@ def polygon_faults(corners: Sequence[Point], name: str) -> list[str]:
     short = [i for i, (a, b) in enumerate(edges) if math.dist(a, b) < _SHORTEST_EDGE]
     if short:
         return [
-            f"{name}: edge {i} from {_told(edges[i][0])} to {_told(edges[i][1])} must be at least "
-            f"{1e3 * _SHORTEST_EDGE:g} mm long"
+            f"{name}: edge {i} {_format_edge(edges[i])} must be at least {1e3 * _SHORTEST_EDGE:g} mm long"
             for i in short
         ]
     faults = [
-        f"{name}: edge {i} from {_told(edges[i][0])} to {_told(edges[i][1])} and edge {j} from {_told(edges[j][0])} to "
-        f"{_told(edges[j][1])} {'overlap' if _adjacent(i, j, n) else 'cross or touch'}; a polygon's edges must meet at "
-        "its corners only"
+        f"{name}: edge {i} {_format_edge(edges[i])} and edge {j} {_format_edge(edges[j])} "
+        f"{'overlap' if _adjacent(i, j, n) else 'cross or touch'}; a polygon's edges must meet at its corners only"
         for i, j in combinations(range(n), 2)
         if _meet_beside_corners(edges[i], edges[j], i, j, n)
     ]
@@ -301,5 +299,5 @@ def _cross(a: Point, b: Point) -> float:
     return a[0] * b[1] - a[1] * b[0]
 
 
-def _told(p: Point) -> str:
-    return f"({1e3 * p[0]:g}, {1e3 * p[1]:g}) mm"
+def _format_edge(edge: tuple[Point, Point]) -> str:
+    return " ".join(f"{word} ({1e3 * x:g}, {1e3 * y:g}) mm" for word, (x, y) in zip(("from", "to"), edge, strict=True))

@@ -26,7 +26,8 @@ the start. Positions are those of centres of mass."""
 Ray = tuple[float, float]
 """Cosine and sine of the angle between a ray and the direction that a sensor looks in."""
 
-_ITERATIONS = 10
+_ITERATIONS = 10  # of pymunk's solver, its default
+_OBJECT_FRICTION = 1.0  # of object and second object with one another (assumed)
 _HAND, _OBJECT, _OTHER = 1, 2, 3  # groups whose own shapes do not collide
 _NAMED_FINGERS = tuple(zip(("thumb", "index", "ring"), FINGERS, strict=True))
 _DISTAL = tuple(int(i) - 1 for i in accumulate(len(f.lengths) for f in FINGERS))  # among the phalanges
@@ -250,21 +251,21 @@ class GraspWorld:
     def _add_thing(self, motion: Motion) -> PymunkBody:
         p, solid, (x, y) = self._params, self._solid, self._centre
         mass = solid.mass
-        thing = self._edge.add_body(mass, mass * solid.gyration, motion)
+        thing = self._edge.add_body(mass, mass * solid.radius_of_gyration_squared, motion)
         for part in solid.parts:
             if isinstance(part, Disc):
-                self._edge.add_circle(thing, (-x, -y), part.radius, 1.0, _OBJECT)
+                self._edge.add_circle(thing, (-x, -y), part.radius, _OBJECT_FRICTION, _OBJECT)
                 continue
             for corners in convex_parts(part.corners) if isinstance(part, Polygon) else [part.corners]:
-                self._edge.add_polygon(thing, [(c_x - x, c_y - y) for c_x, c_y in corners], 1.0, _OBJECT)
+                self._edge.add_polygon(thing, [(c_x - x, c_y - y) for c_x, c_y in corners], _OBJECT_FRICTION, _OBJECT)
         weight = p.table_friction * mass * p.gravity
         self._edge.add_ground_friction(thing, weight, weight * solid.friction_arm, self._ground_body)
         return thing
 
     def _add_other(self, motion: Motion) -> PymunkBody:
         p, disc = self._params, Disc(radius=self._params.other_radius)
-        other = self._edge.add_body(p.other_mass, p.other_mass * disc.gyration, motion)
-        self._edge.add_circle(other, disc.centroid, disc.radius, 1.0, _OTHER)
+        other = self._edge.add_body(p.other_mass, p.other_mass * disc.radius_of_gyration_squared, motion)
+        self._edge.add_circle(other, disc.centroid, disc.radius, _OBJECT_FRICTION, _OTHER)
         weight = p.table_friction * p.other_mass * p.gravity
         self._edge.add_ground_friction(other, weight, weight * 2.0 * disc.radius / 3.0)
         return other

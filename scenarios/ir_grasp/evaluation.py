@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from handover.controllers.ir_grasp.parameters import Correction, Strategy
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
@@ -20,9 +21,16 @@ _BODIES = 2
 
 _LEFT_BEHIND = 0.04
 """How far an object that is held may have stayed behind the hand since the pull began, m (assumed): less than the
-object's and the fingers' width, so that it is still where they closed."""
+width of [Luberto]'s objects and the fingers on them, so that it is still where they closed."""
 
-_COST = "cost f of thumb and ring, [Luberto] eq. (4), as the hand began to close"
+_COST = "cost f of thumb and ring as the hand began to close, [Luberto] eq. (4)"
+
+_STEPS = {
+    Correction.PAPER: "Gauss-Newton steps",
+    Correction.FAST: "control periods in which both fingers of the cost saw the object",
+}
+
+_REFINED = "time from the first look at the sensors until the hand closes"
 
 IN_COST = (0, 2)
 """Thumb and ring, the fingers in the cost, as indices of distances."""
@@ -70,6 +78,7 @@ class GraspEvaluator(Evaluator):
         self._p_WG_start: Floats = np.zeros(2)
         self._p_HO: Floats = np.zeros(2)
         self._p_HO_closed: Floats | None = None  # in H, when the pull began
+        self._touched = False
         self._touching = 0
         self._touching_closed = 0
         self._lost_in = ""
@@ -86,6 +95,7 @@ class GraspEvaluator(Evaluator):
             self._at_start = self._vision_errors(signals)
         if phase != self._phase:
             self._enter(phase, signals)
+        self._touched |= "CLOSE" not in self._entered and int(signals["scene.touching"]) > 0
         if phase in self._moves:
             self._count(phase, signals)
         elif phase in _AFTER_CLOSING:
@@ -134,15 +144,23 @@ class GraspEvaluator(Evaluator):
         seen = _where_below(_given(signals, "reflex.distance", (3,)), ReflexParams().distance_max)
         true = _where_below(signals["scene.range"], OUT_OF_RANGE)
         cost, blind = float(_given(signals, "reflex.cost")), bool(np.isnan(seen[list(IN_COST)]).any())
-        what_of_cost = f"{_COST} (thumb or ring sees nothing)" if blind else _COST
+        p = self.parameters
+        what_of_cost = _COST if p.literal else f"{_COST} of distances less their target"
+        if blind:
+            what_of_cost += " (thumb or ring sees nothing)"
         carried = signals["scene.p_WG"] - self._p_WG_start if "scene.p_WG" in signals else np.zeros(2)
         displaced = float(np.linalg.norm(signals["scene.p_WO"] - self._p_WO_start - carried))
         stop = int(_given(signals, "reflex.stop"))
         offset = self._offset(signals)
         metrics = {
             "final_cost": Metric(math.nan if blind else cost, "m2", what_of_cost),
-            "steps": Metric(int(_given(signals, "reflex.steps")), "1", "Gauss-Newton steps"),
-            "refinement_time": Metric(t - began, "s", "time from the first look at the sensors until the hand closes"),
+            "steps": Metric(int(_given(signals, "reflex.steps")), "1", _STEPS[p.correction]),
+            "refinement_time": Metric(
+                t - began, "s", _REFINED if p.strategy is Strategy.REFLEX else "time from the pre-grasp pose to closing"
+            ),
+            "touched": Metric(
+                int(self._touched), "1", "whether hand and object touched before the hand closed: 1 if so"
+            ),
             "displacement": Metric(
                 displaced, "m", "how far the object was pushed before the hand closed, less what the ground carried it"
             ),
@@ -199,8 +217,9 @@ class GraspEvaluator(Evaluator):
     def outcome(self) -> Outcome:
         """Return whether the object came along and is still in the hand, why, and the metrics."""
         metrics = {**self._at_closing, **self._at_start}
+        unit_of_count = "moves" if self.parameters.correction is Correction.PAPER else "changes of the command"
         for phase, what in (("PROBE", "probing"), ("RECOVER", "recovering"), ("APPROACH", "approaching")):
-            metrics[f"{what}_moves"] = Metric(self._moves[phase], "1", f"{what} moves")
+            metrics[f"{what}_moves"] = Metric(self._moves[phase], "1", f"{unit_of_count} while {what}")
         if self._p_HO_closed is not None:
             metrics["left_behind"] = Metric(
                 self._left_behind, "m", "how far the object moved in the hand since the pull began"

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from handover.controllers.ir_grasp.parameters import Strategy
+from handover.controllers.ir_grasp.parameters import Correction, Strategy
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.plants.ir_grasp.objects import SOLIDS
@@ -31,9 +31,10 @@ FINGERS = ("thumb", "index", "ring")
 def published_values(p: Parameters) -> Sequence[PublishedValue]:
     """Return table II's distances for the object and the pose; nothing for what is not in the table.
 
-    It has the five things, unmoved or moved a little, and the reflex.
+    It has the five things, unmoved or moved a little, and the paper's algorithm.
     """
-    if p.strategy is not Strategy.REFLEX or p.literal or p.thing not in SOLIDS or p.is_beyond_the_table:
+    as_printed = p.strategy is Strategy.REFLEX and p.correction is Correction.PAPER and not p.literal
+    if not as_printed or p.thing not in SOLIDS or p.is_beyond_the_table:
         return ()
     pose = "perturbed" if p.perturbed else "nominal"
     thing = p.thing.name.lower().removesuffix("_a").removesuffix("_b")
@@ -131,6 +132,7 @@ class IrGrasp(Experiment[GraspEvaluator]):
             forward_distance=p.forward,
             literal=p.literal,
             correction=p.correction,
+            jacobian_offset_0=p.jacobian_offset(),
             p_WH_pregrasp=drawn.p_WH_pregrasp,
             yaw_pregrasp=drawn.yaw,
         )

@@ -21,7 +21,7 @@ from handover.cosim.system.system import System
 from handover.plants.ir_grasp.hand import JOINTS, sensor_rays
 from handover.plants.ir_grasp.objects import SOLIDS, Thing
 from handover.plants.ir_grasp.parameters import OUT_OF_RANGE
-from handover.plants.ir_grasp.shapes import Slab
+from handover.plants.ir_grasp.shapes import Rectangle
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Metric, Outcome
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.places import Place
@@ -79,7 +79,7 @@ def bench_pose(p: SensorParameters, distance: float) -> tuple[Floats, float]:
     yaw = -math.atan2(directions[p.finger, 1], directions[p.finger, 0])
     origins, _ = sensor_rays(np.zeros(2), yaw, np.zeros(JOINTS))
     box = SOLIDS[THING].parts[0]
-    assert isinstance(box, Slab), "the box has flat faces"
+    assert isinstance(box, Rectangle), "the box has flat faces"
     return np.array([box.low[0] / math.cos(p.incidence) - distance, 0.0]) - origins[p.finger], yaw
 
 

@@ -6,12 +6,14 @@ A `Situation` is where object and hand are before the grasp: what vision saw, an
 import enum
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from handover.controllers.ir_grasp.parameters import Correction, Strategy
 from handover.cosim.blocks.ports import Corners8, Floats, Vector2, parameter
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Radian, Second
+from handover.cosim.record.reader import Record
 from handover.plants.ir_grasp.hand import PALM
 from handover.plants.ir_grasp.objects import Solid, Thing, placed, polygon_corners, solid_of
 from handover.plants.ir_grasp.parameters import PENTAGON
@@ -57,6 +59,9 @@ class Parameters:
     forward: Metre = parameter(0.035, "how far forward, for that strategy", minimum=0.0, maximum=0.3)
     correction: Correction = parameter(
         Correction.PAPER, "correct by algorithm 1, moves and readings at rest, or continuously, on the move"
+    )
+    last_grasp: str = parameter(
+        "", "folder of an earlier run, whose estimated Jacobian correction=fast begins with; empty: the hand's design"
     )
     literal: bool = parameter(False, "the correction's equations as printed: [Luberto] eqs. (4) and (9)")
     standoff: Metre = parameter(
@@ -113,6 +118,13 @@ class Parameters:
             faults.append(f"shift_least {self.shift_least:g} m must be at most shift_most {self.shift_most:g} m")
         if self.literal and self.correction is Correction.FAST:
             faults.append("literal: takes the paper's equations as printed, which correction=paper alone uses")
+        if self.last_grasp and not (self.correction is Correction.FAST and self.strategy is Strategy.REFLEX):
+            faults.append("last_grasp: its Jacobian is what correction=fast of strategy=reflex begins with")
+        elif self.last_grasp:
+            try:
+                self.jacobian_offset()
+            except ValueError as e:
+                faults.append(f"last_grasp: {e}")
         if self.thing is Thing.POLYGON:
             faults.extend(polygon_faults(polygon_corners(self.corners, self.corner_count), "corners"))
         return faults
@@ -138,6 +150,22 @@ class Parameters:
             plain = solid_of(shape, disc_radius=self.expected_radius, bar_size=self.expected_size)
             believed = replace(plain, yaw=self.solid.yaw)
         return replace(believed, yaw=believed.yaw + self.expected_yaw)
+
+    def jacobian_offset(self) -> Floats:
+        """Return what the last grasp found the Jacobian to be off its design by, (3, 4); zeros without one.
+
+        Raises:
+            ValueError: the folder holds no record of such a grasp.
+        """
+        if not self.last_grasp:
+            return np.zeros((3, 4))
+        path = Path(self.last_grasp) / "signals.parquet"
+        if not path.is_file():
+            raise ValueError(f"there is no record {path}; name the folder of a run of ir_grasp")
+        record = Record(path)
+        if "reflex.jacobian_offset" not in record:
+            raise ValueError(f"{path} has no signal reflex.jacobian_offset; name the folder of a run of ir_grasp")
+        return np.array(record["reflex.jacobian_offset"][-1], dtype=float)
 
     @property
     def is_beyond_the_table(self) -> bool:

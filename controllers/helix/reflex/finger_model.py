@@ -1,6 +1,6 @@
 """What the controller expects its infrared sensors to read of a ball at a place: its own model of fingers and beams.
 
-[Luberto] eq. (11) for the characteristic; the gripper's fingers as they were built, the rest from data sheets.
+[Luberto] eq. (11) for the characteristic; the gripper's fingers and their beams as designed (assumed).
 """
 
 from dataclasses import dataclass
@@ -18,6 +18,7 @@ _AZIMUTHS = np.radians([60.0, 180.0, 300.0])
 _WINDOW = 0.0042  # from the middle of the fingertip, m
 _FULL_SCALE = 4095
 _RINGS = ((0.0, 1), (0.5, 6), (0.9, 12))  # rays of a beam: part of its half angle, how many
+"""The gripper's design, assumed as the plant's: [Vervloet2025] gives no dimensions of fingers with sensors."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,8 +26,8 @@ class FingerModel:
     """Sensors of one characteristic y = a e^(bx) + c e^(dx), eq. (11), whose beams are bundles of rays.
 
     A reading is the mean over the rays of the ticks x(y) cos(theta), y being the way to the ball along the ray and
-    theta the angle from the ball's normal. Nearer than `nearest` it falls evenly to the share `contact` at contact, by
-    the data sheet. Lengths are in m, angles in rad, ticks of a 12-bit converter.
+    theta the angle from the ball's normal. Nearer than `nearest` it falls evenly to the share `contact` at contact
+    (assumed). Lengths are in m, angles in rad, ticks of a 12-bit converter.
     """
 
     a: float

@@ -21,9 +21,10 @@ from handover.cosim.blocks.units import Metre, Number, PerTick, Radian, Second, 
 
 __all__ = ["GraspReflex", "Inputs", "InvalidGraspReflexParameters", "Outputs", "Params", "Source"]
 
-_RESPONSE_MEMORY = 1.5  # s; as the servo's
+_RESPONSE_MEMORY = 1.5  # s; as the servo's (assumed)
 _RECKONED = 1e-6
-"""Variance of a reckoned wrist and gripper, m2: what is not known of them is the ball's, which is found from them."""
+"""Variance of wrist and gripper by dead reckoning, m2 (assumed): what is not known of them is the ball's, which is
+found from them."""
 _LEVEL = np.array([1.0, 1.0, 0.0])
 """Directions in W in which the arm makes a part of its commanded motion alone, as it gives way in bending. In depth,
 which its tendons' lengths set, it makes all of it: of 45 mm down 44 to 48, of as much across 18 to 30."""
@@ -312,7 +313,7 @@ class GraspReflex:
         self._t = t
 
     def _rigid(self, pose: Floats) -> Floats:
-        """Return wrist and gripper at their distance, with the gripper where it is: eq. (13), which the servo keeps."""
+        """Return wrist and gripper at their distance, the gripper where it is: [Vervloet2025] eq. (13)."""
         p_WR, p_WG = pose[:3], pose[3:]
         away = p_WR - p_WG
         return np.concatenate([p_WG + self._params.d_gripper * away / float(np.linalg.norm(away)), p_WG])

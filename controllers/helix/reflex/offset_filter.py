@@ -26,7 +26,7 @@ _SETTLED = 1e-3
 _STARTS = (0.0, -0.02, -0.01, 0.01, 0.02)
 """How far along the gripper's axis the ball is tried at, m."""
 _FAR_STARTS = (*_STARTS, -0.04, 0.04)
-"""Likewise, where the belief fits no reading."""
+"""Likewise, where the belief fits no reading. These numbers are own choices (assumed)."""
 _MISFIT, _REOPENED = 4.0, 0.01
 """Mean square of residuals, in their deviations, at which the belief counts as wrong, and the deviation that b gets
 then, m: else a filter that has settled on the wrong one of two places stays there, however badly it fits."""

@@ -103,7 +103,7 @@ class IrTableRuns:
         self, name: str, arm: Arm, perturbed: bool, things: Sequence[Thing] = tuple(SOLIDS)
     ) -> NDArray[np.float64]:
         """Return a metric of an arm's runs in a pose, without those that have none."""
-        values = [row[name] for row in self.rows(arm, perturbed, things)]
+        values = [row.get(name) for row in self.rows(arm, perturbed, things)]
         return np.array([v for v in values if v is not None and not math.isnan(v)], dtype=np.float64)
 
     def together(self, names: Sequence[str], arm: Arm, perturbed: bool) -> NDArray[np.float64]:

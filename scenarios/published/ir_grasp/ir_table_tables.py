@@ -122,8 +122,9 @@ def _closing(runs: IrTableRuns) -> ComparisonTable:
         title="How the hand came to close",
         header=["arm", "why it closed", "steps", "time (s)", "object displaced: median, most (mm)"],
         rows=rows,
-        note="Medians with bootstrapped intervals, 95 %: Gauss-Newton steps, and time from the first look at the "
-        "sensors until closing. Displaced: how far the object was pushed before the hand closed.",
+        note="Medians with bootstrapped intervals, 95 %: Gauss-Newton steps, and time until closing, from the first "
+        "look at the sensors or, of a hand that does not look, from the pre-grasp pose. Displaced: how "
+        "far the object was pushed before the hand closed.",
     )
 
 

@@ -50,8 +50,11 @@ BLIND = LimitArm("blind", {"strategy": "blind"}, False, ("towards", "any", "larg
 """It holds less than half of what is nominal (`ir-table`), so it is tried where objects come nearer to the hand."""
 FORWARD_35 = LimitArm("forward 35 mm", {"strategy": "forward", "forward": "0.035"}, False)
 FORWARD_55 = LimitArm("forward 55 mm", {"strategy": "forward", "forward": "0.055"}, False)
+FORWARD_100 = LimitArm("forward 100 mm, closing", {"strategy": "contact", "reflex.touch_torque": "100"}, False)
+"""Slowly closing as far as its reach, since no joint's torque counts as a contact; the tendon may, rarely."""
 CONTACT = LimitArm("until contact", {"strategy": "contact"}, False)
-ARMS = (REFLEX, SIGHT, PAPER, BLIND, FORWARD_35, FORWARD_55, CONTACT)
+"""Likewise, but it closes for good as its joints feel what touches the reflex's: it has all senses but sight."""
+ARMS = (REFLEX, SIGHT, PAPER, BLIND, FORWARD_35, FORWARD_55, FORWARD_100, CONTACT)
 
 _TABLE = ("cylinder", "baby_cup_a", "baby_cup_b", "paper_box_a", "paper_box_b")
 _THINGS: tuple[Point, ...] = tuple({"thing": name} for name in _TABLE)
@@ -106,7 +109,7 @@ class Axis:
         """The start, if there is one, and the levels."""
         return self.levels if self.start is None else (self.start, *self.levels)
 
-    def told(self, level: float) -> str:
+    def format_level(self, level: float) -> str:
         """Return a level with its unit."""
         return f"{self.scale * level:.3g} {self.unit}".strip()
 

@@ -179,9 +179,9 @@ class LimitRuns:
         if below is None:
             return "not within the range"
         if below == 0:
-            return "from the start" if axis.start is not None else f"at {axis.told(rates[0][0])} or before"
+            return "from the start" if axis.start is not None else f"at {axis.format_level(rates[0][0])} or before"
         (x, high), (y, low) = rates[below - 1], rates[below]
-        return axis.told(x + (high - _HALF) / (high - low) * (y - x))
+        return axis.format_level(x + (high - _HALF) / (high - low) * (y - x))
 
     def compared(self, first: LimitArm, others: Sequence[LimitArm]) -> list[Comparison]:
         """Compare an arm with the best of others along each axis of which there are runs of both."""

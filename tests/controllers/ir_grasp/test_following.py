@@ -239,14 +239,20 @@ def test_a_reading_beyond_the_range_is_not_seen_and_weighs_nothing():
     assert commands[0] == commands[1]
 
 
-def test_contact_closes_when_the_tendon_is_not_as_tight_as_that_of_a_free_hand():
-    seen = grasp(reflex(strategy=Strategy.CONTACT), scene((0.01, 0.0)))
+def test_contact_closes_when_joints_or_tendon_feel_the_object_between_the_fingers():
+    seen = grasp(reflex(strategy=Strategy.CONTACT), scene((0.01, 0.02)))
     o, y = seen[-1]
     assert o.stop is Stop.CONTACT
     assert y.touching >= 1
     assert not {Phase.TRACK, Phase.SEARCH, Phase.PROBE} & phases(seen)
+    numb: dict[str, Any] = {"strategy": Strategy.CONTACT, "touch_torque": 100.0}
+    assert grasp(reflex(**numb), scene((0.01, 0.02)))[-1][0].stop is Stop.REACH
+    by_tendon = grasp(reflex(**numb), scene((0.01, 0.06)))[-1][0]
+    assert by_tendon.stop is Stop.CONTACT
     apart = grasp(reflex(strategy=Strategy.CONTACT), scene((0.5, 0.35)))
     assert apart[-1][0].p_WH_cmd[0] - PREGRASP[0] >= Params().reach[0] - 1e-3
+    assert apart[-1][0].stop is Stop.REACH
+    assert not apart[-1][1].touching
 
 
 @pytest.mark.parametrize(
@@ -312,3 +318,15 @@ def test_what_the_correction_on_the_move_cannot_work_with_is_refused(given: dict
     with pytest.raises(InvalidReflexParameters, match=why):
         reflex(**given)
     reflex(correction=Correction.PAPER, **given)
+
+
+def test_a_grasp_begins_with_the_jacobian_of_the_last_one():
+    first, design = reflex(), np.zeros((3, 4))
+    assert np.array_equal(first.outputs(0.0, Inputs()).jacobian_offset, design)
+    end = grasp(first, scene((0.03, 0.02)))[-1][0]
+    assert np.max(np.abs(end.jacobian_offset[[0, 2]])) > 0.02  # what thumb and ring saw was not met squarely
+    second = reflex(jacobian_offset_0=end.jacobian_offset)
+    assert np.array_equal(second.outputs(0.0, Inputs()).jacobian_offset, end.jacobian_offset)
+    seen = grasp(second, scene((0.03, 0.02)))
+    assert not np.array_equal(seen[-1][0].jacobian_offset, end.jacobian_offset)
+    assert np.linalg.norm(in_hand(seen[-1][1])) < 0.2

@@ -45,7 +45,6 @@ def test_an_object_that_is_seen_by_one_side_then_the_other_is_approached_instead
     made = [r.motion(case, may_close=True) for case in [Visibility.INDEX_RING, Visibility.THUMB] * 4]
     assert made[0] == Motion(Action.TO_FINGERS, STEP)
     assert [m.action for m in made[1:]] == [Action.FORWARD] * 7
-    assert r.reversals == 7
 
 
 def test_after_a_reversal_the_step_across_is_halved_down_to_the_least():
@@ -77,7 +76,6 @@ def test_back_and_forth_ends_on_the_fingers_side():
     assert r.motion(Visibility.RING, may_close=True).action is Action.BACK
     assert r.motion(Visibility.INDEX, may_close=True).action is Action.TO_FINGERS
     assert r.motion(Visibility.RING, may_close=True).action is Action.TO_FINGERS
-    assert r.reversals == 2
 
 
 def test_an_object_that_is_not_in_sight_is_approached_by_whole_steps():

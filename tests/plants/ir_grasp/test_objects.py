@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.ir_grasp.objects import SOLIDS, Solid, Thing, outlines
-from handover.plants.ir_grasp.shapes import Disc, Polygon, Slab
+from handover.plants.ir_grasp.shapes import Disc, Polygon, Rectangle
 
 
 def met_of_polygons(thing: Thing, start: tuple[float, float], heading: float) -> float | None:
@@ -94,16 +94,16 @@ def test_gyration_and_friction_arm_are_the_integrals_over_the_shape():
     distance: Floats = np.linalg.norm(p, axis=1)
     disc = Solid(parts=(Disc(radius=0.04),), yaw=0.0, mass=1.0, reflectivity=1.0)
     inside = distance < 0.04
-    assert disc.gyration == pytest.approx(mean(distance[inside] ** 2), rel=0.01)
+    assert disc.radius_of_gyration_squared == pytest.approx(mean(distance[inside] ** 2), rel=0.01)
     assert disc.friction_arm == pytest.approx(mean(distance[inside]), rel=0.01)
-    box = Solid(parts=(Slab(low=(-0.04, -0.025), high=(0.04, 0.025)),), yaw=0.0, mass=1.0, reflectivity=1.0)
+    box = Solid(parts=(Rectangle(low=(-0.04, -0.025), high=(0.04, 0.025)),), yaw=0.0, mass=1.0, reflectivity=1.0)
     inside = (np.abs(p[:, 0]) < 0.04) & (np.abs(p[:, 1]) < 0.025)
-    assert box.gyration == pytest.approx(mean(distance[inside] ** 2), rel=0.01)
+    assert box.radius_of_gyration_squared == pytest.approx(mean(distance[inside] ** 2), rel=0.01)
     assert box.friction_arm == pytest.approx(mean(distance[inside]), rel=0.01)
 
 
 def test_a_slender_bar_and_a_dented_polygon_have_the_friction_arm_of_their_area():
-    bar = Slab(low=(0.03, -0.005), high=(0.13, 0.005))
+    bar = Rectangle(low=(0.03, -0.005), high=(0.13, 0.005))
     assert bar.mean_distance == pytest.approx(0.025, rel=0.03)  # a quarter of the length, and a little
     dented = Polygon(corners=((0.04, 0.0), (0.008, 0.006), (0.0, 0.04), (-0.03, 0.0), (0.0, -0.04)))
     corners = dented.corners

@@ -10,24 +10,24 @@ from hypothesis import strategies as st
 from handover.cosim.blocks.ports import Floats
 from handover.plants.ir_grasp.objects import drawn_solid
 from handover.plants.ir_grasp.pymunk_edge import convex_parts
-from handover.plants.ir_grasp.shapes import Disc, Point, Polygon, Slab, capsule_hit, polygon_faults
+from handover.plants.ir_grasp.shapes import Disc, Point, Polygon, Rectangle, capsule_hit, polygon_faults
 
 HOOK = Polygon(corners=((-0.03, -0.02), (0.03, -0.02), (0.03, -0.005), (-0.01, -0.005), (-0.01, 0.04), (-0.03, 0.04)))
 """A polygon with a dent."""
 
 
-def test_a_polygon_with_a_slabs_corners_is_that_slab():
-    slab = Slab(low=(-0.03, -0.01), high=(0.05, 0.02))
-    polygon = Polygon(corners=tuple(slab.corners))
-    assert polygon.area == pytest.approx(slab.area)
-    assert polygon.centroid == pytest.approx(slab.centroid)
-    assert polygon.gyration == pytest.approx(slab.gyration)
-    assert polygon.reach == pytest.approx(slab.reach)
+def test_a_polygon_with_the_corners_of_a_rectangle_is_that_rectangle():
+    rectangle = Rectangle(low=(-0.03, -0.01), high=(0.05, 0.02))
+    polygon = Polygon(corners=tuple(rectangle.corners))
+    assert polygon.area == pytest.approx(rectangle.area)
+    assert polygon.centroid == pytest.approx(rectangle.centroid)
+    assert polygon.radius_of_gyration_squared == pytest.approx(rectangle.radius_of_gyration_squared)
+    assert polygon.reach == pytest.approx(rectangle.reach)
     for bearing in np.linspace(0.0, 6.2, 40):
         x, y = 0.01 + 0.2 * math.cos(bearing), 0.2 * math.sin(bearing)
         for aside in (-0.15, 0.0, 0.1):
             d = (math.cos(bearing + math.pi + aside), math.sin(bearing + math.pi + aside))
-            one, other = slab.intersect(x, y, *d), polygon.intersect(x, y, *d)
+            one, other = rectangle.intersect(x, y, *d), polygon.intersect(x, y, *d)
             assert (one is None) == (other is None)
             if one is not None and other is not None:
                 assert other == pytest.approx(one)
@@ -41,7 +41,7 @@ def test_integrals_of_a_polygon_with_a_dent_are_those_over_its_area():
     middle = np.mean(p[inside], axis=0, dtype=np.float64)
     np.testing.assert_allclose(HOOK.centroid, middle, atol=2e-4)
     away: Floats = np.linalg.norm(p[inside] - middle, axis=1)
-    assert HOOK.gyration == pytest.approx(float(np.mean(away**2, dtype=np.float64)), rel=0.01)
+    assert HOOK.radius_of_gyration_squared == pytest.approx(float(np.mean(away**2, dtype=np.float64)), rel=0.01)
 
 
 def test_a_ray_into_a_dent_meets_what_is_nearer():
@@ -66,7 +66,7 @@ def test_convex_parts_make_up_the_polygon():
 
 
 def test_faces_are_eighths_of_a_disc_and_edges_by_their_first_corner():
-    disc, slab = Disc(radius=0.03), Slab(low=(-0.02, -0.01), high=(0.02, 0.01))
+    disc, rectangle = Disc(radius=0.03), Rectangle(low=(-0.02, -0.01), high=(0.02, 0.01))
     for sector in range(8):
         bearing = (sector + 0.5) * math.pi / 4.0
         c, s = math.cos(bearing), math.sin(bearing)
@@ -74,7 +74,7 @@ def test_faces_are_eighths_of_a_disc_and_edges_by_their_first_corner():
         assert hit is not None
         assert hit.face == sector
     for face, (x, y) in enumerate(((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))):
-        hit = slab.intersect(0.1 * x, 0.1 * y, -x, -y)
+        hit = rectangle.intersect(0.1 * x, 0.1 * y, -x, -y)
         assert hit is not None
         assert hit.face == face
 

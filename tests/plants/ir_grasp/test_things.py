@@ -19,7 +19,7 @@ from handover.plants.ir_grasp.objects import (
 )
 from handover.plants.ir_grasp.parameters import InvalidSceneParameters, Params
 from handover.plants.ir_grasp.scene import GraspScene, Inputs, Outputs
-from handover.plants.ir_grasp.shapes import Disc, Polygon, Slab
+from handover.plants.ir_grasp.shapes import Disc, Polygon, Rectangle
 from handover.plants.ir_grasp.world import GraspWorld, initial_snapshot
 
 STEP = 0.015
@@ -47,7 +47,9 @@ def test_a_bar_like_the_box_moves_like_it_and_so_does_a_polygon_nearly():
     own = SOLIDS[Thing.PAPER_BOX_A]
     box = replace(AROUND, thing=Thing.PAPER_BOX_A, mass_O=own.mass, reflectivity=own.reflectivity)
     bar = replace(box, thing=Thing.BAR, bar_size=np.array([0.075, 0.05]))
-    corners = np.vstack([np.array(own.parts[0].corners), np.zeros((4, 2))]) if isinstance(own.parts[0], Slab) else None
+    corners = (
+        np.vstack([np.array(own.parts[0].corners), np.zeros((4, 2))]) if isinstance(own.parts[0], Rectangle) else None
+    )
     assert corners is not None
     polygon = replace(box, thing=Thing.POLYGON, corners=corners, corner_count=4)
     u = Inputs(p_WH_cmd=np.array([-0.15, 0.01]), sigma_cmd=0.9)
@@ -113,7 +115,7 @@ def test_mass_follows_from_the_area_unless_given():
 def test_the_family_is_in_its_ranges_and_half_of_it_is_held_out():
     solids = [drawn_solid(seed) for seed in range(300)]
     kinds = [type(s.parts[0]) for s in solids]
-    assert all(kinds.count(kind) > 70 for kind in (Disc, Slab, Polygon))
+    assert all(kinds.count(kind) > 70 for kind in (Disc, Rectangle, Polygon))
     for s in solids:
         assert 0.05 <= s.mass <= 0.3
         assert 0.3 <= s.reflectivity <= 1.5

@@ -1,18 +1,24 @@
 """The correction on the move in the scenario, on the built FMUs."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
+from click.testing import CliRunner
 
 from handover.controllers.ir_grasp.ir_reflex import Inputs, IrReflex
 from handover.controllers.ir_grasp.parameters import Correction, Strategy
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.master.master import Master
+from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.fmus.build import cached
+from handover.scenarios.cli.command import main
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 from handover.scenarios.ir_grasp.parameters import Parameters, Situation
@@ -86,3 +92,27 @@ def test_an_object_carried_at_15_mm_a_second_is_held():
     assert outcome.metrics["displacement"].value < 5e-3
     assert outcome.metrics["steps"].value > 0
     assert "TRACK" in shadow.phases
+
+
+def test_a_run_begins_with_what_the_last_one_learnt_of_the_jacobian(tmp_path: Path):
+    given = ["run", "ir_grasp", "--no-report", "-p", "correction=fast", "-p", "perturbed=false", "--out"]
+    assert CliRunner().invoke(main, [*given, str(tmp_path / "first")]).exit_code == 0
+    learnt = Record(tmp_path / "first" / "signals.parquet")["reflex.jacobian_offset"]
+    assert np.max(np.abs(learnt[-1])) > 0.01
+    second = [*given, str(tmp_path / "second"), "-p", f"last_grasp={tmp_path / 'first'}"]
+    assert CliRunner().invoke(main, second).exit_code == 0
+    begun = Record(tmp_path / "second" / "signals.parquet")["reflex.jacobian_offset"]
+    assert begun[0] == pytest.approx(learnt[-1], abs=1e-12)  # to rounding: the design is added and taken off
+    assert np.array_equal(learnt[0], np.zeros((3, 4)))
+
+
+def test_a_last_grasp_that_is_none_is_refused(tmp_path: Path):
+    fast = Parameters(correction=Correction.FAST, last_grasp=str(tmp_path))
+    assert fast.faults() == [
+        f"last_grasp: there is no record {tmp_path / 'signals.parquet'}; name the folder of a run of ir_grasp"
+    ]
+    pq.write_table(pa.table({"time": [0.0], "reflex.steps": [0]}), tmp_path / "signals.parquet")
+    (fault,) = fast.faults()
+    assert "has no signal reflex.jacobian_offset" in fault
+    (fault,) = dataclasses.replace(fast, correction=Correction.PAPER).faults()
+    assert fault == "last_grasp: its Jacobian is what correction=fast of strategy=reflex begins with"

@@ -22,7 +22,7 @@ def grasp_table(
 
     def row(run: PlannedRun) -> Mapping[str, Any]:
         done = status(run) == "done"
-        figures = {"displacement": 0.0, "stop": 1.0, "steps": 4.0, "refinement_time": 5.0, **DISTANCES}
+        figures = {"displacement": 0.0, "touched": 0.0, "stop": 1.0, "steps": 4.0, "refinement_time": 5.0, **DISTANCES}
         figures.update({name: of(run) for name, of in metrics.items()})
         return {
             "seed": run.seed,

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from handover.controllers.ir_grasp.visibility import RECOVERY, Recovery, Visibility
+from handover.controllers.ir_grasp.visibility import Visibility
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.published.ir_grasp.convergence_curves import Descent, median_of
 from handover.scenarios.published.ir_grasp.grasp_drawings import SEEN, draw_cases
@@ -56,11 +56,6 @@ def test_each_case_of_figure_9_has_a_scene_in_which_the_sensors_read_so():
     assert set(SEEN) == set(Visibility) - {Visibility.ALL_SEEN}
     for case, scene in SEEN.items():
         assert scene.case() is case
-
-
-@pytest.mark.parametrize("case", SEEN)
-def test_the_drawn_action_is_what_the_controller_begins_with(case: Visibility):
-    assert Recovery(0.01, 0.05, 0.002).motion(case, may_close=True).action is RECOVERY[case]
 
 
 def test_figure_9_is_left_as_png_and_svg(tmp_path: Path):
