@@ -44,10 +44,11 @@ class IrLimits(PublishedExperiment):
     """The hand is disturbed in one way at a time, more and more, and meets each scene by several ways to grasp.
 
     Three ways use the sensors: the reflex, the same without touch where fingertips meet objects, and, where sensors are
-    at fault, the paper's algorithm. Five do not: everywhere going 35 or 55 mm ahead, going 100 mm ahead while slowly
-    closing, and that until the joints feel a contact; closing at once where objects come nearer. Each level has three scenes of each of five objects, the
-    table's, or discs and bars of five masses; seven objects that were kept from all tuning join them where objects are
-    carried, and where light or sensors differ. Nothing was tuned with a seed of this campaign.
+    at fault, the paper's algorithm. Five do not: everywhere going 35 or 55 mm ahead, going 100 mm ahead while
+    slowly closing, and that until the joints feel a contact; closing at once where objects come nearer. Each level
+    has three scenes of each of five objects, the table's, or discs and bars of five masses; seven objects that were
+    kept from all tuning join them where objects are carried, and where light or sensors differ. Nothing was tuned
+    with a seed of this campaign.
     """
 
     name: ClassVar[str] = "ir-limits"
