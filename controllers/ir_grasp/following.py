@@ -60,6 +60,8 @@ class Following:
     a finger outwards near its root is between the fingers, and the hand closes. An object that is lost is awaited
     where it was seen, then searched.
 
+    What all sensors read in the first rounds, when the hand is far from the object, is taken for ambient light.
+
     Attributes:
         mode: of the last round.
         rounds: control periods with both fingers of the cost in sight.
@@ -82,6 +84,8 @@ class Following:
         self._before: Mode = Mode.SEARCH
         self._settled, self._lost, self._pushed, self._path = 0.0, 0.0, 0.0, 0.0
         self._saw = [False] * 3
+        self._first: list[X] = []
+        self._ambient = 0.0
         self._along, self._then = 0.0, math.nan  # way ahead since the distance of the side that sees was another
         self._around: list[tuple[float, float]] = []  # corners of a way around what went along, in W
         self._rounded = 0
@@ -99,9 +103,18 @@ class Following:
         """Estimated d(distance)/d[ahead, left, yaw, sigma], (3, 4), less that of the hand's design."""
         return self._filter.jacobian_offset
 
+    def without_ambient(self, ticks: X) -> X:
+        """Return readings less the ambient light's."""
+        return tuple(max(0.0, v - self._ambient) for v in ticks) if self._ambient else ticks
+
     def look(self, x: X, ticks: X) -> bool:
         """Take a round's readings; return whether any finger sees the object."""
         p = self._params
+        if len(self._first) < p.ambient_rounds:
+            self._first.append(ticks)
+            ambient = float(np.min(np.mean(self._first, axis=0)))
+            self._ambient = ambient if ambient >= p.ambient_least else 0.0
+        ticks = self.without_ambient(ticks)
         distances = [self._calibration.distance(v) for v in ticks]
         # a finger that sees goes on seeing down to fewer ticks: noise at the edge of sight is no news
         self._saw = [
@@ -309,7 +322,7 @@ class Following:
     def get_state(self) -> tuple[object, ...]:
         """Return estimates, search, what was seen, and counters."""
         modes = (int(self.mode), int(self._before), self.rounds)
-        saw = (self._saw, self._front, self._beside)
+        saw = (self._saw, self._front, self._beside, list(self._first), self._ambient)
         around = (self._along, self._then, list(self._around), self._rounded, self._searches_ahead)
         touch = (self._touch.get_state(), self._touched)
         counters = (self._off, self._settled, self._lost, self._pushed, self._path)
@@ -322,8 +335,8 @@ class Following:
         self._filter.set_state(estimates)
         self._search.set_state(searched)
         self.mode, self._before = Mode(mode), Mode(before)
-        seen, self._front, self._beside = saw
-        self._saw = list(seen)
+        seen, self._front, self._beside, first, self._ambient = saw
+        self._saw, self._first = list(seen), list(first)
         self._along, self._then, corners, self._rounded, self._searches_ahead = around
         self._around = list(corners)
         self._off, self._settled, self._lost, self._pushed, self._path = counters

@@ -132,7 +132,9 @@ class IrReflex:
 
     def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
         """Return the command in force and what the sensors say; no time passes."""
-        ticks = u.ticks.tolist()
+        ticks: X = tuple(u.ticks.tolist())
+        if self._fast:
+            ticks = self._following.without_ambient(ticks)
         distances = self._distances(ticks)
         p_x, p_y, yaw, sigma = self._command()
         return Outputs(

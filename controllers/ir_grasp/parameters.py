@@ -222,6 +222,10 @@ class Params:
     path_limit: Metre = parameter(0.15, "way ahead that it may make once it has seen the object", minimum=0.0)
     follow_speed: MetrePerSecond = parameter(0.06, "largest speed at which an object is followed", minimum=0.0)
     rest_speed: MetrePerSecond = parameter(0.003, "estimated speed that is as good as rest", minimum=0.0)
+    ambient_rounds: int = parameter(
+        8, "first rounds, far from the object, of which FAST takes the least finger's mean for ambient light", minimum=0
+    )
+    ambient_least: Tick = parameter(20.0, "mean reading that counts as ambient light", minimum=0.0, maximum=4095.0)
     tick_noise: Tick = parameter(4.0, "standard deviation of a reading", minimum=0.0)
     jump: Metre = parameter(0.006, "change of a distance that no smooth surface explains", minimum=0.0)
     distance_drift: Metre = parameter(3e-4, "random change of a distance in a round", minimum=0.0)

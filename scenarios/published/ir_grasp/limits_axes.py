@@ -1,7 +1,8 @@
 """What `ir-limits` varies: the ways to grasp, and the axes along which one thing at a time is disturbed.
 
-All but three axes start from the nominal pose. What returns more or less light, and sensors that are off their curve,
-harm a hand that uses its sensors only where it has to: there, objects are moved as in the paper's perturbed poses.
+All but four axes start from the nominal pose. Light, what returns more or less of it, and sensors that are off their
+curve harm a hand that uses its sensors only where it has to: there, objects are moved as in the paper's perturbed
+poses.
 """
 
 import math
@@ -44,7 +45,9 @@ SIGHT = LimitArm(
     ("thumb", "fingers", "any", "position", "yaw"),
 )
 """What the sensors do alone: no joint's torque counts as a contact. Tried where fingertips meet objects."""
-PAPER = LimitArm("paper's algorithm", {"strategy": "reflex", "correction": "paper"}, True, ("dark", "bright", "curve"))
+PAPER = LimitArm(
+    "paper's algorithm", {"strategy": "reflex", "correction": "paper"}, True, ("dark", "bright", "ambient", "curve")
+)
 """What it claims of its sensors is judged; its runs are the longest."""
 BLIND = LimitArm("blind", {"strategy": "blind"}, False, ("towards", "any", "large", "near"))
 """It holds less than half of what is nominal (`ir-table`), so it is tried where objects come nearer to the hand."""
@@ -225,6 +228,17 @@ AXES = (
         0.9,
         MOVED,
         (*_THINGS, *_DRAWN),
+        blind_alike=True,
+    ),
+    Axis(
+        "ambient",
+        "ambient light, moved",
+        "ticks",
+        1.0,
+        (100.0, 400.0, 1500.0, 3000.0),
+        {"scene.ambient": "{}"},
+        base=MOVED,
+        scenes=(*_THINGS, *_DRAWN),
         blind_alike=True,
     ),
     Axis(

@@ -230,7 +230,7 @@ def test_a_reading_beyond_the_range_is_not_seen_and_weighs_nothing():
     edge = p.calibration.ticks(p.distance_max)
     commands: list[list[float]] = []
     for beyond in (0.0, math.floor(edge) - 1.0):
-        controller = reflex()
+        controller = reflex(ambient_rounds=0)  # else two such readings from the first are taken for ambient light
         ticks = np.array([beyond, beyond, round(p.calibration.ticks(0.02))])
         o = [controller.step(k * DT, DT, Inputs(ticks=ticks, p_WH=np.array(PREGRASP))) for k in range(5)][-1]
         assert o.case is Visibility.RING
@@ -330,3 +330,20 @@ def test_a_grasp_begins_with_the_jacobian_of_the_last_one():
     seen = grasp(second, scene((0.03, 0.02)))
     assert not np.array_equal(seen[-1][0].jacobian_offset, end.jacobian_offset)
     assert np.linalg.norm(in_hand(seen[-1][1])) < 0.2
+
+
+@pytest.mark.parametrize("ambient", [100.0, 1500.0])
+def test_ambient_light_is_not_taken_for_an_object(ambient: float):
+    in_the_dark, in_light = (grasp(reflex(), scene((0.02, 0.03), ambient=light)) for light in (0.0, ambient))
+    assert in_light[-1][0].stop is in_the_dark[-1][0].stop
+    assert in_hand(in_light[-1][1]) == pytest.approx(in_hand(in_the_dark[-1][1]), abs=2e-3)
+    assert in_light[0][0].case is Visibility.NONE
+    untold = grasp(reflex(ambient_rounds=0), scene((0.02, 0.03), ambient=1500.0))
+    assert untold[0][0].case is Visibility.ALL_SEEN
+
+
+def test_what_one_finger_alone_sees_at_the_start_is_no_ambient_light():
+    controller = reflex()
+    for k in range(10):
+        o = controller.step(k * DT, DT, Inputs(ticks=np.array([0.0, 900.0, 3.0]), p_WH=np.array(PREGRASP)))
+    assert o.case is Visibility.INDEX

@@ -90,7 +90,7 @@ def test_every_point_is_one_that_the_scenario_takes():
 def test_ways_share_their_scenes_and_objects_and_levels_do_not():
     plan = IrLimits().plan(quick=False)
     of_arms = {name for arm in ARMS for name in arm.parameters}
-    of_sensors = {"scene.reflectivity", "scene.sensor_tolerance"}  # their levels share scenes
+    of_sensors = {"scene.reflectivity", "scene.ambient", "scene.sensor_tolerance"}  # their levels share scenes
     scenes: dict[int, set[frozenset[tuple[str, str]]]] = {}
     arms: dict[int, set[str]] = {}
     for run in plan.runs():
