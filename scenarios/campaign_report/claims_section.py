@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from handover.scenarios.experiment.display_unit import DisplayUnit, display_unit
 from handover.scenarios.published.published_experiment import Claim, ComparisonTable, Verdict
 from handover.scenarios.reporting.html import rows_table
 from handover.scenarios.reporting.page import Section
@@ -39,7 +38,7 @@ def _row(claim: Claim, header: Sequence[str]) -> Markup:
         "claim": Markup("{}{}").format(claim.claim, where),
         "published": claim.published,
         "ours": claim.measured,
-        "95 % interval": _interval(claim),
+        "95 % interval": claim.interval_text,
         "verdict": Markup("{}<br><span class='soft'>{}</span>").format(verdict, claim.reason),
     }
     text = Markup().join(
@@ -49,17 +48,6 @@ def _row(claim: Claim, header: Sequence[str]) -> Markup:
         for name in header
     )
     return Markup("<tr>{}</tr>").format(text)
-
-
-def _interval(claim: Claim) -> str:
-    """Return the interval, a rate's in percent."""
-    if claim.interval is None:
-        return ""
-    unit = display_unit(claim.unit, claim.interval)
-    if claim.unit == "1" and "%" in claim.measured:
-        unit = DisplayUnit(100.0, "%")
-    low, high = (x * unit.factor for x in claim.interval)
-    return f"{low:.3g} to {high:.3g} {unit.symbol}".rstrip()
 
 
 def comparison_section(tables: Sequence[ComparisonTable]) -> Section | None:

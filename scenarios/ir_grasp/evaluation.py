@@ -243,7 +243,7 @@ class GraspEvaluator(Evaluator):
             return f"{refined}; the hand was not pulled back"
         where = f"{1000 * closed[0]:.0f} mm ahead of the wrist and {1000 * closed[1]:+.0f} mm beside it"
         if self._touching_closed < _BODIES:
-            how = "without touching the object" if not self._touching_closed else "with the object outside the fingers"
-            return f"{refined}; the hand closed {how}, {where}"
+            how = "does not touch the object" if not self._touching_closed else "has the object outside its fingers"
+            return f"{refined}; the closed hand {how}, {where}"
         during = {"PULL": "during the pull", "SHAKE": "during the shake"}.get(self._lost_in, "at the end")
         return f"{refined}; the object, {where}, slipped out of the closed hand {during}"

@@ -142,6 +142,8 @@ class SensorEvaluator(Evaluator):
             reason = f"the {who}'s sensor was still {1000 * self._distance:.1f} mm from the face at {self._t:.1f} s"
         else:
             reason = f"the {who}'s sensor came to {1000 * self._distance:.1f} mm from the face and touched nothing"
+            if math.isnan(self._first_seen):
+                reason += "; it returns so little light that the curve never put it in range"
         return Outcome(success=not math.isnan(self._arrived) and not self._touched, reason=reason, metrics=metrics)
 
 

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.experiment.display_unit import DisplayUnit, display_unit
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.results.run_folder import disk_errors_reported, write_whole
 
@@ -65,6 +66,17 @@ class Claim:
     def verdict_text(self) -> str:
         """The verdict in words: that of a claim which nobody has published says whether it holds."""
         return _BEYOND[self.verdict] if self.beyond else self.verdict.value
+
+    @property
+    def interval_text(self) -> str:
+        """The interval with a unit that suits its size, a rate's in percent; empty if there is none."""
+        if self.interval is None:
+            return ""
+        unit = display_unit(self.unit, self.interval)
+        if self.unit == "1" and "%" in self.measured:
+            unit = DisplayUnit(100.0, "%")
+        low, high = (x * unit.factor for x in self.interval)
+        return f"{low:.3g} to {high:.3g} {unit.symbol}".rstrip()
 
     def as_data(self) -> dict[str, Any]:
         """Return it as JSON data."""

@@ -65,8 +65,7 @@ def _print_claim(console: Console, claim: Claim) -> None:
     figures = [f"published: {claim.published}"] if claim.published else []
     figures += [f"ours: {claim.measured}"] if claim.measured else []
     if claim.interval is not None:
-        unit = "" if claim.unit == "1" else f" {claim.unit}"
-        figures.append(f"95 % interval: {claim.interval[0]:.3g} to {claim.interval[1]:.3g}{unit}")
+        figures.append(f"95 % interval: {claim.interval_text}")
     where = f" ({claim.where})" if claim.where else ""
     console.print(Text.assemble((claim.verdict_text, _STYLES[claim.verdict]), f"  {claim.claim}{where}"))
     if figures:

@@ -97,7 +97,9 @@ def _of_pose(runs: IrTableRuns, folders: Path, folder: Path, perturbed: bool) ->
                 _curves(above, [1e3 * d.distance[:, i] for d in descents], colour, last, 1e3 * published[finger])
             norm = 1e3 * math.hypot(published["thumb"], published["ring"])
             _curves(below, [1e3 * d.norm for d in descents], _NORM, last, norm)
-            above.set(title=f"{name.replace('_', ' ')} ({len(descents)} runs)", ylim=(0, 68))
+            above.set(
+                title=f"{name.replace('_', ' ')} ({len(descents)} run{'' if len(descents) == 1 else 's'})", ylim=(0, 68)
+            )
             below.set(xlabel="Gauss-Newton step", ylim=(0, 92))
             for axes in (above, below):
                 axes.set(xlim=(-0.4, last + 1.2))

@@ -126,9 +126,10 @@ def _last_steps(runs: IrTableRuns) -> ComparisonTable:
     names = (*_FINGERS, "norm")
     header = ["object and pose", "runs", "steps", *(f"{n}, {who}" for n in names for who in ("ours", "published"))]
     return ComparisonTable(
-        title="At the last step (mm)",
+        title="As the hand closes (mm)",
         header=header,
         rows=rows,
-        note="Medians of the runs in which the finger sees the object; not seen: by half of the runs or more. Both "
-        "poses of an object are taken together, as table II does. The norm is that of thumb and ring.",
+        note="After the last step, or after the recoveries that may follow it, or at the best pose of all: curves may "
+        "end elsewhere. Medians of the runs in which the finger sees the object; not seen: by half of the runs or more. "
+        "Both poses of an object are taken together, as table II does. The norm is that of thumb and ring.",
     )

@@ -93,7 +93,7 @@ def test_a_hand_that_closed_beside_the_object_says_where_it_is():
     done = ((t, signals(Phase.DONE, **beside)) for t in (7.0, 7.4))
     outcome = grasp(*done, at_closing=signals(Phase.PULL, **beside)).outcome()
     assert not outcome.success
-    assert "without touching the object, 170 mm ahead of the wrist and +30 mm beside it" in outcome.reason
+    assert "does not touch the object, 170 mm ahead of the wrist and +30 mm beside it" in outcome.reason
 
 
 def test_a_controller_that_is_done_before_its_hand_closed_has_failed():
