@@ -118,6 +118,7 @@ class Parameters:
             faults.append(f"shift_least {self.shift_least:g} m must be at most shift_most {self.shift_most:g} m")
         if self.literal and self.correction is Correction.FAST:
             faults.append("literal: takes the paper's equations as printed, which correction=paper alone uses")
+        faults.extend(self._without_effect())
         if self.last_grasp and not (self.correction is Correction.FAST and self.strategy is Strategy.REFLEX):
             faults.append("last_grasp: its Jacobian is what correction=fast of strategy=reflex begins with")
         elif self.last_grasp:
@@ -150,6 +151,26 @@ class Parameters:
             plain = solid_of(shape, disc_radius=self.expected_radius, bar_size=self.expected_size)
             believed = replace(plain, yaw=self.solid.yaw)
         return replace(believed, yaw=believed.yaw + self.expected_yaw)
+
+    def _without_effect(self) -> list[str]:
+        """Return the parameters that were given though nothing would come of them."""
+        effects = {
+            "disc_radius": (self.thing is Thing.DISC, "thing=disc"),
+            "bar_size": (self.thing is Thing.BAR, "thing=bar"),
+            "corners": (self.thing is Thing.POLYGON, "thing=polygon"),
+            "corner_count": (self.thing is Thing.POLYGON, "thing=polygon"),
+            "thing_seed": (self.thing is Thing.DRAWN, "thing=drawn"),
+            "expected_radius": (self.expected is Expected.DISC, "expected=disc"),
+            "expected_size": (self.expected is Expected.BAR, "expected=bar"),
+            "nudge_time": (bool(np.any(self.nudge)), "a nudge"),
+            "other_place": (self.other_radius > 0.0, "an other_radius above 0"),
+        }
+        default = type(self)()
+        return [
+            f"{name}: it is that of {needed} alone"
+            for name, (has_effect, needed) in effects.items()
+            if not has_effect and not np.array_equal(getattr(self, name), getattr(default, name))
+        ]
 
     def jacobian_offset(self) -> Floats:
         """Return what the last grasp found the Jacobian to be off its design by, (3, 4); zeros without one.

@@ -130,6 +130,6 @@ def _last_steps(runs: IrTableRuns) -> ComparisonTable:
         header=header,
         rows=rows,
         note="After the last step, or after the recoveries that may follow it, or at the best pose of all: curves may "
-        "end elsewhere. Medians of the runs in which the finger sees the object; not seen: by half of the runs or more. "
-        "Both poses of an object are taken together, as table II does. The norm is that of thumb and ring.",
+        "end elsewhere. Medians of the runs in which the finger sees the object; not seen: by half of the runs or "
+        "more. Both poses of an object are taken together, as table II does. The norm is that of thumb and ring.",
     )

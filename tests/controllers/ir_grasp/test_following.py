@@ -344,6 +344,5 @@ def test_ambient_light_is_not_taken_for_an_object(ambient: float):
 
 def test_what_one_finger_alone_sees_at_the_start_is_no_ambient_light():
     controller = reflex()
-    for k in range(10):
-        o = controller.step(k * DT, DT, Inputs(ticks=np.array([0.0, 900.0, 3.0]), p_WH=np.array(PREGRASP)))
-    assert o.case is Visibility.INDEX
+    u = Inputs(ticks=np.array([0.0, 900.0, 3.0]), p_WH=np.array(PREGRASP))
+    assert [controller.step(k * DT, DT, u) for k in range(10)][-1].case is Visibility.INDEX

@@ -96,3 +96,18 @@ def test_equations_as_printed_are_refused_of_a_correction_that_does_not_use_them
     (fault,) = Parameters(literal=True, correction=Correction.FAST).faults()
     assert fault == "literal: takes the paper's equations as printed, which correction=paper alone uses"
     assert Parameters(literal=True, correction=Correction.PAPER).faults() == []
+
+
+@pytest.mark.parametrize(
+    ("given", "needed"),
+    [
+        ({"disc_radius": 0.05}, "thing=disc"),
+        ({"thing_seed": 3}, "thing=drawn"),
+        ({"expected": Expected.BAR, "expected_radius": 0.02}, "expected=disc"),
+        ({"nudge_time": 1.0}, "a nudge"),
+        ({"other_place": np.array([0.0, -0.1])}, "an other_radius above 0"),
+    ],
+)
+def test_a_parameter_without_any_effect_is_refused(given: dict[str, Any], needed: str):
+    (fault,) = Parameters(**given).faults()
+    assert fault.endswith(f": it is that of {needed} alone")
