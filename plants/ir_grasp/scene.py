@@ -65,7 +65,7 @@ class Outputs:
     tension_meas: Newton = output("tension of the tendon by the motor's current")
     p_WO: Vector2[Metre] = output("position of the object, in the world")
     yaw_O: Radian = output("orientation of the object, that of its reference pose included")
-    p_WG: Vector2[Metre] = output("how far the ground under the object has carried it, or what stands still on it")
+    p_ground: Vector2[Metre] = output("how far the ground under the object has carried it, or what stands still on it")
     p_WX: Vector2[Metre] = output("position of the second object, in the world; 0 if there is none")
     touching: int = output("number of the hand's bodies, of palm and 8 phalanges, that touch the object")
     range: Vector3[Metre] = output(
@@ -134,7 +134,7 @@ class GraspScene:
             tension_meas=tension_meas,
             p_WO=np.array([x_O, y_O]),
             yaw_O=yaw_O,
-            p_WG=np.array(w.ground),
+            p_ground=np.array(w.ground),
             p_WX=np.zeros(2) if w.other is None else np.array(w.other),
             touching=w.touching,
             range=np.array(self._sensing.ranges(w)),

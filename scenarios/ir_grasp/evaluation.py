@@ -75,7 +75,7 @@ class GraspEvaluator(Evaluator):
         self._moves = {"RECOVER": 0, "APPROACH": 0, "PROBE": 0}
         self._command: tuple[float, ...] = ()
         self._p_WO_start: Floats = np.zeros(2)
-        self._p_WG_start: Floats = np.zeros(2)
+        self._p_ground_start: Floats = np.zeros(2)
         self._p_HO: Floats = np.zeros(2)
         self._p_HO_closed: Floats | None = None  # in H, when the pull began
         self._touched = False
@@ -91,7 +91,7 @@ class GraspEvaluator(Evaluator):
         self._t, phase = t, signals.text("reflex.phase")
         if not self.moments:
             self.moments["start"], self._p_WO_start = t, signals["scene.p_WO"]
-            self._p_WG_start = signals["scene.p_WG"] if "scene.p_WG" in signals else np.zeros(2)
+            self._p_ground_start = signals["scene.p_ground"] if "scene.p_ground" in signals else np.zeros(2)
             self._at_start = self._vision_errors(signals)
         if phase != self._phase:
             self._enter(phase, signals)
@@ -148,7 +148,7 @@ class GraspEvaluator(Evaluator):
         what_of_cost = _COST if p.literal else f"{_COST} of distances less their target"
         if blind:
             what_of_cost += " (thumb or ring sees nothing)"
-        carried = signals["scene.p_WG"] - self._p_WG_start if "scene.p_WG" in signals else np.zeros(2)
+        carried = signals["scene.p_ground"] - self._p_ground_start if "scene.p_ground" in signals else np.zeros(2)
         displaced = float(np.linalg.norm(signals["scene.p_WO"] - self._p_WO_start - carried))
         stop = int(_given(signals, "reflex.stop"))
         offset = self._offset(signals)

@@ -57,7 +57,7 @@ PLACES = {
             "yaw_H_0": "drawn from the run's seed",
         },
         optional={
-            "p_WG": "what it carried the object is no displacement by the hand",
+            "p_ground": "what it carried the object is no displacement by the hand",
             "tension": "shown as a signal",
             "q_meas": "felt by correction=fast",
             "tension_meas": "felt by strategy=contact and correction=fast",

@@ -107,12 +107,16 @@ class HelixReflex(PublishedExperiment):
             *("cameras", "reflex", "success", "closed", "beside the axis, mm", "along it, mm", "belief's error, mm"),
             *("as the ball left the hand, mm", "failed because"),
         ]
-        cells = [_cells(CAMERAS[c], r, of_case(table, c, r)) for c in CAMERAS for r in (True, False)]
-        told = " ".join(_told(CAMERAS[c], pairs(table, c)) for c in CAMERAS)
+        cells = [
+            [CAMERAS[c], "with" if r else "without", *_figures_of(of_case(table, c, r))]
+            for c in CAMERAS
+            for r in (True, False)
+        ]
+        tests = " ".join(_tests(CAMERAS[c], pairs(table, c)) for c in CAMERAS)
         note = (
             "Medians, with intervals by bootstrap, of the runs in which the gripper closed: where the ball was beside "
             "and along the gripper's axis as it began to, by ground truth, and how far from there the controller had "
-            f"it; then beside the axis as it left the hand. {told}"
+            f"it; then beside the axis as it left the hand. {tests}"
         )
         return [
             ComparisonTable(title="With and without the reflex", header=header, rows=cells, note=note),
@@ -129,7 +133,10 @@ class HelixReflex(PublishedExperiment):
                 for k, colour in enumerate(COLOURS[:2]):
                     axis.plot(np.full(len(both), k), both[:, k], "o", ms=4, color=colour)
                 axis.set_xticks([0, 1], ["without", "by reflex"])
-                axis.set(title=f"cameras {label}", xlim=(-0.4, 1.4), ylim=(0.0, None))
+                axis.set(title=f"cameras {label}", xlim=(-0.4, 1.4))
+            top = max(axis.get_ylim()[1] for axis in axes)
+            for axis in axes:
+                axis.set_ylim(0.0, top)
             axes[0].set(ylabel="ball beside the gripper's axis (mm)")
         caption = (
             "Where the ball was beside the gripper's axis when the gripper began to close, by ground truth; lines join "
@@ -220,7 +227,7 @@ def _table_of_mismatches(table: CampaignTable) -> ComparisonTable:
     cases: Mapping[str, str | None] = {"all as expected, but for tolerances": None, **{m: m for m in MISMATCHES}}
     header = ["what the reflex does not expect", "success", "closed", "beside the axis, mm", "along it, mm"]
     header += ["belief's error, mm", "as the ball left the hand, mm", "failed because"]
-    cells = [[label, *_cells("", True, of_case(table, "covered", True, m))[2:]] for label, m in cases.items()]
+    cells = [[label, *_figures_of(of_case(table, "covered", True, m))] for label, m in cases.items()]
     note = (
         "Cameras covered within 50 mm, with the reflex; figures as above. Of its sensors the reflex knows the design: "
         "gain and range of each are 5 % off, directions 0.03 rad (1.7°) in each of two (one standard deviation)."
@@ -228,12 +235,12 @@ def _table_of_mismatches(table: CampaignTable) -> ComparisonTable:
     return ComparisonTable(title="A model that is wrong", header=header, rows=cells, note=note)
 
 
-def _cells(label: str, reflex: bool, rows: Rows) -> list[str]:
-    cells = [label, "with" if reflex else "without"]
+def _figures_of(rows: Rows) -> list[str]:
+    """Return success, how many closed, medians of the offsets in mm, and reasons of failure; empty without runs."""
     if not rows:
-        return [*cells, *[""] * 7]
+        return [""] * 7
     closed = [row for row in rows if np.isfinite(_value(row, OFFSET))]
-    told = [
+    medians = [
         format_median(1e3 * x[np.isfinite(x)], 1)
         for x in (
             np.array([_value(row, name) for row in closed])
@@ -241,10 +248,10 @@ def _cells(label: str, reflex: bool, rows: Rows) -> list[str]:
         )
     ]
     taken = format_rate(sum(bool(row["success"]) for row in rows), len(rows))
-    return [*cells, taken, f"{len(closed)}", *told, reasons_of(rows)]
+    return [taken, f"{len(closed)}", *medians, reasons_of(rows)]
 
 
-def _told(label: str, of_pairs: Sequence[tuple[Row, Row]]) -> str:
+def _tests(label: str, of_pairs: Sequence[tuple[Row, Row]]) -> str:
     if not of_pairs:
         return ""
     d, test = offsets(of_pairs), paired_test(*successes(of_pairs))

@@ -25,7 +25,7 @@ def test_the_object_goes_along_with_the_ground_from_and_until_when_it_moves():
     ys = course(p, 3.0)
     t = STEP * np.arange(1, len(ys) + 1)
     way = np.clip(t - 0.6, 0.0, 1.8)[:, None] * p.carry_velocity
-    np.testing.assert_allclose([y.p_WG for y in ys], way, atol=1e-12)
+    np.testing.assert_allclose([y.p_ground for y in ys], way, atol=1e-12)
     slip = np.hypot(0.004, 0.02) ** 2 / (2.0 * 0.3 * 9.81)  # as friction brings it to speed
     np.testing.assert_allclose([y.p_WO for y in ys], way, atol=slip + 3e-5)
     assert all(y.yaw_O == 0.0 for y in ys)
@@ -34,7 +34,7 @@ def test_the_object_goes_along_with_the_ground_from_and_until_when_it_moves():
 def test_a_bump_takes_the_object_its_way_at_its_time():
     ys = course(replace(AWAY, nudge=np.array([0.006, -0.008]), nudge_time=0.3), 0.9)
     np.testing.assert_array_equal(ys[19].p_WO, [0.0, 0.0])
-    np.testing.assert_allclose(ys[-1].p_WG, [0.006, -0.008], atol=1e-12)
+    np.testing.assert_allclose(ys[-1].p_ground, [0.006, -0.008], atol=1e-12)
     np.testing.assert_allclose(ys[-1].p_WO, [0.006, -0.008], atol=2e-4)
     assert np.linalg.norm(ys[24].p_WO) == pytest.approx(0.1 * 0.075, abs=0.1**2 / (2.0 * 0.3 * 9.81) + 1e-4)
 
@@ -44,7 +44,7 @@ def test_fingers_that_hold_the_object_let_the_ground_slide_on_below():
     p = replace(p, carry_velocity=np.array([0.02, -0.03]), carry_from=1.5, carry_until=4.5)
     ys = course(p, 4.5, Inputs(p_WH_cmd=np.array([-0.11, 0.0]), sigma_cmd=0.9))
     assert min(y.touching for y in ys[100:]) >= 2
-    np.testing.assert_allclose(ys[-1].p_WG, [0.06, -0.09])
+    np.testing.assert_allclose(ys[-1].p_ground, [0.06, -0.09])
     assert np.linalg.norm(ys[-1].p_WO - ys[99].p_WO) < 0.02
     np.testing.assert_allclose(ys[-1].p_WO, ys[-30].p_WO, atol=1e-3)
 
@@ -59,7 +59,7 @@ def test_a_state_with_a_carried_object_is_complete():
     for k in range(58, 120):
         y, again = (s.step(k * STEP, STEP, BESIDE) for s in (scene, other))
         np.testing.assert_array_equal(again.p_WO, y.p_WO)
-        np.testing.assert_array_equal(again.p_WG, y.p_WG)
+        np.testing.assert_array_equal(again.p_ground, y.p_ground)
         np.testing.assert_array_equal(again.ticks, y.ticks)
 
 

@@ -22,7 +22,7 @@ def signals(
     p_WH: float = -0.1,
     index: tuple[float, float] = (0.05, 0.05),
     thumb: float = 0.01,
-    p_WG: tuple[float, float] = (0.0, 0.0),
+    p_ground: tuple[float, float] = (0.0, 0.0),
 ) -> Signals:
     """Return what a hand along x, and an object at a place in its frame, would show.
 
@@ -43,7 +43,7 @@ def signals(
         show("scene", name, Kind.REAL, value)
     show("scene", "range", Kind.REAL, [0.01, index[1], 0.01])
     show("scene", "q", Kind.REAL, np.zeros(8))
-    show("scene", "p_WG", Kind.REAL, p_WG)
+    show("scene", "p_ground", Kind.REAL, p_ground)
     show("scene", "touching", Kind.INTEGER, touching)
     for name, value in (("distance", [thumb, index[0], 0.01]), ("cost", 1e-5), ("yaw_cmd", 0.0), ("sigma_cmd", 0.0)):
         show("reflex", name, Kind.REAL, value)
@@ -150,8 +150,8 @@ def test_a_run_that_ends_early_says_in_which_phase():
 
 
 def test_what_the_ground_carried_the_object_is_no_displacement_by_the_hand():
-    def displacement(p_WG: tuple[float, float]) -> float:
-        closing = signals(Phase.CLOSE, p_HO=(0.13, 0.04), p_WG=p_WG)
+    def displacement(p_ground: tuple[float, float]) -> float:
+        closing = signals(Phase.CLOSE, p_HO=(0.13, 0.04), p_ground=p_ground)
         return follow((0.0, signals(Phase.REACH)), (1.0, closing)).outcome().metrics["displacement"].value
 
     assert displacement((0.0, 0.0)) == pytest.approx(0.05)
