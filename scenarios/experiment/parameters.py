@@ -77,6 +77,7 @@ def parameters_of(experiment: type[Experiment[Any]], kept: Mapping[str, Any]) ->
 def parse_value(variable: Variable, text: str) -> tuple[Any, str | None]:
     """Return a parameter's value from its text, and its fault with the valid values, None if there is none."""
     value: Any = text
+    given = 1
     if variable.kind is Kind.BOOLEAN:
         value = {"true": True, "false": False}.get(text.lower(), text)
     elif variable.kind in (Kind.REAL, Kind.INTEGER):
@@ -84,6 +85,7 @@ def parse_value(variable: Variable, text: str) -> tuple[Any, str | None]:
             numbers = [float(part) for part in text.split(",")]
         except ValueError:
             numbers = []
+        given = len(numbers)
         if variable.shape and numbers:
             value = np.array(numbers).reshape(variable.shape) if len(numbers) == variable.size else np.array(numbers)
         elif len(numbers) == 1:
@@ -97,6 +99,8 @@ def parse_value(variable: Variable, text: str) -> tuple[Any, str | None]:
     valid_range = range_of(variable)
     if fault and valid_range and valid_range not in fault:
         fault += f", {valid_range}"
+    if fault and variable.shape and given not in (0, variable.size):
+        fault += f": it takes {variable.size} numbers, {given} {'is' if given == 1 else 'are'} given"
     if fault and variable.items and (hint := suggestion(text, [n.lower() for n, _ in variable.items])):
         fault += f"; {hint}"
     return value, fault

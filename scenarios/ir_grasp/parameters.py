@@ -38,7 +38,10 @@ class Parameters:
         np.array([0.11, 0.03]), "length and width of thing=bar", minimum=5e-3, maximum=0.3
     )
     corners: Corners8[Metre] = parameter(
-        PENTAGON, "corners of thing=polygon, counter-clockwise; the first corner_count count", minimum=-0.2, maximum=0.2
+        PENTAGON,
+        "corners of thing=polygon, counter-clockwise: the first corner_count, the rest may be 0",
+        minimum=-0.2,
+        maximum=0.2,
     )
     corner_count: int = parameter(5, "how many corners thing=polygon has", minimum=3, maximum=8)
     thing_seed: int = parameter(

@@ -5,6 +5,7 @@ from handover.scenarios.free_flyer.handover.handovers import RobotToHuman
 from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.helix.parameters import HandPlace
+from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 
 
 def test_values_are_parsed_by_their_declared_kind():
@@ -49,3 +50,8 @@ def test_all_faults_are_reported_together():
 def test_a_fault_quotes_a_whole_number_as_it_was_given(text: str, fault: str):
     with pytest.raises(InvalidParameter, match=fault):
         parse_parameters(RobotToHuman, [f"stuck_nozzle={text}"])
+
+
+def test_too_few_numbers_of_an_array_are_counted():
+    with pytest.raises(InvalidParameter, match=r"from -0.2 to 0.2 m: it takes 2 numbers, 1 is given"):
+        parse_parameters(IrGrasp, ["shift=0.1"])
