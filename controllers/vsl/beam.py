@@ -196,10 +196,15 @@ def _math_of(value: Any) -> Any:
 
 
 def _newton_turn(link_2: Pair, link_3: Pair, tip: Pair) -> Pair:
-    """Return the turns of joints 2 and 3 that bring the tip of links of these steps where it is wanted, rad."""
+    """Return the turns of joints 2 and 3 that bring the tip of links of these steps where it is wanted, rad.
+
+    An arm that is stretched out exactly, at which no turn of a joint brings the tip nearer, is left as it is.
+    """
     x, z = link_2[0] + link_3[0], link_2[1] + link_3[1]
     off_x, off_z = tip[0] - x, tip[1] - z
     determinant = link_3[0] * -z + link_3[1] * x
+    if isinstance(determinant, float) and determinant == 0.0:
+        return 0.0, 0.0
     return (off_x * link_3[0] + off_z * link_3[1]) / determinant, -(off_x * x + off_z * z) / determinant
 
 

@@ -16,6 +16,7 @@ from handover.controllers.vsl.learned_model import Learned, VslModel
 from handover.controllers.vsl.model_text import InvalidModel, parse_model, read_model
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
+from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Ampere, Hertz, Metre, Number, Pascal, PerSecond, Radian, RadianPerSecond, Second
 
@@ -160,7 +161,7 @@ class Outputs:
 
 
 class IdleParameters(InvalidParameters):
-    """Parameters that only what was learned has, set where nothing learned is used; `faults` lists all of them."""
+    """Parameters out of range, or set where nothing that was learned uses them; `faults` lists all of them."""
 
     block = "HybridKinematics"
 
@@ -214,7 +215,7 @@ class HybridKinematics:
     period: ClassVar[Fraction | None] = _PERIOD
 
     def __init__(self, params: Params) -> None:
-        if faults := _idle(params):
+        if faults := parameter_faults(params) or _idle(params):
             raise IdleParameters(faults)
         self._params = p = params
         self._kinematics = VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)

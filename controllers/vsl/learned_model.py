@@ -102,8 +102,11 @@ class Domain:
         return np.where((z < self._low) | (z > self._high), 0.0, 1.0 / self.scale)
 
     def outside(self, x: Floats) -> bool:
-        """Return whether inputs x, shape (inputs,), lie outside the polytope, that is, surely beyond the training."""
-        return bool(np.any(self._directions @ ((x - self.mean) / self.scale) > self.hull))
+        """Return whether inputs x, shape (inputs,), lie outside the polytope, that is, surely beyond the training.
+
+        What is no number lies outside.
+        """
+        return not bool(np.all(self._directions @ ((x - self.mean) / self.scale) <= self.hull))
 
     @cached_property
     def _low(self) -> Floats:

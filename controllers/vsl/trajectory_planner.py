@@ -25,8 +25,8 @@ __all__ = ["Elbow", "Inputs", "InvalidPath", "Outputs", "Params", "Path", "Traje
 _MARGIN = 0.001
 """How near to a singularity a path may come, m (assumed): there a joint turns about seven times faster than usual."""
 
-MAX_PRESSURE = 1e6
-"""Highest pressure that is commanded, Pa."""
+MAX_PRESSURE = 3e5
+"""Highest pressure that is commanded, Pa: what the arm takes (assumed)."""
 
 _PERIOD = Fraction(1, 50)  # s
 _SAME_TIME = 1e-9  # s; rounding of sums of intervals

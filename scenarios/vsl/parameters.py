@@ -19,6 +19,7 @@ from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Number,
 from handover.plants.vsl.parameters import MAX_PRESSURE, Link, Motion
 
 _MAX_LOAD = 0.3
+_SAMPLES = 100  # of a segment, to find where it is below the ground
 
 
 class Links(enum.IntEnum):
@@ -216,9 +217,16 @@ class Parameters:
         except InvalidWaypoints as e:
             return [f"waypoints: {e}"]
         ends = [segments[0].x_0, *(segment.x_g for segment in segments)]
-        return [
+        below = [
             f"waypoints: {self.waypoints}: waypoint {i}, {format_point(p_WG)}, is below the ground, z = 0 in W"
             for i, p_WG in enumerate(ends, 1)
+            if p_WG[2] < 0.0
+        ]
+        lowest = [min(segment.sampled(_SAMPLES, 1.0)[0], key=lambda p_WG: p_WG[2]) for segment in segments]
+        return below or [
+            f"waypoints: {self.waypoints}: the way from waypoint {i} to {i + 1} goes through {format_point(p_WG)}, "
+            "below the ground, z = 0 in W"
+            for i, p_WG in enumerate(lowest, 1)
             if p_WG[2] < 0.0
         ]
 

@@ -1,5 +1,6 @@
 import dataclasses
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -341,3 +342,14 @@ def test_a_sensor_at_the_arm_tells_a_mismatch_that_inputs_do_not(sensor: dict[st
     assert y.model_mismatch == bool(sensor)
     assert (y.innovation > 0.01) == bool(sensor)
     assert not y.outside
+
+
+def test_parameters_out_of_range_are_refused():
+    with pytest.raises(IdleParameters, match="K_I"):
+        HybridKinematics(Params(K_I=-5.0))
+
+
+def test_the_beam_commands_an_arm_that_is_stretched_out_upright():
+    unit = HybridKinematics(Params(learned=Learned.PHYSICS))
+    y = unit.step(0.0, 0.02, Inputs(q_ref=np.array([0.0, math.pi / 2.0, 0.0]), p_meas=np.full(2, 1e5)))
+    assert np.all(np.isfinite(y.q_cmd))

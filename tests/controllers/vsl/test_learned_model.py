@@ -112,6 +112,7 @@ def test_points_beyond_an_axis_or_a_corner_are_outside():
     cubic = fitted()
     assert cubic.outside(np.array([2.1, 0.05, 1e5]))
     assert cubic.outside(np.array([0.5, 0.05, 4e4]))
+    assert cubic.outside(np.array([0.5, np.nan, 1e5]))
     x = RNG.normal(size=(300, 2))
     x = x[np.sum(x**2, axis=1) < 1.0]
     disc = fit_cubic(x, x, x, x).cubic

@@ -115,6 +115,11 @@ def test_a_path_goes_by_a_file_of_waypoints(tmp_path: Path):
     ("text", "given", "fault"),
     [
         ("x,y,z\n0.3,0,0.1\n0.3,0,-0.1\n", (), r"waypoint 2, \(0\.3, 0, -0\.1\) m?.*is below the ground"),
+        (
+            "x,y,z,via_x,via_y,via_z\n0.3,0,0.02,,,\n0.36,0,0.02,0.33,0,-0.01\n",
+            (),
+            r"the way from waypoint 1 to 2 goes through \(0\.33, 0, -0\.01\) m?.*below the ground",
+        ),
         ("x,y,z\n0.3,0,0.1\n0.3,0,0.2\n", ("x_0=0.2,0,0.1",), "x_0 is for a line only"),
         ("x,y,z\n0.3,0,0.1\n", (), "it has 1 waypoints"),
         ("x,y,z\n0.3,0,0.1\n0.3,0,0.2\n", ("path=linear",), "waypoints is for path=custom only"),

@@ -67,7 +67,7 @@ def test_runs_of_the_limits_are_found_by_what_they_are_of(tmp_path: Path):
     runs = LimitRuns(table)
     large = next(axis for axis in AXES if axis.key == "large")
     tried = [int(arm.meets(large)) for arm in ARMS]
-    assert sum(tried) == 5
+    assert sum(tried) == 6
     assert [runs.count(arm, large, large.levels[-1:])[1] for arm in ARMS] == tried
     assert sum(runs.count(arm, axis, axis.all_levels)[1] for axis in AXES for arm in ARMS) == sum(tried)
     assert {f.name for f in draw_figures(IrLimits(), table, folder.runs, folder.figures)} == {
