@@ -78,7 +78,7 @@ def test_an_object_that_is_carried_is_followed_and_gone_along_with_while_the_han
     seen = grasp(controller, plant, Phase.PULL)
     assert Phase.TRACK in phases(seen)
     closing = [(o, y) for o, y in seen if o.phase is Phase.CLOSE]
-    assert np.linalg.norm(closing[0][1].p_WO - closing[0][1].p_WG - [0.0, -0.01]) < 2e-3
+    assert np.linalg.norm(closing[0][1].p_WO - closing[0][1].p_ground - [0.0, -0.01]) < 2e-3
     gone = closing[-1][0].p_WH_cmd - closing[0][0].p_WH_cmd
     rate = gone[1] / (DT * (len(closing) - 1))
     assert 0.4 * v < rate < 1.5 * v
