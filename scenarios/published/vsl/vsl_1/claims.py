@@ -15,6 +15,10 @@ _BY_SPRINGS = (
     "An arm of springs sags the more the more it carries, whatever its stiffness, and the stiffness was chosen for "
     "errors about as in fig. 5, so agreement proves nothing."
 )
+_BY_LEVER = (
+    "Its own weight and its load bend an arm of springs the more the farther it reaches out, whatever its stiffness, "
+    "so agreement proves nothing."
+)
 _BY_CHOICE = (
     "How much stiffer pressure makes a link was chosen so that errors fall with it about as in fig. 5, so agreement "
     "proves nothing."
@@ -100,7 +104,8 @@ def _reach(runs: Vsl1Runs, path: TipPath, sentence: str) -> Claim:
     ]
     beyond = path is not TipPath.SQUARE
     where, published = ("", "") if beyond else ("sec. V-C, fig. 5(c)", "higher")
-    return separation_claim(f"{sentence}.", where, published, comparisons, beyond=beyond)
+    claim = separation_claim(f"{sentence}.", where, published, comparisons, beyond=beyond)
+    return claim if beyond else without_verdict(claim, _BY_LEVER)
 
 
 def _servo(runs: Vsl1Runs) -> Claim:

@@ -25,6 +25,10 @@ _RIGID_BY_CHOICE = (
     "stiffness it falls."
 )
 
+_NO_NETWORK = (
+    "The paper claims this of its network; `--model` takes the file of a trained one. Here stands for it what ships."
+)
+
 
 def claims_of(runs: Vsl2Runs) -> list[Claim]:
     """Return the claims, those beyond the paper last."""
@@ -32,14 +36,15 @@ def claims_of(runs: Vsl2Runs) -> list[Claim]:
 
 
 def _estimates(runs: Vsl2Runs) -> list[Claim]:
-    """Judge the polynomials that ship, as the tip goes by rigid kinematics, and the paper's network if it is there."""
-    shipped = _estimate(runs, MODEL_BASED, f"{CUBIC.label} that ship, while the tip goes by rigid kinematics")
-    if PUBLISHED not in runs.learned:
-        return [shipped]
-    return [_estimate(runs, PUBLISHED, f"{PUBLISHED.label}, while the tip goes by its commands"), shipped]
+    """Judge the paper's network, if it was trained, and beyond the paper the polynomials that ship."""
+    by_polynomials = f"{CUBIC.label} that ship, while the tip goes by rigid kinematics"
+    return [
+        _estimate(runs, PUBLISHED, f"{PUBLISHED.label}, while the tip goes by its commands"),
+        _estimate(runs, MODEL_BASED, by_polynomials, beyond=True),
+    ]
 
 
-def _estimate(runs: Vsl2Runs, method: ControlMethod, by: str) -> Claim:
+def _estimate(runs: Vsl2Runs, method: ControlMethod, by: str, *, beyond: bool = False) -> Claim:
     comparisons = [
         Comparison(
             case.label, *(runs.metric(f"{what}_error", case, method) for what in ("estimate", "model")), paired=True
@@ -50,7 +55,8 @@ def _estimate(runs: Vsl2Runs, method: ControlMethod, by: str) -> Claim:
         f"The hybrid forward model, here {by}, predicts the real position of the tip more precisely than rigid "
         "kinematics."
     )
-    return separation_claim(sentence, "sec. V-C, fig. 6", "more precisely", comparisons)
+    where, published = ("", "") if beyond else ("sec. V-C, fig. 6", "more precisely")
+    return separation_claim(sentence, where, published, comparisons, beyond=beyond)
 
 
 def _command(runs: Vsl2Runs) -> Claim:
@@ -67,9 +73,9 @@ def _rigid(runs: Vsl2Runs) -> Claim:
 
 
 def _by_network(runs: Vsl2Runs, claim: Claim) -> Claim:
-    by = f"Judged by {runs.hybrid.label}"
-    note = f"{by}." if runs.hybrid is PUBLISHED else f"{by}, for want of the paper's network."
-    return replace(claim, reason=f"{claim.reason} {note}")
+    """Say by which corrector a claim of the paper is judged; only its own network gives a verdict."""
+    claim = replace(claim, reason=f"{claim.reason} Measured by {runs.hybrid.label}.")
+    return claim if runs.hybrid is PUBLISHED else without_verdict(claim, _NO_NETWORK)
 
 
 def _stiffer(runs: Vsl2Runs) -> list[Claim]:
@@ -90,7 +96,8 @@ def _stiffer(runs: Vsl2Runs) -> list[Claim]:
 
 def _other_arms(runs: Vsl2Runs) -> list[Claim]:
     """Judge each method that was taught on arms that it was not taught on."""
-    on, claims = "On every arm that nothing was learned from the tip errs less by", list[Claim]()
+    on = f"On each of the {len(runs.arms)} arms tried from which nothing was learned the tip errs less by"
+    claims: list[Claim] = []
     pairs = [(case, arm) for case in CASES for arm in runs.arms]
     for method in runs.learned if pairs else ():
         against = {
@@ -110,7 +117,7 @@ def _imus(runs: Vsl2Runs) -> list[Claim]:
     if IMU not in runs.feedback:
         return []
     comparisons = [_compared(runs, case, IMU, CUBIC, arm, arm) for case, arm in pairs]
-    sentence = "On every arm the tip errs less by polynomials with an IMU a link than by polynomials alone."
+    sentence = "On each arm tried the tip errs less by polynomials with an IMU a link than by polynomials alone."
     return [separation_claim(sentence, "", "", comparisons, beyond=True)]
 
 

@@ -149,7 +149,7 @@ class Vsl2Runs:
     @property
     def learned(self) -> tuple[ControlMethod, ...]:
         """The methods that any run goes that were taught."""
-        return tuple(method for method in LEARNED if self.rows(CASES[0], method))
+        return tuple(method for method in LEARNED if any(self.rows(case, method) for case in CASES))
 
     @property
     def feedback(self) -> tuple[ControlMethod, ...]:
