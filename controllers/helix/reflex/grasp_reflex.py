@@ -198,8 +198,8 @@ class GraspReflex:
     - While the cameras see both, their measurements go on to the servo, the ball's less what the fingers find the
       cameras to have wrong, beta.
     - Where they see one or none, and the gripper is near, wrist and gripper go on by dead reckoning from the motors,
-      and the ball is put where the filter has it from there. So an error of reckoning is the ball's as well, and the servo
-      centres the gripper by what the fingers feel. With `feels` false that is dead reckoning.
+      and the ball is put where the filter has it from there. So an error of reckoning is the ball's as well, and the
+      servo centres the gripper by what the fingers feel. With `feels` false that is dead reckoning.
     - Else, or where the filter's deviation exceeds `lost`, what is not seen is not known (`known_O`, `known_R`).
 
     The gripper's orientation is that of the servo's estimated state, without twist. Nothing here closes the gripper:
