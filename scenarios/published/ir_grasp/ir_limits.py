@@ -220,7 +220,7 @@ def _quick_enough(runs: LimitRuns) -> Claim:
         published="",
         measured=medians,
         verdict=verdict_of(float(np.median(ours)) <= _REFINED, could_be_either=len(ours) >= _MIN_RUNS),
-        reason="Holds if it is so over all its runs on these axes; the paper's algorithm runs on three of them.",
+        reason="Holds if it is so over all its runs on these axes; the paper's algorithm runs on four of them.",
         beyond=True,
     )
 
@@ -245,7 +245,7 @@ def _worth_table(runs: LimitRuns) -> ComparisonTable:
     why = _WHY_UNPUSHED if _unpushed(runs) else ""
     note = (
         f"{why}{sentence_of_worth(compared)} All levels beyond the start together, in the same scenes; p by the exact "
-        "sign-flip test over scenes, corrected by Holm over the axes. On the last three axes the levels are of the "
+        "sign-flip test over scenes, corrected by Holm over the axes. On the last four axes the levels are of the "
         "same scenes, and a hand that does not look met each once. The best way without looking is chosen by these "
         "runs themselves, which favours it."
     )
@@ -288,7 +288,7 @@ def _halves(runs: LimitRuns) -> ComparisonTable:
 
 def _span(axis: Axis) -> str:
     first, last = axis.all_levels[0], axis.all_levels[-1]
-    return f"{axis.scale * first:.3g} to {axis.format_level(last)}"
+    return f"{axis.format_number(first)} to {axis.format_level(last)}"
 
 
 def _rates(runs: LimitRuns) -> ComparisonTable:

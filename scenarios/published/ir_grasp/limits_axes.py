@@ -114,7 +114,12 @@ class Axis:
 
     def format_level(self, level: float) -> str:
         """Return a level with its unit."""
-        return f"{self.scale * level:.3g} {self.unit}".strip()
+        return f"{self.format_number(level)} {self.unit}".strip()
+
+    def format_number(self, level: float) -> str:
+        """Return a level, to be followed by its unit."""
+        number = self.scale * level
+        return f"{number:.0f}" if abs(number) >= 100.0 else f"{number:.3g}"
 
 
 _SHIFTS = (0.02, 0.04, 0.06, 0.08)
