@@ -297,13 +297,14 @@ def _rates(runs: LimitRuns) -> ComparisonTable:
         for level in axis.all_levels:
             counts = [runs.count(arm, axis, (level,)) for arm in ARMS]
             if any(n for _, n in counts):
-                rows.append([f"{axis.title}: {axis.format_level(level)}", *map(_with_interval, counts)])
+                cells = [_with_interval(count).replace(" %)", ")") for count in counts]
+                rows.append([f"{axis.title}: {axis.format_level(level)}", *cells])
     return ComparisonTable(
         title="Objects held",
         header=["axis and level", *(arm.title for arm in ARMS)],
         rows=rows,
-        note="With intervals by Clopper and Pearson, 95 %. Where it makes no difference to a hand that does not "
-        "look, its runs are those at the axis's start.",
+        note="With 95 % intervals by Clopper and Pearson, in percent. Where it makes no difference to a hand that does "
+        "not look, its runs are those at the axis's start.",
     )
 
 

@@ -92,7 +92,7 @@ def _pushes(axes: Axes, runs: LimitRuns, arm: LimitArm, axis: Axis, aside: float
 
 
 def _levels(axes: Axes, axis: Axis) -> None:
-    axes.set_xticks(range(len(axis.all_levels)), [f"{axis.scale * level:.3g}" for level in axis.all_levels])
+    axes.set_xticks(range(len(axis.all_levels)), [axis.format_number(level) for level in axis.all_levels])
     axes.set_xlim(-0.4, len(axis.all_levels) - 0.6)
     label = f"{axis.title} ({axis.unit})" if axis.unit else axis.title
     axes.set_xlabel(fill(label, 34), fontsize=8)
@@ -112,4 +112,4 @@ def _finish(panels: Sequence[Axes], count: int, label: str, arms: Sequence[Limit
         arm.title: Line2D([], [], color=COLOURS[ARMS.index(arm)], ls="-" if arm.looks else "--", marker="o", ms=3)
         for arm in arms
     }
-    legend_below(panels[0], entries)
+    legend_below(panels[0], entries, columns=min(len(entries), _COLUMNS))
