@@ -13,7 +13,7 @@ from handover.plants.ir_grasp.scene import GraspScene, Inputs
 
 HOST: Any = fmpy
 STEP, STEPS = 0.015, 40
-OUTPUTS = ("p_WO[1]", "p_WO[2]", "p_WX[1]", "p_WX[2]", "p_WG[2]", "ticks[1]", "ticks[3]", "p_WH_meas[1]", "yaw_O")
+OUTPUTS = ("p_WO[1]", "p_WO[2]", "p_WX[1]", "p_WX[2]", "p_ground[2]", "ticks[1]", "ticks[3]", "p_WH_meas[1]", "yaw_O")
 
 
 def test_fmpy_runs_a_disturbed_scene_as_it_is():
