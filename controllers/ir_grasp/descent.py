@@ -15,10 +15,7 @@ from handover.controllers.ir_grasp.parameters import Params
 from handover.cosim.blocks.ports import Floats
 
 _RANK_TOLERANCE = 1e-12
-_GROWTH, _SHRINKAGE = (
-    2.0,
-    0.5,
-)  # of the factor on alpha, after a step that lessened the cost and one that did not (assumed)
+_GROWTH, _SHRINKAGE = 2.0, 0.5  # of the factor on alpha, by whether a step lessened the cost (assumed)
 
 
 def cost(r: Floats) -> float:

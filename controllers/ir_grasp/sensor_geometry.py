@@ -52,14 +52,18 @@ def sensor_poses(sigma: float) -> SensorPoses:
     return poses
 
 
+@lru_cache(maxsize=8)  # likewise
 def nominal_jacobian(sigma: float) -> Floats:
     """Return d(distance)/d[ahead, left, yaw, sigma], (3, 4), in m per m, m, rad, 1, for a surface that is met squarely.
 
-    A window that moves by dp comes nearer by n . dp; that the beam turns changes its length in second order only.
+    A window that moves by dp comes nearer by n . dp; that the beam turns changes its length in second order only. The
+    array is read-only.
     """
     p, n, slope = sensor_poses(sigma)
     turning = n[:, 1] * p[:, 0] - n[:, 0] * p[:, 1]
-    return -np.column_stack([n, turning, np.sum(n * slope, axis=1)])
+    J: Floats = -np.column_stack([n, turning, np.sum(n * slope, axis=1)])
+    J.flags.writeable = False
+    return J
 
 
 def surface_points(sigma: float, distances: Floats) -> Floats:

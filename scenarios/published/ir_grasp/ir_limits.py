@@ -37,6 +37,7 @@ _PUSHED, _PUSHED_MOST = 0.005, 0.015
 _REFINED = 3.0
 _SPEED = next(axis for axis in AXES if axis.key == "speed")
 _LIGHT = tuple(axis for axis in AXES if axis.key in ("dark", "bright"))
+_ALIKE_AXES = sum(axis.blind_alike for axis in AXES)
 _CURVE = next(axis for axis in AXES if axis.key == "curve")
 
 
@@ -220,7 +221,8 @@ def _quick_enough(runs: LimitRuns) -> Claim:
         published="",
         measured=medians,
         verdict=verdict_of(float(np.median(ours)) <= _REFINED, could_be_either=len(ours) >= _MIN_RUNS),
-        reason="Holds if it is so over all its runs on these axes; the paper's algorithm runs on four of them.",
+        reason="Holds if it is so over all its runs on these axes; the paper's algorithm runs on "
+        f"{len(PAPER.axes)} of them.",
         beyond=True,
     )
 
@@ -245,9 +247,9 @@ def _worth_table(runs: LimitRuns) -> ComparisonTable:
     why = _WHY_UNPUSHED if _unpushed(runs) else ""
     note = (
         f"{why}{sentence_of_worth(compared)} All levels beyond the start together, in the same scenes; p by the exact "
-        "sign-flip test over scenes, corrected by Holm over the axes. On the last four axes the levels are of the "
-        "same scenes, and a hand that does not look met each once. The best way without looking is chosen by these "
-        "runs themselves, which favours it."
+        "sign-flip test over scenes, corrected by Holm over the axes. "
+        f"On the last {_ALIKE_AXES} axes the levels are of the same scenes, and a hand that does not look met each "
+        "once. The best way without looking is chosen by these runs themselves, which favours it."
     )
     if runs.unfinished:
         note += f" {runs.unfinished} runs did not come to their end, and count as failures."

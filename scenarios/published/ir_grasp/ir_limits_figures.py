@@ -41,7 +41,8 @@ def _rates(runs: LimitRuns, shown: Sequence[Axis], folder: Path) -> Figure:
         _finish(panels, len(shown), "objects held (%)", ARMS)
     caption = (
         "Objects held by each way to grasp, the more disturbed the further to the right; intervals by Clopper and "
-        "Pearson, 95 %. Leftmost there is no disturbance yet, but for the bars. All but the last four start from the "
+        "Pearson, 95 %. Leftmost there is no disturbance yet, but for the bars. All but the last "
+        f"{sum(axis.blind_alike for axis in AXES)} start from the "
         "nominal pose; in those objects are moved as in the paper's perturbed poses."
     )
     return Figure("limits", caption)
