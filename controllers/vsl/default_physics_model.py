@@ -8,12 +8,12 @@ Generated; when the sources of the arm (plants/vsl/) have changed, run again
 DEFAULT_MODEL = """\
 {
  "format": "handover-vsl-model",
- "version": 1,
+ "version": 2,
  "kind": "physics",
  "provenance": {
   "arm": {
    "fmu": "VslArm",
-   "key": "9085b21db2a2114db1cf7d9367faed5bc389008cfeece0a50723bddf195448ed",
+   "key": "f5fd7d7e26e3d3fac6e76aadad0fc8d0f7a1fbf63e9e94ac37615a445a1c65ff",
    "parameters": {
     "EI_0": 0.55,
     "EI_factor": [1.0, 1.0, 1.0],
@@ -75,7 +75,7 @@ DEFAULT_MODEL = """\
   },
   "seed": 0,
   "points": {"measured": 1500, "training": 1050, "validation": 225, "test": 225},
-  "data": "22dfef2fb63b19440ca2c6fe061c0c2211f2c21bfe43fbd0a13d7722e2d34e3b",
+  "data": "a83d233d66639f315136046e5675d8d8aa8285099fd8d6a9378947547e73d67e",
   "inverse": {"validation_rms_rad": 0.005157},
   "forward": {"validation_rms_m": 0.0009866},
   "mean_test_errors_m": {
@@ -109,9 +109,9 @@ DEFAULT_MODEL = """\
    2.49928836586, 2.70958393793, 2.75584109515, 3.0530068901, 2.65285461721, 2.91322725137, 2.68663067567,
    2.7469743477, 2.52768567615, 2.39526032128, 3.19314594363, 1.99470033658, 2.44671211756, 2.39697178774],
   "beam": {
-   "EI_0": 0.357114922776,
-   "EI_p": 1.69719203192e-05,
-   "joint": 44.014879344,
+   "EI_0": 0.357114922786,
+   "EI_p": 1.69719203188e-05,
+   "joint": 44.0148793451,
    "link": 0.14,
    "elbow": 0.125,
    "gripper": 0.035,
@@ -142,9 +142,9 @@ DEFAULT_MODEL = """\
    2.49928836586, 2.70958393793, 2.75584109515, 3.0530068901, 2.65285461721, 2.91322725137, 2.68663067567,
    2.7469743477, 2.52768567615, 2.39526032128, 3.19314594363, 1.99470033658, 2.44671211756, 2.39697178774],
   "beam": {
-   "EI_0": 0.357114922776,
-   "EI_p": 1.69719203192e-05,
-   "joint": 44.014879344,
+   "EI_0": 0.357114922786,
+   "EI_p": 1.69719203188e-05,
+   "joint": 44.0148793451,
    "link": 0.14,
    "elbow": 0.125,
    "gripper": 0.035,
@@ -152,6 +152,7 @@ DEFAULT_MODEL = """\
    "kt": 1.78,
    "gravity": 9.81
   }
- }
+ },
+ "sha256": "9e3acde327728b90dd5b3cf935915843c0dabe5c9c5c15844117adaf85fed2a6"
 }
 """

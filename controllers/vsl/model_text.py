@@ -33,7 +33,7 @@ from handover.controllers.vsl.learned_model import (
 from handover.controllers.vsl.network import ACTIVATIONS, LAYERS, Activation, Network
 from handover.cosim.blocks.ports import Floats
 
-FORMAT, VERSION = "handover-vsl-model", 1
+FORMAT, VERSION = "handover-vsl-model", 2
 
 ANY = -1
 """A number of entries that is not checked."""
@@ -66,9 +66,9 @@ class InvalidModel(ValueError):
 
 
 def model_text(model: VslModel) -> str:
-    """Return a model as JSON in lines of less than 120 characters, ending in a newline.
+    """Return a model as JSON in lines of less than 120 characters, ending in a newline, with a digest of all of it.
 
-    Weights of networks are their bytes in base64, with a digest: 1.6 million numbers as text would be read for seconds.
+    Weights of networks are their bytes in base64: 1.6 million numbers as text would be read for seconds.
     """
     k = model.kinematics
     content = {
@@ -82,7 +82,7 @@ def model_text(model: VslModel) -> str:
         "inverse": {"inputs": list(INVERSE_INPUTS), **_plain(model.inverse)},
         "forward": {"inputs": list(_FORWARD_INPUTS[model.forward_input]), **_plain(model.forward)},
     }
-    return _json(content, "") + "\n"
+    return _json({**content, "sha256": _digest(content)}, "") + "\n"
 
 
 def read_model(path: Path) -> VslModel:
@@ -102,7 +102,8 @@ def parse_model(text: str, source: str) -> VslModel:
     """Return the model that `model_text` wrote.
 
     Raises:
-        InvalidModel: it is not JSON, of another format or version, lacks something, or has a part of a wrong kind.
+        InvalidModel: it is not JSON, of another format or version, lacks something, has a part of a wrong kind, or is
+            not what its digest was made of.
     """
     try:
         content: object = json.loads(text)
@@ -125,7 +126,7 @@ def parse_model(text: str, source: str) -> VslModel:
     kind = reader.kind(whole)
     forward_input = reader.forward_input(whole)
     forward_inputs = _FORWARD_INPUTS[forward_input]
-    return VslModel(
+    model = VslModel(
         inverse=reader.regressor(whole, "inverse", INVERSE_INPUTS, kind, kinematics),
         forward=reader.regressor(whole, "forward", forward_inputs, kind, kinematics),
         kinematics=kinematics,
@@ -135,6 +136,15 @@ def parse_model(text: str, source: str) -> VslModel:
         friction=reader.friction(whole),
         usual=reader.usual(whole),
     )
+    stated = reader.entry(whole, "sha256")
+    if stated != _digest({name: part for name, part in whole.items() if name != "sha256"}):
+        raise InvalidModel(source, "it is damaged, or was changed by hand: its sha256 is not that of its content")
+    return model
+
+
+def _digest(content: dict[str, Any]) -> str:
+    """Return a hash of what JSON holds, whatever its order and spaces."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
 class _Reader:
@@ -168,8 +178,8 @@ class _Reader:
         return array
 
     def kind(self, whole: dict[str, Any]) -> Learned:
-        """Return what the model is; files from before there were several say nothing, and are cubic."""
-        kind = whole.get("kind", Learned.CUBIC.name.lower())
+        """Return what the model is."""
+        kind = self.entry(whole, "kind")
         for known in Learned:
             if kind == known.name.lower():
                 return known
@@ -184,10 +194,8 @@ class _Reader:
         return ForwardInput.X if is_X else ForwardInput.Q
 
     def friction(self, whole: dict[str, Any]) -> tuple[float, float]:
-        """Return the currents by friction; files from before it was learned have none."""
-        first, second = (
-            self.numbers(whole, "the file", "friction", (2,)).tolist() if "friction" in whole else (0.0, 0.0)
-        )
+        """Return the currents by friction, A; 0 where they are not compensated."""
+        first, second = self.numbers(whole, "the file", "friction", (2,)).tolist()
         return first, second
 
     def usual(self, whole: dict[str, Any]) -> Cubic | None:
@@ -287,8 +295,6 @@ class _Reader:
             data = base64.b64decode("".join(cast("list[str]", lines)), validate=True)
         except (binascii.Error, ValueError) as e:
             raise InvalidModel(self._source, f"{name}.weights is not base64: {e}") from e
-        if hashlib.sha256(data).hexdigest() != self.entry(table, "sha256", name):
-            raise InvalidModel(self._source, f"{name}.weights is damaged: its digest is not the one stated beside it")
         if len(data) % _STORED.itemsize:
             raise InvalidModel(self._source, f"{name}.weights is no whole number of {_STORED.itemsize} bytes")
         numbers = np.frombuffer(data, _STORED)
@@ -354,7 +360,6 @@ def _plain_network(network: Network) -> dict[str, Any]:
         "precision": network.weights[0].dtype.name,
         "mean_y": network.mean_y.tolist(),
         "scale_y": network.scale_y.tolist(),
-        "sha256": hashlib.sha256(data).hexdigest(),
         "weights": [text[k : k + _WIDTH - 8] for k in range(0, len(text), _WIDTH - 8)],
     }
 

@@ -251,7 +251,10 @@ def _fault_at_points(segment: Segment, p: Params, kinematics: VslKinematics) -> 
 
 def _fault_between(segment: Segment, p: Params, kinematics: VslKinematics) -> str | None:
     """Return where a segment whose points are good runs through a singularity between them, and which; or None."""
-    for x in segment.sampled(math.ceil(segment.length / _MARGIN), p.V)[0]:
+    longest = (
+        2.0 * math.pi * kinematics.reach[1]
+    )  # within reach there is no longer arc: one through nearly a line has km
+    for x in segment.sampled(math.ceil(min(segment.length, longest) / _MARGIN), p.V)[0]:
         if fault := kinematics.fault(x, _MARGIN):
             return f"between its points, at {format_point(x)}: {fault}"
     return None

@@ -59,7 +59,7 @@ class PressureLine:
     def _leak(self, dt: float, p_cmd: float) -> float:
         """Leak with the valve closed until the pressure leaves the band, at most for dt; return what is left of dt."""
         lowest = p_cmd - self._band
-        until = self._T_leak * math.log(self.p / lowest) if self.p > lowest > 0.0 else math.inf
+        until = self._T_leak * math.log(max(self.p / lowest, 1.0)) if lowest > 0.0 else math.inf
         if until > dt:
             self.p *= math.exp(-dt / self._T_leak)
             return 0.0
@@ -93,7 +93,7 @@ class VslServo:
         self._friction = 0.0
         self._shown = angle
 
-    def turn(self, command: float, speed: float, dt: float) -> None:
+    def move(self, command: float, speed: float, dt: float) -> None:
         """Aim at the command, rad, nearing it at a speed, rad/s, for dt; 0 means the servo's own."""
         own = self._speed
         travel = dt * (min(abs(speed), own) if speed != 0.0 else own)

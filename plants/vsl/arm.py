@@ -13,25 +13,25 @@ from handover.cosim.blocks.ports import Floats, Polyline25, Vector2, Vector3, ou
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.blocks.units import Ampere, Kilogram, Metre, Newton, Pascal, Radian, RadianPerSecond
 from handover.plants.vsl.actuators import PressureLine, VslServo
-from handover.plants.vsl.chain import Complexes, VslChain
+from handover.plants.vsl.chain import Complexes, Pose, VslChain
 from handover.plants.vsl.dynamics import NoConvergence, StartsInFace, VslDynamics
 from handover.plants.vsl.parameters import (
+    MAX_ANGLE,
     MAX_LOAD,
     MAX_PRESSURE,
-    TURN,
     InvalidVslArmParameters,
     Link,
     Motion,
     Params,
 )
-from handover.plants.vsl.sensors import Sensors, in_steps
+from handover.plants.vsl.sensors import Sensors, quantized
 from handover.plants.vsl.statics import NoEquilibrium, VslStatics
 
 __all__ = ["Inputs", "InvalidInput", "InvalidVslArmParameters", "Link", "Motion", "Outputs", "Params", "VslArm"]
 
 
 class InvalidInput(InvalidParameters):
-    """Inputs that are not finite, or a load or pressure out of range; `faults` lists all of them."""
+    """Inputs that are not finite, or an angle, load or pressure out of range; `faults` lists all of them."""
 
     block = "VslArm"
 
@@ -41,7 +41,7 @@ class Inputs:
     """Commands to motors and regulators, and what hangs on the gripper."""
 
     q_cmd: Vector3[Radian] = port(
-        np.array([0.0, 0.8411, -1.6821]), "commanded joint angles", minimum=-TURN, maximum=TURN
+        np.array([0.0, 0.8411, -1.6821]), "commanded joint angles", minimum=-MAX_ANGLE, maximum=MAX_ANGLE
     )
     qd_cmd: Vector3[RadianPerSecond] = port(
         np.zeros(3), "speeds at which the joints go there, whatever their sign; 0: as fast as they can"
@@ -82,7 +82,7 @@ class VslArm:
     - Servos go to q_cmd at qd_cmd, `VslServo`. Under the torque tau of J2 or J3 the encoder shows
       q = q_aim - tau / servo_stiffness (with a lag, if DYNAMIC); the joint yields by tau / joint_stiffness more,
       behind the encoder. Friction shows in the current only. J1 carries no weight and does not yield: its current is
-      friction and the arm's inertia about it.
+      friction and what changes the arm's angular momentum about it, (I w)' = I w' + I' w.
     - Air: `PressureLine`. A rigid link has a line that is closed behind the transducer.
     - J1 may be a stepper motor: it stands at the nearest whole step, which it counts. Commands and readings may be
       rounded to what a converter resolves. Noise of the readings, tilt by accelerometers: `Sensors`.
@@ -94,7 +94,8 @@ class VslArm:
     Raises:
         InvalidVslArmParameters: by the constructor, for parameters of which no arm can be built.
         InvalidInput: by `outputs` and `step`, which then change nothing.
-        NoEquilibrium: by `outputs` and `step`, if the arm buckles.
+        NoEquilibrium: by `outputs` and `step`, if the load buckles the arm; of an arm that swings by `outputs` and the
+            first `step` alone: later it falls over, as an arm would.
         StartsInFace: by `outputs` and `step`, if it would start below the face.
         NoConvergence: by `step`, if there is no solution of the equations of motion.
     """
@@ -124,7 +125,7 @@ class VslArm:
         self._parts = (self._mechanics, *self._servos, *self._lines)
         self._loads = params.loads()
         self._sensors = Sensors(params, self._chain.sensors)
-        self._spin = 0.0
+        self._qd_1 = 0.0
         self._q = [0.0] * len(self._servos)  # what the encoders show, and the currents, without noise
         self._i = list(self._q)
         self._started = False
@@ -163,10 +164,10 @@ class VslArm:
 
     def _snapshot(self) -> tuple[Any, ...]:
         """Return all that a step changes before it can fail, as references: nothing of it is ever written to."""
-        return [part.snapshot() for part in self._parts], self._spin, self._q, self._i, self._started
+        return [part.snapshot() for part in self._parts], self._qd_1, self._q, self._i, self._started
 
     def _restore(self, snapshot: tuple[Any, ...]) -> None:
-        parts, self._spin, self._q, self._i, self._started = snapshot
+        parts, self._qd_1, self._q, self._i, self._started = snapshot
         for part, own in zip(self._parts, parts, strict=True):
             part.restore(own)
 
@@ -186,18 +187,22 @@ class VslArm:
         first = self._aims()
         P = self._params
         for servo, command, speed in zip(self._servos, u.q_cmd.tolist(), u.qd_cmd.tolist(), strict=False):
-            servo.turn(in_steps(command, P.encoder_step), speed, dt)
+            servo.move(quantized(command, P.encoder_step), speed, dt)
         for line, p_cmd in zip(self._lines, (*u.p_cmd.tolist(), u.p_cmd_4), strict=False):
-            line.advance(dt, in_steps(p_cmd, P.regulator_step))
+            line.advance(dt, quantized(p_cmd, P.regulator_step))
         last = self._aims()
-        spin = (last[0] - first[0]) / dt
-        self._mechanics.advance(dt, (first[1:], last[1:]), self._pressures(), load, spin)
+        before, pose = self._qd_1, self._mechanics.pose
+        self._qd_1 = (last[0] - first[0]) / dt
+        self._mechanics.advance(dt, (first[1:], last[1:]), self._pressures(), load, self._qd_1)
         self._q = self._shown()
         for servo, q in zip(self._servos, self._q, strict=True):
             servo.slide(q)
-        faster, self._spin = (spin - self._spin) / dt, spin
-        inertia = self._chain.inertia_about_J1(self._mechanics.pose, load) if faster else 0.0
-        self._i = self._currents(faster * inertia)
+        L = self._angular_momentum(self._qd_1, self._mechanics.pose, load)
+        self._i = self._currents((L - self._angular_momentum(before, pose, load)) / dt)
+
+    def _angular_momentum(self, qd_1: float, pose: Pose, load: float) -> float:
+        """Return that about the axis of J1, which turns at the speed qd_1, kg m2/s."""
+        return self._chain.inertia_about_J1(pose, load) * qd_1 if qd_1 else 0.0
 
     def _aims(self) -> tuple[float, ...]:
         return tuple(servo.angle for servo in self._servos)
@@ -208,7 +213,7 @@ class VslArm:
     @property
     def _theta_1(self) -> float:
         """Where J1 stands."""
-        return in_steps(self._servos[0].angle, self._params.base_step)
+        return quantized(self._servos[0].angle, self._params.base_step)
 
     def _shown(self) -> list[float]:
         """Return what encoders, and the count of a stepper motor, show, without noise."""
@@ -231,7 +236,7 @@ class VslArm:
         shape = np.zeros((25, 3))
         shape[1:] = self._in_world(self._chain.centre_line(ends))
         read = self._sensors.read(self._q, self._i, self._pressures(), p_WG)
-        tilts = self._sensors.tilts(pose, self._mechanics.acceleration(self._spin))
+        tilts = self._sensors.tilts(pose, self._mechanics.acceleration(self._qd_1))
         return Outputs(
             q_meas=read.q,
             i_meas=read.i,
@@ -256,12 +261,15 @@ class VslArm:
 
 
 def _check_inputs(u: Inputs) -> None:
-    """Raise InvalidInput for what is not finite, and for a load or pressure out of range."""
+    """Raise InvalidInput for what is not finite, and for an angle, load or pressure out of range."""
     faults: list[str] = []
     if not np.isfinite((*u.q_cmd, *u.qd_cmd, *u.p_cmd)).all():
         faults.append(f"q_cmd {u.q_cmd}, qd_cmd {u.qd_cmd} and p_cmd {u.p_cmd} must be finite")
-    elif not 0.0 <= min(u.p_cmd) <= max(u.p_cmd) <= MAX_PRESSURE:
-        faults.append(f"p_cmd {u.p_cmd} Pa must be from 0 to {MAX_PRESSURE:g} Pa")
+    else:
+        if not float(np.abs(u.q_cmd).max()) <= MAX_ANGLE:
+            faults.append(f"q_cmd {u.q_cmd} rad must be from {-MAX_ANGLE:.4g} to {MAX_ANGLE:.4g} rad")
+        if not 0.0 <= min(u.p_cmd) <= max(u.p_cmd) <= MAX_PRESSURE:
+            faults.append(f"p_cmd {u.p_cmd} Pa must be from 0 to {MAX_PRESSURE:g} Pa")
     if not 0.0 <= u.p_cmd_4 <= MAX_PRESSURE:
         faults.append(f"p_cmd_4 {u.p_cmd_4:g} Pa must be from 0 to {MAX_PRESSURE:g} Pa")
     if not 0.0 <= u.load <= MAX_LOAD:

@@ -47,7 +47,7 @@ class _Held(NamedTuple):
     C: Floats
     C_y: Floats
     weight: Floats
-    spin2: float
+    qd2_1: float
 
 
 class VslDynamics:
@@ -113,7 +113,7 @@ class VslDynamics:
         theta: tuple[Sequence[float], Sequence[float]],
         p: Sequence[float],
         load: float,
-        spin: float,
+        qd_1: float,
     ) -> None:
         """Advance by dt.
 
@@ -122,10 +122,10 @@ class VslDynamics:
             theta: angles of the chain's joints, rad, that the servos aim at first and last; they go evenly between.
             p: pressures of the links, Pa.
             load: at the tip, kg.
-            spin: rate of J1, rad/s.
+            qd_1: speed of J1, rad/s.
         """
         steps = max(1, math.ceil(dt / self._params.substep - 1e-9))
-        held = self._held(p, load, spin)
+        held = self._held(p, load, qd_1)
         aims = np.linspace(theta[0], theta[1], steps + 1)
         self.force = 0.0
         for i in range(steps):
@@ -141,13 +141,13 @@ class VslDynamics:
         whiten = np.linalg.inv(np.linalg.cholesky(self._mass(D, held.C_y)))
         return np.sqrt(np.linalg.eigvalsh(whiten @ K @ np.transpose(whiten))) / (2.0 * math.pi)
 
-    def acceleration(self, spin: float) -> Complexes:
+    def acceleration(self, qd_1: float) -> Complexes:
         """Return the accelerations of the bodies' ends in the arm's plane, m/s2, after that of the shoulder, (n + 1,).
 
-        J1 turns at the rate spin, rad/s.
+        J1 turns at the speed qd_1, rad/s.
         """
         u, e, _ = self._directions(self._y)
-        a = self._accelerated(u, e, self._v, self._a) - spin * spin * u.real
+        a = self._accelerated(u, e, self._v, self._a) - qd_1 * qd_1 * u.real
         return np.concatenate(([0.0], np.cumsum(a)))
 
     def snapshot(self) -> tuple[Any, ...]:
@@ -159,12 +159,12 @@ class VslDynamics:
         self._y, self._v, self._a, self._a_mean, self._offset, self.force, pose = snapshot
         self.pose = Pose(*pose)
 
-    def _held(self, p: Sequence[float], load: float, spin: float) -> _Held:
+    def _held(self, p: Sequence[float], load: float, qd_1: float) -> _Held:
         hinge, shear = self._chain.springs(p)
         k = 1.0 / np.concatenate((hinge, np.array(shear)[self._sheared]))
         weight: Floats = self._params.gravity * (self._chain.carried + load)
         C = self._chain.coupling + load
-        return _Held(k, C, C[np.ix_(self._body, self._body)], weight, spin * spin)
+        return _Held(k, C, C[np.ix_(self._body, self._body)], weight, qd_1 * qd_1)
 
     def _substep(self, h: float, first: Floats, last: Floats, held: _Held) -> None:
         """Advance by h, or by halves of it if need be, while the servos' aims go from the first to the last."""
@@ -247,8 +247,8 @@ class VslDynamics:
         by_v, by_a = by
         accelerated = self._accelerated(u, e, v, a)
         force = self._stopped(u, D, v)
-        pull = held.C @ (accelerated - held.spin2 * u.real) + 1j * (held.weight - force)
-        G = by_a * D - held.spin2 * D.real
+        pull = held.C @ (accelerated - held.qd2_1 * u.real) + 1j * (held.weight - force)
+        G = by_a * D - held.qd2_1 * D.real
         G[:n] += 1j * accelerated - 2.0 * by_v * u * v[:n]
         G[at] -= 2.0 * by_v * e[at] * v[n:]
         G[n:] += 1j * e[at] * (1j * a[at] - v[at] ** 2) - 2.0 * by_v * e[at] * v[at]

@@ -30,13 +30,17 @@ from handover.cosim.blocks.units import (
     Second,
 )
 
-TURN = 2.0 * math.pi
+MAX_ANGLE = 2.0 * math.pi
+"""Largest angle of a joint either way, rad (assumed)."""
+
 NO_FACE = -10.0
+"""Height that stands for no face, m."""
+
 MAX_PRESSURE = 3.0e5
-"""Pa; the published experiments go to 2 bar."""
+"""Highest pressure, Pa (assumed: half as much again as the 2 bar of the published experiments)."""
 
 MAX_LOAD = 0.5
-"""Largest load, kg; the published experiments go to 0.1 kg."""
+"""Largest load, kg (assumed: five times the 0.1 kg of the published experiments)."""
 
 
 class InvalidVslArmParameters(InvalidParameters):
@@ -147,7 +151,7 @@ class Params:
     valve_tolerance: Pascal = parameter(500.0, "deviation at which the valve closes", minimum=1.0, maximum=1e5)
     valve_band: Pascal = parameter(2000.0, "deviation at which it opens again", minimum=1.0, maximum=1e5)
     q_0: Vector3[Radian] = parameter(
-        np.array([0.0, 0.8411, -1.6821]), "where the joints start, in rest", minimum=-TURN, maximum=TURN
+        np.array([0.0, 0.8411, -1.6821]), "where the joints start, in rest", minimum=-MAX_ANGLE, maximum=MAX_ANGLE
     )
     p_0: Vector2[Pascal] = parameter(
         np.array([1.0e5, 1.0e5]), "pressures of links 2 and 3 at the start", minimum=0.0, maximum=MAX_PRESSURE

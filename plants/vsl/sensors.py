@@ -14,8 +14,8 @@ from handover.plants.vsl.parameters import Params
 _MAX_LINKS = 3
 
 
-def in_steps(value: float, step: float) -> float:
-    """Return the nearest whole multiple of a step, or the value itself if the step is 0."""
+def quantized(value: float, step: float) -> float:
+    """Return the nearest whole multiple of a step, as a converter does; the value itself if the step is 0."""
     return step * round(value / step) if step else value
 
 
@@ -78,9 +78,9 @@ class Sensors:
             p_meas[2] += self._sigma_4 * self._noise_more[0]
         if P.encoder_step:
             counted = 1 if P.base_step else 0
-            q_meas[counted:] = [in_steps(x, P.encoder_step) for x in q_meas[counted:].tolist()]
+            q_meas[counted:] = [quantized(x, P.encoder_step) for x in q_meas[counted:].tolist()]
         if P.transducer_step:
-            p_meas = np.array([in_steps(x, P.transducer_step) for x in p_meas.tolist()])
+            p_meas = np.array([quantized(x, P.transducer_step) for x in p_meas.tolist()])
         return Readings(q_meas, _three(i) + noise[3:6], p_meas, p_WG + noise[6:9])
 
     def tilts(self, pose: Pose, acceleration: Complexes | None) -> list[float]:

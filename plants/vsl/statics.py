@@ -18,7 +18,7 @@ _LINKS = {1: "link 2", 2: "links 2 and 3", 3: "links 2, 3 and 4"}
 
 
 class NoEquilibrium(RuntimeError):
-    """The arm buckles: there is no stable rest that its unloaded shape leads to."""
+    """The arm buckles under its load, or there is no stable rest that its unloaded shape leads to."""
 
     is_refusal = True
 
@@ -58,6 +58,10 @@ class VslStatics:
     every hinge if the rest is stable. The search begins at the last rest; if it does not converge, gravity is increased
     from 0 in steps.
 
+    A payload buckles the arm by linear buckling analysis: the stiffness of the springs less that by which the weights
+    push along the links, both in the shape without load, is not positive definite. Only upright is there then no rest
+    at all; an arm that leans a little would bend right over, far from where any payload is carried.
+
     Args:
         chain: whose rest it is.
         gravity: in m/s2.
@@ -80,6 +84,8 @@ class VslStatics:
 
     def settle(self, theta: Sequence[float], p: Sequence[float], load: float) -> None:
         """Rest at the angles of the chain's joints that the servos aim at, rad, wherever the arm was before."""
+        if _buckles(self._bodies(theta, p, load, 1.0), sum(theta)):
+            raise NoEquilibrium(theta, p, load)
         tip, reached, share = sum(theta), 0.0, _MAX_SHARE
         while reached < 1.0:
             bodies = self._bodies(theta, p, load, min(reached + share, 1.0))
@@ -97,15 +103,17 @@ class VslStatics:
         theta: tuple[Sequence[float], Sequence[float]],
         p: Sequence[float],
         load: float,
-        spin: float,  # noqa: ARG002
+        qd_1: float,  # noqa: ARG002
     ) -> None:
-        """Rest at the last of the angles; time, the first angles and the turn of J1 do not matter."""
+        """Rest at the last of the angles; time, the first angles and the speed of J1 do not matter."""
         bodies = self._bodies(theta[1], p, load, 1.0)
+        if _buckles(bodies, sum(theta[1])):
+            raise NoEquilibrium(theta[1], p, load)
         tip = _newton(bodies, self._tip)
         if tip is None or not self._rest(bodies, tip):
             self.settle(theta[1], p, load)
 
-    def acceleration(self, spin: float) -> None:
+    def acceleration(self, qd_1: float) -> None:
         """Return None: at rest at every instant."""
 
     def snapshot(self) -> tuple[Any, ...]:
@@ -151,6 +159,25 @@ class VslStatics:
         droop = tuple(self._droop * tau for tau in torque)
         self.pose = Pose(np.array(angles[::-1]), np.array(shears[::-1]), torque, droop)
         return True
+
+
+def _buckles(bodies: list[_Body], tip: float) -> bool:
+    """Return whether the weights buckle the arm, by the shape without load, in which the tip's body is at an angle.
+
+    The derivative of the ground's angle by the tip's is taken along that shape: as at a rest it is positive at every
+    hinge if the second derivative of the potential energy is positive definite.
+    """
+    dtau, phi, dphi = 0.0, tip, 1.0
+    co, si = math.cos(phi), math.sin(phi)
+    for l, c, A, b, offset in bodies:
+        dtau -= A * (c * A * (co * co - si * si) - l * si) * dphi
+        dphi -= b * dtau
+        if dphi <= 0.0:
+            return True
+        if offset:
+            phi -= offset
+            co, si = math.cos(phi), math.sin(phi)
+    return False
 
 
 def _newton(bodies: list[_Body], tip: float) -> float | None:

@@ -2,8 +2,6 @@
 
 import json
 import math
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -31,6 +29,9 @@ _COLUMNS: Mapping[str, tuple[str, int]] = {
 
 _ORDER = "order"
 
+_NAMED = 4
+"""Parameters that are named where an arm has others."""
+
 
 class InvalidData(ValueError):
     """A file of which no model can be trained; `path` is the file, `fault` says why."""
@@ -41,7 +42,7 @@ class InvalidData(ValueError):
 
 
 def write_data(path: Path, measured: Measured) -> None:
-    """Write points to a file that appears whole or not at all.
+    """Write points to a file.
 
     Raises:
         OSError: it cannot be written.
@@ -51,28 +52,21 @@ def write_data(path: Path, measured: Measured) -> None:
     }
     table: Any = pa.Table.from_pydict({**columns, _ORDER: measured.order})
     metadata = {_METADATA: json.dumps({"version": VERSION, **measured.origin}, sort_keys=True).encode()}
-    handle, part = tempfile.mkstemp(dir=path.absolute().parent, prefix=f".{path.name}-")
-    os.close(handle)
-    try:
-        pq.write_table(table.replace_schema_metadata(metadata), part)
-        Path(part).chmod(0o644)
-        os.replace(part, path)
-    except BaseException:
-        Path(part).unlink(missing_ok=True)
-        raise
+    pq.write_table(table.replace_schema_metadata(metadata), path)
 
 
-def read_data(path: Path, key: str, kinematics: VslKinematics) -> Measured:
+def read_data(path: Path, key: str, kinematics: VslKinematics, parameters: Mapping[str, Any] | None = None) -> Measured:
     """Read points of an arm.
 
     Args:
         path: Parquet file.
         key: hash of the arm's sources, see `content_key`.
         kinematics: of rigid links, by which the arm was commanded.
+        parameters: of the arm, as plain data; None: of any.
 
     Raises:
         InvalidData: it cannot be read, is no Parquet file, lacks columns, has numbers that are not finite, or is of
-            another arm or other links.
+            another arm, other parameters of it, or other links.
     """
     try:
         table: Any = pq.read_table(path)
@@ -84,6 +78,8 @@ def read_data(path: Path, key: str, kinematics: VslKinematics) -> Measured:
         raise InvalidData(path, f"it lacks the columns {', '.join(missing)}")
     origin = _origin(path, table.schema.metadata or {})
     _check_arm(path, origin, key, kinematics)
+    if parameters is not None:
+        _check_parameters(path, origin["arm"], parameters)
     numbers = {name: _numbers(path, table, name) for name in wanted}
     parts = {
         part: np.column_stack([numbers[f"{port}[{k + 1}]"] for k in range(n)]) for part, (port, n) in _COLUMNS.items()
@@ -124,6 +120,23 @@ def _check_arm(path: Path, origin: Mapping[str, Any], key: str, kinematics: VslK
     links = links_of(kinematics)
     if dict(origin["links"]) != links:
         raise InvalidData(path, f"it was measured with links of {_text(origin['links'])}, not {_text(links)}")
+
+
+def _check_parameters(path: Path, arm: Mapping[str, Any], parameters: Mapping[str, Any]) -> None:
+    """Refuse points of an arm whose parameters are others; its noise may be drawn from any seed."""
+    stated: object = arm.get("parameters")
+    if not isinstance(stated, dict):
+        raise InvalidData(path, f"its metadata {_METADATA.decode()!r} lacks the arm's parameters")
+    found = cast("dict[str, Any]", stated)
+    others = [n for n in sorted({*found, *parameters} - {"seed"}) if found.get(n) != parameters.get(n)]
+    if others:
+        differing = ", ".join(f"{n} = {found.get(n)}, not {parameters.get(n)}" for n in others[:_NAMED])
+        differing += f" and {len(others) - _NAMED} more" if len(others) > _NAMED else ""
+        raise InvalidData(
+            path,
+            f"it was measured on an arm with {differing}: --arm NAME=VALUE says which arm is meant, --adapt learns"
+            " what makes it differ",
+        )
 
 
 def _text(links: Mapping[str, Any]) -> str:

@@ -26,11 +26,17 @@ from handover.controllers.vsl.learned_model import (
     rotate_about_z,
 )
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu.file.description import FmuPort
 from handover.scenarios.vsl.data_file import links_of
 from handover.scenarios.vsl.model_file import content_key
-from handover.scenarios.vsl.training_data import STRETCH, Dataset, Measured, collect, describe_arm, parameters_of
+from handover.scenarios.vsl.training_data import (
+    STRETCH,
+    Dataset,
+    Measured,
+    collect,
+    describe_arm,
+    parameters_of,
+    plain_parameters,
+)
 
 Progress = Callable[[float, float], None]
 
@@ -139,11 +145,14 @@ class VslTraining:
         usable = self._usable(data)
         order = np.full(len(data), -1)
         order[usable[rng.permutation(len(usable))]] = np.arange(len(usable))
-        stated = {n: _start(p) for n, p in sorted(d.parameters.items())} | parameters
-        plain = {n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in stated.items()}
-        arm = {"fmu": d.name, "key": content_key(self.fmu), "parameters": plain}
+        arm = {"fmu": d.name, "key": content_key(self.fmu), "parameters": plain_parameters(d, parameters)}
         origin = {"arm": arm, "links": links_of(self.kinematics), "seed": self.seed, "walk": self.walk}
         return Measured(data, order, origin)
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the parameters of the arm that is measured, with some seed, as plain data."""
+        d = describe_arm(self.fmu)
+        return plain_parameters(d, {**parameters_of(d, 0), **self.arm})
 
     def learn(self, measured: Measured, progress: Progress, share: float = 1.0) -> tuple[VslModel, Errors]:
         """Return the model of measured points and its errors.
@@ -377,14 +386,6 @@ def _rms(validation_rms: float, unit: str) -> dict[str, float]:
 
 def _rounded(errors: Errors) -> dict[str, float]:
     return {name: float(f"{value:.4g}") for name, value in vars(errors).items() if value is not None}
-
-
-def _start(port: FmuPort) -> Any:
-    """Return a parameter's default as JSON has it."""
-    if port.kind not in (Kind.REAL, Kind.INTEGER) or port.start is None:
-        return port.start
-    numbers = [float(n) if port.kind is Kind.REAL else int(n) for n in port.start.split()]
-    return numbers if port.shape else numbers[0]
 
 
 def _lengths(vectors: Floats) -> Floats:

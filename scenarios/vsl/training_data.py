@@ -14,7 +14,7 @@ from handover.controllers.vsl.kinematics import VslKinematics
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure
-from handover.cosim.fmu.file.description import FmuDescription, describe_fmu
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.fmu.file.fmpy_edge import unpack
 from handover.cosim.fmu.instance import Instance
 
@@ -27,7 +27,7 @@ RADII = (0.22, 0.42)
 HEIGHTS = (0.03, 0.37)
 """Heights of the wanted tip, m (assumed)."""
 
-TURN = 0.5
+MAX_THETA_1 = 0.5
 """Largest angle of J1 either way, rad (assumed)."""
 
 SAG = 0.075
@@ -152,6 +152,20 @@ def parameters_of(d: FmuDescription, seed: int) -> dict[str, Any]:
     return {name: value for name, value in wanted.items() if name in d.parameters}
 
 
+def plain_parameters(d: FmuDescription, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return all parameters of the arm as plain data: those given, and the starts of the others."""
+    stated = {n: _start_of(p) for n, p in sorted(d.parameters.items())} | dict(given)
+    return {n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in stated.items()}
+
+
+def _start_of(port: FmuPort) -> Any:
+    """Return a parameter's start as JSON has it."""
+    if port.kind not in (Kind.REAL, Kind.INTEGER) or port.start is None:
+        return port.start
+    numbers = [float(n) if port.kind is Kind.REAL else int(n) for n in port.start.split()]
+    return numbers if port.shape else numbers[0]
+
+
 def collect(
     d: FmuDescription,
     kinematics: VslKinematics,
@@ -232,7 +246,7 @@ def _commanded_tip(kinematics: VslKinematics, rng: np.random.Generator) -> Float
     """Return a point to command the tip to, shape (3,), m."""
     while True:
         radius, height, lift = rng.uniform(*RADII), rng.uniform(*HEIGHTS), rng.uniform(0.0, SAG)
-        theta_1 = rng.uniform(-TURN, TURN)
+        theta_1 = rng.uniform(-MAX_THETA_1, MAX_THETA_1)
         p_WG = np.array([radius * np.cos(theta_1), radius * np.sin(theta_1), height + lift * (radius / RADII[1]) ** 2])
         if np.hypot(radius, p_WG[2] - kinematics.L_1) <= STRETCH:
             return p_WG

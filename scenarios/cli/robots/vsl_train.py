@@ -25,7 +25,7 @@ from handover.scenarios.cli.options import WholeNumber
 from handover.scenarios.execution.errors import UsageError, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import progress_bar
-from handover.scenarios.results.run_folder import write_whole
+from handover.scenarios.results.run_folder import replacing, write_whole
 from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
 from handover.scenarios.vsl.learning_curve import curve_table, draw_curve, learning_curve
 from handover.scenarios.vsl.model_file import content_key, file_text
@@ -135,7 +135,7 @@ class _Options:
             idle := typed & {"learned", "forward_input", "friction_compensation", "epochs", "curve", "elbow"}
         ):
             raise UsageError(f"{_names(idle)}: with --adapt it is the model's")
-        if self.data and (idle := typed & {"points", "walk", "seed", "arm", "save_data"}):
+        if self.data and (idle := typed & {"points", "walk", "seed", "save_data"}):
             raise UsageError(f"{_names(idle)}: with --data it is the file's")
         if self.adapt is None and self.data is None and self.points < MIN_POINTS:
             raise UsageError(f"--points {self.points}: {self.points} is not in the range x>={MIN_POINTS}")
@@ -172,7 +172,8 @@ class _Options:
     def measured(self, training: VslTraining, progress: Progress) -> Measured:
         """Return points from the file, or as the arm measures them, which are then saved if wanted."""
         if self.data:
-            measured = read_data(self.data, content_key(training.fmu), training.kinematics)
+            parameters = None if self.adapt else training.parameters()
+            measured = read_data(self.data, content_key(training.fmu), training.kinematics, parameters)
             try:
                 training.check(measured)
             except NothingToLearn as e:
@@ -190,7 +191,8 @@ class _Options:
         """Write what is to be written of points and model."""
         if self.save_data:
             try:
-                write_data(self.save_data, measured)
+                with replacing(self.save_data) as unfinished:
+                    write_data(unfinished, measured)
             except OSError as e:
                 raise UsageError(f"--save-data {self.save_data}: {e.strerror or e}") from e
         write_whole(self.out, file_text(model, self.out))

@@ -20,12 +20,12 @@ _NAMED = 5
 """Comparisons that are named where a claim fails."""
 
 
-def chance_of(n: int) -> float:
+def p_value_of_separation(n: int) -> float:
     """Return the exact p-value of the rank-sum test, two-sided, of two groups of n values that do not overlap."""
     return 2.0 / comb(2 * n, n)
 
 
-MIN_RUNS = next(n for n in range(1, 64) if chance_of(n) < LEVEL)
+MIN_RUNS = next(n for n in range(1, 64) if p_value_of_separation(n) < LEVEL)
 """Runs of a group below which groups that do not overlap can be chance; of fewer pairs nothing is concluded, either."""
 
 
@@ -88,7 +88,11 @@ def separation_claim(
     elif paired:
         reason += " Both errors are of the same runs, so no p-value of independent groups is given."
     else:
-        reason += f" By chance {n} runs of each part so with p = {format_p_value(chance_of(n))} (rank sums)."
+        p = format_p_value(p_value_of_separation(n))
+        reason += (
+            f" Runs of a group differ by the sensors' noise alone; that would separate {n} of each with p = {p} (rank "
+            "sums), which says nothing of another arm."
+        )
     if failing := [c.label for c in found if not c.holds]:
         reason += f" It fails at: {'; '.join(failing[:_NAMED])}"
         reason += f"; and {len(failing) - _NAMED} more." if len(failing) > _NAMED else "."

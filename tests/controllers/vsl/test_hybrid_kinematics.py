@@ -1,6 +1,6 @@
 import dataclasses
-import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,8 @@ from handover.controllers.vsl.hybrid_kinematics import (
     Params,
 )
 from handover.controllers.vsl.kinematics import VslKinematics
-from handover.controllers.vsl.model_text import parse_model
+from handover.controllers.vsl.learned_model import Cubic
+from handover.controllers.vsl.model_text import model_text, parse_model
 
 ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
 MODEL = parse_model(DEFAULT_MODEL, "that ships")
@@ -195,10 +196,12 @@ def test_a_restored_state_goes_on_bit_for_bit(params: Params, steps: int):
 
 
 def test_a_model_is_read_from_a_file(tmp_path: Path):
-    changed = json.loads(DEFAULT_MODEL)
-    changed["inverse"]["coefficients"] = [[0.25] + [0.0] * 119] * 3
+    shipped = parse_model(DEFAULT_MODEL, "that ships")
+    assert isinstance(shipped.inverse, Cubic)
+    constant = np.zeros_like(shipped.inverse.coefficients)
+    constant[0] = 0.25
     file = tmp_path / "m.json"
-    file.write_text(json.dumps(changed))
+    file.write_text(model_text(replace(shipped, inverse=replace(shipped.inverse, coefficients=constant))))
     y = HybridKinematics(Params(model=str(file))).step(0.0, 0.02, USUAL)
     np.testing.assert_allclose(y.q_cmd, USUAL.q_ref + 0.25)
 

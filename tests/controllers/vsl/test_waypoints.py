@@ -1,6 +1,7 @@
 """Files of waypoints: the path that they make, and what is refused with its reason."""
 
 import math
+import tracemalloc
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -105,3 +106,14 @@ def test_out_of_reach_is_said_with_the_waypoint_and_by_how_much(tmp_path: FilePa
         TrajectoryPlanner(Params(path=Path.CUSTOM, waypoints=str(ends), N=1))
     with pytest.raises(InvalidPath, match=r"waypoints: .*none\.csv: it cannot be read"):
         TrajectoryPlanner(Params(path=Path.CUSTOM, waypoints=str(tmp_path / "none.csv")))
+
+
+def test_the_long_way_round_an_arc_through_nearly_a_line_is_refused_at_once(tmp_path: FilePath):
+    """By way of a point 3 um beside the line, beyond its end: 600 m of arc, which 600,000 points would sample."""
+    way = file(tmp_path, "x,y,z,via_x,via_y,via_z\n0.3,0,0.15,,,\n0.31,0,0.15,0.32,0,0.150001\n")
+    tracemalloc.start()
+    with pytest.raises(InvalidPath, match=r"from waypoint 1 to 2, between its points, at .* too far"):
+        TrajectoryPlanner(Params(path=Path.CUSTOM, waypoints=str(way), N=1))
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 1e7

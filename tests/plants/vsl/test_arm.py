@@ -162,6 +162,18 @@ def test_the_base_motor_feels_inertia_when_it_starts_and_stops():
     assert sum(i_1) == pytest.approx(0.0, abs=1e-9)
 
 
+def test_the_base_motor_holds_back_an_arm_that_is_drawn_in_while_it_turns():
+    """At a steady speed the current is I' w: of a single massless link with a mass at its end, d(m L^2 cos^2)/dt w."""
+    exact = replace(EXACT, gear_friction=0.0, joint_stiffness=1e12, servo_stiffness=1e12, links=1, gravity=0.0)
+    params = replace(exact, link_2=Link.RIGID, link_mass=1e-9, EI_rigid=1e9, q_0=np.array([0.0, 0.6, 0.0]))
+    arm, dt, w, raise_ = VslArm(params), 0.001, 1.5, 0.8
+    u = ArmInputs(q_cmd=np.array([2.0, 1.4, 0.0]), qd_cmd=np.array([w, raise_, 1.0]), load=0.1)
+    i_1 = [arm.step(k * dt, dt, u).i_meas[0] for k in range(101)][-1]
+    angle = 0.6 + raise_ * 0.1005  # in the middle of the last step
+    torque = -0.135 * 0.225**2 * math.sin(2.0 * angle) * raise_ * w
+    assert i_1 == pytest.approx(torque / 1.78, rel=1e-3)
+
+
 def test_joints_follow_their_profile():
     arm = VslArm(EXACT)
     u = ArmInputs(q_cmd=np.array([0.5, 0.8411, -1.2]), qd_cmd=np.array([0.5, 0.0, 0.2]))
@@ -295,6 +307,7 @@ def test_an_arm_that_buckles_is_refused_and_stays_as_it_was(motion: Motion):
         ({"load": math.inf}, "load inf kg"),
         ({"load": 0.6}, "load 0.6 kg"),
         ({"q_cmd": np.array([0.0, math.nan, 0.0])}, "must be finite"),
+        ({"q_cmd": np.array([0.0, -6.3, 0.0])}, "rad must be from -6.283 to 6.283 rad"),
         ({"p_cmd": np.array([-1.0, 1e5])}, "must be from 0 to 300000 Pa"),
         ({"p_cmd": np.array([1e5, 4e5])}, "must be from 0 to 300000 Pa"),
     ],

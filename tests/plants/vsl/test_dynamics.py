@@ -109,6 +109,20 @@ def test_first_modes_are_where_they_were_measured():
     assert swinging(rigid, OUTSTRETCHED).frequencies(P, 0.0)[0] == pytest.approx(10.6, abs=0.05)
 
 
+def test_twelve_hinges_have_the_first_mode_of_a_cantilever():
+    """Euler-Bernoulli: w = 1.8751^2 sqrt(EI / (m L^3)); the error of a chain of n hinges falls with n^2."""
+    stiff = replace(LOOSE, links=1, cap=0.0, shear_0=1e9, gravity=0.0, joint_stiffness=1e8, gripper_mass=1e-9)
+    wanted = 1.8751041**2 * math.sqrt(0.55 / (0.14 * 0.225**3)) / (2.0 * math.pi)
+    found: list[float] = []
+    for hinges in (6, 12):
+        dynamics = VslDynamics(VslChain(stiff, hinges), stiff)
+        dynamics.settle((0.0,), (0.0,), 0.0)
+        found.append(float(dynamics.frequencies((0.0,), 0.0)[0]))
+    coarse, fine = (abs(f / wanted - 1.0) for f in found)
+    assert fine < 0.002
+    assert 3.0 < coarse / fine < 5.0
+
+
 def ringing(params: Params, h: float = 0.002) -> Floats:
     """Height of the tip, every h, after a small load has been taken off."""
     chain = VslChain(params, 2)

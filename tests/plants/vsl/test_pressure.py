@@ -41,6 +41,14 @@ def test_a_closed_line_leaks_slowly_and_is_filled_up_again():
     assert 0.99e5 < air.p < 1e5
 
 
+def test_a_closed_line_exactly_at_the_edge_of_its_band_opens_at_once():
+    edge, before = line(0.98e5), line(0.98e5 + 1e-6)
+    for air in (edge, before):
+        air.advance(0.1, 1e5)
+        assert air.open
+    assert edge.p == pytest.approx(before.p, abs=1e-3)
+
+
 def test_small_changes_of_the_command_do_not_move_the_valve():
     air = line(1e5, leak_time=1e9)
     air.advance(1.0, 1.015e5)

@@ -8,7 +8,7 @@ import pytest
 
 from handover.plants.vsl.arm import Inputs, Outputs, VslArm
 from handover.plants.vsl.parameters import Link, Motion, Params
-from handover.plants.vsl.sensors import in_steps
+from handover.plants.vsl.sensors import quantized
 
 EXACT = Params(servo_noise=0.0, current_noise=0.0, tracker_noise=0.0, pressure_noise=0.0, imu_noise=0.0)
 PRINTED = replace(
@@ -97,7 +97,7 @@ def test_encoders_show_and_take_whole_counts():
     assert y[-1].q_meas[1] == round(0.9 / COUNT) * COUNT
 
 
-def test_pressures_are_commanded_and_read_in_steps():
+def test_pressures_are_commanded_and_read_quantized():
     params = replace(EXACT, transducer_step=50.0, regulator_step=1e4, leak_time=1e9, valve_tolerance=1.0)
     y = walk(params, Inputs(p_cmd=np.array([1.26e5, 1.74e5])), 600)
     np.testing.assert_allclose(np.array([x.p_meas for x in y]) % 50.0, 0.0, atol=1e-9)
@@ -105,5 +105,5 @@ def test_pressures_are_commanded_and_read_in_steps():
 
 
 def test_without_steps_a_value_is_kept():
-    assert in_steps(0.1234567, 0.0) == 0.1234567
-    assert in_steps(-0.74, 0.5) == -0.5
+    assert quantized(0.1234567, 0.0) == 0.1234567
+    assert quantized(-0.74, 0.5) == -0.5

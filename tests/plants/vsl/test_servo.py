@@ -11,14 +11,14 @@ def servo() -> VslServo:
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_goes_to_its_command_at_the_given_speed_and_no_faster_than_it_can(speed: float, travel: float, way: float):
     motor = servo()
-    motor.turn(0.2 + way, speed, 0.02)
+    motor.move(0.2 + way, speed, 0.02)
     assert motor.angle == pytest.approx(0.2 + way * travel)
 
 
 def test_stops_at_its_command():
     motor = servo()
     for _ in range(100):
-        motor.turn(0.7, 0.9, 0.02)
+        motor.move(0.7, 0.9, 0.02)
     assert motor.angle == 0.7
 
 
@@ -46,7 +46,7 @@ def test_friction_sticks_until_the_gear_slides():
 
 def test_continues_from_a_state():
     one, other = servo(), servo()
-    one.turn(1.0, 0.5, 0.3)
+    one.move(1.0, 0.5, 0.3)
     one.slide(0.3505)
     other.restore(one.snapshot())
     assert (other.angle, other.current(0.1)) == (one.angle, one.current(0.1))

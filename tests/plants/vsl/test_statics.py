@@ -151,6 +151,26 @@ def test_an_arm_that_buckles_is_refused():
         rest(Params(EI_0=0.1, EI_p=0.0), upright, 0.0, 0.5)
 
 
+@pytest.mark.parametrize("lean", [0.0, 1e-6, 1e-3, 0.05])
+def test_what_buckles_an_upright_arm_buckles_one_that_leans_a_little(lean: float):
+    params, theta = Params(EI_0=0.2, EI_p=0.0), (math.pi / 2.0 - lean, 0.0)
+    chain = VslChain(params, 6)
+    statics = VslStatics(chain, params.gravity, 1.0 / params.servo_stiffness)
+    statics.settle(theta, (0.0, 0.0), 0.0)
+    assert abs(statics.pose.angles[-1] - math.pi / 2.0) <= 4.0 * lean + 1e-12
+    for act in (
+        lambda: statics.settle(theta, (0.0, 0.0), 0.5),
+        lambda: statics.advance(0.02, (theta, theta), (0.0, 0.0), 0.5, 0.0),
+    ):
+        with pytest.raises(NoEquilibrium, match=r"0\.5 kg.*buckles"):
+            act()
+
+
+def test_no_payload_buckles_an_arm_that_hangs_or_lies_level():
+    for theta in ((0.0, 0.0), (-math.pi / 2.0, 0.0), (-0.3, -0.4)):
+        rest(Params(EI_0=0.1, EI_p=0.0), theta, 0.0, 0.5)
+
+
 def critical_load(**changes: Any) -> float:
     params = replace(ONE_LINK, shear_0=1e9, **changes)
     low, high = 0.0, 100.0

@@ -7,10 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from handover.controllers.vsl.beam import HINGES, Beam, Stiffness, Weights
+from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.master.master import Master
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
+from handover.plants.vsl.chain import VslChain
+from handover.plants.vsl.parameters import Params as ArmParams
+from handover.plants.vsl.statics import VslStatics
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
 from handover.scenarios.vsl.path_experiments import VslHybrid
 
@@ -126,3 +131,29 @@ def test_the_closed_loop_does_not_swing_the_arm_up():
         for closed in ("false", "true")
     ]
     assert np.all(np.array(swinging) < 0.002)
+
+
+def test_the_weights_of_the_controllers_beam_are_those_of_the_arm():
+    w, arm = Weights(), ArmParams()
+    assert (w.link, w.elbow, w.gripper) == (arm.link_mass, arm.servo_mass, arm.gripper_mass)
+    assert (w.cap, w.kt, w.gravity) == (arm.cap, arm.kt, arm.gravity)
+
+
+@pytest.mark.parametrize("load", [0.0, 0.05, 0.1])
+@pytest.mark.parametrize("theta", [(0.84, -1.68), (0.48, -0.95), (0.2, -0.6)])
+def test_the_controllers_beam_bends_as_the_arm_does(theta: tuple[float, float], load: float):
+    """With as many hinges, no shear, and currents without friction; the load it has from the currents alone."""
+    arm = ArmParams(shear_0=1e9)
+    p, chain = (8e4, 1.5e5), VslChain(arm, HINGES)
+    statics = VslStatics(chain, arm.gravity, 1.0 / arm.servo_stiffness)
+    statics.settle(theta, p, load)
+    pose = statics.pose
+    q = (theta[0] - pose.droop[0], theta[1] - pose.droop[1])
+    i = (pose.torque[0] / arm.kt, pose.torque[1] / arm.kt)
+    stiffness = Stiffness(arm.EI_0, arm.EI_p, arm.joint_stiffness)
+    kinematics = VslKinematics(arm.L_1, arm.L_2, arm.L_3, Elbow.UP)
+    tip, torques = Beam(kinematics, stiffness, Weights()).bent(q, p, i)
+    sag = kinematics.L_2 * np.exp(1j * q[0]) + kinematics.L_3 * np.exp(1j * sum(q)) - chain.ends(pose)[-1]
+    assert abs(sag) > 0.008
+    assert abs(complex(*tip) - chain.ends(pose)[-1]) < 2e-4
+    assert torques == pytest.approx(pose.torque, rel=2e-3)

@@ -14,6 +14,8 @@ from vsl_training_points import ARM, call, key_of_made_up, made_up
 from handover.scenarios.cli.robots import vsl_train as vsl_train_command
 from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
 
+PARAMETERS = made_up(1).origin["arm"]["parameters"]
+
 
 @pytest.mark.parametrize("learned", [[], ["--learned", "physics"], ["--friction-compensation"]])
 def test_training_from_saved_points_gives_the_same_bytes(learned: list[str], tmp_path: Path):
@@ -73,6 +75,9 @@ def about(**origin: Any) -> Callable[[Any], Any]:
         (about(links={"L_1": 0.15, "L_2": 0.2, "L_3": 0.2, "elbow": "UP"}), "with links of L_1 0.15, L_2 0.2"),
         (about(version=9), "is not of version 1"),
         (about(seed="x"), "has a seed or walk of a wrong kind"),
+        (about(arm={"key": "k", "parameters": PARAMETERS | {"EI_0": 1.0}}), "on an arm with EI_0 = 1.0, not 0.55"),
+        (about(arm={"key": "k", "parameters": {}}), r"EI_0 = None, not 0.55, EI_factor = .* and \d+ more"),
+        (about(arm={"key": "k"}), "lacks the arm's parameters"),
         (about(arm=None), "lacks arm, links, seed or walk"),
         (with_metadata(None), "does not say of which arm it is"),
         (with_metadata({b"handover-vsl-data": b"{"}), "is not JSON"),
@@ -82,7 +87,22 @@ def test_data_that_cannot_be_trained_on_is_refused(change: Callable[[Any], Any],
     write_data(tmp_path / "d.parquet", made_up(100))
     pq.write_table(change(pq.read_table(tmp_path / "d.parquet")), tmp_path / "d.parquet")
     with pytest.raises(InvalidData, match=text):
-        read_data(tmp_path / "d.parquet", "k", ARM)
+        read_data(tmp_path / "d.parquet", "k", ARM, PARAMETERS)
+
+
+def test_data_of_an_arm_with_other_parameters_are_refused_unless_that_arm_is_meant(tmp_path: Path):
+    out = tmp_path / "m.json"
+    first = call("--points", "400", "--arm", "EI_0=0.605", "--save-data", tmp_path / "d.parquet", "--out", out)
+    assert first.exit_code == 0, first.output
+    former = out.read_bytes()
+    result = call("--data", tmp_path / "d.parquet", "--out", out)
+    assert result.exit_code == 2
+    assert "it was measured on an arm with EI_0 = 0.605, not 0.55: --arm NAME=VALUE says which" in result.output
+    assert out.read_bytes() == former
+    result = call("--data", tmp_path / "d.parquet", "--arm", "EI_0=0.605", "--out", out)
+    assert result.exit_code == 0, result.output
+    assert out.read_bytes() == former
+    assert call("--data", tmp_path / "d.parquet", "--adapt", out, "--out", tmp_path / "n.json").exit_code == 0
 
 
 def test_data_of_too_few_points_or_without_gauges_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

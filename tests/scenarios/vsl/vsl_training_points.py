@@ -11,6 +11,7 @@ from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import VslModel
 from handover.controllers.vsl.model_text import parse_model
 from handover.cosim.blocks.ports import Floats
+from handover.fmus.build import cached
 from handover.scenarios.cli.robots.vsl_train import vsl_train
 from handover.scenarios.vsl.training import VslTraining
 from handover.scenarios.vsl.training_data import Dataset, Measured
@@ -54,7 +55,8 @@ def made_up(n: int, seed: int = 2) -> Measured:
     usable = np.flatnonzero(np.arange(n) % 10 != 9)
     order[usable] = np.random.default_rng(seed).permutation(len(usable))
     links = {"L_1": 0.15, "L_2": 0.225, "L_3": 0.225, "elbow": "UP"}
-    return Measured(data, order, {"arm": {"key": "k", "parameters": {}}, "links": links, "seed": seed, "walk": False})
+    arm = {"key": "k", "parameters": replace(TRAINING, fmu=cached("VslArm", 3)).parameters()}
+    return Measured(data, order, {"arm": arm, "links": links, "seed": seed, "walk": False})
 
 
 def shipped() -> VslModel:

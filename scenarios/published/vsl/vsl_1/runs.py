@@ -73,18 +73,24 @@ def format_load(load: float) -> str:
     return f"{1000 * load:g} g"
 
 
+def has_completed_path(row: Mapping[str, Any]) -> bool:
+    """Return whether a run came to the end of its path, however far off it was."""
+    return row["status"] == "done" and row.get("path_time") is not None
+
+
 class Vsl1Runs:
-    """Our results cell by cell. Runs that did not come to their end do not count.
+    """Our results cell by cell. Runs that did not complete the path do not count.
 
     Attributes:
-        done, not_done: how many runs count, and how many do not, as a unit failed or a worker was lost.
+        done, not_done: how many runs count, and how many do not: a unit failed, a worker was lost, or the path was not
+            completed.
     """
 
     def __init__(self, table: CampaignTable) -> None:
         rows = table.rows
         self._done: dict[Cell, list[dict[str, Any]]] = {}
         for row in rows:
-            if row["status"] == "done":
+            if has_completed_path(row):
                 self._done.setdefault(_cell_of(row), []).append(row)
         self._cells = {_cell_of(row) for row in rows}
         self.done = sum(map(len, self._done.values()))

@@ -32,7 +32,7 @@ def _errors(runs: Vsl1Runs, path: TipPath) -> ComparisonTable:
         f"between runs, of the servos also from links to links. {_NOT_PRINTED}"
     )
     if runs.not_done:
-        note += f" {runs.not_done} runs did not come to their end and do not count."
+        note += f" {runs.not_done} runs did not complete the path and do not count."
     return ComparisonTable(
         title=f"Fig. {PANELS[path]}: mean error (mm)",
         header=["load", "servos", *(links.label for links in runs.links)],

@@ -13,13 +13,13 @@ from handover.plants.vsl.parameters import Link
 from handover.scenarios.campaign.plan import is_number
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.published.vsl.vsl_1.runs import format_load
+from handover.scenarios.published.vsl.vsl_1.runs import format_load, has_completed_path
 from handover.scenarios.vsl.parameters import HybridParameters
 
 _PUBLISHED, _BEYOND = (paper_values("vsl", group) for group in ("published", "beyond"))
 _BAR = 1e5  # Pa
 
-REPETITIONS: int = _PUBLISHED["repetitions"]
+REPETITIONS: int = _BEYOND["repetitions"]
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Case:
 
 
 CASES = tuple(Case(load, pressure) for load, pressure in _PUBLISHED["experiment_2"])
-"""Left and right of fig. 6."""
+"""Left and right of fig. 6; of fig. 7, which names neither, assumed to be the same."""
 
 
 @dataclass(frozen=True)
@@ -128,16 +128,16 @@ OTHERS = tuple(_others())
 
 
 class Vsl2Runs:
-    """Our results by case, method and arm. Runs that did not come to their end do not count."""
+    """Our results by case, method and arm. Runs that did not complete the path do not count."""
 
     def __init__(self, table: CampaignTable) -> None:
         rows = table.rows
         self._done: dict[_Key, list[dict[str, Any]]] = {}
         for row in rows:
-            if row["status"] == "done":
+            if has_completed_path(row):
                 self._done.setdefault(_key_of(row), []).append(row)
-        self.not_done = sum(row["status"] != "done" for row in rows)
-        """Number of runs that do not count, as a unit failed or a worker was lost."""
+        self.not_done = sum(not has_completed_path(row) for row in rows)
+        """Number of runs that do not count: a unit failed, a worker was lost, or the path was not completed."""
 
     @property
     def arms(self) -> tuple[Arm, ...]:
@@ -187,7 +187,7 @@ class Vsl2Runs:
         return np.array([row[name] for row in self.rows(case, method, arm)], dtype=np.float64)
 
     def rows(self, case: Case, method: ControlMethod, arm: Arm = TRAINED) -> list[dict[str, Any]]:
-        """Return the rows of runs that came to their end."""
+        """Return the rows of runs that completed the path."""
         return self._done.get(_key_of({**case.parameters, **method.parameters, **arm.parameters}), [])
 
 

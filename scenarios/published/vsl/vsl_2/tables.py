@@ -51,7 +51,7 @@ def _errors(runs: Vsl2Runs, case: Case) -> ComparisonTable:
     if PUBLISHED not in runs.learned:
         note += " The paper's network is left out: no file of a trained one was given."
     if runs.not_done:
-        note += f" {runs.not_done} runs did not come to their end and do not count."
+        note += f" {runs.not_done} runs did not complete the path and do not count."
     return ComparisonTable(
         title=f"Fig. 7(b), {case.label}: errors (mm)",
         header=["method", "published", "mean", "median", "25th to 75th percentile", "largest"],

@@ -12,7 +12,7 @@ from handover.controllers.vsl.paths import Path as TipPath
 from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.published_experiment import Claim, Verdict
-from handover.scenarios.published.vsl.separation import MIN_RUNS, Comparison, chance_of, separation_claim
+from handover.scenarios.published.vsl.separation import MIN_RUNS, Comparison, p_value_of_separation, separation_claim
 from handover.scenarios.published.vsl.vsl_1.experiment import Vsl1
 from handover.scenarios.published.vsl.vsl_1.runs import RIGID, SOFT, Cell, Vsl1Runs
 
@@ -26,7 +26,9 @@ def usual(given: Mapping[str, str]) -> float:
     return (0.02 + 0.1 * float(given["load"])) / (0.5 + 1e-5 * float(given["pressure"]))
 
 
-def table_of(error: Error = usual, quick: bool = False, far: float = 2.0, status: str = "done") -> CampaignTable:
+def table_of(
+    error: Error = usual, quick: bool = False, far: float = 2.0, status: str = "done", path_time: float | None = 8.0
+) -> CampaignTable:
     """Return the plan's runs with made-up errors, 0.01 mm apart; far from the base `far` times those near."""
     rows: list[dict[str, Any]] = []
     for run in Vsl1().plan(quick).runs():
@@ -35,7 +37,7 @@ def table_of(error: Error = usual, quick: bool = False, far: float = 2.0, status
         row |= {"load": float(given["load"]), "pressure": float(given["pressure"]) if "pressure" in given else None}
         spread = given["path"] != "linear"
         row |= {"error_near": size if spread else None, "error_far": far * size if spread else None}
-        rows.append(row | {"mean_error": size, "servo_error": 0.001})
+        rows.append(row | {"mean_error": size, "servo_error": 0.001, "path_time": path_time})
     return CampaignTable(pa.Table.from_pylist(rows))
 
 
@@ -99,10 +101,12 @@ def test_of_the_quick_plan_nothing_is_concluded():
     assert "it takes 4" in claims[0].reason
 
 
-def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(tmp_path: Path):
-    table = table_of(status="failed")
+@pytest.mark.parametrize(
+    "table", [table_of(status="failed"), table_of(path_time=None)], ids=["failed", "path not completed"]
+)
+def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(table: CampaignTable, tmp_path: Path):
     assert {c.verdict for c in Vsl1().claims(table)} == {Verdict.NOT_COMPARABLE}
-    assert "375 runs did not come to their end" in Vsl1().tables(table)[0].note
+    assert "375 runs did not complete the path" in Vsl1().tables(table)[0].note
     assert not Vsl1().draw(table, tmp_path, tmp_path)
 
 
@@ -135,8 +139,8 @@ def test_a_cells_runs_are_its_own():
 
 
 def test_groups_that_overlap_do_not_hold_and_few_runs_decide_nothing():
-    assert chance_of(5) == pytest.approx(2 / 252)
-    assert chance_of(MIN_RUNS) < 0.05 < chance_of(MIN_RUNS - 1)
+    assert p_value_of_separation(5) == pytest.approx(2 / 252)
+    assert p_value_of_separation(MIN_RUNS) < 0.05 < p_value_of_separation(MIN_RUNS - 1)
     low, high = np.array([1.0, 2.0, 3.0, 4.0, 5.0]), np.array([4.5, 6.0, 7.0, 8.0, 9.0])
     assert not Comparison("overlapping", low, high).holds
     assert Comparison("apart", low, high + 1.0).margin == pytest.approx(0.5)

@@ -44,6 +44,7 @@ def table_of(
     estimate: float = 0.001,
     network: bool = True,
     status: str = "done",
+    path_time: float | None = 8.0,
 ) -> CampaignTable:
     """Return the plan's runs with made-up errors, 0.01 mm apart; with a network, those of the small one once more."""
     default, rows = HybridParameters(), list[dict[str, Any]]()
@@ -57,7 +58,16 @@ def table_of(
         row |= {"closed_loop": given.get("closed_loop") == "true", "imu": given.get("imu", "none")}
         row["arm_seed"] = int(given.get("arm_seed", default.arm_seed))
         row |= dict.fromkeys(("mean_error", "median_error", "error_p25", "error_p75", "max_error"), size)
-        rows.append(row | {"model_error": 0.02, "estimate_error": estimate, "outside": 0.0, "model_mismatch": 0.5})
+        rows.append(
+            row
+            | {
+                "path_time": path_time,
+                "model_error": 0.02,
+                "estimate_error": estimate,
+                "outside": 0.0,
+                "model_mismatch": 0.5,
+            }
+        )
     return CampaignTable(pa.Table.from_pylist(rows))
 
 
@@ -157,8 +167,10 @@ def test_of_the_quick_plan_nothing_is_concluded():
     assert {c.verdict for c in claims} == {Verdict.NOT_COMPARABLE}
 
 
-def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(tmp_path: Path):
-    table = table_of(status="failed")
+@pytest.mark.parametrize(
+    "table", [table_of(status="failed"), table_of(path_time=None)], ids=["failed", "path not completed"]
+)
+def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(table: CampaignTable, tmp_path: Path):
     assert {c.verdict for c in Vsl2().claims(table)} == {Verdict.NOT_COMPARABLE}
     assert not Vsl2().tables(table)
     assert not Vsl2().draw(table, tmp_path, tmp_path)
