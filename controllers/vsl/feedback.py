@@ -6,14 +6,14 @@ from typing import Protocol
 import numpy as np
 
 from handover.controllers.vsl.kinematics import VslKinematics
-from handover.controllers.vsl.learned_model import VslModel, inputs_of, turned
+from handover.controllers.vsl.learned_model import VslModel, friction_direction, inputs_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.state import pack_state, unpack_state
 
 _SHORTEST_LEVER = 0.03
 """m; of an arm that stands upright, currents say nothing of a load (assumed)."""
 
-_ON_THE_WAY = 0.05
+_MOVING_ERROR = 0.05
 """Angle between command and encoder, rad, from which a joint is on its way and the tip not yet to judge (assumed)."""
 
 _DAMPING = 0.01
@@ -50,9 +50,9 @@ class Readings(Protocol):
 class CurrentFilter:
     """Currents through two lags in series, which attenuate what an arm that swings feels of its own inertia.
 
-    With friction compensation, they are freed of the gears' friction first: i - c d, with c as trained and d in
+    With friction compensation, the gears' friction is taken off first: i - c d, with c as trained and d in
     [-1, 1] which way friction acts, by the unit's own commands, which have no noise. What is smoothed then is what a
-    load adds to the usual currents i_0(q, p) at its levers b(q): i - c d - i_0 = lambda b + e, with e square to b.
+    load adds to the nominal currents i_0(q, p) at its levers b(q): i - c d - i_0 = lambda b + e, with e square to b.
     lambda and e change with the load alone, so that smoothing them does not lag behind the posture.
 
     Args:
@@ -68,18 +68,18 @@ class CurrentFilter:
 
     def step(self, u: Readings, dt: float) -> Floats:
         """Return the currents, shape (3,), A, after a further period; of joint 1 0 with friction compensation."""
-        usual = self._usual(u)
-        self._smoothed = self._after(u, dt, usual)
-        return self._at_posture(self._smoothed[1], usual)
+        nominal = self._nominal(u)
+        self._smoothed = self._after(u, dt, nominal)
+        return self._at_posture(self._smoothed[1], nominal)
 
     def now(self, u: Readings) -> Floats:
         """Return the currents as they would be; no time passes."""
-        usual = self._usual(u)
-        return self._at_posture(self._after(u, 0.0, usual)[1], usual)
+        nominal = self._nominal(u)
+        return self._at_posture(self._after(u, 0.0, nominal)[1], nominal)
 
     def turn(self, turn: Floats) -> None:
         """Take up how the joints are commanded to turn on, shape (3,), rad."""
-        self._direction = turned(self._direction, turn[1:], self._reversal)
+        self._direction = friction_direction(self._direction, turn[1:], self._reversal)
 
     def oscillation(self, u: Readings, i: Floats) -> Floats:
         """Return by how much currents of joints 2 and 3 are off the smoothed ones, i, shape (2,), A."""
@@ -94,14 +94,14 @@ class CurrentFilter:
         """Restore a state of this filter or of one with equal arguments."""
         self._smoothed, self._direction = unpack_state(state)
 
-    def _usual(self, u: Readings) -> tuple[Floats, Floats]:
+    def _nominal(self, u: Readings) -> tuple[Floats, Floats]:
         """Return i_0 and b at the posture, A and m; nothing without friction compensation."""
         model = self._friction_model
         return (np.zeros(0), np.zeros(0)) if model is None else model.currents(u.q_meas, u.p_meas)
 
-    def _after(self, u: Readings, dt: float, usual: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    def _after(self, u: Readings, dt: float, nominal: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Return what is smoothed, once and twice: the currents, or with friction compensation [lambda, e_2, e_3]."""
-        measured = self._explained(u, usual)
+        measured = self._explained(u, nominal)
         if self._smoothed is None or self._lag == 0.0:
             return np.array(measured), np.array(measured)
         share = 1.0 - math.exp(-dt / self._lag)
@@ -111,19 +111,19 @@ class CurrentFilter:
     def _explained(self, u: Readings, at_posture: tuple[Floats, Floats]) -> Floats:
         if self._friction_model is None:
             return u.i_meas
-        usual, levers = at_posture
-        more = u.i_meas[1:] - self._direction * self._friction_model.friction - usual
+        nominal, levers = at_posture
+        more = u.i_meas[1:] - self._direction * self._friction_model.friction - nominal
         by_lever = levers @ more / max(levers @ levers, _SHORTEST_LEVER**2)
         return np.concatenate([[by_lever], more - by_lever * levers])
 
     def _at_posture(self, smoothed: Floats, at_posture: tuple[Floats, Floats]) -> Floats:
         if self._friction_model is None:
             return smoothed
-        usual, levers = at_posture
-        return np.concatenate([[0.0], usual + smoothed[0] * levers + smoothed[1:]])
+        nominal, levers = at_posture
+        return np.concatenate([[0.0], nominal + smoothed[0] * levers + smoothed[1:]])
 
 
-class TipLoop:
+class TipFeedback:
     """Integral control of the tip as tracker or IMUs see it, at their rate: dq' = K_I J~^+ e, e = f(q_ref) - p_WG.
 
     q_ref is that of the period that ends; J~ is the corrected Jacobian, J~^+ its damped inverse. e is smoothed: an arm
@@ -163,7 +163,7 @@ class TipLoop:
         if readings == self._readings:
             return
         self._readings = readings
-        if before is None or on_the_way(before[1], u.q_meas):
+        if before is None or is_moving(before[1], u.q_meas):
             return
         self._error = self._error + self._share * (self._kinematics.forward(before[0]) - p_WG - self._error)
         q = u.q_meas
@@ -254,9 +254,9 @@ class ModelMonitor:
         self._mean = unpack_state(state)
 
 
-def on_the_way(q_cmd: Floats, q_meas: Floats) -> bool:
+def is_moving(q_cmd: Floats, q_meas: Floats) -> bool:
     """Return whether a joint is still far from where it was commanded to, so that the tip is not yet to judge."""
-    return bool(np.max(np.abs(q_cmd - q_meas)) > _ON_THE_WAY)
+    return bool(np.max(np.abs(q_cmd - q_meas)) > _MOVING_ERROR)
 
 
 class VibrationDamping:

@@ -15,9 +15,9 @@ from handover.controllers.vsl.learned_model import (
     Regressor,
     all_powers,
     factors_of,
+    friction_direction,
     hull_directions,
     monomials,
-    turned,
 )
 from handover.cosim.blocks.ports import Floats
 
@@ -28,14 +28,22 @@ _DIGITS = 12
 """Digits kept of every number: what follows is rounding noise, which linear algebra libraries disagree on."""
 
 _FRICTION_ITERATIONS, _FRICTION_STRIDE, _FRICTION_TOLERANCE = 40, 1.5, 1e-5
-"""Steps are too short by about a third: a fit on currents with friction takes them for less than they are worth."""
+"""Most steps, what each is multiplied by, and the change of a current, A, at which they end (own choice).
+
+Steps are too short by about a third: a fit on currents with friction takes them for less than they are worth.
+"""
 
 _FRICTION_PENALTY = (1e-4,)
+"""The one penalty of the cubics by which friction is found: they are compared, not used (own choice)."""
 
 _FIRST_STIFFNESS = (1.0, 1e-5, 100.0)
-_BEAM_ITERATIONS, _LOG_STEP = 30, 1e-5
+"""EI_0, N m2, EI_p, N m2/Pa, and joint, N m/rad, from which the fit of a beam begins (own choice)."""
 
-_SMALLEST = 1e-12
+_BEAM_ITERATIONS, _LOG_STEP = 30, 1e-5
+"""Gauss-Newton steps of that fit, and the change of a logarithm by which its derivatives are taken (own choice)."""
+
+SMALLEST = 1e-12
+"""Scale below which values count as constant: none is divided by less."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +109,7 @@ def directions_of(q_cmd: Floats, reversal: float) -> Floats:
     """
     directions = np.zeros_like(q_cmd)
     for k in range(1, len(q_cmd)):
-        directions[k] = turned(directions[k - 1], q_cmd[k] - q_cmd[k - 1], reversal)
+        directions[k] = friction_direction(directions[k - 1], q_cmd[k] - q_cmd[k - 1], reversal)
     return directions
 
 
@@ -139,7 +147,7 @@ def fit_adapted(base: Regressor, x: Floats, y: Floats) -> Adapted:
         y: values, shape (points, values).
     """
     predicted = base.predict(x)
-    magnitude = np.maximum(np.std(predicted, axis=0), _SMALLEST)
+    magnitude = np.maximum(np.std(predicted, axis=0), SMALLEST)
     features = np.concatenate([base.domain.standardised(x), predicted / magnitude], axis=1)
     feature_mean, left = np.mean(features, axis=0), y - predicted
     centred = left - np.mean(left, axis=0)
@@ -150,7 +158,7 @@ def fit_adapted(base: Regressor, x: Floats, y: Floats) -> Adapted:
         taken = np.sum(U**2 * shares, axis=1) + 1.0 / len(x)  # what each point has of its own prediction
         errors: Floats = (centred - (U * shares) @ (np.transpose(U) @ centred)) / (1.0 - taken)[:, None]
         weights = np.transpose(right) @ (
-            (shares / np.maximum(singular, _SMALLEST))[:, None] * (np.transpose(U) @ centred)
+            (shares / np.maximum(singular, SMALLEST))[:, None] * (np.transpose(U) @ centred)
         )
         fits.append((float(np.mean(errors**2)), weights))
     weights = min(fits, key=lambda f: f[0])[1]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from handover.controllers.vsl.fit import domain_of, rounded
+from handover.controllers.vsl.fit import SMALLEST, domain_of, rounded
 from handover.controllers.vsl.learned_model import Domain, Learned
 from handover.controllers.vsl.network import ACTIVATIONS, LAYERS, Activation, Network, Weights
 from handover.cosim.blocks.ports import Floats
@@ -161,7 +161,7 @@ class _Frame:
     def of(cls, points: Points) -> "_Frame":
         domain = domain_of(points.x)
         mean_y = rounded(np.mean(points.y, axis=0))
-        largest = max(float(np.max(np.std(points.y, axis=0))), _SMALLEST)
+        largest = max(float(np.max(np.std(points.y, axis=0))), SMALLEST)
         scale_y = rounded(np.full(len(mean_y), largest))  # one for all: what is noise alone is not blown up
         y, y_validation = ((v - mean_y) / scale_y for v in (points.y, points.y_validation))
         z, z_validation = domain.standardised(points.x), domain.standardised(points.x_validation)
@@ -171,9 +171,6 @@ class _Frame:
         d = self.domain
         weights, biases = tuple(parts[0::2]), tuple(parts[1::2])
         return Network(d.mean, d.scale, d.hull, weights, biases, activation, self.mean_y, self.scale_y)
-
-
-_SMALLEST = 1e-12
 
 
 def _transposed(part: Any) -> Weights:

@@ -10,7 +10,14 @@ from typing import ClassVar
 import numpy as np
 
 from handover.controllers.vsl import default_friction_model, default_model, default_physics_model, default_small_model
-from handover.controllers.vsl.feedback import CurrentFilter, ImuTip, ModelMonitor, TipLoop, VibrationDamping, on_the_way
+from handover.controllers.vsl.feedback import (
+    CurrentFilter,
+    ImuTip,
+    ModelMonitor,
+    TipFeedback,
+    VibrationDamping,
+    is_moving,
+)
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import Learned, VslModel
 from handover.controllers.vsl.model_text import InvalidModel, parse_model, read_model
@@ -23,7 +30,6 @@ from handover.cosim.blocks.units import Ampere, Hertz, Metre, Number, Pascal, Pe
 __all__ = [
     "Elbow",
     "HybridKinematics",
-    "IdleParameters",
     "Imu",
     "Inputs",
     "InvalidModel",
@@ -31,6 +37,7 @@ __all__ = [
     "Method",
     "Outputs",
     "Params",
+    "UnusedParameters",
 ]
 
 _SHIPPED = {
@@ -160,7 +167,7 @@ class Outputs:
     model_mismatch: bool = output("by that distance the arm is not the one learned from; false without a sensor")
 
 
-class IdleParameters(InvalidParameters):
+class UnusedParameters(InvalidParameters):
     """Parameters out of range, or set where nothing that was learned uses them; `faults` lists all of them."""
 
     block = "HybridKinematics"
@@ -183,7 +190,7 @@ class HybridKinematics:
     in 3 s.
 
     Beyond the source, and each for itself: friction compensation, see `CurrentFilter`; the closed loop by the tracker,
-    of both methods, or by IMUs of an arm that does not shake, see `TipLoop`; and the damping of vibrations, see
+    of both methods, or by IMUs of an arm that does not shake, see `TipFeedback`; and the damping of vibrations, see
     `VibrationDamping`, which without friction compensation only commands ahead. With closed_loop IMUs do nothing: the
     tracker sees the tip itself.
 
@@ -197,7 +204,7 @@ class HybridKinematics:
     may add to the error.
 
     Raises:
-        IdleParameters: by the constructor, for MODEL_BASED with a model, friction_compensation, vibration_damping, or
+        UnusedParameters: by the constructor, for MODEL_BASED with a model, friction_compensation, vibration_damping, or
             kind of model of its own.
         InvalidModel: by the constructor, if the model is used and cannot be read, is not what `learned` and
             `friction_compensation` say, or was trained for other links.
@@ -216,13 +223,13 @@ class HybridKinematics:
 
     def __init__(self, params: Params) -> None:
         if faults := parameter_faults(params) or _idle(params):
-            raise IdleParameters(faults)
+            raise UnusedParameters(faults)
         self._params = p = params
         self._kinematics = VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
         self._model = _model(p, self._kinematics) if p.method is not Method.MODEL_BASED else None
         self._currents = CurrentFilter(self._model if p.friction_compensation else None, p.i_lag, p.reversal)
         rate = p.tracker_rate if p.closed_loop else float(1 / _PERIOD)
-        self._loop = TipLoop(self._kinematics, self._model, rate, p.tracker_lag, p.K_I, p.dq_max)
+        self._loop = TipFeedback(self._kinematics, self._model, rate, p.tracker_lag, p.K_I, p.dq_max)
         self._looped = p.closed_loop or p.imu is Imu.FEEDBACK
         self._imu_tip = ImuTip(self._kinematics, p.imu_shares)
         self._monitor = ModelMonitor(p.mismatch_lag, p.mismatch_limit)
@@ -246,7 +253,7 @@ class HybridKinematics:
         if at_once:
             y.qd_cmd = np.copysign(self._params.qd_max, y.qd_cmd)
         if self._before is not None:
-            if tip is not None and self._model is not None and not on_the_way(self._before[1], u.q_meas):
+            if tip is not None and self._model is not None and not is_moving(self._before[1], u.q_meas):
                 self._monitor.step(dt, tip, y.p_WG_est)
                 y.innovation, y.model_mismatch = self._monitor.innovation, self._monitor.mismatch
             self._currents.turn(y.q_cmd - self._before[1])

@@ -130,6 +130,25 @@ class VslKinematics:
         """
         return np.asarray(np.linalg.solve(self.jacobian(q), v_WG), dtype=np.float64)
 
+    def joint_path(self, points: Floats, velocities: Floats, theta_1: float) -> tuple[list[Floats], list[Floats]]:
+        """Return the angles at n + 1 points of a path, rad, and the joint velocities at the first n, rad/s.
+
+        Joint 1 goes on past half a turn instead of all the way back.
+
+        Args:
+            points: shape (n + 1, 3), m.
+            velocities: of the tip there, shape (n + 1, 3), m/s.
+            theta_1: angle of joint 1 before, rad.
+
+        Raises:
+            Unreachable: as `inverse`.
+            numpy.linalg.LinAlgError: as `joint_velocities`.
+        """
+        q = [self.inverse(x) for x in points]
+        for angles, unwrapped in zip(q, np.unwrap([theta_1, *(a[0] for a in q)])[1:], strict=True):
+            angles[0] = unwrapped
+        return q, [self.joint_velocities(a, v) for a, v in zip(q[:-1], velocities[:-1], strict=True)]
+
     def singularity(self, p_WG: Floats, margin: float) -> str | None:
         """Return which singularity of J, where det J = -L2 L3 s3 (L2 c2 + L3 c23) is 0, is nearer than margin, or None.
 

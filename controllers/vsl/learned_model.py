@@ -45,7 +45,7 @@ FORWARD_INPUTS_X = tuple(f"p_WG_model[{k + 1}]" for k in range(3)) + FORWARD_INP
 INVERSE_INPUTS = ("q_ref[1]", "q_ref[2]", "q_ref[3]", "p_meas[1]", "p_meas[2]", "i_meas[2]", "i_meas[3]")
 """Inputs in rad or m, Pa and A; the current of joint 1, which carries no weight, is left out."""
 
-USUAL_INPUTS = ("q_meas[2]", "q_meas[3]", "p_meas[1]", "p_meas[2]")
+NOMINAL_INPUTS = ("q_meas[2]", "q_meas[3]", "p_meas[1]", "p_meas[2]")
 
 VALUES = 3
 """What each residual has: an angle a joint, or a coordinate an axis."""
@@ -243,9 +243,9 @@ class VslModel:
         kind: what the two are.
         forward_input: what `forward` takes of the posture.
         friction: currents by the friction of the gears of joints 2 and 3, A, shape (2,), which turn with the direction
-            of motion and which the currents are to be freed of before; 0 if it was trained on the currents as measured.
-        usual: currents of joints 2 and 3 without friction under the mean of the loads that it was trained on, A, by
-            `USUAL_INPUTS`; None if it was trained on the currents as measured.
+            of motion and which is to be taken off the currents before; 0 if it was trained on the currents as measured.
+        nominal: currents of joints 2 and 3 without friction under the mean of the loads that it was trained on, A, by
+            `NOMINAL_INPUTS`; None if it was trained on the currents as measured.
     """
 
     inverse: Regressor
@@ -255,7 +255,7 @@ class VslModel:
     kind: Learned = Learned.CUBIC
     forward_input: ForwardInput = ForwardInput.Q
     friction: tuple[float, float] = (0.0, 0.0)
-    usual: Cubic | None = None
+    nominal: Cubic | None = None
 
     @property
     def is_absolute(self) -> bool:
@@ -290,17 +290,17 @@ class VslModel:
         return J + R @ by_posture + np.outer(turning, [1.0, 0.0, 0.0])
 
     def currents(self, q_meas: Floats, p_meas: Floats) -> tuple[Floats, Floats]:
-        """Return the usual currents of joints 2 and 3, shape (2,), A, and a load's levers on them, shape (2,), m.
+        """Return the nominal currents of joints 2 and 3, shape (2,), A, and a load's levers on them, shape (2,), m.
 
         Raises:
             ValueError: it was trained on the currents as measured.
         """
-        if self.usual is None:
-            raise ValueError("it was trained on the currents as measured, and has no usual ones")
+        if self.nominal is None:
+            raise ValueError("it was trained on the currents as measured, and has no nominal ones")
         theta_2, theta_23 = float(q_meas[1]), float(q_meas[1] + q_meas[2])
         lever_3 = self.kinematics.L_3 * math.cos(theta_23)
         lever_2 = self.kinematics.L_2 * math.cos(theta_2) + lever_3
-        return self.usual.predict(np.concatenate([q_meas[1:], p_meas])), np.array([lever_2, lever_3])
+        return self.nominal.predict(np.concatenate([q_meas[1:], p_meas])), np.array([lever_2, lever_3])
 
     def outside(self, q_ref: Floats, q_meas: Floats, p_meas: Floats, i_meas: Floats) -> bool:
         """Return whether either is evaluated outside the polytope of its training."""
@@ -318,7 +318,7 @@ def inputs_of(q: Floats, p: Floats, i: Floats) -> Floats:
     return np.concatenate([q, p, i[..., 1:]], axis=-1)
 
 
-def turned(direction: Floats, turn: Floats, reversal: float) -> Floats:
+def friction_direction(direction: Floats, turn: Floats, reversal: float) -> Floats:
     """Return which way friction acts, from -1 to 1, after a further turn, rad: all of `reversal` turns it round."""
     return np.minimum(np.maximum(direction + 2.0 * turn / reversal, -1.0), 1.0)
 

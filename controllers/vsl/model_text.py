@@ -19,7 +19,7 @@ from handover.controllers.vsl.learned_model import (
     FORWARD_INPUTS,
     FORWARD_INPUTS_X,
     INVERSE_INPUTS,
-    USUAL_INPUTS,
+    NOMINAL_INPUTS,
     VALUES,
     Adapted,
     Cubic,
@@ -78,7 +78,7 @@ def model_text(model: VslModel) -> str:
         "provenance": model.provenance,
         "links": {"L_1": k.L_1, "L_2": k.L_2, "L_3": k.L_3, "elbow": k.elbow.name},
         "friction": list(model.friction),
-        **({"usual": {"inputs": list(USUAL_INPUTS), **_plain(model.usual)}} if model.usual else {}),
+        **({"nominal": {"inputs": list(NOMINAL_INPUTS), **_plain(model.nominal)}} if model.nominal else {}),
         "inverse": {"inputs": list(INVERSE_INPUTS), **_plain(model.inverse)},
         "forward": {"inputs": list(_FORWARD_INPUTS[model.forward_input]), **_plain(model.forward)},
     }
@@ -134,7 +134,7 @@ def parse_model(text: str, source: str) -> VslModel:
         kind=kind,
         forward_input=forward_input,
         friction=reader.friction(whole),
-        usual=reader.usual(whole),
+        nominal=reader.nominal(whole),
     )
     stated = reader.entry(whole, "sha256")
     if stated != _digest({name: part for name, part in whole.items() if name != "sha256"}):
@@ -198,12 +198,14 @@ class _Reader:
         first, second = self.numbers(whole, "the file", "friction", (2,)).tolist()
         return first, second
 
-    def usual(self, whole: dict[str, Any]) -> Cubic | None:
-        """Return the usual currents, which a model on currents with friction does not have."""
+    def nominal(self, whole: dict[str, Any]) -> Cubic | None:
+        """Return the nominal currents, which a model on currents with friction does not have."""
         if not any(self.friction(whole)):
             return None
-        table = self._named(whole, "usual", USUAL_INPUTS)
-        return self._cubic(table, "usual", self._domain(table, "usual", len(USUAL_INPUTS)), len(USUAL_INPUTS) // 2)
+        table = self._named(whole, "nominal", NOMINAL_INPUTS)
+        return self._cubic(
+            table, "nominal", self._domain(table, "nominal", len(NOMINAL_INPUTS)), len(NOMINAL_INPUTS) // 2
+        )
 
     def _named(self, whole: dict[str, Any], name: str, inputs: tuple[str, ...]) -> dict[str, Any]:
         """Return a table of which the inputs are these."""

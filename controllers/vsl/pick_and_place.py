@@ -27,13 +27,13 @@ class InvalidTask(InvalidParameters):
     block = "PickAndPlace"
 
 
-class Leg:
-    """Parts of the task, in their order; their numbers are the output `leg`."""
+class TaskPhase:
+    """Parts of the task, in their order; their numbers are the output `phase`."""
 
     SETTLE, DESCEND, GRASP, LIFT, CARRY, SOFTEN, LOWER, RELEASE, LEAVE, DONE = range(10)
 
 
-LEGS = ("settle", "descend", "grasp", "lift", "carry", "soften", "lower", "release", "leave", "done")
+PHASES = ("settle", "descend", "grasp", "lift", "carry", "soften", "lower", "release", "leave", "done")
 """Their names."""
 
 
@@ -80,7 +80,7 @@ class Outputs:
     qd_ref: Vector3[RadianPerSecond] = output("joint velocities on the way there, by the inverse Jacobian, eq. (8)")
     p_cmd: Vector2[Pascal] = output("pressure commands of links 2 and 3")
     vacuum: bool = output("the cup is to suck")
-    leg: int = output(
+    phase: int = output(
         "part of the task, from 0: settle, descend, grasp, lift, carry, soften, lower, release, leave, done"
     )
     done: bool = output("the task has ended")
@@ -114,7 +114,7 @@ class PickAndPlace:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
-        ("p_WG_goal", "q_ref", "qd_ref", "p_cmd", "vacuum", "leg", "done"), ("go",)
+        ("p_WG_goal", "q_ref", "qd_ref", "p_cmd", "vacuum", "phase", "done"), ("go",)
     )
     period: ClassVar[Fraction | None] = _PERIOD
 
@@ -171,21 +171,21 @@ class PickAndPlace:
         if periods is None:
             start = self._parts[0].p_0
             q = self._kinematics.inverse(start)
-            return self._output(start, q, p.qd_0, p.p_contact, vacuum=False, leg=Leg.SETTLE)
-        leg = 1 + bisect.bisect_right(self._ends, periods)
-        k, part = min(periods, last), self._parts[min(leg, len(self._parts)) - 1]
-        qd = self._qd[k] if leg < Leg.DONE else p.qd_0
-        return self._output(self._points[k], self._q[k], qd, part.pressure, part.vacuum, leg)
+            return self._output(start, q, p.qd_0, p.p_contact, vacuum=False, phase=TaskPhase.SETTLE)
+        phase = 1 + bisect.bisect_right(self._ends, periods)
+        k, part = min(periods, last), self._parts[min(phase, len(self._parts)) - 1]
+        qd = self._qd[k] if phase < TaskPhase.DONE else p.qd_0
+        return self._output(self._points[k], self._q[k], qd, part.pressure, part.vacuum, phase)
 
-    def _output(self, goal: Floats, q: Floats, qd: Floats, pressure: float, vacuum: bool, leg: int) -> Outputs:
+    def _output(self, goal: Floats, q: Floats, qd: Floats, pressure: float, vacuum: bool, phase: int) -> Outputs:
         return Outputs(
             p_WG_goal=np.array(goal),
             q_ref=np.array(q),
             qd_ref=np.array(qd),
             p_cmd=np.array([pressure, pressure]),
             vacuum=vacuum,
-            leg=leg,
-            done=leg == Leg.DONE,
+            phase=phase,
+            done=phase == TaskPhase.DONE,
         )
 
     def _add(self, part: _Part) -> None:
@@ -201,18 +201,16 @@ class PickAndPlace:
             line = Line(part.p_0, part.p_1)
             n = max(1, round(line.length / part.speed / T))
             points, velocities = line.sampled(n, part.speed)
-            angles = [self._kinematics.inverse(x) for x in points]
-            before = self._q[-1] if self._q else angles[0]
-            for q, theta_1 in zip(angles, np.unwrap([before[0], *(q[0] for q in angles)])[1:], strict=True):
-                q[0] = theta_1
+            before = self._q[-1] if self._q else self._kinematics.inverse(points[0])
+            q, qd = self._kinematics.joint_path(points, velocities, float(before[0]))
             self._points += list(points[1:])
-            self._q += angles[1:]
-            self._qd += [self._kinematics.joint_velocities(q, v) for q, v in zip(angles[:-1], velocities, strict=False)]
+            self._q += q[1:]
+            self._qd += qd
         self._ends.append(len(self._points))
 
 
 def _parts(p: Params) -> Sequence[_Part]:
-    """Return the parts of the task after the first settling, in the order of `LEGS`."""
+    """Return the parts of the task after the first settling, in the order of `PHASES`."""
     above, below = np.array([0.0, 0.0, p.hover]), np.array([0.0, 0.0, p.press])
     over_P, at_P, over_Q, at_Q = p.p_WP + above, p.p_WP - below, p.p_WQ + above, p.p_WQ - below
     return (
@@ -230,7 +228,7 @@ def _parts(p: Params) -> Sequence[_Part]:
 def _faults(parts: Sequence[_Part], kinematics: VslKinematics) -> list[str]:
     """Return what is wrong with where the tip is to go, each place once."""
     faults: dict[str, None] = {}
-    for name, part in zip(LEGS[1:], parts, strict=False):
+    for name, part in zip(PHASES[1:], parts, strict=False):
         if part.rest is not None:
             continue
         line = Line(part.p_0, part.p_1)

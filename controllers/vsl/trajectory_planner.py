@@ -191,16 +191,13 @@ class TrajectoryPlanner:
     def _add(self, segment: Segment) -> None:
         p = self._params
         points, velocities = segment.sampled(p.N, p.V)
-        q = [self._kinematics.inverse(x) for x in points]
         before = self._q[-1] if self._q else self._q_0
-        for k, theta_1 in enumerate(np.unwrap([before[0], *(angles[0] for angles in q)])[1:]):
-            q[k][0] = theta_1
+        q, qd = self._kinematics.joint_path(points, velocities, float(before[0]))
         began = self._ends[-1] if self._ends else 0.0
-        for k in range(p.N):
-            self._points.append(points[k + 1])
-            self._q.append(q[k + 1])
-            self._qd.append(self._kinematics.joint_velocities(q[k], velocities[k]))
-            self._ends.append(began + (k + 1) * segment.length / (p.N * p.V))
+        self._points += list(points[1:])
+        self._q += q[1:]
+        self._qd += qd
+        self._ends += [began + (k + 1) * segment.length / (p.N * p.V) for k in range(p.N)]
 
 
 def pressures_of(text: str) -> Schedule:

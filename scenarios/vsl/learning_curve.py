@@ -6,7 +6,8 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from handover.scenarios.vsl.training import Errors, Progress, VslTraining
+from handover.scenarios.vsl.residuals import Errors
+from handover.scenarios.vsl.training import Progress, VslTraining
 from handover.scenarios.vsl.training_data import Measured
 
 SIZES = (250, 500, 1000, 2000, 4000, 8000, 17568)

@@ -18,7 +18,10 @@ from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
 from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Number, Pascal, Second
 from handover.plants.vsl.parameters import MAX_PRESSURE, Link, Motion
 
-_MAX_LOAD = 0.3
+BAR = 1e5
+"""Pa."""
+
+_MAX_LOAD = 0.3  # kg (assumed)
 _SAMPLES = 100  # of a segment, to find where it is below the ground
 
 

@@ -51,7 +51,7 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
                 "p_cmd": "",
                 "vacuum": "",
                 "p_WG_goal": "in W; compared with the tip while it carries",
-                "leg": "says what is touched and when",
+                "phase": "says what is touched and when",
                 "done": "by it the run ends",
             },
             optional=dict.fromkeys(

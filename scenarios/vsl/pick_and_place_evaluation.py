@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handover.controllers.vsl.pick_and_place import LEGS, Leg
+from handover.controllers.vsl.pick_and_place import PHASES, TaskPhase
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
 from handover.cosim.system.signals import Signals
 from handover.plants.vsl.parameters import MAX_PRESSURE
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 
-_TOUCHES = {"pick": (Leg.DESCEND, Leg.GRASP), "place": (Leg.LOWER, Leg.RELEASE)}
+_TOUCHES = {"pick": (TaskPhase.DESCEND, TaskPhase.GRASP), "place": (TaskPhase.LOWER, TaskPhase.RELEASE)}
 """Parts of the task in which something is touched."""
 
 
@@ -71,7 +71,7 @@ class PickAndPlaceEvaluator(Evaluator):
         self.force = dict.fromkeys(_TOUCHES, 0.0)
         self.carried_off = 0.0
         self._t = 0.0
-        self._leg = 0
+        self._phase = 0
         self._was_held = self._held = self._done = False
         self._p_WO = np.array(parameters.pick)
         self._p_WG_goal: Floats | None = None
@@ -79,14 +79,14 @@ class PickAndPlaceEvaluator(Evaluator):
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Take in what is touched, carried and put down."""
-        self._t, self._leg = t, int(signals["planner.leg"])
+        self._t, self._phase = t, int(signals["planner.phase"])
         self._held, self._done = bool(signals["gripper.held"]), bool(signals["planner.done"])
         self._was_held = self._was_held or self._held
         self._p_WO = np.array(signals["gripper.p_WO"])
-        for touch, legs in _TOUCHES.items():
-            if self._leg in legs:
+        for touch, phases in _TOUCHES.items():
+            if self._phase in phases:
                 self.force[touch] = max(self.force[touch], float(signals["arm.f_G"]))
-        goal, carrying = signals["planner.p_WG_goal"], self._leg == Leg.CARRY
+        goal, carrying = signals["planner.p_WG_goal"], self._phase == TaskPhase.CARRY
         if self._p_WG_goal is not None and not (carrying and np.array_equal(goal, self._p_WG_goal)):
             off = float(np.linalg.norm(signals["arm.p_WG"] - self._p_WG_goal))
             self.carried_off = max(self.carried_off, off)
@@ -115,7 +115,7 @@ class PickAndPlaceEvaluator(Evaluator):
         if self._done:
             return "the object was never picked up" if not self._was_held else "the object did not come to rest"
         held = "with the object" if self._held else "without the object"
-        return f"stopped at {self._t:.1f} s as it was to {LEGS[self._leg]}, {held}"
+        return f"stopped at {self._t:.1f} s as it was to {PHASES[self._phase]}, {held}"
 
     def _metrics(self) -> dict[str, Metric]:
         what = "largest force as the tip comes down to"

@@ -4,17 +4,17 @@ from pathlib import Path
 
 import numpy as np
 
-from handover.controllers.vsl.pick_and_place import LEGS, Leg
+from handover.controllers.vsl.pick_and_place import PHASES, TaskPhase
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
 from handover.scenarios.experiment.replay import Body, Line, Replay, prism
 from handover.scenarios.experiment.time_plot import Curve, Level, Phase, TimeFigure, TimePlot, phases_of
+from handover.scenarios.vsl.parameters import BAR
 from handover.scenarios.vsl.pick_and_place_evaluation import PickAndPlaceParameters
 from handover.scenarios.vsl.replay import arm_bodies, arm_lines
 
-_BAR = 1e5  # Pa
 _SIDE, _TABLE = 0.04, 0.006
 """Side of the object, which is drawn as a box, and thickness of the table, m (assumed)."""
 _OBJECT, _TABLE_COLOUR, _TIP = "#b58a1b", "#9aa3af", "#d1602b"
@@ -22,7 +22,7 @@ _OBJECT, _TABLE_COLOUR, _TIP = "#b58a1b", "#9aa3af", "#d1602b"
 
 def phases_of_task(record: Record) -> tuple[Phase, ...]:
     """Return the parts of the task by their names."""
-    return phases_of(record, "planner.leg", dict(enumerate(LEGS)))
+    return phases_of(record, "planner.phase", dict(enumerate(PHASES)))
 
 
 def figures_of_pick_and_place(parameters: PickAndPlaceParameters, record: Record) -> list[TimeFigure]:
@@ -60,7 +60,7 @@ def figures_of_pick_and_place(parameters: PickAndPlaceParameters, record: Record
                     title="Pressure in link 3",
                     quantity="pressure",
                     unit="bar",
-                    curves=[Curve(label=label, values=p[:, 1] / _BAR) for label, p in pressures.items()],
+                    curves=[Curve(label=label, values=p[:, 1] / BAR) for label, p in pressures.items()],
                     phases=phases,
                     limits=(0.0, None),
                 ),
@@ -71,13 +71,13 @@ def figures_of_pick_and_place(parameters: PickAndPlaceParameters, record: Record
 
 def draw_pick_and_place(parameters: PickAndPlaceParameters, record: Record, folder: Path) -> list[Figure]:
     """Draw the way of the tip, and the arm as it picks up and as it puts down."""
-    goal, tip, shape, leg = (record[n] for n in ("planner.p_WG_goal", "arm.p_WG", "arm.shape", "planner.leg"))
-    on_task = leg > Leg.SETTLE
+    goal, tip, shape, phase = (record[n] for n in ("planner.p_WG_goal", "arm.p_WG", "arm.shape", "planner.phase"))
+    on_task = phase > TaskPhase.SETTLE
     with figure(folder / "way", 1, size=(8.0, 5.2)) as (axes,):
         axes.plot(*_in_plane(goal[on_task]), color=COLOURS[2], lw=3.0, alpha=0.35, label="desired")
         axes.plot(*_in_plane(tip[on_task]), color=COLOURS[1], lw=1.2, label="tip")
-        for k, (name, part) in enumerate({"picks up": Leg.GRASP, "puts down": Leg.RELEASE}.items()):
-            rows = np.flatnonzero(leg == part)
+        for k, (name, part) in enumerate({"picks up": TaskPhase.GRASP, "puts down": TaskPhase.RELEASE}.items()):
+            rows = np.flatnonzero(phase == part)
             if len(rows):
                 axes.plot(*_in_plane(shape[rows[-1]]), color=COLOURS[(0, 3)[k]], lw=2.4, label=f"arm as it {name}")
         axes.axhline(1000 * float(parameters.pick[2]), color="#4d5866", lw=0.8, ls=(0, (7, 3)), label="object's top")

@@ -22,14 +22,13 @@ from handover.scenarios.experiment.time_plot import (
     phases_of,
 )
 from handover.scenarios.vsl.evaluation import PathEvaluator, distance
-from handover.scenarios.vsl.parameters import Parameters
+from handover.scenarios.vsl.parameters import BAR, Parameters
 
 SERVOS, TIP = "tip by the servos, links taken as rigid", "tip by the tracker"
 _PALETTE = ("servos", "tip", "desired", "estimate")
 SERVO_COLOUR, TIP_COLOUR, DESIRED_COLOUR, ESTIMATE_COLOUR = COLOURS[: len(_PALETTE)]
 _LINKS: tuple[Stroke, ...] = ("solid", "dashed")
 """Strokes of the links' pressures, which often coincide."""
-_BAR = 1e5  # Pa
 _FLAT = 1e-6
 """Distance from the plane XZ below which a path lies in it, m."""
 
@@ -123,7 +122,7 @@ def _currents(record: Record, phases: Sequence[Phase]) -> TimePlot:
 
 
 def _pressures(record: Record, phases: Sequence[Phase]) -> TimePlot:
-    commanded, measured = (record[signal] / _BAR for signal in ("planner.p_cmd", "arm.p_meas"))
+    commanded, measured = (record[signal] / BAR for signal in ("planner.p_cmd", "arm.p_meas"))
     curves: list[Curve] = []
     for k, stroke in enumerate(_LINKS):
         name = f"link {k + 2}"

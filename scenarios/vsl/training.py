@@ -23,11 +23,11 @@ from handover.controllers.vsl.learned_model import (
     Regressor,
     VslModel,
     inputs_of,
-    rotate_about_z,
 )
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.vsl.data_file import links_of
 from handover.scenarios.vsl.model_file import content_key
+from handover.scenarios.vsl.residuals import Errors, Pairs, Residuals, lengths_of
 from handover.scenarios.vsl.training_data import (
     STRETCH,
     Dataset,
@@ -40,20 +40,17 @@ from handover.scenarios.vsl.training_data import (
 
 Progress = Callable[[float, float], None]
 
-Pairs = tuple[Floats, Floats]
-"""Inputs and values of points, shapes (points, inputs) and (points, values)."""
-
 MIN_POINTS = 400
 """Number of points below which the 120 coefficients of a cubic are not worth fitting (assumed)."""
 
 _MIN_VARIATION = 1e-9
-"""Range of an input, relative to its magnitude, below which it counts as constant: that much is rounding."""
+"""Range of an input, relative to its magnitude, below which it counts as constant: rounding (own choice)."""
 
 _FRICTION_POINTS = 1500
-"""Training points of which the gears' friction is learned: two numbers."""
+"""Training points of which the gears' friction, two numbers, is learned (own choice)."""
 
 _FOLDS = 10
-"""Parts into which the few points of an adaptation are split: each is tested by what the others teach."""
+"""Parts into which the few points of an adaptation are split: each is tested by what the others teach (own choice)."""
 
 
 class NothingToLearn(ValueError):
@@ -62,25 +59,6 @@ class NothingToLearn(ValueError):
     def __init__(self, fmu: Path, fault: str) -> None:
         super().__init__(f"{fmu}: {fault}")
         self.fmu, self.fault = fmu, fault
-
-
-@dataclass(frozen=True, kw_only=True)
-class Errors:
-    """Mean errors of the test points, of rigid kinematics and with what was learned.
-
-    Attributes:
-        forward_model_based, forward_hybrid: distance of the tip from where the kinematics take it to be, m.
-        inverse_model_based, inverse_hybrid: distance by which the command for the measured tip would miss it, m, by the
-            Jacobian.
-        forward_other_input: forward_hybrid of what takes X = f(q) in place of q, or q in place of X; None if it was not
-            trained.
-    """
-
-    forward_model_based: float
-    forward_hybrid: float
-    inverse_model_based: float
-    inverse_hybrid: float
-    forward_other_input: float | None = None
 
 
 @dataclass(frozen=True)
@@ -116,6 +94,11 @@ class VslTraining:
     walk: bool = False
     arm: Mapping[str, Any] = field(default_factory=dict[str, Any])
     epochs: int = EPOCHS
+
+    @property
+    def residuals(self) -> Residuals:
+        """What is to be learned of measured points."""
+        return Residuals(kinematics=self.kinematics, learned=self.learned, forward_input=self.forward_input)
 
     def like(self, model: VslModel) -> "VslTraining":
         """Return the training of a model of the same kind for the same links."""
@@ -172,20 +155,20 @@ class VslTraining:
         if self.friction_compensation:
             few = training[:_FRICTION_POINTS]
             friction = self._friction(measured.points.rows(few), directions[few])
-        data = measured.points.freed(directions, friction)
+        data = measured.points.without_friction(directions, friction)
         parts = data.rows(training), data.rows(validation)
         seeds = [int(n) for n in np.random.SeedSequence(measured.origin["seed"]).generate_state(4)[2:] >> 1]
         inverse, forward = self._fit_both(*parts, seeds, progress)
-        usual = self._usual_currents(*parts) if self.friction_compensation else None
-        kinds = self.learned, self.forward_input, friction, usual
+        nominal = self._nominal_currents(*parts) if self.friction_compensation else None
+        kinds = self.learned, self.forward_input, friction, nominal
         model = VslModel(inverse.regressor, forward.regressor, self.kinematics, {}, *kinds)
-        errors = self.errors(model, data.rows(test))
+        errors = self.residuals.errors(model, data.rows(test))
         if self.learned is not Learned.PHYSICS:
             other = replace(self, forward_input=_OTHER[self.forward_input])
-            pairs = other.forward_pairs(parts[0]), other.forward_pairs(parts[1])
+            pairs = other.residuals.forward_pairs(parts[0]), other.residuals.forward_pairs(parts[1])
             beside = other._fit(*pairs, seeds[1], progress, "m").regressor
             theirs = replace(model, forward=beside, forward_input=other.forward_input)
-            errors = replace(errors, forward_other_input=self.forward_error(theirs, data.rows(test)))
+            errors = replace(errors, forward_other_input=self.residuals.forward_error(theirs, data.rows(test)))
         counts = {"measured": len(measured.points), "training": len(training)}
         provenance: dict[str, Any] = {
             "arm": measured.origin["arm"],
@@ -206,10 +189,11 @@ class VslTraining:
         The errors with it are of points that it did not see: each tenth by what the other nine teach.
         """
         directions = directions_of(measured.points.q_cmd[:, 1:], Params().reversal)
-        data = measured.points.freed(directions, base.friction).rows(np.flatnonzero(measured.order >= 0))
+        data = measured.points.without_friction(directions, base.friction).rows(np.flatnonzero(measured.order >= 0))
         folds = [np.arange(len(data)) % _FOLDS == k for k in range(_FOLDS)]
         tested = [
-            (self.errors(self._adapted(base, data.rows(~fold)), data.rows(fold)), int(np.sum(fold))) for fold in folds
+            (self.residuals.errors(self._adapted(base, data.rows(~fold)), data.rows(fold)), int(np.sum(fold)))
+            for fold in folds
         ]
         names = ("forward_model_based", "forward_hybrid", "inverse_model_based", "inverse_hybrid")
         errors = Errors(**{n: sum(getattr(e, n) * size for e, size in tested) / len(data) for n in names})
@@ -222,47 +206,7 @@ class VslTraining:
             "versions": {"python": platform.python_version(), "numpy": np.__version__},
             "adapted_from": base.provenance,
         }
-        return replace(self._adapted(base, data), provenance=provenance), self.errors(base, data), errors
-
-    def inverse_pairs(self, data: Dataset) -> Pairs:
-        """Return inputs, the rigid angles of the measured tips first, and commanded minus rigid angles, rad.
-
-        The *measured* angles in place of the commanded ones would leave the servos' droop in. Of a published network
-        the values are the commanded angles themselves.
-        """
-        q_rigid = np.array([self.kinematics.inverse(p) for p in data.p_WG])
-        values = data.q_cmd if self.learned is Learned.PUBLISHED else data.q_cmd - q_rigid
-        return inputs_of(q_rigid, data.p, data.i), values
-
-    def forward_pairs(self, data: Dataset) -> Pairs:
-        """Return inputs, the measured angles or X = f(q) first, and measured minus rigid tips in the arm's plane, m.
-
-        Of a published network the values are the measured tips themselves, in the world.
-        """
-        rigid = np.array([self.kinematics.forward(q) for q in data.q])
-        inputs = inputs_of(data.q if self.forward_input is ForwardInput.Q else rigid, data.p, data.i)
-        if self.learned is Learned.PUBLISHED:
-            return inputs, data.p_WG
-        residuals = [
-            rotate_about_z(r, -theta_1) for r, theta_1 in zip(data.p_WG - rigid, data.q[:, 0].tolist(), strict=True)
-        ]
-        return inputs, np.array(residuals)
-
-    def errors(self, model: VslModel, test: Dataset) -> Errors:
-        """Return the errors of points that were not trained on; their currents are without friction if its are."""
-        rigid = np.array([self.kinematics.forward(q) for q in test.q])
-        q_rigid = np.array([self.kinematics.inverse(p) for p in test.p_WG])
-        commands = np.array([model.command(*point) for point in zip(q_rigid, test.p, test.i, strict=True)])
-        return Errors(
-            forward_model_based=_mean_length(test.p_WG - rigid),
-            forward_hybrid=self.forward_error(model, test),
-            inverse_model_based=_mean_length(self._moved(q_rigid, test.q_cmd - q_rigid)),
-            inverse_hybrid=_mean_length(self._moved(q_rigid, test.q_cmd - commands)),
-        )
-
-    def forward_error(self, model: VslModel, test: Dataset) -> float:
-        """Return the mean distance of the tip from where a model takes it to be, m."""
-        return _mean_length(test.p_WG - [model.tip(*point) for point in zip(test.q, test.p, test.i, strict=True)])
+        return replace(self._adapted(base, data), provenance=provenance), self.residuals.errors(base, data), errors
 
     def _fit_both(
         self, training: Dataset, validation: Dataset, seeds: list[int], progress: Progress
@@ -270,8 +214,8 @@ class VslTraining:
         """Fit what corrects eq. (11) and what corrects eq. (10)."""
         if self.learned is Learned.PHYSICS:
             return self._fit_beam(training, validation)
-        inverse = self.inverse_pairs(training), self.inverse_pairs(validation)
-        forward = self.forward_pairs(training), self.forward_pairs(validation)
+        inverse = self.residuals.inverse_pairs(training), self.residuals.inverse_pairs(validation)
+        forward = self.residuals.forward_pairs(training), self.residuals.forward_pairs(validation)
         return self._fit(*inverse, seeds[0], progress, "rad"), self._fit(*forward, seeds[1], progress, "m")
 
     def _fit(
@@ -296,7 +240,7 @@ class VslTraining:
 
     def _fit_beam(self, training: Dataset, validation: Dataset) -> tuple[_Fitted, _Fitted]:
         """Fit a beam to tips, and the servos' droop to what their encoders show of it."""
-        forward, inverse = self.forward_pairs(training), self.inverse_pairs(training)
+        forward, inverse = self.residuals.forward_pairs(training), self.residuals.inverse_pairs(training)
         beam = fit_beam(self.kinematics, *forward)
         torques, droops = beam.weights.kt * training.i[:, 1:], (training.q_cmd - training.q)[:, 1:]
         droop = float(f"{np.sum(torques * droops) / np.sum(torques**2):.12g}")
@@ -304,21 +248,24 @@ class VslTraining:
         tip = BentTip(seen.mean, seen.scale, seen.hull, beam)
         command = BentCommand(wanted.mean, wanted.scale, wanted.hull, beam, droop)
         fitted: list[_Fitted] = []
-        for bent, pairs, unit in ((command, self.inverse_pairs, "rad"), (tip, self.forward_pairs, "m")):
+        for bent, pairs, unit in (
+            (command, self.residuals.inverse_pairs, "rad"),
+            (tip, self.residuals.forward_pairs, "m"),
+        ):
             x, y = pairs(validation)
             fitted.append(_Fitted(bent, _rms(float(np.sqrt(np.mean((bent.predict(x) - y) ** 2))), unit)))
         return fitted[0], fitted[1]
 
     def _friction(self, data: Dataset, directions: Floats) -> tuple[float, float]:
         """Return the currents by friction that leave least of the tips unexplained."""
-        residuals = replace(self, learned=Learned.CUBIC, forward_input=ForwardInput.Q)
+        residuals = replace(self.residuals, learned=Learned.CUBIC, forward_input=ForwardInput.Q)
 
         def inputs_at(c: Floats) -> Floats:
-            return residuals.forward_pairs(data.freed(directions, c))[0]
+            return residuals.forward_pairs(data.without_friction(directions, c))[0]
 
         return fit_friction(inputs_at, directions, residuals.forward_pairs(data)[1])
 
-    def _usual_currents(self, training: Dataset, validation: Dataset) -> Cubic:
+    def _nominal_currents(self, training: Dataset, validation: Dataset) -> Cubic:
         """Fit the currents of joints 2 and 3 to angles and pressures, whatever the load."""
         pairs = [(np.concatenate([d.q[:, 1:], d.p], axis=1), d.i[:, 1:]) for d in (training, validation)]
         return fit_cubic(*pairs[0], *pairs[1]).cubic
@@ -326,13 +273,9 @@ class VslTraining:
     def _adapted(self, base: VslModel, data: Dataset) -> VslModel:
         return replace(
             base,
-            inverse=fit_adapted(_base(base.inverse), *self.inverse_pairs(data)),
-            forward=fit_adapted(_base(base.forward), *self.forward_pairs(data)),
+            inverse=fit_adapted(_base(base.inverse), *self.residuals.inverse_pairs(data)),
+            forward=fit_adapted(_base(base.forward), *self.residuals.forward_pairs(data)),
         )
-
-    def _moved(self, q: Floats, angles: Floats) -> Floats:
-        """Return the displacements of the tip by small joint rotations, shape (n, 3), m, by the Jacobian."""
-        return np.array([self.kinematics.jacobian(at) @ dq for at, dq in zip(q, angles, strict=True)])
 
     def _usable(self, measured: Dataset) -> Any:
         """Return the rows of points with tips within reach."""
@@ -368,7 +311,7 @@ class VslTraining:
 
     def _within_reach(self, p_WG: Floats) -> NDArray[np.bool_]:
         min_reach, _ = self.kinematics.reach
-        from_shoulder = _lengths(p_WG - np.array([0.0, 0.0, self.kinematics.L_1]))
+        from_shoulder = lengths_of(p_WG - np.array([0.0, 0.0, self.kinematics.L_1]))
         return (from_shoulder <= STRETCH) & (from_shoulder >= min_reach + 0.001)
 
 
@@ -386,11 +329,3 @@ def _rms(validation_rms: float, unit: str) -> dict[str, float]:
 
 def _rounded(errors: Errors) -> dict[str, float]:
     return {name: float(f"{value:.4g}") for name, value in vars(errors).items() if value is not None}
-
-
-def _lengths(vectors: Floats) -> Floats:
-    return np.sqrt(np.sum(vectors**2, axis=1))
-
-
-def _mean_length(vectors: Floats) -> float:
-    return float(np.mean(_lengths(vectors)))

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from handover.controllers.vsl.kinematics import VslKinematics
+from handover.controllers.vsl.learned_model import Integers
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure
@@ -43,18 +43,15 @@ LOADS = (0.0, 0.13)
 """Loads at the gripper, kg; the published ones are 0 to 0.1."""
 
 _STEP, _STEPS, _KEPT = 0.1, 15, 5
-"""Each point: steps of 0.1 s until settled; the mean of the readings after the last ones is kept."""
+"""Each point: steps of 0.1 s until settled; the mean of the readings after the last ones is kept (assumed)."""
 
-_THINGS = ("angles", "pressures", "load")
+_QUANTITIES = ("angles", "pressures", "load")
 """What is varied from point to point."""
 
 _WANTED = {
     "input": {"q_cmd": (3,), "p_cmd": (2,), "load": ()},
     "output": {"q_meas": (3,), "i_meas": (3,), "p_meas": (2,), "p_WG_meas": (3,)},
 }
-
-
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -82,8 +79,8 @@ class Dataset:
         """Return some of the points."""
         return Dataset(self.p_WG[indices], self.p[indices], self.i[indices], self.q[indices], self.q_cmd[indices])
 
-    def freed(self, directions: Floats, friction: Sequence[float] | Floats) -> "Dataset":
-        """Return the points with currents freed of friction, (2,) of joints 2 and 3, A; see `directions_of`."""
+    def without_friction(self, directions: Floats, friction: Sequence[float] | Floats) -> "Dataset":
+        """Return the points with the friction taken off currents 2 and 3, (2,), A; see `directions_of`."""
         if not np.any(friction):
             return self
         i = np.array(self.i)
@@ -203,7 +200,7 @@ def collect(
             _start(arm, parameters)
             q_cmd = np.zeros(3)
             for k in range(points):
-                drawn = _THINGS if not walk or k == 0 else (_THINGS[rng.integers(len(_THINGS))],)
+                drawn = _QUANTITIES if not walk or k == 0 else (_QUANTITIES[rng.integers(len(_QUANTITIES))],)
                 if "angles" in drawn:
                     q_cmd = kinematics.inverse(_commanded_tip(kinematics, rng))
                     arm.u["q_cmd"][0][:] = q_cmd

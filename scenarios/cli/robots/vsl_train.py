@@ -29,13 +29,8 @@ from handover.scenarios.results.run_folder import replacing, write_whole
 from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
 from handover.scenarios.vsl.learning_curve import curve_table, draw_curve, learning_curve
 from handover.scenarios.vsl.model_file import content_key, file_text
-from handover.scenarios.vsl.training import (
-    MIN_POINTS,
-    Errors,
-    NothingToLearn,
-    Progress,
-    VslTraining,
-)
+from handover.scenarios.vsl.residuals import Errors
+from handover.scenarios.vsl.training import MIN_POINTS, NothingToLearn, Progress, VslTraining
 from handover.scenarios.vsl.training_data import Measured, describe_arm
 
 _PATH = click.Path(path_type=Path)

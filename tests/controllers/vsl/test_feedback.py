@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handover.controllers.vsl import default_friction_model, default_model, default_physics_model, default_small_model
-from handover.controllers.vsl.feedback import CurrentFilter, ImuTip, ModelMonitor, TipLoop, VibrationDamping
+from handover.controllers.vsl.feedback import CurrentFilter, ImuTip, ModelMonitor, TipFeedback, VibrationDamping
 from handover.controllers.vsl.fit import directions_of
 from handover.controllers.vsl.hybrid_kinematics import Inputs
-from handover.controllers.vsl.learned_model import Adapted, VslModel, inputs_of, turned
+from handover.controllers.vsl.learned_model import Adapted, VslModel, friction_direction, inputs_of
 from handover.controllers.vsl.model_text import parse_model
 from handover.cosim.blocks.ports import Floats
 
@@ -24,9 +24,9 @@ P = np.array([1e5, 1e5])
 
 
 def reading(q: Floats = Q, **given: Any) -> Inputs:
-    usual, _ = FRICTION_MODEL.currents(q, P)
+    nominal, _ = FRICTION_MODEL.currents(q, P)
     u = Inputs(
-        q_ref=q, qd_ref=np.zeros(3), q_meas=q, p_meas=P, i_meas=np.array([0.0, *usual]), p_WG_meas=ARM.forward(q)
+        q_ref=q, qd_ref=np.zeros(3), q_meas=q, p_meas=P, i_meas=np.array([0.0, *nominal]), p_WG_meas=ARM.forward(q)
     )
     return dataclasses.replace(u, **given)
 
@@ -35,11 +35,11 @@ def reading(q: Floats = Q, **given: Any) -> Inputs:
 def test_the_direction_stays_within_one_and_follows_a_long_turn(turns: list[float], reversal: float):
     direction = np.zeros(1)
     for turn in turns:
-        direction = turned(direction, np.array([turn]), reversal)
+        direction = friction_direction(direction, np.array([turn]), reversal)
         assert -1.0 <= direction[0] <= 1.0
-    assert turned(direction, np.array([reversal]), reversal)[0] == 1.0
-    assert turned(direction, np.array([-reversal]), reversal)[0] == -1.0
-    assert turned(direction, np.zeros(1), reversal)[0] == direction[0]
+    assert friction_direction(direction, np.array([reversal]), reversal)[0] == 1.0
+    assert friction_direction(direction, np.array([-reversal]), reversal)[0] == -1.0
+    assert friction_direction(direction, np.zeros(1), reversal)[0] == direction[0]
 
 
 def test_directions_of_commands_are_those_one_after_another():
@@ -60,13 +60,13 @@ def test_a_window_frees_currents_of_friction(direction: float):
 
 
 def test_what_a_load_adds_does_not_lag_behind_the_posture():
-    """A load of constant mass adds its levers to the usual currents: in any posture, at once."""
+    """A load of constant mass adds its levers to the nominal currents: in any posture, at once."""
     unit, plain = CurrentFilter(FRICTION_MODEL, 0.2, 0.002), CurrentFilter(None, 0.2, 0.002)
     worst, worst_plain = 0.0, 0.0
     for k in range(60):
         q = ARM.inverse(np.array([0.30 + 0.0015 * k, 0.0, 0.15]))
-        usual, levers = FRICTION_MODEL.currents(q, P)
-        u = reading(q, i_meas=np.array([0.0, *(usual + 0.3 * levers)]))
+        nominal, levers = FRICTION_MODEL.currents(q, P)
+        u = reading(q, i_meas=np.array([0.0, *(nominal + 0.3 * levers)]))
         worst = max(worst, float(np.max(np.abs(unit.step(u, 0.02) - u.i_meas))))
         worst_plain = max(worst_plain, float(np.max(np.abs(plain.step(u, 0.02) - u.i_meas))))
     assert worst < 1e-9
@@ -86,7 +86,7 @@ def test_a_change_of_load_is_smoothed_by_two_lags():
 def closed(error: Floats, seconds: float, **given: float) -> Floats:
     """Return where the tip of a rigid arm is that is off by an error, after the loop was closed for a while."""
     params = {"rate": 30.0, "lag": 0.2, "K_I": 2.0, "limit": 0.2} | given
-    loop = TipLoop(ARM, None, **params)
+    loop = TipFeedback(ARM, None, **params)
     before = Q, Q
     for k in range(round(seconds / 0.02)):
         at = ARM.forward(Q + loop.dq) + error
@@ -102,7 +102,7 @@ def test_the_loop_takes_the_tips_error_away():
 
 
 def test_the_loop_takes_each_reading_once():
-    loop = TipLoop(ARM, None, 10.0, 0.0, 2.0, 0.2)
+    loop = TipFeedback(ARM, None, 10.0, 0.0, 2.0, 0.2)
     off = ARM.forward(Q) - np.array([0.0, 0.0, 0.01])
     seen: list[float] = []
     for k in range(11):
@@ -112,7 +112,7 @@ def test_the_loop_takes_each_reading_once():
 
 
 def test_the_loop_rests_while_joints_are_on_their_way_and_stays_within_its_limit():
-    loop = TipLoop(ARM, None, 30.0, 0.0, 20.0, 0.05)
+    loop = TipFeedback(ARM, None, 30.0, 0.0, 20.0, 0.05)
     far = ARM.forward(Q) - np.array([0.0, 0.0, 0.2])
     loop.step(0.0, reading(), far, np.zeros(3), (Q, Q + np.array([0.0, 0.1, 0.0])))
     loop.step(0.1, reading(), far, np.zeros(3), None)

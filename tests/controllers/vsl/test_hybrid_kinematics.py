@@ -12,7 +12,6 @@ from handover.controllers.vsl.default_model import DEFAULT_MODEL
 from handover.controllers.vsl.hybrid_kinematics import (
     Elbow,
     HybridKinematics,
-    IdleParameters,
     Imu,
     Inputs,
     InvalidModel,
@@ -20,6 +19,7 @@ from handover.controllers.vsl.hybrid_kinematics import (
     Method,
     Outputs,
     Params,
+    UnusedParameters,
 )
 from handover.controllers.vsl.kinematics import VslKinematics
 from handover.controllers.vsl.learned_model import Cubic
@@ -249,7 +249,7 @@ def test_by_rigid_kinematics_what_was_learned_is_refused_and_not_ignored():
         friction_compensation=True,
         vibration_damping=True,
     )
-    with pytest.raises(IdleParameters) as e:
+    with pytest.raises(UnusedParameters) as e:
         HybridKinematics(idle)
     assert [fault.split(":")[0] for fault in e.value.faults] == [
         "learned",
@@ -348,7 +348,7 @@ def test_a_sensor_at_the_arm_tells_a_mismatch_that_inputs_do_not(sensor: dict[st
 
 
 def test_parameters_out_of_range_are_refused():
-    with pytest.raises(IdleParameters, match="K_I"):
+    with pytest.raises(UnusedParameters, match="K_I"):
         HybridKinematics(Params(K_I=-5.0))
 
 

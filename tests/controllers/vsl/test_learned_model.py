@@ -353,7 +353,7 @@ def test_numbers_within_many_lists_are_refused():
         (SHIPPED[2], cut("inverse", "beam"), "inverse has no 'beam'"),
         (SHIPPED[2], put(-1.0, "forward", "beam", "EI_0"), "forward.beam.EI_0 must be above 0"),
         (SHIPPED[2], put(0.2, "forward", "beam", "cap"), "two caps leave nothing"),
-        (SHIPPED[3], cut("usual"), "the file has no 'usual'"),
+        (SHIPPED[3], cut("nominal"), "the file has no 'nominal'"),
         (SHIPPED[3], put([0.1], "friction"), r"friction has the shape \[1\], not \[2\]"),
     ],
 )

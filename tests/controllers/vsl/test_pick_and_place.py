@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
-from handover.controllers.vsl.pick_and_place import LEGS, Inputs, InvalidTask, Leg, Outputs, Params, PickAndPlace
+from handover.controllers.vsl.pick_and_place import (
+    PHASES,
+    Inputs,
+    InvalidTask,
+    Outputs,
+    Params,
+    PickAndPlace,
+    TaskPhase,
+)
 
 SHORT = Params(settle=0.1, wait=0.1)
 
@@ -22,12 +30,12 @@ def task(params: Params, at_most: int = 3000) -> list[Outputs]:
 
 def test_the_parts_come_in_their_order_with_their_pressures_and_vacuum():
     ys = task(SHORT)
-    legs = [y.leg for y in ys]
-    assert sorted(legs) == legs
-    assert list(dict.fromkeys(legs)) == list(range(len(LEGS)))
-    stiff = {LEGS[y.leg] for y in ys if y.p_cmd[0] == SHORT.p_carry}
+    phases = [y.phase for y in ys]
+    assert sorted(phases) == phases
+    assert list(dict.fromkeys(phases)) == list(range(len(PHASES)))
+    stiff = {PHASES[y.phase] for y in ys if y.p_cmd[0] == SHORT.p_carry}
     assert stiff == {"lift", "carry"}
-    assert {LEGS[y.leg] for y in ys if y.vacuum} == {"grasp", "lift", "carry", "soften", "lower"}
+    assert {PHASES[y.phase] for y in ys if y.vacuum} == {"grasp", "lift", "carry", "soften", "lower"}
     assert all(y.p_cmd[0] in (SHORT.p_contact, SHORT.p_carry) for y in ys)
 
 
@@ -38,20 +46,20 @@ def test_the_tip_goes_at_its_speeds_by_the_joint_velocities_to_where_it_is_wante
         np.testing.assert_allclose(kinematics.forward(y.q_ref), y.p_WG_goal, atol=1e-12)
     for before, y in pairwise(ys):
         moved = float(np.linalg.norm(y.p_WG_goal - before.p_WG_goal)) / 0.02
-        if y.leg == before.leg and y.leg in (Leg.DESCEND, Leg.LOWER):
+        if y.phase == before.phase and y.phase in (TaskPhase.DESCEND, TaskPhase.LOWER):
             assert moved == pytest.approx(p.V_contact, rel=0.01)
-        elif y.leg == before.leg and y.leg in (Leg.LIFT, Leg.CARRY, Leg.LEAVE):
+        elif y.phase == before.phase and y.phase in (TaskPhase.LIFT, TaskPhase.CARRY, TaskPhase.LEAVE):
             assert moved == pytest.approx(p.V, rel=0.02)
             np.testing.assert_allclose(y.qd_ref * 0.02, y.q_ref - before.q_ref, atol=2e-4)
-    lowest = [y.p_WG_goal for y in ys if y.leg in (Leg.GRASP, Leg.RELEASE)]
+    lowest = [y.p_WG_goal for y in ys if y.phase in (TaskPhase.GRASP, TaskPhase.RELEASE)]
     np.testing.assert_allclose(lowest[0], p.p_WP - [0.0, 0.0, p.press])
     np.testing.assert_allclose(lowest[-1], p.p_WQ - [0.0, 0.0, p.press])
 
 
 def test_without_waiting_each_rest_takes_a_period():
-    legs = [y.leg for y in task(replace(SHORT, wait=0.0))]
-    assert [legs.count(leg) for leg in (Leg.GRASP, Leg.SOFTEN, Leg.RELEASE)] == [1, 1, 1]
-    assert list(dict.fromkeys(legs)) == list(range(len(LEGS)))
+    phases = [y.phase for y in task(replace(SHORT, wait=0.0))]
+    assert [phases.count(phase) for phase in (TaskPhase.GRASP, TaskPhase.SOFTEN, TaskPhase.RELEASE)] == [1, 1, 1]
+    assert list(dict.fromkeys(phases)) == list(range(len(PHASES)))
 
 
 def test_joint_1_turns_on_behind_the_foot():
@@ -62,7 +70,7 @@ def test_joint_1_turns_on_behind_the_foot():
     assert np.max(np.abs(np.diff(theta_1))) < 0.02
     assert theta_1[-1] == pytest.approx(2.0 * np.pi + np.arctan2(-0.08, -0.30))
     for before, y in pairwise(ys):
-        if before.leg == y.leg == Leg.CARRY:
+        if before.phase == y.phase == TaskPhase.CARRY:
             np.testing.assert_allclose(y.qd_ref * 0.02, y.q_ref - before.q_ref, atol=2e-4)
 
 
@@ -70,9 +78,9 @@ def test_it_waits_above_the_object_until_it_may_go():
     unit = PickAndPlace(SHORT)
     for k in range(50):
         y = unit.step(0.02 * k, 0.02, Inputs(go=False))
-        assert (y.leg, y.vacuum) == (Leg.SETTLE, False)
-    assert unit.step(1.0, 0.02, Inputs()).leg == Leg.DESCEND
-    assert unit.step(1.02, 0.02, Inputs(go=False)).leg == Leg.DESCEND
+        assert (y.phase, y.vacuum) == (TaskPhase.SETTLE, False)
+    assert unit.step(1.0, 0.02, Inputs()).phase == TaskPhase.DESCEND
+    assert unit.step(1.02, 0.02, Inputs(go=False)).phase == TaskPhase.DESCEND
 
 
 def test_a_restored_state_goes_on_bit_for_bit():
@@ -83,7 +91,7 @@ def test_a_restored_state_goes_on_bit_for_bit():
     for k in range(100):
         a, b = (unit.step(0.02 * k, 0.02, Inputs()) for unit in (one, other))
         np.testing.assert_array_equal(a.q_ref, b.q_ref)
-        assert (a.leg, a.vacuum) == (b.leg, b.vacuum)
+        assert (a.phase, a.vacuum) == (b.phase, b.vacuum)
 
 
 @pytest.mark.parametrize(

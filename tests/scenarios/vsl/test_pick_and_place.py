@@ -11,7 +11,7 @@ from flyer_runs import metric, run
 from parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.vsl
-from handover.controllers.vsl.pick_and_place import Leg, Params
+from handover.controllers.vsl.pick_and_place import Params, TaskPhase
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.vsl.pick_and_place import VslPickAndPlace
@@ -52,29 +52,29 @@ def test_it_carries_an_object_to_its_place_and_touches_more_softly_with_softer_l
     assert 0.1 < metric(soft, "pick_force") < metric(stiff, "pick_force")
     assert metric(soft, "carry_error") < 0.01
     record = Record(tmp_path / "soft" / "signals.parquet")
-    leg, held, pressure = record["planner.leg"], record["gripper.held"], record["arm.p_meas"][:, 0]
-    assert not held[leg < Leg.GRASP].any()
-    assert held[leg == Leg.CARRY].all()
-    assert pressure[leg == Leg.CARRY].min() > 1.8e5
-    assert pressure[leg == Leg.LOWER].max() < 0.6e5
+    phase, held, pressure = record["planner.phase"], record["gripper.held"], record["arm.p_meas"][:, 0]
+    assert not held[phase < TaskPhase.GRASP].any()
+    assert held[phase == TaskPhase.CARRY].all()
+    assert pressure[phase == TaskPhase.CARRY].min() > 1.8e5
+    assert pressure[phase == TaskPhase.LOWER].max() < 0.6e5
     assert (tmp_path / "soft" / "report.html").exists()
 
 
 def test_a_tip_that_carries_is_compared_with_the_goal_that_it_was_to_reach():
     evaluator = PickAndPlaceEvaluator(PickAndPlaceParameters())
 
-    def seen(leg: int, goal: float, tip: float) -> Any:
+    def seen(phase: int, goal: float, tip: float) -> Any:
         arm = {"arm.f_G": 0.0, "arm.p_WG": np.array([tip, 0.0, 0.1])}
-        planner = {"planner.leg": leg, "planner.done": False, "planner.p_WG_goal": np.array([goal, 0.0, 0.1])}
+        planner = {"planner.phase": phase, "planner.done": False, "planner.p_WG_goal": np.array([goal, 0.0, 0.1])}
         return {**arm, **planner, "gripper.held": True, "gripper.p_WO": np.array([tip, 0.0, 0.1])}
 
     for k in range(1, 5):
-        evaluator(0.04 * k, seen(Leg.CARRY, 0.002 * k, 0.002 * (k - 1)))
-        evaluator(0.04 * k + 0.02, seen(Leg.CARRY, 0.002 * k, 0.002 * (k - 0.5)))  # half the way
+        evaluator(0.04 * k, seen(TaskPhase.CARRY, 0.002 * k, 0.002 * (k - 1)))
+        evaluator(0.04 * k + 0.02, seen(TaskPhase.CARRY, 0.002 * k, 0.002 * (k - 0.5)))  # half the way
     assert evaluator.carried_off == pytest.approx(0.0, abs=1e-12)
-    evaluator(0.2, seen(Leg.SOFTEN, 0.008, 0.007))
+    evaluator(0.2, seen(TaskPhase.SOFTEN, 0.008, 0.007))
     assert evaluator.carried_off == pytest.approx(0.001)
-    evaluator(0.22, seen(Leg.SOFTEN, 0.008, 0.1))
+    evaluator(0.22, seen(TaskPhase.SOFTEN, 0.008, 0.1))
     assert evaluator.carried_off == pytest.approx(0.001)
 
 
@@ -82,7 +82,7 @@ def test_on_a_table_higher_than_the_shoulder_the_arm_starts_above_it(tmp_path: P
     run(VslPickAndPlace, tmp_path / "r", "pick=0.3,0,0.2", "place=0.36,0,0.2", "settle=0.1", "wait=0.1")
     record = Record(tmp_path / "r" / "signals.parquet")
     assert record["arm.p_WG"][0, 2] > 0.2
-    assert np.all(record["arm.f_G"][record["planner.leg"] == Leg.SETTLE] == 0.0)
+    assert np.all(record["arm.f_G"][record["planner.phase"] == TaskPhase.SETTLE] == 0.0)
 
 
 def test_an_object_that_is_too_heavy_for_the_cup_is_never_picked_up(tmp_path: Path):

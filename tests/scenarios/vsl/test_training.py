@@ -32,7 +32,7 @@ def test_the_parts_are_70_15_15_of_the_usable_points_and_lose_nothing():
 
 def test_forward_residuals_are_those_of_the_plane_that_joint_1_turns():
     sag = np.array([-0.01, 0.002, -0.03])
-    inputs, residuals = TRAINING.forward_pairs(points(50, np.zeros(3), sag))
+    inputs, residuals = TRAINING.residuals.forward_pairs(points(50, np.zeros(3), sag))
     np.testing.assert_allclose(residuals, np.tile(sag, (50, 1)), atol=1e-12)
     assert inputs.shape == (50, 7)
 
@@ -40,7 +40,7 @@ def test_forward_residuals_are_those_of_the_plane_that_joint_1_turns():
 def test_inverse_residuals_lead_from_the_measured_tip_to_the_command():
     droop = np.array([0.0, -0.02, -0.01])
     data = points(50, droop, np.zeros(3))
-    inputs, residuals = TRAINING.inverse_pairs(data)
+    inputs, residuals = TRAINING.residuals.inverse_pairs(data)
     np.testing.assert_allclose(inputs[:, :3], data.q, atol=1e-9)
     np.testing.assert_allclose(residuals, np.tile(-droop, (50, 1)), atol=1e-9)
 

@@ -26,7 +26,8 @@ from handover.scenarios.cli.robots import vsl_train as vsl_train_command
 from handover.scenarios.vsl import learning_curve as curve_module
 from handover.scenarios.vsl.data_file import write_data
 from handover.scenarios.vsl.learning_curve import curve_table, learning_curve
-from handover.scenarios.vsl.training import Errors, Progress, VslTraining
+from handover.scenarios.vsl.residuals import Errors
+from handover.scenarios.vsl.training import Progress, VslTraining
 from handover.scenarios.vsl.training_data import Measured
 
 
@@ -175,7 +176,7 @@ def test_an_arm_that_teaches_nothing_is_refused(arm: str, text: str, tmp_path: P
 def test_a_folder_that_goes_away_is_reported_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     def gone(training: VslTraining, measured: Measured, _progress: Progress) -> tuple[VslModel, Errors]:
         (tmp_path / "a").rmdir()
-        return shipped(), training.errors(shipped(), measured.points.rows(np.arange(10)))
+        return shipped(), training.residuals.errors(shipped(), measured.points.rows(np.arange(10)))
 
     (tmp_path / "a").mkdir()
     write_data(tmp_path / "d.parquet", made_up(400))

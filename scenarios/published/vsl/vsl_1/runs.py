@@ -11,9 +11,9 @@ from handover.cosim.blocks.ports import Floats
 from handover.plants.vsl.parameters import Link
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
+from handover.scenarios.vsl.parameters import BAR
 
 _PUBLISHED = paper_values("vsl", "published")
-_BAR = 1e5  # Pa
 
 PATHS = (TipPath.LINEAR, TipPath.CURVE, TipPath.SQUARE)
 """Rows of fig. 5."""
@@ -33,7 +33,7 @@ class Links:
     @property
     def label(self) -> str:
         """What they are called."""
-        return "rigid" if self.pressure is None else f"{self.pressure / _BAR:g} bar"
+        return "rigid" if self.pressure is None else f"{self.pressure / BAR:g} bar"
 
     @property
     def parameters(self) -> dict[str, str]:

@@ -14,10 +14,9 @@ from handover.scenarios.campaign.plan import is_number
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.published.vsl.vsl_1.runs import format_load, has_completed_path
-from handover.scenarios.vsl.parameters import HybridParameters
+from handover.scenarios.vsl.parameters import BAR, HybridParameters
 
 _PUBLISHED, _BEYOND = (paper_values("vsl", group) for group in ("published", "beyond"))
-_BAR = 1e5  # Pa
 
 REPETITIONS: int = _BEYOND["repetitions"]
 
@@ -32,7 +31,7 @@ class Case:
     @property
     def label(self) -> str:
         """Both in words."""
-        return f"{format_load(self.load)}, {self.pressure / _BAR:g} bar"
+        return f"{format_load(self.load)}, {self.pressure / BAR:g} bar"
 
     @property
     def parameters(self) -> dict[str, str]:
