@@ -25,9 +25,7 @@ _RIGID_BY_CHOICE = (
     "stiffness it falls."
 )
 
-_NO_NETWORK = (
-    "The paper claims this of its network; `--model` takes the file of a trained one. Here stands for it what ships."
-)
+_NO_NETWORK = "The paper claims this of its network; `--model` takes the file of a trained one."
 
 
 def claims_of(runs: Vsl2Runs) -> list[Claim]:
@@ -38,10 +36,10 @@ def claims_of(runs: Vsl2Runs) -> list[Claim]:
 def _estimates(runs: Vsl2Runs) -> list[Claim]:
     """Judge the paper's network, if it was trained, and beyond the paper the polynomials that ship."""
     by_polynomials = f"{CUBIC.label} that ship, while the tip goes by rigid kinematics"
-    return [
-        _estimate(runs, PUBLISHED, f"{PUBLISHED.label}, while the tip goes by its commands"),
-        _estimate(runs, MODEL_BASED, by_polynomials, beyond=True),
-    ]
+    by_network = _estimate(runs, PUBLISHED, f"{PUBLISHED.label}, while the tip goes by its commands")
+    if PUBLISHED not in runs.learned:
+        by_network = replace(by_network, reason=_NO_NETWORK)
+    return [by_network, _estimate(runs, MODEL_BASED, by_polynomials, beyond=True)]
 
 
 def _estimate(runs: Vsl2Runs, method: ControlMethod, by: str, *, beyond: bool = False) -> Claim:
@@ -68,14 +66,15 @@ def _command(runs: Vsl2Runs) -> Claim:
 def _rigid(runs: Vsl2Runs) -> Claim:
     comparisons = [_compared(runs, case, runs.hybrid, RIGID) for case in CASES]
     sentence = "With the hybrid inverse model the soft arm's tip errs less than that of an arm with rigid links."
-    claim = _by_network(runs, separation_claim(sentence, "sec. V-C, fig. 7(b)", "lower", comparisons))
-    return without_verdict(claim, _RIGID_BY_CHOICE)
+    return _by_network(runs, separation_claim(sentence, "sec. V-C, fig. 7(b)", "lower", comparisons), _RIGID_BY_CHOICE)
 
 
-def _by_network(runs: Vsl2Runs, claim: Claim) -> Claim:
-    """Say by which corrector a claim of the paper is judged; only its own network gives a verdict."""
+def _by_network(runs: Vsl2Runs, claim: Claim, why_none: str = "") -> Claim:
+    """Say by which corrector a claim of the paper is judged; only its own network gives a verdict, if any does."""
     claim = replace(claim, reason=f"{claim.reason} Measured by {runs.hybrid.label}.")
-    return claim if runs.hybrid is PUBLISHED else without_verdict(claim, _NO_NETWORK)
+    if runs.hybrid is not PUBLISHED:
+        why_none = f"{why_none} {_NO_NETWORK} Here stands for it what ships.".lstrip()
+    return without_verdict(claim, why_none) if why_none else claim
 
 
 def _stiffer(runs: Vsl2Runs) -> list[Claim]:
