@@ -34,7 +34,7 @@ __all__ = [
 RUNTIME = Path(__file__).with_name("runtime")
 
 SHARED_SOURCES = (
-    "brought.c",
+    "bundled.c",
     "derivatives.c",
     "embedded.c",
     "lifecycle.c",

@@ -2,7 +2,7 @@
 
 PyInstaller follows the imports and copies interpreter, packages and the libraries that they are linked to into a
 folder, for the platform on which it runs. The runtime starts the program in it as the unit's process
-(`runtime/brought.c`); the block's own sources are in the FMU as in any other.
+(`runtime/bundled.c`); the block's own sources are in the FMU as in any other.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ from handover.fmus.compile import cache_folder, host_platform
 from handover.fmus.sources import Carried
 
 PROGRAM = "unit.exe" if os.name == "nt" else "unit"
-"""Name of the frozen program, in `resources/standalone/PLATFORM`; also in `runtime/brought.c`."""
+"""Name of the frozen program, in `resources/standalone/PLATFORM`; also in `runtime/bundled.c`."""
 
 _UNWANTED = ("tkinter", "turtle", "idlelib", "lib2to3", "unittest", "pydoc", "readline", "curses", "ensurepip", "venv")
 """Of the standard library: for the console, for windows, for developers."""

@@ -7,6 +7,7 @@
  *     lifecycle.c, stepping.c   modes from instantiation to the end; steps and event mode
  *     sampling.c, state.c       ticks of a sampled block; saved states
  *     slave.c                   calls into Python
+ *     bundled.c                 the interpreter that a standalone unit brings
  *     embedded.c, remote.c      Python in the host's process, or in one of its own
  *     variables.c               the table of variables, checks of their values
  *     log.c                     messages to the host's logger

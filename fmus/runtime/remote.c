@@ -3,8 +3,8 @@
  *
  * Calls and their answers go through a channel; the variables' buffers lie in shared memory, so setting and getting
  * stay copies in memory. FMU_PYTHON is the path of the interpreter, else that of resources/python.txt is taken, else
- * `python3` on the PATH; a unit that brings its interpreter runs in that, and in no other. FMU_PYTHON_TIMEOUT is how long a call may take, in seconds; 0 is without limit. Starting, which
- * imports packages, may always take a minute.
+ * `python3` on the PATH; a unit that brings its interpreter runs in that, and in no other. FMU_PYTHON_TIMEOUT is how long
+ * a call may take, in seconds; 0 is without limit. Starting, which imports packages, may always take a minute.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -34,7 +34,7 @@ typedef struct {
     SharedMemory memory;
     char *interpreter, *resources, *token;
     double limit; /* s */
-    bool brought; /* the interpreter is the unit's own, of which one process serves all instances */
+    bool bundled; /* the interpreter is the unit's own, of which one process serves all instances */
 } Remote;
 
 /* How calls and answers look in the channel; the numbers in them are fmus/server.py's, too. */
@@ -152,7 +152,7 @@ static Start begin(Instance *instance, const char *function, Text *fault) {
     Text script = {0}, wanted = {0};
     text_add(&script, "%s/sources/handover/fmus/server.py", side->resources);
     const char *arguments[] = {"-E", "-u", "-X", "utf8", "-c", BEGINNING, text_of(&script), NULL};
-    side->process = side->brought ? process_join(side->interpreter, arguments + 6, &side->memory, fault)
+    side->process = side->bundled ? process_join(side->interpreter, arguments + 6, &side->memory, fault)
                                   : process_start(side->interpreter, arguments, &side->memory, fault);
     text_clear(&script);
     if (!side->process) return NO_PYTHON;
@@ -165,7 +165,7 @@ static Start begin(Instance *instance, const char *function, Text *fault) {
     text_clear(&wanted);
     Start start = NOT_STARTED;
     if (done != TRANSFERRED) {
-        const char *doubt = side->brought ? "" : "; is it a Python 3.10 or later?";
+        const char *doubt = side->bundled ? "" : "; is it a Python 3.10 or later?";
         Text early = {0};
         if (done != TOO_LATE) text_add(&early, " before the unit had started%s", doubt);
         lose(side, done, limit, text_of(&early), fault);
@@ -305,11 +305,11 @@ Start remote_start(Instance *instance, const char *function, const char *resourc
     return start;
 }
 
-Start brought_start(Instance *instance, const char *function, const char *resources, const char *token,
+Start bundled_start(Instance *instance, const char *function, const char *resources, const char *token,
                     const char *program, Text *tried) {
     if (!prepare(instance, function, resources, token)) return NOT_STARTED;
     Remote *side = side_of(instance);
-    side->brought = true;
+    side->bundled = true;
     Text apart = {0};
     Start start = NO_PYTHON;
     if (shared_memory_open(&side->memory, &apart))

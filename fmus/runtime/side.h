@@ -45,7 +45,7 @@ Start embedded_start(Instance *instance, const char *function, const char *resou
 Start remote_start(Instance *instance, const char *function, const char *resources, const char *token, Text *tried);
 
 /* In the interpreter that the unit brings, `program`; neither embedded nor another process is tried besides. */
-Start brought_start(Instance *instance, const char *function, const char *resources, const char *token,
+Start bundled_start(Instance *instance, const char *function, const char *resources, const char *token,
                     const char *program, Text *tried);
 
 #endif

@@ -2,7 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "brought.h"
+#include "bundled.h"
 #include "log.h"
 #include "platform.h"
 #include "side.h"
@@ -30,24 +30,24 @@ static bool only_a_library_is_chosen(void) {
 }
 
 /* Starts a unit that brings its interpreter: whatever the environment says of other ones. */
-static Start start_brought(Instance *instance, const char *function, const char *resources, const char *token,
-                           bool *is_brought) {
+static Start start_bundled(Instance *instance, const char *function, const char *resources, const char *token,
+                           bool *is_bundled) {
     Text tried = {0};
     char *program;
     Start start = NO_PYTHON;
-    Brought brought = brought_interpreter(resources, &program, &tried);
-    *is_brought = brought != BRINGS_NONE;
-    if (brought == BRINGS_ONE) start = brought_start(instance, function, resources, token, program, &tried);
-    if (*is_brought && start == NO_PYTHON) refuse(instance, function, "%s", text_of(&tried));
+    Bundle bundled = bundled_interpreter(resources, &program, &tried);
+    *is_bundled = bundled != NO_BUNDLE;
+    if (bundled == BUNDLED) start = bundled_start(instance, function, resources, token, program, &tried);
+    if (*is_bundled && start == NO_PYTHON) refuse(instance, function, "%s", text_of(&tried));
     free(program);
     text_clear(&tried);
     return start;
 }
 
 bool slave_start(Instance *instance, const char *function, const char *resources, const char *token) {
-    bool here, apart, is_brought;
-    Start own = start_brought(instance, function, resources, token, &is_brought);
-    if (is_brought) return own == STARTED;
+    bool here, apart, is_bundled;
+    Start own = start_bundled(instance, function, resources, token, &is_bundled);
+    if (is_bundled) return own == STARTED;
     if (!read_ways(instance, function, &here, &apart)) return false;
     Text tried = {0};
     Start start = NO_PYTHON;

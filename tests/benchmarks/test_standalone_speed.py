@@ -26,19 +26,19 @@ def test_start_and_step(benchmark: BenchmarkFixture, tmp_path: Path, name: str):
     """The unit with its interpreter in a folder that has none, and as it usually is, by turns."""
     entry = UNITS[name]
     root = BareFolder(tmp_path / "root")
-    brought, plain = root.unpack(build(entry, 3, tmp_path, standalone=True)), root.unpack(cached(name, 3))
+    bundled, plain = root.unpack(build(entry, 3, tmp_path, standalone=True)), root.unpack(cached(name, 3))
     starts: list[float] = []
-    steps: dict[str, list[float]] = {"brought": [], "plain": []}
+    steps: dict[str, list[float]] = {"bundled": [], "plain": []}
 
     def measure() -> None:
-        inside = root.step(brought, float(entry.step), 500, inside=True)
+        inside = root.step(bundled, float(entry.step), 500, inside=True)
         outside = root.step(plain, float(entry.step), 500, inside=False)
         starts.append(inside.figure(r"started in ([\d.]+) s"))
-        for kind, stepped in (("brought", inside), ("plain", outside)):
+        for kind, stepped in (("bundled", inside), ("plain", outside)):
             steps[kind].append(stepped.figure(r"([\d.]+) us a step"))
 
     benchmark.pedantic(measure, rounds=ROUNDS if benchmark.enabled else 1)
-    apart, within = (float(np.median(steps[kind])) for kind in ("brought", "plain"))
+    apart, within = (float(np.median(steps[kind])) for kind in ("bundled", "plain"))
     print(
         f"\n{name}: starts in {np.median(starts):.2f} s ({np.max(starts):.2f} at most), {apart:.1f} us a step; "
         f"{within:.1f} us in the host's process, {apart - within:.1f} more"

@@ -113,8 +113,8 @@ def test_an_instance_that_hangs_is_ended_when_its_time_is_over(host: CtypesHost,
 
 def test_on_another_platform_it_says_so(fmu: Path):
     host = CtypesHost(fmu, 3)
-    brought = host.folder / "resources" / "standalone" / host_platform()
-    brought.rename(brought.with_name("riscv64-linux"))
+    bundled = host.folder / "resources" / "standalone" / host_platform()
+    bundled.rename(bundled.with_name("riscv64-linux"))
     assert not host.instantiate()
     assert "brings its interpreter for another platform than this one" in host.log[-1]
     host.close()

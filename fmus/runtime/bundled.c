@@ -1,4 +1,4 @@
-#include "brought.h"
+#include "bundled.h"
 
 #include "platform.h"
 
@@ -22,22 +22,22 @@
 
 static bool exists(const Text *path) { return platform_exists(text_of(path)); }
 
-Brought brought_interpreter(const char *resources, char **program, Text *fault) {
+Bundle bundled_interpreter(const char *resources, char **program, Text *fault) {
     Text folder = {0}, path = {0};
-    Brought brought = BRINGS_NONE;
+    Bundle bundled = NO_BUNDLE;
     text_add(&folder, "%s/standalone", resources);
     text_add(&path, "%s/" PLATFORM "/" PROGRAM, text_of(&folder));
     *program = NULL;
     if (exists(&path)) {
-        brought = platform_make_executable(text_of(&path), fault) ? BRINGS_ONE : BRINGS_OTHER;
-        if (brought == BRINGS_ONE) *program = copy_of(text_of(&path));
+        bundled = platform_make_executable(text_of(&path), fault) ? BUNDLED : UNUSABLE_BUNDLE;
+        if (bundled == BUNDLED) *program = copy_of(text_of(&path));
     } else if (exists(&folder)) {
-        brought = BRINGS_OTHER;
+        bundled = UNUSABLE_BUNDLE;
         text_add(fault, "the unit brings its interpreter for another platform than this one, " PLATFORM ": there is no "
                         "%s. Cure: take the unit that was built here, or one that was built without --standalone",
                  text_of(&path));
     }
     text_clear(&folder);
     text_clear(&path);
-    return brought;
+    return bundled;
 }
