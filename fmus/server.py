@@ -94,7 +94,7 @@ class Server:
         self._memory = mmap.mmap(-1, 1)
         self._explain: Callable[[BaseException], str] = _trace
         self._methods: dict[bytes, Callable[..., Any]] = {}
-        self._slave: Any = None
+        self._slave: Any = None  # nothing that it or `_methods` refers to may refer to this object
 
     def run(self) -> None:
         """Execute calls until the host closes the channel."""
@@ -119,7 +119,9 @@ class Server:
     def _find(self, method: bytes) -> Callable[..., Any]:
         if method not in self._methods:
             name = method.rstrip(b"\0").decode()
-            self._methods[method] = self._start if name == "start" else getattr(self._slave, name)
+            if name == "start":
+                return self._start
+            self._methods[method] = getattr(self._slave, name)
         return self._methods[method]
 
     def _start(self, wanted: bytes) -> bytes:
