@@ -35,6 +35,9 @@ ANSWERED, REFUSED, RAISED = 0, 1, 2
 PATIENCE = 5.0
 """Seconds that a call may take to return once the host has ended."""
 
+LOOK_AFTER = 500
+"""How often it is looked whether the host is there, ms."""
+
 _starting = threading.Lock()  # `runpy` works for one thread at a time
 
 
@@ -174,13 +177,17 @@ def _close_all_but(kept: tuple[int, ...]) -> None:
                     continue
 
 
-def _end_with_the_host(number: int) -> None:
-    """End the process when the host has closed the channel: a block that never returns must not outlive the host."""
+def _end_with_the_host(host: int, number: int) -> None:
+    """End the process when the host has closed the channel, or has ended while a fork of it keeps the channel open.
+
+    A block that never returns must not outlive the host.
+    """
     select: Any = _module("select")
     poller = select.poll()
     poller.register(number, 0)  # hang-ups are reported whatever events are asked for
-    while not any(event & (select.POLLHUP | select.POLLERR) for _, event in poller.poll()):
-        pass
+    while os.getppid() in (host, 0):  # 0: the host is in another namespace of processes, and cannot be seen from here
+        if any(event & (select.POLLHUP | select.POLLERR) for _, event in poller.poll(LOOK_AFTER)):
+            break
     threading.Event().wait(PATIENCE)
     os._exit(1)
 
@@ -217,20 +224,19 @@ def _serve(channel: int, memory: int) -> None:
 def main() -> None:
     """Serve the host.
 
-    The arguments are this script and numbers: of the channel and of the shared memory, or of a socket by which the host
-    sends both for each instance that it makes of the unit.
+    The arguments are this script and numbers: of the host's process, then of the channel and the shared memory, or of a
+    socket by which the host sends both for each instance that it makes of the unit.
     """
-    numbers = tuple(int(number) for number in sys.argv[2:])
+    host, *numbers = (int(number) for number in sys.argv[2:])
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the host's to handle
     sys.argv[1:] = []
     if sys.platform != "win32":  # on Windows the host's job object ends this process
         _close_all_but((0, 1, 2, *numbers))
+        threading.Thread(target=_end_with_the_host, args=(host, numbers[0]), daemon=True).start()
     if len(numbers) == 1:
         _serve_instances(numbers[0])
         return
     channel, memory = numbers
-    if sys.platform != "win32":
-        threading.Thread(target=_end_with_the_host, args=(channel,), daemon=True).start()
     Server(Channel(channel), memory).run()
 
 

@@ -16,15 +16,17 @@ typedef enum {
     TOO_LATE /* the deadline passed */
 } Transfer;
 
-/* Starts `interpreter arguments... CHANNEL MEMORY`: the last two, numbers, are its ends of the channel and of the shared
- * memory (descriptors; on Windows handles). It inherits nothing else but, on POSIX, standard output and standard error.
+/* Starts `interpreter arguments... HOST CHANNEL MEMORY`: the last three, numbers, are the host's process, with which it
+ * ends, and its ends of the channel and of the shared memory (descriptors; on Windows handles). It inherits nothing else but, on POSIX, standard output and standard error.
  * On failure returns NULL and adds why to `fault`. */
 Process *process_start(const char *interpreter, const char *const arguments[], const SharedMemory *memory, Text *fault);
 
 /* The same for a unit that brings its interpreter, of which one process serves all instances that this host makes: it is
- * started with the first as `program arguments... CONTROL`, and ends with the last. Neither the host's PYTHONHOME nor
- * its LD_LIBRARY_PATH reach it. On Windows each instance has a process of its own. */
-Process *process_join(const char *program, const char *const arguments[], const SharedMemory *memory, Text *fault);
+ * started with the first as `program arguments... HOST CONTROL`, and ends with the last. A unit is the same if its token
+ * and the program's file are. Of the host's environment the process gets only where it may write. On Windows each
+ * instance has a process of its own. */
+Process *process_join(const char *program, const char *token, const char *const arguments[], const SharedMemory *memory,
+                      Text *fault);
 
 /* Seconds of a monotonic clock. */
 double process_clock(void);

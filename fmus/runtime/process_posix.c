@@ -9,6 +9,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <spawn.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -30,6 +31,7 @@ extern char **environ;
 #define CHANNEL 3 /* the descriptors' numbers in the process */
 #define MEMORY 4
 #define MOST_ARGUMENTS 8
+#define MOST_VARIABLES 3
 #define LOOK_AFTER 500 /* ms: how often a silent process is looked after; one that it made may hold the channel open */
 
 double process_clock(void) {
@@ -70,23 +72,20 @@ static void set_attributes(posix_spawnattr_t *attributes) {
     posix_spawnattr_setsigdefault(attributes, &all);
 }
 
-/* Variables by which an interpreter or the dynamic linker would look elsewhere. */
-static bool leads_astray(const char *variable) {
-    const char *prefixes[] = {"PYTHON", "LD_", "DYLD_", "_PYI_", "_MEIPASS"};
-    for (size_t i = 0; i < sizeof prefixes / sizeof *prefixes; i++)
-        if (strncmp(variable, prefixes[i], strlen(prefixes[i])) == 0) return true;
-    return false;
-}
-
-/* The host's environment without them, whose strings are the host's; `libraries`, the first, is where the program's lie. */
-static char **own_environment(const char *libraries) {
-    size_t n = 0, kept = 0;
-    while (environ[n]) n++;
-    char **variables = calloc(n + 2, sizeof *variables);
-    if (variables) variables[kept++] = (char *)libraries;
-    for (size_t i = 0; variables && i < n; i++)
-        if (!leads_astray(environ[i])) variables[kept++] = environ[i];
-    return variables;
+/* Fills the environment of a bundled program, whose strings are the host's: `libraries`, where its own lie, and of the
+ * host's variables those that say where it may write. All others could change what the unit computes, such as a search
+ * path, a locale, or the settings of a package. */
+static void fill_environment(char *variables[MOST_VARIABLES + 1], const char *libraries) {
+    const char *passed_on[] = {"HOME=", "TMPDIR="};
+    size_t n = 0;
+    variables[n++] = (char *)libraries;
+    for (size_t k = 0; k < sizeof passed_on / sizeof *passed_on; k++)
+        for (char **variable = environ; variable && *variable; variable++)
+            if (strncmp(*variable, passed_on[k], strlen(passed_on[k])) == 0) {
+                variables[n++] = *variable;
+                break;
+            }
+    variables[n] = NULL;
 }
 
 /* `channel` and `memory` are not among the numbers that they get: dup2 onto itself would not let them be inherited. */
@@ -112,19 +111,26 @@ static int spawn(pid_t *id, const char *program, char *const arguments[], int ch
     return fault;
 }
 
-/* Puts the arguments and the numbers of the descriptors into `list`, which has room for MOST_ARGUMENTS and four more. */
-static void list_arguments(char *list[], const char *program, const char *const arguments[], bool with_memory) {
+typedef struct {
+    char *list[MOST_ARGUMENTS + 5]; /* the program, its arguments, three numbers, NULL */
+    char host[24];
+} Command;
+
+/* Adds the numbers of this process and of the descriptors to the arguments. */
+static void fill_command(Command *command, const char *program, const char *const arguments[], bool with_memory) {
     int n = 0;
-    list[n++] = (char *)program;
-    for (; *arguments && n <= MOST_ARGUMENTS; arguments++) list[n++] = (char *)*arguments;
-    list[n++] = "3";
-    list[n++] = with_memory ? "4" : NULL;
-    list[n] = NULL;
+    snprintf(command->host, sizeof command->host, "%ld", (long)getpid());
+    command->list[n++] = (char *)program;
+    for (; *arguments && n <= MOST_ARGUMENTS; arguments++) command->list[n++] = (char *)*arguments;
+    command->list[n++] = command->host;
+    command->list[n++] = "3";
+    command->list[n++] = with_memory ? "4" : NULL;
+    command->list[n] = NULL;
 }
 
 Process *process_start(const char *interpreter, const char *const arguments[], const SharedMemory *memory, Text *fault) {
-    char *list[MOST_ARGUMENTS + 4];
-    list_arguments(list, interpreter, arguments, true);
+    Command command;
+    fill_command(&command, interpreter, arguments, true);
     int ends[2];
     if (!process_open_channel(ends)) {
         text_add(fault, "no channel to it: %s", strerror(errno));
@@ -133,7 +139,7 @@ Process *process_start(const char *interpreter, const char *const arguments[], c
     int channel = fcntl(ends[1], F_DUPFD_CLOEXEC, 10), shared = fcntl((int)memory->file, F_DUPFD_CLOEXEC, 10);
     Process *process = calloc(1, sizeof *process);
     int why = channel < 0 || shared < 0 ? errno : process ? 0 : ENOMEM;
-    if (!why) why = spawn(&process->id, interpreter, list, channel, shared, environ);
+    if (!why) why = spawn(&process->id, interpreter, command.list, channel, shared, environ);
     close(ends[1]);
     if (channel >= 0) close(channel);
     if (shared >= 0) close(shared);
@@ -149,8 +155,8 @@ Process *process_start(const char *interpreter, const char *const arguments[], c
 }
 
 bool process_start_alone(const char *program, const char *const arguments[], pid_t *id, int *control, Text *fault) {
-    char *list[MOST_ARGUMENTS + 4];
-    list_arguments(list, program, arguments, false);
+    Command command;
+    fill_command(&command, program, arguments, false);
     int ends[2];
     if (!process_open_channel(ends)) {
         text_add(fault, "no channel to it: %s", strerror(errno));
@@ -158,11 +164,10 @@ bool process_start_alone(const char *program, const char *const arguments[], pid
     }
     Text libraries = {0}; /* the program is linked to some that it brings */
     text_add(&libraries, "LD_LIBRARY_PATH=%.*s/_internal", (int)(strrchr(program, '/') - program), program);
-    char **environment = own_environment(text_of(&libraries));
+    char *environment[MOST_VARIABLES + 1];
+    fill_environment(environment, text_of(&libraries));
     int channel = fcntl(ends[1], F_DUPFD_CLOEXEC, 10);
-    int why = channel < 0 ? errno : environment ? 0 : ENOMEM;
-    if (!why) why = spawn(id, program, list, channel, -1, environment);
-    free(environment);
+    int why = channel < 0 ? errno : spawn(id, program, command.list, channel, -1, environment);
     text_clear(&libraries);
     close(ends[1]);
     if (channel >= 0) close(channel);

@@ -22,7 +22,8 @@ Life process_life(pid_t id);
 /* Two ends of a channel that no process inherits by accident. */
 bool process_open_channel(int ends[2]);
 
-/* Starts `program arguments... CONTROL`, `program` being a path; neither the host's PYTHONHOME nor its LD_LIBRARY_PATH reach it. */
+/* Starts `program arguments... HOST CONTROL`, `program` being a path; of the host's environment only HOME and TMPDIR reach
+ * it. */
 bool process_start_alone(const char *program, const char *const arguments[], pid_t *id, int *control, Text *fault);
 
 /* Waits, kills what is left of the process's group, and gives how it ended; false if the host has reaped it itself. */

@@ -1,27 +1,27 @@
 /* One process for all instances that a host makes of a unit that brings its interpreter: what that takes of memory does
  * not multiply. Each instance has a channel and a memory of its own, which are handed over by the control channel.
  */
-#ifdef _WIN32
-#include "process.h"
-
-Process *process_join(const char *program, const char *const arguments[], const SharedMemory *memory, Text *fault) {
-    return process_start(program, arguments, memory, fault); /* each instance has a process of its own here */
-}
-
-#else
+#ifndef _WIN32
 #define _GNU_SOURCE
 #include <errno.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "process_posix.h"
 
+#ifdef __APPLE__
+#define CHANGED st_ctimespec
+#else
+#define CHANGED st_ctim
+#endif
+
 struct SharedProcess {
-    char *program;
+    char *unit; /* see identity() */
     pid_t id, host;
     int control;
     size_t instances;
@@ -40,24 +40,37 @@ static void lock(void) {
 
 static void unlock(void) { atomic_flag_clear(&taken); }
 
+/* What instances of one unit have in common. Another unit that is unpacked to the same place has another token, or, of the
+ * same sources with other packages, a program that was changed at another time. */
+static char *identity(const char *program, const char *token) {
+    Text text = {0};
+    struct stat facts = {0};
+    stat(program, &facts);
+    text_add(&text, "%s\n%s\n%llu %llu %lld.%09ld", program, token, (unsigned long long)facts.st_dev,
+             (unsigned long long)facts.st_ino, (long long)facts.CHANGED.tv_sec, (long)facts.CHANGED.tv_nsec);
+    char *copy = copy_of(text_of(&text));
+    text_clear(&text);
+    return copy;
+}
+
 /* One that runs; those of a host that forked this one are that host's. */
-static SharedProcess *find(const char *program) {
+static SharedProcess *find(const char *unit) {
     for (SharedProcess *one = all; one; one = one->next)
-        if (one->host == getpid() && !one->is_over && strcmp(one->program, program) == 0 && process_life(one->id) == RUNS)
+        if (one->host == getpid() && !one->is_over && strcmp(one->unit, unit) == 0 && process_life(one->id) == RUNS)
             return one;
     return NULL;
 }
 
-static SharedProcess *begin(const char *program, const char *const arguments[], Text *fault) {
+/* Takes `unit` over. */
+static SharedProcess *begin(char *unit, const char *program, const char *const arguments[], Text *fault) {
     SharedProcess *one = calloc(1, sizeof *one);
-    char *name = copy_of(program);
-    if (one && name && process_start_alone(program, arguments, &one->id, &one->control, fault)) {
-        one->program = name;
+    if (one && process_start_alone(program, arguments, &one->id, &one->control, fault)) {
+        one->unit = unit;
         one->host = getpid();
         one->next = all;
         return all = one;
     }
-    free(name);
+    free(unit);
     free(one);
     return NULL;
 }
@@ -89,7 +102,7 @@ static void drop(SharedProcess *one) {
             *place = one->next;
             break;
         }
-    free(one->program);
+    free(one->unit);
     free(one);
 }
 
@@ -100,7 +113,8 @@ static void end(SharedProcess *one, double patience) {
     one->has_status = process_reap(one->id, patience, &one->status);
 }
 
-Process *process_join(const char *program, const char *const arguments[], const SharedMemory *memory, Text *fault) {
+Process *process_join(const char *program, const char *token, const char *const arguments[], const SharedMemory *memory,
+                      Text *fault) {
     int ends[2] = {-1, -1};
     Process *process = calloc(1, sizeof *process);
     if (!process || !process_open_channel(ends)) {
@@ -108,9 +122,11 @@ Process *process_join(const char *program, const char *const arguments[], const 
         free(process);
         return NULL;
     }
+    char *unit = identity(program, token);
     lock();
-    SharedProcess *shared = find(program);
-    if (!shared) shared = begin(program, arguments, fault);
+    SharedProcess *shared = unit ? find(unit) : NULL;
+    if (shared) free(unit);
+    else if (unit) shared = begin(unit, program, arguments, fault);
     bool joined = shared && hand_over(shared->control, ends[1], (int)memory->file);
     if (shared && !joined) text_add(fault, "it takes no instance: %s", strerror(errno));
     if (joined) {

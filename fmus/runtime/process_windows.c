@@ -10,6 +10,7 @@
 
 #define PIPE_BUFFER 65536
 #define LONGEST_COMMAND 32768 /* characters: CreateProcess's own limit */
+#define ENVIRONMENT 32768     /* characters */
 
 struct Process {
     HANDLE process, channel, done; /* `done` is the event of the transfer under way */
@@ -53,7 +54,8 @@ static wchar_t *command_line(const char *interpreter, const char *const argument
     Text command = {0}, numbers = {0};
     add_argument(&command, interpreter);
     for (; *arguments; arguments++) add_argument(&command, *arguments);
-    text_add(&numbers, " %llu %llu", (unsigned long long)(uintptr_t)channel, (unsigned long long)(uintptr_t)memory);
+    text_add(&numbers, " %lu %llu %llu", GetCurrentProcessId(), (unsigned long long)(uintptr_t)channel,
+             (unsigned long long)(uintptr_t)memory);
     text_add(&command, "%s", text_of(&numbers));
     wchar_t *line = calloc(LONGEST_COMMAND, sizeof *line);
     if (line && !MultiByteToWideChar(CP_UTF8, 0, text_of(&command), -1, line, LONGEST_COMMAND)) *line = 0;
@@ -62,7 +64,26 @@ static wchar_t *command_line(const char *interpreter, const char *const argument
     return line;
 }
 
-static bool create(wchar_t *line, HANDLE handles[2], PROCESS_INFORMATION *made) {
+/* The environment of a bundled program: of the host's variables those that say where the system is and where the program
+ * may write, in the order that Windows wants. All others could change what the unit computes. */
+static wchar_t *bundled_environment(void) {
+    const wchar_t *passed_on[] = {L"LOCALAPPDATA", L"SYSTEMROOT", L"TEMP", L"TMP", L"USERPROFILE"};
+    wchar_t *block = calloc(ENVIRONMENT, sizeof *block), *end = block;
+    for (size_t i = 0; block && i < sizeof passed_on / sizeof *passed_on; i++) {
+        wchar_t *value = end + wcslen(passed_on[i]) + 1;
+        if (value + 2 >= block + ENVIRONMENT) break;
+        DWORD room = (DWORD)(block + ENVIRONMENT - value - 1), n = GetEnvironmentVariableW(passed_on[i], value, room);
+        if (n == 0 || n >= room) continue;
+        wcscpy(end, passed_on[i]);
+        value[-1] = L'=';
+        end = value + n + 1;
+    }
+    if (block) end[0] = end[1] = 0;
+    return block;
+}
+
+/* `environment` NULL: the host's. */
+static bool create(wchar_t *line, HANDLE handles[2], wchar_t *environment, PROCESS_INFORMATION *made) {
     SIZE_T size = 0;
     STARTUPINFOEXW startup = {.StartupInfo.cb = sizeof startup};
     InitializeProcThreadAttributeList(NULL, 1, 0, &size);
@@ -73,8 +94,9 @@ static bool create(wchar_t *line, HANDLE handles[2], PROCESS_INFORMATION *made) 
         UpdateProcThreadAttribute(startup.lpAttributeList, 0, PROC_THREAD_ATTRIBUTE_HANDLE_LIST, handles,
                                   2 * sizeof *handles, NULL, NULL) &&
         CreateProcessW(NULL, line, NULL, NULL, TRUE,
-                       EXTENDED_STARTUPINFO_PRESENT | CREATE_NO_WINDOW | CREATE_SUSPENDED | CREATE_NEW_PROCESS_GROUP,
-                       NULL, NULL, &startup.StartupInfo, made);
+                       EXTENDED_STARTUPINFO_PRESENT | CREATE_NO_WINDOW | CREATE_SUSPENDED | CREATE_NEW_PROCESS_GROUP |
+                           CREATE_UNICODE_ENVIRONMENT,
+                       environment, NULL, &startup.StartupInfo, made);
     DWORD why = GetLastError();
     DeleteProcThreadAttributeList(startup.lpAttributeList);
     free(startup.lpAttributeList);
@@ -92,7 +114,8 @@ static HANDLE job_of(HANDLE process) {
     return job;
 }
 
-Process *process_start(const char *interpreter, const char *const arguments[], const SharedMemory *memory, Text *fault) {
+static Process *start(const char *program, const char *const arguments[], const SharedMemory *memory,
+                      wchar_t *environment, Text *fault) {
     HANDLE ours, theirs, shared = NULL;
     if (!open_channel(&ours, &theirs)) {
         text_add(fault, "no channel to it, code %lu", GetLastError());
@@ -100,10 +123,10 @@ Process *process_start(const char *interpreter, const char *const arguments[], c
     }
     HANDLE here = GetCurrentProcess();
     DuplicateHandle(here, (HANDLE)memory->file, here, &shared, 0, TRUE, DUPLICATE_SAME_ACCESS);
-    wchar_t *line = command_line(interpreter, arguments, theirs, shared);
+    wchar_t *line = command_line(program, arguments, theirs, shared);
     PROCESS_INFORMATION made = {0};
     Process *process = calloc(1, sizeof *process);
-    bool created = process && line && create(line, (HANDLE[]){theirs, shared}, &made);
+    bool created = process && line && create(line, (HANDLE[]){theirs, shared}, environment, &made);
     if (!created) text_add(fault, "CreateProcess failed with code %lu", GetLastError());
     free(line);
     CloseHandle(theirs);
@@ -119,6 +142,19 @@ Process *process_start(const char *interpreter, const char *const arguments[], c
                          .job = job_of(made.hProcess)};
     ResumeThread(made.hThread);
     CloseHandle(made.hThread);
+    return process;
+}
+
+Process *process_start(const char *interpreter, const char *const arguments[], const SharedMemory *memory, Text *fault) {
+    return start(interpreter, arguments, memory, NULL, fault);
+}
+
+Process *process_join(const char *program, const char *token, const char *const arguments[], const SharedMemory *memory,
+                      Text *fault) {
+    (void)token; /* each instance has a process of its own here */
+    wchar_t *environment = bundled_environment();
+    Process *process = environment ? start(program, arguments, memory, environment, fault) : NULL;
+    free(environment);
     return process;
 }
 

@@ -152,7 +152,7 @@ static Start begin(Instance *instance, const char *function, Text *fault) {
     Text script = {0}, wanted = {0};
     text_add(&script, "%s/sources/handover/fmus/server.py", side->resources);
     const char *arguments[] = {"-E", "-u", "-X", "utf8", "-c", BEGINNING, text_of(&script), NULL};
-    side->process = side->bundled ? process_join(side->interpreter, arguments + 6, &side->memory, fault)
+    side->process = side->bundled ? process_join(side->interpreter, side->token, arguments + 6, &side->memory, fault)
                                   : process_start(side->interpreter, arguments, &side->memory, fault);
     text_clear(&script);
     if (!side->process) return NO_PYTHON;

@@ -2,7 +2,10 @@
 
 import copy
 import ctypes
+import json
 import os
+import signal
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +14,7 @@ import pytest
 from ctypes_host import ERROR, OK, SIZE, CtypesHost, Log3
 from sample_units.trouble import Deed
 
-from handover.fmus.build import build
+from handover.fmus.build import build, build_block
 from handover.fmus.catalog import own_unit
 from handover.fmus.compile import host_platform
 
@@ -21,6 +24,18 @@ pytestmark = [
 ]
 
 DT = 1 / 64
+OF_THE_HOST = "/of/the/host"
+"""A value of environment variables."""
+VARIABLES = (
+    "PYTHONHOME",
+    "PYTHONPATH",
+    "LD_PRELOAD",
+    "LD_LIBRARY_PATH",
+    "PATH",
+    "LC_ALL",
+    "MPLBACKEND",
+    "OMP_NUM_THREADS",
+)
 
 
 @pytest.fixture(scope="module")
@@ -109,6 +124,58 @@ def test_an_instance_that_hangs_is_ended_when_its_time_is_over(host: CtypesHost,
     assert "was ended, as it did not answer another instance of the unit in time" in second.log[-1]
     free(first)
     free(second)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads the process's environment in /proc")
+def test_no_variable_of_the_host_reaches_it_but_where_it_may_write(
+    host: CtypesHost, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    for name in VARIABLES:
+        monkeypatch.setenv(name, OF_THE_HOST)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    first = instance(host)
+    given = Path(f"/proc/{process(first)}/environ").read_bytes().decode()
+    free(first)
+    assert OF_THE_HOST not in given
+    assert f"HOME={tmp_path}\0" in given
+    assert not {line.partition("=")[0] for line in given.split("\0")} & set(VARIABLES) - {"LD_LIBRARY_PATH"}
+
+
+def test_another_unit_at_the_same_place_does_not_meet_the_process_of_the_one_before(fmu: Path):
+    host = CtypesHost(fmu, 3)
+    first = instance(host)
+    program = host.folder / "resources" / "standalone" / host_platform() / "unit"
+    content, mode = program.read_bytes(), program.stat().st_mode
+    program.unlink()  # unpacked again: the same sources, perhaps with other packages
+    program.write_bytes(content)
+    program.chmod(mode)
+    second = instance(host)
+    facts = host.folder / "resources" / "unit.json"
+    host.token = "{another}"
+    facts.write_text(json.dumps({**json.loads(facts.read_text()), "token": host.token}))
+    third, fourth = instance(host), instance(host)
+    assert len({process(each) for each in (first, second, third)}) == 3
+    assert process(third) == process(fourth)
+    for each in (first, second, third, fourth):
+        assert each.step(DT, DT) == OK, each.log
+        free(each)
+    host.close()
+
+
+@pytest.mark.parametrize("standalone", [True, False])
+def test_it_ends_with_a_host_of_which_a_fork_lives_on(fmu: Path, tmp_path: Path, standalone: bool):
+    unit = fmu if standalone else build_block("sample_units.trouble:Trouble", 3, tmp_path)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "FMU_PYTHON_PROCESS": "1"}
+    command = [sys.executable, str(Path(__file__).with_name("forking_host.py")), str(unit)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as host:
+        assert host.stdout
+        fork = int(host.stdout.readline())
+        try:
+            host.kill()
+            assert host.communicate(timeout=20)[0] == ""  # ends when the unit's process does, which has the pipe, too
+            assert is_alive(fork)
+        finally:
+            os.kill(fork, signal.SIGKILL)
 
 
 def test_on_another_platform_it_says_so(fmu: Path):
