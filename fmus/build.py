@@ -24,14 +24,15 @@ from handover.cosim.fmu.file.archive import FmuArchive, write_archive
 from handover.fmus import interpreter
 from handover.fmus.binaries import binaries
 from handover.fmus.catalog import Entry, find_unit, import_class
-from handover.fmus.compile import cache_folder, host_platform, named_platforms
+from handover.fmus.compile import cache_folder, host_platform
 from handover.fmus.documentation import page
 from handover.fmus.fmi2_description import fmi2_description
 from handover.fmus.fmi3_description import fmi3_description
 from handover.fmus.layout import Form, Layout
 from handover.fmus.model_description import Model
 from handover.fmus.sources import Carried, beside_block, closure
-from handover.fmus.standalone import CannotFreeze, frozen, try_unit
+from handover.fmus.standalone.freezer import PROGRAM, check_standalone, frozen
+from handover.fmus.standalone.trial import try_unit
 
 _log = logging.getLogger(__name__)
 
@@ -168,9 +169,9 @@ def build(
         NotCompiled: there is no runtime and no compiler.
     """
     form = _form(fmi, scalar=scalar)
+    if standalone:
+        check_standalone(platforms)
     carried = closure(entry.block)
-    if standalone and platforms and set(named_platforms(platforms)) != {host_platform()}:
-        raise CannotFreeze(f"an interpreter can be frozen for this machine's platform only, {host_platform()}")
     if not (entry.name.isidentifier() and entry.name.isascii()):
         raise InvalidName(entry.name)
     _check_step(entry.step)
@@ -201,7 +202,8 @@ def build(
         try_unit(entry.name, files, model.token, float(entry.step))
     else:
         files["resources/python.txt"] = os.fsencode(interpreter.describe())
-    return write_archive(out_dir / file_name(entry.name, form, standalone=standalone), files)
+    programs = [f"resources/standalone/{host_platform()}/{PROGRAM}"] if standalone else []
+    return write_archive(out_dir / file_name(entry.name, form, standalone=standalone), files, programs)
 
 
 def _check_step(step: object) -> None:

@@ -34,6 +34,14 @@ class HostError(Exception):
     is_refusal = True
 
 
+class MissingPackages(HostError):
+    """The Python that runs the FMU does not have packages that it needs: the distributions `missing`."""
+
+    def __init__(self, message: str, missing: Sequence[str]) -> None:
+        super().__init__(message)
+        self.missing = missing
+
+
 class MissingSource(ModuleNotFoundError):
     """The FMU itself lacks a module; logged without a traceback."""
 
@@ -114,11 +122,12 @@ def _require(unit: dict[str, Any], resources: str) -> None:
     if missing:
         names = ", ".join(f"{p['distribution']} (built with version {p['version']})" for p in missing)
         wanted = " ".join(f"{p['distribution']}=={p['version']}" for p in missing)
-        raise HostError(
+        raise MissingPackages(
             f"unit {unit['unit']} needs packages that this Python does not have: {names}."
             f" This is Python {sys.version.split()[0]}, prefix {sys.prefix}, executable {sys.executable or 'unknown'}."
             f" Cure: install them into it, for instance with `python -m pip install {wanted}`,"
-            " or choose another Python with the environment variable FMU_PYTHON (hosts that are not Python)."
+            " or choose another Python with the environment variable FMU_PYTHON (hosts that are not Python).",
+            [p["distribution"] for p in missing],
         )
 
 

@@ -57,12 +57,12 @@ class Carried:
 
     def packages(self) -> list[Package]:
         """Return the environment's packages with their versions; modules of no distribution are left out."""
-        named = [(module, name) for module in self.modules for name in _distributions().get(module, [])[:1]]
+        named = [(module, name) for module in self.modules for name in distributions_by_module().get(module, [])[:1]]
         return [Package(module, name, metadata.version(name)) for module, name in named]
 
 
 @cache
-def _distributions() -> dict[str, list[str]]:
+def distributions_by_module() -> dict[str, list[str]]:
     """Return distributions by top-level module; `packages_distributions` of Python 3.10 misses most of them."""
     by_module: dict[str, set[str]] = {}
     for distribution in metadata.distributions():

@@ -14,7 +14,7 @@ import uuid
 import zipfile
 import zlib
 from collections import defaultdict
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Collection, Generator, Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import ClassVar
 
@@ -280,8 +280,17 @@ class FmuArchive:
         try:
             with zipfile.ZipFile(self.path) as z:
                 z.extractall(folder)
+                for member in z.infolist():
+                    if (member.external_attr >> 16) & stat.S_IXUSR and not member.is_dir():
+                        _make_executable(folder / member.filename)
         except _DAMAGE as e:
             raise InvalidFmu(self.path, f"cannot be unpacked: {one_line(e)}") from e
+
+
+def _make_executable(file: Path) -> None:
+    """Let those execute a file who may read it; `zipfile` leaves that out."""
+    mode = file.stat().st_mode
+    file.chmod(mode | (mode & 0o444) >> 2)
 
 
 def folder_fault(description_name: str = DESCRIPTION) -> str:
@@ -322,13 +331,15 @@ _UNIX = 3
 """The system that created the members, so that their permissions count."""
 
 
-def write_archive(path: Path, files: Mapping[str, bytes]) -> Path:
+def write_archive(path: Path, files: Mapping[str, bytes], programs: Collection[str] = ()) -> Path:
     """Write a zip file whose bytes depend on the files' names and contents alone.
+
+    `programs` are those of the names that may be executed, besides all in `binaries`.
 
     It appears complete or not at all, also where the machine goes down, so two processes may write the same file at the
     same time.
     """
-    content = _packed(files)
+    content = _packed(files, programs)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}-{uuid.uuid4().hex}")
     try:
@@ -344,7 +355,7 @@ def write_archive(path: Path, files: Mapping[str, bytes]) -> Path:
     return path
 
 
-def _packed(files: Mapping[str, bytes]) -> bytes:
+def _packed(files: Mapping[str, bytes], programs: Collection[str]) -> bytes:
     """Return a zip file: members, their directory, its end. It takes 65,535 files, and 4 GiB of each and in all.
 
     Not by `zipfile`: where an exception such as Ctrl-C drops its objects within a member, Python 3.13 reports that they
@@ -358,7 +369,7 @@ def _packed(files: Mapping[str, bytes]) -> bytes:
         flags = 0 if name.isascii() else 0x800  # UTF-8
         sizes = zlib.crc32(content), len(packed), len(content), len(encoded), 0
         facts = struct.pack("<5H3L2H", _VERSION, flags, zipfile.ZIP_DEFLATED, 0, _DATE, *sizes)
-        mode = 0o755 if name.startswith("binaries/") else 0o644
+        mode = 0o755 if name.startswith("binaries/") or name in programs else 0o644
         place = struct.pack("<3H2L", 0, 0, 0, mode << 16, len(members))
         directory += b"PK\1\2" + bytes([_VERSION, _UNIX]) + facts + place + encoded
         members += b"PK\3\4" + facts + encoded + packed

@@ -16,8 +16,8 @@ from handover.fmus.compile import TARGETS, compile_runtime, has_compiler, is_cur
 from handover.fmus.fmi2_description import NoFmi2Form
 from handover.fmus.layout import DuplicateName
 from handover.fmus.model_description import AmbiguousName, InvalidText
-from handover.fmus.sources import FileElsewhere, closure
-from handover.fmus.standalone import CannotFreeze
+from handover.fmus.sources import FileElsewhere, beside_block, closure
+from handover.fmus.standalone.freezer import CannotFreeze, check_standalone
 from handover.scenarios.catalog import search_folder
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
@@ -139,11 +139,27 @@ def build_command(
             raise UsageError("--include is for units of your own, MODULE:CLASS; those of the catalog open no files")
         if step is not None and all(entry in UNITS.values() for entry in entries):
             raise UsageError("--step is for units of your own, MODULE:CLASS; those of the catalog have theirs")
+        _check_what_goes_along(entries, platforms if standalone else None, include)
         _compile_missing(platforms)
         given = {"platforms": platforms or None, "standalone": standalone, "include": include}
         make = partial(build, out_dir=out, scalar=scalar, **given)
         for line in _build_all(entries, fmi, make, out, named=bool(units)):
             click.echo(line)
+
+
+def _check_what_goes_along(
+    entries: Sequence[Entry], standalone_for: Sequence[str] | None, include: Sequence[Path]
+) -> None:
+    """Refuse what --standalone and --include cannot do before anything is compiled."""
+    try:
+        if standalone_for is not None:
+            check_standalone(standalone_for)
+        for entry in entries:
+            beside_block(entry.block, include)
+    except CannotFreeze as e:
+        raise UsageError(f"--standalone: {e}") from e
+    except FileElsewhere as e:
+        raise UsageError(f"--include: {e}") from e
 
 
 def _compile_missing(platforms: Sequence[str]) -> None:
@@ -167,8 +183,6 @@ def _build_all(
                     raise UsageError(str(e)) from e
             except CannotFreeze as e:
                 raise UsageError(f"--standalone: {e}") from e
-            except FileElsewhere as e:
-                raise UsageError(f"--include: {e}") from e
             except (InvalidName, InvalidStep, DuplicateName, AmbiguousName, InvalidText) as e:
                 raise UsageError(f"{entry.block}: {e}") from e
             except OSError as e:

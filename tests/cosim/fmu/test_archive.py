@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from native_units import native_fmu
 
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmu.file.archive import FmuArchive, archive_faults
+from handover.cosim.fmu.file.archive import FmuArchive, archive_faults, write_archive
 from handover.cosim.fmu.file.fmpy_edge import problems_of
 from handover.cosim.master.master import Master
 from handover.cosim.system.system import System
@@ -51,6 +51,15 @@ def test_a_sound_archive_is_unpacked(tmp_path: Path):
     FmuArchive(file).unpack(tmp_path / "target")
     assert (tmp_path / "target" / "resources" / "table.csv").read_bytes() == PLAIN["resources/table.csv"]
     assert (tmp_path / "target" / "binaries" / "x86_64-linux" / "größe.so").read_bytes() == b"x"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="files have no such permission there")
+def test_programs_may_be_executed_after_unpacking(tmp_path: Path):
+    files = {"binaries/unit.so": b"x", "resources/program": b"x", "resources/table.csv": b"x"}
+    file = write_archive(tmp_path / "a.fmu", files, ["resources/program"])
+    FmuArchive(file).unpack(tmp_path / "target")
+    executable = [name for name in files if os.access(tmp_path / "target" / name, os.X_OK)]
+    assert executable == ["binaries/unit.so", "resources/program"]
 
 
 @pytest.mark.parametrize(

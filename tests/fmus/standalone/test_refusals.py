@@ -1,6 +1,7 @@
 """What cannot be given away with an interpreter is told when it is built, and nothing is written."""
 
 import importlib.metadata
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,12 +9,13 @@ import fmpy
 import pytest
 from click.testing import CliRunner
 
-from handover.fmus import standalone
 from handover.fmus.build import build
 from handover.fmus.catalog import UNITS, own_unit
 from handover.fmus.compile import TARGETS, host_platform
 from handover.fmus.sources import FileElsewhere
-from handover.fmus.standalone import CannotFreeze
+from handover.fmus.standalone import freezer
+from handover.fmus.standalone.freezer import CannotFreeze
+from handover.scenarios.cli.units import build as build_units
 from handover.scenarios.cli.units.build import build_command
 
 READER = '''"""A gain out of a table."""
@@ -88,21 +90,37 @@ def refused(*given: str) -> str:
     return result.output
 
 
-@pytest.mark.usefixtures("folder")
-def test_for_another_platform():
+@pytest.fixture
+def compiles_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have no runtime for any platform, and fail where one is compiled."""
+
+    def fail(targets: Sequence[str]) -> None:
+        raise AssertionError(f"the runtime for {targets} is compiled first")
+
+    for name, stand_in in (("is_current", lambda _: False), ("has_compiler", lambda: True), ("compile_runtime", fail)):
+        monkeypatch.setattr(build_units, name, stand_in)
+
+
+@pytest.mark.usefixtures("folder", "compiles_nothing")
+@pytest.mark.parametrize("platforms", ["{other}", "host,{other}", "all"])
+def test_for_another_platform(platforms: str):
     other = next(target for target in TARGETS if target != host_platform())
-    assert f"this machine's platform only, {host_platform()}" in refused("Push", "--standalone", "--platform", other)
+    why = refused("Push", "--standalone", "--platform", platforms.format(other=other))
+    assert f"this machine's platform only, {host_platform()}, since PyInstaller copies" in why
+    assert f"build the unit for {other}" in why
+    assert f"for {host_platform()}" not in why
 
 
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("folder", "compiles_nothing")
 def test_without_pyinstaller(monkeypatch: pytest.MonkeyPatch):
     def version(name: str) -> str:
         if name == "pyinstaller":
             raise importlib.metadata.PackageNotFoundError
         return "1"
 
-    monkeypatch.setattr(standalone.importlib.metadata, "version", version)
-    assert 'Cure: pip install "handover-cosim[standalone]"' in refused("Push", "--standalone", "--fmi", "3")
+    monkeypatch.setattr(freezer.importlib.metadata, "version", version)
+    cure = 'Cure: pip install "handover-cosim[standalone]"'
+    assert cure in refused("Push", "--standalone", "--fmi", "3", "--platform", "host")
 
 
 def test_a_file_elsewhere_or_of_a_unit_of_the_catalog(folder: Path, tmp_path: Path):
@@ -113,6 +131,12 @@ def test_a_file_elsewhere_or_of_a_unit_of_the_catalog(folder: Path, tmp_path: Pa
         with pytest.raises(FileElsewhere, match="the folder of the block's module"):
             build(own_unit(block, None), 3, tmp_path, include=[file])
     assert "--include is for units of your own" in refused("Push", "--include", "table.csv")
+
+
+@pytest.mark.usefixtures("compiles_nothing")
+def test_a_file_elsewhere_is_refused_before_anything_is_compiled(folder: Path):
+    block = reader(folder, "reads_nothing_else", "Path(__file__).with_name('table.csv')")
+    assert "--include: nothing.csv does not lie in" in refused(block, "--include", "nothing.csv", "--platform", "host")
 
 
 def test_a_file_beside_the_module_goes_along(folder: Path, tmp_path: Path):
@@ -131,14 +155,15 @@ def test_files_that_the_fmu_lacks_or_that_only_this_machine_has(folder: Path, tm
     here = own_unit(reader(folder, "reads_here", f"Path({str(folder / 'table.csv')!r})"), None)
     with pytest.raises(CannotFreeze, match=r"files that only this machine has: .*table\.csv"):
         build(here, 3, tmp_path / "out", standalone=True)
-    assert not list((tmp_path / "out").glob("*")) if (tmp_path / "out").exists() else True
+    assert not list((tmp_path / "out").glob("*"))
     assert build(beside, 3, tmp_path / "out", standalone=True, include=[folder / "table.csv"]).is_file()
 
 
 @pytest.mark.slow
 def test_a_package_that_is_not_frozen_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
-    unwanted = standalone._unwanted  # pyright: ignore[reportPrivateUsage]
-    monkeypatch.setattr(standalone, "_unwanted", lambda names: [*unwanted(names), "msgpack"])  # pyright: ignore[reportUnknownLambdaType,reportUnknownArgumentType]
-    with pytest.raises(CannotFreeze, match="msgpack"):
+    unwanted = freezer._unwanted  # pyright: ignore[reportPrivateUsage]
+    monkeypatch.setattr(freezer, "_unwanted", lambda names: [*unwanted(names), "msgpack"])  # pyright: ignore[reportUnknownLambdaType,reportUnknownArgumentType]
+    with pytest.raises(CannotFreeze, match="FreeFlyer: package msgpack cannot be frozen: PyInstaller"):
         build(UNITS["FreeFlyer"], 3, tmp_path, standalone=True)
+    assert not list(tmp_path.glob("*.fmu"))

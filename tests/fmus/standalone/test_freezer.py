@@ -1,0 +1,87 @@
+"""What goes into a frozen folder and into the FMU, without freezing anything."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from handover.fmus.compile import host_platform
+from handover.fmus.sources import Carried
+from handover.fmus.standalone import freezer, trial
+from handover.fmus.standalone.freezer import (
+    CannotFreeze,
+    _contents,  # pyright: ignore[reportPrivateUsage]
+    _imported,  # pyright: ignore[reportPrivateUsage]
+    _key,  # pyright: ignore[reportPrivateUsage]
+)
+
+NOTHING = Carried({}, ())
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links and scripts")
+
+
+@pytest.fixture
+def frozen(tmp_path: Path) -> Path:
+    """Return a frozen folder: a package's libraries, and one in the package's own folder."""
+    folder = tmp_path / "frozen"
+    for name in ("unit", "_internal/numpy.libs/libblas.so", "_internal/llvm/libllvm.so"):
+        file = folder / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(name)
+    return folder
+
+
+def test_what_links_lead_to_stands_in_their_places(frozen: Path):
+    (frozen / "_internal/libblas.so").symlink_to("numpy.libs/libblas.so")
+    (frozen / "_internal/libllvm.so").symlink_to("llvm/libllvm.so")
+    (frozen / "_internal/Current").symlink_to("llvm")
+    blas, llvm = b"_internal/numpy.libs/libblas.so", b"_internal/llvm/libllvm.so"
+    assert _contents(frozen) == {
+        "unit": b"unit",
+        "_internal/libblas.so": blas,
+        "_internal/llvm/libllvm.so": llvm,
+        "_internal/libllvm.so": llvm,
+        "_internal/Current/libllvm.so": llvm,
+    }
+
+
+@pytest.mark.parametrize("target", ["nothing", "..", "../.."])
+def test_a_link_that_leads_nowhere_or_to_where_it_lies_is_refused(frozen: Path, target: str):
+    (frozen / "_internal/link").symlink_to(target)
+    with pytest.raises(CannotFreeze, match=f"the symbolic link _internal/link to {target},"):
+        _contents(frozen)
+
+
+def test_another_version_of_a_package_that_another_one_imports_is_frozen_anew(monkeypatch: pytest.MonkeyPatch):
+    versions = {"direct": "1.0", "indirect": "1.0", "not imported": "1.0"}
+    monkeypatch.setattr(freezer, "distributions_by_module", lambda: {name: [name] for name in versions})
+    monkeypatch.setattr(freezer.importlib.metadata, "version", lambda name: versions.get(name, "6"))  # pyright: ignore[reportUnknownLambdaType,reportUnknownArgumentType]
+
+    def key() -> str:
+        return _key(["direct", "indirect.part"], NOTHING)
+
+    before = key()
+    versions["not imported"] = "2.0"
+    assert key() == before
+    versions["indirect"] = "1.1"
+    assert key() != before
+
+
+def test_how_this_machine_finds_its_installations_is_not_frozen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "__editable___own_1_0_finder.py").touch()
+    (tmp_path / "needed.py").touch()
+    (tmp_path / "own.py").write_text("import _distutils_hack, __editable___own_1_0_finder, needed\nclass Own: ...\n")
+    hack = tmp_path / "_distutils_hack"
+    hack.mkdir()
+    (hack / "__init__.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)  # pyright: ignore[reportUnknownMemberType]
+    names = _imported("own:Own", NOTHING)
+    assert "needed" in names
+    assert not [name for name in names if name.startswith(("__editable__", "_distutils_hack"))]
+
+
+def test_a_unit_that_does_not_come_to_its_end_is_refused(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(trial, "LIMIT", 0.2)
+    program = {f"resources/standalone/{host_platform()}/unit": b"#!/bin/sh\nexec sleep 60\n"}
+    with pytest.raises(CannotFreeze, match=r"Push: it has not started and stepped once in 0\.2 s"):
+        trial.try_unit("Push", program, "{token}", 0.01)
