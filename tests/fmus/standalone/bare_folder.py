@@ -4,18 +4,21 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from handover.fmus.binaries import FMI2_FOLDERS
 from handover.fmus.compile import RUNTIME, host_platform, zig_cc
 
 HOST = Path(__file__).with_name("bare_host.c")
 LIBRARIES = ("libc", "libm", "libdl", "libpthread", "librt", "libutil")
 """Of the C library, by the names before `.so`."""
-KINDS = {"Float64": "f", "Int64": "i", "Enumeration": "i", "Boolean": "b", "Binary": "p"}
+KINDS = {"Float64": "f", "Real": "f", "Int64": "i", "Integer": "i", "Enumeration": "i", "Boolean": "b", "Binary": "p"}
+"""The host's letters for types of FMI 2 and FMI 3."""
 
 
 def can_be_entered() -> bool:
@@ -80,25 +83,49 @@ class BareFolder:
         inside: bool,
         environment: Mapping[str, str] | None = None,
     ) -> Stepped:
-        """Step an unpacked FMI 3 unit in the host, in this folder as the root or outside of it."""
+        """Step an unpacked unit in the host, in this folder as the root or outside of it."""
         root = ET.parse(unit / "modelDescription.xml").getroot()
+        fmi = int(float(root.attrib["fmiVersion"]))
         name = root.find("CoSimulation").attrib["modelIdentifier"]  # pyright: ignore[reportOptionalMemberAccess]
         place = Path("/", unit.relative_to(self.path)) if inside else unit
-        library = place / "binaries" / host_platform() / f"{name}.so"
-        given = [library, place / "resources", root.attrib["instantiationToken"], repr(dt), str(steps), str(instances)]
-        chroot = shutil.which("chroot") or "chroot"
-        command = ([chroot, self.path, "/host"] if inside else [self.path / "host"]) + given + _outputs(root)
-        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment or {}, timeout=300)
+        library = place / "binaries" / (FMI2_FOLDERS[host_platform()] if fmi == 2 else host_platform()) / f"{name}.so"
+        resources = (place / "resources").as_uri() if fmi == 2 else str(place / "resources")
+        token = root.attrib["guid" if fmi == 2 else "instantiationToken"]
+        given = [str(fmi), str(library), resources, token, repr(dt), str(steps), str(instances), *_outputs(root)]
+        command = self.entered("/host") if inside else [str(self.path / "host")]
+        done = subprocess.run(
+            [*command, *given], capture_output=True, text=True, check=False, env=environment or {}, timeout=300
+        )
         assert done.returncode == 0, done.stderr
         return Stepped(done.stdout.splitlines(), done.stderr)
+
+    def entered(self, program: str) -> list[str]:
+        """Return the beginning of a command that runs one of the folder's programs with this folder as the root."""
+        return [shutil.which("chroot") or "chroot", str(self.path), program]
+
+    def add(self, file: Path, place: str) -> None:
+        """Copy a program or a library of another host's to a place in the folder, with the libraries that it needs."""
+        inside = self.path / place.lstrip("/")
+        inside.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(file, inside)
+        inside.chmod(0o755)
+        folder = str(Path(sys.prefix) / "lib")  # Ecos' library is in a wheel of its own
+        listed = subprocess.run(
+            ["ldd", str(file)], capture_output=True, text=True, check=True, env={"LD_LIBRARY_PATH": folder}
+        )
+        for library in map(Path, re.findall(r"=> (/\S+)", listed.stdout)):
+            if not list(self.path.glob(f"**/{library.name}")):
+                (self.path / "lib").mkdir(exist_ok=True)
+                shutil.copy(library.resolve(), self.path / "lib" / library.name)
 
 
 def _outputs(root: ET.Element) -> list[str]:
     listed: list[str] = []
     for variable in root.find("ModelVariables") or ():
         if variable.get("causality") == "output":
+            kind = KINDS.get(variable.tag) or next(KINDS[child.tag] for child in variable if child.tag in KINDS)
             count = 1
             for dimension in variable.findall("Dimension"):
                 count *= int(dimension.attrib["start"])
-            listed.append(f"{KINDS[variable.tag]}:{variable.attrib['valueReference']}:{count}")
+            listed.append(f"{kind}:{variable.attrib['valueReference']}:{count}")
     return listed
