@@ -54,10 +54,13 @@ def _drawing_nothing() -> Generator[None]:
 
 
 def _glfw() -> list[str]:
-    """Return the names of GLFW libraries in Exudyn's wheel; they are unlike from one version to the next."""
+    """Return the names of GLFW libraries in Exudyn's wheel; they are unlike from one version to the next.
+
+    Where Exudyn is frozen with a unit, they lie beside its folder.
+    """
     package = importlib.util.find_spec("exudyn")
-    origin = Path(package.origin or "") if package else Path()
-    return sorted(file.name for file in origin.parent.parent.glob("exudyn.libs/libglfw*"))
+    beside = Path(package.origin or "").parent.parent if package else Path()
+    return sorted(file.name for folder in (beside / "exudyn.libs", beside) for file in folder.glob("libglfw*"))
 
 
 _exu, _items = _load()
