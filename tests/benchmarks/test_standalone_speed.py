@@ -27,20 +27,23 @@ def test_start_and_step(benchmark: BenchmarkFixture, tmp_path: Path, name: str):
     entry = UNITS[name]
     root = BareFolder(tmp_path / "root")
     bundled, plain = root.unpack(build(entry, 3, tmp_path, standalone=True)), root.unpack(cached(name, 3))
-    starts: list[float] = []
+    first: list[float] = []
     steps: dict[str, list[float]] = {"bundled": [], "plain": []}
+    fastest: dict[str, list[float]] = {"bundled": [], "plain": []}
 
     def measure() -> None:
         inside = root.step(bundled, float(entry.step), 500, inside=True)
         outside = root.step(plain, float(entry.step), 500, inside=False)
-        starts.append(inside.figure(r"started in ([\d.]+) s"))
+        first.append(inside.figure(r"first step after ([\d.]+) s"))
         for kind, stepped in (("bundled", inside), ("plain", outside)):
             steps[kind].append(stepped.figure(r"([\d.]+) us a step"))
+            fastest[kind].append(stepped.figure(r"([\d.]+) us the fastest"))
 
     benchmark.pedantic(measure, rounds=ROUNDS if benchmark.enabled else 1)
     apart, within = (float(np.median(steps[kind])) for kind in ("bundled", "plain"))
     print(
-        f"\n{name}: starts in {np.median(starts):.2f} s ({np.max(starts):.2f} at most), {apart:.1f} us a step; "
-        f"{within:.1f} us in the host's process, {apart - within:.1f} more"
+        f"\n{name}: instance and first step take {np.median(first):.2f} s ({np.max(first):.2f} at most), a further one "
+        f"{apart:.1f} us, {within:.1f} us in the host's process: {apart - within:.1f} us more; "
+        f"of the fastest {min(fastest['bundled']) - min(fastest['plain']):.1f} us more"
     )
-    benchmark.extra_info.update(start=float(np.median(starts)), apart=apart, within=within)
+    benchmark.extra_info.update(first=float(np.median(first)), apart=apart, within=within)
