@@ -7,7 +7,7 @@ PARALLEL := --numprocesses auto --dist loadfile
 
 WHEELS := x86_64-linux aarch64-linux x86_64-windows x86_64-darwin aarch64-darwin
 
-.PHONY: demo test test-slow fuzz paper real-time standalone lint bench pictures wheels install clean
+.PHONY: demo test test-slow fuzz paper real-time standalone lint bench pictures icons wheels install clean
 
 demo: $(VENV)/.installed
 	$(BIN)/handover run helix_handover
@@ -44,6 +44,10 @@ bench: $(VENV)/.installed-test
 # The README's pictures; needs chromium, too.
 pictures: $(VENV)/.installed-test
 	$(BIN)/python docs/pictures.py
+
+# The units' icons as PNG, of their drawings in fmus/icons/.
+icons: $(VENV)/.installed-test
+	$(BIN)/python tests/fmus/rendered_icons.py
 
 wheels: $(VENV)/bin/python
 	for platform in $(WHEELS); do \

@@ -1,6 +1,7 @@
 """Builds FMUs of FMI 2.0 or 3.0 for co-simulation, from the catalog's units or from any block class.
 
-An FMU holds the model description, a documentation page, the runtime in C, and the Python sources that its block needs.
+An FMU holds the model description, a documentation page, the unit's icon, the runtime in C, and the Python sources that
+its block needs.
 Its token and the prefix of its modules are hashes of its content, so that the same content gives the same file.
 """
 
@@ -11,6 +12,7 @@ import logging
 import os
 import sys
 import uuid
+import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from fractions import Fraction
@@ -28,11 +30,15 @@ from handover.fmus.compile import cache_folder, host_platform
 from handover.fmus.documentation import page
 from handover.fmus.fmi2_description import fmi2_description
 from handover.fmus.fmi3_description import fmi3_description
+from handover.fmus.icons import graphical_representation, icon_files, icon_of
 from handover.fmus.layout import Form, Layout
-from handover.fmus.model_description import Model
+from handover.fmus.model_description import Model, to_xml
 from handover.fmus.sources import Carried, beside_block, closure
 from handover.fmus.standalone.freezer import PROGRAM, check_standalone, frozen
 from handover.fmus.standalone.trial import try_unit
+
+TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
+"""The file in an FMU of FMI 3 that describes how the unit is drawn."""
 
 _log = logging.getLogger(__name__)
 
@@ -164,6 +170,7 @@ def build(
         UnknownVersion, InvalidName, InvalidStep: the standard's version, the name or the step is invalid.
         DeclarationError, DuplicateName, AmbiguousName, InvalidText: the block's declarations are invalid, or it cannot
             start from the entry's start values.
+        InvalidIcon: the block's attribute `icon` names no picture.
         NoFmi2Form: FMI 2 was asked for, but the block has binary ports, or integers that start beyond 32 bits.
         UnknownPlatform: the runtime is not available for a platform.
         NotCompiled: there is no runtime and no compiler.
@@ -175,6 +182,7 @@ def build(
     if not (entry.name.isidentifier() and entry.name.isascii()):
         raise InvalidName(entry.name)
     _check_step(entry.step)
+    icon = icon_of(entry)
     sources = {path: file.read_bytes() for path, file in carried.files.items()}
     sources |= {path: file.read_bytes() for path, file in beside_block(entry.block, include).items()}
     packages = carried.packages()
@@ -195,6 +203,8 @@ def build(
         "documentation/index.html": page(model, packages, host_platform() if standalone else ""),
         "resources/unit.json": json.dumps(unit, indent=2).encode() + b"\n",
         **{f"resources/sources/{path}": content for path, content in sources.items()},
+        **icon_files(icon, fmi),
+        **({TERMINALS: _terminals_and_icons()} if fmi == 3 else {}),
         **binaries(entry.name, fmi, ("host",) if standalone else platforms),
     }
     if standalone:
@@ -204,6 +214,12 @@ def build(
         files["resources/python.txt"] = os.fsencode(interpreter.describe())
     programs = [f"resources/standalone/{host_platform()}/{PROGRAM}"] if standalone else []
     return write_archive(out_dir / file_name(entry.name, form, standalone=standalone), files, programs)
+
+
+def _terminals_and_icons() -> bytes:
+    root = ET.Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+    root.append(graphical_representation())
+    return to_xml(root)
 
 
 def _check_step(step: object) -> None:
@@ -243,6 +259,7 @@ def _content_key(entry: Entry, form: Form, carried: Carried) -> str:
     builder = sorted(Path(__file__).parent.glob("*.*"))
     parts = {path: file.read_bytes() for path, file in carried.files.items()}
     parts |= {f"builder/{file.name}": file.read_bytes() for file in builder if file.is_file()}
+    parts |= icon_files(icon_of(entry), form.fmi)
     parts |= binaries(entry.name, form.fmi)
     parts |= {f"environment/{module}": _version_mark(module) for module in carried.modules}
     parts |= {"interpreter": os.fsencode(interpreter.describe()), "entry": repr((entry, form)).encode()}

@@ -23,7 +23,8 @@ class Block(Protocol):
     communication point); `period` is the sampling period of a block that is sampled, in seconds, else None. `deferred`,
     which may be left out, names modules that the constructor imports late, as they take long to load and ports are read
     without them: an FMU loads them when it is instantiated (not every library loads in the thread that a host steps
-    in), and a process that makes many instances loads them once beforehand.
+    in), and a process that makes many instances loads them once beforehand. `icon`, likewise, names a PNG beside the
+    block's module, by which other tools show the unit; an SVG of the same name goes with it.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]]

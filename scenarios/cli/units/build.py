@@ -14,6 +14,7 @@ from handover.fmus.build import InvalidName, InvalidStep, build
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, own_unit
 from handover.fmus.compile import TARGETS, compile_runtime, has_compiler, is_current, named_platforms
 from handover.fmus.fmi2_description import NoFmi2Form
+from handover.fmus.icons import InvalidIcon
 from handover.fmus.layout import DuplicateName
 from handover.fmus.model_description import AmbiguousName, InvalidText
 from handover.fmus.sources import FileElsewhere, beside_block, closure
@@ -183,7 +184,7 @@ def _build_all(
                     raise UsageError(str(e)) from e
             except CannotFreeze as e:
                 raise UsageError(f"--standalone: {e}") from e
-            except (InvalidName, InvalidStep, DuplicateName, AmbiguousName, InvalidText) as e:
+            except (InvalidName, InvalidStep, InvalidIcon, DuplicateName, AmbiguousName, InvalidText) as e:
                 raise UsageError(f"{entry.block}: {e}") from e
             except OSError as e:
                 if e.filename and Path(e.filename).absolute().is_relative_to(out.absolute()):

@@ -1,0 +1,111 @@
+"""The icons of units: the pictures by which other tools, reports and lists show them.
+
+The catalog's are in the folder `icons/`, by robot: NAME.svg, drawn by hand, and NAME.png, rendered from it (`make
+icons`), so that building an FMU needs no renderer. A unit of one's own has the picture that its block's attribute
+`icon` names, else `icons/block.svg`, a block in a diagram.
+"""
+
+import inspect
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from handover.cosim.fmu.file.xml import UnsafeXml, parse_xml
+from handover.fmus.catalog import UNITS, Entry, import_class
+from handover.fmus.model_description import number
+
+_FOLDER = Path(__file__).parent / "icons"
+_OF_ANY_BLOCK = _FOLDER / "block.svg"
+_PNG = b"\x89PNG\r\n\x1a\n"
+"""With what every PNG begins."""
+
+_FMI2_PNG = "model.png"
+_FMI3_PNG, _FMI3_SVG = "terminalsAndIcons/icon.png", "terminalsAndIcons/icon.svg"
+
+_CORNER = 100.0
+"""Half the side of an icon, in the units of its coordinate system."""
+_MILLIMETRES = 0.1
+"""Of a unit of that coordinate system, in a diagram: an icon is 20 mm wide."""
+
+
+class InvalidIcon(ValueError):
+    """A block's attribute `icon` does not name a picture."""
+
+    def __init__(self, block: str, icon: object, fault: str) -> None:
+        super().__init__(
+            f"icon = {icon!r} of {block}: {fault}; right is the name of a PNG beside the block's module, such as "
+            "'spring.png', and a drawing spring.svg beside that goes with it"
+        )
+        self.block, self.icon, self.fault = block, icon, fault
+
+
+@dataclass(frozen=True)
+class Icon:
+    """A unit's icon: the contents of a PNG, and of an SVG, which is empty if there is none."""
+
+    png: bytes
+    svg: bytes
+
+
+def catalog_icon(name: str) -> Path:
+    """Return the SVG of a unit of the catalog, and the one of any block for every other name."""
+    own = _FOLDER.glob(f"*/{name}.svg") if name in UNITS else ()
+    return next(iter(own), _OF_ANY_BLOCK)
+
+
+def icon_of(entry: Entry) -> Icon:
+    """Return the icon of a unit of the catalog, or of one's own.
+
+    Raises:
+        InvalidIcon: the block's attribute `icon` names no picture.
+        UnknownBlock: the block does not exist.
+    """
+    names = {unit.block: name for name, unit in UNITS.items()}
+    if entry.block in names:
+        return _read(catalog_icon(names[entry.block]))
+    block = import_class(entry.block)
+    owner = next((c for c in block.__mro__ if "icon" in vars(c)), None)
+    if owner is None:
+        return _read(_OF_ANY_BLOCK)
+    icon = vars(owner)["icon"]
+    if not isinstance(icon, str):
+        raise InvalidIcon(entry.block, icon, "that is no text")
+    folder = Path(inspect.getfile(owner)).resolve().parent
+    file = (folder / icon).resolve()
+    if not file.is_relative_to(folder) or not file.is_file():
+        raise InvalidIcon(entry.block, icon, f"there is no such file in {folder}")
+    return _checked(entry.block, icon, _read(file.with_suffix(".svg"), file))
+
+
+def _read(svg: Path, png: Path | None = None) -> Icon:
+    return Icon((png or svg.with_suffix(".png")).read_bytes(), svg.read_bytes() if svg.is_file() else b"")
+
+
+def _checked(block: str, name: str, icon: Icon) -> Icon:
+    if not icon.png.startswith(_PNG):
+        raise InvalidIcon(block, name, "that is no PNG")
+    if icon.svg:
+        try:
+            is_drawing = parse_xml(icon.svg).tag == "{http://www.w3.org/2000/svg}svg"
+        except UnsafeXml as e:
+            raise InvalidIcon(block, name, f"the SVG of that name cannot be read: {e}") from e
+        if not is_drawing:
+            raise InvalidIcon(block, name, "the SVG of that name does not begin with <svg> of its namespace")
+    return icon
+
+
+def icon_files(icon: Icon, fmi: int) -> Mapping[str, bytes]:
+    """Return an icon's files by their paths in an FMU of FMI 2 or 3, as the standards name them."""
+    if fmi == 2:
+        return {_FMI2_PNG: icon.png}
+    return {_FMI3_PNG: icon.png, **({_FMI3_SVG: icon.svg} if icon.svg else {})}
+
+
+def graphical_representation() -> ET.Element:
+    """Return the element of FMI 3.0's terminalsAndIcons.xml that says where the icon is drawn: in all of a square."""
+    corners = {"x1": number(-_CORNER), "y1": number(-_CORNER), "x2": number(_CORNER), "y2": number(_CORNER)}
+    root = ET.Element("GraphicalRepresentation")
+    ET.SubElement(root, "CoordinateSystem", corners, suggestedScalingFactorTo_mm=number(_MILLIMETRES))
+    ET.SubElement(root, "Icon", corners)
+    return root
