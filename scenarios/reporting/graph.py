@@ -12,8 +12,9 @@ from markupsafe import Markup, escape
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.graph import Pair, bent, places
+from handover.fmus.icons import catalog_icon
 from handover.scenarios.experiment.time_plot import COLOURS
-from handover.scenarios.reporting.html import plot_html
+from handover.scenarios.reporting.html import picture_source, plot_html
 from handover.scenarios.reporting.page import Section, template
 
 _MAX_UNITS = 40
@@ -22,6 +23,13 @@ _MAX_LISTED = 14
 """Signals that a line's tooltip lists."""
 _FEW = 8
 """Number of units up to which a box has room for more than the name."""
+_NODE, _ICON = 48, 36
+"""Width of a unit's node and of the icon in it, of few units, pixels; those of many are smaller by `_SMALL`."""
+_SMALL = 0.7
+_LABEL, _LINE = 26, 14
+"""Height of a box with one line of text, and of each further one, pixels."""
+_EDGE = 6
+"""Room above the nodes and below the boxes, pixels."""
 
 
 class _Signal(NamedTuple):
@@ -90,13 +98,19 @@ def _plot(units: Sequence[Mapping[str, Any]], bundles: _Bundles) -> Markup:
         _head(points, _signal_text(*pair, cs), colour[pair[0]])
         for points, (pair, cs) in zip(lines, between.items(), strict=True)
     ]
+    detailed = len(units) <= _FEW
+    scale = 1.0 if detailed else _SMALL
+    pixel = 1.0 / (80 if len(units) <= 2 else 112 + 16 * min(len(units), 10))
+    top = 1.0 + (scale * _NODE / 2 + _EDGE) * pixel
+    bottom = -top - (_LABEL + 3 * _LINE * detailed) * pixel
     axis = {"visible": False, "fixedrange": True}
     figure = go.Figure(
-        [*drawn, *heads],
+        [*drawn, *heads, _nodes(list(at.values()), list(colour.values()), scale)],
         {
             "xaxis": {**axis, "range": [-1.6, 1.6]},
-            "yaxis": {**axis, "range": [-1.25, 1.25]},
-            "annotations": [_box(u, at[u["name"]], colour[u["name"]], detailed=len(units) <= _FEW) for u in units],
+            "yaxis": {**axis, "range": [bottom, top]},
+            "images": [_picture(u, at[u["name"]], scale * _ICON * pixel) for u in units],
+            "annotations": [_box(u, at[u["name"]], colour[u["name"]], scale, detailed=detailed) for u in units],
             "showlegend": False,
             "hovermode": "closest",
             "dragmode": False,
@@ -104,8 +118,40 @@ def _plot(units: Sequence[Mapping[str, Any]], bundles: _Bundles) -> Markup:
         },
     )
     text = "; ".join(f"{a} to {b}: {', '.join(s.output for s in signals)}" for (a, b), signals in bundles.items())
-    height = 230 if len(units) <= 2 else 280 + 40 * min(len(units), 10)
-    return plot_html(figure, height=height, label=f"Graph of {len(units)} units. {text}")
+    return plot_html(figure, height=round((top - bottom) / pixel), label=f"Graph of {len(units)} units. {text}")
+
+
+def _nodes(places: Sequence[Floats], colours: Sequence[str], scale: float) -> Any:
+    """Return what the icons lie on: lines end at it."""
+    return go.Scatter(
+        x=[float(p[0]) for p in places],
+        y=[float(p[1]) for p in places],
+        mode="markers",
+        marker={
+            "symbol": "circle",
+            "size": scale * _NODE,
+            "color": "var(--card)",
+            "opacity": 1,
+            "line": {"width": 2, "color": list(colours)},
+        },
+        hoverinfo="skip",
+    )
+
+
+def _picture(unit: Mapping[str, Any], at: Floats, size: float) -> dict[str, Any]:
+    """Return a unit's icon, as high as `size`, in units of the axis; it is square."""
+    return {
+        "source": picture_source(catalog_icon(unit["model"]).read_bytes(), "image/svg+xml"),
+        "xref": "x",
+        "yref": "y",
+        "x": float(at[0]),
+        "y": float(at[1]),
+        "sizex": 1.0,
+        "sizey": size,
+        "xanchor": "center",
+        "yanchor": "middle",
+        "layer": "above",
+    }
 
 
 def _line(points: Floats, colour: str) -> Any:
@@ -154,7 +200,8 @@ def _form(c: Mapping[str, Any]) -> str:
     return f" ({text})" if text else ""
 
 
-def _box(unit: Mapping[str, Any], at: Floats, colour: str, *, detailed: bool) -> dict[str, Any]:
+def _box(unit: Mapping[str, Any], at: Floats, colour: str, scale: float, *, detailed: bool) -> dict[str, Any]:
+    """Return the text below a unit's node."""
     name, model = escape(unit["name"]), escape(unit["model"])
     details = f"FMI {escape(unit['fmi'])}, {escape(rate(unit))}"
     lines = details.replace(", sampled", "<br>sampled")  # narrow, for phones
@@ -164,6 +211,8 @@ def _box(unit: Mapping[str, Any], at: Floats, colour: str, *, detailed: bool) ->
         "text": f"<b>{name}</b><br>{model}<br>{lines}" if detailed else f"<b>{name}</b>",
         "hovertext": f"{name}: {model}, {details}",
         "showarrow": False,
+        "yanchor": "top",
+        "yshift": -scale * _NODE / 2,
         "bgcolor": "var(--card)",
         "bordercolor": colour,
         "borderwidth": 2,

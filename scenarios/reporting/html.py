@@ -1,5 +1,6 @@
 """HTML that pages are made of: Plotly figures, which the page's script draws in its colours and width, and tables."""
 
+import base64
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -28,6 +29,11 @@ def plot_html(figure: go.Figure, height: int = 320, label: str = "") -> Markup:
     content["layout"].pop("template", None)  # has colours of its own, on white
     data = json_html(content)
     return Markup(f'<div class="plot" role="img" aria-label="{escape(label)}" style="height: {height}px">{data}</div>')
+
+
+def picture_source(content: bytes, mime: str) -> str:
+    """Return a picture as the address by which a page that opens offline shows it; `mime` is such as image/png."""
+    return f"data:{mime};base64,{base64.b64encode(content).decode()}"
 
 
 _ESCAPED_SLASH = re.compile(r"(\\\\)|\\u002f")

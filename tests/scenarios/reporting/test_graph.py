@@ -1,13 +1,16 @@
 """The graph of a run's system: places, arrows with their signals, and a table; of a large system the table alone."""
 
+import base64
 import itertools
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from handover.fmus.icons import catalog_icon
 from handover.scenarios.reporting.graph import bent, graph_section, places, rate
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
@@ -64,6 +67,18 @@ def test_signals_of_a_pair_share_an_arrow_that_names_them():
     assert "p_WG (m, x 3)" in html
     assert "f_G \\u2192 f (N, x 3)" in html or "f_G → f (N, x 3)" in html
     assert "<td>arm.grip</td><td>hand.grip</td><td></td><td>1</td>" in html
+
+
+def test_each_unit_has_its_icon_and_one_of_another_package_that_of_any_block():
+    units = [unit("arm", model="TendonArm"), unit("pose", model="PoseController"), unit("own", model="../block")]
+    section = graph_section({"system": {"units": units, "connections": []}})
+    assert section is not None
+    figure = json.loads(re.findall(r'<script type="application/json">(.*?)</script>', str(section.html))[0])
+    shown = [base64.b64decode(image["source"].removeprefix("data:image/svg+xml;base64,")) for image in
+             figure["layout"]["images"]]  # fmt: skip
+    assert shown == [catalog_icon(name).read_bytes() for name in ("TendonArm", "PoseController", "block")]
+    nodes = figure["data"][-1]
+    assert [(i["x"], i["y"]) for i in figure["layout"]["images"]] == list(zip(nodes["x"], nodes["y"], strict=True))
 
 
 def test_a_conversion_stands_in_the_table():
