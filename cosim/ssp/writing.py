@@ -1,4 +1,7 @@
-"""Writes a system as an SSP that other tools load, with its FMUs, and its start values as parameter sets (SSV)."""
+"""Writes a system as an SSP that other tools load: FMUs, their icons, and start values as parameter sets (SSV).
+
+Where units and lines are drawn in other tools is in `handover.cosim.ssp.geometry`.
+"""
 
 import re
 import xml.etree.ElementTree as ET
@@ -15,6 +18,7 @@ from handover.cosim.fmu.file.archive import write_archive
 from handover.cosim.fmu.file.default_experiment import proposed_step
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.ssp.connected_ports import entry_names
+from handover.cosim.ssp.geometry import ConnectorName, Diagram, add_external_connectors, icon_of
 from handover.cosim.ssp.xml import (
     OMS_ANNOTATION,
     OMS_NAMESPACE,
@@ -176,7 +180,11 @@ def write_ssp(
     bound = {n: u for n, u in system.units.items() if bound_values(u)}
     sets = {n: f"resources/{_plain(n)}-{k}.ssv" for k, n in enumerate(bound, 1)}
     contents |= {sets[n]: parameter_set(u, version, name) for n, u in bound.items()}
-    contents[STRUCTURE] = _Structure(system, version, files, sets, parallel_step).content(name, stop)
+    pictures = {fmu: (f"resources/{Path(file).stem}.png", icon_of(fmu)) for fmu, file in files.items()}
+    icons = {fmu: (member, png) for fmu, (member, png) in pictures.items() if png is not None}
+    contents |= dict(icons.values())
+    drawn = {fmu: member for fmu, (member, _) in icons.items()}
+    contents[STRUCTURE] = _Structure(system, version, files, drawn, sets, parallel_step).content(name, stop)
     return write_archive(path, contents)
 
 
@@ -197,15 +205,17 @@ def _plain(name: str) -> str:
 
 class _Structure:
     def __init__(
-        self, system: System, version: str, files: Mapping[Path, str], sets: Mapping[str, str],
-        parallel_step: Fraction | None,
+        self, system: System, version: str, files: Mapping[Path, str], icons: Mapping[Path, str],
+        sets: Mapping[str, str], parallel_step: Fraction | None,
     ) -> None:  # fmt: skip
         self._system, self._version, self._files, self._sets = system, version, files, sets
+        self._icons = icons
         self._parallel_step = parallel_step
         self._base = parallel_step or common_divisor([u.period for u in system.units.values()])
         self._external = [PortName(unit, port) for unit, ports in system.externals.items() for port in ports]
         self._connected = {*self._external, *(end for c in system.connections for end in (c.source, c.target))}
         self._types = DescribedTypes(p for u in system.units.values() for p in self._shown(u))
+        self._diagram = Diagram(system, {name: self._shown(unit) for name, unit in system.units.items()})
 
     def content(self, name: str, stop: Fraction | None) -> bytes:
         """Return SystemStructure.ssd."""
@@ -217,6 +227,7 @@ class _Structure:
         for unit in self._system.units.values():
             self._add_component(elements, unit)
         self._add_connections(system)
+        self._diagram.add_system(system)
         self._add_master(system)
         self._types.add_enumerations(root, "ssd")
         self._types.add_units(root, "ssd")
@@ -246,6 +257,7 @@ class _Structure:
                 connector = ET.SubElement(connectors, "ssd:Connector", name=f"{end.unit}.{name}", kind="input")
                 self._types.add_type(connector, "ssc", port)
                 add_dimensions(connector, port.shape if len(port.references) == 1 else ())
+        add_external_connectors(list(connectors) if self._external else ())
 
     def _shown(self, unit: PlacedUnit) -> list[FmuPort]:
         """Return a unit's inputs and outputs, of the enumerations only what is connected: see `bound_values`."""
@@ -269,6 +281,8 @@ class _Structure:
                 connector = ET.SubElement(connectors, "ssd:Connector", name=name, kind=port.causality.value)
                 self._types.add_type(connector, "ssc", port)
                 add_dimensions(connector, port.shape if len(port.references) == 1 else ())
+                self._diagram.add_connector(connector, unit.name)
+        self._diagram.add_element(component, unit.name, self._icons.get(d.path, ""))
         if unit.name in self._sets:
             bindings = ET.SubElement(component, "ssd:ParameterBindings")
             ET.SubElement(bindings, "ssd:ParameterBinding", source=self._sets[unit.name])
@@ -302,7 +316,10 @@ class _Structure:
             for y, u in zip(from_, to, strict=True):
                 ends = {"startElement": c.source.unit, "startConnector": y}
                 ends |= {"endElement": c.target.unit, "endConnector": u}
-                _add_connection(parent, ends, linear)
+                connection = _add_connection(parent, ends, linear)
+                self._diagram.add_connection(
+                    connection, ConnectorName(c.source.unit, y), ConnectorName(c.target.unit, u)
+                )
         if faults:
             raise NotExportable(faults)
 
@@ -322,10 +339,10 @@ def _add_step(annotations: ET.Element, **step: str) -> None:
     ET.SubElement(annotation, "Step", {"xmlns": "urn:handover:communication", **step})
 
 
-def _add_connection(parent: ET.Element, ends: dict[str, str], linear: LinearTransformation | None) -> None:
+def _add_connection(parent: ET.Element, ends: dict[str, str], linear: LinearTransformation | None) -> ET.Element:
     if linear is None:
-        ET.SubElement(parent, "ssd:Connection", ends)
-        return
+        return ET.SubElement(parent, "ssd:Connection", ends)
     element = ET.SubElement(parent, "ssd:Connection", {**ends, "suppressUnitConversion": "true"})
     numbers = {"factor": repr(linear.factor), "offset": repr(linear.offset)}
     ET.SubElement(element, "ssc:LinearTransformation", numbers)
+    return element

@@ -28,7 +28,8 @@ def places(units: Sequence[str], pairs: Collection[Pair]) -> dict[str, Floats]:
     """Return each unit's position, shape (2,), within -1 and 1 each way; the same for the same system.
 
     Few units lie on a circle, clockwise from the top, in the order that minimizes the total distance of signals around
-    it; two lie side by side. Of many units, connected ones lie near each other.
+    it; two lie side by side. Of many units, connected ones lie near each other, if networkx is installed; else they lie
+    on a circle as they come.
     """
     if len(units) <= 2:
         return {name: np.array([2.0 * k - (len(units) - 1.0), 0.0]) for k, name in enumerate(units)}
@@ -63,8 +64,10 @@ def _around(order: Sequence[str]) -> dict[str, Floats]:
 
 def _near_each_other(units: Sequence[str], pairs: Collection[Pair]) -> dict[str, Floats]:
     """Return positions by Kamada and Kawai's layout, started from a circle, that fill the square."""
-    import networkx as nx  # takes long to load, and few units need none of it
-
+    try:
+        import networkx as nx  # takes long to load, and few units need none of it
+    except ModuleNotFoundError:  # it comes with what reports need
+        return _around(units)
     graph = cast(Any, nx).Graph()
     graph.add_nodes_from(units)
     graph.add_edges_from(pairs)
