@@ -31,10 +31,11 @@ from handover.scenarios.catalog import (
 )
 from handover.scenarios.cli.console import open_console, print_json, print_rows
 from handover.scenarios.cli.summaries.port_tables import allowed, plain, port_rows, type_of, variable_data
-from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.places import PlacePort, ports_of_place
+from handover.scenarios.results.run_folder import check_place
 
 
 @click.command("list", short_help="List scenarios and units, or what one of them takes and gives.")
@@ -46,17 +47,41 @@ from handover.scenarios.experiment.places import PlacePort, ports_of_place
     metavar="NAME",
     help="Of a SCENARIO: list what a unit needs to take the place of its unit NAME.",
 )
-def list_command(name: str | None, place: str | None, *, as_json: bool) -> None:
+@click.option(
+    "--html",
+    "page",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Write all units with icons, parameters and ports into a page that opens offline.",
+)
+def list_command(name: str | None, place: str | None, page: Path | None, *, as_json: bool) -> None:
     """List scenarios and units, the parameters of a SCENARIO, or parameters and ports of a UNIT.
 
     Either can be your own, named MODULE:CLASS, such as my_scene:TwoLinkReach for the class TwoLinkReach in my_scene.py;
     modules are looked for in the working directory first.
     """
+    if page is not None:
+        if name is not None or place is not None or as_json:
+            raise UsageError("--html is for all units: without SCENARIO, UNIT, --unit and --json")
+        _write_page(page)
+        return
     data, show = _subject(name, place)
     if as_json:
         print_json(data())
     else:
         show()
+
+
+def _write_page(file: Path) -> None:
+    with one_line_errors():
+        if file.suffix.lower() not in (".html", ".htm") or file.is_dir():
+            raise UsageError(f"--html {file}: name a file for the page that ends with .html")
+        require_extra("reports", "the page")
+        check_place(file.parent)
+        from handover.scenarios.cli.units.units_page import write_units_page  # loads what pages are made of
+
+        write_units_page(file)
+    click.echo(file)
 
 
 def _subject(name: str | None, place: str | None) -> tuple[Callable[[], dict[str, Any]], Callable[[], None]]:

@@ -1,6 +1,8 @@
 """`handover info`, `handover list --json` and what they tell of FMUs, SSPs, units and scenarios."""
 
+import base64
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
@@ -9,12 +11,15 @@ import pytest
 from click.testing import CliRunner, Result
 
 from handover.fmus.build import cached
-from handover.fmus.catalog import PackageFailure
+from handover.fmus.catalog import UNITS, PackageFailure
+from handover.fmus.icons import catalog_icon
 from handover.scenarios.cli.command import main
 from handover.scenarios.cli.list import place_data, print_place
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+
+FEW = ("Push", "IrReflex")
 
 
 def call(*arguments: str | Path) -> Result:
@@ -125,3 +130,37 @@ def test_an_export_replaces_a_file_only_when_told_to(tmp_path: Path):
     assert file.read_text() == "something"
     assert call("export", "ir_grasp", "--ssp", file, "--force").exit_code == 0
     assert file.stat().st_size > 1000
+
+
+def test_the_page_of_all_units_has_each_with_its_icon_and_ports(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("handover.scenarios.cli.units.units_page.UNITS", {n: UNITS[n] for n in FEW})
+    monkeypatch.setattr("handover.scenarios.cli.units.units_page.SYSTEMS", ())
+    for module in ("handover.scenarios.cli.units.units_page", "handover.fmus.catalog"):
+        monkeypatch.setattr(f"{module}.installed_units", lambda: {"Lost": "nowhere:Lost"})
+    file = tmp_path / "units.html"
+    result = call("list", "--html", file)
+    assert (result.exit_code, result.output) == (0, f"{file}\n")
+    html = file.read_text()
+    assert re.findall(r'<article class="unit" id="unit-(.*?)"', html) == [*FEW, "Lost"]
+    for name in FEW:
+        picture = base64.b64encode(catalog_icon(name).read_bytes()).decode()
+        assert f'<img src="data:image/svg+xml;base64,{picture}"' in html
+        assert UNITS[name].summary in html
+    assert "pulse of force and torque on a gripper" in html
+    assert len(re.findall(r"<details><summary>", html)) == len(FEW)
+    assert "there is no module &#39;nowhere&#39;" in html
+    assert len(html) < 100_000  # without Plotly, which has megabytes
+
+
+@pytest.mark.parametrize("given", [("Push",), ("--json",), ("ir_grasp", "--unit", "reflex")])
+def test_the_page_is_of_all_units_alone(given: tuple[str, ...], tmp_path: Path):
+    result = call("list", *given, "--html", tmp_path / "units.html")
+    assert result.exit_code == 2
+    assert "--html is for all units: without SCENARIO, UNIT, --unit and --json" in result.output
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_page_of_units_is_named_as_one(tmp_path: Path):
+    result = call("list", "--html", tmp_path / "Push")
+    assert result.exit_code == 2
+    assert "name a file for the page that ends with .html" in result.output
