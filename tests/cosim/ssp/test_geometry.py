@@ -46,7 +46,9 @@ class Drawn:
         """Return the points of a line with both ends, shape (n, 2)."""
         found = connection.find("ssd:ConnectionGeometry", NAMESPACES)
         assert found is not None
-        between = np.array([[float(x) for x in found.attrib[axis].split()] for axis in ("pointsX", "pointsY")]).T
+        between: NDArray[np.float64] = np.array(
+            [[float(x) for x in found.attrib[axis].split()] for axis in ("pointsX", "pointsY")]
+        ).T
         ends = [
             self.end(connection.attrib[f"{e}Element"], connection.attrib[f"{e}Connector"]) for e in ("start", "end")
         ]
