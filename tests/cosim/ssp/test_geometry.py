@@ -46,13 +46,11 @@ class Drawn:
         """Return the points of a line with both ends, shape (n, 2)."""
         found = connection.find("ssd:ConnectionGeometry", NAMESPACES)
         assert found is not None
-        between: NDArray[np.float64] = np.array(
-            [[float(x) for x in found.attrib[axis].split()] for axis in ("pointsX", "pointsY")]
-        ).T
-        ends = [
+        xs, ys = ([float(x) for x in found.attrib[axis].split()] for axis in ("pointsX", "pointsY"))
+        start, end = (
             self.end(connection.attrib[f"{e}Element"], connection.attrib[f"{e}Connector"]) for e in ("start", "end")
-        ]
-        return np.array([ends[0], *between, ends[1]])
+        )
+        return np.array([start, *(np.array([x, y]) for x, y in zip(xs, ys, strict=True)), end])
 
     def end(self, unit: str, connector: str) -> NDArray[np.float64]:
         low, high = self.boxes[unit]
