@@ -1,9 +1,9 @@
-"""Checks one FMU file: archive, description, interface, binaries, loading, and a short run.
+"""Checks one FMU file: archive, description, interface, binaries, loading, a short run, and what it brings along.
 
 `check_fmu` runs the parts in this order, each only if the ones before it allow. The description is checked by FMPy's
 validation with the standard's schema and rules (`standard_findings`) and by `description_checks`; the libraries'
 formats and platforms are checked before one is loaded (`binary_findings`); loading and running happen in isolated
-processes.
+processes. Of an FMU with a manifest of related files this is checked, and the experiments in it are run.
 """
 
 import math
@@ -14,11 +14,14 @@ from pathlib import Path, PurePosixPath
 
 from handover.cosim.check.described_variable import variables_of
 from handover.cosim.check.description_checks import description_findings, interface_findings, says
-from handover.cosim.check.finding import CheckReport, Finding, Level, Section, fault, warning
+from handover.cosim.check.finding import RUN, CheckReport, Finding, Level, Section, fault, warning
 from handover.cosim.check.isolated_process import run_isolated
+from handover.cosim.check.reference_experiment import ExperimentCheck, ReferenceExperiment, experiments_in
+from handover.cosim.check.related_files import MANIFEST, related_files
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.file.archive import DESCRIPTION, FmuArchive
 from handover.cosim.fmu.file.default_experiment import default_experiment, proposed_step
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.fmu.file.fmpy_edge import (
     checked_xml,
     libraries_in,
@@ -140,7 +143,7 @@ def check_fmu(path: Path, timeout: float) -> CheckReport:
     with tempfile.TemporaryDirectory(prefix="handover-check-", ignore_cleanup_errors=True) as scratch:
         check = _Check(path, timeout, Path(scratch))
         reason = ""
-        for name, run_part in check.parts:
+        for name, run_part in check.parts():
             if reason:
                 sections.append(Section(name, reason, reached=False))
                 continue
@@ -167,14 +170,20 @@ class _Check:
     def __init__(self, path: Path, timeout: float, scratch: Path) -> None:
         self.path, self.timeout, self.scratch = path, timeout, scratch
         self.can_continue = self.is_described = False
-        self.parts = (
-            ("archive", self._archive),
-            ("description", self._description),
-            ("interface", self._interface),
-            ("binaries", self._binaries),
-            ("loading", self._loading),
-            ("run", self._run),
-        )
+        self.experiments: list[ReferenceExperiment] = []
+
+    def parts(self) -> Iterator[tuple[str, Callable[[], tuple[str, list[Finding]]]]]:
+        """Yield the parts by name; each must have been run before the next is asked for."""
+        yield "archive", self._archive
+        yield "description", self._description
+        yield "interface", self._interface
+        if self.can_continue and MANIFEST in self.archive.names:
+            yield "references", self._references
+        yield "binaries", self._binaries
+        yield "loading", self._loading
+        yield RUN, self._run
+        if self.experiments:
+            yield "experiments", self._experiments
 
     def _archive(self) -> tuple[str, list[Finding]]:
         self.archive = FmuArchive(self.path)
@@ -207,6 +216,11 @@ class _Check:
         step = proposed_step(default_experiment(self.root).step)
         text = f"co-simulation, {f'steps of {float(step):g} s' if step else 'no step size given: a run needs --step'}"
         return text if interface else "no co-simulation", findings
+
+    def _references(self) -> tuple[str, list[Finding]]:
+        files, findings = related_files(self.archive)
+        self.experiments, more = experiments_in(files)
+        return f"{len(files)} related file{'s' if len(files) != 1 else ''}", [*findings, *more]
 
     def _binaries(self) -> tuple[str, list[Finding]]:
         findings = list(binary_findings(self.archive, self.fmi, self.identifier))
@@ -245,6 +259,13 @@ class _Check:
             done = ("state restored", capabilities["keeps_state"]), ("second instance", capabilities["allows_two"])
             parts += [what for what, was_done in (*done, ("reset", True)) if was_done]
         return ", ".join(parts) or "stopped", report.findings
+
+    def _experiments(self) -> tuple[str, list[Finding]]:
+        names = [v.name for v in variables_of(self.root, self.fmi)]
+        check = ExperimentCheck(self.archive, describe_fmu(self.path), names, self.folder, self.scratch, self.timeout)
+        results = [check.run(experiment) for experiment in self.experiments]
+        findings = [f for _, found in results for f in found]
+        return "; ".join(text for text, _ in results if text), findings
 
 
 def _state_capabilities(interface: XmlElement, fmi: int) -> Iterator[tuple[str, bool]]:

@@ -58,6 +58,10 @@ def note(what: str, *, where: str = "", cure: str = "") -> Finding:
     return Finding(level=Level.NOTE, what=what, where=where, cure=cure)
 
 
+RUN = "run"
+"""Name of the section in which the unit runs."""
+
+
 @dataclass(frozen=True)
 class Section:
     """One group of checks.
@@ -94,8 +98,8 @@ class CheckReport:
 
     @property
     def ran(self) -> bool:
-        """Whether the unit ran without a fault; the run is the last section."""
-        return self.sections[-1].reached and self.sections[-1].level is not Level.FAULT
+        """Whether the unit ran without a fault."""
+        return any(s.name == RUN and s.reached and s.level is not Level.FAULT for s in self.sections)
 
     def count(self, level: Level) -> int:
         """Return the number of findings of a level."""

@@ -33,10 +33,10 @@ class ProbedInstance(Instance):
         held = [p.name for p in inputs.values() if p.kind not in _WITHOUT_NUMBERS]
         super().__init__(name, replace(description, inputs=inputs, outputs=outputs), folder, held)
 
-    def start(self, t: float) -> None:
-        """Set start values and go through initialisation mode; the outputs are read."""
+    def start(self, t: float, given: Mapping[str, Any] | None = None) -> None:
+        """Set start values, those that are given or the FMU's, and go through initialisation; the outputs are read."""
         self.time = t
-        starts = self._starts()
+        starts = {**self._starts(), **(given or {})}
         self.set_start(starts)
         for name, views in self.u.items():
             if name in starts:

@@ -61,7 +61,7 @@ class SmokeRun:
         try:
             unit = self._instance("unit")
         except InvalidFmu as e:
-            self.journal.found(fault(e.fault, where="instantiation", log=_log_tail(e.log)))
+            self.journal.found(fault(e.fault, where="instantiation", log=log_tail(e.log)))
             return
         try:
             self._run(unit)
@@ -69,7 +69,7 @@ class SmokeRun:
             self.journal.found(failure(e))
         except InvalidFmu as e:
             what = f"a second instance beside the first: {e.fault}"
-            self.journal.found(fault(what, where="instantiation", log=_log_tail(e.log)))
+            self.journal.found(fault(what, where="instantiation", log=log_tail(e.log)))
         finally:
             unit.free()
 
@@ -180,7 +180,7 @@ class SmokeRun:
                     what = f"its value cannot be read: {e.call} answered {e.status}"
                     cure = f"value reference {ports[0].references[0]} must be one of its library"
                     where = f"variable {ports[0].name!r}"
-                    self.journal.found(fault(what, where=where, cure=cure, log=_log_tail(list(e.log)[-1:])))
+                    self.journal.found(fault(what, where=where, cure=cure, log=log_tail(list(e.log)[-1:])))
                 else:
                     pending += [ports[len(ports) // 2 :], ports[: len(ports) // 2]]
         if unread := [port.name for ports in pending for port in ports]:
@@ -234,10 +234,10 @@ def _first_of(names: Sequence[str]) -> str:
 
 def failure(e: UnitFailure) -> Finding:
     """Return a failed call as a finding, with the end of the unit's log."""
-    return fault(f"{e.call} at t = {e.t:.6g} s answered {e.status}", log=_log_tail(e.log))
+    return fault(f"{e.call} at t = {e.t:.6g} s answered {e.status}", log=log_tail(e.log))
 
 
-def _log_tail(log: Sequence[str]) -> tuple[str, ...]:
+def log_tail(log: Sequence[str]) -> tuple[str, ...]:
     """Return the end of a unit's log, which holds the cause: of a traceback, what was raised and where."""
     return tuple(log_lines(log)[-_MAX_LINES:])
 
