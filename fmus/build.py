@@ -11,10 +11,11 @@ import json
 import logging
 import os
 import sys
+import tempfile
 import uuid
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from numbers import Rational
 from pathlib import Path
@@ -33,6 +34,7 @@ from handover.fmus.fmi3_description import fmi3_description
 from handover.fmus.icons import graphical_representation, icon_files, icon_of
 from handover.fmus.layout import Form, Layout
 from handover.fmus.model_description import Model, to_xml
+from handover.fmus.reference import ParameterSet, related_files
 from handover.fmus.sources import Carried, beside_block, closure
 from handover.fmus.standalone.freezer import PROGRAM, check_standalone, frozen
 from handover.fmus.standalone.trial import try_unit
@@ -41,6 +43,13 @@ TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 """The file in an FMU of FMI 3 that describes how the unit is drawn."""
 
 _log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Proof:
+    """That a reference experiment is to be recorded: with the stimulus in a CSV file or, without one, the default."""
+
+    stimulus: Path | None = None
 
 
 class UnknownVersion(ValueError):
@@ -147,6 +156,8 @@ def build(
     platforms: Sequence[str] | None = None,
     standalone: bool = False,
     include: Sequence[Path] = (),
+    parameter_sets: Sequence[ParameterSet] = (),
+    proof: Proof | None = None,
 ) -> Path:
     """Build a unit's FMU. The same sources, packages and interpreter give the same bytes, unless it is standalone.
 
@@ -161,8 +172,12 @@ def build(
         standalone: bring the interpreter and all packages along, for this machine's platform: nothing need be installed
             where the FMU is used. The unit is started in them, and steps once, before the FMU is written.
         include: data files that the block opens beside its module, by `__file__`.
+        parameter_sets: that the FMU brings along (FMI-LS-REF).
+        proof: the experiment that is recorded and brought along; it takes the time of two runs.
 
     Raises:
+        CannotProve, InvalidTable: the experiment cannot be recorded, or its stimulus is not one for this unit.
+        InvalidParameterSet: a parameter set is not one for this unit.
         CannotFreeze: a standalone FMU cannot be made: PyInstaller is not installed, a platform is another one than this
             machine's, a package cannot be frozen, or the block opens files that the FMU does not have.
         FileElsewhere: a data file does not lie in the folder of the block's module, or below.
@@ -213,7 +228,22 @@ def build(
     else:
         files["resources/python.txt"] = os.fsencode(interpreter.describe())
     programs = [f"resources/standalone/{host_platform()}/{PROGRAM}"] if standalone else []
-    return write_archive(out_dir / file_name(entry.name, form, standalone=standalone), files, programs)
+    name = file_name(entry.name, form, standalone=standalone)
+    source = f"resources/sources/{_source_of(entry.block, carried)}"
+    files |= related_files(model, source, parameter_sets)
+    if proof is not None:
+        from handover.fmus.reference_run import record_experiment  # loads FMPy, which takes long
+
+        with tempfile.TemporaryDirectory(prefix="handover-proof-") as scratch:
+            experiment = record_experiment(write_archive(Path(scratch, name), files, programs), entry.step, proof.stimulus)
+        files |= related_files(model, source, parameter_sets, experiment)
+    return write_archive(out_dir / name, files, programs)
+
+
+def _source_of(block: str, carried: Carried) -> str:
+    """Return the path of a block's own module among the sources that its FMU carries."""
+    path = block.partition(":")[0].replace(".", "/")
+    return f"{path}.py" if f"{path}.py" in carried.files else f"{path}/__init__.py"
 
 
 def _terminals_and_icons() -> bytes:

@@ -118,7 +118,13 @@ def parameter_set(unit: PlacedUnit, version: str, name: str) -> bytes:
 
     All units' sets have one name: Ecos applies the sets of one name, which it is called with.
     """
-    values = bound_values(unit)
+    return values_document(bound_values(unit), version, name)
+
+
+def values_document(
+    values: Mapping[str, tuple[FmuPort, Any]], version: str, name: str, descriptions: Mapping[str, str] | None = None
+) -> bytes:
+    """Return an SSV file of values, by name, each with its port; `descriptions` of some of them are shown to users."""
     types = DescribedTypes(port for port, _ in values.values() if port.kind is not Kind.ENUMERATION)
     root = root_element("ssv:ParameterSet", version, name)
     parameters = ET.SubElement(root, "ssv:Parameters")
@@ -126,8 +132,10 @@ def parameter_set(unit: PlacedUnit, version: str, name: str) -> bytes:
         texts, names = _texts(port, value), entry_names(port)
         if len(names) == 1:
             texts = [" ".join(texts) if port.shape else texts[0]]
+        told = (descriptions or {}).get(port.name)
         for name, text in zip(names, texts, strict=True):
-            parameter = ET.SubElement(parameters, "ssv:Parameter", name=name)
+            attributes = {"name": name} if told is None else {"name": name, "description": told}
+            parameter = ET.SubElement(parameters, "ssv:Parameter", attributes)
             types.add_type(parameter, "ssv", port).set("value", text)
             add_dimensions(parameter, port.shape if len(names) == 1 else ())
     types.add_units(root, "ssv")

@@ -8,20 +8,23 @@ from pathlib import Path
 
 import click
 
+from handover.cosim.check.signal_table import InvalidTable
 from handover.cosim.exceptions import nearest
 from handover.fmus.binaries import NotCompiled
-from handover.fmus.build import InvalidName, InvalidStep, build
+from handover.fmus.build import InvalidName, InvalidStep, Proof, build
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, own_unit
 from handover.fmus.compile import TARGETS, compile_runtime, has_compiler, is_current, named_platforms
 from handover.fmus.fmi2_description import NoFmi2Form
 from handover.fmus.icons import InvalidIcon
 from handover.fmus.layout import DuplicateName
 from handover.fmus.model_description import AmbiguousName, InvalidText
+from handover.fmus.reference import CannotProve, NothingToCompare
 from handover.fmus.sources import FileElsewhere, beside_block, closure
 from handover.fmus.standalone.freezer import CannotFreeze, check_standalone
 from handover.scenarios.catalog import search_folder
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.experiment.parameter_sets import parameter_sets
 from handover.scenarios.results.run_folder import InvalidRunFolder, check_place
 
 
@@ -56,6 +59,9 @@ _HELP = """Build UNITs (all by default) as FMUs for other tools. A unit of your 
 spring:Spring for the class Spring in spring.py; modules are looked for in the working directory first.
 
 A unit with pictures has no FMI 2 form, since FMI 2 knows no binary variables.
+
+Each FMU brings along, with their roles in a manifest (FMI-LS-REF), its source, its documentation and the parameter sets
+of the papers and, by --prove, an experiment with its result, which `handover check` runs and compares on any machine.
 
 \b
 Environment, when units are built
@@ -116,6 +122,18 @@ Environment, when a tool loads the units
     multiple=True,
     help="Data file that a unit of your own opens beside its module, by __file__.",
 )
+@click.option(
+    "--prove",
+    is_flag=True,
+    help="Play a stimulus to the FMU and bring it along with the outputs. Takes some seconds a unit.",
+)
+@click.option(
+    "--stimulus",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Stimulus of --prove for one UNIT: CSV with columns time (s) and inputs, such as p_WG[1], held row by row "
+    " [default: steps and ramps of the inputs that have a unit or a range]",
+)
 def build_command(
     units: Sequence[str],
     fmi: str,
@@ -126,6 +144,8 @@ def build_command(
     *,
     scalar: bool,
     standalone: bool,
+    prove: bool,
+    stimulus: Path | None,
 ) -> None:
     """Build units as FMUs for other tools."""
     named = list(dict.fromkeys(units))
@@ -140,10 +160,12 @@ def build_command(
             raise UsageError("--include is for units of your own, MODULE:CLASS; those of the catalog open no files")
         if step is not None and all(entry in UNITS.values() for entry in entries):
             raise UsageError("--step is for units of your own, MODULE:CLASS; those of the catalog have theirs")
+        if stimulus is not None:
+            _check_stimulus(stimulus, units, prove=prove)
         _check_what_goes_along(entries, platforms if standalone else None, include)
         _compile_missing(platforms)
         given = {"platforms": platforms or None, "standalone": standalone, "include": include}
-        make = partial(build, out_dir=out, scalar=scalar, **given)
+        make = partial(build, out_dir=out, scalar=scalar, proof=Proof(stimulus) if prove else None, **given)
         for line in _build_all(entries, fmi, make, out, named=bool(units)):
             click.echo(line)
 
@@ -163,6 +185,15 @@ def _check_what_goes_along(
         raise UsageError(f"--include: {e}") from e
 
 
+def _check_stimulus(stimulus: Path, units: Sequence[str], *, prove: bool) -> None:
+    if not prove:
+        raise UsageError("--stimulus is that of --prove; give both")
+    if len(units) != 1:
+        raise UsageError(f"--stimulus is for one UNIT, whose inputs it has; {len(units) or 'no'} units are named")
+    if not stimulus.is_file():
+        raise UsageError(f"--stimulus {stimulus}: there is no such file")
+
+
 def _compile_missing(platforms: Sequence[str]) -> None:
     missing = [target for target in named_platforms(platforms) if not is_current(target)] if platforms else []
     if missing and not has_compiler():
@@ -173,15 +204,17 @@ def _compile_missing(platforms: Sequence[str]) -> None:
 
 
 def _build_all(
-    entries: Sequence[Entry], fmi: str, make: Callable[[Entry, int], Path], out: Path, *, named: bool
+    entries: Sequence[Entry], fmi: str, make: Callable[..., Path], out: Path, *, named: bool
 ) -> Iterator[str]:
     for entry in entries:
         for version in (2, 3) if fmi == "both" else (int(fmi),):
             try:
-                yield str(make(entry, version))
+                yield str(_made(entry, version, make, named=named))
             except NoFmi2Form as e:
                 if named and fmi == "2":
                     raise UsageError(str(e)) from e
+            except (CannotProve, InvalidTable) as e:
+                raise UsageError(f"--prove: {e}") from e
             except CannotFreeze as e:
                 raise UsageError(f"--standalone: {e}") from e
             except (InvalidName, InvalidStep, InvalidIcon, DuplicateName, AmbiguousName, InvalidText) as e:
@@ -190,3 +223,15 @@ def _build_all(
                 if e.filename and Path(e.filename).absolute().is_relative_to(out.absolute()):
                     raise InvalidRunFolder(out, f"it cannot be written to: {e.strerror}") from e
                 raise UsageError(f"{entry.name} cannot be built: {e}") from e
+
+
+def _made(entry: Entry, version: int, make: Callable[..., Path], *, named: bool) -> Path:
+    """Build a unit's FMU; if all units are built, one that gives nothing to compare is built without an experiment."""
+    sets = parameter_sets(entry.name) if entry in UNITS.values() else []
+    try:
+        return make(entry, version, parameter_sets=sets)
+    except NothingToCompare as e:
+        if named:
+            raise
+        click.echo(f"{e}; it is built without an experiment", err=True)
+        return make(entry, version, parameter_sets=sets, proof=None)

@@ -1,0 +1,213 @@
+"""Makes an FMU's reference experiment: a stimulus, and what its outputs were as it was played to the FMU itself.
+
+The default stimulus leaves everything at its start value for ten steps. Then every real input that has a unit, or a
+range with both ends, moves: entries in turn by a step and by a ramp of twenty steps, by a tenth of the range or,
+without one, by a hundredth of the start value or of one unit. Numbers without unit or range stay: they are quaternions
+and rotation matrices more often than not.
+
+The tolerance of the result is measured. Other platforms round otherwise, so the stimulus is played once more with every
+real input 1e-13 of its value smaller, which is some hundred times the rounding of one operation; ten times the greatest
+difference that it makes is allowed, relative to the variable's largest value, but no less than 1e-9.
+"""
+
+import math
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from handover.cosim.blocks.variable import Kind
+from handover.cosim.check.experiment_run import (
+    communication_points,
+    result_columns,
+    run_experiment,
+    stimulus_columns,
+)
+from handover.cosim.check.finding import Finding, Level
+from handover.cosim.check.reference_experiment import ABSOLUTE, Difference, Setup, differences
+from handover.cosim.check.signal_table import (
+    Column,
+    InvalidTable,
+    SignalTable,
+    has_columns,
+    read_header,
+    read_table,
+    unknown_columns,
+    write_table,
+)
+from handover.cosim.fmu.file.archive import FmuArchive
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
+from handover.cosim.fmu.start_values import entries_of
+from handover.fmus.compile import host_platform
+from handover.fmus.reference import CannotProve, NothingToCompare
+
+_STEPS, _AT_REST, _RAMP = 50, 10, 20
+_SHARE_OF_RANGE, _SHARE_OF_VALUE = 0.1, 0.01
+_PERTURBATION = 1e-13
+_MARGIN, _LEAST, _MOST = 10.0, 1e-9, 1e-2
+_TIMEOUT = 600.0  # s, of one run
+
+
+@dataclass(frozen=True)
+class RecordedExperiment:
+    """A stimulus with its result, both as CSV, and how the result was made.
+
+    Attributes:
+        origin: whose the stimulus is, in a clause.
+        spread: the difference that rounded inputs made, of the output that differed most.
+    """
+
+    stimulus: bytes
+    result: bytes
+    setup: Setup
+    origin: str
+    spread: Difference | None
+
+    def text_lines(self, stimulus: str, result: str) -> list[str]:
+        """Return what users should know, for the files of these names."""
+        s, spread = self.setup, self.spread
+        most = f"{spread.share:.2g} of its largest value ({spread.name})" if spread and spread.greatest else "nothing"
+        lines = [
+            f"{stimulus} has the inputs, {self.origin}: columns of CSV, time in seconds and entries named as",
+            "in FMI 2. An input holds the latest row's value from initialisation on; others hold their start values.",
+            f"{result} has the outputs at all communication points, {s.step} s apart, as this FMU gave them on",
+            f"{host_platform()}, without event mode, all parameters being as in the model description.",
+            "",
+            f"Tolerance: {s.relative:g} of the largest value that a variable has in the result, plus {s.absolute:g} in",
+            "its unit; what is no real number is equal. It is measured: real inputs that were 1e-13 of their value",
+            f"smaller changed the outputs by at most {most}. Ten times that is allowed, and no less than {_LEAST:g}.",
+            "",
+        ]
+        if s.left_out:
+            lines += [f"Left out, as binary or of more than 1000 entries: {', '.join(s.left_out)}.", ""]
+        return [*lines, "`handover check FILE.fmu` plays the stimulus and compares.", ""]
+
+
+def record_experiment(fmu: Path, step: Fraction, stimulus: Path | None = None) -> RecordedExperiment:
+    """Play a stimulus to an FMU twice, in processes of its own, and return it with the first run's outputs.
+
+    Args:
+        fmu: the FMU.
+        step: its communication step, in seconds.
+        stimulus: a CSV file of inputs over time; None: the default one, see above.
+
+    Raises:
+        InvalidTable: the stimulus is not one for this FMU.
+        CannotProve: there is no library for this machine, no output to compare, a run fails, or rounding changes the
+            outputs by so much that a comparison on other machines would prove nothing.
+        OSError: the file cannot be read.
+    """
+    d = describe_fmu(fmu)
+    columns, compared = stimulus_columns(d), result_columns(d)
+    given = default_stimulus(d, step) if stimulus is None else read_stimulus(stimulus, columns)
+    communication_points(given.times, (), step, varies_step=d.capabilities.varies_step)
+    if not compared:
+        raise NothingToCompare(d.name)
+    with tempfile.TemporaryDirectory(prefix="handover-reference-") as scratch:
+        folder = Path(scratch, "fmu")
+        FmuArchive(fmu).unpack(folder)
+        nearby = replace(given, columns={n: _rounded(columns[n][0], v) for n, v in given.columns.items()})
+        first, second = (
+            _played(d, folder, write_table(table, columns), step, Path(scratch, name))
+            for name, table in (("first", given), ("second", nearby))
+        )
+    one, other = (read_table(content, "result", compared) for content in (first, second))
+    spread = max(differences(one, other, compared), key=lambda difference: difference.share)
+    if spread.greatest > ABSOLUTE and spread.share * _MARGIN > _MOST:
+        size = "it no longer gives the same" if math.isinf(spread.greatest) else f"by {spread.share:.2g} of its value"
+        raise CannotProve(
+            f"{d.name}: output {spread.name!r} changes as inputs round ({size} at t = {spread.at:g} s), so that other "
+            "machines could not meet a result; give a shorter or calmer stimulus by --stimulus"
+        )
+    setup = Setup(
+        step=step,
+        relative=_tolerance(spread),
+        absolute=ABSOLUTE,
+        parameters={p.name: p.start or "" for p in d.parameters.values()},
+        left_out=tuple(p.name for p in d.outputs.values() if not has_columns(p)),
+    )
+    origin = "the default ones of `handover build --prove`" if stimulus is None else "given by the FMU's author"
+    return RecordedExperiment(write_table(given, columns), first, setup, origin, spread)
+
+
+def _tolerance(spread: Difference) -> float:
+    """Return ten times a difference, rounded up to one digit; no less than `_LEAST`, as where all differ by less."""
+    wanted = _MARGIN * spread.share if spread.greatest > ABSOLUTE else 0.0
+    if wanted <= _LEAST:
+        return _LEAST
+    digit = 10.0 ** math.floor(math.log10(wanted))
+    return float(f"{math.ceil(wanted / digit) * digit:.0e}")
+
+
+def _played(d: FmuDescription, folder: Path, stimulus: bytes, step: Fraction, scratch: Path) -> bytes:
+    scratch.mkdir()
+    files = {"stimulus": scratch / "stimulus.csv", "result": scratch / "result.csv"}
+    files["stimulus"].write_bytes(stimulus)
+    faults = [f for f in run_experiment(d.path, folder, files, step, scratch, _TIMEOUT) if f.level is Level.FAULT]
+    if faults:
+        raise CannotProve(f"{d.name} fails as its reference is made: {_with_log(faults[0])}")
+    return files["result"].read_bytes()
+
+
+def _with_log(finding: Finding) -> str:
+    return f"{finding.line}{f' ({finding.log[-1].strip()})' if finding.log else ''}"
+
+
+def read_stimulus(file: Path, columns: Mapping[str, Column]) -> SignalTable:
+    """Return a stimulus from a CSV file.
+
+    Raises:
+        InvalidTable: it is no CSV, names what is no input, has values that its inputs cannot have, or has less than two
+            rows or times that do not rise.
+        OSError: it cannot be read.
+    """
+    content, name = file.read_bytes(), str(file)
+    if lacking := unknown_columns(read_header(content, name), columns, "input"):
+        raise InvalidTable(name, lacking)
+    table = read_table(content, name, columns, in_range=True)
+    if len(table.times) < 2:
+        raise InvalidTable(name, ["it has one row; the last row's time is the end, so at least two are right"])
+    return table
+
+
+def default_stimulus(d: FmuDescription, step: Fraction) -> SignalTable:
+    """Return the default stimulus, see above: a row a step, a column an entry of an input."""
+    columns = stimulus_columns(d)
+    starts: dict[str, list[Any]] = {
+        p.name: [p.start or ""] if p.kind is Kind.STRING else entries_of(p, {}) for p, _ in columns.values()
+    }
+    moving = [name for name, (port, _) in columns.items() if _moves(port)]
+    ramped = set(moving[1::2])
+    values = {
+        name: _moved(port, starts[port.name][i], ramped=name in ramped) if name in moving
+        else [starts[port.name][i]] * (_STEPS + 1)
+        for name, (port, i) in columns.items()
+    }  # fmt: skip
+    return SignalTable([k * step for k in range(_STEPS + 1)], values)
+
+
+def _moves(port: FmuPort) -> bool:
+    has_range = port.minimum is not None and port.maximum is not None
+    return port.is_continuous and (has_range or port.unit.symbol != "1")
+
+
+def _moved(port: FmuPort, start: float, *, ramped: bool) -> list[float]:
+    low, high = port.minimum, port.maximum
+    by = _SHARE_OF_VALUE * max(1.0, abs(start))
+    if low is not None and high is not None:
+        by = _SHARE_OF_RANGE * (high - low)
+    if high is not None and start + by > high:
+        by = -by
+    shares = [min(1.0, max(0.0, (k - _AT_REST) / _RAMP)) if ramped else float(k >= _AT_REST) for k in range(_STEPS + 1)]
+    return [start + share * by for share in shares]
+
+
+def _rounded(port: FmuPort, values: Sequence[float]) -> Sequence[float]:
+    """Return real values a little nearer to 0, within their range; others as they are."""
+    if port.kind is not Kind.REAL:
+        return values
+    low = -math.inf if port.minimum is None else port.minimum
+    high = math.inf if port.maximum is None else port.maximum
+    return [min(high, max(low, x * (1.0 - _PERTURBATION))) for x in values]
