@@ -86,7 +86,7 @@ class RecordedExperiment:
 
 
 def record_experiment(fmu: Path, step: Fraction, stimulus: Path | None = None) -> RecordedExperiment:
-    """Play a stimulus to an FMU twice, in processes of its own, and return it with the first run's outputs.
+    """Play a stimulus to an FMU twice, in a process of its own, and return it with the first run's outputs.
 
     Args:
         fmu: the FMU.
@@ -109,10 +109,7 @@ def record_experiment(fmu: Path, step: Fraction, stimulus: Path | None = None) -
         folder = Path(scratch, "fmu")
         FmuArchive(fmu).unpack(folder)
         nearby = replace(given, columns={n: _rounded(columns[n][0], v) for n, v in given.columns.items()})
-        first, second = (
-            _played(d, folder, write_table(table, columns), step, Path(scratch, name))
-            for name, table in (("first", given), ("second", nearby))
-        )
+        first, second = _played(d, folder, [write_table(t, columns) for t in (given, nearby)], step, Path(scratch))
     one, other = (read_table(content, "result", compared) for content in (first, second))
     spread = max(differences(one, other, compared), key=lambda difference: difference.share)
     if spread.greatest > ABSOLUTE and spread.share * _MARGIN > _MOST:
@@ -141,14 +138,23 @@ def _tolerance(spread: Difference) -> float:
     return float(f"{math.ceil(wanted / digit) * digit:.0e}")
 
 
-def _played(d: FmuDescription, folder: Path, stimulus: bytes, step: Fraction, scratch: Path) -> bytes:
-    scratch.mkdir()
-    files = {"stimulus": scratch / "stimulus.csv", "result": scratch / "result.csv"}
-    files["stimulus"].write_bytes(stimulus)
-    faults = [f for f in run_experiment(d.path, folder, files, step, scratch, _TIMEOUT) if f.level is Level.FAULT]
+def _played(
+    d: FmuDescription, folder: Path, stimuli: Sequence[bytes], step: Fraction, scratch: Path
+) -> list[bytes]:  # fmt: skip
+    """Return the results of stimuli.
+
+    Raises:
+        CannotProve: a run fails.
+    """
+    runs = [
+        {"stimulus": scratch / f"stimulus-{k}.csv", "result": scratch / f"result-{k}.csv"} for k in range(len(stimuli))
+    ]
+    for run, stimulus in zip(runs, stimuli, strict=True):
+        run["stimulus"].write_bytes(stimulus)
+    faults = [f for f in run_experiment(d.path, folder, runs, step, scratch, _TIMEOUT) if f.level is Level.FAULT]
     if faults:
         raise CannotProve(f"{d.name} fails as its reference is made: {_with_log(faults[0])}")
-    return files["result"].read_bytes()
+    return [run["result"].read_bytes() for run in runs]
 
 
 def _with_log(finding: Finding) -> str:

@@ -48,8 +48,8 @@ def test_the_readme_has_what_is_tested_here():
     assert len(RUNS) == 13
     assert len(LIVE_RUNS) == 1
     assert len([c for c in COMMANDS if " export " in c]) == 1
-    assert len([c for c in COMMANDS if " build " in c]) == 3
-    assert len([c for c in COMMANDS if " check " in c]) == 1
+    assert len([c for c in COMMANDS if " build " in c]) == 4
+    assert len([c for c in COMMANDS if " check " in c]) == 2
     assert len([c for c in COMMANDS if " vsl-train " in c]) == 2
     assert len([c for c in COMMANDS if " sweep " in c]) == 4
     assert len([c for c in COMMANDS if " compare " in c]) == 1
@@ -163,8 +163,17 @@ def test_a_unit_runs_in_ecos(folder: Path):
 
 
 def test_the_unit_passes_its_check(folder: Path):
-    done = handover(command_with(" check "), folder)
+    done = handover(command_with(" check units/TendonArm"), folder)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+def test_a_unit_brings_an_experiment_along_that_its_check_repeats(folder: Path):
+    done = handover(command_with(" --prove "), folder)
+    assert done.returncode == 0, done.stderr
+    done = handover(command_with(" check units/FreeFlyer"), folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "outputs compared, all equal" in done.stdout
 
 
 @pytest.mark.slow

@@ -72,15 +72,15 @@ def communication_points(
 
 
 def run_experiment(
-    fmu: Path, folder: Path, files: Mapping[str, Path], step: Fraction | None, scratch: Path, timeout: float
+    fmu: Path, folder: Path, runs: Sequence[Mapping[str, Path]], step: Fraction | None, scratch: Path, timeout: float
 ) -> list[Finding]:
-    """Play a stimulus to an FMU in a process of its own and write what its outputs were; return what went wrong.
+    """Play stimuli to an FMU in a process of its own and write what its outputs were; return what went wrong.
 
     Args:
         fmu: the FMU.
         folder: where it is unpacked.
-        files: `stimulus`, `result` which is written if nothing went wrong and, if there is one, `reference`, at whose
-            times outputs are recorded, too.
+        runs: the files of each run, which has an instance of its own: `stimulus`, `result` which is written if nothing
+            goes wrong and, if there is one, `reference`, at whose times outputs are recorded, too.
         step: communication step, in seconds; None: from row to row.
         scratch: an empty folder for the process.
         timeout: in seconds.
@@ -89,7 +89,7 @@ def run_experiment(
         "fmu": str(fmu.absolute()),
         "folder": str(folder),
         "step": None if step is None else str(step),
-        **{name: str(path) for name, path in files.items()},
+        "runs": [{name: str(path) for name, path in files.items()} for files in runs],
     }
     return run_isolated("handover.cosim.check.experiment_run", task, scratch, timeout).findings
 
@@ -160,28 +160,32 @@ class _NotFinite(Exception):
 
 
 def main(task: Mapping[str, Any]) -> None:
-    """Play `task["stimulus"]` to the FMU `task["fmu"]`, unpacked in `task["folder"]`, into `task["result"]`."""
+    """Make `task["runs"]` of the FMU `task["fmu"]`, unpacked in `task["folder"]`, with the step `task["step"]`."""
     journal = Journal(Path(task["journal"]))
     d = describe_fmu(Path(task["fmu"]))
-    stimulus = read_table(Path(task["stimulus"]).read_bytes(), "stimulus", stimulus_columns(d))
-    reference = Path(task["reference"]).read_bytes() if "reference" in task else b""
-    times = read_table(reference, "result", {}).times if reference else ()
     step = None if task["step"] is None else Fraction(task["step"])
+    for files in task["runs"]:
+        _run(d, Path(task["folder"]), {name: Path(path) for name, path in files.items()}, step, journal)
+    journal.begins("unloading the library")
+    journal.ends()
+
+
+def _run(d: FmuDescription, folder: Path, files: Mapping[str, Path], step: Fraction | None, journal: Journal) -> None:
+    stimulus = read_table(files["stimulus"].read_bytes(), "stimulus", stimulus_columns(d))
+    times = read_table(files["reference"].read_bytes(), "result", {}).times if "reference" in files else ()
     points = communication_points(stimulus.times, times, step, varies_step=d.capabilities.varies_step)
     try:
-        unit = ProbedInstance("unit", d, Path(task["folder"]), journal)
+        unit = ProbedInstance("unit", d, folder, journal)
     except InvalidFmu as e:
         journal.found(fault(e.fault, where="instantiation", log=log_tail(e.log)))
     else:
         try:
             result = _Run(unit, stimulus).play(points)
             unit.end()
-            Path(task["result"]).write_bytes(write_table(result, result_columns(d)))
+            files["result"].write_bytes(write_table(result, result_columns(d)))
         except UnitFailure as e:
             journal.found(failure(e))
         except _NotFinite as e:
             journal.found(fault(f"not finite: {e.value}", where=e.where))
         finally:
             unit.free()
-    journal.begins("unloading the library")
-    journal.ends()

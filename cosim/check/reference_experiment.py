@@ -266,7 +266,7 @@ class ExperimentCheck:
         if experiment.result is not None:
             files["reference"] = place / "reference.csv"
             files["reference"].write_bytes(self._archive.read(experiment.result.path))
-        findings += run_experiment(self._d.path, self._folder, files, step, place, self._timeout)
+        findings += run_experiment(self._d.path, self._folder, [files], step, place, self._timeout)
         n = len(points) - 1
         if any(f.level is Level.FAULT for f in findings) or reference is None:
             return f"{experiment.name}: {n} steps", findings

@@ -123,6 +123,13 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
         (("build", "failing_arm:Inputs"), "failing_arm:Inputs: Inputs.feedthrough, period, outputs, step, get_state"),
         (("build", "Push", "--step", "0.1"), "--step is for units of your own"),
         (("build", "StereoCamera", "--fmi", "2"), "FMI 2"),
+        (("build", "Push", "--stimulus", "given.csv"), "--stimulus is that of --prove; give both"),
+        (("build", "--prove", "--stimulus", "given.csv"), "--stimulus is for one UNIT, whose inputs it has; no units"),
+        (
+            ("build", "Push", "Thrusters", "--prove", "--stimulus", "a.csv"),
+            "for one UNIT, whose inputs it has; 2",
+        ),
+        (("build", "Push", "--prove", "--stimulus", "given.csv"), "--stimulus given.csv: there is no such file"),
     ],
 )
 def test_a_usage_error_is_refused_with_valid_values(tmp_path: Path, arguments: tuple[str, ...], sentence: str):

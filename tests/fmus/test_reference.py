@@ -1,0 +1,213 @@
+"""The files of FMI-LS-REF in our FMUs: manifest, parameter sets, and an experiment that any host can repeat."""
+
+import csv
+import io
+import itertools
+import xml.etree.ElementTree as ET
+import zipfile
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import pytest
+import xmlschema
+
+from handover.cosim.check.check_fmu import check_fmu
+from handover.cosim.check.reference_experiment import Setup, experiments_in
+from handover.cosim.check.related_files import FOLDER, MANIFEST, related_files
+from handover.cosim.check.signal_table import InvalidTable
+from handover.cosim.fmu.file.archive import FmuArchive, write_archive
+from handover.cosim.fmu.file.description import describe_fmu
+from handover.fmus.build import Proof, build
+from handover.fmus.catalog import Entry
+from handover.fmus.reference import PAGE, CannotProve, InvalidParameterSet, NothingToCompare, ParameterSet
+from handover.fmus.reference_run import default_stimulus
+
+SCHEMAS = Path(fmpy.__file__).parent / "schema" / "fmi3"
+FORMS = [(2, False), (3, False), (3, True)]
+
+
+def unit(block: str, step: Fraction = Fraction(1, 10)) -> Entry:
+    return Entry(block.rpartition(":")[2], f"sample_units.{block}", step, "a sample")
+
+
+EVERY_KIND, SAMPLED = unit("every_kind:EveryKind"), unit("sampled:Sampled", Fraction(1, 30))
+CHAOTIC, EYE = unit("chaotic:Chaotic"), unit("eye:Eye", Fraction(1, 30))
+SETS = [
+    ParameterSet(
+        name="keen",
+        description="A set",
+        values={"gain": 3.0, "p0": [1.0, 2.0, 4.0], "mood": "keen", "fast": True, "n": 4},
+        origins={"gain": "table 1 (stated)"},
+        labels=("origin:published",),
+    )
+]
+
+
+def contents(fmu: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(fmu) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def rows_of(content: bytes) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(content.decode())))
+
+
+def schema() -> Any:
+    """Return the standard's schema, with the two that it takes from FMI 3 as FMPy brings them."""
+    text = Path(__file__).with_name("schema").joinpath("fmi-ls-ref.xsd").read_text(encoding="utf-8")
+    for name in ("fmi3LayeredStandardManifest.xsd", "fmi3Annotation.xsd"):
+        text = text.replace(f"https://raw.githubusercontent.com/modelica/fmi-standard/main/schema/{name}",
+                            (SCHEMAS / name).as_uri())  # fmt: skip
+    return xmlschema.XMLSchema(text, allow="local")
+
+
+def setup_of(fmu: Path) -> Setup:
+    (experiment,) = experiments_in(related_files(FmuArchive(fmu))[0])[0]
+    return experiment.setup
+
+
+def test_an_experiment_is_brought_along(tmp_path: Path):
+    fmu = build(EVERY_KIND, 3, tmp_path, platforms=["host"], parameter_sets=SETS, proof=Proof())
+    files = contents(fmu)
+    schema().validate(io.BytesIO(files[MANIFEST]))
+    listed, findings = related_files(FmuArchive(fmu))
+    assert findings == []
+    assert [f.role for f in listed] == ["model", "document", "document", "parameter", "experiment", "result"]
+    assert listed[0].path == "resources/sources/sample_units/every_kind.py"
+    stimulus, result = (rows_of(files[f"{FOLDER}/smoke-test/{name}.csv"]) for name in ("stimulus", "result"))
+    assert {"a", "v[3]", "M[2,1]", "k", "on", "mood_in", "word"} <= set(stimulus[0])
+    assert (stimulus[0]["mood_in"], stimulus[0]["on"], stimulus[0]["word"]) == ("CALM", "true", "hello")
+    assert float(result[-1]["total"]) == 50
+    assert (result[-1]["off"], result[-1]["mood_out"]) == ("false", "CALM")
+    assert result[-1]["sentence"] == 'a<b&"c" 100% #1 hello'
+    assert setup_of(fmu).relative == 1e-9
+    assert set(setup_of(fmu).parameters) == {"gain", "p0", "n", "fast", "mood", "label", "seed"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("fmi", "scalar"), FORMS)
+def test_an_experiment_is_repeated_in_each_form(tmp_path: Path, fmi: int, scalar: bool):
+    fmu = build(EVERY_KIND, fmi, tmp_path, scalar=scalar, platforms=["host"], parameter_sets=SETS, proof=Proof())
+    schema().validate(io.BytesIO(contents(fmu)[MANIFEST]))
+    report = check_fmu(fmu, 60.0)
+    assert report.passed
+    assert report.sections[-1].summary == "smoke-test/stimulus.csv: 50 steps, 8 outputs compared, all equal"
+
+
+def test_without_proof_there_are_source_documents_and_parameters(tmp_path: Path):
+    fmu = build(SAMPLED, 3, tmp_path, platforms=["host"])
+    files = contents(fmu)
+    schema().validate(io.BytesIO(files[MANIFEST]))
+    assert [f.role for f in related_files(FmuArchive(fmu))[0]] == ["model", "document", "document"]
+    assert "There is none. `handover build --prove` records one." in files[PAGE].decode()
+    assert not any("smoke-test" in name for name in files)
+
+
+def test_a_stimulus_of_ones_own_is_played(tmp_path: Path):
+    given = tmp_path / "given.csv"
+    given.write_text("time,u\n0.0,1.0\n0.1,10.0\n0.2,10.0\n")
+    fmu = build(SAMPLED, 3, tmp_path, platforms=["host"], proof=Proof(given))
+    result = rows_of(contents(fmu)[f"{FOLDER}/smoke-test/result.csv"])
+    assert [float(row["time"]) for row in result] == pytest.approx([k / 30 for k in range(7)])
+    gained = [float(after["y"]) - float(before["y"]) for before, after in itertools.pairwise(result)]
+    assert gained == pytest.approx([0.1] * 3 + [1.0] * 3, abs=1e-12)  # a tick takes the input of its instant
+
+
+@pytest.mark.parametrize(
+    ("content", "wanted"),
+    [
+        ("time,w\n0,1\n1,1\n", "column 'w' is no input of the FMU: valid: x"),
+        ("time,x\n0,nan\n1,1\n", "line 2, column 'x': 'nan': a finite number is right"),
+        ("time,x\n0,0.1\n0,0.1\n", "line 3: the time 0 s is not after 0 s"),
+        ("time,x\n0,2.0\n1,0.1\n", "line 2, column 'x': '2.0': it is out of range: from 0 to 1 m"),
+        ("time,x\n0,0.1\n", "it has one row; the last row's time is the end, so at least two are right"),
+    ],
+)
+def test_a_stimulus_at_fault_is_refused_before_anything_is_written(tmp_path: Path, content: str, wanted: str):
+    given = tmp_path / "given.csv"
+    given.write_text(content)
+    with pytest.raises(InvalidTable) as caught:
+        build(CHAOTIC, 3, tmp_path / "out", platforms=["host"], proof=Proof(given))
+    assert wanted in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_step_that_the_unit_does_not_take_is_refused(tmp_path: Path):
+    given = tmp_path / "given.csv"
+    given.write_text("time,u\n0.0,1.0\n0.25,1.0\n")
+    with pytest.raises(InvalidTable, match=r"0\.25 s lies within a step: the unit takes only steps of 0\.0333333 s"):
+        build(SAMPLED, 3, tmp_path / "out", platforms=["host"], proof=Proof(given))
+
+
+@pytest.mark.slow
+def test_the_tolerance_is_what_rounding_makes_of_the_outputs(tmp_path: Path):
+    """A difference of 1e-13 of 0.3 becomes 2^20 times that in 20 steps: 3e-8 of 0.3; in 50 nothing of it is left."""
+    given = tmp_path / "given.csv"
+    given.write_text("time,x\n0.0,0.3\n2.0,0.3\n")
+    relative = setup_of(build(CHAOTIC, 3, tmp_path, platforms=["host"], proof=Proof(given))).relative
+    assert relative is not None
+    assert 10 * 3e-14 * 2**20 / 0.95 <= relative <= 2 * 10 * 3e-14 * 2**20 / 0.3
+    with pytest.raises(CannotProve, match="output 'y' changes as inputs round"):
+        build(CHAOTIC, 3, tmp_path / "out", platforms=["host"], proof=Proof())
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_unit_of_pictures_has_nothing_to_compare(tmp_path: Path):
+    with pytest.raises(NothingToCompare, match="all are binary"):
+        build(EYE, 3, tmp_path / "out", platforms=["host"], proof=Proof())
+
+
+def test_a_unit_that_fails_is_not_proven(tmp_path: Path):
+    given = tmp_path / "given.csv"
+    given.write_text("time,a\n0.0,1.0\n0.1,666\n0.3,1\n")
+    with pytest.raises(CannotProve, match=r"fmi3DoStep at t = 0\.1 s answered Error .*the number of the beast"):
+        build(EVERY_KIND, 3, tmp_path / "out", platforms=["host"], proof=Proof(given))
+
+
+@pytest.mark.slow
+def test_a_result_of_other_parameters_is_told(tmp_path: Path):
+    fmu = build(SAMPLED, 3, tmp_path, platforms=["host"], proof=Proof())
+    files = contents(fmu)
+    files["modelDescription.xml"] = files["modelDescription.xml"].replace(b'start="0.1"', b'start="0.2"')
+    report = check_fmu(write_archive(tmp_path / "other.fmu", files), 60.0)
+    assert not report.passed
+    (finding,) = report.sections[-1].findings
+    assert "made with other parameters: gain was '0.1' and is '0.2'" in finding.line
+
+
+def test_the_default_stimulus_moves_what_has_a_unit_or_a_range(tmp_path: Path):
+    d = describe_fmu(build(EVERY_KIND, 2, tmp_path, platforms=["host"]))
+    columns = default_stimulus(d, Fraction(1, 10)).columns
+    moved = {name for name, values in columns.items() if len(set(values)) > 1}
+    assert moved == {*(f"v[{i}]" for i in (1, 2, 3)), *(f"M[{i},{j}]" for i in (1, 2, 3) for j in (1, 2, 3))}
+    assert columns["v[1]"][9:12] == [0.1, 0.11, 0.11]
+    assert columns["v[2]"][10:31:10] == pytest.approx([-0.2, -0.195, -0.19])
+    x = default_stimulus(describe_fmu(build(CHAOTIC, 2, tmp_path, platforms=["host"])), Fraction(1, 10)).columns["x"]
+    assert x[9:11] == [0.3, 0.4]
+
+
+@pytest.mark.parametrize(("fmi", "scalar"), FORMS)
+def test_a_parameter_set_has_the_variables_of_its_form(tmp_path: Path, fmi: int, scalar: bool):
+    files = contents(build(EVERY_KIND, fmi, tmp_path, scalar=scalar, platforms=["host"], parameter_sets=SETS))
+    root = ET.fromstring(files[f"{FOLDER}/parameters/keen.ssv"])
+    assert root.get("version") == ("1.0" if fmi == 2 else "2.0")
+    found = {p.get("name"): (p[0].tag.partition("}")[2], p[0].get("value")) for p in root[0]}
+    real, whole = ("Real", "Integer") if fmi == 2 else ("Float64", "Int64")
+    places = {"p0": (real, "1.0 2.0 4.0")}
+    if fmi == 2 or scalar:
+        places = {f"p0[{i}]": (real, value) for i, value in enumerate(("1.0", "2.0", "4.0"), 1)}
+    others = {"gain": (real, "3.0"), "mood": ("Enumeration", "KEEN"), "fast": ("Boolean", "true"), "n": (whole, "4")}
+    assert found == places | others
+    assert root[0][0].get("description") == "table 1 (stated)"
+
+
+@pytest.mark.parametrize(
+    ("values", "wanted"),
+    [({"gains": 1.0}, "gains: no parameter of it"), ({"gain": 11.0}, "gain: 11.0 is out of range: from 0 to 10")],
+)
+def test_a_parameter_set_that_does_not_fit_is_refused(tmp_path: Path, values: dict[str, Any], wanted: str):
+    with pytest.raises(InvalidParameterSet, match=f"EveryKind, parameter set 'a': {wanted}"):
+        build(EVERY_KIND, 3, tmp_path / "out", parameter_sets=[ParameterSet(name="a", description="b", values=values)])
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,44 @@
+"""The parameter sets of the catalog's units fit their parameters, and keep apart what is published and what is not."""
+
+import numpy as np
+import pytest
+
+from handover.cosim.blocks.description import describe
+from handover.cosim.blocks.start_values import fault_of
+from handover.cosim.blocks.variable import Variable
+from handover.fmus.catalog import UNITS, import_class
+from handover.scenarios.experiment.parameter_sets import parameter_sets
+
+
+def declared(unit: str) -> dict[str, Variable]:
+    return {v.name: v for v in describe(import_class(UNITS[unit].block)).parameters}
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_the_sets_of_a_unit_fit_and_have_origins(unit: str):
+    parameters, sets = declared(unit), parameter_sets(unit)
+    assert sets
+    for each in sets:
+        assert each.values
+        assert [fault_of(parameters[name], value) for name, value in each.values.items()] == [None] * len(each.values)
+        assert set(each.origins) == set(each.values)
+    for each in (s for s in sets if s.name in ("published", "assumed")):
+        assert all(origin.endswith("(assumed)") is (each.name == "assumed") for origin in each.origins.values())
+        for name, value in each.values.items():
+            start = parameters[name].start
+            assert value == start.name.lower() if parameters[name].items else np.array_equal(value, start), name
+
+
+def test_published_gains_and_our_own_are_sets_of_their_own():
+    impedance = {s.name: s for s in parameter_sets("ImpedanceController")}
+    assert set(impedance) == {"published", "assumed", "rigid", "compliant"}
+    assert impedance["compliant"].values == {"behaviour": "compliant"}
+    assert "k_B_rotational 1 N.m.s/rad, table 4.1" in impedance["compliant"].origins["behaviour"]
+    assert impedance["published"].origins["mass"] == "Astrobee (stated)"
+    assert "p_BG" in impedance["assumed"].values
+    servo = {s.name: s.values for s in parameter_sets("VisualServo")}
+    assert servo["thesis"]["use_covariance"] != servo["own"]["use_covariance"]
+
+
+def test_a_unit_of_ones_own_has_none():
+    assert parameter_sets("spring") == []
