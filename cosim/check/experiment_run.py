@@ -59,7 +59,8 @@ def communication_points(
     """
     start, stop = stimulus[0], max([*stimulus[-1:], *reference[-1:]])
     if step is not None and (stop - start) / step > MAX_POINTS:
-        raise InvalidTable("stimulus", [f"{float((stop - start) / step):.3g} steps; at most {MAX_POINTS:g} are done"])
+        many = f"until {float(stop):g} s there are more than {MAX_POINTS:g} steps of {float(step):g} s, too many to do"
+        raise InvalidTable("stimulus", [many])
     grid = [] if step is None else [start + k * step for k in range(math.floor((stop - start) / step) + 1)]
     rows = {t for t in (*stimulus, *reference) if t >= start}
     if not varies_step and step is not None:

@@ -10,6 +10,7 @@ result, plus `absolute`; what is no real number must be equal.
 """
 
 import math
+import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -259,8 +260,7 @@ class ExperimentCheck:
             )
         except InvalidTable as e:
             return "", [fault(str(e), where=where)]
-        place = self._scratch / f"experiment-{experiment.stimulus.line}"
-        place.mkdir()
+        place = Path(tempfile.mkdtemp(prefix="experiment-", dir=self._scratch))
         files = {"stimulus": place / "stimulus.csv", "result": place / "result.csv"}
         files["stimulus"].write_bytes(self._archive.read(experiment.stimulus.path))
         if experiment.result is not None:
