@@ -1,7 +1,7 @@
 """Builds FMUs of FMI 2.0 or 3.0 for co-simulation, from the catalog's units or from any block class.
 
-An FMU holds the model description, a documentation page, the unit's icon, the runtime in C, and the Python sources that
-its block needs.
+An FMU holds the model description, the unit's icon and terminals, a documentation page, the runtime in C, and the
+Python sources that its block needs.
 Its token and the prefix of its modules are hashes of its content, so that the same content gives the same file.
 """
 
@@ -13,7 +13,6 @@ import os
 import sys
 import tempfile
 import uuid
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
@@ -23,7 +22,7 @@ from typing import Any
 
 from handover.cosim.blocks.description import describe, with_start_values
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmu.file.archive import FmuArchive, write_archive
+from handover.cosim.fmu.file.archive import TERMINALS, FmuArchive, write_archive
 from handover.fmus import interpreter
 from handover.fmus.binaries import binaries
 from handover.fmus.catalog import Entry, find_unit, import_class
@@ -31,16 +30,14 @@ from handover.fmus.compile import cache_folder, host_platform
 from handover.fmus.documentation import page
 from handover.fmus.fmi2_description import fmi2_description
 from handover.fmus.fmi3_description import fmi3_description
-from handover.fmus.icons import graphical_representation, icon_files, icon_of
+from handover.fmus.icons import icon_files, icon_of
 from handover.fmus.layout import Form, Layout
-from handover.fmus.model_description import Model, to_xml
+from handover.fmus.model_description import Model
 from handover.fmus.reference import ParameterSet, related_files
 from handover.fmus.sources import Carried, beside_block, closure
 from handover.fmus.standalone.freezer import PROGRAM, check_standalone, frozen
 from handover.fmus.standalone.trial import try_unit
-
-TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
-"""The file in an FMU of FMI 3 that describes how the unit is drawn."""
+from handover.fmus.terminals import terminals_file
 
 _log = logging.getLogger(__name__)
 
@@ -215,11 +212,11 @@ def build(
     }
     files = {
         "modelDescription.xml": describe_in_xml(replace(model, needs_python=not standalone)),
+        **({TERMINALS: terminals_file(model)} if fmi == 3 or model.description.terminals else {}),
         "documentation/index.html": page(model, packages, host_platform() if standalone else ""),
         "resources/unit.json": json.dumps(unit, indent=2).encode() + b"\n",
         **{f"resources/sources/{path}": content for path, content in sources.items()},
         **icon_files(icon, fmi),
-        **({TERMINALS: _terminals_and_icons()} if fmi == 3 else {}),
         **binaries(entry.name, fmi, ("host",) if standalone else platforms),
     }
     if standalone:
@@ -244,12 +241,6 @@ def _source_of(block: str, carried: Carried) -> str:
     """Return the path of a block's own module among the sources that its FMU carries."""
     path = block.partition(":")[0].replace(".", "/")
     return f"{path}.py" if f"{path}.py" in carried.files else f"{path}/__init__.py"
-
-
-def _terminals_and_icons() -> bytes:
-    root = ET.Element("fmiTerminalsAndIcons", fmiVersion="3.0")
-    root.append(graphical_representation())
-    return to_xml(root)
 
 
 def _check_step(step: object) -> None:

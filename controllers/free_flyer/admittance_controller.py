@@ -10,7 +10,7 @@ import numpy as np
 from handover.controllers.free_flyer import impedance_controller, ports
 from handover.controllers.free_flyer.body import InvalidControllerParameters, stability_faults
 from handover.controllers.free_flyer.gains import PidGains
-from handover.controllers.free_flyer.ports import PERIOD, Behaviour, Inputs
+from handover.controllers.free_flyer.ports import PERIOD, TERMINALS, Behaviour, Inputs
 from handover.controllers.free_flyer.rotations import from_rotation_vector, rotation_matrix, unit_quaternion
 from handover.controllers.free_flyer.sampled_loop import LinearController, SampledLoop
 from handover.controllers.free_flyer.virtual_body import VirtualBody, admittance_law
@@ -36,6 +36,7 @@ from handover.cosim.blocks.plain_rotation import (
 )
 from handover.cosim.blocks.ports import Floats, Vector3, output, parameter
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal
 from handover.cosim.blocks.units import Newton, NewtonMetre, Number, PerSecond, PerSecond2
 
 __all__ = ["AdmittanceController", "Behaviour", "Inputs", "InvalidControllerParameters", "Outputs", "Params"]
@@ -139,6 +140,7 @@ class AdmittanceController:
         "f_G_est": ("v_WB_meas", "active"),
         "tau_G_est": ("q_WB_meas", "v_WB_meas", "w_WB_meas", "active"),
     }
+    terminals: ClassVar[tuple[Terminal, ...]] = TERMINALS
     period: ClassVar[Fraction] = PERIOD
     deferred: ClassVar[tuple[str, ...]] = ("control", "threadpoolctl")
 

@@ -11,7 +11,7 @@ from handover.controllers.free_flyer.arm_impedance import ArmAtRest, NullMotion
 from handover.controllers.free_flyer.arm_model import ArmModel, Chain, OperationalSpace, mass_matrix
 from handover.controllers.free_flyer.body import InvalidControllerParameters, stability_faults
 from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains
-from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, Behaviour
+from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, TERMINALS, Behaviour
 from handover.controllers.free_flyer.ports import Inputs as BaseInputs
 from handover.controllers.free_flyer.ports import Outputs as BaseOutputs
 from handover.controllers.free_flyer.rotations import unit_quaternion
@@ -19,6 +19,7 @@ from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.geometry import quaternion_of, rotation_of
 from handover.cosim.blocks.plain_rotation import quaternion, rotation_vector
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, output, parameter, port
+from handover.cosim.blocks.terminals import Terminal
 from handover.cosim.blocks.units import (
     Kilogram,
     KilogramMetre2,
@@ -176,6 +177,7 @@ class ArmImpedanceController:
         "error_p": ("p_WB_meas", "q_WB_meas", "q_J", "p_WG_goal"),
         "error_R": ("q_WB_meas", "q_J", "q_WG_goal"),
     }
+    terminals: ClassVar[tuple[Terminal, ...]] = TERMINALS
     period: ClassVar[Fraction] = PERIOD
     deferred: ClassVar[tuple[str, ...]] = ("control", "threadpoolctl")
 

@@ -29,6 +29,7 @@ from handover.cosim.blocks.plain_rotation import (
     vector,
 )
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 
 __all__ = [
     "HandoverPhase",
@@ -91,6 +92,10 @@ class HandoverStateMachine:
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
         (y.name for y in fields(Outputs)), tuple(u.name for u in fields(Inputs))
+    )
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal("estimate", TerminalKind.MOTION, "p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas"),
+        terminal("goal", TerminalKind.POSE, "p_WG_goal", "q_WG_goal"),
     )
     period: ClassVar[Fraction] = PERIOD
 

@@ -24,6 +24,7 @@ from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.plain_rotation import ZERO, Vector, add, dot, lerp, nlerp, rotate, subtract, vector
 from handover.cosim.blocks.ports import Vector3, Vector4, output, parameter, port
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Number, Radian, RadianPerSecond
 
 __all__ = ["HandoverPhase", "HandoverTask", "HandoverTeam", "Inputs", "InvalidTeamParameters", "Outputs", "Params"]
@@ -178,6 +179,14 @@ class HandoverTeam:
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
         (f.name for f in fields(Outputs)), tuple(f.name for f in fields(Inputs))
+    )
+    terminals: ClassVar[tuple[Terminal, ...]] = tuple(
+        t
+        for r in (1, 2)
+        for t in (
+            terminal(f"estimate_{r}", TerminalKind.MOTION, **{f"{x}_WB_meas": f"{x}_WB_meas_{r}" for x in "pqvw"}),
+            terminal(f"goal_{r}", TerminalKind.POSE, **{f"{x}_WG_goal": f"{x}_WG_goal_{r}" for x in "pq"}),
+        )
     )
     period: ClassVar[Fraction] = PERIOD
 

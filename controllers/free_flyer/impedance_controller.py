@@ -9,7 +9,7 @@ import numpy as np
 
 from handover.controllers.free_flyer.body import FlyerBody, InvalidControllerParameters, stability_faults
 from handover.controllers.free_flyer.gains import ImpedanceGains, published_gains
-from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, Behaviour, Inputs, Outputs
+from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, TERMINALS, Behaviour, Inputs, Outputs
 from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
 from handover.cosim.blocks.plain_rotation import (
@@ -27,6 +27,7 @@ from handover.cosim.blocks.plain_rotation import (
     vector,
 )
 from handover.cosim.blocks.ports import Matrix3, Vector3, parameter
+from handover.cosim.blocks.terminals import Terminal
 from handover.cosim.blocks.units import (
     Kilogram,
     KilogramMetre2,
@@ -112,6 +113,7 @@ class ImpedanceController:
         "error_p": ("p_WB_meas", "q_WB_meas", "p_WG_goal"),
         "error_R": ("q_WB_meas", "q_WG_goal"),
     }
+    terminals: ClassVar[tuple[Terminal, ...]] = TERMINALS
     period: ClassVar[Fraction] = PERIOD
     deferred: ClassVar[tuple[str, ...]] = ("control", "threadpoolctl")
 

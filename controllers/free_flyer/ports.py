@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from handover.cosim.blocks.ports import Vector3, Vector4, output, port
+from handover.cosim.blocks.terminals import TerminalKind, terminal
 from handover.cosim.blocks.units import (
     Metre,
     MetrePerSecond,
@@ -73,3 +74,11 @@ class Outputs:
     damping_ratio: Number = output("least damping ratio of the linearised loop")
     pole_frequency: RadianPerSecond = output("frequency of the pole with that ratio", minimum=0.0)
     slowest_decay: Second = output("time constant of the pole with the largest |z|", minimum=0.0)
+
+
+TERMINALS = (
+    terminal("estimate", TerminalKind.MOTION, "p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas"),
+    terminal("goal", TerminalKind.POSE, "p_WG_goal", "q_WG_goal"),
+    terminal("command", TerminalKind.WRENCH, "f_cmd", "tau_cmd"),
+)
+"""What of a controller's ports is connected together."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from handover.controllers.free_flyer.body import FlyerBody, InvalidControllerParameters, stability_faults
 from handover.controllers.free_flyer.gains import PidGains, pid_law
-from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, Inputs, Outputs
+from handover.controllers.free_flyer.ports import ARM, INERTIA, MASS, PERIOD, TERMINALS, Inputs, Outputs
 from handover.controllers.free_flyer.profile import Bounds, Profile, Reference, profile_between
 from handover.controllers.free_flyer.rotations import rotation_matrix, unit_quaternion
 from handover.controllers.free_flyer.sampled_loop import SampledLoop
@@ -36,6 +36,7 @@ from handover.cosim.blocks.plain_rotation import (
 )
 from handover.cosim.blocks.ports import Matrix3, Vector3, parameter
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal
 from handover.cosim.blocks.units import (
     Kilogram,
     KilogramMetre2,
@@ -153,6 +154,7 @@ class PoseController:
         "error_p": ("p_WB_meas", "q_WB_meas", "p_WG_goal"),
         "error_R": ("q_WB_meas", "q_WG_goal"),
     }
+    terminals: ClassVar[tuple[Terminal, ...]] = TERMINALS
     period: ClassVar[Fraction] = PERIOD
     deferred: ClassVar[tuple[str, ...]] = ("control", "threadpoolctl")
 

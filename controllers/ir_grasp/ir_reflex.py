@@ -18,6 +18,7 @@ from handover.controllers.ir_grasp.visibility import Recovery, Visibility, displ
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Matrix3x4, Vector2, Vector3, Vector8, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Metre, Newton, Number, Radian, SquareMetre, Tick
 
 __all__ = [
@@ -108,6 +109,10 @@ class IrReflex:
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
         ("p_WH_cmd", "yaw_cmd", "sigma_cmd", "phase", "case", "cost", "distance", "steps", "stop"),
         ("ticks", "p_WH", "yaw", "sigma", "tension", "q"),
+    )
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal("encoders", TerminalKind.MEASUREMENTS, "p_WH", "yaw", "sigma", "tension", "q"),
+        terminal("hand", TerminalKind.COMMAND, "p_WH_cmd", "yaw_cmd", "sigma_cmd"),
     )
     period: ClassVar[Fraction | None] = _PERIOD
 

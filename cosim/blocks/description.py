@@ -18,6 +18,7 @@ import numpy as np
 
 from handover.cosim.blocks.declarations import DeclarationError, declared_variables
 from handover.cosim.blocks.start_values import fault_of, numbers_of
+from handover.cosim.blocks.terminals import Terminal, terminal_faults
 from handover.cosim.blocks.variable import Causality, Kind, Variable
 
 _ATTRIBUTES = ("feedthrough", "period")
@@ -36,6 +37,7 @@ class Description:
         parameters, inputs, outputs: their fields, in the order of their declaration.
         feedthrough: by output, the inputs with direct feedthrough to it.
         period: of a sampled block, in seconds.
+        terminals: its ports that are connected together.
         has_events: whether it is an `EventfulBlock`.
         has_derivatives: whether it is a `DifferentiableBlock`.
     """
@@ -51,6 +53,7 @@ class Description:
     outputs: tuple[Variable, ...]
     feedthrough: Mapping[str, tuple[str, ...]]
     period: Fraction | None
+    terminals: tuple[Terminal, ...]
     has_events: bool
     has_derivatives: bool
 
@@ -66,8 +69,8 @@ def describe(block: type[Any]) -> Description:
 
     Raises:
         DeclarationError: an attribute or method of a block is missing; a field has no `parameter`, `port` or `output`
-            declaration, or a type that no port has, or a start value or bound that its type cannot hold; period or
-            feedthrough are invalid.
+            declaration, or a type that no port has, or a start value or bound that its type cannot hold; period,
+            feedthrough or terminals are invalid.
     """
     check_form(block)
     params_type = _annotation(block, "__init__", "params")
@@ -80,6 +83,9 @@ def describe(block: type[Any]) -> Description:
         for name, known in [(y, outputs)] + [(u, inputs) for u in us]:
             if name not in [v.name for v in known]:
                 raise DeclarationError(block.__name__, "feedthrough", f"no such port: {name!r}")
+    terminals = getattr(block, "terminals", ())
+    if faults := terminal_faults(terminals, inputs, outputs):
+        raise DeclarationError(block.__name__, "terminals", "; ".join(faults))
     return Description(
         name=block.__name__,
         doc=inspect.getdoc(block) or "",
@@ -92,6 +98,7 @@ def describe(block: type[Any]) -> Description:
         outputs=outputs,
         feedthrough=feedthrough,
         period=block.period,
+        terminals=tuple(terminals),
         has_events=_has_events(block),
         has_derivatives=hasattr(block, "directional_derivative"),
     )

@@ -66,3 +66,8 @@ class Variable(Declared):
     start: Any
     enumeration: type[enum.IntEnum] | None = None
     raster: Raster | None = None
+
+    @property
+    def mime(self) -> str | None:
+        """MIME type of a picture; None of anything else."""
+        return self.raster.mime if self.raster else None

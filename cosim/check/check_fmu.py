@@ -10,16 +10,17 @@ import math
 import re
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
-from handover.cosim.check.described_variable import variables_of
+from handover.cosim.check.described_variable import DescribedVariable, variables_of
 from handover.cosim.check.description_checks import description_findings, interface_findings, says
-from handover.cosim.check.finding import RUN, CheckReport, Finding, Level, Section, fault, warning
+from handover.cosim.check.finding import RUN, CheckReport, Finding, Level, Section, fault, note, warning
 from handover.cosim.check.isolated_process import run_isolated
 from handover.cosim.check.reference_experiment import ExperimentCheck, ReferenceExperiment, experiments_in
 from handover.cosim.check.related_files import MANIFEST, related_files
 from handover.cosim.exceptions import InvalidFmu
-from handover.cosim.fmu.file.archive import DESCRIPTION, FmuArchive
+from handover.cosim.fmu.file.archive import DESCRIPTION, TERMINALS, FmuArchive
 from handover.cosim.fmu.file.default_experiment import default_experiment, proposed_step
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.fmu.file.fmpy_edge import (
@@ -32,9 +33,11 @@ from handover.cosim.fmu.file.fmpy_edge import (
     problems_of,
     read_description,
     required_functions,
+    terminal_problems,
     version_of,
 )
 from handover.cosim.fmu.file.library_format import HEAD, platforms_of, shortage
+from handover.cosim.fmu.file.terminals import Terminals, read_terminals
 from handover.cosim.fmu.file.xml import XmlElement
 
 _SCHEMA = re.compile(
@@ -95,6 +98,20 @@ def _listed(names: set[str]) -> str:
 
 def _shortened(text: str) -> str:
     return text if len(text) <= 400 else text[:397] + "..."
+
+
+def terminal_findings(archive: FmuArchive, terminals: Terminals) -> Iterator[Finding]:
+    """Yield what is wrong with an FMU's terminals, and, as notes, which cannot be connected as a whole here."""
+    if terminals.fault:
+        yield fault(terminals.fault)
+    elif TERMINALS in archive.names:
+        for problem in terminal_problems(archive.read(TERMINALS)):
+            yield fault(problem, where=TERMINALS)
+    for t in terminals.by_name.values():
+        for what in t.faults:
+            yield fault(what, where=t.where)
+        for what in t.limits:
+            yield note(f"cannot be connected as a whole: {what}", where=t.where)
 
 
 _FMI2_FOLDERS = {
@@ -205,7 +222,17 @@ class _Check:
         text = f"{self.root.get('modelName')}, FMI {self.root.get('fmiVersion')}, {n} variable{'s' if n != 1 else ''}"
         findings = [*standard_findings(self.path, own), *own]
         self.is_described = all(f.level is not Level.FAULT for f in findings)
-        return text, findings
+        return text, [*findings, *terminal_findings(self.archive, self._terminals(variables))]
+
+    def _terminals(self, variables: Sequence[DescribedVariable]) -> Terminals:
+        """Return the terminals; of a description that cannot be understood only what is wrong with their names."""
+        try:
+            if self.is_described:
+                return describe_fmu(self.path).terminals
+        except InvalidFmu:  # which the run reports
+            pass
+        named = read_terminals(self.archive, {v.name: v.causality for v in variables}, {})
+        return replace(named, by_name={name: replace(t, limits=()) for name, t in named.by_name.items()})
 
     def _interface(self) -> tuple[str, list[Finding]]:
         findings = list(interface_findings(self.root, self.fmi))

@@ -30,21 +30,14 @@ def find_entry(ports: Mapping[str, FmuPort], name: str) -> Entry | None:
     return (port, everywhere.index(indices)) if indices in everywhere else None
 
 
-def entry_names(port: FmuPort) -> list[str]:
-    """Return the names of a port's variables in its FMU: its own, or one for each entry."""
-    if len(port.references) == 1:
-        return [port.name]
-    return [f"{port.name}[{','.join(map(str, index))}]" for index in indices_of(port.shape)]
-
-
 def variable_names(d: FmuDescription) -> list[str]:
     """Return the names that connectors of an FMU can have."""
-    return [name for port in ports_of(d).values() for name in entry_names(port)]
+    return [name for port in ports_of(d).values() for name in port.entry_names]
 
 
 def settable_names(d: FmuDescription) -> list[str]:
     """Return the names that start values of an FMU can have."""
-    return [name for port in d.settable.values() for name in entry_names(port)]
+    return [name for port in d.settable.values() for name in port.entry_names]
 
 
 def unfed(d: FmuDescription) -> dict[str, FmuPort]:
@@ -56,7 +49,7 @@ def split_arrays(d: FmuDescription, names: Collection[str]) -> FmuDescription:
     """Return a description in which the named arrays of scalars are scalars, as they are in the FMU itself."""
     if not names:
         return d
-    apart = {n: entry_names(p) if n in names else [n] for n, p in ports_of(d).items()}
+    apart = {n: p.entry_names if n in names else [n] for n, p in ports_of(d).items()}
 
     def ports(given: Mapping[str, FmuPort]) -> dict[str, FmuPort]:
         return {e.name: e for p in given.values() for e in (_entries(p) if p.name in names else [p])}
@@ -78,7 +71,7 @@ def split_arrays(d: FmuDescription, names: Collection[str]) -> FmuDescription:
 
 
 def _entries(port: FmuPort) -> list[FmuPort]:
-    names = entry_names(port)
+    names = port.entry_names
     starts = [None] * len(names) if port.start is None else port.start.split()
     return [
         replace(port, name=name, shape=(), references=(reference,), start=start)

@@ -16,7 +16,6 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Causality
 from handover.cosim.fmu.file.archive import FmuArchive
 from handover.cosim.fmu.file.description import FmuPort
-from handover.cosim.ssp.connected_ports import entry_names
 from handover.cosim.system.graph import bent, places
 from handover.cosim.system.system import PortName, System
 
@@ -142,7 +141,7 @@ def _spots(
     for side in _SIDES:
         there = [p for p in ports if _side(towards[p.name], p.causality) is side]
         there.sort(key=lambda p: float(-towards[p.name][1] if side[0] else towards[p.name][0]))
-        names = [ConnectorName(unit, name) for port in there for name in entry_names(port)]
+        names = [ConnectorName(unit, name) for port in there for name in port.entry_names]
         spots |= {name: _Spot(_along(side, k, len(names)), side) for k, name in enumerate(names)}
     return spots
 

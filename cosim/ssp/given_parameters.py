@@ -15,7 +15,7 @@ from handover.cosim.blocks.units import UNKNOWN
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
-from handover.cosim.ssp.connected_ports import Entry, entry_names, find_entry, unfed
+from handover.cosim.ssp.connected_ports import Entry, find_entry, unfed
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.ssp.start_values import Given
 from handover.cosim.ssp.structure import SspComponent, SspConnector, SspNestedSystem
@@ -119,10 +119,10 @@ def put(given: dict[str, Given], entry: Entry, name: str, value: SspValue) -> No
     """
     port, index = entry
     if index is None:
-        for other in entry_names(port):
+        for other in port.entry_names:
             given.pop(other, None)
     elif (whole := given.pop(port.name, None)) is not None and len(whole.value.texts) == port.size:
-        for other, text in zip(entry_names(port), whole.value.texts, strict=True):
+        for other, text in zip(port.entry_names, whole.value.texts, strict=True):
             given[other] = replace(whole, value=replace(whole.value, texts=(text,)))
     given[name] = Given(value)
 

@@ -16,7 +16,7 @@ from handover.cosim.exceptions import InvalidFmu, InvalidSsp, WiringError
 from handover.cosim.fmu.file.default_experiment import exact_seconds, proposed_step
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.ssp.archive import SspArchive
-from handover.cosim.ssp.connected_ports import entry_names, find_entry, split_arrays
+from handover.cosim.ssp.connected_ports import find_entry, split_arrays
 from handover.cosim.ssp.flattening import FlatConnection, FlatSystem, Node, components_of, flatten
 from handover.cosim.ssp.given_parameters import SettableParameter, named_parameters, settable_parameters
 from handover.cosim.ssp.parameter_set import SspValue
@@ -133,7 +133,7 @@ class Grouping:
         """Return the name of a port's entry: its own if it is split, else the port's."""
         if not self._is_apart(name):
             return name
-        names = entry_names(self._port(name))
+        names = self._port(name).entry_names
         return PortName(name.unit, names[min(k, len(names) - 1)])  # of an array variable, a fault, there is one name
 
 
@@ -275,5 +275,5 @@ class SspFile:
         unit = self.system.units[path]
         if name in unit.description.parameters:
             return unit.start.get(name)
-        names = entry_names(parameter.declared)  # of an array that was split
+        names = parameter.declared.entry_names  # of an array that was split
         return " ".join(str(unit.start.get(n, unit.description.parameters[n].start)) for n in names)

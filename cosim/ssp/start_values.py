@@ -9,7 +9,7 @@ import numpy as np
 from handover.cosim.blocks.units import UNKNOWN, Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.file.description import FmuPort
-from handover.cosim.ssp.connected_ports import Entry, entry_names
+from handover.cosim.ssp.connected_ports import Entry
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.system.conversion import LinearTransformation, conversion, needs_no_conversion
 
@@ -83,7 +83,7 @@ def start_values(given: Mapping[str, tuple[Entry, Given]]) -> tuple[dict[str, An
     partly = {n for n, by_index in entries.items() if len(by_index) < ports[n].size}
     for name, by_index in entries.items():
         if name in partly:
-            names = entry_names(ports[name])
+            names = ports[name].entry_names
             values |= {names[k]: value for k, value in by_index.items()}
         else:
             values[name] = np.array([by_index[k] for k in range(len(by_index))]).reshape(ports[name].shape)

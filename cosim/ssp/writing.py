@@ -17,7 +17,6 @@ from handover.cosim.exceptions import NotExportable
 from handover.cosim.fmu.file.archive import write_archive
 from handover.cosim.fmu.file.default_experiment import proposed_step
 from handover.cosim.fmu.file.description import FmuPort
-from handover.cosim.ssp.connected_ports import entry_names
 from handover.cosim.ssp.geometry import ConnectorName, Diagram, add_external_connectors, icon_of
 from handover.cosim.ssp.xml import (
     OMS_ANNOTATION,
@@ -129,7 +128,7 @@ def values_document(
     root = root_element("ssv:ParameterSet", version, name)
     parameters = ET.SubElement(root, "ssv:Parameters")
     for port, value in values.values():
-        texts, names = _texts(port, value), entry_names(port)
+        texts, names = _texts(port, value), port.entry_names
         if len(names) == 1:
             texts = [" ".join(texts) if port.shape else texts[0]]
         told = (descriptions or {}).get(port.name)
@@ -261,7 +260,7 @@ class _Structure:
         connectors = ET.SubElement(system, "ssd:Connectors") if self._external else system
         for end in self._external:
             port = self._system.units[end.unit].description.inputs[end.port]
-            for name in entry_names(port):
+            for name in port.entry_names:
                 connector = ET.SubElement(connectors, "ssd:Connector", name=f"{end.unit}.{name}", kind="input")
                 self._types.add_type(connector, "ssc", port)
                 add_dimensions(connector, port.shape if len(port.references) == 1 else ())
@@ -285,7 +284,7 @@ class _Structure:
         shown = self._shown(unit)
         connectors = ET.SubElement(component, "ssd:Connectors") if shown else component
         for port in shown:
-            for name in entry_names(port):
+            for name in port.entry_names:
                 connector = ET.SubElement(connectors, "ssd:Connector", name=name, kind=port.causality.value)
                 self._types.add_type(connector, "ssc", port)
                 add_dimensions(connector, port.shape if len(port.references) == 1 else ())
@@ -304,7 +303,7 @@ class _Structure:
         connections, clocks = self._system.connections, self._system.clock_connections()
         parent = ET.SubElement(system, "ssd:Connections") if connections or self._external else system
         for end in self._external:
-            for name in entry_names(self._system.units[end.unit].description.inputs[end.port]):
+            for name in self._system.units[end.unit].description.inputs[end.port].entry_names:
                 ends = {"startConnector": f"{end.unit}.{name}", "endElement": end.unit, "endConnector": name}
                 _add_connection(parent, ends, None)
         faults: list[str] = []
@@ -315,7 +314,7 @@ class _Structure:
                 )
                 continue
             a, b = self._ports(c)
-            from_, to = entry_names(a), entry_names(b)
+            from_, to = a.entry_names, b.entry_names
             if len(from_) != len(to):
                 one, other = (c.source, c.target) if len(from_) < len(to) else (c.target, c.source)
                 faults.append(f"{one} is one array variable and each entry of {other} one; both must be of one kind")

@@ -15,6 +15,7 @@ from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, Vector6, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Metre, Number, PerTick, Radian, Tick
 from handover.plants.helix.gripper_fingers import FINGERS, finger_joints
 from handover.plants.infrared_sensor import InfraredSensor, InvalidSensorParameters
@@ -143,6 +144,7 @@ class FingerInfrared:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"ticks": ("p_WG", "q_WG", "grip", "p_WO", "p_WH")}
+    terminals: ClassVar[tuple[Terminal, ...]] = (terminal("gripper", TerminalKind.POSE, "p_WG", "q_WG"),)
     period: ClassVar[Fraction | None] = Fraction(3, 100)
 
     def __init__(self, params: Params) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Vector2, Vector3, Vector8, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Metre, Newton, Number, Radian, Tick
 from handover.plants.ir_grasp.parameters import InvalidSceneParameters, Params
 from handover.plants.ir_grasp.sensing import Sensing
@@ -99,6 +100,18 @@ class GraspScene:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal(
+            "encoders",
+            TerminalKind.MEASUREMENTS,
+            p_WH="p_WH_meas",
+            yaw="yaw_meas",
+            sigma="sigma_meas",
+            tension="tension_meas",
+            q="q_meas",
+        ),
+        terminal("hand", TerminalKind.COMMAND, "p_WH_cmd", "yaw_cmd", "sigma_cmd"),
+    )
     period: ClassVar[Fraction | None] = None
     variable_step: ClassVar[bool] = False
 

@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
+from handover.cosim.fmu.file.archive import TERMINALS
+from handover.cosim.fmu.file.description import describe_fmu
+from handover.cosim.fmu.file.fmpy_edge import terminal_problems
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
 from handover.fmus.fmi2_description import NoFmi2Form
@@ -31,6 +34,11 @@ def test_every_unit_is_valid_or_says_why_it_has_no_such_form(name: str, fmi: int
         assert name in PICTURES
         return
     assert validate_fmu(str(file)) == []
+    terminals = describe_fmu(file).terminals
+    assert (terminals.fault, {name: t.reason for name, t in terminals.by_name.items() if t.reason}) == ("", {})
+    with zipfile.ZipFile(file) as archive:
+        assert (TERMINALS in archive.namelist()) is bool(terminals.by_name)
+        assert not terminals.by_name or terminal_problems(archive.read(TERMINALS)) == []
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,8 @@ import pytest
 from rendered_icons import ICONS, difference, drawings, pixels, rendered
 from written_blocks import write_block
 
-from handover.fmus.build import TERMINALS, build_block, cached
+from handover.cosim.fmu.file.archive import TERMINALS
+from handover.fmus.build import build_block, cached
 from handover.fmus.catalog import UNITS
 from handover.fmus.fmi2_description import NoFmi2Form
 from handover.fmus.icons import InvalidIcon, catalog_icon

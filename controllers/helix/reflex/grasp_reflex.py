@@ -17,6 +17,7 @@ from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, Vector6, Vector9, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Metre, Number, PerTick, Radian, Second, SquareMetre, Tick
 
 __all__ = ["GraspReflex", "Inputs", "InvalidGraspReflexParameters", "Outputs", "Params", "Source"]
@@ -221,6 +222,26 @@ class GraspReflex:
         (
             *("p_WO_meas", "p_WR_meas", "p_WG_meas", "cov_O", "cov_R", "cov_G", "seen_O", "seen_R"),
             *("ticks", "grip"),
+        ),
+    )
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal(
+            "measurements",
+            TerminalKind.MEASUREMENTS,
+            *("p_WO_meas", "p_WR_meas", "p_WG_meas"),
+            *("cov_O", "cov_R", "cov_G", "seen_O", "seen_R"),
+        ),
+        terminal(
+            "corrected",
+            TerminalKind.MEASUREMENTS,
+            p_WO_meas="p_WO",
+            p_WR_meas="p_WR",
+            p_WG_meas="p_WG",
+            cov_O="P_O",
+            cov_R="P_R",
+            cov_G="P_G",
+            seen_O="known_O",
+            seen_R="known_R",
         ),
     )
     period: ClassVar[Fraction | None] = None

@@ -18,6 +18,7 @@ from handover.controllers.helix.servo.task import SAME_TIME, Phase, Task, Verdic
 from handover.controllers.helix.servo.tracking import UP, Tracker
 from handover.cosim.blocks.ports import Floats, Matrix3, Vector3, Vector9, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Metre, Number, Radian, SquareMetre
 
 __all__ = ["Inputs", "InvalidServoParameters", "Outputs", "Params", "Phase", "Verdict", "VisualServo"]
@@ -98,6 +99,15 @@ class VisualServo:
             *("p_WO_est", "p_WR_est", "p_WG_est", "estimate_converged", "step_converged"),
         ),
         ("p_WO_meas", "p_WR_meas", "p_WG_meas", "cov_O", "cov_R", "cov_G", "seen_O", "seen_R"),
+    )
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal(
+            "measurements",
+            TerminalKind.MEASUREMENTS,
+            *("p_WO_meas", "p_WR_meas", "p_WG_meas"),
+            *("cov_O", "cov_R", "cov_G", "seen_O", "seen_R"),
+        ),
+        terminal("actuators", TerminalKind.COMMAND, "dl_t", "closure"),
     )
     period: ClassVar[Fraction | None] = None
 

@@ -24,6 +24,7 @@ from handover.cosim.blocks.ports import (
     port,
 )
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Metre, SquareMetre
 
 __all__ = ["Detector", "HandoverVision", "Inputs", "Outputs", "Params"]
@@ -71,6 +72,15 @@ class HandoverVision:
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
         ("p_WO_meas", "p_WR_meas", "p_WG_meas", "cov_O", "cov_R", "cov_G", "seen_O", "seen_R"),
         ("left", "right", "third"),
+    )
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal("pictures", TerminalKind.PICTURES, "left", "right", "third"),
+        terminal(
+            "measurements",
+            TerminalKind.MEASUREMENTS,
+            *("p_WO_meas", "p_WR_meas", "p_WG_meas"),
+            *("cov_O", "cov_R", "cov_G", "seen_O", "seen_R"),
+        ),
     )
     period: ClassVar[Fraction | None] = Fraction(1, 30)
 

@@ -104,6 +104,7 @@ def _shown(name: str) -> str:
 
 
 DESCRIPTION = "modelDescription.xml"
+TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 NO_FILE_FAULT = "not a regular file"
 
 _DAMAGE = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError, EOFError, ValueError)

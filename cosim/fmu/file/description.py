@@ -17,9 +17,11 @@ from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
 from handover.cosim.blocks.variable import Causality, Declared, Kind
 from handover.cosim.exceptions import InvalidFmu
+from handover.cosim.fmu.file.archive import FmuArchive
 from handover.cosim.fmu.file.clocks import FmuClock, clocks_of, without_clocks
 from handover.cosim.fmu.file.default_experiment import DefaultExperiment, default_experiment
 from handover.cosim.fmu.file.feedthrough import feedthrough_of
+from handover.cosim.fmu.file.terminals import Terminals, read_terminals
 from handover.cosim.fmu.file.xml import XmlElement, collection_paused
 
 if TYPE_CHECKING:
@@ -129,6 +131,13 @@ class FmuPort(Declared):
         return self.kind is Kind.REAL and not self.discrete
 
     @property
+    def entry_names(self) -> list[str]:
+        """Names of its variables in the FMU: its own, or one for each entry."""
+        if len(self.references) == 1:
+            return [self.name]
+        return [f"{self.name}[{','.join(map(str, index))}]" for index in indices_of(self.shape)]
+
+    @property
     def signature(self) -> str:
         """Kind, unit and shape, as in `real [3] m`, for messages."""
         shape = f" [{','.join(map(str, self.shape))}]" if self.shape else ""
@@ -153,7 +162,8 @@ class FmuDescription:
     `initial` are outputs and local variables whose start values may be given (`initial` is `exact` or `approx`).
 
     `step` is the communication step that it proposes, in seconds. `untouched_fault` says how its model description
-    breaks the standard in parts that co-simulation does not touch; a run warns of it.
+    breaks the standard in parts that co-simulation does not touch; a run warns of it. `terminals` group ports that are
+    connected together.
     """
 
     path: Path
@@ -175,6 +185,7 @@ class FmuDescription:
     untouched_fault: str = ""
     clocks: Mapping[str, FmuClock] = field(default_factory=dict[str, FmuClock])
     initial: Mapping[str, FmuPort] = field(default_factory=dict[str, FmuPort])
+    terminals: Terminals = Terminals()
 
     @property
     def settable(self) -> dict[str, FmuPort]:
@@ -235,6 +246,11 @@ def describe_fmu(path: Path) -> FmuDescription:
         capabilities=capabilities,
         clocks=clocks,
         initial={p.name: p for p in _group_elements([p for p in starting if p is not None])},
+        terminals=read_terminals(
+            FmuArchive(path),
+            {v.name: v.causality for v in md.modelVariables},
+            {**by_causality[Causality.INPUT], **by_causality[Causality.OUTPUT]},
+        ),
     )
 
 

@@ -4,6 +4,7 @@ FMPy has no types, so units are read only here and loaded only in `handover.cosi
 Every file that FMPy opens is checked before: its parser would follow entities, and its unpacking paths out of a folder.
 """
 
+import importlib
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple, Protocol, cast
@@ -20,6 +21,8 @@ from handover.cosim.fmu.file.library_format import HEAD, shortage
 from handover.cosim.fmu.file.model_structure import lost_references
 from handover.cosim.fmu.file.reduced_description import reduced_fmu
 from handover.cosim.fmu.file.xml import UnsafeXml, XmlElement, check_xml, parse_xml
+
+_etree: Any = importlib.import_module("lxml.etree")  # neither it nor its classes have types
 
 _BUILD_DESCRIPTION = "sources/buildDescription.xml"
 _MAX_PROBLEMS = 3
@@ -158,6 +161,13 @@ def problems_of(path: Path) -> tuple[list[str], str]:
     except Exception as e:  # as above
         return problems, f"{type(e).__name__}: {one_line(e)}"
     return problems, ""
+
+
+def terminal_problems(content: bytes) -> list[str]:
+    """Return how a terminals file that `parse_xml` reads breaks FMI 3.0's schema, which FMPy has and does not use."""
+    schema = _etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"))
+    schema.validate(_etree.fromstring(content))
+    return [f"line {e.line}: {e.message.rstrip('.')}" for e in schema.error_log]
 
 
 def required_functions(fmi: int) -> list[str]:

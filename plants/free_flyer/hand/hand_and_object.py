@@ -21,6 +21,7 @@ from handover.cosim.blocks.plain_rotation import (
     vector,
 )
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.plants.free_flyer.hand.attachment import Attachment, Frame, Palm
 from handover.plants.free_flyer.hand.contacts import (
     MovedGripper,
@@ -100,6 +101,12 @@ class HandAndObject:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal("gripper", TerminalKind.MOTION, "p_WG", "q_WG", "v_WG", "w_WG"),
+        terminal("contact", TerminalKind.WRENCH, "f_G", "tau_G"),
+        terminal("object", TerminalKind.POSE, "p_WO", "q_WO"),
+        terminal("hand", TerminalKind.POSE, "p_WH", "q_WH"),
+    )
     period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: Params) -> None:

@@ -24,6 +24,7 @@ from handover.cosim.blocks.plain_rotation import (
 )
 from handover.cosim.blocks.ports import Vector3, Vector4, Vector14, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Metre, MetrePerSecond, Newton, NewtonMetre, Number, Radian, RadianPerSecond
 from handover.plants.free_flyer.hand.attachment import Attachment, Frame, Palm
 from handover.plants.free_flyer.hand.contacts import (
@@ -135,6 +136,12 @@ class LargeObjectAndHands:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal("gripper_1", TerminalKind.MOTION, p_WG="p_WG_1", q_WG="q_WG_1", v_WG="v_WG_1", w_WG="w_WG_1"),
+        terminal("contact_1", TerminalKind.WRENCH, f_G="f_G_1", tau_G="tau_G_1"),
+        terminal("gripper_2", TerminalKind.MOTION, p_WG="p_WG_2", q_WG="q_WG_2", v_WG="v_WG_2", w_WG="w_WG_2"),
+        terminal("contact_2", TerminalKind.WRENCH, f_G="f_G_2", tau_G="tau_G_2"),
+    )
     period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: Params) -> None:

@@ -22,6 +22,7 @@ from handover.cosim.blocks.plain_rotation import (
 )
 from handover.cosim.blocks.ports import Matrix3, Vector3, Vector4, output, parameter, port
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import (
     Kilogram,
     KilogramMetre2,
@@ -144,6 +145,12 @@ class FreeFlyer:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal("base", TerminalKind.MOTION, "p_WB", "q_WB", "v_WB", "w_WB"),
+        terminal("gripper", TerminalKind.MOTION, "p_WG", "q_WG", "v_WG", "w_WG"),
+        terminal("thrust", TerminalKind.WRENCH, "f_B", "tau_B"),
+        terminal("contact", TerminalKind.WRENCH, "f_G", "tau_G"),
+    )
     period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: Params) -> None:

@@ -24,6 +24,7 @@ from handover.cosim.blocks.plain_rotation import (
 from handover.cosim.blocks.ports import Floats, Vector3, Vector4, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Hertz, Metre, MetrePerSecond, Number, Radian, RadianPerSecond, Second
 
 _ROUNDING = 1e-6
@@ -171,6 +172,10 @@ class Navigation:
         "v_WB_meas": ("v_WB",),
         "w_WB_meas": ("w_WB",),
     }
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal("base", TerminalKind.MOTION, "p_WB", "q_WB", "v_WB", "w_WB"),
+        terminal("estimate", TerminalKind.MOTION, "p_WB_meas", "q_WB_meas", "v_WB_meas", "w_WB_meas"),
+    )
     period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: Params) -> None:

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats, Vector3, output, parameter
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Newton, NewtonMetre, Second
 
 
@@ -53,6 +54,7 @@ class Push:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    terminals: ClassVar[tuple[Terminal, ...]] = (terminal("contact", TerminalKind.WRENCH, "f_G", "tau_G"),)
     period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: Params) -> None:

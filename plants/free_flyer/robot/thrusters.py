@@ -13,6 +13,7 @@ import numpy as np
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, Vector12, output, parameter, port
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Newton, NewtonMetre, Number, Radian, RadianPerSecond, Second
 from handover.plants.free_flyer.robot.nozzles import LARGEST_ANGLE, Nozzles, PropulsionModules, lost_directions
 
@@ -147,6 +148,11 @@ class Thrusters:
         **dict.fromkeys(("f_B", "tau_B", "saturated", "flapper_angles"), _COMMANDS),
         "impeller_speeds": (),
     }
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal("thrust", TerminalKind.WRENCH, "f_B", "tau_B"),
+        terminal("command_of_pose", TerminalKind.WRENCH, f_cmd="f_pose", tau_cmd="tau_pose"),
+        terminal("command_of_impedance", TerminalKind.WRENCH, f_cmd="f_impedance", tau_cmd="tau_impedance"),
+    )
     period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: Params) -> None:

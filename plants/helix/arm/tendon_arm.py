@@ -8,8 +8,17 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal
 from handover.plants.helix.arm.tendon_parameters import Params
-from handover.plants.helix.arm.tendon_ports import R_WB, Inputs, Outputs, closed_towards, internal_steps, outputs_of
+from handover.plants.helix.arm.tendon_ports import (
+    R_WB,
+    TERMINALS,
+    Inputs,
+    Outputs,
+    closed_towards,
+    internal_steps,
+    outputs_of,
+)
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -37,6 +46,7 @@ class TendonArm:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    terminals: ClassVar[tuple[Terminal, ...]] = TERMINALS
     period: ClassVar[Fraction | None] = None
     variable_step: ClassVar[bool] = False
     deferred: ClassVar[tuple[str, ...]] = ("handover.plants.helix.arm.tendon_chain",)

@@ -9,9 +9,11 @@ import numpy as np
 from handover.cosim.blocks.block import InvalidState
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal
 from handover.plants.helix.arm.tendon_parameters import Params
 from handover.plants.helix.arm.tendon_ports import (
     R_WB,
+    TERMINALS,
     Inputs,
     Outputs,
     SolverFailure,
@@ -42,6 +44,7 @@ class TendonArmFast:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    terminals: ClassVar[tuple[Terminal, ...]] = TERMINALS
     period: ClassVar[Fraction | None] = None
     variable_step: ClassVar[bool] = False
     deferred: ClassVar[tuple[str, ...]] = ("handover.plants.helix.arm.fast_chain",)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats, Polyline25, Vector3, Vector4, Vector9, output, port
+from handover.cosim.blocks.terminals import TerminalKind, terminal
 from handover.cosim.blocks.units import Metre, Newton, Number
 
 R_WB = np.diag([1.0, -1.0, -1.0])
@@ -109,3 +110,11 @@ def outputs_of(p_B: Floats, z_B: Floats, q_WR: Floats, d_gripper: float, tension
         tension=np.maximum(tension, 0.0),
         grip=grip,
     )
+
+
+TERMINALS = (
+    terminal("wrist", TerminalKind.POSE, "p_WR", "q_WR"),
+    terminal("gripper", TerminalKind.POSE, "p_WG", "q_WG"),
+    terminal("actuators", TerminalKind.COMMAND, "dl_t", "closure"),
+)
+"""What of an arm's ports is connected together."""

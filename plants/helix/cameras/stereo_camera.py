@@ -25,6 +25,7 @@ from handover.cosim.blocks.ports import (
 )
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Levels, Metre, Number, Pixel, Second
 from handover.plants.helix.cameras.painting import Backdrop, Canvas, Part
 from handover.plants.helix.cameras.scene import HandoverScene, MarkerCollar
@@ -237,6 +238,11 @@ class StereoCamera:
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = dict.fromkeys(
         ("left", "right", "third"), ("backbone", "p_WR", "q_WR", "p_WG", "q_WG", "grip", "p_WO", "p_WH")
+    )
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal("wrist", TerminalKind.POSE, "p_WR", "q_WR"),
+        terminal("gripper", TerminalKind.POSE, "p_WG", "q_WG"),
+        terminal("pictures", TerminalKind.PICTURES, "left", "right", "third"),
     )
     period: ClassVar[Fraction | None] = Fraction(1, 30)
 

@@ -9,6 +9,7 @@ import numpy as np
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.plants.hand_motion import HandTremor, minimum_jerk
 from handover.plants.helix.hand.bowl import Bowl
 from handover.plants.helix.hand.guidance import Guidance, GuidanceGains
@@ -57,6 +58,7 @@ class HandoverPartner:
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    terminals: ClassVar[tuple[Terminal, ...]] = (terminal("gripper", TerminalKind.POSE, "p_WG", "q_WG"),)
     period: ClassVar[Fraction | None] = None
     deferred: ClassVar[tuple[str, ...]] = ("handover.plants.helix.hand.held_ball",)
 
