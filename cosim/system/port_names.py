@@ -1,16 +1,18 @@
-"""Ports of a system's units by name: one end of a connection, all ports of one side, and which of two sides match."""
+"""Units as they are placed in a system, connections, and their ends by name: a port, or all of one side."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
 
 from handover.cosim.blocks.variable import Causality
-from handover.cosim.fmu.file.description import FmuPort
-from handover.cosim.system.wiring_faults import mismatch
+from handover.cosim.fmu.file.description import FmuDescription
+from handover.cosim.system.conversion import LinearTransformation
 
 
 @dataclass(frozen=True)
 class PortName:
-    """One end of a connection: a port of a unit in a system."""
+    """One end of a connection: a port of a unit in a system, or one of its terminals."""
 
     unit: str
     port: str
@@ -19,8 +21,20 @@ class PortName:
         return f"{self.unit}.{self.port}"
 
 
+@dataclass(frozen=True)
+class Connection:
+    """An output that feeds an input.
+
+    Real values are converted to the input's unit; a `transformation` replaces that.
+    """
+
+    source: PortName
+    target: PortName
+    transformation: LinearTransformation | None = None
+
+
 class PortNames:
-    """Makes port names by attribute: `arm.y.p_WG`. `System.check` checks whether such a port exists.
+    """Makes names of ports and terminals by attribute: `arm.y.p_WG`. `System.check` checks whether there is such a one.
 
     By itself it stands for all inputs, or all outputs, of its unit: `System.connect(arm.y, camera.u)`.
     """
@@ -38,6 +52,43 @@ class PortNames:
         return f"{self._unit}.{'y' if self._causality is Causality.OUTPUT else 'u'}"
 
 
+@dataclass(frozen=True)
+class PlacedUnit:
+    """A unit of a system: its FMU's description, its start values, and its communication step in seconds.
+
+    A sampled unit computes its outputs from the inputs at the instant at which a step begins.
+    """
+
+    name: str
+    description: FmuDescription
+    start: Mapping[str, Any]
+    period: Fraction
+    sampled: bool
+
+    @property
+    def uses_events(self) -> bool:
+        """Whether it runs in event mode, in which clocks tick and steps end at events.
+
+        A sampled unit does without: it ticks by itself, see `FmuDescription`.
+        """
+        return self.description.capabilities.event_mode and not self.sampled
+
+    @property
+    def u(self) -> PortNames:
+        """Its inputs, by attribute."""
+        return PortNames(self.name, Causality.INPUT)
+
+    @property
+    def y(self) -> PortNames:
+        """Its outputs, by attribute."""
+        return PortNames(self.name, Causality.OUTPUT)
+
+    def _repr_html_(self) -> str:
+        from handover.cosim.fmu.file.port_table import description_html  # of notebooks alone
+
+        return description_html(self.description)
+
+
 def unit_of(ports: PortNames, causality: Causality) -> str:
     """Return the unit whose ports of a causality these are.
 
@@ -53,57 +104,11 @@ def unit_of(ports: PortNames, causality: Causality) -> str:
     return unit
 
 
-@dataclass(frozen=True)
-class MatchedPorts:
-    """What `System.connect` did with two units: its text has a line for each input that it looked at.
-
-    Attributes:
-        source, target: the units.
-        connected: inputs that the output of the same name feeds.
-        left: inputs that have an output of the same name and are not connected, each with the reason.
-        unmatched: inputs that nothing feeds, as no output has their name.
-    """
-
-    source: str
-    target: str
-    connected: tuple[str, ...]
-    left: Mapping[str, str]
-    unmatched: tuple[str, ...]
-
-    def __str__(self) -> str:
-        lines = [f"{self.source}.{name} -> {self.target}.{name}" for name in self.connected]
-        lines += [f"{self.target}.{name} left: {reason}" for name, reason in self.left.items()]
-        lines += [f"{self.target}.{name} left: {self.source} has no output of this name" for name in self.unmatched]
-        return "\n".join(lines)
-
-
-def matched_ports(
-    source: str,
-    target: str,
-    outputs: Mapping[str, FmuPort],
-    inputs: Mapping[str, FmuPort],
-    fed: Mapping[str, str],
-) -> MatchedPorts:
-    """Match inputs with outputs of the same name, kind and shape, whose unit is the same or can be converted.
-
-    `source` and `target` name the units; `fed` has the inputs that get their values otherwise, with what feeds each.
-    """
-    left: dict[str, str] = {}
-    for name in [n for n in inputs if n in outputs]:
-        a, b = outputs[name], inputs[name]
-        if name in fed:
-            left[name] = fed[name]
-        elif reason := mismatch(a, b):
-            left[name] = f"{source}.{name} is {a.signature}, it is {b.signature}: {reason}"
-    connected = tuple(n for n in inputs if n in outputs and n not in left)
-    unmatched = tuple(n for n in inputs if n not in outputs and n not in fed)
-    return MatchedPorts(source, target, connected, left, unmatched)
-
-
 def ambiguity(target: PortName, sources: Collection[PortName]) -> str:
     """Return that several outputs match an input, and how to choose."""
     *others, last = sorted(f"{s.unit}.y.{s.port}" for s in sources)
+    by = " by name" if all(s.port == target.port for s in sources) else ""
     return (
-        f"{target}: {', '.join(others)} and {last} match it by name; connect the one that is meant: "
+        f"{target}: {', '.join(others)} and {last} match it{by}; connect the one that is meant: "
         f"connect({others[0]}, {target.unit}.u.{target.port})"
     )

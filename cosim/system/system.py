@@ -5,8 +5,7 @@ FMUs that a process may instantiate only once, and connections whose ports do no
 """
 
 from collections import defaultdict
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from numbers import Rational
 from pathlib import Path
@@ -18,58 +17,18 @@ from handover.cosim.fmu.file.clocks import FmuClock
 from handover.cosim.fmu.file.default_experiment import NO_STEP, DefaultExperiment, NoStep, proposed_step
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.system.conversion import LinearTransformation, conversion
-from handover.cosim.system.port_names import MatchedPorts, PortName, PortNames, ambiguity, matched_ports, unit_of
+from handover.cosim.system.matching import (
+    Ambiguity,
+    DoNotMatch,
+    MatchedPorts,
+    TerminalEnd,
+    matched_members,
+    matches_of,
+    told_of_terminals,
+)
+from handover.cosim.system.port_names import Connection, PlacedUnit, PortName, PortNames, ambiguity, unit_of
 from handover.cosim.system.time_series import ExternalSource, NoSource, TimeSeries, external_fault
 from handover.cosim.system.wiring_faults import clock_mismatch, event_faults, mismatch, once_faults, value_faults
-
-
-@dataclass(frozen=True)
-class PlacedUnit:
-    """A unit of a system: its FMU's description, its start values, and its communication step in seconds.
-
-    A sampled unit computes its outputs from the inputs at the instant at which a step begins.
-    """
-
-    name: str
-    description: FmuDescription
-    start: Mapping[str, Any]
-    period: Fraction
-    sampled: bool
-
-    @property
-    def uses_events(self) -> bool:
-        """Whether it runs in event mode, in which clocks tick and steps end at events.
-
-        A sampled unit does without: it ticks by itself, see `FmuDescription`.
-        """
-        return self.description.capabilities.event_mode and not self.sampled
-
-    @property
-    def u(self) -> PortNames:
-        """Its inputs, by attribute."""
-        return PortNames(self.name, Causality.INPUT)
-
-    @property
-    def y(self) -> PortNames:
-        """Its outputs, by attribute."""
-        return PortNames(self.name, Causality.OUTPUT)
-
-    def _repr_html_(self) -> str:
-        from handover.cosim.fmu.file.port_table import description_html  # of notebooks alone
-
-        return description_html(self.description)
-
-
-@dataclass(frozen=True)
-class Connection:
-    """An output that feeds an input.
-
-    Real values are converted to the input's unit; a `transformation` replaces that.
-    """
-
-    source: PortName
-    target: PortName
-    transformation: LinearTransformation | None = None
 
 
 class System:
@@ -79,7 +38,9 @@ class System:
         self.units: dict[str, PlacedUnit] = {}
         self.connections: list[Connection] = []
         self._sources: defaultdict[str, dict[str, PortName]] = defaultdict(dict)  # by unit, by input
-        self._matches: defaultdict[PortName, list[PortName]] = defaultdict(list)  # by input, what matches it by name
+        self._matches: defaultdict[PortName, list[Connection]] = defaultdict(list)  # by input, what matches it
+        self._ambiguities: list[Ambiguity] = []  # of terminals
+        self._unmatched: dict[tuple[str, str], str] = {}  # by two units of which nothing matches, what there is
         self.followed: defaultdict[str, dict[str, TimeSeries]] = defaultdict(dict)
         """By unit and input, the values over time that inputs follow."""
         self.externals: defaultdict[str, dict[str, ExternalSource]] = defaultdict(dict)
@@ -127,7 +88,7 @@ class System:
     @overload
     def connect(
         self, source: PortName, target: PortName, transformation: LinearTransformation | None = None
-    ) -> None: ...
+    ) -> MatchedPorts | None: ...
     @overload
     def connect(self, source: PortNames, target: PortNames) -> MatchedPorts: ...
     def connect(
@@ -139,16 +100,20 @@ class System:
         """Let an output feed an input, `connect(arm.y.x, camera.u.x)`, or all that match, `connect(arm.y, camera.u)`.
 
         Real values are converted to the input's unit where both have the same dimension. A `transformation` replaces
-        that conversion, whatever the units; it is for one connection of real values.
+        that conversion, whatever the units; it is for one connection of real values. Instead of ports, two terminals
+        can be named, `connect(arm.y.gripper, camera.u.gripper)`: all outputs of the one feed the inputs of the other,
+        or, where the two do not match, none does, and `check` says why. Of terminals, what was connected is returned.
 
-        Of two units, each input is fed by the output of the same name, kind and shape whose unit is the same or can be
-        converted; what was connected and what was left is returned. An input that is connected by its own name, follows
-        values or comes from outside is left, whether that was said before or is said later; `check` finds an input that
-        several units match, and two units of which nothing matches.
+        Of two units, terminals that match are connected first: by their names, then by their kinds. Each other input is
+        fed by the output of the same name, kind and shape whose unit is the same or can be converted; what was
+        connected and what was left is returned. An input that is connected by its own name, follows values or comes
+        from outside is left, whether that was said before or is said later; `check` finds an input that several units
+        match, terminals of which several match or that do not match as they should, and two units of which nothing
+        matches.
 
         Raises:
-            TypeError: an end is not a port, or not the outputs or inputs of a unit, or units are connected with a
-                transformation, which is for one connection.
+            TypeError: an end is not a port, or not the outputs or inputs of a unit, or units or terminals are connected
+                with a transformation, which is for one connection.
         """
         if isinstance(source, PortNames) or isinstance(target, PortNames):
             if transformation is not None:
@@ -157,38 +122,66 @@ class System:
         for end in (source, target):
             if not isinstance(end, PortName):  # pyright: ignore[reportUnnecessaryIsInstance]
                 raise TypeError(f"{end!r} is not a port: give unit.y.NAME and unit.u.NAME of what add returned")
-        self._forget_matches(target)
-        self._connect(source, target, transformation)
-        return None
+        a, b = self._terminal(source), self._terminal(target)
+        if a is None or b is None:
+            self._connect(Connection(source, target, transformation))
+            return None
+        if transformation is not None:
+            raise TypeError("a transformation is for one connection: give unit.y.NAME and unit.u.NAME")
+        return self._connect_terminals(a, b)
 
-    def _connect(self, source: PortName, target: PortName, transformation: LinearTransformation | None = None) -> None:
-        self.connections.append(Connection(source, target, transformation))
-        self._sources[target.unit][target.port] = source
+    def _terminal(self, end: PortName) -> TerminalEnd | None:
+        """Return the terminal that an end names; None where it names a port, as any terminal is hidden by."""
+        unit = self.units.get(end.unit)
+        if unit is None or end.port in {**unit.description.settable, **unit.description.outputs}:
+            return None
+        found = unit.description.terminals.by_name.get(end.port)
+        return None if found is None else (end.unit, unit.description, found)
+
+    def _connect_terminals(self, a: TerminalEnd, b: TerminalEnd) -> MatchedPorts:
+        connections: list[Connection] = []
+        try:
+            connections = matched_members(a, b)
+            if not connections:
+                raise DoNotMatch("no output of the one has an input of the other")
+        except DoNotMatch as e:
+            self._faults.append(f"{a[0]}.{a[2].name} -> {b[0]}.{b[2].name}: terminals that do not match: {e}")
+        for c in connections:
+            self._connect(c)
+        return told_of_terminals(a, b, connections)
+
+    def _connect(self, c: Connection) -> None:
+        self._forget_matches(c.target)
+        self._add(c)
+
+    def _add(self, c: Connection) -> None:
+        self.connections.append(c)
+        self._sources[c.target.unit][c.target.port] = c.source
 
     def _connect_matching(self, source: Any, target: Any) -> MatchedPorts:
         a, b = unit_of(source, Causality.OUTPUT), unit_of(target, Causality.INPUT)
-        outputs, inputs = self.units[a].description.outputs, self.units[b].description.inputs
+        inputs = self.units[b].description.inputs
+        matches = matches_of(a, self.units[a].description, b, self.units[b].description)
+        self._faults += [f for f in matches.faults if f not in self._faults]
+        if matches.nothing:
+            self._unmatched[a, b] = matches.nothing
+        self._ambiguities += [x for x in matches.ambiguities if x not in self._ambiguities]
         fed = {
             port: f"{end} feeds it" for port, end in self._sources[b].items() if PortName(b, port) not in self._matches
         }
         fed |= dict.fromkeys(self.followed[b], "it follows values over time")
         fed |= dict.fromkeys(self.externals[b], "it comes from outside")
-        matched = matched_ports(a, b, outputs, inputs, fed)
-        if not matched.connected and not matched.left:
-            self._faults.append(
-                f"{a}.y -> {b}.u: no output has the name of an input; {a} has {', '.join(outputs) or 'no outputs'}, "
-                f"{b} {', '.join(inputs) or 'no inputs'}"
-            )
-        left = dict(matched.left)
-        for port in matched.connected:
-            matches = self._matches[PortName(b, port)]
-            if PortName(a, port) not in matches:
-                matches.append(PortName(a, port))
-                if len(matches) == 1:
-                    self._connect(matches[0], PortName(b, port))
-            if matches[0] != PortName(a, port):
-                left[port] = f"{matches[0]} matches it, too"
-        return replace(matched, connected=tuple(port for port in matched.connected if port not in left), left=left)
+        left = {n: fed.get(n, matches.left.get(n, "")) for n in inputs if n in {**matches.connections, **matches.left}}
+        for port, c in matches.connections.items():
+            if port in fed:
+                continue
+            known = self._matches[c.target]
+            if c not in known:
+                known.append(c)
+                if len(known) == 1:
+                    self._add(c)
+            left[port] = f"{known[0].source} matches it, too" if known[0] != c else ""
+        return matches.told(a, b, inputs, left, fed)
 
     def _forget_matches(self, target: PortName) -> None:
         """Take back that an input was connected by its match, as something else is said of it."""
@@ -200,7 +193,7 @@ class System:
         """Remove the connections of a port, and what it is set to or follows."""
         self._matches.pop(end, None)
         for matches in self._matches.values():
-            matches[:] = [m for m in matches if m != end]
+            matches[:] = [m for m in matches if m.source != end]
         self.connections = [c for c in self.connections if end not in (c.source, c.target)]
         for sources in self._sources.values():
             for port in [p for p, source in sources.items() if source == end]:
@@ -212,7 +205,11 @@ class System:
         self.units[end.unit] = replace(unit, start={n: x for n, x in unit.start.items() if n != end.port})
         for target, (match,) in [(t, m) for t, m in self._matches.items() if len(m) == 1]:
             if target.port not in self._sources[target.unit]:
-                self._connect(match, target)
+                self._add(match)
+
+    def allow_no_match(self, unit: str) -> None:
+        """Let `check` accept that nothing matches of this unit and another with which it was connected as a whole."""
+        self._unmatched = {units: text for units, text in self._unmatched.items() if unit not in units}
 
     def add_fault(self, fault: str) -> None:
         """Let `check` raise a fault that whoever wires the system has found, besides those that it finds."""
@@ -254,7 +251,12 @@ class System:
         Raises:
             WiringError: with every fault of the system.
         """
-        faults = [*self._faults, *(ambiguity(end, ends) for end, ends in self._matches.items() if len(ends) > 1)]
+        faults = [
+            *self._faults,
+            *self._unmatched.values(),
+            *(str(a) for a in self._ambiguities if not a.is_settled(self.fed_inputs(a.target))),
+        ]
+        faults += [ambiguity(to, [c.source for c in cs]) for to, cs in self._matches.items() if len(cs) > 1]
         for unit in self.units.values():
             faults += value_faults(unit.name, unit.description, unit.start)
             faults += event_faults(unit.name, unit.description, unit.sampled)
@@ -387,6 +389,8 @@ class System:
             return ports[end.port], None
         if end.port in d.parameters:
             return None, f"{end} is a parameter"
+        if end.port in d.terminals.by_name:
+            return None, f"{end} is a terminal: connect it with one, or its ports one by one"
         if end.port in others:
             return None, f"{end} is an {'input' if role == 'output' else 'output'}, not an {role}"
         return None, f"{end.unit} has no {role} {end.port!r}; {nearest(end.port, ports)}"
