@@ -98,6 +98,7 @@ class _Fitting:
 
     def fit(self) -> None:
         """Find what is missing and of another kind; disconnect the former."""
+        self._system.allow_no_match(self._unit.name)
         absent: dict[Causality, list[str]] = {causality: [] for causality in _CAUSALITIES}
         for port in self._ports:
             v = port.declared
@@ -113,9 +114,14 @@ class _Fitting:
         self._note(absent)
 
     def _check(self, found: FmuPort, wanted: Variable) -> None:
-        """Check the kind of an output that the scenario itself reads; ports of connections are checked with these."""
-        end = PortName(self._unit.name, found.name)
-        if found.causality is not Causality.OUTPUT or any(c.source == end for c in self._system.connections):
+        """Check the kind of an output that the scenario itself reads, and of an input that was left as it matches none.
+
+        Ports of connections are checked with these, and what an input is set to with the values.
+        """
+        end, system = PortName(self._unit.name, found.name), self._system
+        is_set = found.name in (*system.fed_inputs(end.unit), *self._unit.start)
+        is_used = is_set or any(c.source == end for c in system.connections)
+        if found.causality is not wanted.causality or wanted.causality is Causality.PARAMETER or is_used:
             return
         if fault := _difference(found, wanted):
             self._system.add_fault(f"{end} ({found.signature}): {fault}, as that of {self._own.name}")

@@ -68,9 +68,6 @@ def published_values(p: Parameters) -> Sequence[PublishedValue]:
     return values
 
 
-MEASUREMENTS = ("p_WO_meas", "p_WR_meas", "p_WG_meas", "cov_O", "cov_R", "cov_G", "seen_O", "seen_R")
-"""What vision tells the controller."""
-
 _CLOSING = 15
 """Time after the approach, s: 10 to close, 3 for person and ball (`HandoverEvaluator`), and 2 to spare."""
 
@@ -106,8 +103,7 @@ class HelixHandover(Experiment[HandoverEvaluator]):
     def build(self, parameters: Parameters, seed: int, fmu: FmuOf) -> System:
         """Wire arm, hand, cameras, vision and controller."""
         s = self.without_measurements(parameters, seed, fmu)
-        for name in MEASUREMENTS:
-            s.connect(getattr(s.units["vision"].y, name), getattr(s.units["servo"].u, name))
+        s.connect(s.units["vision"].y, s.units["servo"].u)
         return s
 
     def without_measurements(self, p: Parameters, seed: int, fmu: FmuOf, **of_cameras: Any) -> System:
@@ -170,17 +166,13 @@ class HelixHandover(Experiment[HandoverEvaluator]):
         )
         arm = s.add("arm", fmu("arm"), **p.arm_values())
         hand = s.add("hand", fmu("hand"), seed=hand_seed, **p.hand_values(p.p_WO))
-        for name in ("backbone", "p_WR", "q_WR", "p_WG", "q_WG", "grip"):
-            s.connect(getattr(arm.y, name), getattr(camera.u, name))
-        for name in ("p_WO", "p_WH"):
-            s.connect(getattr(hand.y, name), getattr(camera.u, name))
+        s.connect(arm.y, camera.u)
+        s.connect(hand.y, camera.u)
         for side in p.cameras.sides:
             s.connect(getattr(camera.y, side), getattr(vision.u, side))
-        s.connect(servo.y.dl_t, arm.u.dl_t)
-        s.connect(servo.y.closure, arm.u.closure)
-        s.connect(hand.y.f_G, arm.u.f_G)
-        for name in ("p_WG", "q_WG", "grip"):
-            s.connect(getattr(arm.y, name), getattr(hand.u, name))
+        s.connect(servo.y, arm.u)
+        s.connect(hand.y, arm.u)
+        s.connect(arm.y, hand.u)
         return s
 
     def stop_time(self, parameters: Parameters) -> Fraction:

@@ -19,14 +19,11 @@ from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
-from handover.scenarios.helix.helix_handover import MEASUREMENTS, HelixHandover
+from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.helix.parameters import Parameters
 from handover.scenarios.helix.places import REFLEX_PLACES
 from handover.scenarios.helix.reflex_grasp_evaluation import ReflexGraspEvaluator
 from handover.scenarios.helix.reflex_grasp_parameters import Offer, ReflexGraspParameters
-
-_CORRECTED = ("p_WO", "p_WR", "p_WG", "P_O", "P_R", "P_G", "known_O", "known_R")
-"""What the reflex tells the servo in the place of the measurements, in their order."""
 
 
 class HelixReflexGrasp(HelixHandover):
@@ -82,18 +79,13 @@ class HelixReflexGrasp(HelixHandover):
             ball_radius=p.expected_radius,
         )
         vision, servo, arm, hand = (s.units[name] for name in ("vision", "servo", "arm", "hand"))
-        for name in ("p_WG", "q_WG", "grip"):
-            s.connect(getattr(arm.y, name), getattr(fingers.u, name))
-        for name in ("p_WO", "p_WH"):
-            s.connect(getattr(hand.y, name), getattr(fingers.u, name))
-        for name in MEASUREMENTS:
-            s.connect(getattr(vision.y, name), getattr(reflex.u, name))
-        for name, corrected in zip(MEASUREMENTS, _CORRECTED, strict=True):
-            s.connect(getattr(reflex.y, corrected), getattr(servo.u, name))
-        s.connect(fingers.y.ticks, reflex.u.ticks)
-        s.connect(arm.y.grip, reflex.u.grip)
-        for name in ("dl_t", "q_est"):
-            s.connect(getattr(servo.y, name), getattr(reflex.u, name))
+        s.connect(arm.y, fingers.u)
+        s.connect(hand.y, fingers.u)
+        s.connect(vision.y, reflex.u)
+        s.connect(reflex.y, servo.u)
+        s.connect(fingers.y, reflex.u)
+        s.connect(arm.y, reflex.u)
+        s.connect(servo.y, reflex.u)
         return s
 
     def stop_time(self, parameters: Any) -> Fraction:

@@ -12,12 +12,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from terminal_units import described_unit
 
+from handover.cosim.exceptions import WiringError
 from handover.cosim.record.reader import Record
 from handover.cosim.system.schedule import Schedule
+from handover.cosim.system.system import System
 from handover.fmus.build import cached
+from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.helix.cameras import CameraPlaces
 from handover.scenarios.helix.helix_handover import HelixHandover
+from handover.scenarios.helix.helix_reflex_grasp import HelixReflexGrasp
 from handover.scenarios.helix.parameters import Parameters
 
 
@@ -44,6 +49,58 @@ def test_a_third_picture_is_wired_where_there_is_a_third_camera():
         system = HelixHandover().build(Parameters(cameras=cameras), 0, lambda n: cached(HelixHandover.units[n], 3))
         pairs = {(f"{c.source.unit}.{c.source.port}", f"{c.target.unit}.{c.target.port}") for c in system.connections}
         assert (("camera.third", "vision.third") in pairs) is (cameras is CameraPlaces.THREE)
+
+
+HANDOVER = {
+    **{f"camera.{name}": f"arm.{name}" for name in ("backbone", "p_WR", "q_WR", "p_WG", "q_WG", "grip")},
+    **{f"camera.{name}": f"hand.{name}" for name in ("p_WO", "p_WH")},
+    **{f"vision.{name}": f"camera.{name}" for name in ("left", "right")},
+    **{f"servo.{what}_meas": f"vision.{what}_meas" for what in ("p_WO", "p_WR", "p_WG")},
+    **{f"servo.{name}": f"vision.{name}" for name in ("cov_O", "cov_R", "cov_G", "seen_O", "seen_R")},
+    **{f"arm.{name}": f"servo.{name}" for name in ("dl_t", "closure")},
+    "arm.f_G": "hand.f_G",
+    **{f"hand.{name}": f"arm.{name}" for name in ("p_WG", "q_WG", "grip")},
+}
+"""By input, the output that feeds it."""
+
+WITH_REFLEX = {
+    **HANDOVER,
+    **{f"servo.{what}_meas": f"reflex.{what}" for what in ("p_WO", "p_WR", "p_WG")},
+    **{f"servo.cov_{frame}": f"reflex.P_{frame}" for frame in "ORG"},
+    **{f"servo.seen_{frame}": f"reflex.known_{frame}" for frame in "OR"},
+    **{f"reflex.{what}_meas": f"vision.{what}_meas" for what in ("p_WO", "p_WR", "p_WG")},
+    **{f"reflex.{name}": f"vision.{name}" for name in ("cov_O", "cov_R", "cov_G", "seen_O", "seen_R")},
+    **{f"fingers.{name}": f"arm.{name}" for name in ("p_WG", "q_WG", "grip")},
+    **{f"fingers.{name}": f"hand.{name}" for name in ("p_WO", "p_WH")},
+    **{f"reflex.{name}": f"servo.{name}" for name in ("dl_t", "q_est")},
+    "reflex.ticks": "fingers.ticks",
+    "reflex.grip": "arm.grip",
+}
+
+
+@pytest.mark.parametrize(("scenario", "wanted"), [(HelixHandover(), HANDOVER), (HelixReflexGrasp(), WITH_REFLEX)])
+def test_whole_units_are_wired_to_what_they_are_to_be(scenario: Experiment[Any], wanted: dict[str, str]):
+    system = scenario.build(scenario.parameters_type(), 0, lambda name: cached(scenario.units[name], 3))
+    system.check()
+    assert sorted((str(c.target), str(c.source)) for c in system.connections) == sorted(wanted.items())
+
+
+def wired_with(hand: Path) -> System:
+    """Return the handover with another unit in the place of hand and ball."""
+    fmus = {name: cached(unit, 3) for name, unit in HelixHandover.units.items()} | {"hand": hand}
+    return HelixHandover().wire(Parameters(), 0, lambda name: fmus[name])
+
+
+def test_a_unit_in_a_place_need_not_match_what_is_optional_and_differs_nowhere(tmp_path: Path):
+    given = {"p_WO": "m 3", "p_WH": "m 3"}
+    without = wired_with(described_unit(tmp_path / "a.fmu", {}, given))
+    with pytest.raises(WiringError) as lacks:
+        without.check()
+    assert all("needs the" in fault for fault in lacks.value.faults)  # the required ones alone
+    assert any("no inputs p_WG, q_WG, grip" in note for note in without.notes)
+    other = wired_with(described_unit(tmp_path / "b.fmu", {"p_WG": "m 2"}, given))
+    with pytest.raises(WiringError, match=r"hand\.p_WG \(real \[2\] m\): it must be real \[3\] m, as that of Handover"):
+        other.check()
 
 
 @pytest.mark.slow
