@@ -29,7 +29,7 @@ RUNS = [c for c in COMMANDS if " run " in c and "--live" not in c]
 LIVE_RUNS = [c for c in COMMANDS if "--live" in c]
 """Begins once its page is open: tests/scenarios/live runs it."""
 PROGRAMS = [text for kind, text in BLOCKS if kind == "python"]
-IN_PYTHON, STEPS, AGENT, OWN_SYSTEM, IN_FMPY, OWN_BLOCK, OWN_BUILD = PROGRAMS
+IN_PYTHON, STEPS, AGENT, OWN_SYSTEM, TERMINALS, IN_FMPY, OWN_BLOCK, OWN_BUILD = PROGRAMS
 
 
 def handover(command: str, folder: Path) -> "subprocess.CompletedProcess[str]":
@@ -50,6 +50,7 @@ def test_the_readme_has_what_is_tested_here():
     assert len([c for c in COMMANDS if " export " in c]) == 1
     assert len([c for c in COMMANDS if " build " in c]) == 4
     assert len([c for c in COMMANDS if " check " in c]) == 2
+    assert len([c for c in COMMANDS if " info " in c]) == 1
     assert len([c for c in COMMANDS if " vsl-train " in c]) == 2
     assert len([c for c in COMMANDS if " sweep " in c]) == 4
     assert len([c for c in COMMANDS if " compare " in c]) == 1
@@ -137,6 +138,22 @@ def test_a_unit_runs_in_fmpy(folder: Path):
 
 
 @pytest.mark.skipif(sys.platform != "linux" or not interpreter.library(), reason="the program looks for linux64")
+def test_a_unit_tells_its_terminals(folder: Path):
+    done = handover(command_with(" info "), folder)
+    assert done.returncode == 0, done.stderr
+    listed = [line.split()[:3] for line in done.stdout.partition("\nTerminals")[2].splitlines() if line]
+    assert listed == [
+        ["wrist", "_handover_pose", "plug"],
+        ["gripper", "_handover_pose", "plug"],
+        ["actuators", "_handover_command", "plug"],
+    ]
+
+
+def test_whole_units_and_terminals_are_connected(tmp_path: Path):
+    lines = program(TERMINALS, tmp_path).splitlines()
+    assert lines == [f"robot.{x}_WB -> navigation.{x}_WB (terminal base)" for x in "pqvw"]
+
+
 def test_a_unit_runs_in_a_c_program(folder: Path):
     script = block_with("./c_host")
     if shutil.which("cc") is None:

@@ -42,6 +42,8 @@ def test_an_array_is_one_member_in_fmi_3_and_one_for_each_entry_elsewhere():
     assert 'fmiVersion="3.0"' in entries  # the version that defines the file, also within an FMU of FMI 2
 
 
-def test_a_block_without_terminals_has_no_file():
-    with zipfile.ZipFile(cached("TrajectoryPlanner", 3)) as archive:
+def test_without_terminals_the_file_tells_of_the_icon_alone_and_in_fmi_2_there_is_none():
+    assert "<Terminals>" not in written(cached("TrajectoryPlanner", 3))
+    assert "<GraphicalRepresentation>" in written(cached("TrajectoryPlanner", 3))
+    with zipfile.ZipFile(cached("TrajectoryPlanner", 2)) as archive:
         assert TERMINALS not in archive.namelist()

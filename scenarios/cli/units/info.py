@@ -9,6 +9,7 @@ import click
 from handover.cosim.fmu.file.archive import FmuArchive
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.fmu.file.fmpy_edge import platforms_in
+from handover.cosim.fmu.file.terminals import FmuTerminal
 from handover.cosim.ssp.ssp_file import SspFile
 from handover.cosim.system.system import System
 from handover.scenarios.cli.console import open_console, print_json, print_rows
@@ -18,8 +19,8 @@ from handover.scenarios.execution.fmu_run import is_fmu
 from handover.scenarios.execution.ssp_run import is_ssp
 
 _HELP = """Tell what is in FILE, an FMU (2.0 or 3.0, co-simulation) or an SSP: names, steps, capabilities, parameters,
-inputs and outputs; of an SSP its units, parameters and connections. Nothing is loaded or run; `handover check` does
-that.
+inputs, outputs and terminals; of an SSP its units, parameters and connections. Nothing is loaded or run; `handover
+check` does that.
 """
 
 _CAPABILITIES = {
@@ -69,7 +70,19 @@ def fmu_data(d: FmuDescription, platforms: list[str]) -> dict[str, Any]:
         "sampled": d.sampled,
         "capabilities": capabilities,
         **{kind: [variable_data(p) for p in of_kind.values()] for kind, of_kind in ports.items()},
+        "terminals": [terminal_data(t) for t in d.terminals.by_name.values()],
         "fault": d.untouched_fault or None,
+    }
+
+
+def terminal_data(t: FmuTerminal) -> dict[str, Any]:
+    """Return a terminal as JSON can hold it: members by name; `fault` says why it cannot be connected."""
+    return {
+        "name": t.name,
+        "kind": t.kind or None,
+        "rule": t.rule.value if t.rule else None,
+        "members": [{"name": m.name or None, "port": m.port} for m in t.members],
+        "fault": t.reason or None,
     }
 
 
@@ -96,13 +109,20 @@ def _print_fmu(data: dict[str, Any], d: FmuDescription) -> None:
         ("capabilities", "; ".join(able) or "none of those that are optional"),
         ("token", data["token"]),
     ]
-    if data["fault"]:
-        rows.append(("fault", data["fault"]))
+    rows += [("fault", fault) for fault in (data["fault"], d.terminals.fault) if fault]
     print_rows(console, rows)
     for heading, ports in (("Parameters", d.parameters), ("Inputs", d.inputs), ("Outputs", d.outputs)):
         if ports:
             console.print(heading, style="bold")
             print_rows(console, port_rows(ports.values()))
+    if data["terminals"]:
+        console.print("Terminals", style="bold")
+        print_rows(console, [_terminal_row(t) for t in data["terminals"]])
+
+
+def _terminal_row(t: dict[str, Any]) -> tuple[str, ...]:
+    members = [m["port"] if m["name"] in (m["port"], None) else f"{m['name']} = {m['port']}" for m in t["members"]]
+    return t["name"], t["kind"] or "", t["rule"] or "", t["fault"] or ", ".join(members)
 
 
 def _print_system(data: dict[str, Any], parameters: Collection[FmuPort]) -> None:
