@@ -232,7 +232,9 @@ def build(
         from handover.fmus.reference_run import record_experiment  # loads FMPy, which takes long
 
         with tempfile.TemporaryDirectory(prefix="handover-proof-") as scratch:
-            experiment = record_experiment(write_archive(Path(scratch, name), files, programs), entry.step, proof.stimulus)
+            experiment = record_experiment(
+                write_archive(Path(scratch, name), files, programs), entry.step, proof.stimulus
+            )
         files |= related_files(model, source, parameter_sets, experiment)
     return write_archive(out_dir / name, files, programs)
 

@@ -20,12 +20,12 @@ class Block(Protocol):
     A block may offer more, see `EventfulBlock` and `DifferentiableBlock`.
 
     Class attributes: `feedthrough` names, by output, the inputs with direct feedthrough to it (within the same
-    communication point); `period` is the sampling period of a block that is sampled, in seconds, else None. Three may be
-    left out: `terminals` are ports that are connected together, see `handover.cosim.blocks.terminals`; `deferred` names
-    modules that the constructor imports late, as they take long to load and ports are read without them: an FMU loads
-    them when it is instantiated (not every library loads in the thread that a host steps in), and a process that makes
-    many instances loads them once beforehand; `icon` names a PNG beside the block's module, by which other tools show
-    the unit; an SVG of the same name goes with it.
+    communication point); `period` is the sampling period of a block that is sampled, in seconds, else None. Others may
+    be left out: `terminals` are ports that are connected together, see `handover.cosim.blocks.terminals`; `deferred`
+    names modules that the constructor imports late, as they take long to load and ports are read without them: an FMU
+    loads them when it is instantiated (not every library loads in the thread that a host steps in), and a process that
+    makes many instances loads them once beforehand; `icon` names a PNG beside the block's module, by which other tools
+    show the unit; an SVG of the same name goes with it.
     """
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]]
