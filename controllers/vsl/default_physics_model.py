@@ -13,7 +13,7 @@ DEFAULT_MODEL = """\
  "provenance": {
   "arm": {
    "fmu": "VslArm",
-   "key": "f5fd7d7e26e3d3fac6e76aadad0fc8d0f7a1fbf63e9e94ac37615a445a1c65ff",
+   "key": "8e522ab79868cadd652816acb05a7f1ff776c430f5f1a773ff55ce5e4adfd1d4",
    "parameters": {
     "EI_0": 0.55,
     "EI_factor": [1.0, 1.0, 1.0],
@@ -153,6 +153,6 @@ DEFAULT_MODEL = """\
    "gravity": 9.81
   }
  },
- "sha256": "9e3acde327728b90dd5b3cf935915843c0dabe5c9c5c15844117adaf85fed2a6"
+ "sha256": "ac29af59377ad56ba571f9736db63aa1ecb21485e6dd10959554ddb020a2b462"
 }
 """

@@ -13,7 +13,7 @@ DEFAULT_MODEL = """\
  "provenance": {
   "arm": {
    "fmu": "VslArm",
-   "key": "f5fd7d7e26e3d3fac6e76aadad0fc8d0f7a1fbf63e9e94ac37615a445a1c65ff",
+   "key": "8e522ab79868cadd652816acb05a7f1ff776c430f5f1a773ff55ce5e4adfd1d4",
    "parameters": {
     "EI_0": 0.55,
     "EI_factor": [1.0, 1.0, 1.0],
@@ -287,6 +287,6 @@ DEFAULT_MODEL = """\
    "mkPql0kj1GD4C9Pl7XPoxSPz7fFDk7Oi/qvw=="
   ]
  },
- "sha256": "12606876abfebea5ca5d1bcb5434412a45998a57c2edf3b5489a233e822a637c"
+ "sha256": "b81dfa0223b5db74addcce5103c126c3d0dba2d1615252909be084452c7a48a8"
 }
 """

@@ -25,6 +25,7 @@ from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Vector2, Vector3, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Ampere, Hertz, Metre, Number, Pascal, PerSecond, Radian, RadianPerSecond, Second
 
 __all__ = [
@@ -220,6 +221,10 @@ class HybridKinematics:
         "model_mismatch": ("q_meas", "p_meas", "i_meas", "p_WG_meas", "tilt_meas"),
     }
     period: ClassVar[Fraction | None] = _PERIOD
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal("joints", TerminalKind.COMMAND, "q_cmd", "qd_cmd"),
+        terminal("sensors", TerminalKind.MEASUREMENTS, "q_meas", "p_meas", "i_meas"),
+    )
 
     def __init__(self, params: Params) -> None:
         if faults := parameter_faults(params) or _idle(params):

@@ -11,6 +11,7 @@ import numpy as np
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.ports import Floats, Polyline25, Vector2, Vector3, output, port
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.cosim.blocks.units import Ampere, Kilogram, Metre, Newton, Pascal, Radian, RadianPerSecond
 from handover.plants.vsl.actuators import PressureLine, VslServo
 from handover.plants.vsl.chain import Complexes, Pose, VslChain
@@ -102,6 +103,10 @@ class VslArm:
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     period: ClassVar[Fraction | None] = None
+    terminals: ClassVar[tuple[Terminal, ...]] = (
+        terminal("joints", TerminalKind.COMMAND, "q_cmd", "qd_cmd"),
+        terminal("sensors", TerminalKind.MEASUREMENTS, "q_meas", "p_meas", "i_meas"),
+    )
 
     def __init__(self, params: Params) -> None:
         params.check()

@@ -135,7 +135,7 @@ def built(name: str, given: tuple[str, ...], of_units: Mapping[str, str]) -> tup
         ("ir_grasp", ("correction=fast",), {}, 90),
         ("ir_grasp", DISTURBED, OFF, 90),
         ("ir_sensor", (), {}, 90),
-        ("helix_reflex_grasp", (), {}, 90),
+        ("helix_reflex_grasp", (), {}, 30),
     ],
 )
 def test_a_scenario_ends_in_fmpy_as_here(
