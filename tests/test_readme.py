@@ -137,7 +137,6 @@ def test_a_unit_runs_in_fmpy(folder: Path):
     assert (x, y, z) == pytest.approx((0.0, 0.0, -0.7), abs=1e-6)
 
 
-@pytest.mark.skipif(sys.platform != "linux" or not interpreter.library(), reason="the program looks for linux64")
 def test_a_unit_tells_its_terminals(folder: Path):
     done = handover(command_with(" info "), folder)
     assert done.returncode == 0, done.stderr
@@ -154,6 +153,7 @@ def test_whole_units_and_terminals_are_connected(tmp_path: Path):
     assert lines == [f"robot.{x}_WB -> navigation.{x}_WB (terminal base)" for x in "pqvw"]
 
 
+@pytest.mark.skipif(sys.platform != "linux" or not interpreter.library(), reason="the program looks for linux64")
 def test_a_unit_runs_in_a_c_program(folder: Path):
     script = block_with("./c_host")
     if shutil.which("cc") is None:
