@@ -7,7 +7,9 @@ and rotation matrices more often than not.
 
 The tolerance of the result is measured. Other platforms round otherwise, so the stimulus is played once more with every
 real input 1e-13 of its value smaller, which is some hundred times the rounding of one operation; ten times the greatest
-difference that it makes is allowed, relative to the variable's largest value, but no less than 1e-9. With their default
+difference that it makes is allowed, relative to the variable's largest value, but no less than 1e-9. Differences below
+the absolute tolerance do not count. Parameters and inputs at 0 stay as they are; where no input changes, nothing is
+measured, the tolerance is the least one, and the text in the FMU says so. With their default
 stimuli the catalog's units need no more: their largest difference is 2.8e-11, of TendonArm's tension. numpy and
 OpenBLAS without AVX2 and AVX-512 put that off by 1e-11, and the outputs of 15 other units by at most 2e-10, which is
 PoseController's `slowest_decay`: a number made of parameters alone, which rounded inputs do not move.
@@ -15,7 +17,7 @@ PoseController's `slowest_decay`: a number made of parameters alone, which round
 
 import math
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -50,7 +52,7 @@ _STEPS, _AT_REST, _RAMP = 50, 10, 20
 _SHARE_OF_RANGE, _SHARE_OF_VALUE = 0.1, 0.01
 _PERTURBATION = 1e-13
 _MARGIN, _LEAST, _MOST = 10.0, 1e-9, 1e-2
-_TIMEOUT = 600.0  # s, of one run
+_TIMEOUT = 600.0  # s, of both runs together
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,9 @@ class RecordedExperiment:
 
     Attributes:
         origin: whose the stimulus is, in a clause.
-        spread: the difference that rounded inputs made, of the output that differed most.
+        spread: the difference between the two runs, of the output that differed most; None if none differed by more
+            than the absolute tolerance.
+        is_measured: whether the second run had other inputs.
     """
 
     stimulus: bytes
@@ -67,20 +71,33 @@ class RecordedExperiment:
     setup: Setup
     origin: str
     spread: Difference | None
+    is_measured: bool
 
     def text_lines(self, stimulus: str, result: str) -> list[str]:
         """Return what users should know, for the files of these names."""
         s, spread = self.setup, self.spread
-        most = f"{spread.share:.2g} of its largest value ({spread.name})" if spread and spread.greatest else "nothing"
+        change = f"smaller changed no output by more than {s.absolute:g} in its unit, so that {_LEAST:g} is enough."
+        if spread is not None:
+            most = f"changed the outputs by at most {spread.share:.2g} of its largest value ({spread.name})"
+            change = f"smaller {most}. Ten times that is allowed, and no less than {_LEAST:g}."
+        origin = [
+            "its unit; what is no real number is equal. It is measured: real inputs that were 1e-13 of their value",
+            change,
+        ]
+        if not self.is_measured:
+            origin = [
+                "its unit; what is no real number is equal. It is not measured, as there are no real inputs but 0 that",
+                f"could round: where rounding grows within the unit, {s.relative:g} may be too little elsewhere.",
+            ]
         lines = [
             f"{stimulus} has the inputs, {self.origin}: columns of CSV, time in seconds and entries named as",
             "in FMI 2. An input holds the latest row's value from initialisation on; others hold their start values.",
-            f"{result} has the outputs at all communication points, {s.step} s apart, as this FMU gave them on",
-            f"{host_platform()}, without event mode, all parameters being as in the model description.",
+            f"{result} has the outputs at all communication points, as this FMU gave them on {host_platform()}: every",
+            f"{s.step} s and, if the FMU takes steps of any size, where the inputs have a row; without event mode, all",
+            "parameters being as in the model description.",
             "",
             f"Tolerance: {s.relative:g} of the largest value that a variable has in the result, plus {s.absolute:g} in",
-            "its unit; what is no real number is equal. It is measured: real inputs that were 1e-13 of their value",
-            f"smaller changed the outputs by at most {most}. Ten times that is allowed, and no less than {_LEAST:g}.",
+            *origin,
             "",
         ]
         if s.left_out:
@@ -114,27 +131,48 @@ def record_experiment(fmu: Path, step: Fraction, stimulus: Path | None = None) -
         nearby = replace(given, columns={n: _rounded(columns[n][0], v) for n, v in given.columns.items()})
         first, second = _played(d, folder, [write_table(t, columns) for t in (given, nearby)], step, Path(scratch))
     one, other = (read_table(content, "result", compared) for content in (first, second))
-    spread = max(differences(one, other, compared), key=lambda difference: difference.share)
-    if spread.greatest > ABSOLUTE and spread.share * _MARGIN > _MOST:
-        size = "it no longer gives the same" if math.isinf(spread.greatest) else f"by {spread.share:.2g} of its value"
-        raise CannotProve(
-            f"{d.name}: output {spread.name!r} changes as inputs round ({size} at t = {spread.at:g} s), so that other "
-            "machines could not meet a result; give a shorter or calmer stimulus by --stimulus"
-        )
+    spread = largest_difference(differences(one, other, compared))
+    is_measured = nearby != given
+    if spread is not None and spread.share * _MARGIN > _MOST:
+        raise CannotProve(_refusal(d.name, spread, is_measured=is_measured))
     setup = Setup(
         step=step,
-        relative=_tolerance(spread),
+        relative=relative_tolerance(spread),
         absolute=ABSOLUTE,
         parameters={p.name: p.start or "" for p in d.parameters.values()},
         left_out=tuple(p.name for p in d.outputs.values() if not has_columns(p)),
     )
     origin = "the default ones of `handover build --prove`" if stimulus is None else "given by the FMU's author"
-    return RecordedExperiment(write_table(given, columns), first, setup, origin, spread)
+    return RecordedExperiment(write_table(given, columns), first, setup, origin, spread, is_measured)
 
 
-def _tolerance(spread: Difference) -> float:
-    """Return ten times a difference, rounded up to one digit; no less than `_LEAST`, as where all differ by less."""
-    wanted = _MARGIN * spread.share if spread.greatest > ABSOLUTE else 0.0
+def _refusal(unit: str, spread: Difference, *, is_measured: bool) -> str:
+    size = f"by {spread.share:.2g} of its largest value"
+    if math.isinf(spread.share):
+        size = "it no longer gives the same" if math.isinf(spread.greatest) else f"by {spread.greatest:.2g} from 0"
+    where = f"({size} at t = {spread.at:g} s)"
+    if not is_measured:
+        return (
+            f"{unit}: output {spread.name!r} changes from one run to the next {where}, so that no result could be met; "
+            "let the unit depend on its inputs, its parameters and a seed alone"
+        )
+    return (
+        f"{unit}: output {spread.name!r} changes as inputs round {where}, so that other machines could not meet a "
+        "result; give a shorter or calmer stimulus by --stimulus"
+    )
+
+
+def largest_difference(found: Iterable[Difference]) -> Difference | None:
+    """Return the largest difference, relative to its variable, of those above `ABSOLUTE`; None if there are none.
+
+    Those below are allowed anyway, and those of an output that rests at 0 are infinite relative to it.
+    """
+    return max((d for d in found if d.greatest > ABSOLUTE), key=lambda d: d.share, default=None)
+
+
+def relative_tolerance(spread: Difference | None) -> float:
+    """Return ten times a difference, rounded up to one digit; no less than `_LEAST`, as where there is none."""
+    wanted = _MARGIN * spread.share if spread is not None else 0.0
     if wanted <= _LEAST:
         return _LEAST
     digit = 10.0 ** math.floor(math.log10(wanted))

@@ -14,7 +14,7 @@ import pytest
 import xmlschema
 
 from handover.cosim.check.check_fmu import check_fmu
-from handover.cosim.check.reference_experiment import Setup, experiments_in
+from handover.cosim.check.reference_experiment import Difference, Setup, experiments_in
 from handover.cosim.check.related_files import FOLDER, MANIFEST, related_files
 from handover.cosim.check.signal_table import InvalidTable
 from handover.cosim.fmu.file.archive import FmuArchive, write_archive
@@ -22,7 +22,7 @@ from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus.build import Proof, build
 from handover.fmus.catalog import Entry
 from handover.fmus.reference import PAGE, CannotProve, InvalidParameterSet, NothingToCompare, ParameterSet
-from handover.fmus.reference_run import default_stimulus
+from handover.fmus.reference_run import default_stimulus, largest_difference, record_experiment, relative_tolerance
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema" / "fmi3"
 FORMS = [(2, False), (3, False), (3, True)]
@@ -152,6 +152,30 @@ def test_the_tolerance_is_what_rounding_makes_of_the_outputs(tmp_path: Path):
     with pytest.raises(CannotProve, match="output 'y' changes as inputs round"):
         build(CHAOTIC, 3, tmp_path / "out", platforms=["host"], proof=Proof())
     assert not (tmp_path / "out").exists()
+
+
+def test_noise_of_an_output_at_rest_hides_no_other():
+    resting, apart = Difference("resting", 1e-16, 0.1, 0.0), Difference("apart", 1e-4, 0.2, 1.0)
+    assert largest_difference([resting, apart]) is apart
+    assert relative_tolerance(apart) == 1e-3
+    assert largest_difference([resting]) is None
+    assert relative_tolerance(None) == 1e-9
+
+
+@pytest.mark.parametrize(("x", "wanted"), [("0.0", "It is not measured, as there"), ("0.3", "It is measured: real")])
+def test_a_tolerance_is_measured_only_where_an_input_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, x: str, wanted: str
+):
+    def play(*arguments: Any) -> list[Any]:
+        for run in arguments[2]:
+            run["result"].write_text("time,y\n0.0,0.5\n0.1,0.5\n")
+        return []
+
+    monkeypatch.setattr("handover.fmus.reference_run.run_experiment", play)
+    given = tmp_path / "given.csv"
+    given.write_text(f"time,x\n0.0,{x}\n0.1,{x}\n")
+    recorded = record_experiment(build(CHAOTIC, 3, tmp_path, platforms=["host"]), Fraction(1, 10), given)
+    assert wanted in " ".join(recorded.text_lines("stimulus.csv", "result.csv"))
 
 
 def test_a_unit_of_pictures_has_nothing_to_compare(tmp_path: Path):
