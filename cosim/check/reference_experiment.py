@@ -10,6 +10,7 @@ result, plus `absolute`; what is no real number must be equal.
 """
 
 import math
+import sys
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
@@ -47,6 +48,8 @@ ABSOLUTE = 1e-12
 """Absolute tolerance in a variable's unit, where the manifest gives none: an output that rests at 0 may round."""
 
 _CSV = "text/csv"
+_MAX_CHARACTERS = 1000
+"""Of a step as a fraction: those of doubles have fewer than 400."""
 
 
 @dataclass(frozen=True)
@@ -127,11 +130,8 @@ def _is_csv(file: RelatedFile) -> bool:
 
 def _setup(element: XmlElement) -> Setup:
     tag = f"{{{ANNOTATION_NAMESPACE}}}"
-    try:
-        step = Fraction(element.get("step"))
-    except (ValueError, ZeroDivisionError):
-        step = Fraction(0)
-    if step <= 0:
+    step = _exact_step(element.get("step"))
+    if step is None:
         raise ValueError(f"step={element.get('step')[:40]!r} is no positive number of seconds")
     return Setup(
         step=step,
@@ -140,6 +140,20 @@ def _setup(element: XmlElement) -> Setup:
         parameters={p.get("name"): p.get("value") for p in element.named(f"{tag}Parameter")},
         left_out=tuple(p.get("name") for p in element.named(f"{tag}LeftOut")),
     )
+
+
+def _exact_step(text: str) -> Fraction | None:
+    """Return a step of 1/30 or 0.02, for example, exactly; None if it is no positive number that a double can hold.
+
+    That is seen before an exact number is made, as one of `1e20000000` would take minutes.
+    """
+    try:
+        if len(text) > _MAX_CHARACTERS or ("/" not in text and not 0.0 < float(text) < math.inf):
+            return None
+        step = Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        return None
+    return step if sys.float_info.min <= step <= sys.float_info.max else None
 
 
 def _tolerance(element: XmlElement, name: str) -> float:

@@ -135,6 +135,16 @@ def test_a_path_that_leads_to_another_folder_of_the_archive_is_right(tmp_path: P
     [
         (INPUTS.replace("u", "v"), outputs(), "in.csv: column 'v' is no input of the FMU"),
         (INPUTS, outputs().replace("y", "z"), "out.csv: column 'z' is no variable of the FMU"),
+@pytest.mark.parametrize(
+    "step", ["-1", "1/0", "nan", "1e20000000", "1e-20000000", "0e99999999", f"1/{'9' * 400}", "1" * 5000]
+)
+def test_a_step_that_no_double_can_hold_is_refused_at_once(tmp_path: Path, step: str):
+    content = manifest(STIMULUS.format(SETUP.format("1", "").replace("1/10", step)))
+    ((level, line), *_) = told(packed(tmp_path, content, {"in.csv": INPUTS}))
+    assert level is Level.FAULT
+    assert f"step='{step[:40]}' is no positive number of seconds" in line
+
+
         (INPUTS, outputs().replace("y", "x"), "out.csv: no column is an output of the FMU: valid: y"),
         (INPUTS.replace("0.3,2.0", "0.3,nan"), outputs(), "in.csv: line 3, column 'u': 'nan': a finite number"),
         (INPUTS.replace("0.3,2.0", "0.3,fast"), outputs(), "line 3, column 'u': 'fast': a number is right"),
