@@ -21,7 +21,9 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.blocks.description import describe, with_start_values
+from handover.cosim.check import related_files as manifest_format
 from handover.cosim.exceptions import InvalidFmu
+from handover.cosim.fmu.file import archive as archive_format
 from handover.cosim.fmu.file.archive import TERMINALS, FmuArchive, write_archive
 from handover.fmus import interpreter
 from handover.fmus.binaries import binaries
@@ -40,6 +42,9 @@ from handover.fmus.standalone.trial import try_unit
 from handover.fmus.terminals import terminals_file
 
 _log = logging.getLogger(__name__)
+
+_OUTSIDE = (manifest_format, archive_format)
+"""Modules outside of this package whose constants and layout get into an FMU."""
 
 
 @dataclass(frozen=True)
@@ -279,7 +284,7 @@ def _model(entry: Entry, form: Form, token: str) -> Model:
 
 def _content_key(entry: Entry, form: Form, carried: Carried) -> str:
     """Return a hash of all that an FMU depends on: sources, packages, interpreter, runtime, and the builder itself."""
-    builder = sorted(Path(__file__).parent.glob("*.*"))
+    builder = [*sorted(Path(__file__).parent.glob("*.*")), *(Path(m.__file__ or "") for m in _OUTSIDE)]
     parts = {path: file.read_bytes() for path, file in carried.files.items()}
     parts |= {f"builder/{file.name}": file.read_bytes() for file in builder if file.is_file()}
     parts |= icon_files(icon_of(entry), form.fmi)
