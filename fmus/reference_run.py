@@ -122,6 +122,7 @@ def record_experiment(fmu: Path, step: Fraction, stimulus: Path | None = None) -
     d = describe_fmu(fmu)
     columns, compared = stimulus_columns(d), result_columns(d)
     given = default_stimulus(d, step) if stimulus is None else read_stimulus(stimulus, columns)
+    given = given.snapped(given.times[0], step)
     communication_points(given.times, (), step, varies_step=d.capabilities.varies_step)
     if not compared:
         raise NothingToCompare(d.name)

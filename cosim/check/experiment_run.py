@@ -1,7 +1,8 @@
 """Plays a stimulus to one unit and records its outputs, in an isolated process (`isolated_process`).
 
 The inputs hold the values of the latest row at or before a communication point, from initialisation on; the outputs are
-recorded at every communication point. `run_experiment` starts the process, whose entry is `main`.
+recorded at every communication point. Rows whose times are rounded ends of steps count as
+there (`SignalTable.snapped`). `run_experiment` starts the process, whose entry is `main`.
 """
 
 import bisect
@@ -173,7 +174,11 @@ def main(task: Mapping[str, Any]) -> None:
 
 def _run(d: FmuDescription, folder: Path, files: Mapping[str, Path], step: Fraction | None, journal: Journal) -> None:
     stimulus = read_table(files["stimulus"].read_bytes(), "stimulus", stimulus_columns(d))
-    times = read_table(files["reference"].read_bytes(), "result", {}).times if "reference" in files else ()
+    start = stimulus.times[0]
+    stimulus = stimulus.snapped(start, step)
+    times = ()
+    if "reference" in files:
+        times = read_table(files["reference"].read_bytes(), "result", {}).snapped(start, step).times
     points = communication_points(stimulus.times, times, step, varies_step=d.capabilities.varies_step)
     try:
         unit = ProbedInstance("unit", d, folder, journal)

@@ -217,8 +217,8 @@ class Difference:
 
 def differences(reference: SignalTable, result: SignalTable, columns: Mapping[str, Column]) -> list[Difference]:
     """Return by how much each output differs from a reference, at the times of the reference, which the result has."""
-    rows = {t: k for k, t in enumerate(result.times)}
-    picked = [rows[t] for t in reference.times]
+    rows = {float(t): k for k, t in enumerate(result.times)}
+    picked = [rows[float(t)] for t in reference.times]
     by_port: dict[str, list[str]] = {}
     for name in reference.columns:
         by_port.setdefault(columns[name][0].name, []).append(name)
@@ -264,8 +264,10 @@ class ExperimentCheck:
             return "", [fault(what, where=where, cure="a result of the present parameters is wanted")]
         try:
             tables, findings = self._tables(experiment)
-            stimulus, reference = tables
             step = experiment.setup.step or proposed_step(self._d.step)
+            start = tables[0].times[0]
+            stimulus = tables[0].snapped(start, step)
+            reference = tables[1].snapped(start, step) if tables[1] else None
             points = communication_points(
                 stimulus.times,
                 reference.times if reference else (),

@@ -9,9 +9,10 @@ rounding is.
 import csv
 import ctypes
 import io
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -28,6 +29,8 @@ MAX_ENTRIES = 1000
 """Entries of an array that has columns."""
 
 _MAX_FAULTS = 5
+_SHARE_OF_STEP = 0.01
+"""By which a rounded time may lie off a step's end, at most."""
 
 Column = tuple[FmuPort, int]
 """A variable and the place of one of its entries in row-major order."""
@@ -49,10 +52,28 @@ class SignalTable:
     Attributes:
         times: in seconds, rising.
         columns: by name, a value for each time: a number, or a text of a string.
+        resolutions: for each time that was read, a unit in the last of its written digits, in seconds.
     """
 
     times: Sequence[Fraction]
     columns: Mapping[str, Sequence[Any]]
+    resolutions: Sequence[float] = ()
+
+    def snapped(self, start: Fraction, step: Fraction | None) -> "SignalTable":
+        """Return the table with times on a grid that are there but for rounding, such as 0.0333333 s for 1/30 s.
+
+        Those are nearer to the grid than a unit in the last of their digits, and than a hundredth of a step. Where two
+        rows would have one time, all stay.
+        """
+        if step is None or not self.resolutions:
+            return self
+        times = [_snapped(t, start, step, unit) for t, unit in zip(self.times, self.resolutions, strict=True)]
+        return replace(self, times=times) if all(a < b for a, b in itertools.pairwise(times)) else self
+
+
+def _snapped(t: Fraction, start: Fraction, step: Fraction, resolution: float) -> Fraction:
+    nearest_point = start + round((t - start) / step) * step
+    return nearest_point if abs(t - nearest_point) <= min(resolution, _SHARE_OF_STEP * float(step)) else t
 
 
 def has_columns(port: FmuPort) -> bool:
@@ -120,6 +141,7 @@ def read_table(content: bytes, name: str, columns: Mapping[str, Column], *, in_r
     header, rows = _rows(content, name)
     faults: list[str] = [] if rows else ["it has no rows of values"]
     times: list[Fraction] = []
+    resolutions: list[float] = []
     values: list[list[Any]] = [[] for _ in header]
     for line, row in rows:
         if len(row) != len(header) + 1:
@@ -132,6 +154,7 @@ def read_table(content: bytes, name: str, columns: Mapping[str, Column], *, in_r
         if times and exact_seconds(t) <= times[-1]:
             faults.append(f"line {line}: the time {row[0]} s is not after {float(times[-1]):g} s, the one before")
         times.append(exact_seconds(t))
+        resolutions.append(_resolution(row[0]))
         for text, column, into in zip(row[1:], header, values, strict=True):
             if column in columns:
                 value, fault = _parsed(columns[column][0], text, in_range=in_range)
@@ -140,7 +163,7 @@ def read_table(content: bytes, name: str, columns: Mapping[str, Column], *, in_r
                     faults.append(f"line {line}, column {column!r}: {text!r}: {fault}")
     if faults:
         raise InvalidTable(name, faults)
-    return SignalTable(times, {c: v for c, v in zip(header, values, strict=True) if c in columns})
+    return SignalTable(times, {c: v for c, v in zip(header, values, strict=True) if c in columns}, resolutions)
 
 
 def unknown_columns(header: Sequence[str], known: Iterable[str], what: str) -> list[str]:
@@ -182,6 +205,15 @@ def _parsed(port: FmuPort, text: str, *, in_range: bool) -> tuple[Any, str]:
     if in_range and ((low is not None and number < low) or (high is not None and number > high)):
         return 0, f"it is out of range: {range_of(port)}"
     return number, ""
+
+
+def _resolution(number: str) -> float:
+    """Return a unit in the last digit of a number as written: 1e-4 of 0.0333 and of 3.33e-2."""
+    mantissa, _, exponent = number.strip().lower().partition("e")
+    try:
+        return float(f"1e{int(exponent or 0) - len(mantissa.partition('.')[2])}")
+    except ValueError:  # the exponent has thousands of digits
+        return 0.0
 
 
 def _finite(text: str) -> float | None:

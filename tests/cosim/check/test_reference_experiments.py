@@ -2,15 +2,19 @@
 
 import math
 from collections.abc import Mapping
+from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import decay
 import pytest
 
 from handover.cosim.check.check_fmu import check_fmu
-from handover.cosim.check.finding import CheckReport, Level, Section
+from handover.cosim.check.experiment_run import communication_points
+from handover.cosim.check.finding import CheckReport, Finding, Level, Section
 from handover.cosim.check.reference_experiment import ExperimentCheck, experiments_in
 from handover.cosim.check.related_files import FOLDER, MANIFEST, related_files
+from handover.cosim.check.signal_table import read_table
 from handover.cosim.fmu.file.archive import FmuArchive
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus.compile import host_platform
@@ -52,12 +56,17 @@ def told(fmu: Path) -> list[tuple[Level, str]]:
     return [(f.level, f.line) for f in [*findings, *experiments_in(files)[1]]]
 
 
-def refused(fmu: Path, folder: Path) -> str:
-    """Return why a file's only experiment is not run."""
+def checked(fmu: Path, folder: Path) -> tuple[str, list[Finding]]:
+    """Return what the check of a file's only experiment says."""
     archive = FmuArchive(fmu)
     (experiment,) = experiments_in(related_files(archive)[0])[0]
     check = ExperimentCheck(archive, describe_fmu(fmu), ["x", "u", "y", "mode"], folder / "none", folder, 60.0)
-    (finding,) = check.run(experiment)[1]
+    return check.run(experiment)
+
+
+def refused(fmu: Path, folder: Path) -> str:
+    """Return why a file's only experiment is not run."""
+    (finding,) = checked(fmu, folder)[1]
     assert finding.level is Level.FAULT
     return finding.line
 
@@ -126,15 +135,6 @@ def test_a_manifest_at_fault_is_told(tmp_path: Path, content: bytes, level: Leve
     assert any(each is level and wanted in line for each, line in found), found
 
 
-def test_a_path_that_leads_to_another_folder_of_the_archive_is_right(tmp_path: Path):
-    assert told(packed(tmp_path, manifest('<Related source="../../modelDescription.xml" role="model"/>'))) == []
-
-
-@pytest.mark.parametrize(
-    ("inputs", "results", "wanted"),
-    [
-        (INPUTS.replace("u", "v"), outputs(), "in.csv: column 'v' is no input of the FMU"),
-        (INPUTS, outputs().replace("y", "z"), "out.csv: column 'z' is no variable of the FMU"),
 @pytest.mark.parametrize(
     "step", ["-1", "1/0", "nan", "1e20000000", "1e-20000000", "0e99999999", f"1/{'9' * 400}", "1" * 5000]
 )
@@ -145,6 +145,15 @@ def test_a_step_that_no_double_can_hold_is_refused_at_once(tmp_path: Path, step:
     assert f"step='{step[:40]}' is no positive number of seconds" in line
 
 
+def test_a_path_that_leads_to_another_folder_of_the_archive_is_right(tmp_path: Path):
+    assert told(packed(tmp_path, manifest('<Related source="../../modelDescription.xml" role="model"/>'))) == []
+
+
+@pytest.mark.parametrize(
+    ("inputs", "results", "wanted"),
+    [
+        (INPUTS.replace("u", "v"), outputs(), "in.csv: column 'v' is no input of the FMU"),
+        (INPUTS, outputs().replace("y", "z"), "out.csv: column 'z' is no variable of the FMU"),
         (INPUTS, outputs().replace("y", "x"), "out.csv: no column is an output of the FMU: valid: y"),
         (INPUTS.replace("0.3,2.0", "0.3,nan"), outputs(), "in.csv: line 3, column 'u': 'nan': a finite number"),
         (INPUTS.replace("0.3,2.0", "0.3,fast"), outputs(), "line 3, column 'u': 'fast': a number is right"),
@@ -179,3 +188,20 @@ def test_a_result_of_other_parameters_is_refused(tmp_path: Path, parameters: str
     content = manifest(STIMULUS.format(SETUP.format("1e-9", parameters)), RESULT)
     fmu = packed(tmp_path, content, {"in.csv": INPUTS, "out.csv": outputs()})
     assert wanted in refused(fmu, tmp_path)
+
+
+@pytest.mark.parametrize("varies_step", [False, True])
+def test_times_with_few_digits_are_ends_of_steps(varies_step: bool):
+    step = Fraction(1, 30)
+    table = read_table(b"time\n0\n0.0333333\n0.06666667\n1.0e-1\n0.13333\n", "in.csv", {}).snapped(Fraction(0), step)
+    assert communication_points(table.times, (), step, varies_step=varies_step) == [k * step for k in range(5)]
+
+
+@pytest.mark.parametrize(
+    ("rows", "wanted"),
+    [("0\n0.035\n", [0.0, 0.035]), ("0\n0.03333\n0.03334\n", [0.0, 0.03333, 0.03334]), ("0\n1\n", [0.0, 1.0]),
+     ("0e-99999999999999999999\n1\n", [0.0, 1.0])],
+)  # fmt: skip
+def test_times_within_a_step_stay(rows: str, wanted: list[float]):
+    table = read_table(f"time\n{rows}".encode(), "in.csv", {}).snapped(Fraction(0), Fraction(1, 30))
+    assert [float(t) for t in table.times] == wanted
