@@ -290,10 +290,9 @@ class ExperimentCheck:
         result = read_table(files["result"].read_bytes(), "result", columns)
         compared = differences(reference, result, columns)
         findings += _judged(compared, experiment.setup)
-        worst = max(compared, key=lambda difference: difference.share)
-        most = f", {worst.name} {worst.share:.1g} of its largest value off" if worst.greatest else ", all equal"
         n_outputs = f"{len(compared)} output{'s' if len(compared) != 1 else ''}"
-        return f"{experiment.name}: {n} steps, {n_outputs} compared{most}", findings
+        most = _largest_in_words(compared, experiment.setup)
+        return f"{experiment.name}: {n} steps, {n_outputs} compared, {most}", findings
 
     def _tables(self, e: ReferenceExperiment) -> tuple[tuple[SignalTable, SignalTable | None], list[Finding]]:
         """Return stimulus and result, and what is good to know about them.
@@ -324,6 +323,29 @@ class ExperimentCheck:
         return (stimulus, reference), notes
 
 
+def _allowed(d: Difference, setup: Setup) -> float:
+    relative = RELATIVE if setup.relative is None else setup.relative
+    absolute = ABSOLUTE if setup.absolute is None else setup.absolute
+    return relative * d.largest + absolute
+
+
+def _largest_in_words(compared: Sequence[Difference], setup: Setup) -> str:
+    """Return by how much the output differs that uses most of its tolerance."""
+
+    def use(d: Difference) -> float:
+        allowed = _allowed(d, setup)
+        return d.greatest / allowed if allowed else math.inf if d.greatest else 0.0
+
+    worst = max(compared, key=use)
+    if not worst.greatest:
+        return "all equal"
+    if math.isinf(worst.greatest):
+        return f"{worst.name} not equal"
+    if not worst.largest:
+        return f"{worst.name} {worst.greatest:.1g} off, which is 0 in the result"
+    return f"{worst.name} {worst.share:.1g} of its largest value off"
+
+
 def _judged(compared: Sequence[Difference], setup: Setup) -> Iterator[Finding]:
     """Yield a finding for each output that differs: a fault where it is beyond the tolerance."""
     relative = RELATIVE if setup.relative is None else setup.relative
@@ -333,7 +355,7 @@ def _judged(compared: Sequence[Difference], setup: Setup) -> Iterator[Finding]:
         if math.isinf(d.greatest):
             yield fault(f"it is not as in the result from t = {d.at:.6g} s on", where=where, cure="equal is right")
             continue
-        allowed = relative * d.largest + absolute
+        allowed = _allowed(d, setup)
         size = f"it differs from the result by up to {d.greatest:.3g} at t = {d.at:.6g} s"
         origin = f"{relative:g} of its largest value {d.largest:.3g}, and {absolute:g}"
         level = note if d.greatest <= allowed else fault

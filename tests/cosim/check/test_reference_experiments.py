@@ -190,6 +190,19 @@ def test_a_result_of_other_parameters_is_refused(tmp_path: Path, parameters: str
     assert wanted in refused(fmu, tmp_path)
 
 
+@pytest.mark.parametrize(("y", "wanted"), [("1e-13", "y 1e-13 off, which is 0 in the result"), ("0", "all equal")])
+def test_an_output_at_rest_is_compared_absolutely(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, y: str, wanted: str):
+    def play(*arguments: Any) -> list[Any]:
+        arguments[2][0]["result"].write_text(f"time,y\n0.0,{y}\n0.3,{y}\n1.0,{y}\n")
+        return []
+
+    monkeypatch.setattr("handover.cosim.check.reference_experiment.run_experiment", play)
+    files = {"in.csv": INPUTS, "out.csv": "time,y\n0.0,0\n0.3,0\n1.0,0\n"}
+    summary, findings = checked(packed(tmp_path, manifest(STIMULUS.format(""), RESULT), files), tmp_path)
+    assert summary.endswith(f", 1 output compared, {wanted}")
+    assert all(f.level is Level.NOTE for f in findings)
+
+
 @pytest.mark.parametrize("varies_step", [False, True])
 def test_times_with_few_digits_are_ends_of_steps(varies_step: bool):
     step = Fraction(1, 30)
