@@ -1,8 +1,10 @@
-"""The parameter sets that the catalog's units bring along as FMUs, from the robots' `paper.toml`.
+"""The parameter sets that the catalog's units contain as FMUs, from the robots' `paper.toml`.
 
-Each unit has its defaults in two sets: `published`, what a paper or the robot's makers state, what follows from that or
-is read off a figure; and `assumed`, what none of them gives. Each value has its place in the source. Where a robot was
-tuned in other ways, as the thesis did or as we do, these have a set each.
+The defaults that `paper.toml` gives are in two sets: `published`, what a paper or the robot's makers state, what
+follows from that or is read off a figure; and `assumed`, what none of them gives. Each value has its place in the
+source. In neither set are parameters that `paper.toml` does not name, such as seeds, lenses and places of cameras, and
+those whose default is another value than there; the test of this module lists them all. Where a robot was tuned in
+other ways, as the thesis did or as we do, these have a set each.
 """
 
 from collections.abc import Iterator, Mapping
