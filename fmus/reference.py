@@ -5,6 +5,7 @@ The experiment and its result are in CSV, as `handover.cosim.check.signal_table`
 """
 
 import dataclasses
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -25,6 +26,7 @@ PAGE = "documentation/fmi-ls-ref.txt"
 
 _EXPERIMENT = "smoke-test"
 _STIMULUS, _RESULT = f"{_EXPERIMENT}/stimulus.csv", f"{_EXPERIMENT}/result.csv"
+_FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")
 _FMI2_TYPES = {Kind.REAL: "Real", Kind.INTEGER: "Integer"}
 
 
@@ -33,7 +35,7 @@ class ParameterSet:
     """Values of a unit's parameters that belong together, such as those of a paper.
 
     Attributes:
-        name: of the set, a file's name without its end.
+        name: of the set, a file's name without its end: ASCII letters, digits, `_`, `-` and, after the first, `.`.
         description: one line for users.
         values: by parameter; of enumerations the name.
         origins: in a sentence, where a value is from.
@@ -60,7 +62,7 @@ class NothingToCompare(CannotProve):
 
 
 class InvalidParameterSet(ValueError):
-    """A parameter set names what is no parameter of its unit, or has a value that it cannot have."""
+    """A parameter set has a name that no file can have, names no parameter, or has a value that one cannot have."""
 
     def __init__(self, unit: str, name: str, faults: Sequence[str]) -> None:
         super().__init__(f"{unit}, parameter set {name!r}: {'; '.join(faults)}")
@@ -79,7 +81,7 @@ def related_files(
         experiment: with its result, if there is one.
 
     Raises:
-        InvalidParameterSet: a set does not fit the block's parameters.
+        InvalidParameterSet: a set does not fit the block's parameters; or its name is no file's, or another set's, too.
     """
     manifest = _Manifest()
     manifest.add("text/x-python", f"../../{source}", "model", "Source of the block, with what it imports beside it")
@@ -87,6 +89,7 @@ def related_files(
     manifest.add("text/plain", f"../../{PAGE}", "document", "What the related files are, and how the result was made")
     files: dict[str, bytes] = {}
     for parameters in sets:
+        _check_name(model.name, parameters.name, [s.name for s in sets])
         path = f"parameters/{parameters.name}.ssv"
         files[f"{FOLDER}/{path}"] = _ssv(model, parameters)
         manifest.add("application/x-ssp-parameter-set", path, "parameter", parameters.description, parameters.labels)
@@ -100,6 +103,14 @@ def related_files(
     files[MANIFEST] = to_xml(manifest.root)
     files[PAGE] = _page(model, sets, experiment).encode()
     return files
+
+
+def _check_name(unit: str, name: str, names: Sequence[str]) -> None:
+    if not _FILE_NAME.fullmatch(name):
+        right = "ASCII letters, digits, '_', '-' and, after the first, '.' are right"
+        raise InvalidParameterSet(unit, name, [f"a set's name is that of a file; {right}"])
+    if [n.lower() for n in names].count(name.lower()) > 1:
+        raise InvalidParameterSet(unit, name, ["two sets have this name, and so would their files"])
 
 
 class _Manifest:

@@ -84,8 +84,8 @@ def run_experiment(
         runs: the files of each run, which has an instance of its own: `stimulus`, `result` which is written if nothing
             goes wrong and, if there is one, `reference`, at whose times outputs are recorded, too.
         step: communication step, in seconds; None: from row to row.
-        scratch: an empty folder for the process.
-        timeout: in seconds.
+        scratch: a folder for the process's own files, which may hold others.
+        timeout: of all runs together, in seconds.
     """
     task = {
         "fmu": str(fmu.absolute()),

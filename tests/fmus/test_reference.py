@@ -228,6 +228,22 @@ def test_a_parameter_set_has_the_variables_of_its_form(tmp_path: Path, fmi: int,
 
 
 @pytest.mark.parametrize(
+    ("names", "wanted"),
+    [
+        (["../a"], "a set's name is that of a file; ASCII letters"),
+        (["a b"], "a set's name is that of a file"),
+        ([""], "a set's name is that of a file"),
+        (["a", "A"], "two sets have this name"),
+    ],
+)
+def test_a_parameter_set_whose_name_is_no_files_is_refused(tmp_path: Path, names: list[str], wanted: str):
+    sets = [ParameterSet(name=name, description="b", values={"gain": 3.0}) for name in names]
+    with pytest.raises(InvalidParameterSet, match=wanted):
+        build(EVERY_KIND, 3, tmp_path / "out", parameter_sets=sets)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
     ("values", "wanted"),
     [({"gains": 1.0}, "gains: no parameter of it"), ({"gain": 11.0}, "gain: 11.0 is out of range: from 0 to 10")],
 )
