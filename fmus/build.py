@@ -174,8 +174,8 @@ def build(
         standalone: bring the interpreter and all packages along, for this machine's platform: nothing need be installed
             where the FMU is used. The unit is started in them, and steps once, before the FMU is written.
         include: data files that the block opens beside its module, by `__file__`.
-        parameter_sets: that the FMU brings along (FMI-LS-REF).
-        proof: the experiment that is recorded and brought along; it takes the time of two runs.
+        parameter_sets: that the FMU contains (FMI-LS-REF).
+        proof: the experiment that is recorded and stored with its result; it takes the time of two runs.
 
     Raises:
         CannotProve, InvalidTable: the experiment cannot be recorded, or its stimulus is not one for this unit.

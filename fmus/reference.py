@@ -96,8 +96,8 @@ def related_files(
     if experiment is not None:
         label = [f"experiment:{_EXPERIMENT}"]
         files |= {f"{FOLDER}/{_STIMULUS}": experiment.stimulus, f"{FOLDER}/{_RESULT}": experiment.result}
-        told = "Inputs over time, held from row to row"
-        element = manifest.add("text/csv", _STIMULUS, f"experiment/{_EXPERIMENT}", told, label)
+        held = "Inputs over time, held from row to row"
+        element = manifest.add("text/csv", _STIMULUS, f"experiment/{_EXPERIMENT}", held, label)
         ET.SubElement(element, "Annotations").append(experiment.setup.as_xml(_RESULT))
         manifest.add("text/csv", _RESULT, "result", "Outputs at all communication points", label)
     files[MANIFEST] = to_xml(manifest.root)
@@ -132,9 +132,9 @@ def _ssv(model: Model, parameters: ParameterSet) -> bytes:
     from handover.cosim.ssp.writing import values_document  # takes long to load, and most FMUs have no sets
 
     declared = {v.name: v for v in model.description.parameters}
-    told = [(name, "no parameter of it" if name not in declared else fault_of(declared[name], value))
+    given = [(name, "no parameter of it" if name not in declared else fault_of(declared[name], value))
             for name, value in parameters.values.items()]  # fmt: skip
-    if faults := [f"{name}: {fault}" for name, fault in told if fault]:
+    if faults := [f"{name}: {fault}" for name, fault in given if fault]:
         raise InvalidParameterSet(model.name, parameters.name, faults)
     ports = {name: _port(model.layout, model.form, declared[name]) for name in parameters.values}
     values = {name: (ports[name], value) for name, value in parameters.values.items()}

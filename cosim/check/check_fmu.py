@@ -1,4 +1,4 @@
-"""Checks one FMU file: archive, description, interface, binaries, loading, a short run, and what it brings along.
+"""Checks one FMU file: archive, description, interface, binaries, loading, a short run, and the related files in it.
 
 `check_fmu` runs the parts in this order, each only if the ones before it allow. The description is checked by FMPy's
 validation with the standard's schema and rules (`standard_findings`) and by `description_checks`; the libraries'

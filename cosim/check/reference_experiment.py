@@ -1,4 +1,4 @@
-"""Runs the experiments that an FMU brings along, and compares its outputs with the results beside them.
+"""Runs the experiments that an FMU contains, and compares its outputs with the results beside them.
 
 An experiment is a stimulus (CSV, role `experiment`) and a result (CSV, role `result`) of the manifest that
 `related_files` reads. An annotation of ours at the stimulus (`Setup`) names the result, the communication step, the

@@ -1,4 +1,4 @@
-"""The files that an FMU brings along, with their roles, as the layered standard FMI-LS-REF lists them in a manifest.
+"""The related files of an FMU, with their roles, as the layered standard FMI-LS-REF lists them in a manifest.
 
 The manifest, `extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml`, has an element `Related` for each file: its MIME
 type, its place as a URI relative to the manifest, its role and a description, and labels. Whoever has changed the

@@ -74,7 +74,7 @@ def parameter_sets(unit: str) -> list[ParameterSet]:
         entries |= {n: paper_entry(folder, group, n) for n in paper_values(folder, group) if n in declared}
     return [
         *_by_origin({n: e for n, e in entries.items() if _is_default(declared[n], e["value"])}),
-        *(_tuning(folder, group, told, declared) for group, told in _TUNINGS.get(unit, {}).items()),
+        *(_tuning(folder, group, description, declared) for group, description in _TUNINGS.get(unit, {}).items()),
         *(_behaviour(name) for name in ("rigid", "compliant") if unit in _BEHAVIOURS),
     ]
 
@@ -85,18 +85,18 @@ def _is_default(v: Variable, value: Any) -> bool:
 
 
 def _by_origin(entries: Mapping[str, dict[str, Any]]) -> Iterator[ParameterSet]:
-    for name, told in (
+    for name, description in (
         ("published", "Defaults that are published, derived from that, or read off a figure"),
         ("assumed", "Defaults that no source gives"),
     ):
         chosen = {n: e for n, e in entries.items() if (e["status"] == "assumed") == (name == "assumed")}
         if chosen:
-            yield _set(name, told, chosen, f"origin:{name}")
+            yield _set(name, description, chosen, f"origin:{name}")
 
 
-def _tuning(folder: str, group: str, told: str, declared: Mapping[str, Variable]) -> ParameterSet:
+def _tuning(folder: str, group: str, description: str, declared: Mapping[str, Variable]) -> ParameterSet:
     entries = {n: paper_entry(folder, group, n) for n in paper_values(folder, group) if n in declared}
-    return _set(group, told, entries, f"tuning:{group}")
+    return _set(group, description, entries, f"tuning:{group}")
 
 
 def _behaviour(name: str) -> ParameterSet:
@@ -111,10 +111,10 @@ def _behaviour(name: str) -> ParameterSet:
     )
 
 
-def _set(name: str, told: str, entries: Mapping[str, dict[str, Any]], label: str) -> ParameterSet:
+def _set(name: str, description: str, entries: Mapping[str, dict[str, Any]], label: str) -> ParameterSet:
     return ParameterSet(
         name=name,
-        description=told,
+        description=description,
         values={n: e["value"] for n, e in entries.items()},
         origins={n: f"{e['where']} ({e['status']})" for n, e in entries.items()},
         labels=(label,),

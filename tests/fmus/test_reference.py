@@ -68,7 +68,7 @@ def setup_of(fmu: Path) -> Setup:
     return experiment.setup
 
 
-def test_an_experiment_is_brought_along(tmp_path: Path):
+def test_an_experiment_is_stored_with_its_result(tmp_path: Path):
     fmu = build(EVERY_KIND, 3, tmp_path, platforms=["host"], parameter_sets=SETS, proof=Proof())
     files = contents(fmu)
     schema().validate(io.BytesIO(files[MANIFEST]))
@@ -191,7 +191,7 @@ def test_a_unit_that_fails_is_not_proven(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_a_result_of_other_parameters_is_told(tmp_path: Path):
+def test_a_result_of_other_parameters_is_reported(tmp_path: Path):
     fmu = build(SAMPLED, 3, tmp_path, platforms=["host"], proof=Proof())
     files = contents(fmu)
     files["modelDescription.xml"] = files["modelDescription.xml"].replace(b'start="0.1"', b'start="0.2"')

@@ -60,7 +60,7 @@ spring:Spring for the class Spring in spring.py; modules are looked for in the w
 
 A unit with pictures has no FMI 2 form, since FMI 2 knows no binary variables.
 
-Each FMU brings along, with their roles in a manifest (FMI-LS-REF), its source, its documentation and the parameter sets
+Each FMU contains, with their roles in a manifest (FMI-LS-REF), its source, its documentation and the parameter sets
 of the papers and, by --prove, an experiment with its result, which `handover check` runs and compares on any machine.
 
 \b

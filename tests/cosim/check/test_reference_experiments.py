@@ -1,4 +1,4 @@
-"""What a foreign FMU brings along: its manifest is judged, its experiments are run, and the results are compared."""
+"""The related files of a foreign FMU: its manifest is judged, its experiments are run, and the results are compared."""
 
 import math
 from collections.abc import Mapping
@@ -51,7 +51,7 @@ def packed(folder: Path, content: bytes, files: Mapping[str, str] | None = None,
     return decay.pack(folder / "Decay.fmu", library, others=others)
 
 
-def told(fmu: Path) -> list[tuple[Level, str]]:
+def manifest_findings(fmu: Path) -> list[tuple[Level, str]]:
     files, findings = related_files(FmuArchive(fmu))
     return [(f.level, f.line) for f in [*findings, *experiments_in(files)[1]]]
 
@@ -130,8 +130,8 @@ def test_an_experiment_without_setup_is_run_too(decay_library: bytes, tmp_path: 
         (manifest(STIMULUS.format(SETUP.format("1", "").replace("1/10", "0"))), Level.FAULT, "step='0' is no positive"),
     ],
 )  # fmt: skip
-def test_a_manifest_at_fault_is_told(tmp_path: Path, content: bytes, level: Level, wanted: str):
-    found = told(packed(tmp_path, content, {"in.csv": INPUTS, "in.exp": ""}))
+def test_a_manifest_at_fault_is_reported(tmp_path: Path, content: bytes, level: Level, wanted: str):
+    found = manifest_findings(packed(tmp_path, content, {"in.csv": INPUTS, "in.exp": ""}))
     assert any(each is level and wanted in line for each, line in found), found
 
 
@@ -140,13 +140,14 @@ def test_a_manifest_at_fault_is_told(tmp_path: Path, content: bytes, level: Leve
 )
 def test_a_step_that_no_double_can_hold_is_refused_at_once(tmp_path: Path, step: str):
     content = manifest(STIMULUS.format(SETUP.format("1", "").replace("1/10", step)))
-    ((level, line), *_) = told(packed(tmp_path, content, {"in.csv": INPUTS}))
+    ((level, line), *_) = manifest_findings(packed(tmp_path, content, {"in.csv": INPUTS}))
     assert level is Level.FAULT
     assert f"step='{step[:40]}' is no positive number of seconds" in line
 
 
 def test_a_path_that_leads_to_another_folder_of_the_archive_is_right(tmp_path: Path):
-    assert told(packed(tmp_path, manifest('<Related source="../../modelDescription.xml" role="model"/>'))) == []
+    content = manifest('<Related source="../../modelDescription.xml" role="model"/>')
+    assert manifest_findings(packed(tmp_path, content)) == []
 
 
 @pytest.mark.parametrize(
