@@ -135,12 +135,28 @@ def test_a_manifest_at_fault_is_reported(tmp_path: Path, content: bytes, level: 
     assert any(each is level and wanted in line for each, line in found), found
 
 
-@pytest.mark.parametrize(
-    "step", ["-1", "1/0", "nan", "1e20000000", "1e-20000000", "0e99999999", f"1/{'9' * 400}", "1" * 5000]
-)
-def test_a_step_that_no_double_can_hold_is_refused_at_once(tmp_path: Path, step: str):
+def step_finding(folder: Path, step: str) -> tuple[Level, str]:
+    """Return the first finding of a manifest whose experiment has a step."""
     content = manifest(STIMULUS.format(SETUP.format("1", "").replace("1/10", step)))
-    ((level, line), *_) = manifest_findings(packed(tmp_path, content, {"in.csv": INPUTS}))
+    return manifest_findings(packed(folder, content, {"in.csv": INPUTS}))[0]
+
+
+@pytest.mark.parametrize("step", ["-1", "1/0", f"1/{'9' * 400}"])
+def test_a_step_that_is_not_positive_or_that_no_double_holds_is_refused(tmp_path: Path, step: str):
+    level, line = step_finding(tmp_path, step)
+    assert level is Level.FAULT
+    assert f"step='{step[:40]}' is no positive number of seconds" in line
+
+
+@pytest.mark.parametrize("step", ["nan", "1e20000000", "1e-20000000", "0e99999999", "1" * 5000])
+def test_a_step_that_would_take_long_is_refused_before_it_is_made_exact(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str
+):
+    def exact(text: str) -> Fraction:
+        raise AssertionError(f"{text[:40]} is made exact")
+
+    monkeypatch.setattr("handover.cosim.check.reference_experiment.Fraction", exact)
+    level, line = step_finding(tmp_path, step)
     assert level is Level.FAULT
     assert f"step='{step[:40]}' is no positive number of seconds" in line
 
