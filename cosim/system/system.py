@@ -5,6 +5,7 @@ FMUs that a process may instantiate only once, and connections whose ports do no
 """
 
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from numbers import Rational
@@ -206,6 +207,28 @@ class System:
         for target, (match,) in [(t, m) for t, m in self._matches.items() if len(m) == 1]:
             if target.port not in self._sources[target.unit]:
                 self._add(match)
+
+    def prefer_matches(self, is_preferred: Callable[[PortName], bool]) -> dict[PortName, list[PortName]]:
+        """Where several outputs match an input, leave those that are not preferred.
+
+        Args:
+            is_preferred: tells of an output whether it is; it is asked only of such outputs.
+
+        Returns:
+            By input of whose matches none is preferred, so that none of them feeds it, the outputs that match it.
+        """
+        unfed: dict[PortName, list[PortName]] = {}
+        for target, matches in [(t, list(m)) for t, m in self._matches.items() if len(m) > 1]:
+            kept = [c for c in matches if is_preferred(c.source)]
+            if not kept:
+                unfed[target] = [c.source for c in matches]
+                self._forget_matches(target)
+            elif len(kept) < len(matches):
+                self._matches[target] = kept
+                i = next((i for i, c in enumerate(self.connections) if c.target == target), len(self.connections))
+                self.connections[i : i + 1] = kept[:1]  # in the same place: the order of connections stays
+                self._sources[target.unit][target.port] = kept[0].source
+        return unfed
 
     def allow_no_match(self, unit: str) -> None:
         """Let `check` accept that nothing matches of this unit and another with which it was connected as a whole."""

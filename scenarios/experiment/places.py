@@ -61,18 +61,37 @@ def fit_places(system: System, places: Mapping[str, Place], units: Mapping[str, 
     """Leave out of a system what the units in its places do not have and need not have; what they must have is a fault.
 
     The scenario's own units have all of it. What is left out of another one is noted in `System.notes`, and
-    what is wrong with it in what `System.check` raises.
+    what is wrong with it in what `System.check` raises. Where the scenario connects whole units, an output that the own
+    unit does not have feeds no input that another output matches, too: its unit connects all that the own one does.
 
     Args:
         system: as the scenario wires it.
         places: what each place needs, by the unit's name in the system.
         units: the scenario's own unit in each place, by its name in the catalog or its block's path.
     """
+    _prefer_own_outputs(system, {name: units[name] for name in places if name in system.units})
     for name, place in places.items():
         if name in system.units:
             own, placed = find_unit(units[name]), system.units[name]
             if placed.description.name != own.name or any(_missing(placed.description, place)):
                 _Fitting(system, placed, place, own).fit()
+
+
+def _prefer_own_outputs(system: System, units: Mapping[str, str]) -> None:
+    """Let outputs that the scenario's own units have, too, feed the inputs that several outputs match."""
+
+    def is_of_own(output: PortName) -> bool:
+        return output.unit not in units or output.port in _own_outputs(units[output.unit])
+
+    for target, outputs in system.prefer_matches(is_of_own).items():
+        system.notes.append(
+            f"{target}: {' and '.join(map(str, outputs))} match it, which the scenario's own units do not have, so "
+            "nothing feeds it and it stays at its start value"
+        )
+
+
+def _own_outputs(unit: str) -> set[str]:
+    return {v.name for v in describe(import_class(find_unit(unit).block)).outputs}
 
 
 def _missing(unit: FmuDescription, place: Place) -> Iterator[str]:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from terminal_units import described_unit
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.master.master import Master
@@ -131,6 +132,21 @@ def test_of_three_units_that_match_one_is_named_when_another_was_taken_back(fmu:
     s.connect(others[1].y.x, spring.u.x)
     s.check()
     assert s.sources_of("spring") == {"x": PortName("third", "x")}
+
+
+def test_of_outputs_that_match_one_input_those_that_are_preferred_stay(tmp_path: Path):
+    s = System()
+    given = {"x": "m", "y": "m"}
+    a, b = (s.add(name, described_unit(tmp_path / f"{name}.fmu", {}, given)) for name in "ab")
+    c = s.add("c", described_unit(tmp_path / "c.fmu", {"y": "m", "x": "m", "z": "m"}, {}))
+    s.connect(a.y, c.u)
+    s.connect(b.y, c.u)
+    assert s.prefer_matches(lambda output: output == b.y.x) == {c.u.y: [a.y.y, b.y.y]}
+    s.check()
+    assert s.connections == [Connection(b.y.x, c.u.x)]
+    assert s.sources_of("c") == {"x": b.y.x}
+    s.connect(a.y.y, c.u.y)
+    s.check()
 
 
 def test_a_transformation_of_whole_units_is_refused(fmu: FmuOf):

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from terminal_units import described_unit
+from terminal_units import described_unit, terminal_xml
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.record.reader import Record
@@ -85,10 +85,33 @@ def test_whole_units_are_wired_to_what_they_are_to_be(scenario: Experiment[Any],
     assert sorted((str(c.target), str(c.source)) for c in system.connections) == sorted(wanted.items())
 
 
-def wired_with(hand: Path) -> System:
-    """Return the handover with another unit in the place of hand and ball."""
-    fmus = {name: cached(unit, 3) for name, unit in HelixHandover.units.items()} | {"hand": hand}
+def wired_with(hand: Path, **others: Path) -> System:
+    """Return the handover with another unit in the place of hand and ball, and others in theirs."""
+    fmus = {name: cached(unit, 3) for name, unit in HelixHandover.units.items()} | {"hand": hand, **others}
     return HelixHandover().wire(Parameters(), 0, lambda name: fmus[name])
+
+
+def test_more_outputs_of_a_unit_in_a_place_leave_the_scenarios_connections_as_they_are(tmp_path: Path):
+    given = {"p_WO": "m 3", "p_WH": "m 3", "f_G": "N 3"}
+    more = {"p_WR": "m 3", "q_WR": "1 4", "p_WG": "m 3", "dl_t": "m 9"}
+    palm = terminal_xml("palm", "plug", "_handover_pose", p_WR="p_WR", q_WR="q_WR")
+    plain = wired_with(described_unit(tmp_path / "plain.fmu", {}, given))
+    system = wired_with(described_unit(tmp_path / "more.fmu", {}, given | more, palm))
+    with pytest.raises(WiringError) as lacks:
+        system.check()
+    assert all("needs the" in fault for fault in lacks.value.faults)  # such as the ball's place, which it does not have
+    assert system.connections == plain.connections
+    assert ("camera.p_WR", "arm.p_WR") in {(str(c.target), str(c.source)) for c in system.connections}
+
+
+def test_an_input_that_more_outputs_of_two_units_match_is_left_and_noted(tmp_path: Path):
+    pushes = [described_unit(tmp_path / f"{name}.fmu", {}, {"f_P": "N 3"}) for name in ("hand", "servo")]
+    system = wired_with(pushes[0], servo=pushes[1])
+    with pytest.raises(WiringError) as lacks:
+        system.check()
+    assert not any("match" in fault for fault in lacks.value.faults)
+    assert "f_P" not in system.fed_inputs("arm")
+    assert any(note.startswith("arm.f_P: servo.f_P and hand.f_P match it") for note in system.notes)
 
 
 def test_a_unit_in_a_place_need_not_match_what_is_optional_and_differs_nowhere(tmp_path: Path):
