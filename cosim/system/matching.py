@@ -56,6 +56,31 @@ class DoNotMatch(Exception):
 
 
 @dataclass(frozen=True)
+class TerminalFault:
+    """Terminals that belong together and cannot be connected.
+
+    Attributes:
+        target: the unit that is fed.
+        reason: which terminals these are, and why.
+        inputs: the terminal's inputs; none where the terminal itself is at fault, so that they are not known.
+    """
+
+    target: str
+    reason: str
+    inputs: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        if not self.inputs:
+            return f"{self.reason}; connect the ports that are meant one by one, not the units as a whole"
+        ports = ", ".join(f"{self.target}.u.{port}" for port in self.inputs)
+        return f"{self.reason}; connect its inputs one by one, which are {ports}, or make both terminals alike"
+
+    def is_settled(self, sources: Mapping[str, PortName | None]) -> bool:
+        """Return whether all its inputs are fed, by what was said besides."""
+        return bool(self.inputs) and all(port in sources for port in self.inputs)
+
+
+@dataclass(frozen=True)
 class Ambiguity:
     """Several terminals of one of two units match: whoever wires them has to name those that are meant."""
 
@@ -71,9 +96,9 @@ class Ambiguity:
         meant = f"connect({self.source}.y.{self.outputs[0]}, {self.target}.u.{self.inputs[0]})"
         return f"{self.source}.y -> {self.target}.u: the terminals {a} match {b}; connect those that are meant: {meant}"
 
-    def is_settled(self, fed: Collection[str]) -> bool:
+    def is_settled(self, sources: Mapping[str, PortName | None]) -> bool:
         """Return whether the inputs of one of the terminals that match are fed, by what was said besides."""
-        return any(all(port in fed for port in ports) for ports in self.ports)
+        return any(all(port in sources for port in ports) for ports in self.ports)
 
     @property
     def _sides(self) -> tuple[tuple[str, tuple[str, ...]], tuple[str, tuple[str, ...]]]:
@@ -96,7 +121,7 @@ class Matches:
     connections: dict[str, Connection] = field(default_factory=dict[str, Connection])
     terminals: dict[str, tuple[str, str]] = field(default_factory=dict[str, tuple[str, str]])
     left: dict[str, str] = field(default_factory=dict[str, str])
-    faults: list[str] = field(default_factory=list[str])
+    faults: list[TerminalFault] = field(default_factory=list[TerminalFault])
     nothing: str = ""
     ambiguities: list[Ambiguity] = field(default_factory=list[Ambiguity])
 
@@ -156,7 +181,7 @@ class _TerminalMatching:
         """Return what matches."""
         for unit, d in ((self._source, self._a), (self._target, self._b)):
             if d.terminals.fault:
-                self._fault(f"{unit}: {d.terminals.fault}")
+                self._matches.faults.append(TerminalFault(self._target, f"{unit}: {d.terminals.fault}"))
         self._match_names()
         self._match_kinds()
         return self._matches
@@ -173,7 +198,9 @@ class _TerminalMatching:
                 self._take(a, b)
             except DoNotMatch as e:
                 if is_faulty or a.kind == b.kind:
-                    self._fault(f"{self._source}.{name} -> {self._target}.{name}: terminals that do not match: {e}")
+                    reason = f"{self._source}.{name} -> {self._target}.{name}: terminals that do not match: {e}"
+                    inputs = _ports_in(b, self._b.inputs)
+                    self._matches.faults.append(TerminalFault(self._target, reason, inputs))
                     self._leave(b, f"{self._source}.{name} does not match it")
                 self._given.pop(name, None)
                 self._fed.pop(name, None)
@@ -218,9 +245,6 @@ class _TerminalMatching:
     def _leave(self, b: FmuTerminal, reason: str) -> None:
         for port in _ports_in(b, self._b.inputs):
             self._matches.left[port] = f"its terminal {b.name} is not connected: {reason}"
-
-    def _fault(self, fault: str) -> None:
-        self._matches.faults.append(fault)
 
 
 def _ports_in(t: FmuTerminal, side: Mapping[str, FmuPort]) -> tuple[str, ...]:

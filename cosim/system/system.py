@@ -23,6 +23,7 @@ from handover.cosim.system.matching import (
     DoNotMatch,
     MatchedPorts,
     TerminalEnd,
+    TerminalFault,
     matched_members,
     matches_of,
     told_of_terminals,
@@ -40,7 +41,7 @@ class System:
         self.connections: list[Connection] = []
         self._sources: defaultdict[str, dict[str, PortName]] = defaultdict(dict)  # by unit, by input
         self._matches: defaultdict[PortName, list[Connection]] = defaultdict(list)  # by input, what matches it
-        self._ambiguities: list[Ambiguity] = []  # of terminals
+        self._unsettled: list[TerminalFault | Ambiguity] = []  # of terminals, unless their inputs are fed otherwise
         self._unmatched: dict[tuple[str, str], str] = {}  # by two units of which nothing matches, what there is
         self.followed: defaultdict[str, dict[str, TimeSeries]] = defaultdict(dict)
         """By unit and input, the values over time that inputs follow."""
@@ -109,8 +110,8 @@ class System:
         fed by the output of the same name, kind and shape whose unit is the same or can be converted; what was
         connected and what was left is returned. An input that is connected by its own name, follows values or comes
         from outside is left, whether that was said before or is said later; `check` finds an input that several units
-        match, terminals of which several match or that do not match as they should, and two units of which nothing
-        matches.
+        match, terminals of which several match or that do not match as they should, until their inputs are fed
+        otherwise, and two units of which nothing matches.
 
         Raises:
             TypeError: an end is not a port, or not the outputs or inputs of a unit, or units or terminals are connected
@@ -146,7 +147,8 @@ class System:
             if not connections:
                 raise DoNotMatch("no output of the one has an input of the other")
         except DoNotMatch as e:
-            self._faults.append(f"{a[0]}.{a[2].name} -> {b[0]}.{b[2].name}: terminals that do not match: {e}")
+            what = f"{a[0]}.{a[2].name} -> {b[0]}.{b[2].name}: terminals that do not match: {e}"
+            self._faults.append(f"{what}; connect the ports that are meant one by one instead")
         for c in connections:
             self._connect(c)
         return told_of_terminals(a, b, connections)
@@ -163,10 +165,9 @@ class System:
         a, b = unit_of(source, Causality.OUTPUT), unit_of(target, Causality.INPUT)
         inputs = self.units[b].description.inputs
         matches = matches_of(a, self.units[a].description, b, self.units[b].description)
-        self._faults += [f for f in matches.faults if f not in self._faults]
         if matches.nothing:
             self._unmatched[a, b] = matches.nothing
-        self._ambiguities += [x for x in matches.ambiguities if x not in self._ambiguities]
+        self._unsettled += [x for x in (*matches.faults, *matches.ambiguities) if x not in self._unsettled]
         fed = {
             port: f"{end} feeds it" for port, end in self._sources[b].items() if PortName(b, port) not in self._matches
         }
@@ -277,7 +278,7 @@ class System:
         faults = [
             *self._faults,
             *self._unmatched.values(),
-            *(str(a) for a in self._ambiguities if not a.is_settled(self.fed_inputs(a.target))),
+            *(str(x) for x in self._unsettled if not x.is_settled(self._feeds(x.target))),
         ]
         faults += [ambiguity(to, [c.source for c in cs]) for to, cs in self._matches.items() if len(cs) > 1]
         for unit in self.units.values():
@@ -337,6 +338,10 @@ class System:
     def fed_inputs(self, unit: str) -> list[str]:
         """Return the names of the inputs of a unit that are set during a run."""
         return [*self.sources_of(unit), *self.followed.get(unit, ()), *self.externals.get(unit, ())]
+
+    def _feeds(self, unit: str) -> dict[str, PortName | None]:
+        """Return by input that is set during a run the output that feeds it; None where no output does."""
+        return {port: self._sources[unit].get(port) for port in self.fed_inputs(unit)}
 
     def clock_connections(self) -> list[Connection]:
         """Return the connections between clocks."""

@@ -159,6 +159,24 @@ def test_a_single_connection_takes_precedence_over_a_terminal_before_and_after(b
     assert bench.pairs == {("other.p", "hand.p"), ("other.q", "hand.q")}
 
 
+@pytest.mark.parametrize("is_before", [True, False])
+def test_terminals_that_do_not_match_are_settled_once_all_inputs_are_connected_one_by_one(
+    bench: Bench, is_before: bool
+):
+    a = bench.giver("arm", {**POSE, "x": "m 3"}, named("tip", p="p"))
+    b = bench.taker("hand", POSE, named("tip", p="p", q="q"))
+    if not is_before:
+        bench.system.connect(a.y, b.u)
+    bench.system.connect(a.y.x, b.u.p)
+    if is_before:
+        bench.system.connect(a.y, b.u)
+    cure = "connect its inputs one by one, which are hand.u.p, hand.u.q, or make both terminals alike"
+    assert cure in bench.faults
+    bench.system.connect(a.y.q, b.u.q)
+    bench.system.check()
+    assert bench.pairs == {("arm.x", "hand.p"), ("arm.q", "hand.q")}
+
+
 def test_two_units_whose_terminals_match_one_are_refused(bench: Bench):
     a = bench.giver("a", {"x": "m"}, named("tip", p="x"))
     b = bench.giver("b", {"x": "m"}, named("tip", p="x"))
@@ -198,3 +216,6 @@ def test_a_terminal_with_a_fault_is_refused_where_it_is_met_and_harmless_elsewhe
     bench.system.check()
     bench.system.connect(a.y, b.u)
     assert "arm.tip: there is no variable 'nowhere' (line 1)" in bench.faults
+    faulty = bench.taker("faulty", POSE, named("tip", p="nowhere"))
+    bench.system.connect(a.y, faulty.u)
+    assert "connect the ports that are meant one by one, not the units as a whole" in bench.faults
