@@ -6,7 +6,7 @@ not fit keeps all of it from being connected.
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from handover.cosim.blocks.terminals import MatchingRule
 from handover.cosim.blocks.variable import Kind
@@ -75,34 +75,49 @@ class TerminalFault:
         ports = ", ".join(f"{self.target}.u.{port}" for port in self.inputs)
         return f"{self.reason}; connect its inputs one by one, which are {ports}, or make both terminals alike"
 
-    def is_settled(self, sources: Mapping[str, PortName | None]) -> bool:
-        """Return whether all its inputs are fed, by what was said besides."""
-        return bool(self.inputs) and all(port in sources for port in self.inputs)
+    def remaining(self, sources: Mapping[str, PortName | None]) -> "TerminalFault | None":
+        """Return it unless all its inputs are fed, by what was said besides."""
+        is_settled = bool(self.inputs) and all(port in sources for port in self.inputs)
+        return None if is_settled else self
 
 
 @dataclass(frozen=True)
 class Ambiguity:
-    """Several terminals of one of two units match: whoever wires them has to name those that are meant."""
+    """Several terminals of one of two units match: whoever wires them has to name those that are meant.
+
+    Attributes:
+        source: the unit that feeds.
+        target: the other unit.
+        pairs: the terminals that match, of outputs and of inputs.
+        outputs: by terminal of the unit that feeds, its outputs.
+        inputs: by terminal of the other unit, its inputs.
+    """
 
     source: str
     target: str
-    outputs: tuple[str, ...]
-    inputs: tuple[str, ...]
-    ports: tuple[tuple[str, ...], ...]
-    """By terminal in `inputs`, its inputs."""
+    pairs: tuple[tuple[str, str], ...]
+    outputs: Mapping[str, tuple[str, ...]]
+    inputs: Mapping[str, tuple[str, ...]]
 
     def __str__(self) -> str:
-        a, b = (f"{unit}'s {' and '.join(names)}" for unit, names in self._sides)
-        meant = f"connect({self.source}.y.{self.outputs[0]}, {self.target}.u.{self.inputs[0]})"
+        ours, theirs = (sorted({pair[side] for pair in self.pairs}) for side in (0, 1))
+        a, b = f"{self.source}'s {' and '.join(ours)}", f"{self.target}'s {' and '.join(theirs)}"
+        meant = f"connect({self.source}.y.{ours[0]}, {self.target}.u.{theirs[0]})"
         return f"{self.source}.y -> {self.target}.u: the terminals {a} match {b}; connect those that are meant: {meant}"
 
-    def is_settled(self, sources: Mapping[str, PortName | None]) -> bool:
-        """Return whether the inputs of one of the terminals that match are fed, by what was said besides."""
-        return any(all(port in sources for port in ports) for ports in self.ports)
+    def remaining(self, sources: Mapping[str, PortName | None]) -> "Ambiguity | None":
+        """Return what is ambiguous of it after what was said besides, None if nothing is.
 
-    @property
-    def _sides(self) -> tuple[tuple[str, tuple[str, ...]], tuple[str, tuple[str, ...]]]:
-        return (self.source, self.outputs), (self.target, self.inputs)
+        Terminals whose inputs are all fed are settled, and such whose outputs feed one of the terminals.
+        """
+        used = {sources[port] for ports in self.inputs.values() for port in ports if port in sources}
+        pairs = tuple(
+            (x, y)
+            for x, y in self.pairs
+            if not any(PortName(self.source, port) in used for port in self.outputs[x])
+            and not all(port in sources for port in self.inputs[y])
+        )
+        return replace(self, pairs=pairs) if pairs else None
 
 
 @dataclass
@@ -218,8 +233,10 @@ class _TerminalMatching:
             if len(ours) == len(theirs) == 1:
                 self._take(self._given[ours[0]], self._fed[theirs[0]])
             else:
-                ports = tuple(_ports_in(self._fed[y], self._b.inputs) for y in theirs)
-                self._matches.ambiguities.append(Ambiguity(self._source, self._target, ours, theirs, ports))
+                outputs = {x: _ports_in(self._given[x], self._a.outputs) for x in ours}
+                inputs = {y: _ports_in(self._fed[y], self._b.inputs) for y in theirs}
+                pairs = tuple(pair for pair in fitting if pair[0] in ours)
+                self._matches.ambiguities.append(Ambiguity(self._source, self._target, pairs, outputs, inputs))
                 for y in theirs:
                     self._leave(
                         self._fed[y], f"of {self._source}, several match" if len(ours) > 1 else "others match, too"

@@ -278,7 +278,7 @@ class System:
         faults = [
             *self._faults,
             *self._unmatched.values(),
-            *(str(x) for x in self._unsettled if not x.is_settled(self._feeds(x.target))),
+            *(str(left) for x in self._unsettled if (left := x.remaining(self._feeds(x.target)))),
         ]
         faults += [ambiguity(to, [c.source for c in cs]) for to, cs in self._matches.items() if len(cs) > 1]
         for unit in self.units.values():

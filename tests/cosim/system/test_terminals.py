@@ -125,6 +125,32 @@ def test_an_ambiguity_names_the_candidates_and_is_settled_by_naming_two_terminal
     assert bench.pairs == {("robot.x", "scene.z")}
 
 
+def test_naming_one_pair_of_several_leaves_the_others_to_be_named(bench: Bench):
+    a = bench.giver("robot", {"x": "m", "y": "m"}, named("left", p="x"), named("right", p="y"))
+    b = bench.taker("scene", {"z": "m", "w": "m"}, named("first", p="z"), named("second", p="w"))
+    bench.system.connect(a.y, b.u)
+    assert "the terminals robot's left and right match scene's first and second" in bench.faults
+    bench.system.connect(a.y.left, b.u.second)
+    assert bench.faults == (
+        "robot.y -> scene.u: the terminals robot's right match scene's first; connect those that are meant: "
+        "connect(robot.y.right, scene.u.first)"
+    )
+    bench.system.connect(a.y.right, b.u.first)
+    bench.system.check()
+    assert bench.pairs == {("robot.x", "scene.w"), ("robot.y", "scene.z")}
+
+
+def test_an_ambiguity_is_settled_once_other_units_feed_all_inputs(bench: Bench):
+    a = bench.giver("robot", {"x": "m"}, named("tip", p="x"))
+    other = bench.giver("other", {"z": "m", "w": "m"})
+    b = bench.taker("scene", {"z": "m", "w": "m"}, named("first", p="z"), named("second", p="w"))
+    bench.system.connect(a.y, b.u)
+    bench.system.connect(other.y.z, b.u.z)
+    assert "the terminals robot's tip match scene's second" in bench.faults
+    bench.system.connect(other.y.w, b.u.w)
+    bench.system.check()
+
+
 def test_two_named_terminals_are_connected_or_refused_as_a_whole(bench: Bench):
     a = bench.giver("arm", POSE, named("tip", p="p", q="q"))
     b = bench.taker("hand", {**POSE, "x": "m"}, named("palm", p="p", q="q"))
