@@ -76,6 +76,7 @@ def describe(block: type[Any]) -> Description:
     params_type = _annotation(block, "__init__", "params")
     inputs_type = _annotation(block, "step", "u")
     outputs_type = _annotation(block, "step", "return")
+    parameters = declared_variables(params_type, Causality.PARAMETER, block.__name__)
     inputs = declared_variables(inputs_type, Causality.INPUT, block.__name__)
     outputs = declared_variables(outputs_type, Causality.OUTPUT, block.__name__)
     feedthrough: Mapping[str, tuple[str, ...]] = block.feedthrough
@@ -84,7 +85,7 @@ def describe(block: type[Any]) -> Description:
             if name not in [v.name for v in known]:
                 raise DeclarationError(block.__name__, "feedthrough", f"no such port: {name!r}")
     terminals = getattr(block, "terminals", ())
-    if faults := terminal_faults(terminals, inputs, outputs):
+    if faults := terminal_faults(terminals, inputs, outputs, [v.name for v in parameters]):
         raise DeclarationError(block.__name__, "terminals", "; ".join(faults))
     return Description(
         name=block.__name__,
@@ -93,7 +94,7 @@ def describe(block: type[Any]) -> Description:
         params_type=params_type,
         inputs_type=inputs_type,
         outputs_type=outputs_type,
-        parameters=declared_variables(params_type, Causality.PARAMETER, block.__name__),
+        parameters=parameters,
         inputs=inputs,
         outputs=outputs,
         feedthrough=feedthrough,

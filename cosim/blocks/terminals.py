@@ -9,7 +9,7 @@ match by their members' names, or by their order; a member has its port's name u
 """
 
 import enum
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -69,9 +69,9 @@ class Terminal:
     """Ports that are connected together.
 
     Attributes:
-        name: its name, which no other terminal and no port of the block has.
+        name: its name, which no other terminal and no port or parameter of the block has.
         kind: what it carries.
-        members: its ports by members' names; all of them inputs, or all outputs.
+        members: its ports by members' names; all of them inputs, or all outputs, and none in another terminal.
     """
 
     name: str
@@ -192,14 +192,20 @@ def _signature(kind: Kind, shape: tuple[int, ...], unit: str) -> str:
     return f"{kind.value}{extents}{f' {unit}' if unit not in ('', '1') else ''}"
 
 
-def terminal_faults(terminals: object, inputs: Iterable[MemberPort], outputs: Iterable[MemberPort]) -> list[str]:
-    """Return what is wrong with a block's attribute `terminals`, each with the terminal that it is about."""
+def terminal_faults(
+    terminals: object, inputs: Iterable[MemberPort], outputs: Iterable[MemberPort], parameters: Collection[str] = ()
+) -> list[str]:
+    """Return what is wrong with a block's attribute `terminals`, each with the terminal that it is about.
+
+    `parameters` are the names of the block's parameters.
+    """
     example = 'such as (terminal("gripper", TerminalKind.POSE, "p_WG", "q_WG"),)'
     if not isinstance(terminals, tuple | list):
         return [f"{terminals!r} is not a tuple of terminals, {example}"]
     sides = {p.name: p for p in inputs}, {p.name: p for p in outputs}
     faults: list[str] = []
     names: set[str] = set()
+    terminal_of: dict[str, str] = {}  # by port
     for t in terminals:  # pyright: ignore[reportUnknownVariableType]
         if not isinstance(t, Terminal):
             faults.append(f"{t!r} is not a terminal, {example}")
@@ -207,7 +213,13 @@ def terminal_faults(terminals: object, inputs: Iterable[MemberPort], outputs: It
         if t.name in names or any(t.name in side for side in sides):
             what = "another terminal" if t.name in names else "a port"
             faults.append(f"{t.name!r}: {what} has this name; y.{t.name} and u.{t.name} would stand for either")
+        if t.name in parameters:
+            faults.append(f"{t.name!r}: a parameter has this name, and u.{t.name} would stand for either; rename one")
+        if shared := [port for port in dict.fromkeys(t.members.values()) if port in terminal_of]:
+            held = ", ".join(f"{port} is in {terminal_of[port]!r}" for port in shared)
+            faults.append(f"{t.name!r}: {held}, too; a port is in one terminal, so that one connection feeds it")
         names.add(t.name)
+        terminal_of = dict.fromkeys(t.members.values(), t.name) | terminal_of
         if fault := _fault_of(t, *sides):
             faults.append(f"{t.name!r}: {fault}")
     return faults

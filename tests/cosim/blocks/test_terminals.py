@@ -8,16 +8,25 @@ import pytest
 
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.description import describe
-from handover.cosim.blocks.ports import BLACK_1280X720, Picture1280x720, Raster, Vector3, Vector4, output, port
+from handover.cosim.blocks.ports import (
+    BLACK_1280X720,
+    Picture1280x720,
+    Raster,
+    Vector3,
+    Vector4,
+    output,
+    parameter,
+    port,
+)
 from handover.cosim.blocks.terminals import MatchingRule, TerminalKind, terminal
-from handover.cosim.blocks.units import Metre, Newton, NewtonMetre, Number
+from handover.cosim.blocks.units import Kilogram, Metre, Newton, NewtonMetre, Number
 
 Small = Annotated[np.ndarray[Any, Any], Raster(64, 48)]
 
 
 @dataclass(kw_only=True)
 class Params:
-    pass
+    mass: Kilogram = parameter(1.0, "mass")
 
 
 @dataclass(kw_only=True)
@@ -87,6 +96,7 @@ def test_the_kind_says_the_matching_rule():
         (terminal("tip", TerminalKind.COMMAND, "p", x="p"), r"p is there under two names"),
         (terminal("tip", TerminalKind.COMMAND), r"'tip': it has no members"),
         (terminal("p", TerminalKind.COMMAND, "q"), r"'p': a port has this name; y\.p and u\.p would stand for either"),
+        (terminal("mass", TerminalKind.COMMAND, "q"), r"'mass': a parameter has this name, and u\.mass .*; rename one"),
         (terminal("a tip", TerminalKind.COMMAND, "q"), r"letters, digits and underscores"),
         ("tip", r"'tip' is not a terminal, such as \(terminal\("),
     ],
@@ -94,6 +104,12 @@ def test_the_kind_says_the_matching_rule():
 def test_what_is_no_terminal_is_refused_with_the_reason(declared: Any, wanted: str):
     with pytest.raises(DeclarationError, match=wanted):
         describe(with_terminals(declared))
+
+
+def test_a_port_in_two_terminals_is_refused_with_the_other_one():
+    shared = terminal("tip", TerminalKind.POSE, "p", "q"), terminal("place", TerminalKind.COMMAND, "r", at="p")
+    with pytest.raises(DeclarationError, match=r"terminals: 'place': p is in 'tip', too; a port is in one terminal"):
+        describe(with_terminals(*shared))
 
 
 def test_all_faults_are_told_at_once_and_names_are_unique():
