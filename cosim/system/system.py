@@ -192,7 +192,22 @@ class System:
             self._sources[target.unit].pop(target.port, None)  # several matches may be left, and none connected
 
     def disconnect(self, end: PortName) -> None:
-        """Remove the connections of a port, and what it is set to or follows."""
+        """Remove the connections of a port, or of all ports of a terminal, and what they are set to or follow.
+
+        Raises:
+            ValueError: the terminal has a fault, so that its ports are not known.
+        """
+        if (found := self._terminal(end)) is None:
+            self.disconnect_port(end)
+            return
+        _, _, terminal = found
+        if terminal.reason:
+            raise ValueError(f"terminal {end}: {terminal.reason}; disconnect its ports one by one")
+        for member in terminal.members:
+            self.disconnect_port(PortName(end.unit, member.port))
+
+    def disconnect_port(self, end: PortName) -> None:
+        """Remove the connections of a port alone, whether the unit has a port of this name or not."""
         self._matches.pop(end, None)
         for matches in self._matches.values():
             matches[:] = [m for m in matches if m.source != end]

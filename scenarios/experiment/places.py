@@ -125,7 +125,7 @@ class _Fitting:
             if found is not None:
                 self._check(found, v)
                 continue
-            self._system.disconnect(PortName(self._unit.name, v.name))
+            self._system.disconnect_port(PortName(self._unit.name, v.name))
             if port.is_required:
                 self._system.add_fault(self._fault_of_missing(port))
             else:

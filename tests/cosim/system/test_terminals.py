@@ -164,6 +164,19 @@ def test_two_named_terminals_are_connected_or_refused_as_a_whole(bench: Bench):
     assert "arm.tip -> other.palm: terminals that do not match: other.palm has no member q" in bench.faults
 
 
+def test_a_terminal_is_disconnected_with_all_its_ports(bench: Bench):
+    a = bench.giver("arm", {**POSE, "grip": "1"}, named("tip", p="p", q="q"))
+    b = bench.taker("hand", {**POSE, "grip": "1"}, named("palm", p="p", q="q"), named("no", p="nowhere"))
+    for end in (b.u.palm, a.y.tip):
+        bench.system.connect(a.y, b.u)
+        assert len(bench.pairs) == 3
+        bench.system.disconnect(end)
+        assert bench.pairs == {("arm.grip", "hand.grip")}
+    with pytest.raises(ValueError, match=r"terminal hand\.no: .*'nowhere'.*; disconnect its ports one by one"):
+        bench.system.disconnect(b.u.no)
+    bench.system.check()
+
+
 def test_a_terminal_and_a_port_are_not_connected(bench: Bench):
     a = bench.giver("arm", POSE, named("tip", p="p", q="q"))
     b = bench.taker("hand", POSE)
