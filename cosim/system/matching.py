@@ -1,8 +1,13 @@
 """Which outputs of one unit feed which inputs of another where whole units, or whole terminals, are connected.
 
-Terminals come first: those of the same name, then those of the same kind whose members match. What lies in no matching
-terminal is matched by name. The rules of FMI 3.0 say how members match (`MatchingRule`); whatever of a terminal does
-not fit keeps all of it from being connected.
+Terminals come first: those of the same name, then those of the same kind whose members match by the rules of FMI 3.0
+(`MatchingRule`). Of terminals that do not match, nothing is connected as a terminal:
+
+- Such of one name and one kind are a fault, as is one that breaks the standard, and those of which several match are an
+  ambiguity. Their inputs are left; those of a terminal that breaks the standard are not known, and `check` refuses it.
+- Such of other names, or of one name and different kinds, do not belong together: their inputs are matched by name.
+
+All other inputs are matched by name, too, a bus's member that the other terminal does not have among them.
 """
 
 from collections.abc import Collection, Mapping, Sequence

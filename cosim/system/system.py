@@ -107,11 +107,11 @@ class System:
         or, where the two do not match, none does, and `check` says why. Of terminals, what was connected is returned.
 
         Of two units, terminals that match are connected first: by their names, then by their kinds. Each other input is
-        fed by the output of the same name, kind and shape whose unit is the same or can be converted; what was
-        connected and what was left is returned. An input that is connected by its own name, follows values or comes
-        from outside is left, whether that was said before or is said later; `check` finds an input that several units
-        match, terminals of which several match or that do not match as they should, until their inputs are fed
-        otherwise, and two units of which nothing matches.
+        fed by the output of the same name, kind and shape whose unit is the same or can be converted, unless it is of a
+        terminal that is refused; what was connected and what was left is returned. An input that is connected by its
+        own name, follows values or comes from outside is left, whether that was said before or is said later; `check`
+        finds an input that several units match, terminals of which several match or that do not match as they should,
+        until their inputs are fed otherwise, and two units of which nothing matches.
 
         Raises:
             TypeError: an end is not a port, or not the outputs or inputs of a unit, or units or terminals are connected

@@ -82,6 +82,17 @@ def test_of_a_bus_what_both_have_is_connected(bench: Bench):
     bench.system.check()
 
 
+def test_inputs_of_terminals_that_do_not_belong_together_are_matched_by_name(bench: Bench):
+    a = bench.giver("a", {"p": "m 3", "r": "1 4", "c": "1"}, named("tip", p="p", q="r"))
+    b = bench.taker("b", {"p": "m 3", "q": "1 4"}, named("palm", at="p", turned="q"))
+    assert bench.system.connect(a.y, b.u).connected == ("p",)
+    d = bench.giver("d", {"p": "m 3", "c": "1"}, named("seen", "bus", p="p", certain="c"))
+    e = bench.taker("e", {"at": "m 3", "c": "1"}, named("seen", "bus", p="at", sure="c"))
+    told = bench.system.connect(d.y, e.u)
+    assert (told.connected, set(told.terminals)) == (("at", "c"), {"at"})
+    bench.system.check()
+
+
 def test_a_sequence_matches_by_order_and_needs_as_many(bench: Bench):
     a = bench.giver("a", {"x": "m", "y": "N"}, named("joints", "sequence", x="x", y="y"))
     b = bench.taker("b", {"s": "m", "f": "N"}, named("joints", "sequence", s="s", f="f"))
