@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Any, overload
 
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.exceptions import WiringError, nearest
-from handover.cosim.fmu.file.clocks import FmuClock
+from handover.cosim.exceptions import WiringError
 from handover.cosim.fmu.file.default_experiment import NO_STEP, DefaultExperiment, NoStep, proposed_step
-from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
+from handover.cosim.fmu.file.description import FmuDescription, describe_fmu
 from handover.cosim.system.conversion import LinearTransformation, conversion
 from handover.cosim.system.matching import (
     Ambiguity,
@@ -29,8 +28,16 @@ from handover.cosim.system.matching import (
     told_of_terminals,
 )
 from handover.cosim.system.port_names import Connection, PlacedUnit, PortName, PortNames, ambiguity, unit_of
-from handover.cosim.system.time_series import ExternalSource, NoSource, TimeSeries, external_fault
-from handover.cosim.system.wiring_faults import clock_mismatch, event_faults, mismatch, once_faults, value_faults
+from handover.cosim.system.time_series import ExternalSource, NoSource, TimeSeries
+from handover.cosim.system.wiring_faults import (
+    clock_of,
+    connection_faults,
+    event_faults,
+    once_faults,
+    outside_fault,
+    series_fault,
+    value_faults,
+)
 
 
 class System:
@@ -302,14 +309,17 @@ class System:
         faults += once_faults((u.name, u.description) for u in self.units.values())
         fed: dict[PortName, PortName] = {}
         for c in self.connections:
-            faults += self._connection_faults(c)
+            faults += connection_faults(self.units, c)
             if c.target in fed:
                 faults.append(f"{c.target} is fed twice: by {fed[c.target]} and by {c.source}")
             fed[c.target] = c.source
         for unit, inputs in self.followed.items():
-            faults += [f for port, series in inputs.items() if (f := self._series_fault(PortName(unit, port), series))]
+            for port, series in inputs.items():
+                faults += series_fault(self.units, PortName(unit, port), self._sources.get(unit, {}), series)
         for unit, inputs in self.externals.items():
-            faults += [f for port in inputs if (f := self._external_fault(PortName(unit, port)))]
+            for port in inputs:
+                others = self._sources.get(unit, {}), self.followed.get(unit, {})
+                faults += outside_fault(self.units, PortName(unit, port), *others)
         if faults:
             raise WiringError(faults)
 
@@ -362,14 +372,10 @@ class System:
         """Return the connections between clocks."""
         return [c for c in self.connections if c.target.port in self.units[c.target.unit].description.clocks]
 
-    def _clock(self, end: PortName) -> FmuClock | None:
-        unit = self.units.get(end.unit)
-        return unit.description.clocks.get(end.port) if unit else None
-
     def transformation_of(self, c: Connection) -> LinearTransformation | None:
         """Return how a valid connection transforms values; None where it copies them, or connects clocks."""
         transformation = c.transformation
-        if self._clock(c.target):
+        if clock_of(self.units, c.target):
             return None
         if transformation is None:
             a = self.units[c.source.unit].description.outputs[c.source.port]
@@ -391,49 +397,3 @@ class System:
         reason = proposed.step_fault or NO_STEP if period is None else f"its communication step is {period} s"
         self._faults.append(NoStep(name, reason))
         return Fraction(1, 100)  # any: `check` reports the fault, but more units can be added until then
-
-    def _connection_faults(self, c: Connection) -> list[str]:
-        clocks = self._clock(c.source), self._clock(c.target)
-        if any(clocks) and all(end.unit in self.units for end in (c.source, c.target)):
-            reason = clock_mismatch(*clocks)
-            return [f"{c.source} -> {c.target}: {reason}"] if reason else []
-        a, fault_a = self._find(c.source, "output")
-        b, fault_b = self._find(c.target, "input")
-        if a is None or b is None:
-            return [f"{c.source} -> {c.target}: {f}" for f in (fault_a, fault_b) if f]
-        reason = mismatch(a, b, c.transformation)
-        if reason is None:
-            return []
-        return [f"{c.source} ({a.signature}) -> {c.target} ({b.signature}): {reason}"]
-
-    def _series_fault(self, target: PortName, series: TimeSeries) -> str | None:
-        port, fault = self._find(target, "input")
-        if port is not None and target.port in self._sources.get(target.unit, {}):
-            fault = f"fed by {self._sources[target.unit][target.port]}, so it cannot follow values over time"
-        fault = fault or (series.fault(port) if port is not None else None)
-        return f"{target}: {fault}" if fault else None
-
-    def _external_fault(self, target: PortName) -> str | None:
-        port, fault = self._find(target, "input")
-        if port is not None and target.port in self._sources.get(target.unit, {}):
-            fault = f"fed by {self._sources[target.unit][target.port]}, so it cannot come from outside"
-        elif port is not None and target.port in self.followed.get(target.unit, {}):
-            fault = "follows values over time, so it cannot come from outside"
-        fault = fault or (external_fault(port) if port is not None else None)
-        return f"{target}: {fault}" if fault else None
-
-    def _find(self, end: PortName, role: str) -> tuple[FmuPort | None, str | None]:
-        unit = self.units.get(end.unit)
-        if unit is None:
-            return None, f"there is no unit {end.unit!r}; {nearest(end.unit, self.units)}"
-        d = unit.description
-        ports, others = (d.outputs, d.inputs) if role == "output" else (d.inputs, d.outputs)
-        if end.port in ports:
-            return ports[end.port], None
-        if end.port in d.parameters:
-            return None, f"{end} is a parameter"
-        if end.port in d.terminals.by_name:
-            return None, f"{end} is a terminal: connect it with one, or its ports one by one"
-        if end.port in others:
-            return None, f"{end} is an {'input' if role == 'output' else 'output'}, not an {role}"
-        return None, f"{end.unit} has no {role} {end.port!r}; {nearest(end.port, ports)}"

@@ -12,6 +12,8 @@ from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.file.clocks import FmuClock
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.system.conversion import LinearTransformation, needs_no_conversion
+from handover.cosim.system.port_names import Connection, PlacedUnit, PortName
+from handover.cosim.system.time_series import TimeSeries, external_fault
 
 
 def value_faults(unit: str, description: FmuDescription, start: Mapping[str, Any]) -> list[str]:
@@ -95,3 +97,68 @@ def _unit_mismatch(a: Unit, b: Unit) -> str | None:
     if unusable is not None and a != b:
         return f"the unit {unusable.symbol!r} has the factor {unusable.factor!r} and the offset {unusable.offset!r}"
     return None
+
+
+def connection_faults(units: Mapping[str, PlacedUnit], c: Connection) -> list[str]:
+    """Return why a connection cannot be made: a unit or port that is not there, ports or clocks that do not match."""
+    clocks = clock_of(units, c.source), clock_of(units, c.target)
+    if any(clocks) and all(end.unit in units for end in (c.source, c.target)):
+        reason = clock_mismatch(*clocks)
+        return [f"{c.source} -> {c.target}: {reason}"] if reason else []
+    a, fault_a = _find(units, c.source, "output")
+    b, fault_b = _find(units, c.target, "input")
+    if a is None or b is None:
+        return [f"{c.source} -> {c.target}: {f}" for f in (fault_a, fault_b) if f]
+    reason = mismatch(a, b, c.transformation)
+    return [f"{c.source} ({a.signature}) -> {c.target} ({b.signature}): {reason}"] if reason else []
+
+
+def series_fault(
+    units: Mapping[str, PlacedUnit], target: PortName, sources: Mapping[str, PortName], series: TimeSeries
+) -> list[str]:
+    """Return why an input cannot follow values over time; `sources` are the outputs that feed inputs of its unit."""
+    port, fault = _find(units, target, "input")
+    if port is not None and target.port in sources:
+        fault = f"fed by {sources[target.port]}, so it cannot follow values over time"
+    fault = fault or (series.fault(port) if port is not None else None)
+    return [f"{target}: {fault}"] if fault else []
+
+
+def outside_fault(
+    units: Mapping[str, PlacedUnit],
+    target: PortName,
+    sources: Mapping[str, PortName],
+    followed: Mapping[str, TimeSeries],
+) -> list[str]:
+    """Return why an input cannot come from outside; `followed` are the values over time of inputs of its unit."""
+    port, fault = _find(units, target, "input")
+    if port is not None and target.port in sources:
+        fault = f"fed by {sources[target.port]}, so it cannot come from outside"
+    elif port is not None and target.port in followed:
+        fault = "follows values over time, so it cannot come from outside"
+    fault = fault or (external_fault(port) if port is not None else None)
+    return [f"{target}: {fault}"] if fault else []
+
+
+def clock_of(units: Mapping[str, PlacedUnit], end: PortName) -> FmuClock | None:
+    """Return the clock of a name; None where there is none."""
+    unit = units.get(end.unit)
+    return unit.description.clocks.get(end.port) if unit else None
+
+
+def _find(units: Mapping[str, PlacedUnit], end: PortName, role: str) -> tuple[FmuPort | None, str | None]:
+    """Return an input or output, or why there is none."""
+    unit = units.get(end.unit)
+    if unit is None:
+        return None, f"there is no unit {end.unit!r}; {nearest(end.unit, units)}"
+    d = unit.description
+    ports, others = (d.outputs, d.inputs) if role == "output" else (d.inputs, d.outputs)
+    if end.port in ports:
+        return ports[end.port], None
+    if end.port in d.parameters:
+        return None, f"{end} is a parameter"
+    if end.port in d.terminals.by_name:
+        return None, f"{end} is a terminal: connect it with one, or its ports one by one"
+    if end.port in others:
+        return None, f"{end} is an {'input' if role == 'output' else 'output'}, not an {role}"
+    return None, f"{end.unit} has no {role} {end.port!r}; {nearest(end.port, ports)}"
