@@ -16,6 +16,9 @@ _MOST = 1000
 """Number of waypoints up to which a file is read."""
 
 _SAME_PLACE = 1e-6  # m
+_FARTHEST = 100.0
+"""Coordinate up to which a waypoint is read, m: in millimetres it would be far beyond any arm's reach (assumed)."""
+
 _STRAIGHT = 1e-6
 """Sine of the angle below which three points count as on one line."""
 
@@ -90,9 +93,9 @@ def _points(file: Path, rows: Sequence[tuple[int, dict[str, str]]]) -> list[tupl
         arc = any(row.get(name) for name in _VIA)
         to, via = _point(row, _TO), _point(row, _VIA) if arc else None
         if to is None:
-            faults.append(f"waypoint {number} (line {line}): x, y and z must be finite numbers")
+            faults.append(f"waypoint {number} (line {line}): x, y and z must be numbers of metres, 100 at most")
         elif arc and via is None:
-            faults.append(f"waypoint {number} (line {line}): {', '.join(_VIA)} must be finite numbers, or all empty")
+            faults.append(f"waypoint {number} (line {line}): {', '.join(_VIA)} must be numbers of metres, or all empty")
         elif arc and number == 1:
             faults.append(f"waypoint 1 (line {line}): the path begins there, so no arc leads to it")
         else:
@@ -103,9 +106,9 @@ def _points(file: Path, rows: Sequence[tuple[int, dict[str, str]]]) -> list[tupl
 
 
 def _point(row: Mapping[str, str], names: Sequence[str]) -> Floats | None:
-    """Return a point, shape (3,), m; None if not all three numbers are there and finite."""
+    """Return a point, shape (3,), m; None if not all three numbers are there and of a size."""
     try:
         point = np.array([float(row[name]) for name in names])
     except (KeyError, ValueError):
         return None
-    return point if np.isfinite(point).all() else None
+    return point if np.all(np.abs(point) <= _FARTHEST) else None

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from handover.controllers.vsl.hybrid_kinematics import Imu
+from handover.controllers.vsl.waypoints import InvalidWaypoints
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
@@ -30,7 +31,7 @@ from handover.scenarios.vsl.parameters import (
     Parameters,
     Resolution,
 )
-from handover.scenarios.vsl.places import PLACES
+from handover.scenarios.vsl.places import PLACES, sensor_faults
 
 _GRACE = 5
 """Time by which the path may be completed late before the run ends, s (assumed)."""
@@ -138,8 +139,25 @@ class PathExperiment(Experiment[PathEvaluator]):
         return s
 
     def stop_time(self, parameters: Parameters) -> Fraction:
-        """Return the nominal duration of the run, settling and path, plus a grace period."""
-        return Fraction(round(parameters.settle + parameters.length / parameters.speed)) + _GRACE
+        """Return the nominal duration of the run, settling and path, plus a grace period.
+
+        Raises:
+            InvalidParameter: there is no such file of waypoints, or it is no list of them.
+        """
+        try:
+            length = parameters.length
+        except InvalidWaypoints as e:
+            raise InvalidParameter([f"waypoints: {e}"]) from e
+        return Fraction(round(parameters.settle + length / parameters.speed)) + _GRACE
+
+    def check_unit_values(self, system: System, given: Sequence[str]) -> None:
+        """Reject sensors that the controller is to look at, and that are not connected.
+
+        Raises:
+            InvalidParameter: `kinematics.closed_loop` or `kinematics.imu` is given.
+        """
+        if faults := sensor_faults(system, given, "`-p {}` of vsl_hybrid connects it"):
+            raise InvalidParameter(faults)
 
     def evaluator(self, parameters: Parameters) -> PathEvaluator:
         """Return the evaluator of one run along the path."""
@@ -207,11 +225,12 @@ class VslHybrid(PathExperiment):
         return s
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:
-        """Reject a gain of damping that is without effect.
+        """Reject sensors that are not connected, and a gain of damping that is without effect.
 
         Raises:
-            InvalidParameter: K_D is given, and friction is not compensated.
+            InvalidParameter: as its base; or K_D is given, and friction is not compensated.
         """
+        super().check_unit_values(system, given)
         start = system.units["kinematics"].start
         if "kinematics.K_D" in given and not start.get("friction_compensation"):
             fault = (

@@ -4,7 +4,7 @@
 what its links are meant for, a light touch and a steady carry.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import ClassVar
@@ -22,7 +22,7 @@ from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.vsl.pick_and_place_evaluation import PickAndPlaceEvaluator, PickAndPlaceParameters
-from handover.scenarios.vsl.places import PLACES
+from handover.scenarios.vsl.places import PLACES, sensor_faults
 
 _GRACE = 5
 """Time by which the task may end late before the run does, s (assumed)."""
@@ -125,6 +125,15 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
         s.connect(arm.y.p_WG, gripper.u.p_WG)
         s.connect(gripper.y.load, arm.u.load)
         return s
+
+    def check_unit_values(self, system: System, given: Sequence[str]) -> None:
+        """Reject sensors that the controller is to look at, and that are not connected.
+
+        Raises:
+            InvalidParameter: `kinematics.closed_loop` or `kinematics.imu` is given.
+        """
+        if faults := sensor_faults(system, given, "this scenario has no {}, vsl_hybrid has"):
+            raise InvalidParameter(faults)
 
     def stop_time(self, parameters: PickAndPlaceParameters) -> Fraction:
         """Return the nominal duration of the task, plus a grace period."""

@@ -1,5 +1,9 @@
 """What a unit needs to take a place in the scenarios of the arm with links of variable stiffness."""
 
+from collections.abc import Sequence
+
+from handover.controllers.vsl.hybrid_kinematics import Imu
+from handover.cosim.system.system import System
 from handover.scenarios.experiment.places import Place
 
 _WORLD = "W is the world: z points up, and the first joint turns about it; the ground is at z = 0."
@@ -72,3 +76,29 @@ PLACES = {
     ),
 }
 """By the units' names in the system."""
+
+_SENSORS = {"closed_loop": "p_WG_meas", "imu": "tilt_meas"}
+"""By the parameter of the kinematics that makes it look at a sensor, the input at which that is read."""
+
+
+def sensor_faults(system: System, given: Sequence[str], remedy: str) -> list[str]:
+    """Return which sensors the kinematics are told to look at that nothing is connected to: they would read 0.
+
+    Args:
+        system: as it is wired.
+        given: names of the units' parameters that were set.
+        remedy: what would be right, with `{}` for the parameter's setting.
+    """
+    kinematics = system.units["kinematics"]
+    fed = system.fed_inputs("kinematics")
+    faults: list[str] = []
+    for name, port in _SENSORS.items():
+        value = kinematics.start.get(name)
+        if f"kinematics.{name}" in given and value not in (None, False, "NONE", 0) and port not in fed:
+            text = Imu(value).name if name == "imu" and isinstance(value, int) else str(value)
+            setting = f"{name}={text.lower()}"
+            faults.append(
+                f"kinematics.{name}: nothing is connected to kinematics.{port}, which would read 0; "
+                + remedy.format(setting)
+            )
+    return faults

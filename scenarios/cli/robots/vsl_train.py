@@ -1,14 +1,16 @@
 """The command `handover vsl-train`: learned kinematics of the arm with variable-stiffness links."""
 
+import math
 import os
 import sys
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import click
+import numpy as np
 
 from handover.controllers.vsl.fit_network import EPOCHS, NoPyTorch, torch_or_refusal
 from handover.controllers.vsl.hybrid_kinematics import Params
@@ -50,11 +52,20 @@ class _ArmFailed(click.ClickException):
 
 
 @click.command("vsl-train", context_settings={"show_default": True})
-@click.option("--points", type=WholeNumber(min=_MIN_ADAPTATION, max=1_000_000), default=1500, help="Points to measure.")
+@click.option(
+    "--points",
+    type=WholeNumber(min=_MIN_ADAPTATION, max=1_000_000),
+    default=1500,
+    help="Points to measure; without --adapt at least 400.",
+)
 @click.option(
     "--walk", is_flag=True, help="From point to point vary pressures, angles or load alone, as the paper does."
 )
-@click.option("--seed", type=WholeNumber(min=0), default=0, help="Seed of all random numbers.")
+@click.option(
+    "--seed",
+    type=WholeNumber(min=0),
+    help="Seed of all random numbers [default: 0; with --adapt the next after that of the model's points].",
+)
 @click.option("--elbow", type=_ELBOW, default="up", help="Which way the elbow points.")
 @click.option("--plant", type=_PATH, help="FMU of the arm [default: VslArm, built from its sources].")
 @click.option("--arm", multiple=True, metavar="NAME=VALUE", help="Parameter of the arm, as of one that differs.")
@@ -105,7 +116,7 @@ class _Options:
 
     points: int
     walk: bool
-    seed: int
+    seed: int | None
     elbow: str
     plant: Path | None
     arm: Sequence[str]
@@ -133,7 +144,7 @@ class _Options:
         if self.data and (idle := typed & {"points", "walk", "seed", "save_data"}):
             raise UsageError(f"{_names(idle)}: with --data it is the file's")
         if self.adapt is None and self.data is None and self.points < MIN_POINTS:
-            raise UsageError(f"--points {self.points}: {self.points} is not in the range x>={MIN_POINTS}")
+            raise UsageError(f"--points {self.points}: without --adapt at least {MIN_POINTS}")
         kind = Learned[self.learned.upper()]
         if "epochs" in typed and kind is not Learned.PUBLISHED:
             raise UsageError("--epochs: of the published network alone")
@@ -148,14 +159,14 @@ class _Options:
         p = Params(elbow=Elbow[self.elbow.upper()])
         return VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
 
-    def training(self, kinematics: VslKinematics) -> VslTraining:
-        """Return the training on the arm's FMU."""
+    def training(self, kinematics: VslKinematics, seed: int = 0) -> VslTraining:
+        """Return the training on the arm's FMU; the seed is for what is drawn where none is given."""
         fmu = self.plant or _built()
         return VslTraining(
             fmu=fmu,
             kinematics=kinematics,
             points=self.points,
-            seed=self.seed,
+            seed=seed if self.seed is None else self.seed,
             learned=Learned[self.learned.upper()],
             forward_input=ForwardInput(self.forward_input),
             friction_compensation=self.friction_compensation,
@@ -215,7 +226,7 @@ def _adapt(o: _Options, progress: Progress) -> list[str]:
     """Adapt a model, write, and return what is to be printed."""
     assert o.adapt is not None
     base = read_model(o.adapt)
-    training = o.training(base.kinematics).like(base)
+    training = o.training(base.kinematics, _seed_of_points(base) + 1).like(base)
     measured = o.measured(training, progress)
     o.check_number(measured, _MIN_ADAPTATION, "to adapt to")
     model, before, errors = training.adapt(base, measured)
@@ -231,6 +242,18 @@ def _adapt(o: _Options, progress: Progress) -> list[str]:
             )
         ),
     ]
+
+
+def _seed_of_points(model: VslModel) -> int:
+    """Return the seed of the points that a model, or what it was adapted from, was trained on: 0 if that is not told.
+
+    Points of that seed would be the same again, so that an adaptation would be tested on what the model has seen.
+    """
+    provenance = model.provenance
+    while isinstance(base := provenance.get("adapted_from"), dict):
+        provenance = cast("dict[str, Any]", base)
+    seed = provenance.get("seed")
+    return seed if isinstance(seed, int) else 0
 
 
 _FORWARD_ROW, _INVERSE_ROW = "forward: tip from the encoders' angles", "inverse: command for a measured tip"
@@ -275,12 +298,17 @@ def _arm_values(fmu: Path, given: Sequence[str]) -> dict[str, Any]:
         if name not in parameters:
             raise UsageError(f"--arm {text}: the arm has no parameter {name!r}; {nearest(name, parameters)}")
         port = parameters[name]
-        try:
-            number = float(value) if port.kind in (Kind.REAL, Kind.INTEGER) and not port.shape else None
-        except ValueError as e:
-            raise UsageError(f"--arm {text}: {value!r} is not a number") from e
-        whole = number is not None and port.kind is Kind.INTEGER and number.is_integer()
-        values[name] = value if number is None else int(number) if whole else number
+        values[name] = value
+        if port.kind in (Kind.REAL, Kind.INTEGER):
+            try:
+                numbers = [float(part) for part in (value.split(",") if port.shape else [value])]
+            except ValueError as e:
+                what = (
+                    f"is not {math.prod(port.shape)} numbers with commas between" if port.shape else "is not a number"
+                )
+                raise UsageError(f"--arm {text}: {value!r} {what}") from e
+            whole = port.kind is Kind.INTEGER and numbers[0].is_integer()
+            values[name] = np.array(numbers) if port.shape else int(numbers[0]) if whole else numbers[0]
         if fault := fault_of(port, values[name]):
             raise UsageError(f"--arm {text}: {fault}")
     return values

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from handover.controllers.vsl.beam import HINGES, Beam, Stiffness, Weights
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
@@ -16,6 +17,7 @@ from handover.fmus.build import cached
 from handover.plants.vsl.chain import VslChain
 from handover.plants.vsl.parameters import Params as ArmParams
 from handover.plants.vsl.statics import VslStatics
+from handover.scenarios.cli.command import main
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
 from handover.scenarios.vsl.path_experiments import VslHybrid
 
@@ -157,3 +159,30 @@ def test_the_controllers_beam_bends_as_the_arm_does(theta: tuple[float, float], 
     assert abs(sag) > 0.008
     assert abs(complex(*tip) - chain.ends(pose)[-1]) < 2e-4
     assert torques == pytest.approx(pose.torque, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "given", "text"),
+    [
+        ("vsl_hybrid", "kinematics.imu=feedback", "kinematics.tilt_meas, which would read 0; `-p imu=feedback` of"),
+        ("vsl_hybrid", "kinematics.closed_loop=true", "`-p closed_loop=true` of vsl_hybrid connects it"),
+        ("vsl_model_based", "kinematics.closed_loop=true", "nothing is connected to kinematics.p_WG_meas"),
+        ("vsl_pick_and_place", "kinematics.imu=feedback", "this scenario has no imu=feedback, vsl_hybrid has"),
+    ],
+)
+def test_a_sensor_that_is_not_connected_is_refused(scenario: str, given: str, text: str, tmp_path: Path):
+    result = CliRunner().invoke(main, ["run", scenario, "-p", given, "--out", str(tmp_path / "run")])
+    assert result.exit_code == 2
+    assert text in result.output
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("row", ["0.3,0,nan", "0.3,0,1e308", "0.3,0", "x,0,0.1"])
+def test_a_faulty_list_of_waypoints_is_refused_in_a_line(row: str, tmp_path: Path):
+    (tmp_path / "way.csv").write_text(f"x,y,z\n0.3,0,0.1\n{row}\n")
+    given = ("-p", "path=custom", "-p", f"waypoints={tmp_path / 'way.csv'}", "--out", str(tmp_path / "run"))
+    result = CliRunner().invoke(main, ["run", "vsl_hybrid", *given])
+    assert result.exit_code == 2
+    assert "waypoints: " in result.output
+    assert "Traceback" not in result.output
+    assert not (tmp_path / "run").exists()

@@ -95,6 +95,7 @@ def test_a_model_is_adapted_to_stiffer_links_by_few_points(tmp_path: Path):
     model = read_model(tmp_path / "a.json")
     assert model.provenance["adapted_from"] == shipped().provenance
     assert model.provenance["arm"]["parameters"]["EI_0"] == 0.605
+    assert model.provenance["seed"] == shipped().provenance["seed"] + 1, "its points are others than the base's"
     again = call("--adapt", tmp_path / "a.json", "--points", "50", *stiffer, "--out", tmp_path / "b.json")
     assert again.exit_code == 0, again.output
     np.testing.assert_array_equal(
@@ -114,7 +115,9 @@ def test_without_pytorch_the_published_network_is_refused(tmp_path: Path, monkey
     ("arguments", "text"),
     [
         (["--points", "10"], "10 is not in the range"),
-        (["--points", "50"], "50 is not in the range x>=400"),
+        (["--points", "50"], "--points 50: without --adapt at least 400"),
+        (["--arm", "EI_factor=1.2,1.2"], "is not an array of shape [3]"),
+        (["--arm", "EI_factor=1.2,x,1"], "is not 3 numbers with commas between"),
         (["--arm", "EI_0"], "is not of the form NAME=VALUE"),
         (["--arm", "EI=1"], "the arm has no parameter 'EI'"),
         (["--arm", "EI_0=x"], "'x' is not a number"),
@@ -206,3 +209,9 @@ def test_ctrl_c_leaves_the_file_of_before(tmp_path: Path, monkeypatch: pytest.Mo
     (tmp_path / "m.json").write_text("former")
     assert call("--out", tmp_path / "m.json").exit_code == 130
     assert [p.read_text() for p in tmp_path.iterdir()] == ["former"]
+
+
+def test_arrays_of_the_arm_are_given_with_commas(tmp_path: Path):
+    result = call("--points", "400", "--arm", "EI_factor=1.2,1.1,1", "--out", tmp_path / "m.json")
+    assert result.exit_code == 0, result.output
+    assert read_model(tmp_path / "m.json").provenance["arm"]["parameters"]["EI_factor"] == [1.2, 1.1, 1.0]

@@ -135,8 +135,8 @@ def _by_joints(runs: Vsl2Runs, folder: Path) -> Figure:
         legend_below(panels[0])
     caption = (
         "Mean error of an arm with rigid links by how many times its joints are stiffer than assumed, and that of the "
-        "soft arm, with joints as assumed, by what was learned: the claim that the latter errs less falls where the "
-        "lines cross."
+        "soft arm, with joints as assumed, by what was learned: means over the runs. The claim is that each run of the "
+        "latter errs less."
     )
     return Figure("rigid_joints", caption)
 
