@@ -146,7 +146,14 @@ class Server:
         if hasattr(os, "posix_fallocate"):  # raises if the disk is full, where writing to the memory would crash
             os.posix_fallocate(self._file, 0, size)
         self._memory = mmap.mmap(self._file, size)
+        self.close_file()  # the memory keeps it; a process that serves many instances has descriptors for few files
         return self._memory
+
+    def close_file(self) -> None:
+        """Close the descriptor of the shared memory's file, unless that is done."""
+        if self._file >= 0:
+            os.close(self._file)
+            self._file = -1
 
 
 def _trace(error: BaseException) -> str:
@@ -193,15 +200,36 @@ def _end_with_the_host(host: int, number: int) -> None:
 
 
 def _serve_instances(control: int) -> None:
-    """Serve each instance whose channel and memory come by a socket, until the host closes that or ends."""
+    """Serve each instance whose channel and memory come by a socket, until the host closes that or ends.
+
+    The system drops descriptors for which there is no room, so room for two is kept. An instance that takes the last
+    of it is refused, and those that run go on.
+    """
     threads: list[threading.Thread] = []
     incoming = socket.socket(fileno=control)
+    poller = _module("select").poll()
+    poller.register(incoming, _module("select").POLLIN)
     while True:
-        _, numbers, _, _ = socket.recv_fds(incoming, 1, 2)
-        if len(numbers) != 2:
+        spare = _duplicates(control, 2)
+        poller.poll()
+        for number in spare:
+            os.close(number)
+        byte, numbers, _, _ = socket.recv_fds(incoming, 1, 2)
+        if not byte:
             break
+        spare = _duplicates(control, 2)
+        has_room = len(numbers) == len(spare) == 2
+        for number in spare:
+            os.close(number)
         threads = [thread for thread in threads if thread.is_alive()]
-        threads.append(threading.Thread(target=_serve, args=tuple(numbers), daemon=True))
+        if has_room:
+            threads.append(threading.Thread(target=_serve, args=tuple(numbers), daemon=True))
+        elif numbers:
+            for number in numbers[1:]:
+                os.close(number)
+            threads.append(threading.Thread(target=_refuse, args=(numbers[0],), daemon=True))
+        else:
+            continue
         threads[-1].start()
     deadline = time.monotonic() + PATIENCE
     for thread in threads:
@@ -210,15 +238,45 @@ def _serve_instances(control: int) -> None:
         os._exit(1)
 
 
+def _duplicates(number: int, count: int) -> list[int]:
+    """Return duplicates of a descriptor: so many, or as many as the limit leaves room for."""
+    made: list[int] = []
+    try:
+        while len(made) < count:
+            made.append(os.dup(number))
+    except OSError:
+        pass
+    return made
+
+
 def _serve(channel: int, memory: int) -> None:
     """Serve one instance until the host closes its channel; the files are this thread's."""
+    server = Server(Channel(channel), memory)
     try:
-        Server(Channel(channel), memory).run()
+        server.run()
     except SystemExit:
         pass
     finally:
         os.close(channel)
-        os.close(memory)
+        server.close_file()
+
+
+def _refuse(channel: int) -> None:
+    """Tell an instance, until the host closes its channel, that this process has no room for it."""
+    reason = (
+        b"the process that serves all instances of this unit is at its limit of open files, and takes no further one. "
+        b"Cure: free instances, or start the host with a higher limit (ulimit -n)"
+    )
+    host = Channel(channel)
+    try:
+        while True:
+            _, _, size, _ = CALL.unpack(host.receive(CALL.size))
+            host.receive(size)
+            host.send(ANSWER.pack(RAISED, len(reason)) + reason)
+    except SystemExit:
+        pass
+    finally:
+        os.close(channel)
 
 
 def main() -> None:
