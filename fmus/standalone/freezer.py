@@ -118,12 +118,15 @@ def _imported(block: str, carried: Carried) -> list[str]:
 
     Those count, too, that a function imports as it is called: its sources name them.
     """
-    command = [sys.executable, str(_IMPORTED), block, json.dumps(sys.path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise CannotFreeze(f"{block} cannot be imported: {done.stderr.strip()}")
+    with tempfile.TemporaryDirectory(prefix="handover-imports-") as scratch:
+        result = Path(scratch, "modules.json")
+        command = [sys.executable, str(_IMPORTED), block, json.dumps(sys.path), str(result)]
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+        if done.returncode != 0 or not result.is_file():
+            why = done.stderr.strip() or f"the interpreter ends with exit status {done.returncode}"
+            raise CannotFreeze(f"{block} cannot be imported: {why}")
+        modules: list[str] = json.loads(result.read_text(encoding="utf-8"))
     tops = {path.partition("/")[0].removesuffix(".py") for path in carried.files}
-    modules: list[str] = json.loads(done.stdout.splitlines()[-1])
     own = {*tops, "__main__"}
     modules += [name for name in carried.imported if _findable(name)]
     names = {*_STANDARD, *(name for name in modules if name.partition(".")[0] not in own)}
@@ -160,7 +163,7 @@ def _freeze(names: Sequence[str], carried: Carried, folder: Path) -> None:
             options += ["--exclude-module", unwanted]
         command = [sys.executable, "-m", "PyInstaller", *options, str(main)]
         environment = {**os.environ, "PYINSTALLER_CONFIG_DIR": f"{scratch}/config", "PYTHONHASHSEED": "1"}
-        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False, env=environment)
         made = Path(scratch, "made", "unit")
         if done.returncode != 0 or not (made / PROGRAM).is_file():
             last = "\n".join(done.stderr.strip().splitlines()[-3:])

@@ -1,4 +1,4 @@
-"""What a frozen interpreter runs: the script that it is given, or with `--try RESOURCES TOKEN STEP` one step of a unit.
+"""What a frozen interpreter runs: the script that it is given, or with `--try RESOURCES TOKEN STEP RESULT` one step.
 
 Standard library only.
 """
@@ -13,8 +13,10 @@ _OF_THE_SYSTEM = ("/proc/", "/sys/", "/dev/", "/etc/", "/usr/share/", "/System/"
 """Folders whose files every machine has."""
 
 
-def try_unit(resources: str, token: str, step: str) -> None:
-    """Let a unit start and step once; print as JSON its fault and which files it opened that only this machine has.
+def try_unit(resources: str, token: str, step: str, result: str) -> None:
+    """Let a unit start and step once; write as JSON its fault and which files it opened that only this machine has.
+
+    The result is a file, as a package may print at any time.
 
     A fault has `package`, the name of a missing one, `lacks`, the path of a missing file, and `error`; it is {}
     where there is none, as of a unit that rejects its own start values.
@@ -37,7 +39,9 @@ def try_unit(resources: str, token: str, step: str) -> None:
             fault = {"package": ", ".join(missing), "lacks": None, "error": "PyInstaller has left it out"}
         elif package or lacks or not rejects_start_values:
             fault = {"package": package, "lacks": lacks, "error": loader["explain"](e)}
-    print(json.dumps({"fault": fault, "opened": sorted(opened)}))
+    found = json.dumps({"fault": fault, "opened": sorted(opened)})
+    with open(result, "w", encoding="utf-8") as file:
+        file.write(found)
 
 
 def _note_what_is_read(scratch: str) -> set[str]:

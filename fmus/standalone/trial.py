@@ -38,19 +38,28 @@ def try_unit(name: str, files: Mapping[str, bytes], token: str, step: float) -> 
         resources = Path(scratch, "resources")
         program = resources / "standalone" / host_platform() / PROGRAM
         program.chmod(0o755)
-        command = [program, "--try", str(resources), token, repr(step)]
+        result = Path(scratch, "result.json")
+        command = [program, "--try", str(resources), token, repr(step), str(result)]
         environment = _environment(program, scratch)
         try:
             done = subprocess.run(
-                command, capture_output=True, text=True, check=False, env=environment, cwd=scratch, timeout=LIMIT
+                command,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                check=False,
+                env=environment,
+                cwd=scratch,
+                timeout=LIMIT,
             )
         except subprocess.TimeoutExpired:
             cure = "let its constructor, its outputs and its step take less"
             message = f"{name}: it has not started and stepped once in {LIMIT:g} s in its frozen interpreter; {cure}"
             raise CannotFreeze(message) from None
-        if done.returncode != 0:
-            raise CannotFreeze(f"{name}: its frozen interpreter does not run: {done.stderr.strip()}")
-        _judge(name, json.loads(done.stdout.splitlines()[-1]), resources)
+        if done.returncode != 0 or not result.is_file():
+            why = done.stderr.strip() or f"it ends with exit status {done.returncode}"
+            raise CannotFreeze(f"{name}: its frozen interpreter does not run: {why}")
+        _judge(name, json.loads(result.read_text(encoding="utf-8")), resources)
 
 
 def _environment(program: Path, scratch: str) -> dict[str, str]:

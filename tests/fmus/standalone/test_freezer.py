@@ -7,7 +7,7 @@ import pytest
 
 from handover.fmus.compile import host_platform
 from handover.fmus.sources import Carried
-from handover.fmus.standalone import freezer, trial
+from handover.fmus.standalone import freezer, program, trial
 from handover.fmus.standalone.freezer import (
     CannotFreeze,
     _contents,  # pyright: ignore[reportPrivateUsage]
@@ -16,6 +16,27 @@ from handover.fmus.standalone.freezer import (
 )
 
 NOTHING = Carried({}, ())
+PRINTS = """import atexit, ctypes, os
+atexit.register(print, "at exit")
+ctypes.CDLL(None).printf(b"printed in C, which is flushed at the end\\n")
+os.write(1, b"\\xff is not UTF-8\\n"), os.write(2, b"\\xff\\n")
+"""
+"""A package that prints."""
+LOADER = """
+class Slave:
+    _clock = [0.0, 0.0]
+
+    def initialise(self): ...
+
+    def step(self):
+        open(__file__.replace("loader.py", "table.csv"))
+
+def start(resources, token):
+    return Slave()
+
+def explain(error):
+    return str(error)
+"""
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links and scripts")
 
@@ -85,3 +106,35 @@ def test_a_unit_that_does_not_come_to_its_end_is_refused(monkeypatch: pytest.Mon
     program = {f"resources/standalone/{host_platform()}/unit": b"#!/bin/sh\nexec sleep 60\n"}
     with pytest.raises(CannotFreeze, match=r"Push: it has not started and stepped once in 0\.2 s"):
         trial.try_unit("Push", program, "{token}", 0.01)
+
+
+def test_what_a_package_prints_as_it_is_imported_is_not_taken_for_the_modules(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / "printing.py").write_text(f"{PRINTS}\nclass Own: ...\n")
+    monkeypatch.syspath_prepend(tmp_path)  # pyright: ignore[reportUnknownMemberType]
+    assert "atexit" in _imported("printing:Own", NOTHING)
+
+
+def test_a_module_that_ends_the_interpreter_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "ending.py").write_text("import os\nos._exit(0)\n")
+    monkeypatch.syspath_prepend(tmp_path)  # pyright: ignore[reportUnknownMemberType]
+    with pytest.raises(CannotFreeze, match="ending:Own cannot be imported: the interpreter ends with exit status 0"):
+        _imported("ending:Own", NOTHING)
+
+
+@pytest.mark.parametrize("lacks", [True, False])
+def test_what_a_package_prints_as_it_steps_is_not_taken_for_the_result(lacks: bool):
+    script = f'#!/bin/sh\nexec "{sys.executable}" "{program.__file__}" "$@"\n'
+    files = {
+        f"resources/standalone/{host_platform()}/unit": script,
+        "resources/sources/handover/fmus/loader.py": PRINTS + LOADER,
+    }
+    if not lacks:
+        files["resources/sources/handover/fmus/table.csv"] = "1"
+    contents = {path: content.encode() for path, content in files.items()}
+    if not lacks:
+        trial.try_unit("Push", contents, "{token}", 0.01)
+        return
+    with pytest.raises(CannotFreeze, match=r"Push: it opens handover/fmus/table\.csv, which the FMU does not have"):
+        trial.try_unit("Push", contents, "{token}", 0.01)
