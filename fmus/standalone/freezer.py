@@ -168,16 +168,26 @@ def _freeze(names: Sequence[str], carried: Carried, folder: Path) -> None:
         if done.returncode != 0 or not (made / PROGRAM).is_file():
             last = "\n".join(done.stderr.strip().splitlines()[-3:])
             raise CannotFreeze(f"PyInstaller has failed: {last}")
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        part = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-        shutil.copytree(made, part / "unit", symlinks=True)
         try:
-            os.rename(part / "unit", folder)
-        except OSError:
-            if not folder.is_dir():  # else another process has made it meanwhile
-                raise
-        finally:
-            shutil.rmtree(part, ignore_errors=True)
+            _place(made, folder)
+        except OSError as e:
+            why = e.args[0][0][-1] if isinstance(e, shutil.Error) else e  # it lists all files
+            cure = "make room there, or name another folder by HANDOVER_CACHE"
+            raise CannotFreeze(f"what PyInstaller has made cannot be kept in {folder.parent}: {why}; {cure}") from e
+
+
+def _place(made: Path, folder: Path) -> None:
+    """Copy the folder of the frozen program into the cache, whole or not at all."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    part = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        shutil.copytree(made, part / "unit", symlinks=True)
+        os.rename(part / "unit", folder)
+    except OSError:
+        if not folder.is_dir():  # else another process has made it meanwhile
+            raise
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
 
 
 def _unwanted(names: Sequence[str]) -> list[str]:

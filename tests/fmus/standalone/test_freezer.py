@@ -1,7 +1,13 @@
 """What goes into a frozen folder and into the FMU, without freezing anything."""
 
+import errno
+import os
+import shutil
+import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -9,8 +15,10 @@ from handover.fmus.compile import host_platform
 from handover.fmus.sources import Carried
 from handover.fmus.standalone import freezer, program, trial
 from handover.fmus.standalone.freezer import (
+    PROGRAM,
     CannotFreeze,
     _contents,  # pyright: ignore[reportPrivateUsage]
+    _freeze,  # pyright: ignore[reportPrivateUsage]
     _imported,  # pyright: ignore[reportPrivateUsage]
     _key,  # pyright: ignore[reportPrivateUsage]
 )
@@ -99,6 +107,24 @@ def test_how_this_machine_finds_its_installations_is_not_frozen(tmp_path: Path, 
     names = _imported("own:Own", NOTHING)
     assert "needed" in names
     assert not [name for name in names if name.startswith(("__editable__", "_distutils_hack"))]
+
+
+def test_a_full_disk_leaves_nothing_in_the_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def run(command: Sequence[str], **_options: Any) -> subprocess.CompletedProcess[str]:
+        made = Path(command[command.index("--distpath") + 1], "unit")
+        made.mkdir(parents=True)
+        (made / PROGRAM).write_text("program")
+        return subprocess.CompletedProcess(command, 0, "", "")
+
+    def copy(*_files: object, **_options: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    copytree = shutil.copytree
+    monkeypatch.setattr(freezer.subprocess, "run", run)
+    monkeypatch.setattr(freezer.shutil, "copytree", lambda *a, **k: copytree(*a, **k, copy_function=copy))  # pyright: ignore[reportUnknownLambdaType,reportUnknownArgumentType]
+    with pytest.raises(CannotFreeze, match=f"cannot be kept in {tmp_path}: .*No space left.*HANDOVER_CACHE"):
+        _freeze([], NOTHING, tmp_path / "key")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_unit_that_does_not_come_to_its_end_is_refused(monkeypatch: pytest.MonkeyPatch):
