@@ -68,7 +68,7 @@ static wchar_t *command_line(const char *interpreter, const char *const argument
  * may write, in the order that Windows wants. All others could change what the unit computes. */
 static wchar_t *bundled_environment(void) {
     const wchar_t *passed_on[] = {L"LOCALAPPDATA", L"SYSTEMROOT", L"TEMP", L"TMP", L"USERPROFILE"};
-    wchar_t *block = calloc(ENVIRONMENT, sizeof *block), *end = block;
+    wchar_t *block = calloc(ENVIRONMENT + 1, sizeof *block), *end = block; /* a full one ends with one more zero */
     for (size_t i = 0; block && i < sizeof passed_on / sizeof *passed_on; i++) {
         wchar_t *value = end + wcslen(passed_on[i]) + 1;
         if (value + 2 >= block + ENVIRONMENT) break;
