@@ -25,6 +25,7 @@ struct SharedProcess {
     pid_t id, host;
     int control;
     size_t instances;
+    bool takes_none;          /* it has closed the control channel, as it is about to end */
     bool is_over, has_status; /* `status`: how it ended */
     bool was_silent;          /* it was ended as an instance got no answer */
     int status;
@@ -56,7 +57,8 @@ static char *identity(const char *program, const char *token) {
 /* One that runs; those of a host that forked this one are that host's. */
 static SharedProcess *find(const char *unit) {
     for (SharedProcess *one = all; one; one = one->next)
-        if (one->host == getpid() && !one->is_over && strcmp(one->unit, unit) == 0 && process_life(one->id) == RUNS)
+        if (one->host == getpid() && !one->is_over && !one->takes_none && strcmp(one->unit, unit) == 0 &&
+            process_life(one->id) == RUNS)
             return one;
     return NULL;
 }
@@ -125,10 +127,18 @@ Process *process_join(const char *program, const char *token, const char *const 
     char *unit = identity(program, token);
     lock();
     SharedProcess *shared = unit ? find(unit) : NULL;
-    if (shared) free(unit);
-    else if (unit) shared = begin(unit, program, arguments, fault);
     bool joined = shared && hand_over(shared->control, ends[1], (int)memory->file);
+    if (shared && !joined && (errno == EPIPE || errno == ECONNRESET)) { /* it crashes: its instances will note that */
+        shared->takes_none = true;
+        shared = NULL;
+    }
+    if (!shared && unit) {
+        shared = begin(unit, program, arguments, fault);
+        unit = NULL;
+        joined = shared && hand_over(shared->control, ends[1], (int)memory->file);
+    }
     if (shared && !joined) text_add(fault, "it takes no instance: %s", strerror(errno));
+    free(unit);
     if (joined) {
         shared->instances++;
         *process = (Process){.id = shared->id, .host = getpid(), .channel = ends[0], .shared = shared};

@@ -1,0 +1,82 @@
+"""What a host does while the process that its instances share crashes or ends; its program is a script, not frozen."""
+
+import copy
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from ctypes_host import OK, CtypesHost, Log3
+
+from handover.fmus.build import build_block
+from handover.fmus.compile import host_platform
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="each instance has a process of its own there")
+
+CRASHES = """
+import runpy, socket, sys
+receive = socket.recv_fds
+def receive_one(control, *sizes):
+    received = receive(control, *sizes)
+    control.shutdown(socket.SHUT_RDWR)
+    return received
+socket.recv_fds = receive_one
+runpy.run_path(sys.argv[1], run_name="__main__")
+"""
+"""It takes one instance, and is for some seconds as one that crashes: it runs, but the control channel is closed."""
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build_block("sample_units.trouble:Trouble", 3, tmp_path_factory.mktemp("unit"))
+
+
+@pytest.fixture
+def host_of(fmu: Path) -> Iterator[Callable[[str], CtypesHost]]:
+    """Return what makes a host of the unit with a program as its interpreter."""
+    made: list[CtypesHost] = []
+
+    def host(program: str) -> CtypesHost:
+        made.append(CtypesHost(fmu, 3))
+        folder = made[-1].folder / "resources" / "standalone" / host_platform()
+        folder.mkdir(parents=True)
+        (folder / "unit.py").write_text(program, encoding="utf-8")
+        script = (
+            f'#!/bin/sh\nunset LD_LIBRARY_PATH\nPYTHONPATH="{folder}" exec "{sys.executable}" -c "import unit" "$@"\n'
+        )
+        (folder / "unit").write_text(script, encoding="utf-8")
+        return made[-1]
+
+    yield host
+    for each in made:
+        each.close()
+
+
+def instance(host: CtypesHost) -> CtypesHost:
+    """Return a host of one more instance in the same folder."""
+    other = copy.copy(host)
+    other.instance, other.log = None, []
+    other.logger3 = Log3(other._take_3)  # pyright: ignore[reportPrivateUsage]
+    assert other.instantiate(), other.log
+    assert other.initialise() == OK, other.log
+    return other
+
+
+def process(host: CtypesHost) -> int:
+    return int(host.get("process")[0])
+
+
+def free(host: CtypesHost) -> None:
+    host.call("FreeInstance")
+    host.instance = None
+
+
+def test_an_instance_gets_another_process_where_the_one_that_runs_is_about_to_crash(
+    host_of: Callable[[str], CtypesHost],
+):
+    host = host_of(CRASHES)
+    first = instance(host)
+    second = instance(host)
+    assert process(first) != process(second)
+    free(first)
+    free(second)
