@@ -24,22 +24,32 @@ struct SharedProcess {
     char *unit; /* see identity() */
     pid_t id, host;
     int control;
-    size_t instances;
-    bool takes_none;          /* it has closed the control channel, as it is about to end */
-    bool is_over, has_status; /* `status`: how it ended */
-    bool was_silent;          /* it was ended as an instance got no answer */
+    size_t instances, leaving; /* `leaving`: calls of process_leave() under way */
+    bool takes_none;                    /* it has closed the control channel, as it is about to end */
+    bool is_over, is_ended, has_status; /* is to end, its end has been awaited, `status` is how it ended */
+    bool was_silent;                    /* it was ended as an instance got no answer */
     int status;
     SharedProcess *next;
 };
 
 static SharedProcess *all;
-static atomic_flag taken = ATOMIC_FLAG_INIT; /* a host may make instances in several threads */
+static atomic_int holder; /* the process that has the lock, or 0: a host may make instances in several threads */
 
+static void pause_briefly(void) { nanosleep(&(struct timespec){.tv_nsec = 100000}, NULL); }
+
+/* Where a host forks while one of its threads has the lock, its child has no thread that would give it back: the child
+ * takes it over. It finds a sound list, as each change of that is a single write. */
 static void lock(void) {
-    while (atomic_flag_test_and_set(&taken)) nanosleep(&(struct timespec){.tv_nsec = 100000}, NULL);
+    int own = (int)getpid();
+    for (;;) {
+        int found = 0;
+        if (atomic_compare_exchange_strong(&holder, &found, own)) return;
+        if (found != own && atomic_compare_exchange_strong(&holder, &found, own)) return;
+        pause_briefly();
+    }
 }
 
-static void unlock(void) { atomic_flag_clear(&taken); }
+static void unlock(void) { atomic_store(&holder, 0); }
 
 /* What instances of one unit have in common. Another unit that is unpacked to the same place has another token, or, of the
  * same sources with other packages, a program that was changed at another time. */
@@ -97,7 +107,7 @@ static bool hand_over(int control, int channel, int memory) {
     return sent == 1;
 }
 
-/* Takes a process without instances, which end() has ended, off the list and frees its entry. */
+/* Takes a process that has ended, and that nobody has to do with any more, off the list and frees its entry. */
 static void drop(SharedProcess *one) {
     for (SharedProcess **place = &all; *place; place = &(*place)->next)
         if (*place == one) {
@@ -108,11 +118,11 @@ static void drop(SharedProcess *one) {
     free(one);
 }
 
-static void end(SharedProcess *one, double patience) {
+/* Closes the control channel, at which a process ends that has no instances. */
+static void begin_end(SharedProcess *one) {
+    one->is_over = true;
     shutdown(one->control, SHUT_RDWR);
     close(one->control);
-    one->is_over = true;
-    one->has_status = process_reap(one->id, patience, &one->status);
 }
 
 Process *process_join(const char *program, const char *token, const char *const arguments[], const SharedMemory *memory,
@@ -143,7 +153,9 @@ Process *process_join(const char *program, const char *token, const char *const 
         shared->instances++;
         *process = (Process){.id = shared->id, .host = getpid(), .channel = ends[0], .shared = shared};
     } else if (shared && shared->instances == 0) {
-        end(shared, 0.0);
+        int status;
+        begin_end(shared);
+        process_reap(shared->id, 0.0, &status);
         drop(shared);
     }
     unlock();
@@ -154,16 +166,34 @@ Process *process_join(const char *program, const char *token, const char *const 
     return NULL;
 }
 
+/* The end is awaited without the lock, so that instances of other units can be made meanwhile. */
 bool process_leave(SharedProcess *shared, double patience, int *status, bool *was_silent) {
     lock();
+    shared->leaving++;
     bool is_last = --shared->instances == 0;
-    bool runs = process_life(shared->id) == RUNS, ends = is_last || patience == 0.0 || !runs;
-    if (runs && patience == 0.0 && !shared->is_over) shared->was_silent = true;
-    if (ends && !shared->is_over) end(shared, patience);
+    if (!shared->is_over) {
+        bool runs = process_life(shared->id) == RUNS;
+        if (runs && patience == 0.0) shared->was_silent = true;
+        if (is_last || patience == 0.0 || !runs) {
+            begin_end(shared);
+            unlock();
+            int how = 0;
+            bool reaped = process_reap(shared->id, patience, &how);
+            lock();
+            shared->has_status = reaped;
+            shared->status = how;
+            shared->is_ended = true;
+        }
+    }
+    while (shared->is_over && !shared->is_ended) { /* another thread awaits it */
+        unlock();
+        pause_briefly();
+        lock();
+    }
     bool over = shared->has_status;
     *status = shared->status;
     *was_silent = shared->was_silent;
-    if (is_last) drop(shared);
+    if (--shared->leaving == 0 && shared->instances == 0) drop(shared);
     unlock();
     return over;
 }

@@ -1,7 +1,9 @@
 """What a host does while the process that its instances share crashes or ends; its program is a script, not frozen."""
 
 import copy
+import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -9,7 +11,7 @@ import pytest
 from ctypes_host import OK, CtypesHost, Log3
 
 from handover.fmus.build import build_block
-from handover.fmus.compile import host_platform
+from handover.fmus.compile import RUNTIME, host_platform, zig_cc
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="each instance has a process of its own there")
 
@@ -24,6 +26,14 @@ socket.recv_fds = receive_one
 runpy.run_path(sys.argv[1], run_name="__main__")
 """
 """It takes one instance, and is for some seconds as one that crashes: it runs, but the control channel is closed."""
+
+ENDS_SLOWLY = """
+import os, runpy, sys, time
+runpy.run_path(sys.argv[1], run_name="__main__")
+while not os.path.exists(sys.argv[0] + "may_end"):
+    time.sleep(0.01)
+"""
+"""It ends once a file lets it."""
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +50,8 @@ def host_of(fmu: Path) -> Iterator[Callable[[str], CtypesHost]]:
         made.append(CtypesHost(fmu, 3))
         folder = made[-1].folder / "resources" / "standalone" / host_platform()
         folder.mkdir(parents=True)
-        (folder / "unit.py").write_text(program, encoding="utf-8")
+        source = program.replace("sys.argv[0]", repr(f"{folder}/"))
+        (folder / "unit.py").write_text(source, encoding="utf-8")
         script = (
             f'#!/bin/sh\nunset LD_LIBRARY_PATH\nPYTHONPATH="{folder}" exec "{sys.executable}" -c "import unit" "$@"\n'
         )
@@ -80,3 +91,24 @@ def test_an_instance_gets_another_process_where_the_one_that_runs_is_about_to_cr
     assert process(first) != process(second)
     free(first)
     free(second)
+
+
+def test_an_instance_is_made_while_another_process_takes_its_time_to_end(host_of: Callable[[str], CtypesHost]):
+    host = host_of(ENDS_SLOWLY)
+    first = instance(host)
+    leaving = threading.Thread(target=free, args=(first,))
+    leaving.start()
+    leaving.join(0.1)
+    second = instance(host)
+    assert leaving.is_alive()
+    (host.folder / "resources" / "standalone" / host_platform() / "may_end").touch()
+    leaving.join()
+    free(second)
+
+
+def test_a_fork_of_a_host_of_which_a_thread_has_the_lock_makes_instances(tmp_path: Path):
+    sources = [str(RUNTIME / name) for name in ("process_posix.c", "text.c")]
+    program = Path(__file__).with_name("lock_in_fork.c")
+    built = zig_cc(["-I", str(RUNTIME), str(program), *sources, "-o", str(tmp_path / "lock_in_fork")])
+    assert built.returncode == 0, built.stdout
+    assert subprocess.run([str(tmp_path / "lock_in_fork")], check=False, timeout=60).returncode == 0
