@@ -10,11 +10,12 @@ import importlib.metadata
 import importlib.util
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from handover.fmus.compile import cache_folder, host_platform, named_platforms
@@ -79,10 +80,8 @@ def frozen(block: str, carried: Carried) -> Mapping[str, bytes]:
 
 
 def _key(names: Sequence[str], carried: Carried) -> str:
-    """Return a hash of what is frozen: names of modules, and versions of all packages that they belong to."""
-    by_module = distributions_by_module()
-    found = {name for module in names for name in by_module.get(module.partition(".")[0], ())}
-    found |= {package.distribution for package in carried.packages()}
+    """Return a hash of what is frozen: names of modules, and versions of the packages that they are of and require."""
+    found = _distributions(names) | _with_requirements(package.distribution for package in carried.packages())
     versions = sorted(f"{name}=={importlib.metadata.version(name)}" for name in found)
     parts = [names, versions, sys.version, host_platform(), _freezer_versions(), _MAIN.read_text(encoding="utf-8")]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]
@@ -191,11 +190,46 @@ def _place(made: Path, folder: Path) -> None:
 
 
 def _unwanted(names: Sequence[str]) -> list[str]:
-    """Return the environment's top-level modules that the block does not import, and what no unit needs."""
+    """Return the environment's top-level modules that the block has no use for, and what no unit needs.
+
+    What a package requires is kept: it may import that as late as in some step.
+    """
     wanted = {name.partition(".")[0] for name in names}
-    tops: set[str] = set()
+    kept = _distributions(names)
+    tops: set[str] = set(_UNWANTED)
     for distribution in importlib.metadata.distributions():
-        for file in distribution.files or ():
-            top = file.parts[0].partition(".")[0] if len(file.parts) == 1 else file.parts[0]
-            tops.add(top)
-    return sorted(top for top in {*tops, *_UNWANTED} if top.isidentifier() and top not in wanted)
+        modules = {
+            file.parts[0].partition(".")[0] if len(file.parts) == 1 else file.parts[0]
+            for file in distribution.files or ()
+        }
+        (wanted if _normalised(distribution.metadata["Name"]) in kept else tops).update(modules)
+    return sorted(top for top in tops if top.isidentifier() and top not in wanted)
+
+
+def _distributions(names: Sequence[str]) -> set[str]:
+    """Return the distributions that modules are of, and those that these require."""
+    by_module = distributions_by_module()
+    return _with_requirements(name for module in names for name in by_module.get(module.partition(".")[0], ()))
+
+
+def _with_requirements(distributions: Iterable[str]) -> set[str]:
+    """Return names of distributions and of those that they require without extras, where these are installed."""
+    found: set[str] = set()
+    left = [_normalised(name) for name in distributions]
+    while left:
+        name = left.pop()
+        if name in found:
+            continue
+        try:
+            requirements = importlib.metadata.requires(name) or ()
+        except importlib.metadata.PackageNotFoundError:  # of another platform or version of Python
+            continue
+        found.add(name)
+        asked = (re.match(r"[\w.-]+", text) for text in requirements if not re.search(r";.*\bextra\b", text))
+        left += [_normalised(match[0]) for match in asked if match]
+    return found
+
+
+def _normalised(name: str) -> str:
+    """Return a distribution's name in the form in which names are compared."""
+    return re.sub(r"[-_.]+", "-", name).lower()

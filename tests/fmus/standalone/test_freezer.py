@@ -21,6 +21,7 @@ from handover.fmus.standalone.freezer import (
     _freeze,  # pyright: ignore[reportPrivateUsage]
     _imported,  # pyright: ignore[reportPrivateUsage]
     _key,  # pyright: ignore[reportPrivateUsage]
+    _unwanted,  # pyright: ignore[reportPrivateUsage]
 )
 
 NOTHING = Carried({}, ())
@@ -82,8 +83,13 @@ def test_a_link_that_leads_nowhere_or_to_where_it_lies_is_refused(frozen: Path, 
 
 
 def test_another_version_of_a_package_that_another_one_imports_is_frozen_anew(monkeypatch: pytest.MonkeyPatch):
-    versions = {"direct": "1.0", "indirect": "1.0", "not imported": "1.0"}
+    versions = {"direct": "1.0", "indirect": "1.0", "required": "1.0", "not imported": "1.0"}
     monkeypatch.setattr(freezer, "distributions_by_module", lambda: {name: [name] for name in versions})
+    monkeypatch.setattr(
+        freezer.importlib.metadata,
+        "requires",
+        lambda name: {"direct": ["Required>=1", "not_imported; extra == 'all'"]}.get(name),  # pyright: ignore[reportUnknownLambdaType,reportUnknownArgumentType]
+    )
     monkeypatch.setattr(freezer.importlib.metadata, "version", lambda name: versions.get(name, "6"))  # pyright: ignore[reportUnknownLambdaType,reportUnknownArgumentType]
 
     def key() -> str:
@@ -92,8 +98,16 @@ def test_another_version_of_a_package_that_another_one_imports_is_frozen_anew(mo
     before = key()
     versions["not imported"] = "2.0"
     assert key() == before
-    versions["indirect"] = "1.1"
-    assert key() != before
+    for name in ("indirect", "required"):
+        versions[name] = "1.1"
+        assert key() != before
+        before = key()
+
+
+def test_what_a_package_requires_is_not_left_out_of_what_is_frozen():
+    left_out = _unwanted(["matplotlib"])
+    assert "pytest" in left_out
+    assert not {"matplotlib", "cycler", "dateutil", "numpy", "six"} & set(left_out)
 
 
 def test_how_this_machine_finds_its_installations_is_not_frozen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
