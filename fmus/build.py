@@ -38,7 +38,7 @@ from handover.fmus.model_description import Model
 from handover.fmus.reference import ParameterSet, related_files
 from handover.fmus.sources import Carried, beside_block, closure
 from handover.fmus.standalone.freezer import PROGRAM, check_standalone, frozen
-from handover.fmus.standalone.trial import try_unit
+from handover.fmus.standalone.smoke_test import try_unit
 from handover.fmus.terminals import terminals_file
 
 _log = logging.getLogger(__name__)

@@ -32,11 +32,11 @@ BEGUN = struct.Struct("=QQQ")
 ANSWERED, REFUSED, RAISED = 0, 1, 2
 """Outcomes, as in runtime/side.h: the method returned, rejected the call and changed nothing, or failed."""
 
-PATIENCE = 5.0
-"""Seconds that a call may take to return once the host has ended."""
+GRACE_PERIOD = 5.0
+"""Seconds that a call may take to return once the host has ended, before the process is ended."""
 
-LOOK_AFTER = 500
-"""How often it is looked whether the host is there, ms."""
+POLL_INTERVAL = 500
+"""How often it is checked whether the host still runs, ms."""
 
 _starting = threading.Lock()  # `runpy` works for one thread at a time
 
@@ -193,9 +193,9 @@ def _end_with_the_host(host: int, number: int) -> None:
     poller = select.poll()
     poller.register(number, 0)  # hang-ups are reported whatever events are asked for
     while os.getppid() in (host, 0):  # 0: the host is in another namespace of processes, and cannot be seen from here
-        if any(event & (select.POLLHUP | select.POLLERR) for _, event in poller.poll(LOOK_AFTER)):
+        if any(event & (select.POLLHUP | select.POLLERR) for _, event in poller.poll(POLL_INTERVAL)):
             break
-    threading.Event().wait(PATIENCE)
+    threading.Event().wait(GRACE_PERIOD)
     os._exit(1)
 
 
@@ -231,7 +231,7 @@ def _serve_instances(control: int) -> None:
         else:
             continue
         threads[-1].start()
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + GRACE_PERIOD
     for thread in threads:
         thread.join(max(0.0, deadline - time.monotonic()))
     if any(thread.is_alive() for thread in threads):

@@ -32,7 +32,7 @@ extern char **environ;
 #define MEMORY 4
 #define MOST_ARGUMENTS 8
 #define MOST_VARIABLES 3
-#define LOOK_AFTER 500 /* ms: how often a silent process is looked after; one that it made may hold the channel open */
+#define POLL_INTERVAL 500 /* ms: a silent process may be over, while one that it made holds the channel open */
 
 double process_clock(void) {
     struct timespec now;
@@ -191,11 +191,11 @@ static Transfer await_channel(const Process *process, short events, double deadl
     for (;;) {
         double left = ceil(1e3 * (deadline - process_clock()));
         struct pollfd channel = {.fd = process->channel, .events = events};
-        int n = poll(&channel, 1, left < LOOK_AFTER ? (left > 0 ? (int)left : 0) : LOOK_AFTER);
+        int n = poll(&channel, 1, left < POLL_INTERVAL ? (left > 0 ? (int)left : 0) : POLL_INTERVAL);
         if (n > 0) return TRANSFERRED;
         if (n < 0 && errno != EINTR && errno != EAGAIN) return ENDED;
         if (n == 0 && process_life(process->id) != RUNS) return ENDED;
-        if (n == 0 && left <= LOOK_AFTER) return TOO_LATE;
+        if (n == 0 && left <= POLL_INTERVAL) return TOO_LATE;
     }
 }
 

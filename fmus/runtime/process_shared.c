@@ -24,7 +24,7 @@ struct SharedProcess {
     char *unit; /* see identity() */
     pid_t id, host;
     int control;
-    size_t instances, leaving; /* `leaving`: calls of process_leave() under way */
+    size_t instances, leaving;          /* `leaving`: calls of process_leave() under way */
     bool takes_none;                    /* it has closed the control channel, as it is about to end */
     bool is_over, is_ended, has_status; /* is to end, its end has been awaited, `status` is how it ended */
     bool was_silent;                    /* it was ended as an instance got no answer */

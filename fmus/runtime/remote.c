@@ -17,10 +17,10 @@
 #include "side.h"
 #include "variables.h"
 
-#define TIMEOUT 300.0 /* s: for a call, if FMU_PYTHON_TIMEOUT is not set */
-#define STARTING 60.0 /* s: at least, for starting */
-#define PATIENCE 5.0  /* s: for ending by itself */
-#define TOO_OLD 86    /* exit status, below */
+#define TIMEOUT 300.0    /* s: for a call, if FMU_PYTHON_TIMEOUT is not set */
+#define STARTING 60.0    /* s: at least, for starting */
+#define GRACE_PERIOD 5.0 /* s: for ending by itself */
+#define TOO_OLD 86       /* exit status, below */
 
 /* The folder of the script must not be where modules are looked for; an old Python could not even read the script. */
 #define BEGINNING                                                               \
@@ -82,7 +82,7 @@ static Transfer transfer(const Remote *side, const Question *question, double li
 /* Ends a process that does not answer and adds how it ended; `cure` is what to do then, or nothing. */
 static void lose(Remote *side, Transfer why, double limit, const char *cure, Text *text) {
     Text how = {0};
-    int status = process_end(side->process, why == TOO_LATE ? 0.0 : PATIENCE, &how);
+    int status = process_end(side->process, why == TOO_LATE ? 0.0 : GRACE_PERIOD, &how);
     side->process = NULL;
     if (why == TOO_LATE)
         text_add(text,
@@ -178,7 +178,7 @@ static Start begin(Instance *instance, const char *function, Text *fault) {
     }
     free(answer.bytes);
     if (start != STARTED && side->process) {
-        process_end(side->process, PATIENCE, fault);
+        process_end(side->process, GRACE_PERIOD, fault);
         side->process = NULL;
     }
     return start;
@@ -203,7 +203,7 @@ static bool revive(Instance *instance, const char *function) {
 static void release(Instance *instance) {
     Remote *side = side_of(instance);
     Text how = {0};
-    if (side->process) process_end(side->process, fmin(PATIENCE, side->limit), &how);
+    if (side->process) process_end(side->process, fmin(GRACE_PERIOD, side->limit), &how);
     text_clear(&how);
     shared_memory_close(&side->memory);
     free(side->interpreter);

@@ -13,7 +13,7 @@ import pytest
 
 from handover.fmus.compile import host_platform
 from handover.fmus.sources import Carried
-from handover.fmus.standalone import freezer, program, trial
+from handover.fmus.standalone import freezer, program, smoke_test
 from handover.fmus.standalone.freezer import (
     PROGRAM,
     CannotFreeze,
@@ -142,10 +142,10 @@ def test_a_full_disk_leaves_nothing_in_the_cache(tmp_path: Path, monkeypatch: py
 
 
 def test_a_unit_that_does_not_come_to_its_end_is_refused(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(trial, "LIMIT", 0.2)
+    monkeypatch.setattr(smoke_test, "LIMIT", 0.2)
     program = {f"resources/standalone/{host_platform()}/unit": b"#!/bin/sh\nexec sleep 60\n"}
     with pytest.raises(CannotFreeze, match=r"Push: it has not started and stepped once in 0\.2 s"):
-        trial.try_unit("Push", program, "{token}", 0.01)
+        smoke_test.try_unit("Push", program, "{token}", 0.01)
 
 
 def test_what_a_package_prints_as_it_is_imported_is_not_taken_for_the_modules(
@@ -174,7 +174,7 @@ def test_what_a_package_prints_as_it_steps_is_not_taken_for_the_result(lacks: bo
         files["resources/sources/handover/fmus/table.csv"] = "1"
     contents = {path: content.encode() for path, content in files.items()}
     if not lacks:
-        trial.try_unit("Push", contents, "{token}", 0.01)
+        smoke_test.try_unit("Push", contents, "{token}", 0.01)
         return
     with pytest.raises(CannotFreeze, match=r"Push: it opens handover/fmus/table\.csv, which the FMU does not have"):
-        trial.try_unit("Push", contents, "{token}", 0.01)
+        smoke_test.try_unit("Push", contents, "{token}", 0.01)

@@ -1,4 +1,4 @@
-"""Tries a unit in its frozen interpreter before its FMU is written."""
+"""Smoke test: starts a unit in its frozen interpreter, and lets it step once, before its FMU is written."""
 
 import json
 import os
