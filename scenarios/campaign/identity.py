@@ -6,10 +6,17 @@ from pathlib import Path
 from typing import Any, cast
 
 from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.catalog import ScenarioSource
-from handover.scenarios.results.run_folder import sha256_of, versions
+from handover.scenarios.catalog import ScenarioSource, named_scenario
+from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.results.run_folder import hashes_of_files, sha256_of, versions
 
-_KINDS = {"units": "unit ", "master": "master's ", "versions": "version of ", "source": "scenario's "}
+_KINDS = {
+    "units": "unit ",
+    "master": "master's ",
+    "versions": "version of ",
+    "source": "scenario's ",
+    "parameter_files": "content of ",
+}
 _MAX_LENGTH = 60
 """Characters of a value that a message shows."""
 
@@ -18,6 +25,7 @@ def identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
     """Return all that a campaign's numbers depend on, as JSON data; the plan is a checked one."""
     source = ScenarioSource.of(plan.scenario)
     options = {**plan.options.as_data(), "call_limit": plan.options.call_limit, "pace": plan.options.pace}
+    files = _parameter_files(plan)
     return {
         "experiment": plan.experiment,
         "scenario": plan.scenario,
@@ -31,9 +39,20 @@ def identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
         "scenes": list(plan.scenes),
         **({"varied_units": list(plan.varied_units)} if plan.varied_units else {}),
         "units": {name: {"fmu": path.name, "sha256": sha256_of(path)} for name, path in fmus.items()},
+        **({"parameter_files": files} if files else {}),
         "master": options,
         "versions": versions(),
     }
+
+
+def _parameter_files(plan: CampaignPlan) -> dict[str, str]:
+    """Return the hashes of all files that parameters of runs name, by their paths."""
+    experiment = named_scenario(plan.scenario)()
+    files: dict[str, str] = {}
+    for point in range(len(plan.points)):
+        found = hashes_of_files(experiment.parameter_files(parse_parameters(type(experiment), plan.texts(point))))
+        files |= {entry["file"]: entry["sha256"] for entry in found.values()}
+    return files
 
 
 def differences(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> list[str]:

@@ -245,6 +245,8 @@ def _of_run(path: Path, run: Mapping[str, Any]) -> dict[str, Any]:
         content |= {"checkpoint": run["checkpoint"], "format": run["formats"]}
         content["parameters"] = {**run["parameters"], **run.get("unit_values", {}), **content.get("parameters", {})}
         content["unit"] = _units(path, run)
+        for file in run.get("parameter_files", {}).values():
+            _compare(path, Path(file["file"]), file["sha256"])
     except (KeyError, TypeError, ValueError, AttributeError) as e:
         raise UsageError(f"{path}: it is damaged: {type(e).__name__} {one_line(e)}") from e
     return {key: value for key, value in content.items() if value is not None}

@@ -103,6 +103,7 @@ class InterruptedRun:
             raise
         except (KeyError, TypeError, ValueError) as e:
             raise InvalidRunFolder(self.folder.path, f"its run.json is damaged: {type(e).__name__} {e}") from e
+        self._check_parameter_files()
         self._check_fmus(task)
         return task
 
@@ -163,6 +164,13 @@ class InterruptedRun:
         if path.is_file() and (sha256_of(path) == before or not is_of_cache(path)):
             return path
         return cached(unit, 3)
+
+    def _check_parameter_files(self) -> None:
+        for name, entry in self._object("parameter_files").items():
+            file = Path(str(entry.get("file", "")))
+            if not file.is_file() or sha256_of(file) != entry.get("sha256"):
+                fault = f"{file}, which its parameter {name} names, is not the file that the run began with"
+                raise InvalidRunFolder(self.folder.path, fault)
 
     def _check_fmus(self, task: Task) -> None:
         system = built_system(task.experiment, task.parameters, task.seed, task.fmus, task.unit_values)

@@ -225,6 +225,13 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         """
         return self.evaluator(parameters)
 
+    def parameter_files(self, parameters: Any) -> Mapping[str, Path]:  # noqa: ARG002
+        """Return the files that a run reads, by the parameters that name them; none by default.
+
+        Runs and campaigns keep their hashes, and tell or refuse where another file is there under the same name.
+        """
+        return {}
+
     def led_hand(self, parameters: Any) -> LedHand | None:  # noqa: ARG002
         """Return the hand that somebody outside leads; by default there is none.
 

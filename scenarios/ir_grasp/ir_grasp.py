@@ -147,6 +147,11 @@ class IrGrasp(Experiment[GraspEvaluator]):
         """Return a time far above any run's: of 140 by reflex the longest, with the printed equations, took 26 s."""
         return Fraction(90)
 
+    def parameter_files(self, parameters: Parameters) -> Mapping[str, Path]:
+        """Return the record of the last grasp."""
+        record = parameters.last_record
+        return {} if record is None else {"last_grasp": record}
+
     def evaluator(self, parameters: Parameters) -> GraspEvaluator:
         """Return the evaluator of one grasp."""
         return GraspEvaluator(parameters)

@@ -181,15 +181,20 @@ class Parameters:
         Raises:
             ValueError: the folder holds no record of such a grasp.
         """
-        if not self.last_grasp:
+        path = self.last_record
+        if path is None:
             return np.zeros((3, 4))
-        path = Path(self.last_grasp) / "signals.parquet"
         if not path.is_file():
             raise ValueError(f"there is no record {path}; name the folder of a run of ir_grasp")
         record = Record(path)
         if "reflex.jacobian_offset" not in record:
             raise ValueError(f"{path} has no signal reflex.jacobian_offset; name the folder of a run of ir_grasp")
         return np.array(record["reflex.jacobian_offset"][-1], dtype=float)
+
+    @property
+    def last_record(self) -> Path | None:
+        """The record of the run that last_grasp names."""
+        return Path(self.last_grasp) / "signals.parquet" if self.last_grasp else None
 
     @property
     def is_beyond_the_table(self) -> bool:

@@ -256,6 +256,12 @@ def sha256_of(file: Path) -> str:
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
+def hashes_of_files(files: Mapping[str, Path]) -> dict[str, dict[str, str]]:
+    """Return path and SHA-256 of files, by the given names; those that are not there are left out."""
+    there = {name: file for name, file in files.items() if file.is_file()}
+    return {name: {"file": str(file.absolute()), "sha256": sha256_of(file)} for name, file in there.items()}
+
+
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that a run's numbers depend on."""
     return {"python": platform.python_version(), **{p: _version(p) for p in _PACKAGES}}

@@ -21,7 +21,7 @@ from handover.cosim.master.master import Master
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Metric, Outcome
 from handover.scenarios.results.not_finite import NotFiniteData
-from handover.scenarios.results.run_folder import sha256_of, versions
+from handover.scenarios.results.run_folder import hashes_of_files, sha256_of, versions
 from handover.scenarios.results.system_facts import describe_system, own_period, run_metrics
 from handover.scenarios.results.tables import conversions_of, format_value
 from handover.scenarios.results.task import Task
@@ -110,6 +110,7 @@ class _OfSomeRuns(TypedDict, total=False):
     notes: list[str]
     external_inputs: list[str]
     failure: dict[str, Any] | None
+    parameter_files: dict[str, dict[str, str]]
 
 
 class RunData(Configuration, _OfSomeRuns):
@@ -117,7 +118,8 @@ class RunData(Configuration, _OfSomeRuns):
 
     A run that started has `system` and `conversions`, `warnings` of its FMUs if there are any, `notes` on what its
     units do not have and the wiring leaves out, and the names of `external_inputs`, which came from outside; one that
-    could not start has `failure`; `units` are the FMUs' names and hashes.
+    could not start has `failure`; `units` are the FMUs' names and hashes; `parameter_files` has those of the files that
+    parameters name, by these, where there are any.
     """
 
     source: dict[str, Any]
@@ -316,6 +318,8 @@ def faults_of(content: Mapping[str, Any], declared: type[Any]) -> list[str]:
 
 def _run_data(task: Task, fmus: Mapping[str, Path], of_this_run: _OfSomeRuns) -> RunData:
     hashes = {path: sha256_of(path) for path in dict.fromkeys(fmus.values())}
+    if files := hashes_of_files(task.experiment.parameter_files(task.parameters)):
+        of_this_run = {**of_this_run, "parameter_files": files}
     return RunData(
         **configuration(task),
         source=dict(task.source),

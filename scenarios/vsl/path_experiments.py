@@ -159,6 +159,13 @@ class PathExperiment(Experiment[PathEvaluator]):
         if faults := sensor_faults(system, given, "`-p {}` of vsl_hybrid connects it"):
             raise InvalidParameter(faults)
 
+    def parameter_files(self, parameters: Parameters) -> Mapping[str, Path]:
+        """Return the files of waypoints and of a trained model."""
+        named = {"waypoints": parameters.waypoints}
+        if isinstance(parameters, HybridParameters):
+            named["model"] = parameters.model
+        return {name: Path(file) for name, file in named.items() if file}
+
     def evaluator(self, parameters: Parameters) -> PathEvaluator:
         """Return the evaluator of one run along the path."""
         return PathEvaluator(parameters, hybrid=self.hybrid)

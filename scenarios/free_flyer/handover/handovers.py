@@ -154,6 +154,10 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         x, y, z = (float(n) for n in person["p_WH_0"])
         return LedHand("person", (x, y, z), float(person["arm_reach"]), self.asked)
 
+    def parameter_files(self, parameters: HandoverParameters) -> Mapping[str, Path]:
+        """Return the track that leads the hand."""
+        return {"hand_track": Path(parameters.hand_track)} if parameters.hand_track else {}
+
     def evaluator(self, parameters: HandoverParameters) -> HandoverEvaluator:
         """Return the evaluator of one handover."""
         return HandoverEvaluator(parameters, self.receivers, self.failures)
