@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handover.controllers.vsl.kinematics import VslKinematics
+from handover.plants.vsl.parameters import MAX_ANGLE, MAX_PRESSURE
 from handover.scenarios.vsl.training_data import Dataset, Measured
 
 VERSION = 1
@@ -26,6 +27,17 @@ _COLUMNS: Mapping[str, tuple[str, int]] = {
     "q_cmd": ("q_cmd", 3),
 }
 """By the matrix's parts: the arm's port, of which each entry is a column, in SI units; in the order of eq. (9)."""
+
+_PLAUSIBLE: Mapping[str, tuple[float, float, str]] = {
+    "p": (1e3, 1.2 * MAX_PRESSURE, "Pa (1e5 are a bar)"),
+    "i": (1e-4, 20.0, "A"),
+    "q": (1e-3, MAX_ANGLE, "rad"),
+    "q_cmd": (1e-3, MAX_ANGLE, "rad"),
+}
+"""By the matrix's parts: between what its largest magnitude lies on any arm of this size, and the unit (assumed)."""
+
+_MAX_SAG = 0.25
+"""How far from where rigid links have it the tip is at most in the median, m (assumed: an arm of 0.45 m)."""
 
 _ORDER = "order"
 
@@ -65,8 +77,8 @@ def read_data(path: Path, key: str, kinematics: VslKinematics, parameters: Mappi
         parameters: of the arm, as plain data; None: of any.
 
     Raises:
-        InvalidData: it cannot be read, is no Parquet file, lacks columns, has numbers that are not finite, or is of
-            another arm, other parameters of it, or other links.
+        InvalidData: it cannot be read, is no Parquet file, lacks columns, has numbers that are not finite or, by their
+            size, not in SI units, or is of another arm, other parameters of it, or other links.
     """
     try:
         table: Any = pq.read_table(path)
@@ -84,7 +96,9 @@ def read_data(path: Path, key: str, kinematics: VslKinematics, parameters: Mappi
     parts = {
         part: np.column_stack([numbers[f"{port}[{k + 1}]"] for k in range(n)]) for part, (port, n) in _COLUMNS.items()
     }
-    return Measured(Dataset(**parts), _order(path, numbers[_ORDER]), origin)
+    points, order = Dataset(**parts), _order(path, numbers[_ORDER])
+    _check_units(path, points.rows(order >= 0), kinematics)
+    return Measured(points, order, origin)
 
 
 def _entries(measured: Measured, part: str, port: str) -> list[tuple[str, Any]]:
@@ -136,6 +150,23 @@ def _check_parameters(path: Path, arm: Mapping[str, Any], parameters: Mapping[st
             path,
             f"it was measured on an arm with {differing}: --arm NAME=VALUE says which arm is meant, --adapt learns"
             " what makes it differ",
+        )
+
+
+def _check_units(path: Path, points: Dataset, kinematics: VslKinematics) -> None:
+    """Refuse points that are in other units, as degrees, bar or millimetres: no arm is like that."""
+    if not len(points):
+        return
+    for part, (least, most, unit) in _PLAUSIBLE.items():
+        port, largest = _COLUMNS[part][0], float(np.max(np.abs(getattr(points, part))))
+        if 0.0 < largest < least or largest > most:
+            raise InvalidData(path, f"its {port}, up to {largest:.4g}, cannot be in {unit}; columns are in SI units")
+    off = float(np.median(np.linalg.norm(np.array([kinematics.forward(q) for q in points.q]) - points.p_WG, axis=1)))
+    if off > _MAX_SAG:
+        raise InvalidData(
+            path,
+            f"its p_WG_meas is {off:.3g} m from where rigid links have the tip by q_meas, half of the points more: one "
+            "of them is not in m, rad and the world's frame",
         )
 
 

@@ -31,7 +31,7 @@ from handover.scenarios.vsl.parameters import (
     Parameters,
     Resolution,
 )
-from handover.scenarios.vsl.places import PLACES, sensor_faults
+from handover.scenarios.vsl.places import PLACES, link_count_faults, sensor_faults
 
 _GRACE = 5
 """Time by which the path may be completed late before the run ends, s (assumed)."""
@@ -154,9 +154,9 @@ class PathExperiment(Experiment[PathEvaluator]):
         """Reject sensors that the controller is to look at, and that are not connected.
 
         Raises:
-            InvalidParameter: `kinematics.closed_loop` or `kinematics.imu` is given.
+            InvalidParameter: `kinematics.closed_loop`, `kinematics.imu` or `arm.links` is given.
         """
-        if faults := sensor_faults(system, given, "`-p {}` of vsl_hybrid connects it"):
+        if faults := link_count_faults(given) + sensor_faults(system, given, "`-p {}` of vsl_hybrid connects it"):
             raise InvalidParameter(faults)
 
     def parameter_files(self, parameters: Parameters) -> Mapping[str, Path]:

@@ -22,7 +22,7 @@ from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.vsl.pick_and_place_evaluation import PickAndPlaceEvaluator, PickAndPlaceParameters
-from handover.scenarios.vsl.places import PLACES, sensor_faults
+from handover.scenarios.vsl.places import PLACES, link_count_faults, sensor_faults
 
 _GRACE = 5
 """Time by which the task may end late before the run does, s (assumed)."""
@@ -42,7 +42,14 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
         "arm": "VslArm",
         "gripper": "VacuumGripper",
     }
-    headline: ClassVar[tuple[str, ...]] = ("place_error", "pick_force", "place_force", "carry_error", "pace_arm")
+    headline: ClassVar[tuple[str, ...]] = (
+        "place_error",
+        "dragged",
+        "pick_force",
+        "place_force",
+        "carry_error",
+        "pace_arm",
+    )
     places: ClassVar[Mapping[str, Place]] = {
         "planner": Place(
             required={
@@ -130,9 +137,9 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
         """Reject sensors that the controller is to look at, and that are not connected.
 
         Raises:
-            InvalidParameter: `kinematics.closed_loop` or `kinematics.imu` is given.
+            InvalidParameter: `kinematics.closed_loop`, `kinematics.imu` or `arm.links` is given.
         """
-        if faults := sensor_faults(system, given, "this scenario has no {}, vsl_hybrid has"):
+        if faults := link_count_faults(given) + sensor_faults(system, given, "this scenario has no {}, vsl_hybrid has"):
             raise InvalidParameter(faults)
 
     def stop_time(self, parameters: PickAndPlaceParameters) -> Fraction:

@@ -14,6 +14,9 @@ from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 _TOUCHES = {"pick": (TaskPhase.DESCEND, TaskPhase.GRASP), "place": (TaskPhase.LOWER, TaskPhase.RELEASE)}
 """Parts of the task in which something is touched."""
 
+_ON_THE_WAY = (TaskPhase.CARRY, TaskPhase.SOFTEN, TaskPhase.LOWER)
+"""Parts in which the object is on its way; until the last of them it is to hang above the table."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PickAndPlaceParameters:
@@ -39,7 +42,10 @@ class PickAndPlaceParameters:
     settle: Second = parameter(4.0, "time above the object before it comes down", minimum=0.0, maximum=600.0)
     wait: Second = parameter(1.5, "time for pressures and the cup to follow", minimum=0.0, maximum=60.0)
     tolerance: Metre = parameter(
-        0.01, "how far from its place the object may be for the run to count as a success", minimum=0.0, maximum=1.0
+        0.01,
+        "how far from its place the object may be, and be dragged over the table, for the run to count as a success",
+        minimum=0.0,
+        maximum=1.0,
     )
 
     @property
@@ -64,12 +70,14 @@ class PickAndPlaceEvaluator(Evaluator):
     Attributes:
         force: largest force of the face on the gripper or on what it holds, N, by touch.
         carried_off: largest distance of the tip while it carries from its goal, as the next one is set, m.
+        dragged: length of the way over the table of the object that is held and touches it, on its way to its place, m.
     """
 
     def __init__(self, parameters: PickAndPlaceParameters) -> None:
         self.parameters = parameters
         self.force = dict.fromkeys(_TOUCHES, 0.0)
         self.carried_off = 0.0
+        self.dragged = 0.0
         self._t = 0.0
         self._phase = 0
         self._was_held = self._held = self._done = False
@@ -82,7 +90,10 @@ class PickAndPlaceEvaluator(Evaluator):
         self._t, self._phase = t, int(signals["planner.phase"])
         self._held, self._done = bool(signals["gripper.held"]), bool(signals["planner.done"])
         self._was_held = self._was_held or self._held
-        self._p_WO = np.array(signals["gripper.p_WO"])
+        p_WO = np.array(signals["gripper.p_WO"])
+        if self._held and self._phase in _ON_THE_WAY and signals["arm.f_G"] > 0.0:
+            self.dragged += float(np.hypot(*(p_WO - self._p_WO)[:2]))
+        self._p_WO = p_WO
         for touch, phases in _TOUCHES.items():
             if self._phase in phases:
                 self.force[touch] = max(self.force[touch], float(signals["arm.f_G"]))
@@ -103,15 +114,17 @@ class PickAndPlaceEvaluator(Evaluator):
         return float(np.hypot(*(self._p_WO - self.parameters.place)[:2]))
 
     def outcome(self) -> Outcome:
-        """Return whether the object lies where it is to lie."""
+        """Return whether the object lies where it is to lie, and was not dragged there."""
         put_down = self.over and self._was_held and not self._held
-        success = put_down and self.place_error <= self.parameters.tolerance
+        success = put_down and max(self.place_error, self.dragged) <= self.parameters.tolerance
         return Outcome(success=success, reason=self._reason(put_down), metrics=self._metrics())
 
     def _reason(self, put_down: bool) -> str:
         if put_down:
             forces = f"touched with {self.force['pick']:.2f} N and {self.force['place']:.2f} N"
-            return f"the object lies {1000 * self.place_error:.1f} mm from its place; {forces}"
+            drag = f"; it came down too early and was dragged over {1000 * self.dragged:.0f} mm of the table"
+            too_far = self.dragged > self.parameters.tolerance
+            return f"the object lies {1000 * self.place_error:.1f} mm from its place; {forces}{drag if too_far else ''}"
         if self._done:
             return "the object was never picked up" if not self._was_held else "the object did not come to rest"
         held = "with the object" if self._held else "without the object"
@@ -124,5 +137,8 @@ class PickAndPlaceEvaluator(Evaluator):
             "place_force": Metric(self.force["place"], "N", f"{what} put it down"),
             "place_error": Metric(self.place_error, "m", "horizontal distance of the object from its place at the end"),
             "carry_error": Metric(self.carried_off, "m", "largest distance of the tip from its goal while it carries"),
+            "dragged": Metric(
+                self.dragged, "m", "way of the object over the table while it is held, on the way to its place"
+            ),
             "picked_up": Metric(float(self._was_held), "1", "whether the object was picked up"),
         }

@@ -81,6 +81,13 @@ _SENSORS = {"closed_loop": "p_WG_meas", "imu": "tilt_meas"}
 """By the parameter of the kinematics that makes it look at a sensor, the input at which that is read."""
 
 
+def link_count_faults(given: Sequence[str]) -> list[str]:
+    """Return which of the units' values that were set, by name, the scenario's wiring does not allow."""
+    if "arm.links" not in given:
+        return []
+    return ["arm.links: planner and kinematics are of an arm of two links; more or fewer are for a system of one's own"]
+
+
 def sensor_faults(system: System, given: Sequence[str], remedy: str) -> list[str]:
     """Return which sensors the kinematics are told to look at that nothing is connected to: they would read 0.
 

@@ -168,9 +168,11 @@ def test_the_controllers_beam_bends_as_the_arm_does(theta: tuple[float, float], 
         ("vsl_hybrid", "kinematics.closed_loop=true", "`-p closed_loop=true` of vsl_hybrid connects it"),
         ("vsl_model_based", "kinematics.closed_loop=true", "nothing is connected to kinematics.p_WG_meas"),
         ("vsl_pick_and_place", "kinematics.imu=feedback", "this scenario has no imu=feedback, vsl_hybrid has"),
+        ("vsl_pick_and_place", "arm.links=3", "arm.links: planner and kinematics are of an arm of two links"),
+        ("vsl_hybrid", "arm.links=1", "arm.links: planner and kinematics are of an arm of two links"),
     ],
 )
-def test_a_sensor_that_is_not_connected_is_refused(scenario: str, given: str, text: str, tmp_path: Path):
+def test_what_the_wiring_does_not_have_is_refused(scenario: str, given: str, text: str, tmp_path: Path):
     result = CliRunner().invoke(main, ["run", scenario, "-p", given, "--out", str(tmp_path / "run")])
     assert result.exit_code == 2
     assert text in result.output

@@ -78,6 +78,29 @@ def test_a_tip_that_carries_is_compared_with_the_goal_that_it_was_to_reach():
     assert evaluator.carried_off == pytest.approx(0.001)
 
 
+def test_an_object_that_is_dragged_to_its_place_is_not_placed():
+    parameters = PickAndPlaceParameters()
+    pick, place = np.array(parameters.pick), np.array(parameters.place)
+
+    def verdict(*, force: float) -> Any:
+        evaluator = PickAndPlaceEvaluator(parameters)
+        for k in range(11):
+            p_WO = pick + k / 10 * (place - pick)
+            arm = {"arm.f_G": force, "arm.p_WG": p_WO, "planner.phase": TaskPhase.CARRY, "planner.done": False}
+            seen: Any = {**arm, "planner.p_WG_goal": p_WO, "gripper.held": True, "gripper.p_WO": p_WO}
+            evaluator(0.1 * k, seen)
+        arm = {"arm.f_G": 0.0, "arm.p_WG": place, "planner.phase": TaskPhase.DONE, "planner.done": True}
+        seen = {**arm, "planner.p_WG_goal": place, "gripper.held": False, "gripper.p_WO": place}
+        evaluator(2.0, seen)
+        return evaluator.outcome()
+
+    assert verdict(force=0.0).success
+    dragged = verdict(force=0.5)
+    assert not dragged.success
+    assert dragged.metrics["dragged"].value == pytest.approx(0.06)
+    assert dragged.reason.endswith("it came down too early and was dragged over 60 mm of the table")
+
+
 def test_on_a_table_higher_than_the_shoulder_the_arm_starts_above_it(tmp_path: Path):
     run(VslPickAndPlace, tmp_path / "r", "pick=0.3,0,0.2", "place=0.36,0,0.2", "settle=0.1", "wait=0.1")
     record = Record(tmp_path / "r" / "signals.parquet")
