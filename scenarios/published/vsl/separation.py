@@ -93,7 +93,7 @@ def separation_claim(
             f" Runs of a group differ by the sensors' noise alone; that would separate {n} of each with p = {p} (rank "
             "sums), which says nothing of another arm."
         )
-    if failing := [c.label for c in found if not c.holds]:
+    if failing := [f"{c.label} ({1000 * c.margin:+.2f} mm)" for c in found if not c.holds]:
         reason += f" It fails at: {'; '.join(failing[:_NAMED])}"
         reason += f"; and {len(failing) - _NAMED} more." if len(failing) > _NAMED else "."
     return Claim(

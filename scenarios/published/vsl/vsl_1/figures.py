@@ -17,6 +17,8 @@ _SERVOS = "servos"
 _COLOURS = dict(zip((_SERVOS, RIGID.label, *(links.label for links in SOFT)), (0, 1, 2, 3, 4, 8), strict=True))
 """As in the paper: servos blue, rigid links red, then green, purple, yellow, and brown for its orange."""
 
+DESIRED_COLOUR = "#4d5866"
+
 Curves = Mapping[str, Repetitions]
 """What a panel of fig. 5 shows: the servos' path, and that of the tip on each kind of links."""
 
@@ -46,19 +48,34 @@ def _paths(runs: Vsl1Runs, panels: Mapping[tuple[TipPath, float], Curves], folde
     columns = len(runs.loads)
     with figure(folder / "paths", len(PATHS), columns, size=(1.2 + 2.3 * columns, 9.0)) as grid:
         for axes, ((path, load), curves) in zip(grid, panels.items(), strict=True):
+            if curves:
+                draw_desired(axes, next(iter(curves.values())).desired)
             for name, curve in curves.items():
                 draw_path(axes, curve, COLOURS[_COLOURS[name]], name)
             _name(axes, path, load, first=load == runs.loads[0])
             axes.set_aspect("equal", adjustable="datalim")
         _label(grid, columns, "x in W (mm)", "z in W (mm)")
         legend_below(grid[0])
-    deviation = max(float(np.max(c.deviation)) for curves in panels.values() for c in curves.values())
+    drawn = [curve for curves in panels.values() for curve in curves.values()]
+    each = "each of one run"
+    if _are_repeated(panels):
+        widest = 1000 * max(float(np.max(curve.deviation)) for curve in drawn)
+        each = f"each the mean of its runs with a band of their standard deviation, which is at most {widest:.2g} mm"
     caption = (
         "Paths like [Gandarias2020] fig. 5, by load: where encoders and rigid links put the tip of the rigid arm "
-        "(servos), and the tip by the tracker on rigid links and on soft ones by pressure, each the mean of its runs "
-        f"with a band of their standard deviation, which is at most {1000 * deviation:.1f} mm. Equal scales."
+        f"(servos), and the tip by the tracker on rigid links and on soft ones by pressure, {each}. Equal scales."
     )
     return Figure("paths", caption)
+
+
+def _are_repeated(panels: Mapping[tuple[TipPath, float], Curves]) -> bool:
+    """Return whether something was run more than once."""
+    return any(len(curve.errors) > 1 for curves in panels.values() for curve in curves.values())
+
+
+def draw_desired(axes: Axes, points: Floats) -> None:
+    """Draw the desired path, shape (n, 3), m, under the others."""
+    axes.plot(1000 * points[:, 0], 1000 * points[:, 2], color=DESIRED_COLOUR, lw=3.0, alpha=0.3, label="desired")
 
 
 def draw_path(axes: Axes, curve: Repetitions, colour: str, name: str) -> None:
@@ -89,10 +106,10 @@ def _along(runs: Vsl1Runs, panels: Mapping[tuple[TipPath, float], Curves], folde
             axes.set_ylim(0.0, 1050 * highest)
         _label(grid, columns, "along the path (mm)", "error (mm)")
         legend_below(grid[0])
+    means = "; means of the runs, with bands of their standard deviation" if _are_repeated(panels) else ""
     caption = (
         "Distance from the desired point along the path, by load: of the place where encoders and rigid links put the "
-        "tip of the rigid arm (servos), and of the tip by the tracker; means of the runs, with bands of their standard "
-        "deviation."
+        f"tip of the rigid arm (servos), and of the tip by the tracker{means}."
     )
     return Figure("errors_along", caption)
 

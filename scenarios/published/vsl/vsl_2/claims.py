@@ -95,7 +95,8 @@ def _stiffer(runs: Vsl2Runs) -> list[Claim]:
 
 def _other_arms(runs: Vsl2Runs) -> list[Claim]:
     """Judge each method that was taught on arms that it was not taught on."""
-    on = f"On each of the {len(runs.arms)} arms tried from which nothing was learned the tip errs less by"
+    arms = f"each of the {len(runs.arms)} arms" if len(runs.arms) > 1 else "the one arm"
+    on = f"On {arms} tried from which nothing was learned the tip errs less by"
     claims: list[Claim] = []
     pairs = [(case, arm) for case in CASES for arm in runs.arms]
     for method in runs.learned if pairs else ():

@@ -12,12 +12,11 @@ from handover.cosim.blocks.ports import Floats
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
 from handover.scenarios.published.vsl.path_traces import PathTrace, Repetitions, traces_of
-from handover.scenarios.published.vsl.vsl_1.figures import draw_path
+from handover.scenarios.published.vsl.vsl_1.figures import DESIRED_COLOUR, draw_desired, draw_path
 from handover.scenarios.published.vsl.vsl_2.runs import CASES, MODEL_BASED, TRAINED, Case, ControlMethod, Vsl2Runs
 from handover.scenarios.vsl.plots import draw_box
 
 _BLUE, _RED, _GREEN, _PURPLE = COLOURS[:4]
-_DESIRED = "#4d5866"
 _STROKES: tuple[Any, ...] = ("-", "--", ":", "-.")
 
 
@@ -41,7 +40,7 @@ def draw_figures(runs: Vsl2Runs, folders: Path, folder: Path) -> list[Figure]:
 def _estimates(traces: Mapping[Case, Sequence[PathTrace]], folder: Path) -> Figure:
     with figure(folder / "estimates", 1, len(CASES), size=(9.0, 4.2)) as panels:
         for axes, (case, runs) in zip(panels, traces.items(), strict=True):
-            _draw_desired(axes, runs[0])
+            draw_desired(axes, runs[0].desired)
             draw_path(axes, Repetitions.of(runs, "servo"), _GREEN, "tip by rigid kinematics")
             draw_path(axes, Repetitions.of(runs, "estimated"), _PURPLE, "tip by the hybrid forward model")
             draw_path(axes, Repetitions.of(runs, "tracked"), _BLUE, "tip by the tracker")
@@ -60,7 +59,7 @@ def _compensated(
     with figure(folder / "compensated", 1, len(CASES), size=(9.0, 4.2)) as panels:
         for axes, case in zip(panels, CASES, strict=True):
             plain, hybrid = (traces[case, method][0] for method in (MODEL_BASED, runs.hybrid))
-            _draw_desired(axes, plain)
+            draw_desired(axes, plain.desired)
             axes.plot(*_in_plane(plain.tracked), color=_GREEN, lw=1.1, label="tip, by rigid kinematics")
             axes.plot(*_in_plane(hybrid.tracked), color=_RED, lw=1.1, label=f"tip, by {runs.hybrid.label}")
             axes.plot(*_in_plane(hybrid.commanded), color=_RED, lw=1.1, ls="--", label="compensated command")
@@ -72,10 +71,6 @@ def _compensated(
         "arm. Equal scales."
     )
     return Figure("compensated", caption)
-
-
-def _draw_desired(axes: Axes, trace: PathTrace) -> None:
-    axes.plot(*_in_plane(trace.desired), color=_DESIRED, lw=3.0, alpha=0.3, label="desired")
 
 
 def _in_plane(positions: Floats) -> tuple[Floats, Floats]:
@@ -157,8 +152,8 @@ def _by_arm(runs: Vsl2Runs, folder: Path) -> Figure:
             _logarithmic(axes, (1.0, 2.0, 5.0, 10.0, 20.0, 50.0))
             axes.grid(visible=False, axis="x")
         panels[0].set_ylabel("mean error of the tip (mm)")
-        panels[0].plot([], [], "o", ms=4, color=_DESIRED, label="the arm that was learned from, each run")
-        panels[0].plot([], [], "o", ms=5, mfc="none", mec=_DESIRED, label="another arm, mean of its runs")
+        panels[0].plot([], [], "o", ms=4, color=DESIRED_COLOUR, label="the arm that was learned from, each run")
+        panels[0].plot([], [], "o", ms=5, mfc="none", mec=DESIRED_COLOUR, label="another arm, mean of its runs")
         legend_below(panels[0])
     caption = "Mean errors of the tip along the curve on the arm that was learned from and on others, by method."
     return Figure("other_arms", caption)
