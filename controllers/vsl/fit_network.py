@@ -93,7 +93,7 @@ def fit_published(points: Points, seed: int, epochs: int, progress: Callable[[fl
     z, y, z_validation = (torch.tensor(a, dtype=torch.float32) for a in (frame.z, frame.y, frame.z_validation))
     y_validation = torch.tensor(frame.y_validation, dtype=torch.float32)
     module = published_module(torch, first)
-    optimizer = torch.optim.Adam(module.parameters(), lr=RATE)
+    optimizer = torch.optim.Adam(module.parameters(), lr=RATE, fused=True)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, epochs)
     best, kept, best_epoch = math.inf, [np.array(w) for w in first], 0
     for epoch in range(epochs):
