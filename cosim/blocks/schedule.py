@@ -50,8 +50,8 @@ class Schedule:
             if not colon or len(value) not in sizes:
                 form = "TIME:VALUE" if sizes == (1,) else "TIME:VALUE or TIME:VALUE,VALUE"
                 raise InvalidSchedule(f"{entry!r} is not of the form {form}, with a space between two such entries")
-            if not (times[-1] if times else 0.0) <= t < math.inf:
-                raise InvalidSchedule(f"{entry!r}: times ascend from 0 s")
+            if not 0.0 <= t < math.inf or (times and t <= times[-1]):
+                raise InvalidSchedule(f"{entry!r}: times ascend from 0 s, each later than the one before")
             if not all(minimum <= number <= maximum for number in value):
                 raise InvalidSchedule(f"{entry!r}: values are from {minimum:g} to {maximum:g}")
             times.append(t)

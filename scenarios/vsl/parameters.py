@@ -1,7 +1,6 @@
 """Parameters of the paths of the arm with variable-stiffness links; origins of the defaults are in `paper.toml`."""
 
 import enum
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -175,21 +174,19 @@ class Parameters:
             ("pressure_steps", lambda: Schedule.parse(self.pressure_steps, (1, 2), 0.0, MAX_PRESSURE)),
         ):
             try:
-                faults += self._schedule_faults(name, parse())
+                faults += self._late(name, parse())
             except InvalidSchedule as e:
                 faults.append(f"{name}: {e.fault}")
         return faults
 
-    def _schedule_faults(self, name: str, schedule: Schedule) -> list[str]:
-        """Return which steps are without effect: two at once, or after the path."""
-        twice = [t for t, later in itertools.pairwise(schedule.times) if t == later]
-        faults = [f"{name}: two values from {t:g} s on; one is right" for t in dict.fromkeys(twice)]
+    def _late(self, name: str, schedule: Schedule) -> list[str]:
+        """Return which steps are without effect, as the path has ended by then."""
         try:
             end = self.settle + self.length / self.speed
         except InvalidWaypoints:
-            return faults  # told elsewhere
+            return []  # told elsewhere
         late = [t for t in schedule.times if t >= end]
-        return faults + [f"{name}: nothing changes from {t:g} s on: the path ends at {end:.1f} s" for t in late]
+        return [f"{name}: nothing changes from {t:g} s on: the path ends at {end:.1f} s" for t in late]
 
     @property
     def q_0(self) -> Floats:

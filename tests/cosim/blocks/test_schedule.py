@@ -4,7 +4,7 @@ from handover.cosim.blocks.schedule import InvalidSchedule, Schedule
 
 
 def test_a_value_holds_from_its_time_on():
-    schedule = Schedule.parse("1.5:0.05  3:0 3:0.1", (1,), 0.0, 1.0)
+    schedule = Schedule.parse("1.5:0.05  3:0.1", (1,), 0.0, 1.0)
     assert [schedule.at(t) for t in (0.0, 1.499, 1.5, 2.99, 3.0, 1e6)] == [None, None, (0.05,), (0.05,), (0.1,), (0.1,)]
 
 
@@ -27,6 +27,7 @@ def test_values_may_be_several_numbers_and_a_text_empty():
         ("a:1", "'a:1' is not of the form"),
         ("1:", "'1:' is not of the form"),
         ("2:0.1 1:0.2", "'1:0.2': times ascend from 0 s"),
+        ("2:0.1 2:0.2", "'2:0.2': times ascend from 0 s, each later than the one before"),
         ("-1:0.1", "times ascend"),
         ("nan:0.1", "times ascend"),
         ("inf:0.1", "times ascend"),
