@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.catalog import ScenarioSource, named_scenario
-from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.results.run_folder import hashes_of_files, sha256_of, versions
 
 _KINDS = {
@@ -50,7 +50,8 @@ def _parameter_files(plan: CampaignPlan) -> dict[str, str]:
     experiment = named_scenario(plan.scenario)()
     files: dict[str, str] = {}
     for point in range(len(plan.points)):
-        found = hashes_of_files(experiment.parameter_files(parse_parameters(type(experiment), plan.texts(point))))
+        parameters, _ = split_parameters(type(experiment), plan.texts(point))
+        found = hashes_of_files(experiment.parameter_files(parameters))
         files |= {entry["file"]: entry["sha256"] for entry in found.values()}
     return files
 

@@ -78,7 +78,10 @@ def test_different_files_of_one_name_have_copies_of_their_own(tmp_path: Path, fm
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"scenario": "flyer_impedance"}, "scenario is ir_grasp there, flyer_impedance in this command"),
+        (
+            {"scenario": "flyer_impedance", "fixed": {}, "points": [{}]},
+            "scenario is ir_grasp there, flyer_impedance in this command",
+        ),
         ({"points": [{"forward": "0.03"}]}, "forward is 0.03,0.1 there, 0.03 in this command"),
         ({"points": [{"standoff": "0.1"}] * 2}, "standoff is not given there, 0.1 in this command"),
         ({"fixed": {"thing": "paper_box_a"}}, "thing is cylinder there, paper_box_a in this command"),
@@ -108,8 +111,8 @@ def test_points_of_the_same_values_that_are_combined_otherwise(tmp_path: Path, f
         return replace(PLAN, points=[{"forward": forward, "standoff": standoff} for forward, standoff in pairs])
 
     folder = CampaignFolder(tmp_path / "c")
-    begin(folder, plan(("1", "2"), ("3", "4")), fmus)
-    assert "to 2 points there" in refusal(folder, plan(("1", "2"), ("3", "4"), ("1", "4")), fmus)
+    begin(folder, plan(("0.01", "0.02"), ("0.03", "0.04")), fmus)
+    assert "to 2 points there" in refusal(folder, plan(("0.01", "0.02"), ("0.03", "0.04"), ("0.01", "0.04")), fmus)
 
 
 def test_another_fmu_and_another_version_are_refused(folder: CampaignFolder, fmus: dict[str, Path]):

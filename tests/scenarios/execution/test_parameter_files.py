@@ -50,7 +50,8 @@ def test_a_run_that_names_no_file_keeps_none():
 
 def test_a_campaign_is_another_with_another_file():
     way = write(Path("way.csv"), ROWS)
-    sweep = ("sweep", "vsl_model_based", "load=0,0.05", "-p", f"waypoints={way}", *SHORT, "--out", "campaign")
+    given = ("-p", "arm.cap=0.02", "-p", f"waypoints={way}", *SHORT)
+    sweep = ("sweep", "vsl_model_based", "load=0,0.05", *given, "--out", "campaign")
     first = call(*sweep)
     assert first.exit_code == 0, first.output
     assert call(*sweep).exit_code == 0
