@@ -72,7 +72,10 @@ def _rows(file: Path) -> list[tuple[int, dict[str, str]]]:
         raise InvalidWaypoints(file, [f"it is no CSV file: {e}"]) from e
     if not set(_TO) <= set(columns) <= {*_TO, *_VIA} or len(set(columns)) < len(columns):
         found = ", ".join(columns) or "none"
-        raise InvalidWaypoints(file, [f"its columns are {found}; they must be x, y, z and may be {', '.join(_VIA)}"])
+        raise InvalidWaypoints(
+            file,
+            [f"its first line, by commas, has the columns {found}; they must be x, y, z and may be {', '.join(_VIA)}"],
+        )
     if not 2 <= len(rows) <= _MOST:
         raise InvalidWaypoints(file, [f"it has {len(rows)} waypoints; a path has from 2 to {_MOST}"])
     faults = [

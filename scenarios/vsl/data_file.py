@@ -29,14 +29,14 @@ _COLUMNS: Mapping[str, tuple[str, int]] = {
 """By the matrix's parts: the arm's port, of which each entry is a column, in SI units; in the order of eq. (9)."""
 
 _PLAUSIBLE: Mapping[str, tuple[float, float, str]] = {
-    "p": (1e3, 1.2 * MAX_PRESSURE, "Pa (1e5 are a bar)"),
+    "p": (1e3, 1.02 * MAX_PRESSURE, "Pa above the air outside (1e5 are a bar)"),
     "i": (1e-4, 20.0, "A"),
     "q": (1e-3, MAX_ANGLE, "rad"),
     "q_cmd": (1e-3, MAX_ANGLE, "rad"),
 }
 """By the matrix's parts: between what its largest magnitude lies on any arm of this size, and the unit (assumed)."""
 
-_MAX_SAG = 0.25
+_MAX_SAG = 0.12
 """How far from where rigid links have it the tip is at most in the median, m (assumed: an arm of 0.45 m)."""
 
 _ORDER = "order"
@@ -165,8 +165,8 @@ def _check_units(path: Path, points: Dataset, kinematics: VslKinematics) -> None
     if off > _MAX_SAG:
         raise InvalidData(
             path,
-            f"its p_WG_meas is {off:.3g} m from where rigid links have the tip by q_meas, half of the points more: one "
-            "of them is not in m, rad and the world's frame",
+            f"its p_WG_meas is {off:.3g} m from where rigid links have the tip by q_meas, in the median: one of them "
+            "is not in m, rad and the world's frame, or they are not of the same points",
         )
 
 

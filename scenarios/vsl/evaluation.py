@@ -85,6 +85,9 @@ def distance_to_path(p: Floats, path: Floats) -> float:
     return float(np.min(np.linalg.norm(start + share[:, None] * along - p, axis=1)))
 
 
+_MUCH = 0.1
+"""Share of points at which a model had to extrapolate from which on the verdict says so (assumed)."""
+
 _REACH_SPAN = 0.01
 """Paths that reach equally far throughout, to this many metres, have no near and far part (assumed)."""
 
@@ -139,10 +142,12 @@ class PathEvaluator(Evaluator):
         return self.completed is not None
 
     def outcome(self) -> Outcome:
-        """Return whether the path was completed within the tolerance, and the errors along it."""
+        """Return whether the path was completed within the tolerance and above the ground, and the errors along it."""
         metrics = {**(self._metrics() if self.points else {}), **arm_of(self.parameters).metrics}
         within = "mean_error" in metrics and metrics["mean_error"].value <= self.parameters.tolerance
-        return Outcome(success=self.over and within, reason=self._reason(metrics), metrics=metrics)
+        return Outcome(
+            success=self.over and within and self._lowest >= 0.0, reason=self._reason(metrics), metrics=metrics
+        )
 
     def _reason(self, metrics: dict[str, Metric]) -> str:
         if self.completed is None:
@@ -154,9 +159,12 @@ class PathEvaluator(Evaluator):
             return f"the path was completed at {self.completed:.1f} s without a point on it"
         error, tolerance = metrics["mean_error"].value, self.parameters.tolerance
         verdict = "within" if error <= tolerance else "above"
+        digits = 1 if f"{1000 * error:.1f}" != f"{1000 * tolerance:.1f}" else 3
+        share = metrics["outside"].value if "outside" in metrics else 0.0
+        beyond = f"; the model had to extrapolate at {100 * share:.0f} % of the points" if share >= _MUCH else ""
         return (
-            f"the path was completed at {self.completed:.1f} s; mean error of the tip {error * 1000:.1f} mm, "
-            f"{verdict} the tolerance of {tolerance * 1000:.1f} mm{self._dip}"
+            f"the path was completed at {self.completed:.1f} s; mean error of the tip {1000 * error:.{digits}f} mm, "
+            f"{verdict} the tolerance of {1000 * tolerance:.{digits}f} mm{beyond}{self._dip}"
         )
 
     @property

@@ -31,7 +31,7 @@ from handover.scenarios.vsl.parameters import (
     Parameters,
     Resolution,
 )
-from handover.scenarios.vsl.places import PLACES, link_count_faults, sensor_faults
+from handover.scenarios.vsl.places import PLACES, fixed_value_faults, sensor_faults
 
 _GRACE = 5
 """Time by which the path may be completed late before the run ends, s (assumed)."""
@@ -156,7 +156,7 @@ class PathExperiment(Experiment[PathEvaluator]):
         Raises:
             InvalidParameter: `kinematics.closed_loop`, `kinematics.imu` or `arm.links` is given.
         """
-        if faults := link_count_faults(given) + sensor_faults(system, given, "`-p {}` of vsl_hybrid connects it"):
+        if faults := fixed_value_faults(given) + sensor_faults(system, given, "`-p {}` of vsl_hybrid connects it"):
             raise InvalidParameter(faults)
 
     def parameter_files(self, parameters: Parameters) -> Mapping[str, Path]:

@@ -22,10 +22,17 @@ from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.vsl.pick_and_place_evaluation import PickAndPlaceEvaluator, PickAndPlaceParameters
-from handover.scenarios.vsl.places import PLACES, link_count_faults, sensor_faults
+from handover.scenarios.vsl.places import LINKS, PLACES, fixed_value_faults, sensor_faults
 
 _GRACE = 5
 """Time by which the task may end late before the run does, s (assumed)."""
+_FIXED = {
+    **LINKS,
+    "arm.face": "the table is as high as the top of the object, pick",
+    "gripper.landing": "the object lands on the table, as high as pick and place",
+}
+"""The units' values that are fixed, and why."""
+
 _SUBSTEP = 0.002
 """Longest internal time step of the arm, s: a contact is shorter than a swing."""
 
@@ -137,9 +144,10 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
         """Reject sensors that the controller is to look at, and that are not connected.
 
         Raises:
-            InvalidParameter: `kinematics.closed_loop`, `kinematics.imu` or `arm.links` is given.
+            InvalidParameter: `kinematics.closed_loop`, `kinematics.imu` or a value that is fixed here is given.
         """
-        if faults := link_count_faults(given) + sensor_faults(system, given, "this scenario has no {}, vsl_hybrid has"):
+        faults = fixed_value_faults(given, _FIXED)
+        if faults := faults + sensor_faults(system, given, "this scenario has no {}, vsl_hybrid has"):
             raise InvalidParameter(faults)
 
     def stop_time(self, parameters: PickAndPlaceParameters) -> Fraction:

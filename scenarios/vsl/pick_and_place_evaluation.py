@@ -14,6 +14,9 @@ from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 _TOUCHES = {"pick": (TaskPhase.DESCEND, TaskPhase.GRASP), "place": (TaskPhase.LOWER, TaskPhase.RELEASE)}
 """Parts of the task in which something is touched."""
 
+_LIES = 0.01
+"""How far from the height of the place an object is at most that lies there, m (assumed: deeper than it is pressed)."""
+
 _ON_THE_WAY = (TaskPhase.CARRY, TaskPhase.SOFTEN, TaskPhase.LOWER)
 """Parts in which the object is on its way; until the last of them it is to hang above the table."""
 
@@ -57,6 +60,8 @@ class PickAndPlaceParameters:
 
     def faults(self) -> list[str]:
         """Return what contradicts itself: one face carries the object at both places, and they differ."""
+        if self.pick[2] < 0.0:
+            return [f"pick: its height, {self.pick[2]:g} m, is below the ground, z = 0 in W"]
         if self.pick[2] != self.place[2]:
             return [f"place: its height, {self.place[2]:g} m, must be that of pick, {self.pick[2]:g} m"]
         if np.array_equal(self.pick, self.place):
@@ -106,7 +111,7 @@ class PickAndPlaceEvaluator(Evaluator):
     @property
     def over(self) -> bool:
         """Whether the task has ended and the object lies."""
-        return self._done and abs(float(self._p_WO[2] - self.parameters.place[2])) < self.parameters.tolerance
+        return self._done and abs(float(self._p_WO[2] - self.parameters.place[2])) < _LIES
 
     @property
     def place_error(self) -> float:
@@ -122,9 +127,11 @@ class PickAndPlaceEvaluator(Evaluator):
     def _reason(self, put_down: bool) -> str:
         if put_down:
             forces = f"touched with {self.force['pick']:.2f} N and {self.force['place']:.2f} N"
-            drag = f"; it came down too early and was dragged over {1000 * self.dragged:.0f} mm of the table"
-            too_far = self.dragged > self.parameters.tolerance
-            return f"the object lies {1000 * self.place_error:.1f} mm from its place; {forces}{drag if too_far else ''}"
+            tolerance, off, dragged = self.parameters.tolerance, self.place_error, self.dragged
+            above = f", above the tolerance of {1000 * tolerance:.3g} mm"
+            reason = f"the object lies {1000 * off:.1f} mm from its place{above if off > tolerance else ''}; {forces}"
+            drag = f"; it came down too early and was dragged over {1000 * dragged:.0f} mm of the table{above}"
+            return f"{reason}{drag if dragged > tolerance else ''}"
         if self._done:
             return "the object was never picked up" if not self._was_held else "the object did not come to rest"
         held = "with the object" if self._held else "without the object"

@@ -1,6 +1,6 @@
 """What a unit needs to take a place in the scenarios of the arm with links of variable stiffness."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from handover.controllers.vsl.hybrid_kinematics import Imu
 from handover.cosim.system.system import System
@@ -81,11 +81,13 @@ _SENSORS = {"closed_loop": "p_WG_meas", "imu": "tilt_meas"}
 """By the parameter of the kinematics that makes it look at a sensor, the input at which that is read."""
 
 
-def link_count_faults(given: Sequence[str]) -> list[str]:
-    """Return which of the units' values that were set, by name, the scenario's wiring does not allow."""
-    if "arm.links" not in given:
-        return []
-    return ["arm.links: planner and kinematics are of an arm of two links; more or fewer are for a system of one's own"]
+LINKS = {"arm.links": "planner and kinematics are of an arm of two links; more or fewer are for a system of one's own"}
+"""What is fixed in all scenarios of the arm, by the unit's value, and why."""
+
+
+def fixed_value_faults(given: Sequence[str], fixed: Mapping[str, str] = LINKS) -> list[str]:
+    """Return which of the units' values that were set, by name, are fixed in a scenario, by `fixed`, and why."""
+    return [f"{name}: {why}" for name, why in fixed.items() if name in given]
 
 
 def sensor_faults(system: System, given: Sequence[str], remedy: str) -> list[str]:

@@ -40,6 +40,13 @@ _PATH = click.Path(path_type=Path)
 _MIN_ADAPTATION = 20
 """Number of points below which the eleven weights of an adaptation are not worth fitting (assumed)."""
 
+_NOT_OF_THE_ARM = {
+    "links": "kinematics are learned of an arm of two links",
+    "load_steps": "loads are those of the points, which are drawn; they would have no effect",
+    "motion": "each point is measured when the arm has settled, which an arm in equilibrium does at once",
+}
+"""Parameters of `VslArm` that do not make an arm that differs, by name, and why not."""
+
 _ELBOW = click.Choice([e.name.lower() for e in Elbow], case_sensitive=False)
 _LEARNED = click.Choice([e.name.lower() for e in Learned], case_sensitive=False)
 _FORWARD = click.Choice([e.value for e in ForwardInput], case_sensitive=False)
@@ -295,6 +302,8 @@ def _arm_values(fmu: Path, given: Sequence[str]) -> dict[str, Any]:
         name, equals, value = text.partition("=")
         if not equals:
             raise UsageError(f"--arm {text!r} is not of the form NAME=VALUE")
+        if name in _NOT_OF_THE_ARM:
+            raise UsageError(f"--arm {text}: {_NOT_OF_THE_ARM[name]}")
         if name not in parameters:
             raise UsageError(f"--arm {text}: the arm has no parameter {name!r}; {nearest(name, parameters)}")
         port = parameters[name]

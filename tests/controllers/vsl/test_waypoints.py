@@ -54,9 +54,9 @@ def test_an_arc_runs_at_its_speed_on_its_circle_through_the_third_point(sweep: f
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("x,y\n0.3,0\n", "its columns are x, y; they must be x, y, z and may be via_x, via_y, via_z"),
-        ("x,y,z,x\n0.3,0,0,0\n", "its columns are x, y, z, x;"),
-        ("", "its columns are none"),
+        ("x,y\n0.3,0\n", "by commas, has the columns x, y; they must be x, y, z and may be via_x, via_y, via_z"),
+        ("x,y,z,x\n0.3,0,0,0\n", "has the columns x, y, z, x;"),
+        ("", "has the columns none"),
         ("x,y,z\n0.3,0,0.1\n", "it has 1 waypoints; a path has from 2 to 1000"),
         ("x,y,z\n0.3,0,0.1\n0.3,0\n", "line 3 has 2 values, and there are 3 columns"),
         ("x,y,z\n0.3,0,0.1\n0.3,nan,0.2\n0.3,a,0.2\n", r"waypoint 2 \(line 3\): x, y and.*; waypoint 3 \(line 4\)"),

@@ -169,6 +169,7 @@ def test_the_controllers_beam_bends_as_the_arm_does(theta: tuple[float, float], 
         ("vsl_model_based", "kinematics.closed_loop=true", "nothing is connected to kinematics.p_WG_meas"),
         ("vsl_pick_and_place", "kinematics.imu=feedback", "this scenario has no imu=feedback, vsl_hybrid has"),
         ("vsl_pick_and_place", "arm.links=3", "arm.links: planner and kinematics are of an arm of two links"),
+        ("vsl_pick_and_place", "arm.face=-10", "arm.face: the table is as high as the top of the object, pick"),
         ("vsl_hybrid", "arm.links=1", "arm.links: planner and kinematics are of an arm of two links"),
     ],
 )

@@ -122,11 +122,18 @@ def test_links_below_the_ground_are_reported():
     above = follow(PathEvaluator(Parameters(), hybrid=False), *path(0.01, 0.02)).outcome()
     assert above.metrics["lowest"].value == pytest.approx(0.04)
     assert "ground" not in above.reason
+    assert above.success
     below = follow(
         PathEvaluator(Parameters(), hybrid=False), signals(0.3, segment=0, lowest=-0.0421), *path(0.01, 0.02)
     )
     assert below.outcome().metrics["lowest"].value == pytest.approx(-0.0421)
     assert below.outcome().reason.endswith("the links dipped 42.1 mm below it")
+    assert not below.outcome().success
+
+
+def test_errors_that_round_to_the_tolerance_are_told_with_more_digits():
+    reason = follow(PathEvaluator(HybridParameters(), hybrid=True), *path(0.005, 0.00508)).outcome().reason
+    assert "mean error of the tip 5.040 mm, above the tolerance of 5.000 mm" in reason
 
 
 def test_the_hybrid_reports_its_forward_model_and_of_extrapolation():

@@ -34,6 +34,7 @@ def test_defaults_have_their_origins_and_the_planner_those_of_the_scenario():
     ("given", "fault"),
     [
         ({"place": np.array([0.36, 0.0, 0.1])}, "its height, 0.1 m, must be that of pick, 0.06 m"),
+        ({"pick": np.array([0.3, 0.0, -0.05])}, "pick: its height, -0.05 m, is below the ground"),
         ({"place": PickAndPlaceParameters().pick}, "it must be another than pick"),
         ({"pick": np.array([0.9, 0.0, 0.06])}, "pick: above it the arm is to start, and .*out of reach"),
     ],
@@ -98,7 +99,9 @@ def test_an_object_that_is_dragged_to_its_place_is_not_placed():
     dragged = verdict(force=0.5)
     assert not dragged.success
     assert dragged.metrics["dragged"].value == pytest.approx(0.06)
-    assert dragged.reason.endswith("it came down too early and was dragged over 60 mm of the table")
+    assert dragged.reason.endswith(
+        "it came down too early and was dragged over 60 mm of the table, above the tolerance of 10 mm"
+    )
 
 
 def test_on_a_table_higher_than_the_shoulder_the_arm_starts_above_it(tmp_path: Path):

@@ -120,6 +120,8 @@ def test_without_pytorch_the_published_network_is_refused(tmp_path: Path, monkey
         (["--arm", "EI_factor=1.2,x,1"], "is not 3 numbers with commas between"),
         (["--arm", "EI_0"], "is not of the form NAME=VALUE"),
         (["--arm", "EI=1"], "the arm has no parameter 'EI'"),
+        (["--arm", "links=3"], "--arm links=3: kinematics are learned of an arm of two links"),
+        (["--arm", "load_steps=8:0.1"], "--arm load_steps=8:0.1: loads are those of the points"),
         (["--arm", "EI_0=x"], "'x' is not a number"),
         (["--arm", "EI_0=-1"], "--arm EI_0=-1"),
         (["--save-data", "d.csv"], "ends in .parquet"),

@@ -49,6 +49,16 @@ def scaled(name: str, factor: float) -> Callable[[Any], Any]:
     return change
 
 
+def shuffled(name: str) -> Callable[[Any], Any]:
+    def change(table: Any) -> Any:
+        rows = np.random.default_rng(0).permutation(100)
+        for k in range(1, 4):
+            table = with_column(f"{name}[{k}]", np.asarray(table[f"{name}[{k}]"])[rows])(table)
+        return table
+
+    return change
+
+
 def without(name: str) -> Callable[[Any], Any]:
     return lambda table: table.drop_columns([name])
 
@@ -83,10 +93,12 @@ def about(**origin: Any) -> Callable[[Any], Any]:
         (with_column("order", [0] * 100), "order must count the usable rows from 0"),
         (about(arm={"key": "other"}), "measured on another arm: the hash of its sources is other, not k"),
         (about(links={"L_1": 0.15, "L_2": 0.2, "L_3": 0.2, "elbow": "UP"}), "with links of L_1 0.15, L_2 0.2"),
-        (scaled("p_meas", 1e-5), r"its p_meas, up to 1\.\d+, cannot be in Pa \(1e5 are a bar\)"),
+        (scaled("p_meas", 1e-5), r"its p_meas, up to 1\.\d+, cannot be in Pa above the air outside"),
         (scaled("i_meas", 1e3), "its i_meas, up to 99.*, cannot be in A"),
         (scaled("q_meas", 180.0 / np.pi), r"its q_meas, up to 9.\..*, cannot be in rad"),
         (scaled("q_cmd", 180.0 / np.pi), r"its q_cmd, up to 9.\..*, cannot be in rad"),
+        (with_column("p_meas[1]", [3.2e5] * 100), r"its p_meas, up to 3.*e\+05, cannot be in Pa above"),
+        (shuffled("p_WG_meas"), "its p_WG_meas is .*, or they are not of the same points"),
         (scaled("p_WG_meas", 1e3), "its p_WG_meas is .* m from where rigid links have the tip by q_meas"),
         (about(version=9), "is not of version 1"),
         (about(seed="x"), "has a seed or walk of a wrong kind"),
