@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.blocks.description import describe, with_start_values
-from handover.cosim.check import related_files as manifest_format
 from handover.cosim.exceptions import InvalidFmu
+from handover.cosim.experiments import manifest as manifest_format
 from handover.cosim.fmu.file import archive as archive_format
 from handover.cosim.fmu.file.archive import TERMINALS, FmuArchive, write_archive
 from handover.fmus import interpreter

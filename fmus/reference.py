@@ -1,7 +1,7 @@
 """Writes the files of FMI-LS-REF into an FMU: manifest, parameter sets, a reference experiment, and a text on them.
 
 The manifest lists by roles what the FMU has anyway, its block's source and its documentation, and what is made here.
-The experiment and its result are in CSV, as `handover.cosim.check.signal_table` has them.
+The experiment and its result are in CSV, as `handover.cosim.experiments.signal_table` has them.
 """
 
 import dataclasses
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from handover.cosim.blocks.start_values import fault_of
 from handover.cosim.blocks.variable import Declared, Kind, Variable
-from handover.cosim.check.related_files import DESCRIPTION, FOLDER, MANIFEST, NAMESPACE, ROOT, STANDARD, VERSION
+from handover.cosim.experiments.manifest import DESCRIPTION, FOLDER, MANIFEST, NAMESPACE, ROOT, STANDARD, VERSION
 from handover.cosim.fmu.file.description import FmuPort
 from handover.fmus.layout import Form, Layout
 from handover.fmus.model_description import Model, to_xml

@@ -24,15 +24,14 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.check.experiment_run import (
+from handover.cosim.experiments.experiment_run import (
     communication_points,
     result_columns,
     run_experiment,
     stimulus_columns,
 )
-from handover.cosim.check.finding import Finding, Level
-from handover.cosim.check.reference_experiment import ABSOLUTE, Difference, Setup, differences
-from handover.cosim.check.signal_table import (
+from handover.cosim.experiments.reference_experiment import ABSOLUTE, Difference, Setup, differences
+from handover.cosim.experiments.signal_table import (
     Column,
     InvalidTable,
     SignalTable,
@@ -45,6 +44,7 @@ from handover.cosim.check.signal_table import (
 from handover.cosim.fmu.file.archive import FmuArchive
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.fmu.start_values import entries_of
+from handover.cosim.probe.finding import Finding, Level
 from handover.fmus.compile import host_platform
 from handover.fmus.reference import CannotProve, NothingToCompare
 

@@ -15,11 +15,11 @@ from pathlib import Path, PurePosixPath
 
 from handover.cosim.check.described_variable import DescribedVariable, variables_of
 from handover.cosim.check.description_checks import description_findings, interface_findings, says
-from handover.cosim.check.finding import RUN, CheckReport, Finding, Level, Section, fault, note, warning
-from handover.cosim.check.isolated_process import run_isolated
-from handover.cosim.check.reference_experiment import ExperimentCheck, ReferenceExperiment, experiments_in
-from handover.cosim.check.related_files import MANIFEST, related_files
+from handover.cosim.check.experiment_check import ExperimentCheck
+from handover.cosim.check.report import RUN, CheckReport, Section
 from handover.cosim.exceptions import InvalidFmu
+from handover.cosim.experiments.manifest import MANIFEST, related_files
+from handover.cosim.experiments.reference_experiment import ReferenceExperiment, experiments_in
 from handover.cosim.fmu.file.archive import DESCRIPTION, TERMINALS, FmuArchive
 from handover.cosim.fmu.file.default_experiment import default_experiment, proposed_step
 from handover.cosim.fmu.file.description import describe_fmu
@@ -39,6 +39,8 @@ from handover.cosim.fmu.file.fmpy_edge import (
 from handover.cosim.fmu.file.library_format import HEAD, platforms_of, shortage
 from handover.cosim.fmu.file.terminals import Terminals, read_terminals
 from handover.cosim.fmu.file.xml import XmlElement
+from handover.cosim.probe.finding import Finding, Level, fault, note, warning
+from handover.cosim.probe.isolated_process import run_isolated
 
 _SCHEMA = re.compile(
     r"^(?:Fatal )?(?:ERROR|Error|WARNING) \(line (\d+), column \d+\): (.*)$", re.DOTALL | re.IGNORECASE

@@ -11,10 +11,10 @@ from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
 from handover.cosim.check.described_variable import REALS, DescribedVariable
-from handover.cosim.check.finding import Finding, fault, note, warning
 from handover.cosim.fmu.file.default_experiment import default_experiment
 from handover.cosim.fmu.file.model_structure import lost_references
 from handover.cosim.fmu.file.xml import XmlElement
+from handover.cosim.probe.finding import Finding, fault, note, warning
 
 _KINDS = {
     "ModelExchange": "model exchange",

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from handover.cosim.check.finding import Finding, fault
-from handover.cosim.check.isolated_process import Journal
+from handover.cosim.probe.finding import Finding, fault
+from handover.cosim.probe.isolated_process import Journal
 
 _MISSING_LIBRARY = re.compile(r"(?:^|: |Library not loaded: )([^:\s]*?([^/:\s]+)): cannot open shared object file")
 _MISSING_ON_DARWIN = re.compile(r"Library not loaded: (\S+)")

@@ -14,16 +14,15 @@ import numpy as np
 
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.check.described_variable import variables_of
-from handover.cosim.check.finding import Finding, fault, note, warning
-from handover.cosim.check.isolated_process import Journal
-from handover.cosim.check.probed_instance import ProbedInstance
-from handover.cosim.exceptions import InvalidFmu, UnitFailure, log_lines
+from handover.cosim.exceptions import InvalidFmu, UnitFailure
 from handover.cosim.fmu.file.archive import DESCRIPTION
 from handover.cosim.fmu.file.description import KINDS, FmuDescription, FmuPort, describe_fmu
 from handover.cosim.fmu.file.xml import parse_xml
+from handover.cosim.probe.finding import Finding, abbreviated, fault, note, warning
+from handover.cosim.probe.isolated_process import Journal
+from handover.cosim.probe.probed_instance import ProbedInstance, failure, log_tail
 
 STEPS = 10
-_MAX_LINES = 24  # of a unit's log
 _REPEATED = 5  # steps that are done again from a state
 _TOO_MUCH = 1e-3  # of a signal's largest value: what outputs from a restored state may be off by, with a warning
 _MAX_RESTARTS = 60  # to find the variables that cannot be read
@@ -138,8 +137,10 @@ class SmokeRun:
         level = fault if max(shares.values()) >= _TOO_MUCH else warning
         what = f"steps from a restored state (t = {t:.6g} s) give other outputs than the first time"
         sizes = {n: "" if math.isinf(share) else f" by {share:.2g} of its largest value" for n, share in shares.items()}
-        told = [name + size for name, size in sizes.items()]
-        self.journal.found(level(f"{what}: {_first_of(told)}", where=call, cure="the state must hold all that changes"))
+        differing = [name + size for name, size in sizes.items()]
+        self.journal.found(
+            level(f"{what}: {abbreviated(differing)}", where=call, cure="the state must hold all that changes")
+        )
         return False
 
     def _beside(self, unit: ProbedInstance, at_start: dict[str, bytes], steps: list[dict[str, bytes]]) -> None:
@@ -184,7 +185,7 @@ class SmokeRun:
                 else:
                     pending += [ports[len(ports) // 2 :], ports[: len(ports) // 2]]
         if unread := [port.name for ports in pending for port in ports]:
-            what = f"after {_MAX_RESTARTS} restarts it is not known which of these can be read: {_first_of(unread)}"
+            what = f"after {_MAX_RESTARTS} restarts it is not known which of these can be read: {abbreviated(unread)}"
             self.journal.found(note(what, where="variables inside", cure="mend those that cannot, and check again"))
 
     def _compare(
@@ -199,7 +200,7 @@ class SmokeRun:
         """Return whether outputs differ, and report those that do."""
         different = [name for name, content in a.items() if b[name] != content]
         if different:
-            self.journal.found(level(f"{what}: {_first_of(different)}", where=where))
+            self.journal.found(level(f"{what}: {abbreviated(different)}", where=where))
         return bool(different)
 
     def _check_values(self, unit: ProbedInstance) -> None:
@@ -226,20 +227,6 @@ def _difference(port: FmuPort, first: Sequence[bytes], second: Sequence[bytes]) 
     largest = float(np.max(np.abs(a)))
     share = float(np.max(np.abs(a - b))) / largest if largest > 0 else math.inf
     return math.inf if math.isnan(share) else share
-
-
-def _first_of(names: Sequence[str]) -> str:
-    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
-
-
-def failure(e: UnitFailure) -> Finding:
-    """Return a failed call as a finding, with the end of the unit's log."""
-    return fault(f"{e.call} at t = {e.t:.6g} s answered {e.status}", log=log_tail(e.log))
-
-
-def log_tail(log: Sequence[str]) -> tuple[str, ...]:
-    """Return the end of a unit's log, which holds the cause: of a traceback, what was raised and where."""
-    return tuple(log_lines(log)[-_MAX_LINES:])
 
 
 def _value_findings(port: FmuPort, values: Any, t: float) -> Iterator[Finding]:

@@ -6,9 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from handover.cosim.check.check_fmu import check_fmu
-from handover.cosim.check.finding import CheckReport, Finding, Section, fault, warning
+from handover.cosim.check.report import CheckReport, Section
 from handover.cosim.exceptions import InvalidSsp
 from handover.cosim.fmu.file.default_experiment import NoStep
+from handover.cosim.probe.finding import Finding, fault, warning
 from handover.cosim.ssp.archive import SspArchive
 from handover.cosim.ssp.flattening import components_of
 from handover.cosim.ssp.reading import read_structure

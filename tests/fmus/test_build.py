@@ -11,7 +11,7 @@ import pytest
 from workshop import Workshop
 from written_blocks import write_block
 
-from handover.cosim.check import related_files as manifest_format
+from handover.cosim.experiments import manifest as manifest_format
 from handover.fmus.binaries import universal
 from handover.fmus.build import InvalidName, InvalidStep, UnknownVersion, build_block, cached
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, UnknownUnit, find_unit
@@ -154,7 +154,7 @@ def test_the_cache_builds_again_when_the_manifest_changes(tmp_path: Path, monkey
     monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
     block = write_block(tmp_path, "listed", "1.0", helper="listed_helper")
     first = cached(block, 3)
-    changed = tmp_path / "related_files.py"
+    changed = tmp_path / "manifest.py"
     changed.write_bytes(Path(manifest_format.__file__).read_bytes().replace(manifest_format.VERSION.encode(), b"2.0"))
     monkeypatch.setattr(manifest_format, "__file__", str(changed))
     assert cached(block, 3) != first

@@ -14,9 +14,9 @@ import pytest
 import xmlschema
 
 from handover.cosim.check.check_fmu import check_fmu
-from handover.cosim.check.reference_experiment import Difference, Setup, experiments_in
-from handover.cosim.check.related_files import FOLDER, MANIFEST, related_files
-from handover.cosim.check.signal_table import InvalidTable
+from handover.cosim.experiments.manifest import FOLDER, MANIFEST, related_files
+from handover.cosim.experiments.reference_experiment import Difference, Setup, experiments_in
+from handover.cosim.experiments.signal_table import InvalidTable
 from handover.cosim.fmu.file.archive import FmuArchive, write_archive
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus.build import Proof, build

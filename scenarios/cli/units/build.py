@@ -8,8 +8,8 @@ from pathlib import Path
 
 import click
 
-from handover.cosim.check.signal_table import InvalidTable
 from handover.cosim.exceptions import nearest
+from handover.cosim.experiments.signal_table import InvalidTable
 from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import InvalidName, InvalidStep, Proof, build
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, own_unit

@@ -10,8 +10,9 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.cosim.check.check_fmu import check_fmu
-from handover.cosim.check.finding import CheckReport, Finding, Level, Section
+from handover.cosim.check.report import CheckReport, Section
 from handover.cosim.fmu.file.archive import NO_FILE_FAULT, folder_fault
+from handover.cosim.probe.finding import Finding, Level
 from handover.cosim.ssp.check_ssp import check_ssp
 from handover.scenarios.cli.console import open_console
 from handover.scenarios.execution.errors import UsageError

@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from handover.cosim.check.check_fmu import check_fmu
-from handover.cosim.check.finding import CheckReport, Level
+from handover.cosim.check.report import CheckReport
+from handover.cosim.probe.finding import Level
 
 NO_LIBRARY = b"\x7fELF\x02\x01\x01" + bytes(11) + b"\xb7\x00"  # of aarch64: the check ends before it is loaded
 

@@ -8,10 +8,11 @@ import fmpy
 import pytest
 
 from handover.cosim.check.check_fmu import check_fmu
-from handover.cosim.check.finding import CheckReport, Level
 from handover.cosim.check.load_probe import load_fault
+from handover.cosim.check.report import CheckReport
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.file.fmpy_edge import unpack
+from handover.cosim.probe.finding import Level
 from handover.fmus.compile import host_platform
 
 pytestmark = pytest.mark.skipif(not host_platform().endswith("linux"), reason="signals and messages of Linux")

@@ -7,7 +7,7 @@ import pytest
 from native_units import native_fmu
 
 from handover.cosim.check.check_fmu import check_fmu
-from handover.cosim.check.finding import Finding, Level
+from handover.cosim.probe.finding import Finding, Level
 
 
 def found_in_run(file: Path) -> list[Finding]:

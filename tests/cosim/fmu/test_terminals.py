@@ -7,9 +7,9 @@ from terminal_units import described_unit, terminal_xml
 
 from handover.cosim.blocks.terminals import MatchingRule
 from handover.cosim.check.check_fmu import check_fmu
-from handover.cosim.check.finding import Level
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.fmu.file.terminals import TerminalMember
+from handover.cosim.probe.finding import Level
 
 INPUTS, OUTPUTS = {"f": "N 3", "u": "N"}, {"p": "m 3", "y": "m"}
 

@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.check.isolated_process import Journal
+from handover.cosim.exceptions import UnitFailure, log_lines
 from handover.cosim.fmu.buffers import SignalBuffer
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.fmu.instance import Instance
+from handover.cosim.probe.finding import Finding, fault
+from handover.cosim.probe.isolated_process import Journal
 
 _WITHOUT_NUMBERS = (Kind.STRING, Kind.BINARY)
+_MAX_LINES = 24  # of a unit's log
 
 
 class ProbedInstance(Instance):
@@ -173,3 +176,13 @@ def _bytes_of(port: FmuPort, views: tuple[Any, ...]) -> bytes:
 
 def _without_clock(ports: Mapping[str, FmuPort]) -> dict[str, FmuPort]:
     return {name: port for name, port in ports.items() if not port.clocks}
+
+
+def failure(e: UnitFailure) -> Finding:
+    """Return a failed call as a finding, with the end of the unit's log."""
+    return fault(f"{e.call} at t = {e.t:.6g} s answered {e.status}", log=log_tail(e.log))
+
+
+def log_tail(log: Sequence[str]) -> tuple[str, ...]:
+    """Return the end of a unit's log, which holds the cause: of a traceback, what was raised and where."""
+    return tuple(log_lines(log)[-_MAX_LINES:])

@@ -16,10 +16,8 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.variable import Kind
-from handover.cosim.check.finding import Finding, fault
-from handover.cosim.check.isolated_process import Journal, run_isolated
-from handover.cosim.check.probed_instance import ProbedInstance
-from handover.cosim.check.signal_table import (
+from handover.cosim.exceptions import InvalidFmu, UnitFailure
+from handover.cosim.experiments.signal_table import (
     Column,
     InvalidTable,
     SignalTable,
@@ -29,10 +27,11 @@ from handover.cosim.check.signal_table import (
     read_table,
     write_table,
 )
-from handover.cosim.check.smoke_run import failure, log_tail
-from handover.cosim.exceptions import InvalidFmu, UnitFailure
 from handover.cosim.fmu.file.description import FmuDescription, describe_fmu
 from handover.cosim.fmu.start_values import entries_of
+from handover.cosim.probe.finding import Finding, fault
+from handover.cosim.probe.isolated_process import Journal, run_isolated
+from handover.cosim.probe.probed_instance import ProbedInstance, failure, log_tail
 
 MAX_POINTS = 1_000_000
 
@@ -93,7 +92,7 @@ def run_experiment(
         "step": None if step is None else str(step),
         "runs": [{name: str(path) for name, path in files.items()} for files in runs],
     }
-    return run_isolated("handover.cosim.check.experiment_run", task, scratch, timeout).findings
+    return run_isolated("handover.cosim.experiments.experiment_run", task, scratch, timeout).findings
 
 
 class _Run:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from handover.cosim.check.finding import Finding, Level, fault, warning
+from handover.cosim.probe.finding import Finding, Level, fault, warning
 
 _START = """
 import importlib, json, sys

@@ -11,9 +11,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from urllib.parse import unquote, urlsplit
 
-from handover.cosim.check.finding import Finding, fault, note, warning
 from handover.cosim.fmu.file.archive import FmuArchive, listed
 from handover.cosim.fmu.file.xml import UnsafeXml, XmlElement, parse_xml
+from handover.cosim.probe.finding import Finding, fault, note, warning
 
 STANDARD = "org.fmi-standard.fmi-ls-ref"
 FOLDER = f"extra/{STANDARD}"
