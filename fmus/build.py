@@ -29,17 +29,17 @@ from handover.fmus import interpreter
 from handover.fmus.binaries import binaries
 from handover.fmus.catalog import Entry, find_unit, import_class
 from handover.fmus.compile import cache_folder, host_platform
-from handover.fmus.documentation import page
-from handover.fmus.fmi2_description import fmi2_description
-from handover.fmus.fmi3_description import fmi3_description
-from handover.fmus.icons import icon_files, icon_of
+from handover.fmus.contents.documentation import page
+from handover.fmus.contents.fmi2_description import fmi2_description
+from handover.fmus.contents.fmi3_description import fmi3_description
+from handover.fmus.contents.icons import icon_files, icon_of
+from handover.fmus.contents.model_description import Model
+from handover.fmus.contents.related_files import ParameterSet, related_files
+from handover.fmus.contents.terminals import terminals_file
 from handover.fmus.layout import Form, Layout
-from handover.fmus.model_description import Model
-from handover.fmus.reference import ParameterSet, related_files
 from handover.fmus.sources import Carried, beside_block, closure
 from handover.fmus.standalone.freezer import PROGRAM, check_standalone, frozen
 from handover.fmus.standalone.smoke_test import try_unit
-from handover.fmus.terminals import terminals_file
 
 _log = logging.getLogger(__name__)
 
@@ -234,7 +234,7 @@ def build(
     source = f"resources/sources/{_source_of(entry.block, carried)}"
     files |= related_files(model, source, parameter_sets)
     if proof is not None:
-        from handover.fmus.reference_run import record_experiment  # loads FMPy, which takes long
+        from handover.fmus.contents.reference_experiment import record_experiment  # loads FMPy, which takes long
 
         with tempfile.TemporaryDirectory(prefix="handover-proof-") as scratch:
             experiment = record_experiment(
@@ -284,9 +284,11 @@ def _model(entry: Entry, form: Form, token: str) -> Model:
 
 def _content_key(entry: Entry, form: Form, carried: Carried) -> str:
     """Return a hash of all that an FMU depends on: sources, packages, interpreter, runtime, and the builder itself."""
-    builder = [*sorted(Path(__file__).parent.glob("*.*")), *(Path(m.__file__ or "") for m in _OUTSIDE)]
+    here = Path(__file__).parent
+    own = [file for folder in (here, here / "contents") for file in sorted(folder.glob("*.*"))]
+    builder = [*own, *(Path(m.__file__ or "") for m in _OUTSIDE)]
     parts = {path: file.read_bytes() for path, file in carried.files.items()}
-    parts |= {f"builder/{file.name}": file.read_bytes() for file in builder if file.is_file()}
+    parts |= {f"builder/{file.parent.name}/{file.name}": file.read_bytes() for file in builder if file.is_file()}
     parts |= icon_files(icon_of(entry), form.fmi)
     parts |= binaries(entry.name, form.fmi)
     parts |= {f"environment/{module}": _version_mark(module) for module in carried.modules}

@@ -18,7 +18,7 @@ from handover.fmus import interpreter
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
 from handover.fmus.compile import TARGETS
-from handover.fmus.fmi2_description import NoFmi2Form
+from handover.fmus.contents.fmi2_description import NoFmi2Form
 from handover.scenarios.catalog import SYSTEMS
 
 ROOT = Path(__file__).parent.parent

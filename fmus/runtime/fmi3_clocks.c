@@ -1,6 +1,6 @@
 /* FMI 3.0: the clock of a sampled unit, a periodic input clock of constant interval that ticks first at the start.
  *
- * Its value reference follows those of all other variables (fmus/fmi3_description.py).
+ * Its value reference follows those of all other variables (fmus/contents/fmi3_description.py).
  */
 #include "fmi.h"
 #include "log.h"

@@ -11,7 +11,7 @@ from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.ssp.writing import bound_enumerations, write_ssp
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
-from handover.fmus.fmi2_description import NoFmi2Form
+from handover.fmus.contents.fmi2_description import NoFmi2Form
 from handover.scenarios.cli.options import scenario_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption

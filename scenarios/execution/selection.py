@@ -163,8 +163,8 @@ def load_units(scenario: str) -> None:
 def _invalid_blocks() -> tuple[type[Exception], ...]:
     """Return what is raised for blocks that do not exist or of which no FMU can be made."""
     from handover.fmus.build import InvalidName  # what builds units takes long to import
-    from handover.fmus.icons import InvalidIcon
+    from handover.fmus.contents.icons import InvalidIcon
+    from handover.fmus.contents.model_description import AmbiguousName, InvalidText
     from handover.fmus.layout import DuplicateName
-    from handover.fmus.model_description import AmbiguousName, InvalidText
 
     return UnknownUnit, UnknownBlock, InvalidName, InvalidIcon, DuplicateName, AmbiguousName, InvalidText

@@ -15,7 +15,7 @@ import numpy as np
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.variable import Variable
 from handover.fmus.catalog import UNITS, import_class
-from handover.fmus.reference import ParameterSet
+from handover.fmus.contents.related_files import ParameterSet
 from handover.scenarios.experiment.paper import paper_entry, paper_values
 
 _DEFAULTS: Mapping[str, tuple[str, tuple[str, ...]]] = {

@@ -12,7 +12,7 @@ from markupsafe import Markup, escape
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.graph import Pair, bent, places
-from handover.fmus.icons import catalog_icon
+from handover.fmus.contents.icons import catalog_icon
 from handover.scenarios.experiment.time_plot import COLOURS
 from handover.scenarios.reporting.html import picture_source, plot_html
 from handover.scenarios.reporting.page import Section, template

@@ -14,7 +14,7 @@ from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.fmu.file.fmpy_edge import terminal_problems
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
-from handover.fmus.fmi2_description import NoFmi2Form
+from handover.fmus.contents.fmi2_description import NoFmi2Form
 from handover.plants.helix.arm.tendon_arm import Inputs, TendonArm
 from handover.plants.helix.arm.tendon_parameters import Params
 

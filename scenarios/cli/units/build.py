@@ -14,11 +14,11 @@ from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import InvalidName, InvalidStep, Proof, build
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, own_unit
 from handover.fmus.compile import TARGETS, compile_runtime, has_compiler, is_current, named_platforms
-from handover.fmus.fmi2_description import NoFmi2Form
-from handover.fmus.icons import InvalidIcon
+from handover.fmus.contents.fmi2_description import NoFmi2Form
+from handover.fmus.contents.icons import InvalidIcon
+from handover.fmus.contents.model_description import AmbiguousName, InvalidText
+from handover.fmus.contents.related_files import CannotProve, NothingToCompare
 from handover.fmus.layout import DuplicateName
-from handover.fmus.model_description import AmbiguousName, InvalidText
-from handover.fmus.reference import CannotProve, NothingToCompare
 from handover.fmus.sources import FileElsewhere, beside_block, closure
 from handover.fmus.standalone.freezer import CannotFreeze, check_standalone
 from handover.scenarios.catalog import search_folder

@@ -8,8 +8,8 @@ from markupsafe import Markup
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.description import Description, describe
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, find_unit, import_class, installed_units
-from handover.fmus.documentation import seconds
-from handover.fmus.icons import InvalidIcon, icon_of
+from handover.fmus.contents.documentation import seconds
+from handover.fmus.contents.icons import InvalidIcon, icon_of
 from handover.scenarios.catalog import SYSTEMS
 from handover.scenarios.cli.summaries.port_tables import port_rows
 from handover.scenarios.reporting.html import picture_source, rows_table

@@ -11,7 +11,7 @@ from fmpy.validation import validate_fmu
 from sample_units.every_kind import EveryKind, Inputs, Mood, Outputs, Params
 from workshop import Workshop
 
-from handover.fmus.fmi2_description import NoFmi2Form
+from handover.fmus.contents.fmi2_description import NoFmi2Form
 
 DT, STEPS = 1 / 64, 12
 

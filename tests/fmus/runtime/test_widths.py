@@ -9,7 +9,7 @@ import pytest
 from ctypes_host import ERROR, OK, SIZE, CtypesHost
 from workshop import Workshop
 
-from handover.fmus.fmi2_description import NoFmi2Form
+from handover.fmus.contents.fmi2_description import NoFmi2Form
 
 BLOCK = "every_width:EveryWidth"
 

@@ -12,7 +12,7 @@ from ssp_of import component, connection, connectors, described, pack_ssp, syste
 
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
-from handover.fmus.fmi2_description import NoFmi2Form
+from handover.fmus.contents.fmi2_description import NoFmi2Form
 from handover.scenarios.cli.command import main
 
 LIGHT = ("Push", "IrReflex", "TrajectoryPlanner")

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS, PackageFailure
-from handover.fmus.icons import catalog_icon
+from handover.fmus.contents.icons import catalog_icon
 from handover.scenarios.cli.command import main
 from handover.scenarios.cli.list import place_data, print_place
 from handover.scenarios.execution.errors import UsageError

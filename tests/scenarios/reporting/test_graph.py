@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from handover.fmus.icons import catalog_icon
+from handover.fmus.contents.icons import catalog_icon
 from handover.scenarios.reporting.graph import bent, graph_section, places, rate
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder

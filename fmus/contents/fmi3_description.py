@@ -10,8 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from handover.cosim.blocks.variable import Causality, Kind, Variable
-from handover.fmus.layout import SAMPLE_CLOCK, TIME, HostVariable, capacity
-from handover.fmus.model_description import (
+from handover.fmus.contents.model_description import (
     GENERATOR,
     Model,
     add_default_experiment,
@@ -25,6 +24,7 @@ from handover.fmus.model_description import (
     to_xml,
     variability,
 )
+from handover.fmus.layout import SAMPLE_CLOCK, TIME, HostVariable, capacity
 
 BYTES_MIME_TYPE = "application/octet-stream"
 

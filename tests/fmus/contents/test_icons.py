@@ -16,8 +16,8 @@ from written_blocks import write_block
 from handover.cosim.fmu.file.archive import TERMINALS
 from handover.fmus.build import build_block, cached
 from handover.fmus.catalog import UNITS
-from handover.fmus.fmi2_description import NoFmi2Form
-from handover.fmus.icons import InvalidIcon, catalog_icon
+from handover.fmus.contents.fmi2_description import NoFmi2Form
+from handover.fmus.contents.icons import InvalidIcon, catalog_icon
 
 OwnBlock = Callable[[str], str]
 

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from handover.cosim.fmu.file.xml import UnsafeXml, parse_xml
 from handover.fmus.catalog import UNITS, Entry, import_class
-from handover.fmus.model_description import number
+from handover.fmus.contents.model_description import number
 
-_FOLDER = Path(__file__).parent / "icons"
+_FOLDER = Path(__file__).parents[1] / "icons"
 _OF_ANY_BLOCK = _FOLDER / "block.svg"
 _PNG = b"\x89PNG\r\n\x1a\n"
 """With what every PNG begins."""

@@ -15,8 +15,8 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from handover.cosim.blocks.variable import Causality, Kind, Variable
+from handover.fmus.contents.model_description import Model, enumerations
 from handover.fmus.layout import SAMPLE_CLOCK, Form
-from handover.fmus.model_description import Model, enumerations
 from handover.fmus.sources import Package
 
 PAPERS = {

@@ -2,7 +2,7 @@
 
 from textwrap import dedent
 
-from handover.fmus.documentation import Part, parse
+from handover.fmus.contents.documentation import Part, parse
 
 DOCSTRING = dedent(
     """\

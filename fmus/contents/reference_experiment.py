@@ -46,7 +46,7 @@ from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describ
 from handover.cosim.fmu.start_values import entries_of
 from handover.cosim.probe.finding import Finding, Level
 from handover.fmus.compile import host_platform
-from handover.fmus.reference import CannotProve, NothingToCompare
+from handover.fmus.contents.related_files import CannotProve, NothingToCompare
 
 _STEPS, _AT_REST, _RAMP = 50, 10, 20
 _SHARE_OF_RANGE, _SHARE_OF_VALUE = 0.1, 0.01

@@ -19,10 +19,10 @@ from handover.cosim.blocks.description import Description, describe
 from handover.cosim.blocks.ports import parameter
 from handover.cosim.blocks.units import Number
 from handover.cosim.fmu.file.description import describe_fmu
-from handover.fmus.fmi2_description import fmi2_description
-from handover.fmus.fmi3_description import fmi3_description
+from handover.fmus.contents.fmi2_description import fmi2_description
+from handover.fmus.contents.fmi3_description import fmi3_description
+from handover.fmus.contents.model_description import AmbiguousName, InvalidText, Model
 from handover.fmus.layout import DuplicateName, Form, Layout
-from handover.fmus.model_description import AmbiguousName, InvalidText, Model
 
 ALL, WITHOUT_DATA = "declarations:Declarations", "declarations:WithoutData"
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from handover.fmus.build import build_block
-from handover.fmus.documentation import PAPERS, cited, seconds
+from handover.fmus.contents.documentation import PAPERS, cited, seconds
 
-HOUSE = Path(__file__).parents[2]
+HOUSE = Path(__file__).parents[3]
 
 
 def page_of(block: str, folder: Path, fmi: int, *, scalar: bool = False) -> str:

@@ -21,8 +21,13 @@ from handover.cosim.fmu.file.archive import FmuArchive, write_archive
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus.build import Proof, build
 from handover.fmus.catalog import Entry
-from handover.fmus.reference import PAGE, CannotProve, InvalidParameterSet, NothingToCompare, ParameterSet
-from handover.fmus.reference_run import default_stimulus, largest_difference, record_experiment, relative_tolerance
+from handover.fmus.contents.reference_experiment import (
+    default_stimulus,
+    largest_difference,
+    record_experiment,
+    relative_tolerance,
+)
+from handover.fmus.contents.related_files import PAGE, CannotProve, InvalidParameterSet, NothingToCompare, ParameterSet
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema" / "fmi3"
 FORMS = [(2, False), (3, False), (3, True)]
@@ -171,7 +176,7 @@ def test_a_tolerance_is_measured_only_where_an_input_changes(
             run["result"].write_text("time,y\n0.0,0.5\n0.1,0.5\n")
         return []
 
-    monkeypatch.setattr("handover.fmus.reference_run.run_experiment", play)
+    monkeypatch.setattr("handover.fmus.contents.reference_experiment.run_experiment", play)
     given = tmp_path / "given.csv"
     given.write_text(f"time,x\n0.0,{x}\n0.1,{x}\n")
     recorded = record_experiment(build(CHAOTIC, 3, tmp_path, platforms=["host"]), Fraction(1, 10), given)

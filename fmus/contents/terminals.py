@@ -6,9 +6,9 @@ too; its `fmiVersion` there is that of the standard which defines it. A tool tha
 
 import xml.etree.ElementTree as ET
 
-from handover.fmus.icons import graphical_representation
+from handover.fmus.contents.icons import graphical_representation
+from handover.fmus.contents.model_description import Model, to_xml
 from handover.fmus.layout import Form, element_names
-from handover.fmus.model_description import Model, to_xml
 
 SIGNAL = "signal"
 """The kind of variable whose values are to be equal at both ends; forces in space are signals too, by the standard."""

@@ -7,8 +7,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.variable import Causality, Kind, Variable
-from handover.fmus.layout import Form, HostVariable
-from handover.fmus.model_description import (
+from handover.fmus.contents.model_description import (
     GENERATOR,
     Model,
     add_default_experiment,
@@ -22,6 +21,7 @@ from handover.fmus.model_description import (
     to_xml,
     variability,
 )
+from handover.fmus.layout import Form, HostVariable
 
 
 class NoFmi2Form(ValueError):

@@ -15,11 +15,11 @@ from handover.cosim.blocks.start_values import fault_of
 from handover.cosim.blocks.variable import Declared, Kind, Variable
 from handover.cosim.experiments.manifest import DESCRIPTION, FOLDER, MANIFEST, NAMESPACE, ROOT, STANDARD, VERSION
 from handover.cosim.fmu.file.description import FmuPort
+from handover.fmus.contents.model_description import Model, to_xml
 from handover.fmus.layout import Form, Layout
-from handover.fmus.model_description import Model, to_xml
 
 if TYPE_CHECKING:
-    from handover.fmus.reference_run import RecordedExperiment
+    from handover.fmus.contents.reference_experiment import RecordedExperiment
 
 PAGE = "documentation/fmi-ls-ref.txt"
 """Where the standard wants a text on the related files."""

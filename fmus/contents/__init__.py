@@ -1,0 +1,1 @@
+"""What goes into an FMU besides sources and runtime: descriptions, terminals, icon, documentation, related files."""
