@@ -178,16 +178,16 @@ class UnitFailure(CosimError):
 class InitializationError(CosimError):
     """A unit did not accept its parameters or did not initialise; nothing has run yet.
 
-    What it logged comes first, as it says what is wrong, then the call that answered the error. `told` is what else is
-    known of it: who has set what the unit did not accept.
+    What it logged comes first, as it says what is wrong, then the call that answered the error. `reason` is what else
+    is known of it: who has set what the unit did not accept.
     """
 
-    def __init__(self, failure: UnitFailure, told: str = "") -> None:
+    def __init__(self, failure: UnitFailure, reason: str = "") -> None:
         is_status = failure.message == failure.status and failure.status.isalpha()  # one word, such as Discard
         how = f"{failure.call} {failure.what}" if is_status else failure.message
         if not is_status and failure.kind in ("error", "fatal", "discard"):
             how = f"{_STATUS.sub('', how)} ({failure.call} {failure.what})"
-        super().__init__(f"{failure.unit} does not start: {how}{told}")
+        super().__init__(f"{failure.unit} does not start: {how}{reason}")
         self.failure = failure
 
 

@@ -48,8 +48,8 @@ _OUTSIDE = (manifest_format, archive_format)
 
 
 @dataclass(frozen=True)
-class Proof:
-    """That a reference experiment is to be recorded: with the stimulus in a CSV file or, without one, the default."""
+class ExperimentRequest:
+    """What reference experiment is to be recorded: with the stimulus in a CSV file or, without one, the default."""
 
     stimulus: Path | None = None
 
@@ -159,7 +159,7 @@ def build(
     standalone: bool = False,
     include: Sequence[Path] = (),
     parameter_sets: Sequence[ParameterSet] = (),
-    proof: Proof | None = None,
+    experiment: ExperimentRequest | None = None,
 ) -> Path:
     """Build a unit's FMU. The same sources, packages and interpreter give the same bytes, unless it is standalone.
 
@@ -175,10 +175,10 @@ def build(
             where the FMU is used. The unit is started in them, and steps once, before the FMU is written.
         include: data files that the block opens beside its module, by `__file__`.
         parameter_sets: that the FMU contains (FMI-LS-REF).
-        proof: the experiment that is recorded and stored with its result; it takes the time of two runs.
+        experiment: the reference experiment that is recorded and stored with its result; it takes the time of two runs.
 
     Raises:
-        CannotProve, InvalidTable: the experiment cannot be recorded, or its stimulus is not one for this unit.
+        CannotRecordExperiment, InvalidTable: the experiment cannot be recorded, or its stimulus is none for this unit.
         InvalidParameterSet: a parameter set is not one for this unit.
         CannotFreeze: a standalone FMU cannot be made: PyInstaller is not installed, a platform is another one than this
             machine's, a package cannot be frozen, or the block opens files that the FMU does not have.
@@ -233,14 +233,14 @@ def build(
     name = file_name(entry.name, form, standalone=standalone)
     source = f"resources/sources/{_source_of(entry.block, carried)}"
     files |= related_files(model, source, parameter_sets)
-    if proof is not None:
+    if experiment is not None:
         from handover.fmus.contents.reference_experiment import record_experiment  # loads FMPy, which takes long
 
-        with tempfile.TemporaryDirectory(prefix="handover-proof-") as scratch:
-            experiment = record_experiment(
-                write_archive(Path(scratch, name), files, programs), entry.step, proof.stimulus
+        with tempfile.TemporaryDirectory(prefix="handover-experiment-") as scratch:
+            recorded = record_experiment(
+                write_archive(Path(scratch, name), files, programs), entry.step, experiment.stimulus
             )
-        files |= related_files(model, source, parameter_sets, experiment)
+        files |= related_files(model, source, parameter_sets, recorded)
     return write_archive(out_dir / name, files, programs)
 
 

@@ -63,7 +63,7 @@ class CheckReport:
                 {
                     "name": s.name,
                     "result": s.level.name.lower() if s.reached else "not reached",
-                    "told": s.summary,
+                    "summary": s.summary,
                     "findings": [
                         {"level": f.level.name.lower(), "where": f.where, "what": f.what, "cure": f.cure, "log": f.log}
                         for f in s.findings

@@ -30,8 +30,8 @@ def run_faults(descriptions: Iterable[FmuDescription]) -> dict[Path, str]:
     """
     found: dict[Path, str] = {}
     for d in {d.path: d for d in descriptions}.values():
-        told = f"{d.untouched_fault}; {d.experiment.step_fault}"
-        places = set(_LINE.findall(told))
+        known = f"{d.untouched_fault}; {d.experiment.step_fault}"
+        places = set(_LINE.findall(known))
         state = d.path.stat()
         faults = _faults(d.path, d.fmi, state.st_mtime_ns, state.st_size)
         if lines := [line for line in faults if places.isdisjoint(_LINE.findall(line))]:

@@ -131,9 +131,9 @@ def values_document(
         texts, names = _texts(port, value), port.entry_names
         if len(names) == 1:
             texts = [" ".join(texts) if port.shape else texts[0]]
-        told = (descriptions or {}).get(port.name)
+        description = (descriptions or {}).get(port.name)
         for name, text in zip(names, texts, strict=True):
-            attributes = {"name": name} if told is None else {"name": name, "description": told}
+            attributes = {"name": name} if description is None else {"name": name, "description": description}
             parameter = ET.SubElement(parameters, "ssv:Parameter", attributes)
             types.add_type(parameter, "ssv", port).set("value", text)
             add_dimensions(parameter, port.shape if len(names) == 1 else ())

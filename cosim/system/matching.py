@@ -145,7 +145,7 @@ class Matches:
     nothing: str = ""
     ambiguities: list[Ambiguity] = field(default_factory=list[Ambiguity])
 
-    def told(
+    def matched_ports(
         self, source: str, target: str, inputs: Collection[str], left: Mapping[str, str], fed: Collection[str]
     ) -> MatchedPorts:
         """Return what was connected of all that matches, as something else may have been said of some inputs.
@@ -310,7 +310,9 @@ def matched_members(source: TerminalEnd, target: TerminalEnd) -> list[Connection
     return connections
 
 
-def told_of_terminals(source: TerminalEnd, target: TerminalEnd, connections: Sequence[Connection]) -> MatchedPorts:
+def matched_ports_of_terminals(
+    source: TerminalEnd, target: TerminalEnd, connections: Sequence[Connection]
+) -> MatchedPorts:
     """Return what was connected of two terminals; inputs of the target that none of the connections feeds are left."""
     (unit_a, _, one), (unit_b, b, other) = source, target
     outputs = {c.target.port: c.source.port for c in connections}

@@ -24,8 +24,8 @@ from handover.cosim.system.matching import (
     TerminalEnd,
     TerminalFault,
     matched_members,
+    matched_ports_of_terminals,
     matches_of,
-    told_of_terminals,
 )
 from handover.cosim.system.port_names import Connection, PlacedUnit, PortName, PortNames, ambiguity, unit_of
 from handover.cosim.system.time_series import ExternalSource, NoSource, TimeSeries
@@ -158,7 +158,7 @@ class System:
             self._faults.append(f"{what}; connect the ports that are meant one by one instead")
         for c in connections:
             self._connect(c)
-        return told_of_terminals(a, b, connections)
+        return matched_ports_of_terminals(a, b, connections)
 
     def _connect(self, c: Connection) -> None:
         self._forget_matches(c.target)
@@ -190,7 +190,7 @@ class System:
                 if len(known) == 1:
                     self._add(c)
             left[port] = f"{known[0].source} matches it, too" if known[0] != c else ""
-        return matches.told(a, b, inputs, left, fed)
+        return matches.matched_ports(a, b, inputs, left, fed)
 
     def _forget_matches(self, target: PortName) -> None:
         """Take back that an input was connected by its match, as something else is said of it."""

@@ -46,7 +46,7 @@ from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describ
 from handover.cosim.fmu.start_values import entries_of
 from handover.cosim.probe.finding import Finding, Level
 from handover.fmus.compile import host_platform
-from handover.fmus.contents.related_files import CannotProve, NothingToCompare
+from handover.fmus.contents.related_files import CannotRecordExperiment, NothingToCompare
 
 _STEPS, _AT_REST, _RAMP = 50, 10, 20
 _SHARE_OF_RANGE, _SHARE_OF_VALUE = 0.1, 0.01
@@ -115,8 +115,8 @@ def record_experiment(fmu: Path, step: Fraction, stimulus: Path | None = None) -
 
     Raises:
         InvalidTable: the stimulus is not one for this FMU.
-        CannotProve: there is no library for this machine, no output to compare, a run fails, or rounding changes the
-            outputs by so much that a comparison on other machines would prove nothing.
+        CannotRecordExperiment: there is no library for this machine, no output to compare, a run fails, or rounding
+            changes the outputs by so much that a comparison on other machines would prove nothing.
         OSError: the file cannot be read.
     """
     d = describe_fmu(fmu)
@@ -135,7 +135,7 @@ def record_experiment(fmu: Path, step: Fraction, stimulus: Path | None = None) -
     spread = largest_difference(differences(one, other, compared))
     is_measured = nearby != given
     if spread is not None and spread.share * _MARGIN > _MOST:
-        raise CannotProve(_refusal(d.name, spread, is_measured=is_measured))
+        raise CannotRecordExperiment(_refusal(d.name, spread, is_measured=is_measured))
     setup = Setup(
         step=step,
         relative=relative_tolerance(spread),
@@ -186,7 +186,7 @@ def _played(
     """Return the results of stimuli.
 
     Raises:
-        CannotProve: a run fails.
+        CannotRecordExperiment: a run fails.
     """
     runs = [
         {"stimulus": scratch / f"stimulus-{k}.csv", "result": scratch / f"result-{k}.csv"} for k in range(len(stimuli))
@@ -195,7 +195,7 @@ def _played(
         run["stimulus"].write_bytes(stimulus)
     faults = [f for f in run_experiment(d.path, folder, runs, step, scratch, _TIMEOUT) if f.level is Level.FAULT]
     if faults:
-        raise CannotProve(f"{d.name} fails as its reference is made: {_with_log(faults[0])}")
+        raise CannotRecordExperiment(f"{d.name} fails as its reference is made: {_with_log(faults[0])}")
     return [run["result"].read_bytes() for run in runs]
 
 

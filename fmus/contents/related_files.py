@@ -49,11 +49,11 @@ class ParameterSet:
     labels: Sequence[str] = ()
 
 
-class CannotProve(RuntimeError):
+class CannotRecordExperiment(RuntimeError):
     """An FMU's reference experiment cannot be made; the message says why, and what would be right."""
 
 
-class NothingToCompare(CannotProve):
+class NothingToCompare(CannotRecordExperiment):
     """An FMU has no output that a result in CSV could hold."""
 
     def __init__(self, unit: str) -> None:

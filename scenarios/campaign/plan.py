@@ -57,7 +57,7 @@ class CampaignPlan:
             leaves it as it is in the other runs.
         options: how units are run.
         stop: when each run ends, s; None: as the scenario says.
-        log_level: from which level on each run's log.txt has logs, see `log_told`.
+        log_level: from which level on each run's log.txt has logs, see `logging_to_standard_error`.
         experiment: name of the published experiment that it belongs to; "" if to none.
     """
 

@@ -16,7 +16,7 @@ from handover.scenarios.campaign.worker_pool import JobResult, RunJob
 from handover.scenarios.catalog import search_folder
 from handover.scenarios.execution.errors import one_line_errors
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import log_told
+from handover.scenarios.execution.progress import logging_to_standard_error
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.execution.selection import find_scenario, own_source
 from handover.scenarios.execution.unit_values import split_parameters
@@ -36,7 +36,7 @@ def run_job(job: RunJob, folder: Path) -> None:
     """
     task, clock = _task(job, folder), ElapsedTime().clock()
     try:
-        with log_told(job.log_level):
+        with logging_to_standard_error(job.log_level):
             run_task(task, lambda _t, _end: None, Interruption())
     except _REFUSALS as e:
         _write_refusal(task, e, clock())

@@ -28,7 +28,7 @@ class RunJob:
         runs: the campaign's folder of runs.
         options: how units are run.
         stop: when the run ends, s; None: as the scenario says.
-        log_level: from which level on its log has logs, see `log_told`.
+        log_level: from which level on its log has logs, see `logging_to_standard_error`.
     """
 
     name: str

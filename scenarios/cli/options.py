@@ -135,7 +135,7 @@ log_option = click.option(
     help="From which level on the units' logs and the master's progress are told on standard error; debug: all that"
     " units log.  [default: the master's warnings, and the log of a unit that fails]",
 )
-"""For commands that run units; `log_told` takes its value."""
+"""For commands that run units; `logging_to_standard_error` takes its value."""
 
 _wall_time_option = partial(click.option, cls=HeadedOption, heading="Wall time")
 _LIMIT = _wall_time_option(

@@ -13,7 +13,7 @@ from handover.scenarios.cli.options import limit_options, limits, log_option
 from handover.scenarios.cli.summaries.run import exit_with
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import log_told, progress_bar
+from handover.scenarios.execution.progress import logging_to_standard_error, progress_bar
 from handover.scenarios.execution.resume import InterruptedRun
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.results.run_folder import RunFolder
@@ -40,7 +40,12 @@ def resume(
     folder: Path, no_report: bool, isolate: Sequence[str], log_level: str | None, call_limit: float, pace: float | None
 ) -> None:
     """Resume a run from its last checkpoint."""
-    with Interruption() as interruption, one_line_errors(), log_told(log_level), contextlib.ExitStack() as opened:
+    with (
+        Interruption() as interruption,
+        one_line_errors(),
+        logging_to_standard_error(log_level),
+        contextlib.ExitStack() as opened,
+    ):
         if not folder.is_dir():
             raise UsageError(f"{folder} is no folder; name that of a run")
         run_folder = RunFolder.of_run(folder)

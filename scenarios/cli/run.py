@@ -31,7 +31,7 @@ from handover.scenarios.cli.summaries.run import AS_JSON, exit_with
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.input_sources import played_back
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import log_told, progress_bar
+from handover.scenarios.execution.progress import logging_to_standard_error, progress_bar
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.experiment.live_inputs import inputs_of_pushes
@@ -162,7 +162,12 @@ def run(
 ) -> None:
     """Run a SCENARIO, an SSP or an FMU once."""
     json_to = reserve_stdout() if as_json else None
-    with Interruption() as interruption, one_line_errors(), log_told(log_level), contextlib.ExitStack() as opened:
+    with (
+        Interruption() as interruption,
+        one_line_errors(),
+        logging_to_standard_error(log_level),
+        contextlib.ExitStack() as opened,
+    ):
         if not no_report:
             require_extra("reports", "report and figures", "--no-report")
         if live:
@@ -203,7 +208,7 @@ def run(
         with progress_bar(sys.stderr) as progress:
             result = run_task(task, progress, interruption, control=control, observer=observer)
         if request.sources is not None:
-            _tell_end_of_inputs(task.folder, float(request.sources.told["until"]))
+            _tell_end_of_inputs(task.folder, float(request.sources.origin["until"]))
     exit_with(result, task, json_to=json_to)
 
 

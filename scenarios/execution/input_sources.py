@@ -33,9 +33,9 @@ def played_back(path: Path) -> InputSources:
     if lacking := [name for name in names if name not in record]:
         raise InvalidRunFolder(path, f"its record lacks inputs from outside: {', '.join(lacking)}")
     until = float(record.time[-1])
-    told = {"from": "run", "folder": str(folder.path), "sha256": sha256_of(folder.signals), "until": until}
+    origin = {"from": "run", "folder": str(folder.path), "sha256": sha256_of(folder.signals), "until": until}
     series = {name: record.series(name) for name in names}
-    return InputSources(series, told, where=f"inputs from {path}", is_complete=True)
+    return InputSources(series, origin, where=f"inputs from {path}", is_complete=True)
 
 
 def recorded_input_names(folder: RunFolder) -> Sequence[str]:
@@ -51,7 +51,7 @@ def recorded_input_names(folder: RunFolder) -> Sequence[str]:
 
 
 def resumed_inputs(
-    folder: RunFolder, told: Mapping[str, Any] | None, pushes: Sequence[Pushable] = (), hand: LedHand | None = None
+    folder: RunFolder, origin: Mapping[str, Any] | None, pushes: Sequence[Pushable] = (), hand: LedHand | None = None
 ) -> InputSources | None:
     """Return the sources of a run that is resumed, by what its folder tells of them.
 
@@ -60,16 +60,16 @@ def resumed_inputs(
 
     Args:
         folder: the run's, its record complete as far as it goes.
-        told: what it tells of its sources; None if nobody gave values.
+        origin: what it tells of its sources; None if nobody gave values.
         pushes: bodies of the scenario that can be pushed.
         hand: the hand of the scenario that is led.
 
     Raises:
         InvalidRunFolder: they are gone: the run that was played back is not what it was, or a program gave them.
     """
-    if told is None:
+    if origin is None:
         return None
-    if told.get("from") == "page":
+    if origin.get("from") == "page":
         recorded, names = whole_record_of(folder), recorded_input_names(folder)
         lacking = [name for name in names if recorded is None or name not in recorded]
         if recorded is None or lacking:
@@ -79,14 +79,14 @@ def resumed_inputs(
         age = "" if hand is None else hand.age
         end = float(recorded.time[-1])
         sources = {name: _Recorded(one, is_force=name in forces, is_age=name == age) for name, one in series.items()}
-        return InputSources(sources, {**told, "until": min(end, float(told.get("until", end)))})
-    if told.get("from") != "run":
-        text = f"its inputs came from outside, from a {told.get('from')}, which is gone"
+        return InputSources(sources, {**origin, "until": min(end, float(origin.get("until", end)))})
+    if origin.get("from") != "run":
+        text = f"its inputs came from outside, from a {origin.get('from')}, which is gone"
         instead = f"begin it once more with --inputs-from {folder.path}, which gives it those that it recorded"
         raise InvalidRunFolder(folder.path, f"{text}; {instead}")
-    sources = played_back(Path(told["folder"]))
-    if sources.told != {**sources.told, **told}:
-        raise InvalidRunFolder(folder.path, f"the record of {told['folder']}, whose inputs it took, is another one")
+    sources = played_back(Path(origin["folder"]))
+    if sources.origin != {**sources.origin, **origin}:
+        raise InvalidRunFolder(folder.path, f"the record of {origin['folder']}, whose inputs it took, is another one")
     return sources
 
 
@@ -121,7 +121,7 @@ def give_inputs(system: System, inputs: InputSources | None) -> None:
         return
     own = external_inputs(system)
     unknown = [name for name in inputs.sources if name not in own]
-    faults = [_fault_of_unknown(unknown, own, inputs.told)] if unknown else []
+    faults = [_fault_of_unknown(unknown, own, inputs.origin)] if unknown else []
     faults += [fault for name, end in own.items() if (fault := _fault(system, end, inputs.sources.get(name)))]
     if inputs.is_complete:
         lacking = [name for name in own if name not in inputs.sources]
@@ -137,13 +137,13 @@ def external_inputs(system: System) -> dict[str, PortName]:
     return {f"{unit}.{name}": PortName(unit, name) for unit, names in system.externals.items() for name in names}
 
 
-def _fault_of_unknown(names: Sequence[str], own: Mapping[str, PortName], told: Mapping[str, Any]) -> str:
+def _fault_of_unknown(names: Sequence[str], own: Mapping[str, PortName], origin: Mapping[str, Any]) -> str:
     """Return what is wrong with values for inputs that do not come from outside, and what would be right."""
     parts = [f"{', '.join(names)}: this run takes no values from outside for {'it' if len(names) == 1 else 'them'}"]
     if own:
         parts += [nearest(name, own) for name in names]
-    if told.get("from") == "run":
-        parts.append(f"with which parameters the recorded run takes them is in {Path(told['folder']) / 'run.json'}")
+    if origin.get("from") == "run":
+        parts.append(f"with which parameters the recorded run takes them is in {Path(origin['folder']) / 'run.json'}")
     return "; ".join(parts)
 
 

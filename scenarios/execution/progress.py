@@ -43,11 +43,11 @@ def progress_bar(stream: TextIO) -> Generator[Callable[[float, float], None], No
 
 
 LOG_LEVELS = ("debug", "info", "warning", "error")
-"""From which level on logs can be told, as `log_told` takes it."""
+"""From which level on logs can be told, as `logging_to_standard_error` takes it."""
 
 
 @contextmanager
-def log_told(level: str | None) -> Generator[None, None, None]:
+def logging_to_standard_error(level: str | None) -> Generator[None, None, None]:
     """Tell of units' logs and of the master's progress on standard error, from a level on.
 
     `debug` has all that units log, by all their categories, `info` the master's progress. None leaves all as it is:

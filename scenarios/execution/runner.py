@@ -114,8 +114,8 @@ def run_task(
                 not_finite = outputs_not_finite(task.folder.signals, master.system)
     except InitializationError as e:
         with scenario_code(experiment):
-            told = settings_behind(e.failure.unit, experiment, parameters, task.seed, task.fmus)
-        raise InitializationError(e.failure, told) from e
+            reason = settings_behind(e.failure.unit, experiment, parameters, task.seed, task.fmus)
+        raise InitializationError(e.failure, reason) from e
     except UnitFailure as e:  # as units were loaded, terminated or freed
         if not began:
             raise

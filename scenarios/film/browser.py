@@ -66,7 +66,7 @@ def open_camera(html: str, size: tuple[int, int], *, dark: bool) -> Generator[Ca
     with sync_playwright() as playwright:
         browser = _launched(playwright)
         errors: list[str] = []
-        with _failures_told(errors):
+        with _browser_failures_raised(errors):
             page = browser.new_page(
                 viewport={"width": window[0], "height": window[1]},
                 device_scale_factor=scale,
@@ -89,7 +89,7 @@ def _camera(page: Page, errors: Sequence[str], window: tuple[int, int], scale: f
     asked = {"format": "png", "optimizeForSpeed": True, "clip": whole}
 
     def take(t: float) -> bytes:
-        with _failures_told(errors):
+        with _browser_failures_raised(errors):
             page.evaluate("t => film.show(t)", t)
             return base64.b64decode(cast(dict[str, Any], session.send("Page.captureScreenshot", asked))["data"])
 
@@ -114,7 +114,7 @@ def _launched(playwright: Playwright) -> Browser:
 
 
 @contextmanager
-def _failures_told(errors: Sequence[str]) -> Generator[None, None, None]:
+def _browser_failures_raised(errors: Sequence[str]) -> Generator[None, None, None]:
     try:
         yield
     except PlaywrightError as e:

@@ -26,9 +26,9 @@ def begun_content(shown: ShownRun) -> dict[str, Any]:
     assert scene is not None
     surroundings = {name: str(html) for name, html in scene.surroundings().items()}
     pushes = [{"bodies": push.labels, "greatest": push.greatest} for push in shown.pushes]
-    told = {"title": shown.run.title, "scene": scene.content(), "signals": list(scene.signals), "pushes": pushes}
+    facts = {"title": shown.run.title, "scene": scene.content(), "signals": list(scene.signals), "pushes": pushes}
     task = "" if shown.seat is None else shown.seat.task
-    return {**told, **surroundings, "hand": shown.seat is not None, "task": task}
+    return {**facts, **surroundings, "hand": shown.seat is not None, "task": task}
 
 
 def live_html(

@@ -70,9 +70,9 @@ def every_claim(claim: str, where: str, published: tuple[int, int], measured: tu
 
     Beyond the paper, `published` is (0, 0), and it holds or not.
     """
-    told = format_rate(*published) if published[1] else ""
+    published_rate = format_rate(*published) if published[1] else ""
     if not measured[1]:
-        return nothing_measured(claim, where, told, beyond=not published[1])
+        return nothing_measured(claim, where, published_rate, beyond=not published[1])
     interval, all_do = success_interval(*measured), measured[0] == measured[1]
     rule = f"{'Reproduced' if published[1] else 'Holds'} if every run succeeds; the interval is Clopper and Pearson's."
     if published[1]:
@@ -80,7 +80,7 @@ def every_claim(claim: str, where: str, published: tuple[int, int], measured: tu
         rule += f" Fisher's exact test against the published rate: p = {format_p_value(p)}."
     return Claim(
         claim=claim,
-        published=told,
+        published=published_rate,
         measured=format_rate(*measured),
         interval=(interval.low, interval.high),
         verdict=verdict_of(all_do, could_be_either=measured[1] >= _MIN_FOR_EVERY),

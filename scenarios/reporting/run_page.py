@@ -208,8 +208,8 @@ def master_section(facts: RunFacts) -> Section | None:
         raise InvalidRunFolder(facts.folder.path, fault) from e
     if not (rows or conversions or warnings or notes):
         return None
-    told = (("Warnings", warnings), ("Notes", notes))
-    html = template("run_master.html").render(rows=rows, conversions=conversions, told=told)
+    messages = (("Warnings", warnings), ("Notes", notes))
+    html = template("run_master.html").render(rows=rows, conversions=conversions, messages=messages)
     return Section(anchor="master", title="Master", html=Markup(html))
 
 

@@ -152,7 +152,7 @@ def configuration(task: Task) -> Configuration:
     if task.stop is not None:
         given["stop"] = str(task.stop)
     if task.inputs is not None:
-        given["inputs"] = dict(task.inputs.told)
+        given["inputs"] = dict(task.inputs.origin)
     return Configuration(
         **given,
         scenario=task.experiment.name,
@@ -303,8 +303,8 @@ def _given_rows(task: Task) -> list[list[str]]:
     rows = [[*(part.strip() for part in text.split("=", 1)), "given start value"] for text in given]
     rows += [[name, text, "given value of the unit's parameter"] for name, text in task.unit_values.items()]
     if task.inputs is not None:
-        told = ", ".join(f"{name} {value}" for name, value in task.inputs.told.items())
-        rows.append(["inputs", told, "where the inputs from outside came from"])
+        text = ", ".join(f"{name} {value}" for name, value in task.inputs.origin.items())
+        rows.append(["inputs", text, "where the inputs from outside came from"])
     return rows if task.stop is None else [*rows, ["stop", f"{float(task.stop):g} s", "given stop time of the run"]]
 
 

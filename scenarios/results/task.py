@@ -18,13 +18,13 @@ class InputSources:
 
     Attributes:
         sources: by `unit.input`; inputs from outside that are not among them keep what the system says of them.
-        told: what the run's folder is to say of that, as JSON can hold it; `from` is "run", "page" or "program".
+        origin: what the run's folder is to say of that, as JSON can hold it; `from` is "run", "page" or "program".
         where: how a message names them.
         is_complete: whether all the system's inputs from outside must be among them.
     """
 
     sources: Mapping[str, ExternalSource]
-    told: Mapping[str, Any]
+    origin: Mapping[str, Any]
     where: str = "inputs from outside"
     is_complete: bool = False
 

@@ -38,7 +38,7 @@ def feedthrough_of(md: "ModelDescription", ports: Iterable["FmuPort"]) -> Feedth
     declared, presumed, listed = structure.dependencies(md.outputs)
     presumed |= structure.unlisted(md.modelVariables, listed)
     initially, presumed_initially, listed = structure.dependencies(md.initialUnknowns)
-    told = {y for key in listed for y in structure.outputs[key]}
+    listed_initially = {y for key in listed for y in structure.outputs[key]}
     for y in structure.aliases_of_inputs:
         declared[y] |= structure.aliases_of_inputs[y]
     for y, us in declared.items():
@@ -47,7 +47,7 @@ def feedthrough_of(md: "ModelDescription", ports: Iterable["FmuPort"]) -> Feedth
         _sorted(declared),
         structure.on_all_inputs(presumed),
         _sorted(initially),
-        structure.on_all_inputs(presumed_initially | (presumed - told)),
+        structure.on_all_inputs(presumed_initially | (presumed - listed_initially)),
     )
 
 

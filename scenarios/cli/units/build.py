@@ -11,13 +11,13 @@ import click
 from handover.cosim.exceptions import nearest
 from handover.cosim.experiments.signal_table import InvalidTable
 from handover.fmus.binaries import NotCompiled
-from handover.fmus.build import InvalidName, InvalidStep, Proof, build
+from handover.fmus.build import ExperimentRequest, InvalidName, InvalidStep, build
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, own_unit
 from handover.fmus.compile import TARGETS, compile_runtime, has_compiler, is_current, named_platforms
 from handover.fmus.contents.fmi2_description import NoFmi2Form
 from handover.fmus.contents.icons import InvalidIcon
 from handover.fmus.contents.model_description import AmbiguousName, InvalidText
-from handover.fmus.contents.related_files import CannotProve, NothingToCompare
+from handover.fmus.contents.related_files import CannotRecordExperiment, NothingToCompare
 from handover.fmus.layout import DuplicateName
 from handover.fmus.sources import FileElsewhere, beside_block, closure
 from handover.fmus.standalone.freezer import CannotFreeze, check_standalone
@@ -165,7 +165,9 @@ def build_command(
         _check_what_goes_along(entries, platforms if standalone else None, include)
         _compile_missing(platforms)
         given = {"platforms": platforms or None, "standalone": standalone, "include": include}
-        make = partial(build, out_dir=out, scalar=scalar, proof=Proof(stimulus) if prove else None, **given)
+        make = partial(
+            build, out_dir=out, scalar=scalar, experiment=ExperimentRequest(stimulus) if prove else None, **given
+        )
         for line in _build_all(entries, fmi, make, out, named=bool(units)):
             click.echo(line)
 
@@ -213,7 +215,7 @@ def _build_all(
             except NoFmi2Form as e:
                 if named and fmi == "2":
                     raise UsageError(str(e)) from e
-            except (CannotProve, InvalidTable) as e:
+            except (CannotRecordExperiment, InvalidTable) as e:
                 raise UsageError(f"--prove: {e}") from e
             except CannotFreeze as e:
                 raise UsageError(f"--standalone: {e}") from e
@@ -234,4 +236,4 @@ def _made(entry: Entry, version: int, make: Callable[..., Path], *, named: bool)
         if named:
             raise
         click.echo(f"{e}; it is built without an experiment", err=True)
-        return make(entry, version, parameter_sets=sets, proof=None)
+        return make(entry, version, parameter_sets=sets, experiment=None)

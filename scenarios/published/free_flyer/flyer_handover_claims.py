@@ -36,7 +36,7 @@ _SAME = 0.001
 """Displacement by which the rate of control may make a difference, m: what is expected of it."""
 _MIN_FREE = 4
 """Runs without a gate of which something is concluded."""
-_TOLD_APART = 1.5
+_DIFFERING_RATIO = 1.5
 """Compliant over rigid displacement from which on the behaviours are told apart."""
 
 
@@ -303,13 +303,13 @@ def _limits_hide(runs: HandoverRuns) -> Claim:
     if not all(found.values()):
         return nothing_measured(**facts)
     ratios = {p: away[1] / away[0] for p, away in found.items()}
-    told = [label for label, away in _by_force(runs) if away[1] / away[0] >= _TOLD_APART]
+    differing = [label for label, away in _by_force(runs) if away[1] / away[0] >= _DIFFERING_RATIO]
     return Claim(
         **facts,
         measured=_by_propulsion(ratios),
-        verdict=verdict_of(ratios[Propulsion.LIMITED] < _TOLD_APART <= ratios[Propulsion.IDEAL]),
-        reason=f"Holds if the compliant one goes less than {_TOLD_APART:g} times as far along z with limits, and so "
-        f"far or farther with ideal thrust. Of the forces that both feel, so at: {'; '.join(told) or 'none'}.",
+        verdict=verdict_of(ratios[Propulsion.LIMITED] < _DIFFERING_RATIO <= ratios[Propulsion.IDEAL]),
+        reason=f"Holds if the compliant one goes less than {_DIFFERING_RATIO:g} times as far along z with limits, and "
+        f"so far or farther with ideal thrust. Of the forces that both feel, so at: {'; '.join(differing) or 'none'}.",
     )
 
 

@@ -19,7 +19,7 @@ from handover.cosim.experiments.reference_experiment import Difference, Setup, e
 from handover.cosim.experiments.signal_table import InvalidTable
 from handover.cosim.fmu.file.archive import FmuArchive, write_archive
 from handover.cosim.fmu.file.description import describe_fmu
-from handover.fmus.build import Proof, build
+from handover.fmus.build import ExperimentRequest, build
 from handover.fmus.catalog import Entry
 from handover.fmus.contents.reference_experiment import (
     default_stimulus,
@@ -27,7 +27,13 @@ from handover.fmus.contents.reference_experiment import (
     record_experiment,
     relative_tolerance,
 )
-from handover.fmus.contents.related_files import PAGE, CannotProve, InvalidParameterSet, NothingToCompare, ParameterSet
+from handover.fmus.contents.related_files import (
+    PAGE,
+    CannotRecordExperiment,
+    InvalidParameterSet,
+    NothingToCompare,
+    ParameterSet,
+)
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema" / "fmi3"
 FORMS = [(2, False), (3, False), (3, True)]
@@ -74,7 +80,7 @@ def setup_of(fmu: Path) -> Setup:
 
 
 def test_an_experiment_is_stored_with_its_result(tmp_path: Path):
-    fmu = build(EVERY_KIND, 3, tmp_path, platforms=["host"], parameter_sets=SETS, proof=Proof())
+    fmu = build(EVERY_KIND, 3, tmp_path, platforms=["host"], parameter_sets=SETS, experiment=ExperimentRequest())
     files = contents(fmu)
     schema().validate(io.BytesIO(files[MANIFEST]))
     listed, findings = related_files(FmuArchive(fmu))
@@ -94,7 +100,15 @@ def test_an_experiment_is_stored_with_its_result(tmp_path: Path):
 @pytest.mark.slow
 @pytest.mark.parametrize(("fmi", "scalar"), FORMS)
 def test_an_experiment_is_repeated_in_each_form(tmp_path: Path, fmi: int, scalar: bool):
-    fmu = build(EVERY_KIND, fmi, tmp_path, scalar=scalar, platforms=["host"], parameter_sets=SETS, proof=Proof())
+    fmu = build(
+        EVERY_KIND,
+        fmi,
+        tmp_path,
+        scalar=scalar,
+        platforms=["host"],
+        parameter_sets=SETS,
+        experiment=ExperimentRequest(),
+    )
     schema().validate(io.BytesIO(contents(fmu)[MANIFEST]))
     report = check_fmu(fmu, 60.0)
     assert report.passed
@@ -113,7 +127,7 @@ def test_without_proof_there_are_source_documents_and_parameters(tmp_path: Path)
 def test_a_stimulus_of_ones_own_is_played(tmp_path: Path):
     given = tmp_path / "given.csv"
     given.write_text("time,u\n0.0,1.0\n0.1,10.0\n0.2,10.0\n")
-    fmu = build(SAMPLED, 3, tmp_path, platforms=["host"], proof=Proof(given))
+    fmu = build(SAMPLED, 3, tmp_path, platforms=["host"], experiment=ExperimentRequest(given))
     result = rows_of(contents(fmu)[f"{FOLDER}/smoke-test/result.csv"])
     assert [float(row["time"]) for row in result] == pytest.approx([k / 30 for k in range(7)])
     gained = [float(after["y"]) - float(before["y"]) for before, after in itertools.pairwise(result)]
@@ -134,7 +148,7 @@ def test_a_stimulus_at_fault_is_refused_before_anything_is_written(tmp_path: Pat
     given = tmp_path / "given.csv"
     given.write_text(content)
     with pytest.raises(InvalidTable) as caught:
-        build(CHAOTIC, 3, tmp_path / "out", platforms=["host"], proof=Proof(given))
+        build(CHAOTIC, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest(given))
     assert wanted in str(caught.value)
     assert not (tmp_path / "out").exists()
 
@@ -143,7 +157,7 @@ def test_a_step_that_the_unit_does_not_take_is_refused(tmp_path: Path):
     given = tmp_path / "given.csv"
     given.write_text("time,u\n0.0,1.0\n0.25,1.0\n")
     with pytest.raises(InvalidTable, match=r"0\.25 s lies within a step: the unit takes only steps of 0\.0333333 s"):
-        build(SAMPLED, 3, tmp_path / "out", platforms=["host"], proof=Proof(given))
+        build(SAMPLED, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest(given))
 
 
 @pytest.mark.slow
@@ -151,11 +165,11 @@ def test_the_tolerance_is_what_rounding_makes_of_the_outputs(tmp_path: Path):
     """A difference of 1e-13 of 0.3 becomes 2^20 times that in 20 steps: 3e-8 of 0.3; in 50 nothing of it is left."""
     given = tmp_path / "given.csv"
     given.write_text("time,x\n0.0,0.3\n2.0,0.3\n")
-    relative = setup_of(build(CHAOTIC, 3, tmp_path, platforms=["host"], proof=Proof(given))).relative
+    relative = setup_of(build(CHAOTIC, 3, tmp_path, platforms=["host"], experiment=ExperimentRequest(given))).relative
     assert relative is not None
     assert 10 * 3e-14 * 2**20 / 0.95 <= relative <= 2 * 10 * 3e-14 * 2**20 / 0.3
-    with pytest.raises(CannotProve, match="output 'y' changes as inputs round"):
-        build(CHAOTIC, 3, tmp_path / "out", platforms=["host"], proof=Proof())
+    with pytest.raises(CannotRecordExperiment, match="output 'y' changes as inputs round"):
+        build(CHAOTIC, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest())
     assert not (tmp_path / "out").exists()
 
 
@@ -185,19 +199,21 @@ def test_a_tolerance_is_measured_only_where_an_input_changes(
 
 def test_a_unit_of_pictures_has_nothing_to_compare(tmp_path: Path):
     with pytest.raises(NothingToCompare, match="all are binary"):
-        build(EYE, 3, tmp_path / "out", platforms=["host"], proof=Proof())
+        build(EYE, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest())
 
 
 def test_a_unit_that_fails_is_not_proven(tmp_path: Path):
     given = tmp_path / "given.csv"
     given.write_text("time,a\n0.0,1.0\n0.1,666\n0.3,1\n")
-    with pytest.raises(CannotProve, match=r"fmi3DoStep at t = 0\.1 s answered Error .*the number of the beast"):
-        build(EVERY_KIND, 3, tmp_path / "out", platforms=["host"], proof=Proof(given))
+    with pytest.raises(
+        CannotRecordExperiment, match=r"fmi3DoStep at t = 0\.1 s answered Error .*the number of the beast"
+    ):
+        build(EVERY_KIND, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest(given))
 
 
 @pytest.mark.slow
 def test_a_result_of_other_parameters_is_reported(tmp_path: Path):
-    fmu = build(SAMPLED, 3, tmp_path, platforms=["host"], proof=Proof())
+    fmu = build(SAMPLED, 3, tmp_path, platforms=["host"], experiment=ExperimentRequest())
     files = contents(fmu)
     files["modelDescription.xml"] = files["modelDescription.xml"].replace(b'start="0.1"', b'start="0.2"')
     report = check_fmu(write_archive(tmp_path / "other.fmu", files), 60.0)

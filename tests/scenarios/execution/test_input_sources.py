@@ -173,16 +173,16 @@ def test_a_series_of_another_size_is_refused():
 
 def test_a_run_is_resumed_with_the_inputs_that_it_played_back_and_not_with_those_of_a_program(tmp_path: Path):
     handover.run(pushed_mass(None), out=tmp_path / "mass", stop=Fraction(1, 10), progress=False)
-    told = played_back(tmp_path / "mass").told
+    origin = played_back(tmp_path / "mass").origin
     folder = RunFolder(tmp_path / "resumed")
     assert resumed_inputs(folder, None) is None
-    inputs = resumed_inputs(folder, told)
+    inputs = resumed_inputs(folder, origin)
     assert inputs is not None
     assert list(inputs.sources) == ["mass.f"]
     with pytest.raises(InvalidRunFolder, match="from a program, which is gone; begin it once more with --inputs-from"):
         resumed_inputs(folder, {"from": "program"})
     with pytest.raises(InvalidRunFolder, match="is another one"):
-        resumed_inputs(folder, {**told, "sha256": "0"})
+        resumed_inputs(folder, {**origin, "sha256": "0"})
 
 
 def held_until(released: float, force: float) -> dict[str, ExternalSource]:

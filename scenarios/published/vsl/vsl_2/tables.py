@@ -94,8 +94,8 @@ def _others(runs: Vsl2Runs) -> ComparisonTable:
             values = [runs.metric("mean_error", case, method, arm) for method in methods]
             outside = np.concatenate([runs.metric("outside", case, method, arm) for method in runs.learned])
             share = _share(outside) if any(found) else ""
-            told = [_share(runs.metric("model_mismatch", case, method, arm)) for method in runs.feedback]
-            rows.append([arm.label, case.label, *(format_mean(v) for v in values), share, *told])
+            mismatched = [_share(runs.metric("model_mismatch", case, method, arm)) for method in runs.feedback]
+            rows.append([arm.label, case.label, *(format_mean(v) for v in values), share, *mismatched])
     return ComparisonTable(
         title="The trained arm and others: mean errors (mm)",
         header=[
