@@ -7,13 +7,12 @@ are one slice.
 
 import dataclasses
 import enum
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from handover.cosim.blocks.description import Description
 from handover.cosim.blocks.ports import Width
-from handover.cosim.blocks.variable import Causality, Kind, Variable
+from handover.cosim.blocks.variable import Causality, Kind, Variable, element_names
 
 CLOCK = 2
 """Entries at the start of the real buffer: the time and the step size."""
@@ -215,14 +214,6 @@ def _narrow(v: Variable) -> Variable:
     declared = [n for n in (v.start, v.minimum, v.maximum) if n is not None]
     fits = v.width is Width.INT64 and all(map(Width.INT32.holds, declared))
     return dataclasses.replace(v, width=Width.INT32) if fits else v
-
-
-def element_names(variable: Variable) -> list[str]:
-    """Return the names of a variable's entries, `p_WG[1]` or `cov_O[1,1]`, in row-major order; a scalar's own name."""
-    if not variable.shape:
-        return [variable.name]
-    indices = itertools.product(*(range(1, extent + 1) for extent in variable.shape))
-    return [f"{variable.name}[{','.join(map(str, index))}]" for index in indices]
 
 
 def capacity(variable: Variable) -> int:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import enum
+import itertools
 import math
 from typing import Any
 
@@ -57,6 +58,21 @@ class Declared:
         """Kind, with the width of numbers where it is not the usual one, as in `integer (Int16)`."""
         usual = self.width in (None, Width.FLOAT64, Width.INT64)
         return self.kind.value if usual or self.width is None else f"{self.kind.value} ({self.width.value})"
+
+
+def indices_of(shape: tuple[int, ...]) -> list[tuple[int, ...]]:
+    """Return the indices of an array's entries, counted from 1, in row-major order; one empty index for a scalar."""
+    return list(itertools.product(*(range(1, n + 1) for n in shape)))
+
+
+def subscript(index: tuple[int, ...]) -> str:
+    """Return what the structured naming of FMI puts behind an array's name: `[1]`, `[2,1]`; nothing for a scalar."""
+    return f"[{','.join(map(str, index))}]" if index else ""
+
+
+def element_names(variable: Declared) -> list[str]:
+    """Return the names of a variable's entries, `p_WG[1]` or `cov_O[1,1]`, in row-major order; a scalar's own name."""
+    return [variable.name + subscript(index) for index in indices_of(variable.shape)]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

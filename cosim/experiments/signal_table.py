@@ -17,11 +17,11 @@ from fractions import Fraction
 from typing import Any
 
 from handover.cosim.blocks.start_values import range_of
-from handover.cosim.blocks.variable import Kind
+from handover.cosim.blocks.variable import Kind, element_names
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.buffers import Views
 from handover.cosim.fmu.file.default_experiment import exact_seconds
-from handover.cosim.fmu.file.description import FmuPort, indices_of
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.start_values import parsed_number
 
 TIME = "time"
@@ -85,8 +85,7 @@ def columns_of(ports: Iterable[FmuPort]) -> dict[str, Column]:
     """Return the columns of variables, by name."""
     columns: dict[str, Column] = {}
     for port in filter(has_columns, ports):
-        for i, index in enumerate(indices_of(port.shape)):
-            columns[f"{port.name}[{','.join(map(str, index))}]" if index else port.name] = port, i
+        columns |= {name: (port, i) for i, name in enumerate(element_names(port))}
     return columns
 
 

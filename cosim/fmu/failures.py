@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from handover.cosim.blocks.variable import subscript
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.start_values import LostValue
 
@@ -98,7 +99,7 @@ class NotFinite(UnitFailure):
     @property
     def element(self) -> str:
         """The element's name, as `y` or `p_WG[3]`."""
-        return self.port + (f"[{','.join(map(str, self.index))}]" if self.index else "")
+        return self.port + subscript(self.index)
 
     @property
     def what(self) -> str:

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.declarations import short_repr
 from handover.cosim.blocks.start_values import numbers_of
-from handover.cosim.blocks.variable import Kind
+from handover.cosim.blocks.variable import Kind, indices_of, subscript
 from handover.cosim.fmu.buffers import SignalBuffer, Views, content_of
-from handover.cosim.fmu.file.description import FmuDescription, FmuPort, indices_of
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 
 _BOOLEANS = {"true": 1, "1": 1, "false": 0, "0": 0}
 
@@ -98,7 +98,7 @@ def _differences(unit: str, port: FmuPort, value: Any, views: Views) -> list[Los
     else:
         differs = numbers != wanted
     indices = indices_of(port.shape)
-    elements = [(i, f"[{','.join(map(str, indices[i]))}]" if port.shape else "") for i in np.flatnonzero(differs)]
+    elements = [(i, subscript(indices[i])) for i in np.flatnonzero(differs)]
     return [LostValue(name + index, f"{wanted[i].item()!r}", f"{numbers[i].item()!r}") for i, index in elements]
 
 

@@ -4,7 +4,8 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
-from handover.cosim.fmu.file.description import FmuDescription, FmuPort, indices_of
+from handover.cosim.blocks.variable import indices_of
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 
 _SUBSCRIPT = re.compile(r"(?P<base>.+)\[(?P<indices>\d+(,\d+)*)\]$")
 

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Width
-from handover.cosim.blocks.variable import Kind
+from handover.cosim.blocks.variable import Kind, indices_of
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.buffers import Copy, Views, joined
 from handover.cosim.fmu.failures import NotFinite
-from handover.cosim.fmu.file.description import FmuPort, indices_of
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.instance import Instance
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import PortName, System

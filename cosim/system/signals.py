@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Raster
-from handover.cosim.blocks.variable import Kind
+from handover.cosim.blocks.variable import Kind, indices_of, subscript
 from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.buffers import Views
-from handover.cosim.fmu.file.description import FmuPort, indices_of
+from handover.cosim.fmu.file.description import FmuPort
 
 
 @dataclass(frozen=True)
@@ -104,9 +104,7 @@ class Signals:
             if port.kind in (Kind.BINARY, Kind.STRING):
                 continue
             values = self._views[name][0]
-            for i, index in enumerate(indices_of(port.shape)):
-                subscript = f"[{','.join(map(str, index))}]" if index else ""
-                columns.append(Column(name + subscript, port, values, i))
+            columns += [Column(name + subscript(x), port, values, i) for i, x in enumerate(indices_of(port.shape))]
         return columns
 
     def _of(self, name: str) -> tuple[Views, FmuPort]:

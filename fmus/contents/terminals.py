@@ -6,9 +6,10 @@ too; its `fmiVersion` there is that of the standard which defines it. A tool tha
 
 import xml.etree.ElementTree as ET
 
+from handover.cosim.blocks.variable import element_names
 from handover.fmus.contents.icons import graphical_representation
 from handover.fmus.contents.model_description import Model, to_xml
-from handover.fmus.layout import Form, element_names
+from handover.fmus.layout import Form
 
 SIGNAL = "signal"
 """The kind of variable whose values are to be equal at both ends; forces in space are signals too, by the standard."""

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.start_values import range_of
-from handover.cosim.blocks.variable import Kind
+from handover.cosim.blocks.variable import Kind, element_names
 from handover.cosim.exceptions import nearest
-from handover.cosim.fmu.file.description import FmuPort, indices_of
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.start_values import entries_of, parsed_number
 from handover.cosim.system.time_series import TimeSeries
 from handover.scenarios.execution.errors import UsageError
@@ -31,11 +31,7 @@ Column = tuple[FmuPort, int]
 
 def columns_of(ports: Mapping[str, FmuPort]) -> dict[str, Column]:
     """Return the names of all scalars among some ports: a port's own, or of an array `p[1]`, `p[2]`, ..."""
-    return {
-        f"{p.name}[{','.join(map(str, index))}]" if p.shape else p.name: (p, k)
-        for p in ports.values()
-        for k, index in enumerate(indices_of(p.shape))
-    }
+    return {name: (p, k) for p in ports.values() for k, name in enumerate(element_names(p))}
 
 
 def read_inputs(path: Path, inputs: Mapping[str, FmuPort], start: Mapping[str, Any]) -> dict[str, TimeSeries]:

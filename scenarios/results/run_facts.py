@@ -9,8 +9,8 @@ from typing import Any, cast
 
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.variable import indices_of, subscript
 from handover.cosim.exceptions import one_line
-from handover.cosim.fmu.file.description import indices_of
 from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import scenario_of
 from handover.scenarios.experiment.experiment import Experiment
@@ -118,5 +118,4 @@ def record_of(folder: RunFolder) -> Record | None:
 def elements_of(signal: str, values: NDArray[Any]) -> dict[str, NDArray[Any]]:
     """Return a signal's elements over time by the names of their columns in the record: `p`, or `p[1]`, `p[2]`, ..."""
     columns = values.reshape(len(values), -1)
-    subscripts = [",".join(map(str, index)) for index in indices_of(values.shape[1:])]
-    return {f"{signal}[{text}]" if text else signal: columns[:, k] for k, text in enumerate(subscripts)}
+    return {signal + subscript(index): columns[:, k] for k, index in enumerate(indices_of(values.shape[1:]))}

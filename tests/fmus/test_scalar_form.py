@@ -13,7 +13,8 @@ import pytest
 from ctypes_host import ERROR, OK, SIZE, CtypesHost
 from fmpy.validation import validate_fmu
 
-from handover.cosim.fmu.file.description import describe_fmu, indices_of
+from handover.cosim.blocks.variable import indices_of
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.system.signals import Signals
 from handover.fmus.build import build_block, cached

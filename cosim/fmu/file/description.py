@@ -5,7 +5,6 @@ FMI 2 has no arrays, and some tools do not use those of FMI 3: scalar variables 
 and both forms are interchangeable.
 """
 
-import itertools
 import re
 from collections import defaultdict
 from collections.abc import Mapping
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
-from handover.cosim.blocks.variable import Causality, Declared, Kind
+from handover.cosim.blocks.variable import Causality, Declared, Kind, element_names, indices_of
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.file.archive import FmuArchive
 from handover.cosim.fmu.file.clocks import FmuClock, clocks_of, without_clocks
@@ -95,11 +94,6 @@ def capabilities_of(root: XmlElement, fmi: int) -> Capabilities:
     )
 
 
-def indices_of(shape: tuple[int, ...]) -> list[tuple[int, ...]]:
-    """Return the indices of an array's entries, counted from 1, in row-major order; one empty index for a scalar."""
-    return list(itertools.product(*(range(1, n + 1) for n in shape)))
-
-
 @dataclass(frozen=True, kw_only=True)
 class FmuPort(Declared):
     """A parameter, input or output of an FMU, or another variable whose start value can be given.
@@ -135,7 +129,7 @@ class FmuPort(Declared):
         """Names of its variables in the FMU: its own, or one for each entry."""
         if len(self.references) == 1:
             return [self.name]
-        return [f"{self.name}[{','.join(map(str, index))}]" for index in indices_of(self.shape)]
+        return element_names(self)
 
     @property
     def signature(self) -> str:
