@@ -1,6 +1,5 @@
 """Instances of a unit that brings its interpreter: one process for all, and what becomes of them if it fails."""
 
-import copy
 import ctypes
 import json
 import os
@@ -11,7 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from ctypes_host import ERROR, OK, SIZE, CtypesHost, Log3
+from ctypes_host import ERROR, OK, SIZE, CtypesHost
+from instances import free, process
+from instances import instance as initialised
 from sample_units.trouble import Deed
 
 from handover.fmus.build import build, build_block
@@ -52,22 +53,9 @@ def host(fmu: Path) -> Iterator[CtypesHost]:
 
 def instance(host: CtypesHost) -> CtypesHost:
     """Return a host of one more instance in the same folder, which has stepped once."""
-    other = copy.copy(host)
-    other.instance, other.log = None, []
-    other.logger3 = Log3(other._take_3)  # pyright: ignore[reportPrivateUsage]
-    assert other.instantiate(), other.log
-    assert other.initialise() == OK, other.log
+    other = initialised(host)
     assert other.step(0.0, DT) == OK, other.log
     return other
-
-
-def process(host: CtypesHost) -> int:
-    return int(host.get("process")[0])
-
-
-def free(host: CtypesHost) -> None:
-    host.call("FreeInstance")
-    host.instance = None
 
 
 def do(host: CtypesHost, deed: Deed) -> int:

@@ -1,6 +1,5 @@
 """What a host does while the process that its instances share crashes or ends; its program is a script, not frozen."""
 
-import copy
 import subprocess
 import sys
 import threading
@@ -8,7 +7,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from ctypes_host import OK, CtypesHost, Log3
+from ctypes_host import CtypesHost
+from instances import free, instance, process
 
 from handover.fmus.build import build_block
 from handover.fmus.compile import RUNTIME, host_platform, zig_cc
@@ -61,25 +61,6 @@ def host_of(fmu: Path) -> Iterator[Callable[[str], CtypesHost]]:
     yield host
     for each in made:
         each.close()
-
-
-def instance(host: CtypesHost) -> CtypesHost:
-    """Return a host of one more instance in the same folder."""
-    other = copy.copy(host)
-    other.instance, other.log = None, []
-    other.logger3 = Log3(other._take_3)  # pyright: ignore[reportPrivateUsage]
-    assert other.instantiate(), other.log
-    assert other.initialise() == OK, other.log
-    return other
-
-
-def process(host: CtypesHost) -> int:
-    return int(host.get("process")[0])
-
-
-def free(host: CtypesHost) -> None:
-    host.call("FreeInstance")
-    host.instance = None
 
 
 def test_an_instance_gets_another_process_where_the_one_that_runs_is_about_to_crash(

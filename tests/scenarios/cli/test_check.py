@@ -39,7 +39,7 @@ def assert_passes(unit: str, fmi: int) -> None:
     assert result.exit_code == 0, result.output
     (report,) = json.loads(result.output)
     assert all(c["result"] in ("ok", "note") for c in report["checks"]), result.output
-    assert "second instance, reset" in report["checks"][-1]["told"]
+    assert "second instance, reset" in report["checks"][-1]["summary"]
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
