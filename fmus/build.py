@@ -25,6 +25,7 @@ from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.experiments import manifest as manifest_format
 from handover.cosim.fmu.file import archive as archive_format
 from handover.cosim.fmu.file.archive import TERMINALS, FmuArchive, write_archive
+from handover.cosim.fmu.file.icon import icon_files
 from handover.fmus import interpreter
 from handover.fmus.binaries import binaries
 from handover.fmus.catalog import Entry, find_unit, import_class
@@ -32,7 +33,7 @@ from handover.fmus.compile import cache_folder, host_platform
 from handover.fmus.contents.documentation import page
 from handover.fmus.contents.fmi2_description import fmi2_description
 from handover.fmus.contents.fmi3_description import fmi3_description
-from handover.fmus.contents.icons import icon_files, icon_of
+from handover.fmus.contents.icons import block_icon
 from handover.fmus.contents.model_description import Model
 from handover.fmus.contents.related_files import ParameterSet, related_files
 from handover.fmus.contents.terminals import terminals_file
@@ -199,7 +200,7 @@ def build(
     if not (entry.name.isidentifier() and entry.name.isascii()):
         raise InvalidName(entry.name)
     _check_step(entry.step)
-    icon = icon_of(entry)
+    icon = block_icon(entry)
     sources = {path: file.read_bytes() for path, file in carried.files.items()}
     sources |= {path: file.read_bytes() for path, file in beside_block(entry.block, include).items()}
     packages = carried.packages()
@@ -289,7 +290,7 @@ def _content_key(entry: Entry, form: Form, carried: Carried) -> str:
     builder = [*own, *(Path(m.__file__ or "") for m in _OUTSIDE)]
     parts = {path: file.read_bytes() for path, file in carried.files.items()}
     parts |= {f"builder/{file.parent.name}/{file.name}": file.read_bytes() for file in builder if file.is_file()}
-    parts |= icon_files(icon_of(entry), form.fmi)
+    parts |= icon_files(block_icon(entry), form.fmi)
     parts |= binaries(entry.name, form.fmi)
     parts |= {f"environment/{module}": _version_mark(module) for module in carried.modules}
     parts |= {"interpreter": os.fsencode(interpreter.describe()), "entry": repr((entry, form)).encode()}

@@ -7,14 +7,12 @@ without crossing it.
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Causality
-from handover.cosim.fmu.file.archive import FmuArchive
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.graph import bent, places
 from handover.cosim.system.system import PortName, System
@@ -30,10 +28,6 @@ _STUB = 10.0
 _MARGIN = 10.0
 _EVERY = 5
 """Of the points of a bent line, the share that a diagram gets is one in so many."""
-
-_ICONS = ("terminalsAndIcons/icon.png", "model.png")
-"""Where FMI 3 and FMI 2 have an FMU's icon; an FMU may have both."""
-
 
 _LEFT, _RIGHT = np.array([-1.0, 0.0]), np.array([1.0, 0.0])
 _DOWN, _UP = np.array([0.0, -1.0]), np.array([0.0, 1.0])
@@ -53,17 +47,6 @@ class _Spot(NamedTuple):
 
     at: Floats
     side: Floats
-
-
-def icon_of(fmu: Path) -> bytes | None:
-    """Return an FMU's icon, a PNG, None if it has none.
-
-    Raises:
-        InvalidFmu: it is damaged.
-    """
-    archive = FmuArchive(fmu)
-    found = next((name for name in _ICONS if name in archive.names), None)
-    return None if found is None else archive.read(found)
 
 
 class Diagram:

@@ -14,10 +14,11 @@ from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import NotExportable
-from handover.cosim.fmu.file.archive import write_archive
+from handover.cosim.fmu.file.archive import FmuArchive, write_archive
 from handover.cosim.fmu.file.default_experiment import proposed_step
 from handover.cosim.fmu.file.description import FmuPort
-from handover.cosim.ssp.geometry import ConnectorName, Diagram, add_external_connectors, icon_of
+from handover.cosim.fmu.file.icon import read_icon
+from handover.cosim.ssp.geometry import ConnectorName, Diagram, add_external_connectors
 from handover.cosim.ssp.xml import (
     OMS_ANNOTATION,
     OMS_NAMESPACE,
@@ -187,8 +188,8 @@ def write_ssp(
     bound = {n: u for n, u in system.units.items() if bound_values(u)}
     sets = {n: f"resources/{_plain(n)}-{k}.ssv" for k, n in enumerate(bound, 1)}
     contents |= {sets[n]: parameter_set(u, version, name) for n, u in bound.items()}
-    pictures = {fmu: (f"resources/{Path(file).stem}.png", icon_of(fmu)) for fmu, file in files.items()}
-    icons = {fmu: (member, png) for fmu, (member, png) in pictures.items() if png is not None}
+    pngs = {fmu: read_icon(FmuArchive(fmu)).png for fmu in files}
+    icons = {fmu: (f"resources/{Path(files[fmu]).stem}.png", png) for fmu, png in pngs.items() if png}
     contents |= dict(icons.values())
     drawn = {fmu: member for fmu, (member, _) in icons.items()}
     contents[STRUCTURE] = _Structure(system, version, files, drawn, sets, parallel_step).content(name, stop)

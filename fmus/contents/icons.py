@@ -7,21 +7,14 @@ icons`), so that building an FMU needs no renderer. A unit of one's own has the 
 
 import inspect
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
-from handover.cosim.fmu.file.xml import UnsafeXml, parse_xml
+from handover.cosim.fmu.file.icon import Icon, png_fault, svg_fault
 from handover.fmus.catalog import UNITS, Entry, import_class
 from handover.fmus.contents.model_description import number
 
 _FOLDER = Path(__file__).parents[1] / "icons"
 _OF_ANY_BLOCK = _FOLDER / "block.svg"
-_PNG = b"\x89PNG\r\n\x1a\n"
-"""With what every PNG begins."""
-
-_FMI2_PNG = "model.png"
-_FMI3_PNG, _FMI3_SVG = "terminalsAndIcons/icon.png", "terminalsAndIcons/icon.svg"
 
 _CORNER = 100.0
 """Half the side of an icon, in the units of its coordinate system."""
@@ -40,21 +33,13 @@ class InvalidIcon(ValueError):
         self.block, self.icon, self.fault = block, icon, fault
 
 
-@dataclass(frozen=True)
-class Icon:
-    """A unit's icon: the contents of a PNG, and of an SVG, which is empty if there is none."""
-
-    png: bytes
-    svg: bytes
-
-
 def catalog_icon(name: str) -> Path:
     """Return the SVG of a unit of the catalog, and the one of any block for every other name."""
     own = _FOLDER.glob(f"*/{name}.svg") if name in UNITS else ()
     return next(iter(own), _OF_ANY_BLOCK)
 
 
-def icon_of(entry: Entry) -> Icon:
+def block_icon(entry: Entry) -> Icon:
     """Return the icon of a unit of the catalog, or of one's own.
 
     Raises:
@@ -83,23 +68,11 @@ def _read(svg: Path, png: Path | None = None) -> Icon:
 
 
 def _checked(block: str, name: str, icon: Icon) -> Icon:
-    if not icon.png.startswith(_PNG):
-        raise InvalidIcon(block, name, "that is no PNG")
-    if icon.svg:
-        try:
-            is_drawing = parse_xml(icon.svg).tag == "{http://www.w3.org/2000/svg}svg"
-        except UnsafeXml as e:
-            raise InvalidIcon(block, name, f"the SVG of that name cannot be read: {e}") from e
-        if not is_drawing:
-            raise InvalidIcon(block, name, "the SVG of that name does not begin with <svg> of its namespace")
+    if fault := png_fault(icon.png):
+        raise InvalidIcon(block, name, fault)
+    if icon.svg and (fault := svg_fault(icon.svg)):
+        raise InvalidIcon(block, name, f"the SVG of that name {fault}")
     return icon
-
-
-def icon_files(icon: Icon, fmi: int) -> Mapping[str, bytes]:
-    """Return an icon's files by their paths in an FMU of FMI 2 or 3, as the standards name them."""
-    if fmi == 2:
-        return {_FMI2_PNG: icon.png}
-    return {_FMI3_PNG: icon.png, **({_FMI3_SVG: icon.svg} if icon.svg else {})}
 
 
 def graphical_representation() -> ET.Element:

@@ -3,6 +3,7 @@
 The layout is that of `handover.cosim.system.graph`, which draws the same for notebooks.
 """
 
+import base64
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -138,10 +139,20 @@ def _nodes(places: Sequence[Floats], colours: Sequence[str], scale: float) -> An
     )
 
 
+def _icon(unit: Mapping[str, Any]) -> str:
+    """Return the icon that was in the unit's FMU; where none is kept, that of the catalog's unit, or of any block."""
+    if "icon" not in unit:
+        return picture_source(catalog_icon(unit["model"]).read_bytes(), "image/svg+xml")
+    mime = unit["icon"]["type"]
+    if mime not in ("image/svg+xml", "image/png"):
+        raise ValueError(f"an icon of type {mime!r:.40}")
+    return picture_source(base64.b64decode(unit["icon"]["base64"], validate=True), mime)
+
+
 def _picture(unit: Mapping[str, Any], at: Floats, size: float) -> dict[str, Any]:
     """Return a unit's icon, as high as `size`, in units of the axis; it is square."""
     return {
-        "source": picture_source(catalog_icon(unit["model"]).read_bytes(), "image/svg+xml"),
+        "source": _icon(unit),
         "xref": "x",
         "yref": "y",
         "x": float(at[0]),

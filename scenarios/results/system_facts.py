@@ -4,6 +4,7 @@
 metrics that every run has.
 """
 
+import base64
 import re
 import statistics
 import sys
@@ -12,14 +13,27 @@ from typing import Any
 
 import numpy as np
 
+from handover.cosim.fmu.file.archive import FmuArchive
+from handover.cosim.fmu.file.icon import read_icon
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.iteration import IterationCount
 from handover.cosim.system.system import Connection, PlacedUnit, System
+from handover.fmus.contents.icons import catalog_icon
 from handover.scenarios.experiment.experiment import Experiment, Metric
+
+_MAX_ICON = 200_000
+"""Bytes of an icon that is kept: each run of a campaign keeps its own."""
 
 
 def describe_system(system: System, *, adaptive: bool) -> dict[str, Any]:
-    """Return the units and connections of a checked system, as JSON can hold them; for `adaptive` see `own_period`."""
+    """Return the units and connections of a checked system, as JSON can hold them; for `adaptive` see `own_period`.
+
+    A unit has the icon in its FMU, as the FMU may be gone or changed when a report is made of the folder; not that
+    which the catalog has for its name anyway, nor one of more than 200 kB.
+
+    Raises:
+        InvalidFmu: an FMU is damaged.
+    """
     units = [
         {
             "name": name,
@@ -27,10 +41,20 @@ def describe_system(system: System, *, adaptive: bool) -> dict[str, Any]:
             "fmi": str(unit.description.fmi),
             "period": own_period(unit, adaptive=adaptive),
             "sampled": unit.sampled,
+            **_own_icon(unit),
         }
         for name, unit in system.units.items()
     ]
     return {"units": units, "connections": [_describe_connection(system, c) for c in system.connections]}
+
+
+def _own_icon(unit: PlacedUnit) -> dict[str, dict[str, str]]:
+    mime, content = read_icon(FmuArchive(unit.description.path)).best
+    drawing = catalog_icon(unit.description.name)
+    is_catalogs = content in (drawing.read_bytes(), drawing.with_suffix(".png").read_bytes())
+    if not content or len(content) > _MAX_ICON or is_catalogs:
+        return {}
+    return {"icon": {"type": mime, "base64": base64.b64encode(content).decode()}}
 
 
 def own_period(unit: PlacedUnit, *, adaptive: bool) -> float | None:

@@ -9,7 +9,7 @@ from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.description import Description, describe
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, find_unit, import_class, installed_units
 from handover.fmus.contents.documentation import seconds
-from handover.fmus.contents.icons import InvalidIcon, icon_of
+from handover.fmus.contents.icons import InvalidIcon, block_icon
 from handover.scenarios.catalog import SYSTEMS
 from handover.scenarios.cli.summaries.port_tables import port_rows
 from handover.scenarios.reporting.html import picture_source, rows_table
@@ -47,11 +47,11 @@ def _unit(name: str) -> Markup:
     try:
         entry = find_unit(name)
         description = describe(import_class(entry.block))
-        icon = icon_of(entry)
+        icon = block_icon(entry)
     except (UnknownBlock, DeclarationError, InvalidIcon) as e:
         return _html(name, fault=str(e))
-    picture = picture_source(icon.svg, "image/svg+xml") if icon.svg else picture_source(icon.png, "image/png")
-    return _html(name, entry, description, picture)
+    mime, content = icon.best
+    return _html(name, entry, description, picture_source(content, mime))
 
 
 def _html(

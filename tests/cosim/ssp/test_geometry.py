@@ -13,7 +13,8 @@ from native_units import native_fmu
 from numpy.typing import NDArray
 from ssp_schemas import expect_valid
 
-from handover.cosim.ssp.geometry import icon_of
+from handover.cosim.fmu.file.archive import FmuArchive
+from handover.cosim.fmu.file.icon import Icon, read_icon
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.ssp.xml import NAMESPACES
 from handover.cosim.system.graph import places
@@ -134,9 +135,9 @@ def test_units_have_the_icons_of_their_fmus_which_come_along(fmu: FmuOf, tmp_pat
     named = {n: c.find("ssd:ElementGeometry", NAMESPACES).get("iconSource") for n, c in drawn.components.items()}  # pyright: ignore[reportOptionalMemberAccess]
     assert named["one"] == named["other"] != named["three"]
     assert named["foreign"] is None
-    assert drawn.files[str(named["one"])] == icon_of(fmu("Mass", 2))
-    assert drawn.files[str(named["three"])] == icon_of(fmu("Spring", 3))
-    assert icon_of(native_fmu("mass", 2)) is None
+    assert drawn.files[str(named["one"])] == read_icon(FmuArchive(fmu("Mass", 2))).png
+    assert drawn.files[str(named["three"])] == read_icon(FmuArchive(fmu("Spring", 3))).png
+    assert read_icon(FmuArchive(native_fmu("mass", 2))) == Icon()
     assert [name for name in drawn.files if name.endswith(".png")] == sorted({str(named["one"]), str(named["three"])})
 
 

@@ -9,11 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from native_units import native_fmu
 
+from handover.cosim.fmu.file.archive import FmuArchive, write_archive
+from handover.cosim.system.system import System
+from handover.fmus.build import cached
 from handover.fmus.contents.icons import catalog_icon
 from handover.scenarios.reporting.graph import bent, graph_section, places, rate
+from handover.scenarios.reporting.html import picture_source
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.results.system_facts import describe_system
 
 LOOP = [("camera", "vision"), ("vision", "servo"), ("servo", "arm"), ("arm", "camera"), ("arm", "hand"),
         ("hand", "arm"), ("hand", "camera")]  # fmt: skip
@@ -79,6 +85,36 @@ def test_each_unit_has_its_icon_and_one_of_another_package_that_of_any_block():
     assert shown == [catalog_icon(name).read_bytes() for name in ("TendonArm", "PoseController", "block")]
     nodes = figure["data"][-1]
     assert [(i["x"], i["y"]) for i in figure["layout"]["images"]] == list(zip(nodes["x"], nodes["y"], strict=True))
+
+
+def pictures(units: list[dict[str, Any]]) -> list[str]:
+    section = graph_section({"system": {"units": units, "connections": []}})
+    assert section is not None
+    figure = json.loads(re.findall(r'<script type="application/json">(.*?)</script>', str(section.html))[0])
+    return [image["source"] for image in figure["layout"]["images"]]
+
+
+@pytest.mark.parametrize(("fmi", "member"), [(2, "model.png"), (3, "terminalsAndIcons/icon.svg")])
+def test_a_unit_of_ones_own_has_the_icon_in_its_fmu(fmi: int, member: str, tmp_path: Path):
+    mass = FmuArchive(native_fmu("mass", fmi))
+    catalogs = catalog_icon("Thrusters")
+    own = catalogs.with_suffix(".png") if member.endswith(".png") else catalogs
+    files = {name: mass.read(name) for name in mass.names if not name.endswith("/")}
+    mine = write_archive(tmp_path / "mine.fmu", {**files, member: own.read_bytes()})
+    system = System()
+    for name, fmu in (("mine", mine), ("none", mass.path), ("push", cached("Push", fmi))):
+        system.add(name, fmu)
+    kept = describe_system(system, adaptive=False)["units"]
+    assert [u["name"] for u in kept if "icon" in u] == ["mine"]
+    shown = pictures(json.loads(json.dumps(kept)))
+    of_catalog = [picture_source(catalog_icon(name).read_bytes(), "image/svg+xml") for name in ("block", "Push")]
+    assert shown == [picture_source(own.read_bytes(), f"image/{'png' if fmi == 2 else 'svg+xml'}"), *of_catalog]
+
+
+@pytest.mark.parametrize("icon", [{"type": "text/html", "base64": ""}, {"type": "image/png", "base64": "https://a.b"}])
+def test_what_a_run_says_to_be_an_icon_is_a_picture(icon: dict[str, str]):
+    with pytest.raises(ValueError, match=r"an icon of type 'text/html'|base64|padding"):
+        pictures([unit("a", icon=icon)])
 
 
 def test_a_conversion_stands_in_the_table():
