@@ -106,7 +106,7 @@ def _plot(units: Sequence[Mapping[str, Any]], bundles: _Bundles) -> Markup:
     bottom = -top - (_LABEL + 3 * _LINE * detailed) * pixel
     axis = {"visible": False, "fixedrange": True}
     figure = go.Figure(
-        [*drawn, *heads, _nodes(list(at.values()), list(colour.values()), scale)],
+        [*drawn, *heads, _nodes([at[name] for name in names], [colour[name] for name in names], scale)],
         {
             "xaxis": {**axis, "range": [-1.6, 1.6]},
             "yaxis": {**axis, "range": [bottom, top]},

@@ -87,6 +87,17 @@ def test_each_unit_has_its_icon_and_one_of_another_package_that_of_any_block():
     assert [(i["x"], i["y"]) for i in figure["layout"]["images"]] == list(zip(nodes["x"], nodes["y"], strict=True))
 
 
+ENDS = [("mass", "spring"), ("mass", "other"), ("spring", "mass")]
+
+
+def test_a_units_node_and_box_have_one_colour_wherever_it_lies():
+    html = html_of(["spring", "other", "mass"], [connection(f"{a}.y", f"{b}.u") for a, b in ENDS])
+    figure = json.loads(re.findall(r'<script type="application/json">(.*?)</script>', html)[0])
+    nodes = figure["data"][-1]
+    colours = dict(zip(zip(nodes["x"], nodes["y"], strict=True), nodes["marker"]["line"]["color"], strict=True))
+    assert colours == {(box["x"], box["y"]): box["bordercolor"] for box in figure["layout"]["annotations"]}
+
+
 def pictures(units: list[dict[str, Any]]) -> list[str]:
     section = graph_section({"system": {"units": units, "connections": []}})
     assert section is not None
