@@ -15,18 +15,11 @@ import xmlschema
 
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.experiments.manifest import FOLDER, MANIFEST, related_files
-from handover.cosim.experiments.reference_experiment import Difference, Setup, experiments_in
+from handover.cosim.experiments.reference_experiment import Setup, experiments_in
 from handover.cosim.experiments.signal_table import InvalidTable
 from handover.cosim.fmu.file.archive import FmuArchive, write_archive
-from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus.build import ExperimentRequest, build
 from handover.fmus.catalog import Entry
-from handover.fmus.contents.reference_experiment import (
-    default_stimulus,
-    largest_difference,
-    record_experiment,
-    relative_tolerance,
-)
 from handover.fmus.contents.related_files import (
     PAGE,
     CannotRecordExperiment,
@@ -160,43 +153,6 @@ def test_a_step_that_the_unit_does_not_take_is_refused(tmp_path: Path):
         build(SAMPLED, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest(given))
 
 
-@pytest.mark.slow
-def test_the_tolerance_is_what_rounding_makes_of_the_outputs(tmp_path: Path):
-    """A difference of 1e-13 of 0.3 becomes 2^20 times that in 20 steps: 3e-8 of 0.3; in 50 nothing of it is left."""
-    given = tmp_path / "given.csv"
-    given.write_text("time,x\n0.0,0.3\n2.0,0.3\n")
-    relative = setup_of(build(CHAOTIC, 3, tmp_path, platforms=["host"], experiment=ExperimentRequest(given))).relative
-    assert relative is not None
-    assert 10 * 3e-14 * 2**20 / 0.95 <= relative <= 2 * 10 * 3e-14 * 2**20 / 0.3
-    with pytest.raises(CannotRecordExperiment, match="output 'y' changes as inputs round"):
-        build(CHAOTIC, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest())
-    assert not (tmp_path / "out").exists()
-
-
-def test_noise_of_an_output_at_rest_hides_no_other():
-    resting, apart = Difference("resting", 1e-16, 0.1, 0.0), Difference("apart", 1e-4, 0.2, 1.0)
-    assert largest_difference([resting, apart]) is apart
-    assert relative_tolerance(apart) == 1e-3
-    assert largest_difference([resting]) is None
-    assert relative_tolerance(None) == 1e-9
-
-
-@pytest.mark.parametrize(("x", "wanted"), [("0.0", "It is not measured, as there"), ("0.3", "It is measured: real")])
-def test_a_tolerance_is_measured_only_where_an_input_changes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, x: str, wanted: str
-):
-    def play(*arguments: Any) -> list[Any]:
-        for run in arguments[2]:
-            run["result"].write_text("time,y\n0.0,0.5\n0.1,0.5\n")
-        return []
-
-    monkeypatch.setattr("handover.fmus.contents.reference_experiment.run_experiment", play)
-    given = tmp_path / "given.csv"
-    given.write_text(f"time,x\n0.0,{x}\n0.1,{x}\n")
-    recorded = record_experiment(build(CHAOTIC, 3, tmp_path, platforms=["host"]), Fraction(1, 10), given)
-    assert wanted in " ".join(recorded.text_lines("stimulus.csv", "result.csv"))
-
-
 def test_a_unit_of_pictures_has_nothing_to_compare(tmp_path: Path):
     with pytest.raises(NothingToCompare, match="all are binary"):
         build(EYE, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest())
@@ -220,17 +176,6 @@ def test_a_result_of_other_parameters_is_reported(tmp_path: Path):
     assert not report.passed
     (finding,) = report.sections[-1].findings
     assert "made with other parameters: gain was '0.1' and is '0.2'" in finding.line
-
-
-def test_the_default_stimulus_moves_what_has_a_unit_or_a_range(tmp_path: Path):
-    d = describe_fmu(build(EVERY_KIND, 2, tmp_path, platforms=["host"]))
-    columns = default_stimulus(d, Fraction(1, 10)).columns
-    moved = {name for name, values in columns.items() if len(set(values)) > 1}
-    assert moved == {*(f"v[{i}]" for i in (1, 2, 3)), *(f"M[{i},{j}]" for i in (1, 2, 3) for j in (1, 2, 3))}
-    assert columns["v[1]"][9:12] == [0.1, 0.11, 0.11]
-    assert columns["v[2]"][10:31:10] == pytest.approx([-0.2, -0.195, -0.19])
-    x = default_stimulus(describe_fmu(build(CHAOTIC, 2, tmp_path, platforms=["host"])), Fraction(1, 10)).columns["x"]
-    assert x[9:11] == [0.3, 0.4]
 
 
 @pytest.mark.parametrize(("fmi", "scalar"), FORMS)
