@@ -212,6 +212,36 @@ def test_a_unit_brings_its_interpreter(folder: Path):
     assert file.stat().st_size == pytest.approx(1e6 * float(size), rel=0.1)
 
 
+@pytest.mark.slow
+def test_data_beside_a_unit_goes_along_with_it(tmp_path: Path):
+    (option,) = re.findall(r"`(--include (?:\S+))`", README)
+    file = option.split()[1]
+    read = f"        self.k = params.k * float(Path(__file__).with_name({file!r}).read_text())\n"
+    block = OWN_BLOCK.replace("        self.k = params.k\n", read)
+    assert read in block
+    (tmp_path / "tabled.py").write_text(f"from pathlib import Path\n\n{block}")
+    (tmp_path / file).write_text("2.0")
+    for out, given in (("with", option), ("without", "")):
+        done = handover(f"handover build tabled:Spring --fmi 3 --platform host {given} --out {out}", tmp_path)
+        assert done.returncode == 0, done.stderr
+    (tmp_path / file).unlink()
+    checks = [handover(f"handover check {out}/Spring.fmi3.fmu", tmp_path) for out in ("with", "without")]
+    assert [done.returncode for done in checks] == [0, 1]
+    assert file in checks[1].stdout
+
+
+def test_what_a_unit_in_another_tool_needs_is_run_here_or_an_extra():
+    """Commands of this package are counted above; programs of others are run as the whole blocks in which they are."""
+    section = README.partition("\n## A unit in another tool\n")[2].partition("\n## ")[0]
+    blocks = [text for kind, text in BLOCKS if not kind and text in section]
+    lines = {line for text in blocks for line in text.splitlines() if not line.startswith(".venv/bin/handover ")}
+    others = lines - {*block_with("./c_host").splitlines(), *block_with("./ecos ").splitlines()}
+    install = re.compile(r'[.]venv/bin/python -m pip install --editable "[.]\[(\w+)\]"')
+    extras = {found[1] if (found := install.fullmatch(line)) else line for line in others}
+    assert extras == {"cross", "standalone"}
+    assert extras <= {*re.findall(r"^(\w+) = \[", (ROOT / "pyproject.toml").read_text(), flags=re.MULTILINE)}
+
+
 def command_with(part: str) -> str:
     (command,) = (c for c in COMMANDS if part in c)
     return command
