@@ -79,7 +79,7 @@ def test_different_files_of_one_name_have_copies_of_their_own(tmp_path: Path, fm
     ("change", "text"),
     [
         (
-            {"scenario": "flyer_impedance", "fixed": {}, "points": [{}]},
+            {"scenario": "flyer_impedance", "fixed": {}, "points": [dict[str, str]()]},
             "scenario is ir_grasp there, flyer_impedance in this command",
         ),
         ({"points": [{"forward": "0.03"}]}, "forward is 0.03,0.1 there, 0.03 in this command"),
