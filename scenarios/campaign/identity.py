@@ -8,7 +8,7 @@ from typing import Any, cast
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.catalog import ScenarioSource, named_scenario
 from handover.scenarios.execution.unit_values import split_parameters
-from handover.scenarios.results.run_folder import hashes_of_files, sha256_of, versions
+from handover.scenarios.results.run_folder import sha256_of, versions
 
 _KINDS = {
     "units": "unit ",
@@ -45,15 +45,14 @@ def identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
     }
 
 
-def _parameter_files(plan: CampaignPlan) -> dict[str, str]:
-    """Return the hashes of all files that parameters of runs name, by their paths."""
+def _parameter_files(plan: CampaignPlan) -> dict[str, dict[str, str]]:
+    """Return names and hashes of all files that parameters of runs name, by their paths as they are given."""
     experiment = named_scenario(plan.scenario)()
-    files: dict[str, str] = {}
+    files: set[Path] = set()
     for point in range(len(plan.points)):
-        parameters, _ = split_parameters(type(experiment), plan.texts(point))
-        found = hashes_of_files(experiment.parameter_files(parameters))
-        files |= {entry["file"]: entry["sha256"] for entry in found.values()}
-    return files
+        files.update(experiment.files_read(*split_parameters(type(experiment), plan.texts(point))).values())
+    there = [file for file in sorted(files) if file.is_file()]
+    return {str(file): {"file": file.name, "sha256": sha256_of(file)} for file in there}
 
 
 def differences(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> list[str]:
@@ -113,7 +112,7 @@ def _text(value: Any) -> str:
     if value is None or value == "" or value == []:
         return "not given"
     if isinstance(value, dict) and "sha256" in value:
-        fmu = cast(dict[str, str], value)
-        return f"{fmu['fmu']} (sha256 {fmu['sha256'][:12]})"
+        file = cast(dict[str, str], value)
+        return f"{file.get('fmu') or file.get('file')} (sha256 {file['sha256'][:12]})"
     text = ",".join(map(str, cast(list[Any], value))) if isinstance(value, list) else str(cast(Any, value))
     return text if len(text) <= _MAX_LENGTH else text[: _MAX_LENGTH - 3] + "..."

@@ -75,7 +75,8 @@ class InterruptedRun:
         """Return what the run was to do; `opened` closes what that opens.
 
         Raises:
-            InvalidRunFolder: the scenario or an FMU is not what it was. InvalidFmu, InvalidSsp: one cannot be read.
+            InvalidRunFolder: the scenario, an FMU or a file that a parameter names is not what it was.
+            InvalidFmu, InvalidSsp: one cannot be read.
         """
         description = self._description
         try:
@@ -166,11 +167,18 @@ class InterruptedRun:
         return cached(unit, 3)
 
     def _check_parameter_files(self) -> None:
+        faults: list[str] = []
         for name, entry in self._object("parameter_files").items():
-            file = Path(str(entry.get("file", "")))
-            if not file.is_file() or sha256_of(file) != entry.get("sha256"):
-                fault = f"{file}, which its parameter {name} names, is not the file that the run began with"
-                raise InvalidRunFolder(self.folder.path, fault)
+            if not isinstance(entry, dict) or not {"file", "sha256"} <= entry.keys():
+                raise InvalidRunFolder(self.folder.path, f"its run.json is damaged: parameter_files has {name} {entry}")
+            known = cast(dict[str, str], entry)
+            file = Path(known["file"])
+            if not file.is_file():
+                faults.append(f"{file}, which its parameter {name} names, is not there any more")
+            elif sha256_of(file) != known["sha256"]:
+                faults.append(f"{file}, which its parameter {name} names, is not the file that the run began with")
+        if faults:
+            raise InvalidRunFolder(self.folder.path, "; ".join(faults))
 
     def _check_fmus(self, task: Task) -> None:
         system = built_system(task.experiment, task.parameters, task.seed, task.fmus, task.unit_values)

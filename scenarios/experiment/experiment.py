@@ -154,6 +154,8 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
     headline: ClassVar[tuple[str, ...]] = ()
     """Names of the metrics that summaries list first, in this order; a run need not have all of them. By default, those
     of the evaluator's outcome."""
+    unit_files: ClassVar[tuple[str, ...]] = ()
+    """Values of units' parameters, as `UNIT.NAME`, that name files which these read."""
     is_seeded: ClassVar[bool] = True
     """Whether it draws random numbers, which follow from the seed."""
     parallel_step: ClassVar[Fraction | None] = None
@@ -231,6 +233,11 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         Runs and campaigns keep their hashes, and tell or refuse where another file is there under the same name.
         """
         return {}
+
+    def files_read(self, parameters: Any, unit_values: Mapping[str, str]) -> dict[str, Path]:
+        """Return the files of `parameter_files`, and those that given values of `unit_files` name."""
+        given = {name: Path(unit_values[name]) for name in self.unit_files if unit_values.get(name)}
+        return {**self.parameter_files(parameters), **given}
 
     def led_hand(self, parameters: Any) -> LedHand | None:  # noqa: ARG002
         """Return the hand that somebody outside leads; by default there is none.

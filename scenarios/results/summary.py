@@ -318,7 +318,7 @@ def faults_of(content: Mapping[str, Any], declared: type[Any]) -> list[str]:
 
 def _run_data(task: Task, fmus: Mapping[str, Path], of_this_run: _OfSomeRuns) -> RunData:
     hashes = {path: sha256_of(path) for path in dict.fromkeys(fmus.values())}
-    if files := hashes_of_files(task.experiment.parameter_files(task.parameters)):
+    if files := hashes_of_files(task.experiment.files_read(task.parameters, task.unit_values)):
         of_this_run = {**of_this_run, "parameter_files": files}
     return RunData(
         **configuration(task),

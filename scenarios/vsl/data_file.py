@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 
 from handover.controllers.vsl.kinematics import VslKinematics
 from handover.plants.vsl.parameters import MAX_ANGLE, MAX_PRESSURE
+from handover.plants.vsl.parameters import Params as ArmParams
 from handover.scenarios.vsl.training_data import Dataset, Measured
 
 VERSION = 1
@@ -30,14 +31,17 @@ _COLUMNS: Mapping[str, tuple[str, int]] = {
 
 _PLAUSIBLE: Mapping[str, tuple[float, float, str]] = {
     "p": (1e3, 1.02 * MAX_PRESSURE, "Pa above the air outside (1e5 are a bar)"),
-    "i": (1e-4, 20.0, "A"),
     "q": (1e-3, MAX_ANGLE, "rad"),
     "q_cmd": (1e-3, MAX_ANGLE, "rad"),
 }
 """By the matrix's parts: between what its largest magnitude lies on any arm of this size, and the unit (assumed)."""
 
-_MAX_SAG = 0.12
-"""How far from where rigid links have it the tip is at most in the median, m (assumed: an arm of 0.45 m)."""
+_MAX_TORQUE = 30.0
+"""By currents, N m (assumed: the weakest arm's are below 2; in milliamperes they would be above 1000)."""
+
+_MAX_SHARE_OF_CHANCE = 0.9
+"""How far rigid links' tips are at most from the measured, in the median, as a share of how far they are from other
+points' (assumed: 0.1 of the arm as it is, 0.8 of one with a tenth of the stiffness)."""
 
 _ORDER = "order"
 
@@ -97,7 +101,7 @@ def read_data(path: Path, key: str, kinematics: VslKinematics, parameters: Mappi
         part: np.column_stack([numbers[f"{port}[{k + 1}]"] for k in range(n)]) for part, (port, n) in _COLUMNS.items()
     }
     points, order = Dataset(**parts), _order(path, numbers[_ORDER])
-    _check_units(path, points.rows(order >= 0), kinematics)
+    _check_units(path, points.rows(order >= 0), kinematics, origin["arm"].get("parameters"))
     return Measured(points, order, origin)
 
 
@@ -153,7 +157,7 @@ def _check_parameters(path: Path, arm: Mapping[str, Any], parameters: Mapping[st
         )
 
 
-def _check_units(path: Path, points: Dataset, kinematics: VslKinematics) -> None:
+def _check_units(path: Path, points: Dataset, kinematics: VslKinematics, arm: Mapping[str, Any] | None) -> None:
     """Refuse points that are in other units, as degrees, bar or millimetres: no arm is like that."""
     if not len(points):
         return
@@ -161,8 +165,15 @@ def _check_units(path: Path, points: Dataset, kinematics: VslKinematics) -> None
         port, largest = _COLUMNS[part][0], float(np.max(np.abs(getattr(points, part))))
         if 0.0 < largest < least or largest > most:
             raise InvalidData(path, f"its {port}, up to {largest:.4g}, cannot be in {unit}; columns are in SI units")
-    off = float(np.median(np.linalg.norm(np.array([kinematics.forward(q) for q in points.q]) - points.p_WG, axis=1)))
-    if off > _MAX_SAG:
+    kt = (arm or {}).get("kt", ArmParams().kt)
+    if (largest := float(np.max(np.abs(points.i)))) * kt > _MAX_TORQUE:
+        raise InvalidData(path, f"its i_meas, up to {largest:.4g}, cannot be in A; columns are in SI units")
+    rigid = np.array([kinematics.forward(q) for q in points.q])
+    off, chance = (
+        float(np.median(np.linalg.norm(rigid - tips, axis=1)))
+        for tips in (points.p_WG, np.roll(points.p_WG, len(points) // 2, axis=0))
+    )
+    if off > _MAX_SHARE_OF_CHANCE * chance:
         raise InvalidData(
             path,
             f"its p_WG_meas is {off:.3g} m from where rigid links have the tip by q_meas, in the median: one of them "

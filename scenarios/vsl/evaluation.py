@@ -85,7 +85,7 @@ def distance_to_path(p: Floats, path: Floats) -> float:
     return float(np.min(np.linalg.norm(start + share[:, None] * along - p, axis=1)))
 
 
-_MUCH = 0.1
+_EXTRAPOLATION_TO_REPORT = 0.1
 """Share of points at which a model had to extrapolate from which on the verdict says so (assumed)."""
 
 _REACH_SPAN = 0.01
@@ -161,7 +161,9 @@ class PathEvaluator(Evaluator):
         verdict = "within" if error <= tolerance else "above"
         digits = 1 if f"{1000 * error:.1f}" != f"{1000 * tolerance:.1f}" else 3
         share = metrics["outside"].value if "outside" in metrics else 0.0
-        beyond = f"; the model had to extrapolate at {100 * share:.0f} % of the points" if share >= _MUCH else ""
+        beyond = ""
+        if share >= _EXTRAPOLATION_TO_REPORT:
+            beyond = f"; the model had to extrapolate at {100 * share:.0f} % of the points"
         return (
             f"the path was completed at {self.completed:.1f} s; mean error of the tip {1000 * error:.{digits}f} mm, "
             f"{verdict} the tolerance of {1000 * tolerance:.{digits}f} mm{beyond}{self._dip}"

@@ -174,19 +174,19 @@ class Parameters:
             ("pressure_steps", lambda: Schedule.parse(self.pressure_steps, (1, 2), 0.0, MAX_PRESSURE)),
         ):
             try:
-                faults += self._late(name, parse())
+                faults += self._steps_after_path(name, parse())
             except InvalidSchedule as e:
                 faults.append(f"{name}: {e.fault}")
         return faults
 
-    def _late(self, name: str, schedule: Schedule) -> list[str]:
+    def _steps_after_path(self, name: str, schedule: Schedule) -> list[str]:
         """Return which steps are without effect, as the path has ended by then."""
         try:
             end = self.settle + self.length / self.speed
         except InvalidWaypoints:
-            return []  # told elsewhere
+            return []  # path_faults reports it
         late = [t for t in schedule.times if t >= end]
-        return [f"{name}: nothing changes from {t:g} s on: the path ends at {end:.1f} s" for t in late]
+        return [f"{name}: nothing changes from {t:g} s on: the path ends at {end:.6g} s" for t in late]
 
     @property
     def q_0(self) -> Floats:

@@ -60,6 +60,7 @@ class PathExperiment(Experiment[PathEvaluator]):
         "arm": "VslArm",
     }
     places: ClassVar[Mapping[str, Place]] = PLACES
+    unit_files: ClassVar[tuple[str, ...]] = ("planner.waypoints", "kinematics.model")
     headline: ClassVar[tuple[str, ...]] = (
         "mean_error",
         "median_error",

@@ -22,12 +22,12 @@ from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.vsl.pick_and_place_evaluation import PickAndPlaceEvaluator, PickAndPlaceParameters
-from handover.scenarios.vsl.places import LINKS, PLACES, fixed_value_faults, sensor_faults
+from handover.scenarios.vsl.places import FIXED_VALUES, PLACES, fixed_value_faults, sensor_faults
 
 _GRACE = 5
 """Time by which the task may end late before the run does, s (assumed)."""
 _FIXED = {
-    **LINKS,
+    **FIXED_VALUES,
     "arm.face": "the table is as high as the top of the object, pick",
     "gripper.landing": "the object lands on the table, as high as pick and place",
 }
@@ -49,6 +49,7 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
         "arm": "VslArm",
         "gripper": "VacuumGripper",
     }
+    unit_files: ClassVar[tuple[str, ...]] = ("kinematics.model",)
     headline: ClassVar[tuple[str, ...]] = (
         "place_error",
         "dragged",

@@ -14,11 +14,11 @@ from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 _TOUCHES = {"pick": (TaskPhase.DESCEND, TaskPhase.GRASP), "place": (TaskPhase.LOWER, TaskPhase.RELEASE)}
 """Parts of the task in which something is touched."""
 
-_LIES = 0.01
+_MAX_HEIGHT_ERROR = 0.01
 """How far from the height of the place an object is at most that lies there, m (assumed: deeper than it is pressed)."""
 
-_ON_THE_WAY = (TaskPhase.CARRY, TaskPhase.SOFTEN, TaskPhase.LOWER)
-"""Parts in which the object is on its way; until the last of them it is to hang above the table."""
+_ON_THE_WAY = (TaskPhase.CARRY, TaskPhase.SOFTEN)
+"""Parts in which the object is to hang above the table."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,13 +60,14 @@ class PickAndPlaceParameters:
 
     def faults(self) -> list[str]:
         """Return what contradicts itself: one face carries the object at both places, and they differ."""
+        faults: list[str] = []
         if self.pick[2] < 0.0:
-            return [f"pick: its height, {self.pick[2]:g} m, is below the ground, z = 0 in W"]
+            faults.append(f"pick: its height, {self.pick[2]:g} m, is below the ground, z = 0 in W")
         if self.pick[2] != self.place[2]:
-            return [f"place: its height, {self.place[2]:g} m, must be that of pick, {self.pick[2]:g} m"]
+            faults.append(f"place: its height, {self.place[2]:g} m, must be that of pick, {self.pick[2]:g} m")
         if np.array_equal(self.pick, self.place):
-            return ["place: it must be another than pick"]
-        return []
+            faults.append("place: it must be another than pick")
+        return faults
 
 
 class PickAndPlaceEvaluator(Evaluator):
@@ -111,7 +112,7 @@ class PickAndPlaceEvaluator(Evaluator):
     @property
     def over(self) -> bool:
         """Whether the task has ended and the object lies."""
-        return self._done and abs(float(self._p_WO[2] - self.parameters.place[2])) < _LIES
+        return self._done and abs(float(self._p_WO[2] - self.parameters.place[2])) < _MAX_HEIGHT_ERROR
 
     @property
     def place_error(self) -> float:

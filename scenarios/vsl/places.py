@@ -81,11 +81,13 @@ _SENSORS = {"closed_loop": "p_WG_meas", "imu": "tilt_meas"}
 """By the parameter of the kinematics that makes it look at a sensor, the input at which that is read."""
 
 
-LINKS = {"arm.links": "planner and kinematics are of an arm of two links; more or fewer are for a system of one's own"}
+FIXED_VALUES = {
+    "arm.links": "planner and kinematics are of an arm of two links; for other arms write a system of your own"
+}
 """What is fixed in all scenarios of the arm, by the unit's value, and why."""
 
 
-def fixed_value_faults(given: Sequence[str], fixed: Mapping[str, str] = LINKS) -> list[str]:
+def fixed_value_faults(given: Sequence[str], fixed: Mapping[str, str] = FIXED_VALUES) -> list[str]:
     """Return which of the units' values that were set, by name, are fixed in a scenario, by `fixed`, and why."""
     return [f"{name}: {why}" for name, why in fixed.items() if name in given]
 

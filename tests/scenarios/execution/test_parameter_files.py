@@ -58,7 +58,14 @@ def test_a_campaign_is_another_with_another_file():
     write(way, OTHER)
     refused = call(*sweep)
     assert refused.exit_code == 2
-    assert f"content of {way.absolute()} is" in refused.output
+    assert f"content of {way} is {way} (sha256 " in refused.output
+
+
+def test_files_that_units_values_name_are_known_too():
+    way = write(Path("way.csv"), ROWS).absolute()
+    given = ("-p", "planner.path=CUSTOM", "-p", f"planner.waypoints={way}", "-p", "settle=1", "--stop", "1")
+    call("run", "vsl_model_based", *given, "--out", "run")
+    assert list(json.loads(Path("run/run.json").read_text())["parameter_files"]) == ["planner.waypoints"]
 
 
 @pytest.mark.slow
@@ -71,5 +78,10 @@ def test_a_run_goes_on_with_its_own_file_alone():
     assert refused.exit_code == 2
     fault = f"{way.absolute()}, which its parameter waypoints names, is not the file that the run began with"
     assert fault in refused.output
+    way.unlink()
+    assert (
+        f"{way.absolute()}, which its parameter waypoints names, is not there any more"
+        in call("resume", "killed").output
+    )
     write(way, ROWS)
     assert call("resume", "killed").exit_code == 0

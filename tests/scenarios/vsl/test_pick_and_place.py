@@ -83,11 +83,11 @@ def test_an_object_that_is_dragged_to_its_place_is_not_placed():
     parameters = PickAndPlaceParameters()
     pick, place = np.array(parameters.pick), np.array(parameters.place)
 
-    def verdict(*, force: float) -> Any:
+    def verdict(*, force: float, phase: int = TaskPhase.CARRY) -> Any:
         evaluator = PickAndPlaceEvaluator(parameters)
         for k in range(11):
             p_WO = pick + k / 10 * (place - pick)
-            arm = {"arm.f_G": force, "arm.p_WG": p_WO, "planner.phase": TaskPhase.CARRY, "planner.done": False}
+            arm = {"arm.f_G": force, "arm.p_WG": p_WO, "planner.phase": phase, "planner.done": False}
             seen: Any = {**arm, "planner.p_WG_goal": p_WO, "gripper.held": True, "gripper.p_WO": p_WO}
             evaluator(0.1 * k, seen)
         arm = {"arm.f_G": 0.0, "arm.p_WG": place, "planner.phase": TaskPhase.DONE, "planner.done": True}
@@ -96,6 +96,7 @@ def test_an_object_that_is_dragged_to_its_place_is_not_placed():
         return evaluator.outcome()
 
     assert verdict(force=0.0).success
+    assert verdict(force=0.5, phase=TaskPhase.LOWER).metrics["dragged"].value == 0.0
     dragged = verdict(force=0.5)
     assert not dragged.success
     assert dragged.metrics["dragged"].value == pytest.approx(0.06)

@@ -117,6 +117,15 @@ def test_data_that_cannot_be_trained_on_is_refused(change: Callable[[Any], Any],
         read_data(tmp_path / "d.parquet", "k", ARM, PARAMETERS)
 
 
+@pytest.mark.parametrize("arm", ["EI_factor=0.15,0.15,0.15", "kt=0.05", "kt=20"])
+def test_points_of_the_oddest_arms_are_taken_back(arm: str, tmp_path: Path):
+    out = tmp_path / "m.json"
+    first = call("--points", "400", "--arm", arm, "--save-data", tmp_path / "d.parquet", "--out", out)
+    assert first.exit_code == 0, first.output
+    again = call("--data", tmp_path / "d.parquet", "--arm", arm, "--out", out)
+    assert again.exit_code == 0, again.output
+
+
 def test_data_of_an_arm_with_other_parameters_are_refused_unless_that_arm_is_meant(tmp_path: Path):
     out = tmp_path / "m.json"
     first = call("--points", "400", "--arm", "EI_0=0.605", "--save-data", tmp_path / "d.parquet", "--out", out)
