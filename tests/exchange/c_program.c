@@ -2,10 +2,13 @@
  *
  * Arguments: version of FMI (2 or 3), library, GUID or instantiation token, resources (FMI 2: URI, FMI 3: path), file.
  * Calls, a line each, with value references, numbers of values and files of bytes:
- *     set real|integer|boolean REFERENCE N VALUE...     set binary REFERENCE FILE
- *     get real|integer|boolean REFERENCE N              get binary REFERENCE FILE
- *     initialise                                        step TIME SIZE
+ *     set real|integer|integer32|boolean REFERENCE N VALUE...     set binary REFERENCE FILE
+ *     get real|integer|integer32|boolean REFERENCE N              get binary REFERENCE FILE
+ *     initialise                                                  step TIME SIZE
  * `get` prints its values on one line, with all digits; of bytes it prints how many it has written to the file.
+ *
+ * `cycle` begins calls that `repeat TIMES` makes again, time going on and nothing printed; then it prints `repeated` and
+ * waits for a line, so that others can see what the calls have cost.
  */
 #include <dlfcn.h>
 #include <stdarg.h>
@@ -16,10 +19,22 @@
 #include "fmi.h"
 
 #define MOST 1024
-#define LOAD(name) __typeof__(name) *f_##name = (__typeof__(name) *)find(#name)
+#define LOAD(name)                                                                                                     \
+    static __typeof__(name) *f_##name;                                                                                 \
+    if (!f_##name) f_##name = (__typeof__(name) *)find(#name)
+
+/* A call of the file; of `set` and `get` with room for the numbers, or with the bytes. */
+typedef struct {
+    char what[16], type[16], path[4096];
+    unsigned reference;
+    size_t n;
+    double *values;
+    uint8_t *bytes;
+    double t, size;
+} Call;
 
 static void *library, *unit;
-static int is_fmi2;
+static int is_fmi2, is_quiet;
 
 static void *find(const char *name) {
     void *found = dlsym(library, name);
@@ -110,46 +125,96 @@ static void step(double t, double size) {
         for (size_t i = 0; i < n; i++) values[i] = (double)own[i];                                                     \
     }
 
-static void transfer_bytes(int is_set, unsigned reference, const char *path) {
-    FILE *file = fopen(path, is_set ? "rb" : "wb");
-    if (!file) printf("no file %s\n", path), exit(2);
-    size_t size = 0;
-    if (is_set) {
+static void transfer_bytes(const Call *c) {
+    if (!strcmp(c->what, "set")) {
         LOAD(fmi3SetBinary);
-        fseek(file, 0, SEEK_END);
-        size = (size_t)ftell(file);
-        rewind(file);
-        uint8_t *bytes = malloc(size);
-        const uint8_t *given = bytes;
-        if (fread(bytes, 1, size, file) != size) exit(2);
-        expect_ok(f_fmi3SetBinary(unit, &reference, 1, &size, &given, 1), "set binary");
-        free(bytes);
-    } else {
-        LOAD(fmi3GetBinary);
-        const uint8_t *bytes;
-        expect_ok(f_fmi3GetBinary(unit, &reference, 1, &size, &bytes, 1), "get binary");
-        if (fwrite(bytes, 1, size, file) != size) exit(2);
-        printf("%zu\n", size);
+        const uint8_t *given = c->bytes;
+        expect_ok(f_fmi3SetBinary(unit, &c->reference, 1, &c->n, &given, 1), "set binary");
+        return;
     }
+    LOAD(fmi3GetBinary);
+    const uint8_t *bytes;
+    size_t size;
+    expect_ok(f_fmi3GetBinary(unit, &c->reference, 1, &size, &bytes, 1), "get binary");
+    if (is_quiet) return;
+    FILE *file = fopen(c->path, "wb");
+    if (!file) printf("no file %s\n", c->path), exit(2);
+    if (fwrite(bytes, 1, size, file) != size) exit(2);
     fclose(file);
+    printf("%zu\n", size);
 }
 
-static void transfer(int is_set, const char *type, unsigned reference, FILE *calls) {
-    size_t n;
-    double values[MOST] = {0};
-    if (fscanf(calls, "%zu", &n) != 1 || n > MOST) exit(2);
-    for (size_t i = 0; is_set && i < n; i++)
-        if (fscanf(calls, "%lf", &values[i]) != 1) exit(2);
-    if (!strcmp(type, "real")) {
-        TRANSFER(is_set, reference, n, values, double, Real, double, Float64)
-    } else if (!strcmp(type, "integer")) {
-        TRANSFER(is_set, reference, n, values, int, Integer, int64_t, Int64)
-    } else if (!strcmp(type, "boolean")) {
-        TRANSFER(is_set, reference, n, values, int, Boolean, bool, Boolean)
+static void transfer(const Call *c) {
+    int is_set = !strcmp(c->what, "set");
+    if (!strcmp(c->type, "real")) {
+        TRANSFER(is_set, c->reference, c->n, c->values, double, Real, double, Float64)
+    } else if (!strcmp(c->type, "integer")) {
+        TRANSFER(is_set, c->reference, c->n, c->values, int, Integer, int64_t, Int64)
+    } else if (!strcmp(c->type, "integer32")) {
+        TRANSFER(is_set, c->reference, c->n, c->values, int, Integer, int32_t, Int32)
+    } else if (!strcmp(c->type, "boolean")) {
+        TRANSFER(is_set, c->reference, c->n, c->values, int, Boolean, bool, Boolean)
     } else {
         exit(2);
     }
-    for (size_t i = 0; !is_set && i < n; i++) printf(i + 1 < n ? "%.17g " : "%.17g\n", values[i]);
+    for (size_t i = 0; !is_set && !is_quiet && i < c->n; i++) printf(i + 1 < c->n ? "%.17g " : "%.17g\n", c->values[i]);
+}
+
+static void make(const Call *c) {
+    if (!strcmp(c->what, "initialise"))
+        initialise();
+    else if (!strcmp(c->what, "step"))
+        step(c->t, c->size);
+    else if (!strcmp(c->type, "binary"))
+        transfer_bytes(c);
+    else
+        transfer(c);
+}
+
+static void read_bytes(Call *c) {
+    FILE *file = fopen(c->path, "rb");
+    if (!file) printf("no file %s\n", c->path), exit(2);
+    fseek(file, 0, SEEK_END);
+    c->n = (size_t)ftell(file);
+    rewind(file);
+    c->bytes = malloc(c->n);
+    if (fread(c->bytes, 1, c->n, file) != c->n) exit(2);
+    fclose(file);
+}
+
+/* Read what follows a call's first word. */
+static void read_call(FILE *calls, Call *c) {
+    if (!strcmp(c->what, "initialise")) return;
+    if (!strcmp(c->what, "step")) {
+        if (fscanf(calls, "%lf %lf", &c->t, &c->size) != 2) exit(2);
+        return;
+    }
+    if (fscanf(calls, "%15s %u", c->type, &c->reference) != 2) exit(2);
+    int is_set = !strcmp(c->what, "set");
+    if (!strcmp(c->type, "binary")) {
+        if (fscanf(calls, " %4095[^\n]", c->path) != 1) exit(2);
+        if (is_set) read_bytes(c);
+        return;
+    }
+    if (fscanf(calls, "%zu", &c->n) != 1 || c->n > MOST) exit(2);
+    c->values = calloc(c->n, sizeof *c->values);
+    for (size_t i = 0; is_set && i < c->n; i++)
+        if (fscanf(calls, "%lf", &c->values[i]) != 1) exit(2);
+}
+
+/* Make the calls of the cycle again, from time t on; return the time that is reached. */
+static double repeat(Call *const *cycle, size_t size, size_t times, double t) {
+    is_quiet = 1;
+    for (size_t k = 0; k < times; k++)
+        for (size_t i = 0; i < size; i++) {
+            if (!strcmp(cycle[i]->what, "step")) cycle[i]->t = t, t += cycle[i]->size;
+            make(cycle[i]);
+        }
+    is_quiet = 0;
+    printf("repeated\n");
+    fflush(stdout);
+    for (int c = getchar(); c != '\n' && c != EOF;) c = getchar();
+    return t;
 }
 
 int main(int argc, char **argv) {
@@ -160,22 +225,23 @@ int main(int argc, char **argv) {
     instantiate(argv[3], argv[4]);
     FILE *calls = fopen(argv[5], "r");
     if (!calls) return 2;
-    char call[16], type[16], path[4096];
-    unsigned reference;
-    double t, size;
-    while (fscanf(calls, "%15s", call) == 1) {
-        if (!strcmp(call, "initialise")) {
-            initialise();
-        } else if (!strcmp(call, "step")) {
-            if (fscanf(calls, "%lf %lf", &t, &size) != 2) return 2;
-            step(t, size);
+    Call **cycle = NULL;
+    size_t size = 0, times;
+    int is_cycle = 0;
+    double t = 0.0;
+    for (Call *c = calloc(1, sizeof *c); fscanf(calls, "%15s", c->what) == 1; c = calloc(1, sizeof *c)) {
+        if (!strcmp(c->what, "cycle")) {
+            is_cycle = 1;
+        } else if (!strcmp(c->what, "repeat")) {
+            if (fscanf(calls, "%zu", &times) != 1) return 2;
+            t = repeat(cycle, size, times, t);
         } else {
-            if (fscanf(calls, "%15s %u", type, &reference) != 2) return 2;
-            if (strcmp(type, "binary")) {
-                transfer(!strcmp(call, "set"), type, reference, calls);
-            } else {
-                if (fscanf(calls, " %4095[^\n]", path) != 1) return 2;
-                transfer_bytes(!strcmp(call, "set"), reference, path);
+            read_call(calls, c);
+            make(c);
+            if (!strcmp(c->what, "step")) t = c->t + c->size;
+            if (is_cycle) {
+                cycle = realloc(cycle, (size + 1) * sizeof *cycle);
+                cycle[size++] = c;
             }
         }
     }

@@ -1,0 +1,32 @@
+"""CPU time of a process and of those that it has started, which a unit's interpreter may be; for Linux alone."""
+
+import os
+import time
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+
+_OF_A_PROCESS = 2
+"""Linux' mark, in a clock's number, of the clock that a process's scheduler keeps."""
+
+
+def cpu_seconds(processes: Sequence[int]) -> float:
+    """Return the CPU time of processes that run, of all their threads."""
+    return sum(time.clock_gettime(~process << 3 | _OF_A_PROCESS) for process in processes)
+
+
+def family(process: int | None = None) -> list[int]:
+    """Return a process, by default this one, and its descendants. To find them takes some milliseconds."""
+    children: dict[int, list[int]] = defaultdict(list)
+    for folder in Path("/proc").iterdir():
+        if folder.name.isdigit():
+            try:
+                state = (folder / "stat").read_text()
+            except OSError:  # it has ended
+                continue
+            children[int(state.rpartition(")")[2].split()[1])].append(int(folder.name))
+    found, waiting = list[int](), [os.getpid() if process is None else process]
+    while waiting:
+        found.append(waiting.pop())
+        waiting += children[found[-1]]
+    return found
