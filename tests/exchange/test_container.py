@@ -7,7 +7,7 @@ import drive
 import pytest
 import systems
 from container import outputs_of, put_into_container
-from fmpy_rows import rows_in_fmpy
+from fmpy_rows import record_in_fmpy
 from own_master import Placed, run_in_our_own
 from reference import FMI2_UNITS, References, description, expect_same
 
@@ -28,7 +28,7 @@ def test_a_unit_in_a_container_is_the_same_as_without(unit: str, fmi: int, refer
     driven = [{f"unit_{n}": x for n, x in drive.inputs(d, k).items()} for k in range(drive.STEPS)]
     placed = Placed(cached(unit, fmi, scalar=fmi == 3), drive.parameters(d))
     container = put_into_container(systems.Wired({"unit": placed}, [], step), fmi, tmp_path)
-    in_fmpy = rows_in_fmpy(container, tmp_path / "unpacked", float(step), driven)
+    in_fmpy = record_in_fmpy(container, tmp_path / "unpacked", float(step), driven).rows
     expect_same(outputs_of("unit", in_fmpy), references.varying(unit, fmi))
     in_our_own = run_in_our_own({"container": Placed(container, driven[0])}, [], step, drive.STEPS)["container"]
     expect_same(outputs_of("unit", in_our_own.rows), references.held(unit, fmi))
@@ -46,7 +46,7 @@ def test_a_closed_loop_in_a_container_is_the_same_as_without(
     wanted = run_in_our_own(wired.units, wired.connections, wired.step, STEPS)
     in_our_own = run_in_our_own({"container": Placed(container)}, [], wired.step, STEPS)["container"].rows
     nothing: dict[str, float] = {}
-    in_fmpy = rows_in_fmpy(container, tmp_path / "unpacked", float(wired.step), [nothing] * STEPS)
+    in_fmpy = record_in_fmpy(container, tmp_path / "unpacked", float(wired.step), [nothing] * STEPS).rows
     for name, record in wanted.items():
         assert record.rows[1] != record.rows[-1]
         expect_same(outputs_of(name, in_our_own), record)

@@ -8,9 +8,9 @@ import fmpy
 import numpy as np
 import pytest
 from drive import STEPS, inputs, parameters, scalars
-from reference import FMI2_UNITS, Record, References, description, expect_same, variables
+from fmpy_rows import record_in_fmpy
+from reference import FMI2_UNITS, References, description, expect_same, variables
 
-from handover.cosim.blocks.variable import Kind, Variable
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
 from handover.fmus.layout import element_names
@@ -19,33 +19,26 @@ HOST: Any = fmpy
 LIGHT = ("HandoverPartner", "Thrusters")
 """Units whose tests are quick."""
 
-TYPES = {
-    Kind.REAL: "Float64",
-    Kind.INTEGER: "Int64",
-    Kind.ENUMERATION: "Int64",
-    Kind.BOOLEAN: "Boolean",
-    Kind.STRING: "String",
-    Kind.BINARY: "Binary",
-}
-
 
 def tiered(units: "list[str]") -> list[Any]:
     return [name if name in LIGHT else pytest.param(name, marks=pytest.mark.slow) for name in units]
 
 
 @pytest.mark.parametrize("unit", tiered(FMI2_UNITS))
-def test_fmi2_gives_the_same_in_simulate_fmu(references: References, unit: str):
+def test_fmi2_gives_the_same_simulated(references: References, unit: str):
     expect_same(simulated(unit, cached(unit, 2)), references.varying(unit, 2))
 
 
 @pytest.mark.parametrize("unit", tiered(FMI2_UNITS))
-def test_scalar_fmi3_gives_the_same_in_simulate_fmu(references: References, unit: str):
+def test_scalar_fmi3_gives_the_same_simulated(references: References, unit: str):
     expect_same(simulated(unit, cached(unit, 3, scalar=True)), references.varying(unit, 3))
 
 
 @pytest.mark.parametrize("unit", tiered(list(UNITS)))
 def test_fmi3_gives_the_same_call_by_call(references: References, unit: str, tmp_path: Path):
-    found, wanted = called(unit, cached(unit, 3), tmp_path), references.varying(unit, 3)
+    d, wanted = description(unit), references.varying(unit, 3)
+    driven = [inputs(d, k) for k in range(STEPS)]
+    found = record_in_fmpy(cached(unit, 3), tmp_path, float(UNITS[unit].step), driven, parameters(d))
     expect_same(found.rows, wanted)
     assert found.pictures == wanted.pictures
 
@@ -70,45 +63,3 @@ def simulated(unit: str, fmu: Path) -> list[Mapping[str, float]]:
     )
     assert result["time"] == pytest.approx(times, abs=1e-12)
     return [{name: float(row[name]) for name in outputs} for row in result]
-
-
-def called(unit: str, fmu: Path, folder: Path) -> Record:
-    """Drive an FMI 3 unit through FMPy's class, arrays and pictures whole."""
-    HOST.extract(str(fmu), str(folder))
-    item = HOST.read_model_description(str(folder))
-    slave = HOST.instantiate_fmu(str(folder), item, "CoSimulation")
-    references = {v.name: v.valueReference for v in item.modelVariables}
-    d, step = description(unit), float(UNITS[unit].step)
-    known = variables(unit)
-    rows: list[Mapping[str, float]] = []
-    pictures: list[Mapping[str, bytes]] = []
-
-    def give(values: Mapping[str, Any]) -> None:
-        for name, value in values.items():
-            entries = [value.tobytes()] if known[name].kind is Kind.BINARY else flat(known[name], value)
-            getattr(slave, f"set{TYPES[known[name].kind]}")([references[name]], entries)
-
-    def take() -> None:
-        found = {v.name: getattr(slave, f"get{TYPES[v.kind]}")([references[v.name]], v.size) for v in d.outputs}
-        binaries = [v.name for v in d.outputs if v.kind is Kind.BINARY]
-        pictures.append({name: found.pop(name)[0] for name in binaries})
-        rows.append(scalars(known, found))
-
-    try:
-        give(parameters(d))
-        slave.enterInitializationMode()
-        give(inputs(d, 0))
-        slave.exitInitializationMode()
-        take()
-        for k in range(STEPS):
-            give(inputs(d, k))
-            slave.doStep(k * step, step)
-            take()
-        slave.terminate()
-    finally:
-        slave.freeInstance()
-    return Record(rows, pictures)
-
-
-def flat(v: Variable, value: Any) -> list[Any]:
-    return [value] if v.kind is Kind.STRING else np.ravel(value).tolist()
