@@ -6,7 +6,7 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from own_master import Placed
@@ -15,6 +15,9 @@ from systems import Wired
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu, indices_of
 
+Output = TypeVar("Output", float, bytes)
+"""A scalar output, or a picture."""
+
 LIMIT = 120.0
 """Seconds after which building is given up."""
 
@@ -22,8 +25,8 @@ LIMIT = 120.0
 def put_into_container(wired: Wired, fmi: int, folder: Path, options: Sequence[str] = ()) -> Path:
     """Return an FMU of version `fmi` with a system's units inside.
 
-    It has the inputs that are not connected, but for arrays of FMI 3, and all outputs that are no pictures; each is
-    named `unit_port`, for the toolbox keeps `unit.port` for itself. It has no parameters: the units start with the
+    It has the inputs that are not connected, but for arrays of FMI 3, and all outputs; each is named `unit_port`, for
+    the toolbox keeps `unit.port` for itself. It has no parameters: the units start with the
     values that are given for them.
 
     Raises:
@@ -44,7 +47,7 @@ def put_into_container(wired: Wired, fmi: int, folder: Path, options: Sequence[s
     return folder / "container.fmu"
 
 
-def outputs_of(unit: str, rows: Sequence[Mapping[str, float]]) -> list[dict[str, float]]:
+def outputs_of(unit: str, rows: Sequence[Mapping[str, Output]]) -> list[dict[str, Output]]:
     """Return the outputs of one unit in a container, by the unit's own names."""
     prefix = f"{unit}_"
     return [{n.removeprefix(prefix): x for n, x in row.items() if n.startswith(prefix)} for row in rows]
@@ -61,8 +64,6 @@ def _described(wired: Wired, descriptions: Mapping[str, FmuDescription]) -> dict
             if f"{name}.{port.name}" not in fed and not _is_whole_array(port):
                 inputs += [[f"{name}_{n}", f"{name}.fmu", n] for n in _names(port)]
         for port in d.outputs.values():
-            if port.kind is Kind.BINARY:
-                continue
             outputs += [[f"{name}.fmu", n, f"{name}_{n}"] for n in _names(port)]
         starts += _starts(name, d, wired.units[name])
     for source, target in wired.connections:
