@@ -14,6 +14,7 @@ from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
 from libcosimpy.CosimManipulator import CosimManipulator
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
+from process_cpu import cpu_seconds, family
 
 
 def main(job_file: str, result_file: str) -> None:
@@ -26,15 +27,24 @@ def main(job_file: str, result_file: str) -> None:
     observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
     check(execution.add_observer(observer))
     check(execution.add_manipulator(manipulator))
-    rows: list[Any] = []
-    for k in range(job["steps"]):
+
+    def advance(k: int) -> list[Any]:
         for i, unit in zip(places, job["units"], strict=True):
             for kind, values in unit["driven"][k].items():
                 references, numbers = zip(*values, strict=True)
                 check(getattr(manipulator, f"slave_{kind}_values")(i, list(references), list(numbers)))
         check(execution.step())
-        rows.append([read(observer, i, unit["outputs"]) for i, unit in zip(places, job["units"], strict=True)])
-    Path(result_file).write_text(json.dumps(rows))
+        return [read(observer, i, unit["outputs"]) for i, unit in zip(places, job["units"], strict=True)]
+
+    rows = [advance(k) for k in range(job["steps"])]
+    spent: list[float] = []
+    processes = family()
+    for times in job["repeats"]:
+        began = cpu_seconds(processes)
+        for k in range(times * job["steps"]):
+            advance(k % job["steps"])
+        spent.append(cpu_seconds(processes) - began)
+    Path(result_file).write_text(json.dumps({"rows": rows, "spent": spent}))
 
 
 def loaded(job: Any) -> CosimExecution:

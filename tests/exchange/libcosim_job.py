@@ -62,15 +62,26 @@ class Job:
         Raises:
             AssertionError: libcosim gave up; with what it wrote.
         """
+        return self.run_and_repeat(folder, ())[0]
+
+    def run_and_repeat(self, folder: Path, repeats: Sequence[int]) -> tuple[dict[str, list[Row]], list[float]]:
+        """Run likewise, and then make the steps again, some number of times, as often as there are numbers.
+
+        Returns:
+            What `run` does, and of each repetition the seconds of CPU, those of processes that units have started
+            included.
+        """
         job, result = folder / "job.json", folder / "result.json"
-        job.write_text(json.dumps(self._as_json()))
+        job.write_text(json.dumps(self._as_json() | {"repeats": list(repeats)}))
         host = Path(__file__).with_name("libcosim_host.py")
         command = [sys.executable, str(host), str(job), str(result)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, cwd=folder, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
-        rows = json.loads(result.read_text())
+        found = json.loads(result.read_text())
+        rows = found["rows"]
         outputs = [known(self.description(name).outputs) for name in self.units]
-        return {name: [_row(outputs[i], row[i]) for row in rows] for i, name in enumerate(self.units)}
+        named = {name: [_row(outputs[i], row[i]) for row in rows] for i, name in enumerate(self.units)}
+        return named, found["spent"]
 
     def description(self, unit: str) -> FmuDescription:
         """Return what a unit's FMU says of itself."""

@@ -4,7 +4,7 @@ import dataclasses
 import typing
 from typing import Any
 
-from drive import inputs
+from drive import STEPS, inputs
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import output
@@ -22,7 +22,10 @@ class Inputs:
 
 
 def player(block: type[Any], unit: str) -> type[Any]:
-    """Return a block that plays a unit's inputs: from k to k + 1 steps its outputs are the inputs of step k."""
+    """Return a block that plays a unit's inputs: from k to k + 1 steps its outputs are the inputs of step k.
+
+    After STEPS steps it begins anew.
+    """
     d, period = describe(block), float(UNITS[unit].step)
     hints = typing.get_type_hints(d.inputs_type, include_extras=True)
     fields: list[Any] = [(v.name, hints[v.name], output("what is played")) for v in d.inputs]
@@ -38,7 +41,7 @@ def player(block: type[Any], unit: str) -> type[Any]:
             pass
 
         def outputs(self, t: float, u: Inputs) -> Any:  # noqa: ARG002
-            return made(**inputs(d, round(t / period)))
+            return made(**inputs(d, round(t / period) % STEPS))
 
         def step(self, t: float, dt: float, u: Inputs) -> Any:
             return self.outputs(t + dt, u)

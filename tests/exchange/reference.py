@@ -111,13 +111,22 @@ class References:
         system.add("unit", cached(unit, fmi), period=UNITS[unit].step, **start)
         return _run(system, unit)
 
-    def _run_played(self, unit: str, fmi: int) -> Record:
+    def varying_in(self, unit: str, fmu: Path) -> Record:
+        """Return the like run of another form of the unit."""
+        return _run(self.played(unit, fmu), unit)
+
+    def played(self, unit: str, fmu: Path) -> System:
+        """Return a system of the unit, with its parameters, and of another one that plays its inputs."""
         d, entry, system = description(unit), UNITS[unit], System()
-        system.add("player", self._player(unit), period=entry.step)
-        system.add("unit", cached(unit, fmi), period=entry.step, **drive.parameters(d))
+        if d.inputs:
+            system.add("player", self._player(unit), period=entry.step)
+        system.add("unit", fmu, period=entry.step, **drive.parameters(d))
         for v in d.inputs:
             system.connect(PortName("player", v.name), PortName("unit", v.name))
-        return _run(system, unit)
+        return system
+
+    def _run_played(self, unit: str, fmi: int) -> Record:
+        return self.varying_in(unit, cached(unit, fmi))
 
     def _player(self, unit: str) -> Path:
         module, _, block = UNITS[unit].block.partition(":")
