@@ -17,11 +17,8 @@ pytestmark = needs_libcosim
 
 LIGHT = "FreeFlyer"
 
-ALONE = [n for n in FMI2_UNITS if n != "HybridKinematics"]
-"""Units that are tried alone; the other one's parameters would need an enumeration to be set."""
 
-
-@pytest.mark.parametrize("unit", [n if n == LIGHT else pytest.param(n, marks=pytest.mark.slow) for n in ALONE])
+@pytest.mark.parametrize("unit", [n if n == LIGHT else pytest.param(n, marks=pytest.mark.slow) for n in FMI2_UNITS])
 def test_a_unit_driven_by_libcosim_is_the_same_as_in_our_own_master(unit: str, references: References, tmp_path: Path):
     d = description(unit)
     driven = [drive.inputs(d, k) for k in range(drive.STEPS)]
