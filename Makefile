@@ -7,7 +7,7 @@ PARALLEL := --numprocesses auto --dist loadfile
 
 WHEELS := x86_64-linux aarch64-linux x86_64-windows x86_64-darwin aarch64-darwin
 
-.PHONY: demo test test-slow fuzz paper real-time standalone lint bench pictures icons wheels install clean
+.PHONY: demo test test-slow fuzz paper real-time standalone hosts lint bench pictures icons wheels install clean
 
 demo: $(VENV)/.installed
 	$(BIN)/handover run helix_handover
@@ -15,7 +15,7 @@ demo: $(VENV)/.installed
 install: $(VENV)/.installed
 
 test: lint $(VENV)/.installed-test
-	$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not fuzz and not paper and not real_time and not standalone"
+	$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not fuzz and not paper and not real_time and not standalone and not hosts"
 
 test-slow: $(VENV)/.installed-test
 	$(BIN)/python -m pytest $(PARALLEL) -m slow
@@ -28,6 +28,10 @@ real-time: $(VENV)/.installed-test
 
 standalone: $(VENV)/.installed-test
 	$(BIN)/python -m pytest $(PARALLEL) -m standalone
+
+# docs/hosts.md: every unit in every form and host; a run that was interrupted goes on.
+hosts: $(VENV)/.installed-test
+	$(BIN)/python -m pytest -m hosts -s tests/exchange/hosts
 
 paper: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -m paper

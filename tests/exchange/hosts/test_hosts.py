@@ -1,0 +1,155 @@
+"""docs/hosts.md: every unit in every form and host. `make hosts` makes it; here it is seen that it leaves out none."""
+
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from cells import Cell, difference
+from host_runs import HOSTS, Form
+from libcosim_job import needs_libcosim
+from page import PAGE, ROBOTS, Cells, Notes, is_sound, page, robot_of, written
+from reference import Record
+
+from handover.fmus.build import cached
+from handover.fmus.catalog import UNITS
+from handover.fmus.compile import cache_folder
+
+HERE = Path(__file__).parent
+LIMIT = 1800.0
+"""Seconds after which a unit in a form is given up."""
+WORKERS = os.cpu_count() or 1
+"""Units that are run at a time."""
+
+
+def lacking(text: str) -> list[str]:
+    """Return what the tables of a page lack or have besides the catalog's units, all forms and all hosts."""
+    wanted = [unit for robot in ROBOTS for unit, entry in UNITS.items() if robot_of(entry) == robot]
+    sections = {s.partition("\n")[0]: s for s in re.split(r"^## ", text, flags=re.MULTILINE)}
+    faults = [f"no table of {form.value}" for form in Form if form.value not in sections]
+    for form in (form for form in Form if form.value in sections):
+        lines = sections[form.value].splitlines()
+        rows = {line.split("`")[1]: line.count("|") - 2 for line in lines if line.startswith("| `")}
+        if f"| unit | {' | '.join(HOSTS)} |" not in lines:
+            faults.append(f"{form.value}: other hosts than {', '.join(HOSTS)}")
+        faults += [f"{form.value}: no row of {unit}" for unit in wanted if unit not in rows]
+        faults += [f"{form.value}: {unit} is no unit of the catalog" for unit in rows if unit not in wanted]
+        faults += [f"{form.value}: {unit} has {n} cells" for unit, n in rows.items() if n != len(HOSTS)]
+    return faults
+
+
+def test_the_page_has_every_unit_in_every_form_and_host():
+    assert not lacking(PAGE.read_text(encoding="utf-8")), f"run `make hosts`, and commit docs/{PAGE.name}"
+
+
+def test_a_page_of_all_cells_lacks_nothing_and_one_without_a_row_a_form_or_a_host_does():
+    whole = page({(u, f, h): Cell(0.0, 12.3) for u in UNITS for f in Form for h in HOSTS}, 1)
+    assert not lacking(whole)
+    assert len(lacking(re.sub(r"^\| `Push` .*\n", "", whole, flags=re.MULTILINE))) == len(Form)
+    assert lacking(whole.replace("`Push`", "`Pushes`"))
+    assert lacking(whole.replace(f"## {Form.SCALAR.value}\n", "")) == [f"no table of {Form.SCALAR.value}"]
+    assert lacking(whole.replace(" libcosim |", ""))
+
+
+@pytest.mark.parametrize(
+    ("found", "off", "named"),
+    [
+        ([{"a": 1.0, "b": 2.0}], 0.0, ""),
+        ([{"a": 1.0}], 0.0, "b"),
+        ([{"a": 1.0, "b": 2.5}], 0.25, ""),
+        ([{"a": 1.0, "b": float("nan")}], float("inf"), ""),
+        ([{"a": 1.0, "b": 2.0}] * 2, float("inf"), ""),
+        ([{"a": 1.0, "c": 2.0}], float("inf"), "c"),
+    ],
+)
+def test_what_differs_is_told(found: list[dict[str, float]], off: float, named: str):
+    assert difference(Record(found, []), Record([{"a": 1.0, "b": 2.0}], []), 0) == (off, list(named))
+
+
+def test_pictures_must_be_the_same_to_the_byte():
+    wanted = Record([{}], [{"left": b"12"}])
+    assert difference(Record([{}], [{"left": b"12"}]), wanted, 0) == (0.0, [])
+    assert difference(Record([{}], [{"left": b"13"}]), wanted, 0)[0] == float("inf")
+    assert difference(Record([{}], []), wanted, 0) == (0.0, ["left"])
+
+
+@pytest.mark.parametrize(
+    ("cell", "sound"),
+    [
+        (Cell(0.0, 12.3), True),
+        (Cell(1e-13, 12.3), True),
+        (Cell(1e-11, 12.3), False),
+        (Cell(float("inf"), 12.3), False),
+        (Cell(failure="AssertionError: Unsupported FMI version for FMU"), True),
+        (Cell(failure="AssertionError: it ended with -11"), False),
+        (Cell(failure="it gives none of the unit's outputs"), False),
+    ],
+)
+def test_a_cell_that_is_not_sound_is_bold(cell: Cell, sound: bool):
+    assert is_sound(cell, "Push", Form.FMI3, "libcosim") is sound
+    assert ("**" in written(cell, "Push", Form.FMI3, "libcosim", Notes())) is not sound
+
+
+@pytest.mark.hosts
+@needs_libcosim
+def test_every_unit_in_every_form_and_host():
+    """Makes the page. Interrupted, it goes on where it was; a cell that failed is tried again."""
+    folder = cache_folder() / "hosts" / _sources()
+    folder.mkdir(parents=True, exist_ok=True)
+    cases = [(unit, form) for form in Form for unit in UNITS]
+    with ThreadPoolExecutor(WORKERS) as pool:
+        found = list(pool.map(partial(_cells, folder), *zip(*cases, strict=True)))
+    cells: Cells = {(*case, host): cell for case, made in zip(cases, found, strict=True) for host, cell in made.items()}
+    PAGE.write_text(page(cells, WORKERS), encoding="utf-8")
+    bad = [f"{' '.join((u, f.value, h))}: {c}" for (u, f, h), c in cells.items() if not is_sound(c, u, f, h)]
+    if not bad:
+        for file in folder.iterdir():
+            file.unlink()
+    assert not bad, "\n".join(bad)
+
+
+def _cells(folder: Path, unit: str, form: Form) -> dict[str, Cell]:
+    """Return what the hosts make of a unit in a form, in processes of their own."""
+    file = folder / f"{unit}.{form.name}.{cached(unit, 3).parent.name[:16]}.json"
+    done = _sound(file, unit, form)
+    while len(done) < len(HOSTS):
+        file.write_text(json.dumps({host: vars(cell) for host, cell in done.items()}))
+        environment = {**os.environ, "PYTHONPATH": str(HERE.parent), "OPENBLAS_NUM_THREADS": "1"}
+        command = [sys.executable, str(HERE / "cells.py"), unit, form.value, str(file)]
+        ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=LIMIT)
+        found = json.loads(file.read_text())
+        running = found.pop("running", "")
+        done = {host: Cell(**cell) for host, cell in found.items()}
+        if ended.returncode and not running:
+            raise AssertionError(f"{unit}, {form.value}: {ended.stderr}")
+        if running and running not in done:
+            done[running] = Cell(failure=f"the process ended with {ended.returncode}: {ended.stderr[-300:]}")
+    print(f"{unit}, {form.value}: " + ", ".join(f"{host} {_short(done[host])}" for host in HOSTS), flush=True)
+    return {host: done[host] for host in HOSTS}
+
+
+def _sound(file: Path, unit: str, form: Form) -> dict[str, Cell]:
+    """Return the sound cells of a run that was interrupted."""
+    kept: Any = json.loads(file.read_text()) if file.is_file() else {}
+    cells = {host: Cell(**cell) for host, cell in kept.items() if host != "running"}
+    return {host: cell for host, cell in cells.items() if is_sound(cell, unit, form, host)}
+
+
+def _short(cell: Cell) -> str:
+    return "-" if cell.failure else f"{cell.difference:.0e} {cell.us:.0f} us"
+
+
+def _sources() -> str:
+    """Return a hash of the drivers: what another version of them found is not gone on with."""
+    digest = hashlib.sha256()
+    for file in sorted(HERE.parent.rglob("*.[pc]*")):
+        if file.suffix in (".py", ".c") and not file.name.startswith(("test_", "page")):
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
