@@ -12,8 +12,8 @@ import numpy as np
 from own_master import Placed
 from systems import Wired
 
-from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu, indices_of
+from handover.cosim.blocks.variable import Kind, indices_of, subscript
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 
 Output = TypeVar("Output", float, bytes)
 """A scalar output, or a picture."""
@@ -110,4 +110,4 @@ def _names(port: FmuPort) -> list[str]:
     """Return a port's names in its FMU: one if that has arrays, else its entries'."""
     if len(port.references) == 1:
         return [port.name]
-    return [f"{port.name}[{','.join(map(str, index))}]" for index in indices_of(port.shape)]
+    return [port.name + subscript(index) for index in indices_of(port.shape)]

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.description import Description
-from handover.cosim.blocks.variable import Kind, Variable
-from handover.fmus.layout import element_names
+from handover.cosim.blocks.variable import Kind, Variable, element_names
 from handover.plants.helix.cameras.stereo_camera import Inputs, Params, StereoCamera
 
 STEPS = 10

@@ -19,9 +19,8 @@ from drive import STEPS, inputs, parameters, scalars
 from notary import ENTRIES
 from reference import ARITHMETIC, description, variables
 
-from handover.cosim.blocks.variable import Kind
+from handover.cosim.blocks.variable import Kind, element_names
 from handover.fmus.catalog import UNITS
-from handover.fmus.layout import element_names
 
 SSD, SSV, SSC = (
     f"http://ssp-standard.org/SSP1/{n}" for n in ("SystemStructureDescription", "ParameterValues", "Common")

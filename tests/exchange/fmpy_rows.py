@@ -9,8 +9,8 @@ import fmpy
 import numpy as np
 from reference import Record
 
-from handover.cosim.blocks.variable import Kind
-from handover.cosim.fmu.file.description import FmuPort, describe_fmu, indices_of
+from handover.cosim.blocks.variable import Kind, indices_of
+from handover.cosim.fmu.file.description import FmuPort, describe_fmu
 
 HOST: Any = fmpy
 

@@ -17,7 +17,8 @@ import pytest
 from own_master import Connections, Placed
 from reference import Record
 
-from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu, indices_of
+from handover.cosim.blocks.variable import indices_of
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 
 LIMIT = 120.0
 """Seconds after which a run is ended."""

@@ -11,9 +11,9 @@ from drive import STEPS, inputs, parameters, scalars
 from fmpy_rows import record_in_fmpy
 from reference import FMI2_UNITS, References, description, expect_same, variables
 
+from handover.cosim.blocks.variable import element_names
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
-from handover.fmus.layout import element_names
 
 HOST: Any = fmpy
 LIGHT = ("HandoverPartner", "Thrusters")

@@ -25,13 +25,12 @@ from reference import Record, References, description, variables
 from systems import Wired
 
 from handover.cosim.blocks.description import Description
-from handover.cosim.blocks.variable import Kind
+from handover.cosim.blocks.variable import Kind, element_names
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.fmus.build import build, build_block, cached
 from handover.fmus.catalog import UNITS, Entry
-from handover.fmus.layout import element_names
 
 
 class Form(Enum):
