@@ -18,8 +18,6 @@ from handover.cosim.experiments.experiment_run import (
     stimulus_columns,
 )
 from handover.cosim.experiments.reference_experiment import (
-    ABSOLUTE,
-    RELATIVE,
     Difference,
     ReferenceExperiment,
     Setup,
@@ -125,17 +123,11 @@ class ExperimentCheck:
         return (stimulus, reference), notes
 
 
-def _allowed(d: Difference, setup: Setup) -> float:
-    relative = RELATIVE if setup.relative is None else setup.relative
-    absolute = ABSOLUTE if setup.absolute is None else setup.absolute
-    return relative * d.largest + absolute
-
-
 def _largest_in_words(compared: Sequence[Difference], setup: Setup) -> str:
     """Return by how much the output differs that uses most of its tolerance."""
 
     def use(d: Difference) -> float:
-        allowed = _allowed(d, setup)
+        allowed = setup.allowed(d)
         return d.greatest / allowed if allowed else math.inf if d.greatest else 0.0
 
     worst = max(compared, key=use)
@@ -150,16 +142,14 @@ def _largest_in_words(compared: Sequence[Difference], setup: Setup) -> str:
 
 def _judged(compared: Sequence[Difference], setup: Setup) -> Iterator[Finding]:
     """Yield a finding for each output that differs: a fault where it is beyond the tolerance."""
-    relative = RELATIVE if setup.relative is None else setup.relative
-    absolute = ABSOLUTE if setup.absolute is None else setup.absolute
     for d in (d for d in compared if d.greatest):
         where = f"output {d.name!r}"
         if math.isinf(d.greatest):
             yield fault(f"it is not as in the result from t = {d.at:.6g} s on", where=where, cure="equal is right")
             continue
-        allowed = _allowed(d, setup)
+        allowed = setup.allowed(d)
         size = f"it differs from the result by up to {d.greatest:.3g} at t = {d.at:.6g} s"
-        origin = f"{relative:g} of its largest value {d.largest:.3g}, and {absolute:g}"
+        origin = f"{setup.relative:g} of its largest value {d.largest:.3g}, and {setup.absolute:g}"
         level = note if d.greatest <= allowed else fault
         yield level(f"{size}; {allowed:.3g} is allowed ({origin})", where=where)
 

@@ -42,16 +42,20 @@ class Setup:
 
     Attributes:
         step: communication step in seconds; None: that of the FMU.
-        relative, absolute: tolerances, see above; None where none is given.
+        relative, absolute: tolerances, see above.
         parameters: start values of all parameters, as they are written in the model description.
         left_out: names of outputs that the result does not have.
     """
 
     step: Fraction | None = None
-    relative: float | None = None
-    absolute: float | None = None
+    relative: float = RELATIVE
+    absolute: float = ABSOLUTE
     parameters: Mapping[str, str] = field(default_factory=dict[str, str])
     left_out: Sequence[str] = ()
+
+    def allowed(self, d: "Difference") -> float:
+        """Return by how much the entries of an output may differ, in its unit."""
+        return self.relative * d.largest + self.absolute
 
     def as_xml(self, result: str) -> ET.Element:
         """Return the annotation of a stimulus, which names the result's file as the manifest does."""
