@@ -149,7 +149,7 @@ def _judged(compared: Sequence[Difference], setup: Setup) -> Iterator[Finding]:
             continue
         allowed = setup.allowed(d)
         size = f"it differs from the result by up to {d.greatest:.3g} at t = {d.at:.6g} s"
-        origin = f"{setup.relative:g} of its largest value {d.largest:.3g}, and {setup.absolute:g}"
+        origin = f"{setup.relative_of(d):g} of its largest value {d.largest:.3g}, and {setup.absolute:g}"
         level = note if d.greatest <= allowed else fault
         yield level(f"{size}; {allowed:.3g} is allowed ({origin})", where=where)
 

@@ -6,7 +6,8 @@ tolerances and the parameters with which the result was made. Of an FMU without 
 label in common with the stimulus, or the only one.
 
 An output agrees if no entry differs by more than `relative` times the largest magnitude that its variable has in the
-result, plus `absolute`; what is no real number must be equal.
+result, plus `absolute`; what is no real number must be equal. Of a Float32 output `relative` is 2**-23 at least: a unit
+in its last place, which other machines may round the other way.
 """
 
 import math
@@ -18,6 +19,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.experiments.manifest import EXPERIMENT, RESULT, RelatedFile
 from handover.cosim.experiments.signal_table import Column, SignalTable
@@ -30,6 +32,8 @@ RELATIVE = 1e-3
 """Relative tolerance where the manifest gives none: other hosts set inputs and end steps in other ways."""
 ABSOLUTE = 1e-12
 """Absolute tolerance in a variable's unit, where the manifest gives none: an output that rests at 0 may round."""
+FLOAT32_RESOLUTION = 2.0**-23
+"""A unit in the last place of a number of 32 bits, relative to the number, at most."""
 
 _CSV = "text/csv"
 _MAX_CHARACTERS = 1000
@@ -53,9 +57,13 @@ class Setup:
     parameters: Mapping[str, str] = field(default_factory=dict[str, str])
     left_out: Sequence[str] = ()
 
+    def relative_of(self, d: "Difference") -> float:
+        """Return the relative tolerance of an output."""
+        return max(self.relative, d.resolution)
+
     def allowed(self, d: "Difference") -> float:
         """Return by how much the entries of an output may differ, in its unit."""
-        return self.relative * d.largest + self.absolute
+        return self.relative_of(d) * d.largest + self.absolute
 
     def as_xml(self, result: str) -> ET.Element:
         """Return the annotation of a stimulus, which names the result's file as the manifest does."""
@@ -163,12 +171,14 @@ class Difference:
         greatest: the greatest difference of an entry; infinity of what is no real number and differs.
         at: when, in seconds.
         largest: the largest magnitude that the variable has in the reference; 0 of what is no real number.
+        resolution: relative to the magnitude, a unit in the last place of a Float32; 0 of all others.
     """
 
     name: str
     greatest: float
     at: float
     largest: float
+    resolution: float = 0.0
 
     @property
     def share(self) -> float:
@@ -196,5 +206,6 @@ def differences(reference: SignalTable, result: SignalTable, columns: Mapping[st
             differs = [a != b for a, b in zip(zip(*wanted, strict=True), zip(*given, strict=True), strict=True)]
             apart, largest = np.where(differs, math.inf, 0.0), 0.0
         worst = int(np.argmax(apart))
-        found.append(Difference(port, float(apart[worst]), float(reference.times[worst]), largest))
+        resolution = FLOAT32_RESOLUTION if columns[names[0]][0].width is Width.FLOAT32 else 0.0
+        found.append(Difference(port, float(apart[worst]), float(reference.times[worst]), largest, resolution))
     return found

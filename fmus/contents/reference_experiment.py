@@ -6,20 +6,22 @@ without one, by a hundredth of the start value or of one unit. Numbers without u
 and rotation matrices more often than not.
 
 The tolerance of the result is measured. Other platforms round otherwise, so the stimulus is played once more with every
-real input 1e-13 of its value smaller, which is some hundred times the rounding of one operation. Of 0 there is no
-share, and in a system that feeds the unit a 0 is a sum of values as large as the input has otherwise, and as exact as
-these: it is off by 1e-13 of the largest magnitude that the input has in the stimulus, in any entry; of an input that is
-0 throughout, of its nominal value or, without one, of its range, else of one unit. Ten times the greatest difference
-that all this makes is allowed, relative to the variable's largest value, but no less than 1e-9; for outputs that rest
-at 0, ten times theirs absolutely, from 1e-12 to 1e-9.
+real input 1e-13 of its value smaller, which is some hundred times the rounding of one operation, or that much larger
+where its range ends. A Float32 does not hold as little, so 1e-7 is taken of it, which is its last place. Of 0 there is
+no share, and in a system that feeds the unit a 0 is a sum of values as large as the input has otherwise, and as exact
+as these: it is off by 1e-13 of the largest magnitude that the input has in the stimulus, in any entry, and a Float32,
+too, as it holds that near 0; of an input that is 0 throughout, of its nominal value or, without one, of its range, else
+of one unit. Ten times the greatest difference that all this makes is allowed, relative to the variable's largest value,
+but no less than 1e-9; for outputs that rest at 0, ten times theirs absolutely, from 1e-12 to 1e-9. Of Float32 outputs
+2**-23 is always allowed (`handover.cosim.experiments.reference_experiment`), so differences within it do not count.
 
 A unit may switch at 0: friction has the sign of a speed. If inputs that are off 0 change outputs by more than can be
 allowed, they stay at 0, which all machines read alike, and only the others are off. Parameters stay as they are. Where
-no input could be off, nothing is measured, the tolerance is the least one. The text in the FMU says what was done. With
-their default stimuli the catalog's units need no more: their largest difference is 2.9e-11, of TendonArm's tension;
-VslArm and HybridKinematics switch at 0. numpy and OpenBLAS without AVX2 and AVX-512 put that tension off by 1e-11, and
-the outputs of 15 other units by at most 2e-10, which is PoseController's `slowest_decay`: a number made of parameters
-alone, which inputs do not move.
+no input could be off within its range, nothing is measured, and the tolerance is the least one. The text in the FMU
+says what was done. With their default stimuli the catalog's units need no more: their largest difference is 2.9e-11, of
+TendonArm's tension; VslArm and HybridKinematics switch at 0. numpy and OpenBLAS without AVX2 and AVX-512 put that
+tension off by 1e-11, and the outputs of 15 other units by at most 2e-10, which is PoseController's `slowest_decay`: a
+number made of parameters alone, which inputs do not move.
 """
 
 import math
@@ -31,6 +33,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.experiments.experiment_run import (
     communication_points,
@@ -38,7 +41,12 @@ from handover.cosim.experiments.experiment_run import (
     run_experiment,
     stimulus_columns,
 )
-from handover.cosim.experiments.reference_experiment import ABSOLUTE, Difference, Setup, differences
+from handover.cosim.experiments.reference_experiment import (
+    ABSOLUTE,
+    Difference,
+    Setup,
+    differences,
+)
 from handover.cosim.experiments.signal_table import (
     Column,
     InvalidTable,
@@ -58,7 +66,7 @@ from handover.fmus.contents.related_files import CannotRecordExperiment, Nothing
 
 _STEPS, _AT_REST, _RAMP = 50, 10, 20
 _SHARE_OF_RANGE, _SHARE_OF_VALUE = 0.1, 0.01
-_PERTURBATION = 1e-13
+_PERTURBATION, _FLOAT32_PERTURBATION = 1e-13, 1e-7
 _MARGIN, _LEAST, _MOST = 10.0, 1e-9, 1e-2
 _MOST_ABSOLUTE = 1e-9
 _TIMEOUT = 600.0  # s, of two runs together
@@ -70,9 +78,9 @@ class Tolerance:
 
     Attributes:
         spread: the difference between the two runs, of the output that differed most; None if none differed by more
-            than the absolute tolerance.
+            than is allowed anyway.
         absolute: tolerance in an output's unit.
-        is_measured: whether the second run had other inputs.
+        is_measured: whether the unit got other inputs in the second run.
         at_zero: what inputs that were off 0 changed, where they stay at 0 for that reason.
     """
 
@@ -101,14 +109,17 @@ class Tolerance:
         if self.at_zero is not None:
             at_zero = f"those at 0 stayed there, as off it they change {self.at_zero.name} {_size(self.at_zero)}"
         if not self.is_measured:
-            why = "there are no real inputs" if self.at_zero is None else f"of the real inputs all are 0, and {at_zero}"
+            why = "there is no real input that could be off within its range"
+            if self.at_zero is not None:
+                why = f"of the real inputs all that could be off are 0, and {at_zero}"
             return f"It is not measured: {why}. Where rounding grows within the unit, it may be too little elsewhere."
-        change = f"no output by more than {self.absolute:g} in its unit, so that {_LEAST:g} is enough"
+        resting = f"no output by more than {self.absolute:g} in its unit, or the last place of a Float32"
+        change = f"{resting}, so that {_LEAST:g} is enough"
         if self.spread is not None:
             most = f"the outputs by at most {self.spread.share:.2g} of its largest value ({self.spread.name})"
             change = f"{most}. Ten times that is allowed, and no less than {_LEAST:g}"
-        how = f"It is measured: real inputs were 1e-13 of their value smaller, and {at_zero}; parameters stayed."
-        return f"{how} That changed {change}."
+        how = f"It is measured: real inputs were off by 1e-13 of their value (of a Float32 by 1e-7), and {at_zero}"
+        return f"{how}; parameters stayed. That changed {change}."
 
 
 @dataclass(frozen=True)
@@ -125,8 +136,8 @@ class RecordedExperiment:
         """Return what users should know, for the files of these names."""
         s = self.setup
         allowed = (
-            f"Tolerance: {s.relative:g} of the largest value that a variable has in the result, plus {s.absolute:g} in "
-            f"its unit; what is no real number is equal. {self.tolerance.text}"
+            f"Tolerance: {s.relative:g} of the largest value that a variable has in the result (of a Float32 2**-23 at "
+            f"least), plus {s.absolute:g} in its unit; what is no real number is equal. {self.tolerance.text}"
         )
         lines = [
             f"{stimulus} has the inputs, {self.origin}: columns of CSV, time in seconds and entries named as",
@@ -164,6 +175,7 @@ def record_experiment(fmu: Path, step: Fraction, stimulus: Path | None = None) -
     communication_points(given.times, (), step, varies_step=d.capabilities.varies_step)
     if not compared:
         raise NothingToCompare(d.name)
+    received = as_received(given, columns)
     shares = perturbed(given, columns, off_zero=False)
     nearby = perturbed(given, columns, off_zero=True)
     with tempfile.TemporaryDirectory(prefix="handover-reference-") as scratch:
@@ -171,11 +183,11 @@ def record_experiment(fmu: Path, step: Fraction, stimulus: Path | None = None) -
         FmuArchive(fmu).unpack(folder)
         first, second = _played(d, folder, [write_table(t, columns) for t in (given, nearby)], step, Path(scratch))
         one, other = (read_table(content, "result", compared) for content in (first, second))
-        tolerance = measured(differences(one, other, compared), is_measured=nearby != given)
+        tolerance = measured(differences(one, other, compared), is_measured=nearby != received)
         if not tolerance.is_useful and shares != nearby:
             (third,) = _played(d, folder, [write_table(shares, columns)], step, Path(scratch))
             found = differences(one, read_table(third, "result", compared), compared)
-            tolerance = replace(measured(found, is_measured=shares != given), at_zero=tolerance.spread)
+            tolerance = replace(measured(found, is_measured=shares != received), at_zero=tolerance.spread)
     if tolerance.spread is not None and not tolerance.is_useful:
         raise CannotRecordExperiment(_refusal(d.name, tolerance.spread, is_measured=tolerance.is_measured))
     setup = Setup(
@@ -220,9 +232,11 @@ def _refusal(unit: str, spread: Difference, *, is_measured: bool) -> str:
 def largest_difference(found: Iterable[Difference], absolute: float = ABSOLUTE) -> Difference | None:
     """Return the largest difference, relative to its variable, of those above `absolute`; None if there are none.
 
-    Those below are allowed anyway, and those of an output that rests at 0 are infinite relative to it.
+    Those below are allowed anyway, and those of an output that rests at 0 are infinite relative to it. Likewise those
+    in the last place of a Float32.
     """
-    return max((d for d in found if d.greatest > absolute), key=lambda d: d.share, default=None)
+    beyond = (d for d in found if d.greatest > max(absolute, d.resolution * d.largest))
+    return max(beyond, key=lambda d: d.share, default=None)
 
 
 def relative_tolerance(spread: Difference | None) -> float:
@@ -309,24 +323,34 @@ def _moved(port: FmuPort, start: float, *, ramped: bool) -> list[float]:
     return [start + share * by for share in shares]
 
 
+def as_received(stimulus: SignalTable, columns: Mapping[str, Column]) -> SignalTable:
+    """Return a stimulus as the unit gets it: values of Float32 inputs are rounded."""
+    rounded = {
+        name: [_rounded(columns[name][0], x) for x in values] if columns[name][0].kind is Kind.REAL else values
+        for name, values in stimulus.columns.items()
+    }
+    return replace(stimulus, columns=rounded)
+
+
 def perturbed(stimulus: SignalTable, columns: Mapping[str, Column], *, off_zero: bool) -> SignalTable:
-    """Return a stimulus whose real values are a little nearer to 0, within their ranges; others are as they are.
+    """Return a stimulus as the unit gets it, but with real values a little nearer to 0, or farther off within a range.
 
     With `off_zero` zeros are off 0 by as small a share of their input's magnitude, see above; else they stay.
     """
+    received = as_received(stimulus, columns)
     largest: dict[str, float] = {}
-    for name, values in stimulus.columns.items():
+    for name, values in received.columns.items():
         port = columns[name][0]
         if port.kind is Kind.REAL:
             largest[port.name] = max(largest.get(port.name, 0.0), *map(abs, values))
     changed: dict[str, Sequence[Any]] = {}
-    for name, values in stimulus.columns.items():
+    for name, values in received.columns.items():
         port = columns[name][0]
         if port.kind is Kind.REAL:
             at_zero = _PERTURBATION * (largest[port.name] or _magnitude(port)) if off_zero else 0.0
-            values = [_off(x, at_zero, port) for x in values]
+            values = [_perturbed_value(x, at_zero, port) for x in values]
         changed[name] = values
-    return replace(stimulus, columns=changed)
+    return replace(received, columns=changed)
 
 
 def _magnitude(port: FmuPort) -> float:
@@ -336,8 +360,14 @@ def _magnitude(port: FmuPort) -> float:
     return abs(port.nominal or 0.0) or max(ends) or 1.0
 
 
-def _off(x: float, at_zero: float, port: FmuPort) -> float:
+def _perturbed_value(x: float, at_zero: float, port: FmuPort) -> float:
+    """Return a value a little nearer to 0, else a little farther off; the value itself if neither is in range."""
     low = -math.inf if port.minimum is None else port.minimum
     high = math.inf if port.maximum is None else port.maximum
-    off = x * (1.0 - _PERTURBATION) if x else at_zero if high > 0.0 else -at_zero
-    return min(high, max(low, off))
+    share = _FLOAT32_PERTURBATION if port.width is Width.FLOAT32 else _PERTURBATION
+    choices = (x * (1.0 - share), x * (1.0 + share)) if x else (at_zero, -at_zero)
+    return next((c for c in (_rounded(port, choice) for choice in choices) if low <= c <= high and c != x), x)
+
+
+def _rounded(port: FmuPort, x: float) -> float:
+    return x if port.width is None else port.width.rounded(x)

@@ -5,10 +5,12 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from handover.cosim.blocks.ports import Width
 from handover.cosim.experiments.experiment_run import stimulus_columns
-from handover.cosim.experiments.reference_experiment import ABSOLUTE, Difference
+from handover.cosim.experiments.reference_experiment import ABSOLUTE, Difference, Setup
 from handover.cosim.experiments.signal_table import SignalTable
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus.build import ExperimentRequest, build
@@ -26,9 +28,9 @@ from handover.fmus.contents.reference_experiment import (
 from handover.fmus.contents.related_files import CannotRecordExperiment
 
 STEP = Fraction(1, 10)
-CHAOTIC, EVERY_KIND = (
+CHAOTIC, CHAOTIC_SINGLE, EVERY_KIND = (
     Entry(block.rpartition(":")[2], f"sample_units.{block}", STEP, "a sample")
-    for block in ("chaotic:Chaotic", "every_kind:EveryKind")
+    for block in ("chaotic:Chaotic", "chaotic:ChaoticSingle", "every_kind:EveryKind")
 )
 
 
@@ -70,7 +72,10 @@ def test_an_input_at_0_is_off_it_by_a_share_of_its_range(chaotic: Path, tmp_path
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("later", "is_measured", "wanted"),
-    [("0.0", False, "not measured: of the real inputs all are 0, and those"), ("0.3", True, "smaller, and those")],
+    [
+        ("0.0", False, "not measured: of the real inputs all that could be off are 0, and those"),
+        ("0.3", True, "by 1e-7), and those"),
+    ],
 )
 def test_inputs_stay_at_0_where_what_comes_of_them_is_more_than_a_tolerance(
     chaotic: Path, tmp_path: Path, later: str, is_measured: bool, wanted: str
@@ -109,6 +114,7 @@ def test_a_zero_is_off_by_a_share_of_what_its_input_is_elsewhere(tmp_path: Path)
         ({"minimum": 0.0}, 1e-13),
         ({"minimum": -2.0, "maximum": 0.0}, -2e-13),
         ({"minimum": 0.0, "maximum": 0.0}, 0.0),
+        ({"width": Width.FLOAT32}, 1e-13),
     ],
 )
 def test_of_an_input_that_is_0_throughout_by_a_share_of_what_it_declares(
@@ -116,7 +122,56 @@ def test_of_an_input_that_is_0_throughout_by_a_share_of_what_it_declares(
 ):
     port = replace(describe_fmu(chaotic).inputs["x"], **{"minimum": None, "maximum": None, **declared})
     table = SignalTable([Fraction(0)], {"x": [0.0]})
-    assert perturbed(table, {"x": (port, 0)}, off_zero=True).columns["x"] == [pytest.approx(wanted, rel=1e-12)]
+    assert perturbed(table, {"x": (port, 0)}, off_zero=True).columns["x"] == [pytest.approx(wanted, rel=1e-7)]
+
+
+@pytest.mark.parametrize(
+    ("x", "declared", "wanted"),
+    [
+        (0.5, {"minimum": 0.5, "maximum": 1.0}, 0.5 * (1 + 1e-13)),
+        (1.0, {"minimum": 0.5, "maximum": 1.0}, 1.0 - 1e-13),
+        (-0.5, {"minimum": -1.0, "maximum": -0.5}, -0.5 * (1 + 1e-13)),
+        (0.5, {"minimum": 0.5, "maximum": 0.5}, 0.5),
+        (0.5, {"width": Width.FLOAT32}, 0.5 - 2**-24),
+        (0.5, {"width": Width.FLOAT32, "minimum": 0.5}, 0.5 + 2**-24),
+        (0.3, {"width": Width.FLOAT32}, float(np.nextafter(np.float32(0.3), np.float32(0)))),
+    ],
+)
+def test_an_input_is_off_by_what_its_range_and_width_allow(
+    chaotic: Path, x: float, declared: dict[str, Any], wanted: float
+):
+    port = replace(describe_fmu(chaotic).inputs["x"], **{"minimum": None, "maximum": None, **declared})
+    table = SignalTable([Fraction(0)], {"x": [x]})
+    assert perturbed(table, {"x": (port, 0)}, off_zero=True).columns["x"] == [wanted]
+
+
+def test_a_chaotic_unit_of_a_single_precision_input_is_measured(tmp_path: Path):
+    """1e-7 of 0.5 m, which is the least, becomes 2^8 times that in 8 steps; 1e-13 of it, the input would round away."""
+    fmu = build(CHAOTIC_SINGLE, 3, tmp_path, platforms=["host"])
+    experiment = recorded(fmu, tmp_path, "0.0,0.5\n0.8,0.5\n")
+    assert experiment.tolerance.spread is not None
+    assert experiment.tolerance.spread.greatest == 2.0**-24 * 2**8
+    assert experiment.tolerance.spread.resolution == 2.0**-23
+    assert "(of a Float32 2**-23 at least)" in text_of(experiment)
+    assert "(of a Float32 by 1e-7)" in text_of(experiment)
+    with pytest.raises(CannotRecordExperiment, match="output 'y' changes as inputs round"):
+        recorded(fmu, tmp_path, "0.0,0.5\n2.0,0.5\n")
+
+
+def test_that_no_input_could_be_off_is_said():
+    text = Tolerance(None, ABSOLUTE, is_measured=False).text
+    assert text.startswith("It is not measured: there is no real input that could be off within its range.")
+
+
+def test_the_last_place_of_a_single_precision_output_is_allowed():
+    """It is beyond 1e-9 of the value, and what other machines may round the other way."""
+    last, second = (Difference("y", n * 2.0**-23, 0.1, 1.0, resolution=2.0**-23) for n in (1, 2))
+    setup = Setup(relative=1e-9, absolute=0.0)
+    assert last.greatest <= setup.allowed(last)
+    assert second.greatest > setup.allowed(second)
+    assert setup.allowed(replace(last, resolution=0.0)) == 1e-9
+    assert measured([last], is_measured=True).relative == 1e-9
+    assert measured([second], is_measured=True).relative == 3e-6
 
 
 def test_noise_of_an_output_at_rest_hides_no_other():
