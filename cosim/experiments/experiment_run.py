@@ -1,8 +1,8 @@
 """Plays a stimulus to one unit and records its outputs, in an isolated process (`isolated_process`).
 
 The inputs hold the values of the latest row at or before a communication point, from initialisation on; the outputs are
-recorded at every communication point. Rows whose times are rounded ends of steps count as
-there (`SignalTable.snapped`). `run_experiment` starts the process, whose entry is `main`.
+recorded at every communication point. Rows whose times are rounded ends of steps count as there
+(`SignalTable.snapped`). `run_experiment` starts the process, whose entry is `main`.
 """
 
 import bisect
