@@ -50,7 +50,11 @@ class ParameterSet:
 
 
 class CannotRecordExperiment(RuntimeError):
-    """An FMU's reference experiment cannot be made; the message says why, and what would be right."""
+    """An FMU's reference experiment cannot be made; the message says why, and what would be right.
+
+    `handover.fmus.contents.reference_experiment` raises it. The class stands here, since that module loads FMPy, which
+    takes long, and who catches it builds most FMUs without an experiment.
+    """
 
 
 class NothingToCompare(CannotRecordExperiment):
