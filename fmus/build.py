@@ -176,7 +176,7 @@ def build(
             where the FMU is used. The unit is started in them, and steps once, before the FMU is written.
         include: data files that the block opens beside its module, by `__file__`.
         parameter_sets: that the FMU contains (FMI-LS-REF).
-        experiment: the reference experiment that is recorded and stored with its result; it takes two or three runs.
+        experiment: the reference experiment that is recorded and stored with its result; it takes two to four runs.
 
     Raises:
         CannotRecordExperiment, InvalidTable: the experiment cannot be recorded, or its stimulus is none for this unit.

@@ -69,7 +69,7 @@ _SHARE_OF_RANGE, _SHARE_OF_VALUE = 0.1, 0.01
 _PERTURBATION, _FLOAT32_PERTURBATION = 1e-13, 1e-7
 _MARGIN, _LEAST, _MOST = 10.0, 1e-9, 1e-2
 _MOST_ABSOLUTE = 1e-9
-_TIMEOUT = 600.0  # s, of two runs together
+_TIMEOUT = 600.0  # s, of the first two runs together, and of each later one
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,10 @@ class RecordedExperiment:
 
 
 def record_experiment(fmu: Path, step: Fraction, stimulus: Path | None = None) -> RecordedExperiment:
-    """Play a stimulus to an FMU two or three times, in processes of their own; return it with the first run's outputs.
+    """Play a stimulus to an FMU, in processes of their own; return it with the first run's outputs.
+
+    There are two runs; a third where inputs off 0 change too much; and one more, of the same inputs, before outputs are
+    said to change as inputs round.
 
     Args:
         fmu: the FMU.
@@ -183,13 +186,17 @@ def record_experiment(fmu: Path, step: Fraction, stimulus: Path | None = None) -
         FmuArchive(fmu).unpack(folder)
         first, second = _played(d, folder, [write_table(t, columns) for t in (given, nearby)], step, Path(scratch))
         one, other = (read_table(content, "result", compared) for content in (first, second))
+
+        def change(near: SignalTable) -> list[Difference]:
+            (result,) = _played(d, folder, [write_table(near, columns)], step, Path(scratch))
+            return differences(one, read_table(result, "result", compared), compared)
+
         tolerance = measured(differences(one, other, compared), is_measured=nearby != received)
         if not tolerance.is_useful and shares != nearby:
-            (third,) = _played(d, folder, [write_table(shares, columns)], step, Path(scratch))
-            found = differences(one, read_table(third, "result", compared), compared)
-            tolerance = replace(measured(found, is_measured=shares != received), at_zero=tolerance.spread)
-    if tolerance.spread is not None and not tolerance.is_useful:
-        raise CannotRecordExperiment(_refusal(d.name, tolerance.spread, is_measured=tolerance.is_measured))
+            tolerance = replace(measured(change(shares), is_measured=shares != received), at_zero=tolerance.spread)
+        if tolerance.spread is not None and not tolerance.is_useful:
+            unexplained = largest_difference(change(given)) if tolerance.is_measured else tolerance.spread
+            raise CannotRecordExperiment(_refusal(d.name, tolerance.spread, unexplained))
     setup = Setup(
         step=step,
         relative=tolerance.relative,
@@ -216,17 +223,21 @@ def _size(spread: Difference) -> str:
     return f"by {spread.share:.2g} of its largest value"
 
 
-def _refusal(unit: str, spread: Difference, *, is_measured: bool) -> str:
-    where = f"({_size(spread)} at t = {spread.at:g} s)"
-    if not is_measured:
+def _refusal(unit: str, spread: Difference, unexplained: Difference | None) -> str:
+    """Return why there is no reference: what near inputs changed, or what the same inputs changed, if they did."""
+    if unexplained is not None:
         return (
-            f"{unit}: output {spread.name!r} changes from one run to the next {where}, so that no result could be met; "
-            "let the unit depend on its inputs, its parameters and a seed alone"
+            f"{unit}: output {unexplained.name!r} changes from one run to the next {_place(unexplained)}, so that no "
+            "result could be met; let the unit depend on its inputs, its parameters and a seed alone"
         )
     return (
-        f"{unit}: output {spread.name!r} changes as inputs round {where}, so that other machines could not meet a "
-        "result; give a shorter or calmer stimulus by --stimulus"
+        f"{unit}: output {spread.name!r} changes as inputs round {_place(spread)}, so that other machines could not "
+        "meet a result; give a shorter or calmer stimulus by --stimulus"
     )
+
+
+def _place(spread: Difference) -> str:
+    return f"({_size(spread)} at t = {spread.at:g} s)"
 
 
 def largest_difference(found: Iterable[Difference], absolute: float = ABSOLUTE) -> Difference | None:

@@ -28,9 +28,9 @@ from handover.fmus.contents.reference_experiment import (
 from handover.fmus.contents.related_files import CannotRecordExperiment
 
 STEP = Fraction(1, 10)
-CHAOTIC, CHAOTIC_SINGLE, EVERY_KIND = (
+CHAOTIC, CHAOTIC_SINGLE, RANDOM, EVERY_KIND = (
     Entry(block.rpartition(":")[2], f"sample_units.{block}", STEP, "a sample")
-    for block in ("chaotic:Chaotic", "chaotic:ChaoticSingle", "every_kind:EveryKind")
+    for block in ("chaotic:Chaotic", "chaotic:ChaoticSingle", "chaotic:Random", "every_kind:EveryKind")
 )
 
 
@@ -156,6 +156,13 @@ def test_a_chaotic_unit_of_a_single_precision_input_is_measured(tmp_path: Path):
     assert "(of a Float32 by 1e-7)" in text_of(experiment)
     with pytest.raises(CannotRecordExperiment, match="output 'y' changes as inputs round"):
         recorded(fmu, tmp_path, "0.0,0.5\n2.0,0.5\n")
+
+
+@pytest.mark.parametrize("x", ["0.0", "0.3"])
+def test_a_unit_that_is_random_whatever_its_inputs_is_not_said_to_round(tmp_path: Path, x: str):
+    fmu = build(RANDOM, 3, tmp_path, platforms=["host"])
+    with pytest.raises(CannotRecordExperiment, match=r"output 'y' changes from one run to the next .* a seed alone"):
+        recorded(fmu, tmp_path, f"0.0,{x}\n0.5,{x}\n")
 
 
 def test_that_no_input_could_be_off_is_said():

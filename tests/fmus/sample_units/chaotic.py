@@ -1,5 +1,6 @@
-"""A block that doubles a difference of its input in each step, as chaotic systems do."""
+"""A block that doubles a difference of its input in each step, as chaotic systems do; and one that is random."""
 
+import random
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -80,3 +81,10 @@ class ChaoticSingle:
 
     def set_state(self, state: bytes) -> None:
         self._chaotic.set_state(state)
+
+
+class Random(Chaotic):
+    """y is any number, whatever the input."""
+
+    def outputs(self, t: float, u: Inputs) -> Outputs:  # noqa: ARG002
+        return Outputs(y=random.random())
