@@ -8,6 +8,7 @@ import base64
 import re
 import statistics
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,8 @@ def describe_system(system: System, *, adaptive: bool) -> dict[str, Any]:
     """Return the units and connections of a checked system, as JSON can hold them; for `adaptive` see `own_period`.
 
     A unit has the icon in its FMU, as the FMU may be gone or changed when a report is made of the folder; not that
-    which the catalog has for its name anyway, nor one of more than 200 kB.
+    which the catalog has for its name anyway. Of an icon whose SVG has more than 200 kB the PNG is kept, if it
+    has not.
 
     Raises:
         InvalidFmu: an FMU is damaged.
@@ -49,10 +51,11 @@ def describe_system(system: System, *, adaptive: bool) -> dict[str, Any]:
 
 
 def _own_icon(unit: PlacedUnit) -> dict[str, dict[str, str]]:
-    mime, content = read_icon(FmuArchive(unit.description.path)).best
+    icon = read_icon(FmuArchive(unit.description.path))
     drawing = catalog_icon(unit.description.name)
-    is_catalogs = content in (drawing.read_bytes(), drawing.with_suffix(".png").read_bytes())
-    if not content or len(content) > _MAX_ICON or is_catalogs:
+    of_catalog = (drawing.read_bytes(), drawing.with_suffix(".png").read_bytes())
+    mime, content = (icon if len(icon.svg) <= _MAX_ICON else replace(icon, svg=b"")).best
+    if not content or len(content) > _MAX_ICON or content in of_catalog:
         return {}
     return {"icon": {"type": mime, "base64": base64.b64encode(content).decode()}}
 

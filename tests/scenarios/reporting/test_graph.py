@@ -4,6 +4,7 @@ import base64
 import itertools
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -122,10 +123,44 @@ def test_a_unit_of_ones_own_has_the_icon_in_its_fmu(fmi: int, member: str, tmp_p
     assert shown == [picture_source(own.read_bytes(), f"image/{'png' if fmi == 2 else 'svg+xml'}"), *of_catalog]
 
 
-@pytest.mark.parametrize("icon", [{"type": "text/html", "base64": ""}, {"type": "image/png", "base64": "https://a.b"}])
-def test_what_a_run_says_to_be_an_icon_is_a_picture(icon: dict[str, str]):
-    with pytest.raises(ValueError, match=r"an icon of type 'text/html'|base64|padding"):
-        pictures([unit("a", icon=icon)])
+@pytest.mark.parametrize(
+    ("svg", "png", "kept"),
+    [
+        (200_000, 5000, "svg"),
+        (200_001, 5000, "png"),
+        (200_001, 200_000, "png"),
+        (200_001, 200_001, ""),
+        (0, 200_001, ""),
+    ],
+)
+def test_of_an_icon_that_is_too_large_the_png_is_kept(svg: int, png: int, kept: str, tmp_path: Path):
+    mass = FmuArchive(native_fmu("mass", 3))
+    drawing = catalog_icon("Thrusters")
+    files = {name: mass.read(name) for name in mass.names if not name.endswith("/")}
+    files["terminalsAndIcons/icon.png"] = drawing.with_suffix(".png").read_bytes().ljust(png)
+    if svg:
+        files["terminalsAndIcons/icon.svg"] = drawing.read_bytes().ljust(svg)
+    system = System()
+    system.add("mass", write_archive(tmp_path / "mass.fmu", files))
+    (described,) = describe_system(system, adaptive=False)["units"]
+    types = {"svg": "image/svg+xml", "png": "image/png"}
+    assert described.get("icon", {}).get("type") == types.get(kept)
+    if kept:
+        assert base64.b64decode(described["icon"]["base64"]) == files[f"terminalsAndIcons/icon.{kept}"]
+
+
+@pytest.mark.parametrize(
+    ("icon", "fault"),
+    [
+        ({"type": "text/html", "base64": ""}, "an icon of type 'text/html'"),
+        ({"type": "image/png", "base64": "https://a.b"}, "Only base64 data is allowed"),
+        ({"type": "image/png", "base64": "abc"}, "Incorrect padding"),
+    ],
+)
+def test_what_a_run_says_to_be_an_icon_is_a_picture(icon: dict[str, str], fault: str, tmp_path: Path):
+    with pytest.raises(InvalidRunFolder, match=f"its description of the units is damaged: .*{fault}"):
+        write_run_page(run_of(tmp_path, [unit("a", icon=icon)]))
+    assert not (tmp_path / "report.html").exists()
 
 
 def test_a_conversion_stands_in_the_table():
@@ -167,9 +202,15 @@ def test_rates_are_reported_as_one_reads_them(period: float | None, sampled: boo
     assert rate(unit("u", period=period, sampled=sampled)) == text
 
 
+def run_of(folder: Path, units: Sequence[object]) -> RunFolder:
+    """Write the folder of a run of these units."""
+    run = {"scenario": "x", "parameters": {}, "system": {"units": units, "connections": list[object]()}}
+    (folder / "run.json").write_text(json.dumps(run))
+    (folder / "summary.json").write_text(json.dumps({"success": True, "reason": "", "metrics": {}}))
+    return RunFolder.of_run(folder)
+
+
 def test_a_damaged_system_is_reported_as_the_runs_fault(tmp_path: Path):
-    (tmp_path / "run.json").write_text(json.dumps({"scenario": "x", "parameters": {}, "system": {"units": [1]}}))
-    (tmp_path / "summary.json").write_text(json.dumps({"success": True, "reason": "", "metrics": {}}))
     with pytest.raises(InvalidRunFolder, match="its description of the units is damaged"):
-        write_run_page(RunFolder.of_run(tmp_path))
+        write_run_page(run_of(tmp_path, [1]))
     assert not (tmp_path / "report.html").exists()
