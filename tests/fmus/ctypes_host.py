@@ -1,5 +1,6 @@
 """A small host: loads an FMU's library with ctypes and calls the standard's functions by name."""
 
+import copy
 import ctypes
 import shutil
 import tempfile
@@ -30,7 +31,7 @@ class Callbacks(ctypes.Structure):
 
 
 class CtypesHost:
-    """One FMU, unpacked and loaded, with at most one instance.
+    """One FMU, unpacked and loaded, with at most one instance; `another` has one more.
 
     Attributes:
         log: messages so far, as the host gets them.
@@ -156,6 +157,16 @@ class CtypesHost:
             return self.call(f"{verb}Float64", ctypes.byref(ctypes.c_uint32(first)), SIZE(1), values, SIZE(n))
         references = (ctypes.c_uint32 * n)(*range(first, first + n))
         return self.call(f"{verb}Real", references, SIZE(n), values)
+
+    def another(self) -> "CtypesHost":
+        """Return a host of one more instance in the same folder, which is initialised."""
+        other = copy.copy(self)
+        other.instance, other.log, other.categories, other.names = None, [], [], []
+        other._log2, other.logger3 = Log2(other._take_2), Log3(other._take_3)
+        other.callbacks = Callbacks(logger=other._log2)
+        assert other.instantiate(), other.log
+        assert other.initialise() == OK, other.log
+        return other
 
     def free(self) -> None:
         """Free the instance."""

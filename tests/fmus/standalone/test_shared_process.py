@@ -11,8 +11,6 @@ from pathlib import Path
 
 import pytest
 from ctypes_host import ERROR, OK, SIZE, CtypesHost
-from instances import free, process
-from instances import instance as initialised
 from sample_units.trouble import Deed
 
 from handover.fmus.build import build, build_block
@@ -53,9 +51,13 @@ def host(fmu: Path) -> Iterator[CtypesHost]:
 
 def instance(host: CtypesHost) -> CtypesHost:
     """Return a host of one more instance in the same folder, which has stepped once."""
-    other = initialised(host)
+    other = host.another()
     assert other.step(0.0, DT) == OK, other.log
     return other
+
+
+def process(host: CtypesHost) -> int:
+    return int(host.get("process")[0])
 
 
 def do(host: CtypesHost, deed: Deed) -> int:
@@ -77,11 +79,11 @@ def test_instances_share_a_process_that_ends_with_the_last(host: CtypesHost):
     first, second = instance(host), instance(host)
     assert process(first) == process(second) != os.getpid()
     number = process(first)
-    free(first)
+    first.free()
     assert is_alive(number)
     assert second.step(DT, DT) == OK
     assert second.get("count") == [2.0]
-    free(second)
+    second.free()
     assert not is_alive(number)
 
 
@@ -97,8 +99,8 @@ def test_a_crash_is_told_to_every_instance_and_each_can_go_on_after_a_reset(host
         assert each.step(0.0, DT) == OK
         assert each.get("count") == [1.0]
     assert process(first) == process(second)
-    free(first)
-    free(second)
+    first.free()
+    second.free()
 
 
 def test_an_instance_that_hangs_is_ended_when_its_time_is_over(host: CtypesHost, monkeypatch: pytest.MonkeyPatch):
@@ -110,8 +112,8 @@ def test_an_instance_that_hangs_is_ended_when_its_time_is_over(host: CtypesHost,
     assert not is_alive(number)
     assert second.step(DT, DT) == ERROR
     assert "was ended, as it did not answer another instance of the unit in time" in second.log[-1]
-    free(first)
-    free(second)
+    first.free()
+    second.free()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the process's environment in /proc")
@@ -123,7 +125,7 @@ def test_no_variable_of_the_host_reaches_it_but_where_it_may_write(
     monkeypatch.setenv("HOME", str(tmp_path))
     first = instance(host)
     given = Path(f"/proc/{process(first)}/environ").read_bytes().decode()
-    free(first)
+    first.free()
     assert OF_THE_HOST not in given
     assert f"HOME={tmp_path}\0" in given
     assert not {line.partition("=")[0] for line in given.split("\0")} & set(VARIABLES) - {"LD_LIBRARY_PATH"}
@@ -146,7 +148,7 @@ def test_another_unit_at_the_same_place_does_not_meet_the_process_of_the_one_bef
     assert process(third) == process(fourth)
     for each in (first, second, third, fourth):
         assert each.step(DT, DT) == OK, each.log
-        free(each)
+        each.free()
     host.close()
 
 

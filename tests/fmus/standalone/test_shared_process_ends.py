@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 from ctypes_host import CtypesHost
-from instances import free, instance, process
 
 from handover.fmus.build import build_block
 from handover.fmus.compile import RUNTIME, host_platform, zig_cc
@@ -67,24 +66,24 @@ def test_an_instance_gets_another_process_where_the_one_that_runs_is_about_to_cr
     host_of: Callable[[str], CtypesHost],
 ):
     host = host_of(CRASHES)
-    first = instance(host)
-    second = instance(host)
-    assert process(first) != process(second)
-    free(first)
-    free(second)
+    first = host.another()
+    second = host.another()
+    assert first.get("process") != second.get("process")
+    first.free()
+    second.free()
 
 
 def test_an_instance_is_made_while_another_process_takes_its_time_to_end(host_of: Callable[[str], CtypesHost]):
     host = host_of(ENDS_SLOWLY)
-    first = instance(host)
-    leaving = threading.Thread(target=free, args=(first,))
+    first = host.another()
+    leaving = threading.Thread(target=first.free)
     leaving.start()
     leaving.join(0.1)
-    second = instance(host)
+    second = host.another()
     assert leaving.is_alive()
     (host.folder / "resources" / "standalone" / host_platform() / "may_end").touch()
     leaving.join()
-    free(second)
+    second.free()
 
 
 def test_a_fork_of_a_host_of_which_a_thread_has_the_lock_makes_instances(tmp_path: Path):
