@@ -3,6 +3,7 @@
 import csv
 import io
 import itertools
+import re
 import xml.etree.ElementTree as ET
 import zipfile
 from fractions import Fraction
@@ -165,6 +166,23 @@ def test_a_unit_that_fails_is_not_proven(tmp_path: Path):
         CannotRecordExperiment, match=r"fmi3DoStep at t = 0\.1 s answered Error .*the number of the beast"
     ):
         build(EVERY_KIND, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest(given))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("places", "passes"), [(0, True), (1, True), (2, False)])
+def test_the_last_place_of_a_single_precision_output_may_be_another(tmp_path: Path, places: int, passes: bool):
+    given = tmp_path / "given.csv"
+    given.write_text("time,x\n0.0,0.5\n0.1,0.5\n")
+    single = unit("chaotic:ChaoticSingle")
+    files = contents(build(single, 3, tmp_path, platforms=["host"], experiment=ExperimentRequest(given)))
+    result = f"{FOLDER}/smoke-test/result.csv"
+    assert files[result].startswith(b"time,y\n0.0,0.5\n")
+    files[result] = files[result].replace(b"0.0,0.5", f"0.0,{0.5 + places * 2.0**-24!r}".encode())
+    files[MANIFEST] = re.sub(rb'relative="[^"]*"', b'relative="1e-9"', files[MANIFEST])
+    report = check_fmu(write_archive(tmp_path / "other.fmu", files), 60.0)
+    assert report.passed is passes
+    (line,) = [f.line for f in report.sections[-1].findings] or [""]
+    assert ("(1.19209e-07 of its largest value 0.5, and 1e-12)" in line) is (places > 0)
 
 
 @pytest.mark.slow
