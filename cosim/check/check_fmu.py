@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 from handover.cosim.check.described_variable import DescribedVariable, variables_of
 from handover.cosim.check.description_checks import description_findings, interface_findings, says
 from handover.cosim.check.experiment_check import ExperimentCheck
-from handover.cosim.check.report import RUN, CheckReport, Section
+from handover.cosim.check.report import EXPERIMENTS, RUN, CheckReport, Section
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.experiments.manifest import MANIFEST, related_files
 from handover.cosim.experiments.reference_experiment import ReferenceExperiment, experiments_in
@@ -202,7 +202,7 @@ class _Check:
         yield "loading", self._loading
         yield RUN, self._run
         if self.experiments:
-            yield "experiments", self._experiments
+            yield EXPERIMENTS, self._experiments
 
     def _archive(self) -> tuple[str, list[Finding]]:
         self.archive = FmuArchive(self.path)

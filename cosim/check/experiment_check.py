@@ -84,13 +84,20 @@ class ExperimentCheck:
             files["reference"].write_bytes(self._archive.read(experiment.result.path))
         findings += run_experiment(self._d.path, self._folder, [files], step, place, self._timeout)
         n = len(points) - 1
-        if any(f.level is Level.FAULT for f in findings) or reference is None:
+        if any(f.level is Level.FAULT for f in findings):
             return f"{experiment.name}: {n} steps", findings
+        if reference is None or experiment.result is None:
+            return f"{experiment.name}: {n} steps, nothing compared", findings
         columns = result_columns(self._d)
         result = read_table(files["result"].read_bytes(), "result", columns)
         compared = differences(reference, result, columns)
         findings += _judged(compared, experiment.setup)
         n_outputs = f"{len(compared)} output{'s' if len(compared) != 1 else ''}"
+        if absent := len(set(points) - set(reference.times)):
+            n_outputs += f" at {n + 1 - absent} of {n + 1} points"
+            if experiment.setup.step is not None:
+                what = f"{experiment.result.source}: it lacks {absent} of {n + 1} communication points"
+                findings.append(fault(what, where=where, cure="the result as it was made has a row for each"))
         most = _largest_in_words(compared, experiment.setup)
         return f"{experiment.name}: {n} steps, {n_outputs} compared, {most}", findings
 

@@ -10,6 +10,9 @@ from handover.cosim.probe.finding import Finding, Level
 RUN = "run"
 """Name of the section in which the unit runs."""
 
+EXPERIMENTS = "experiments"
+"""Name of the section in which the experiments that it contains are run again."""
+
 
 @dataclass(frozen=True)
 class Section:

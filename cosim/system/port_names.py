@@ -96,7 +96,10 @@ def unit_of(ports: PortNames, causality: Causality) -> str:
         TypeError: they are something else.
     """
     if not isinstance(ports, PortNames):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise TypeError(f"{ports!r} is one port or none, the other end a unit's: connect UNIT.y with UNIT.u")
+        raise TypeError(
+            f"{ports} is one port or terminal, and the other end all of a unit: connect UNIT.y with UNIT.u, or "
+            "UNIT.y.NAME with UNIT.u.NAME"
+        )
     unit, own = vars(ports)["_unit"], vars(ports)["_causality"]
     if own is not causality:
         wanted = f"{unit}.{'y' if causality is Causality.OUTPUT else 'u'}"

@@ -78,7 +78,8 @@ def _judge(name: str, found: Mapping[str, Any], resources: Path) -> None:
         place = Path(fault["lacks"])
         sources = resources / "sources"
         lacks = place.relative_to(sources) if place.is_relative_to(sources) else place
-        raise CannotFreeze(f"{name}: it opens {lacks}, which the FMU does not have; list it with --include")
+        remedy = "open it beside the module, by its __file__, and list it with --include"
+        raise CannotFreeze(f"{name}: it opens {lacks}, which the FMU does not have there; {remedy}")
     if fault:
         raise CannotFreeze(f"{name}: it fails in its frozen interpreter: {fault['error']}")
     if found["opened"]:

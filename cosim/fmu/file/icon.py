@@ -14,6 +14,8 @@ _FMI2_PNG = "model.png"
 _FMI3_PNG, _FMI3_SVG = "terminalsAndIcons/icon.png", "terminalsAndIcons/icon.svg"
 _PNG = b"\x89PNG\r\n\x1a\n"
 """With what every PNG begins."""
+_PNG_END = b"IEND\xaeB`\x82"
+"""With what it ends: the empty chunk IEND and its CRC."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +34,10 @@ class Icon:
 
 
 def png_fault(content: bytes) -> str:
-    """Return why bytes are no PNG; empty if they begin as one."""
-    return "" if content.startswith(_PNG) else "that is no PNG"
+    """Return why bytes are no PNG; empty if they begin as one and its end is there."""
+    if not content.startswith(_PNG):
+        return "that is no PNG"
+    return "" if _PNG_END in content else "that is a PNG which is cut off"
 
 
 def svg_fault(content: bytes) -> str:

@@ -13,7 +13,14 @@ from handover.cosim.experiments.signal_table import InvalidTable
 from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import ExperimentRequest, InvalidName, InvalidStep, build
 from handover.fmus.catalog import UNITS, Entry, UnknownBlock, own_unit
-from handover.fmus.compile import TARGETS, compile_runtime, has_compiler, is_current, named_platforms
+from handover.fmus.compile import (
+    TARGETS,
+    compile_runtime,
+    has_compiler,
+    host_platform,
+    is_current,
+    named_platforms,
+)
 from handover.fmus.contents.fmi2_description import NoFmi2Form
 from handover.fmus.contents.icons import InvalidIcon
 from handover.fmus.contents.model_description import AmbiguousName, InvalidText
@@ -162,6 +169,8 @@ def build_command(
             raise UsageError("--step is for units of your own, MODULE:CLASS; those of the catalog have theirs")
         if stimulus is not None:
             _check_stimulus(stimulus, units, prove=prove)
+        if prove and platforms and host_platform() not in named_platforms(platforms):
+            raise UsageError(f"--prove plays the experiment on this machine: give --platform {host_platform()}, too")
         _check_what_goes_along(entries, platforms if standalone else None, include)
         _compile_missing(platforms)
         given = {"platforms": platforms or None, "standalone": standalone, "include": include}

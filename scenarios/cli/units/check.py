@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.cosim.check.check_fmu import check_fmu
-from handover.cosim.check.report import CheckReport, Section
+from handover.cosim.check.report import EXPERIMENTS, CheckReport, Section
 from handover.cosim.fmu.file.archive import NO_FILE_FAULT, folder_fault
 from handover.cosim.probe.finding import Finding, Level
 from handover.cosim.ssp.check_ssp import check_ssp
@@ -138,6 +138,8 @@ def _verdict(report: CheckReport) -> Text:
     sentence = f" ({', '.join(counted)})" if counted else ""
     if report.passed:
         return Text.assemble(("usable", "green"), f": no faults were found{sentence}")
+    if {s.name for s in report.sections if s.level is Level.FAULT} == {EXPERIMENTS}:
+        return Text.assemble(("runs here", "bold red"), f", but not as in its own experiments{sentence}")
     if report.ran:
         return Text.assemble(
             ("against the standard", "bold red"), f": it runs here, but another tool may refuse it{sentence}"

@@ -117,5 +117,15 @@ def test_an_output_at_rest_is_compared_absolutely(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr("handover.cosim.check.experiment_check.run_experiment", play)
     files = {"in.csv": INPUTS, "out.csv": "time,y\n0.0,0\n0.3,0\n1.0,0\n"}
     summary, findings = checked(packed(tmp_path, manifest(STIMULUS.format(""), RESULT), files), tmp_path)
-    assert summary.endswith(f", 1 output compared, {wanted}")
+    assert summary.endswith(f", 1 output at 3 of 11 points compared, {wanted}")
     assert all(f.level is Level.NOTE for f in findings)
+
+
+@pytest.mark.skipif(not host_platform().endswith("linux"), reason="decay.c is compiled for Linux")
+def test_a_result_that_is_cut_off_does_not_pass_for_a_whole_one(decay_library: bytes, tmp_path: Path):
+    rows = outputs().splitlines(keepends=True)
+    content = manifest(STIMULUS.format(SETUP.format("1e-9", '<Parameter name="mode" value="0"/>')), RESULT)
+    files = {"in.csv": INPUTS, "out.csv": "".join(rows[:4])}
+    found = section(check_fmu(packed(tmp_path, content, files, decay_library), 60.0), "experiments")
+    assert "out.csv: it lacks 8 of 11 communication points" in found.findings[-1].line
+    assert found.summary.startswith("in.csv: 10 steps, 1 output at 3 of 11 points compared")

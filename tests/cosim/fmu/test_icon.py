@@ -8,8 +8,8 @@ from native_units import native_fmu
 from handover.cosim.fmu.file.archive import FmuArchive, write_archive
 from handover.cosim.fmu.file.icon import Icon, read_icon
 
-PNG = b"\x89PNG\r\n\x1a\n and pixels"
-OTHER = PNG + b" of another"
+BEGIN, END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
+PNG, OTHER = BEGIN + b" and pixels" + END, BEGIN + b" and others" + END
 SVG = b'<svg xmlns="http://www.w3.org/2000/svg"/>'
 FMI2, FMI3, DRAWING = "model.png", "terminalsAndIcons/icon.png", "terminalsAndIcons/icon.svg"
 
@@ -24,6 +24,7 @@ FMI2, FMI3, DRAWING = "model.png", "terminalsAndIcons/icon.png", "terminalsAndIc
         ({FMI3: PNG, DRAWING: b"<svg"}, Icon(PNG), ("image/png", PNG)),
         ({FMI3: PNG, DRAWING: b"<svg/>"}, Icon(PNG), ("image/png", PNG)),
         ({FMI3: b"GIF89a", FMI2: PNG}, Icon(PNG), ("image/png", PNG)),
+        ({FMI3: PNG[:-3], FMI2: OTHER}, Icon(OTHER), ("image/png", OTHER)),
         ({FMI3: b"", DRAWING: b""}, Icon(), ("", b"")),
     ],
 )

@@ -121,6 +121,7 @@ def test_or_the_one_that_it_names(own: OwnBlock, tmp_path: Path, has_drawing: bo
         ('icon = "none.png"', "there is no such file in"),
         ('icon = "../elsewhere.png"', "there is no such file in"),
         ('icon = "text.png"', "that is no PNG"),
+        ('icon = "cut.png"', "that is a PNG which is cut off"),
         ('icon = "bad.png"', "the SVG of that name cannot be read"),
         ('icon = "page.png"', "does not begin with <svg>"),
     ],
@@ -129,6 +130,7 @@ def test_what_names_no_picture_is_refused_before_anything_is_written(
     own: OwnBlock, tmp_path: Path, line: str, fault: str
 ):
     (tmp_path / "text.png").write_text("a picture")
+    (tmp_path / "cut.png").write_bytes(catalog_icon("Push").with_suffix(".png").read_bytes()[:60])
     for name, drawing in (("bad", "<svg"), ("page", "<html/>")):
         shutil.copy(catalog_icon("Push").with_suffix(".png"), tmp_path / f"{name}.png")
         (tmp_path / f"{name}.svg").write_text(drawing)

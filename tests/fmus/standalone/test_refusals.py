@@ -154,7 +154,10 @@ def test_a_file_beside_the_module_goes_along(folder: Path, tmp_path: Path):
 @pytest.mark.slow
 def test_files_that_the_fmu_lacks_or_that_only_this_machine_has(folder: Path, tmp_path: Path):
     beside = own_unit(reader(folder, "reads_missing", "Path(__file__).with_name('table.csv')"), None)
-    with pytest.raises(CannotFreeze, match=r"opens table\.csv, which the FMU does not have; list it with --include"):
+    with pytest.raises(
+        CannotFreeze,
+        match=r"opens table\.csv, which the FMU does not have there; open it beside the",
+    ):
         build(beside, 3, tmp_path / "out", standalone=True)
     here = own_unit(reader(folder, "reads_here", f"Path({str(folder / 'table.csv')!r})"), None)
     with pytest.raises(CannotFreeze, match=r"files that only this machine has: .*table\.csv"):
