@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from handover.cosim.blocks.variable import Causality
+from handover.cosim.exceptions import nearest
 from handover.cosim.fmu.file.description import FmuDescription
 from handover.cosim.system.conversion import LinearTransformation
 
@@ -87,6 +88,28 @@ class PlacedUnit:
         from handover.cosim.fmu.file.port_table import description_html  # of notebooks alone
 
         return description_html(self.description)
+
+
+def check_end(end: Any, ports: str, units: Mapping[str, PlacedUnit]) -> None:
+    """Check an end of a connection.
+
+    Args:
+        end: of which is checked what it is.
+        ports: `y` or `u`, what it should be of.
+        units: those of the system, by name.
+
+    Raises:
+        TypeError: it is no port, and not all outputs or inputs of a unit.
+        ValueError: it is all of a unit that the system does not have.
+    """
+    if isinstance(end, PlacedUnit):
+        right = f"{end.name}.{ports}, or {end.name}.{ports}.NAME for one port"
+        raise TypeError(f"{end.name} is a unit, and its ports are connected: give {right}")
+    if isinstance(end, PortNames):
+        if (unit := vars(end)["_unit"]) not in units:
+            raise ValueError(f"{end!r}: this system has no unit {unit!r}; {nearest(unit, units)}")
+    elif not isinstance(end, PortName):
+        raise TypeError(f"{end!r} is not a port: give unit.y.NAME and unit.u.NAME of what add returned")
 
 
 def unit_of(ports: PortNames, causality: Causality) -> str:

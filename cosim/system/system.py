@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, overload
 
 from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.exceptions import WiringError, nearest
+from handover.cosim.exceptions import WiringError
 from handover.cosim.fmu.file.default_experiment import NO_STEP, DefaultExperiment, NoStep, proposed_step
 from handover.cosim.fmu.file.description import FmuDescription, describe_fmu
 from handover.cosim.system.conversion import LinearTransformation, conversion
@@ -27,7 +27,7 @@ from handover.cosim.system.matching import (
     matched_ports_of_terminals,
     matches_of,
 )
-from handover.cosim.system.port_names import Connection, PlacedUnit, PortName, PortNames, ambiguity, unit_of
+from handover.cosim.system.port_names import Connection, PlacedUnit, PortName, PortNames, ambiguity, check_end, unit_of
 from handover.cosim.system.time_series import ExternalSource, NoSource, TimeSeries
 from handover.cosim.system.wiring_faults import (
     clock_of,
@@ -123,8 +123,10 @@ class System:
         Raises:
             TypeError: an end is not a port, or not the outputs or inputs of a unit, or units or terminals are connected
                 with a transformation, which is for one connection.
+            ValueError: a whole unit is not of this system.
         """
-        self._check_ends(source, target)
+        for end, ports in ((source, "y"), (target, "u")):
+            check_end(end, ports, self.units)
         if isinstance(source, PortNames) or isinstance(target, PortNames):
             if transformation is not None:
                 raise TypeError("a transformation is for one connection: give unit.y.NAME and unit.u.NAME")
@@ -136,18 +138,6 @@ class System:
         if transformation is not None:
             raise TypeError("a transformation is for one connection: give unit.y.NAME and unit.u.NAME")
         return self._connect_terminals(a, b)
-
-    def _check_ends(self, source: Any, target: Any) -> None:
-        """Raise TypeError for ends that are no ports, and ValueError for whole units of another system."""
-        for end, ports in ((source, "y"), (target, "u")):
-            if isinstance(end, PlacedUnit):
-                right = f"{end.name}.{ports}, or {end.name}.{ports}.NAME for one port"
-                raise TypeError(f"{end.name} is a unit, and its ports are connected: give {right}")
-            if isinstance(end, PortNames):
-                if (unit := vars(end)["_unit"]) not in self.units:
-                    raise ValueError(f"{end!r}: this system has no unit {unit!r}; {nearest(unit, self.units)}")
-            elif not isinstance(end, PortName):
-                raise TypeError(f"{end!r} is not a port: give unit.y.NAME and unit.u.NAME of what add returned")
 
     def _terminal(self, end: PortName) -> TerminalEnd | None:
         """Return the terminal that an end names; None where it names a port, as any terminal is hidden by."""

@@ -5,6 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
+from handover.cosim.blocks.variable import Kind
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.catalog import ScenarioSource, named_scenario
 from handover.scenarios.execution.unit_values import split_parameters
@@ -48,9 +49,13 @@ def identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
 def _parameter_files(plan: CampaignPlan) -> dict[str, dict[str, str]]:
     """Return names and hashes of all files that parameters of runs name, by their paths as they are given."""
     experiment = named_scenario(plan.scenario)()
+    # Names of files are texts, of which even many points have few: all others need not be parsed.
+    of_text = {v.name for v in experiment.parameters() if v.kind is Kind.STRING} | {*experiment.unit_files}
+    given = ({**plan.fixed, **point} for point in plan.points)
+    texts = {tuple(f"{n}={text}" for n, text in values.items() if n in of_text) for values in given}
     files: set[Path] = set()
-    for point in range(len(plan.points)):
-        files.update(experiment.files_read(*split_parameters(type(experiment), plan.texts(point))).values())
+    for values in texts - {()}:
+        files.update(experiment.files_read(*split_parameters(type(experiment), values)).values())
     there = [file for file in sorted(files) if file.is_file()]
     return {str(file): {"file": file.name, "sha256": sha256_of(file)} for file in there}
 

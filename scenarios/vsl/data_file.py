@@ -101,7 +101,9 @@ def read_data(path: Path, key: str, kinematics: VslKinematics, parameters: Mappi
         part: np.column_stack([numbers[f"{port}[{k + 1}]"] for k in range(n)]) for part, (port, n) in _COLUMNS.items()
     }
     points, order = Dataset(**parts), _order(path, numbers[_ORDER])
-    _check_units(path, points.rows(order >= 0), kinematics, origin["arm"].get("parameters"))
+    arm: object = origin["arm"].get("parameters")
+    known = cast("dict[str, Any]", arm) if isinstance(arm, dict) else {}
+    _check_units(path, points.rows(order >= 0), kinematics, known)
     return Measured(points, order, origin)
 
 
@@ -157,7 +159,7 @@ def _check_parameters(path: Path, arm: Mapping[str, Any], parameters: Mapping[st
         )
 
 
-def _check_units(path: Path, points: Dataset, kinematics: VslKinematics, arm: Mapping[str, Any] | None) -> None:
+def _check_units(path: Path, points: Dataset, kinematics: VslKinematics, arm: Mapping[str, Any]) -> None:
     """Refuse points that are in other units, as degrees, bar or millimetres: no arm is like that."""
     if not len(points):
         return
@@ -165,7 +167,7 @@ def _check_units(path: Path, points: Dataset, kinematics: VslKinematics, arm: Ma
         port, largest = _COLUMNS[part][0], float(np.max(np.abs(getattr(points, part))))
         if 0.0 < largest < least or largest > most:
             raise InvalidData(path, f"its {port}, up to {largest:.4g}, cannot be in {unit}; columns are in SI units")
-    kt = (arm or {}).get("kt", ArmParams().kt)
+    kt = arm.get("kt", ArmParams().kt)
     if (largest := float(np.max(np.abs(points.i)))) * kt > _MAX_TORQUE:
         raise InvalidData(path, f"its i_meas, up to {largest:.4g}, cannot be in A; columns are in SI units")
     rigid = np.array([kinematics.forward(q) for q in points.q])
