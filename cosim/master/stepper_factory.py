@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.cosim.master.isolated_units import isolated_units
-from handover.cosim.plan.choice import log_fallback, plan_stepper
+from handover.cosim.plan.choice import log_fallback, plan_obstacle, plan_stepper
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
 from handover.cosim.stepping.ensemble import CleanupStack, Ensemble
 from handover.cosim.stepping.event_ensemble import EventEnsemble
@@ -52,6 +52,11 @@ class StepperFactory:
         """Whether units repeat steps after a rollback."""
         return any(g.cycle for g in (*self.schedule.sampled_groups, *self._continuous))
 
+    @property
+    def plan_obstacle(self) -> str | None:
+        """Why the system does not run as a compiled plan; None if it does."""
+        return plan_obstacle(self.schedule, self._system, self._options, iterates=self.iterates)
+
     def load(self, heartbeat: Heartbeat, cleanups: CleanupStack) -> Ensemble:
         """Load the units; the caller closes `cleanups`, also if this fails."""
         load = EventEnsemble if self.has_events else Ensemble
@@ -83,20 +88,24 @@ class StepperFactory:
                 return GaussSeidel(ensemble, *groups, self._solver, late)
 
     def stepper(self, ensemble: Ensemble, coupling: Coupling) -> Stepper:
-        """Return a stepper for initialised units, which is a compiled plan where that does the same."""
+        """Return a stepper for initialised units, which is a compiled plan where that does the same.
+
+        Why it is none is logged.
+        """
         control = self._options.adaptive
         if self._options.cpu_times:
             ensemble.measure_cpu()
-        if isinstance(ensemble, EventEnsemble) or control is not None:
-            log_fallback("steps may end anywhere")
+        if (obstacle := self.plan_obstacle) is not None:
+            log_fallback(obstacle)
+        elif plan := plan_stepper(self.schedule, ensemble, coupling, self._options):
+            return plan
         if isinstance(ensemble, EventEnsemble):
             return EventStepper(self.schedule, ensemble, coupling)
         if self._options.extrapolation is Extrapolation.LINEAR:
             ensemble.extrapolate(self.schedule.tick if control is None else fine_tick(self.schedule, control))
         if control is not None:
             return AdaptiveStepper(self.schedule, coupling, ensemble, control, self._options.order)
-        plan = plan_stepper(self.schedule, ensemble, coupling, self._options, iterates=self.iterates)
-        return plan or GridStepper(self.schedule, coupling, ensemble.extrapolation)
+        return GridStepper(self.schedule, coupling, ensemble.extrapolation)
 
     def _groups(self) -> Sequence[Group]:
         """Return the units that are not sampled, in groups that iterate together at each step."""

@@ -1,17 +1,21 @@
-"""Chooses whether a system runs as a compiled plan, and logs why it does not.
+"""Says whether a system can run as a compiled plan, makes the stepper that runs it, and logs why there is none.
 
 What the plan does not support has to be an obstacle here: the two paths give the same bytes.
 """
 
 import logging
+from collections.abc import Iterable
 
 from handover.cosim.plan.memory import loop
 from handover.cosim.plan.plan_maker import PlanMaker
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.ensemble import Ensemble
+from handover.cosim.stepping.event_stepper import has_events
 from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
 from handover.cosim.stepping.stepper import Coupling
+from handover.cosim.system.port_names import PortName
 from handover.cosim.system.schedule import Schedule
+from handover.cosim.system.system import System
 
 _log = logging.getLogger(__name__)
 
@@ -20,16 +24,15 @@ _MAX_TICKS = 2**63
 
 
 def plan_stepper(
-    schedule: Schedule, ensemble: Ensemble, coupling: Coupling, options: MasterOptions, *, iterates: bool
+    schedule: Schedule, ensemble: Ensemble, coupling: Coupling, options: MasterOptions
 ) -> PlanStepper | None:
-    """Return a stepper that runs a system as a plan; None, with a line in the log, where only the general path can.
+    """Return a stepper that runs a system without obstacle as a plan; None, with a line in the log, without the loop.
 
-    `coupling` does the same on the general path; `iterates` says whether units repeat steps after a rollback.
+    `coupling` does the same on the general path.
     """
-    reason = _obstacle(schedule, ensemble, options, iterates)
-    library = loop() if reason is None else None
+    library = loop()
     if library is None:
-        log_fallback(reason or "its library is not compiled for this machine")
+        log_fallback("its library is not compiled for this machine")
         return None
     plan = PlanMaker(ensemble, schedule, options.algorithm, library, clock=options.cpu_times)
     return PlanStepper(schedule, ensemble, coupling, plan)
@@ -40,19 +43,26 @@ def log_fallback(reason: str) -> None:
     _log.info("no compiled plan: %s", reason)
 
 
-def _obstacle(schedule: Schedule, ensemble: Ensemble, options: MasterOptions, iterates: bool) -> str | None:
+def plan_obstacle(schedule: Schedule, system: System, options: MasterOptions, *, iterates: bool) -> str | None:
+    """Return why a system cannot run as a plan; None if it can. `iterates` says whether units repeat steps."""
     if not options.compiled:
         return "the options ask for none"
+    if options.adaptive is not None or has_events(system, options):
+        return "steps may end anywhere"
     if options.algorithm not in (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL):
         return f"the coupling is {options.algorithm.value}"
     if iterates:
         return "units make a loop"
     if options.extrapolation is not Extrapolation.HOLD:
         return "inputs are extrapolated"
-    if ensemble.system.followed:
-        return "inputs follow values over time"
-    if ensemble.external_inputs:
-        return "inputs come from outside"
+    if system.followed:
+        return f"inputs follow values over time: {_named(system.followed)}"
+    if system.externals:
+        return f"inputs come from outside: {_named(system.externals)}"
     if max(schedule.tick.numerator, schedule.tick.denominator) >= _MAX_TICKS:
         return f"a tick of {schedule.tick} s is too long a fraction"
     return None
+
+
+def _named(ends: Iterable[PortName]) -> str:
+    return ", ".join(str(end) for end in ends)

@@ -31,7 +31,7 @@ from handover.cosim.ssp.xml import (
 )
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.schedule import common_divisor
-from handover.cosim.system.system import Connection, PlacedUnit, PortName, System
+from handover.cosim.system.system import Connection, PlacedUnit, System
 
 Items = tuple[tuple[str, int], ...]
 
@@ -180,7 +180,7 @@ def write_ssp(
         OSError: the file cannot be written.
     """
     system.check()
-    if faults := [f"{u}.{port} follows values over time" for u, ports in system.followed.items() for port in ports]:
+    if faults := [f"{end} follows values over time" for end in system.followed]:
         raise NotExportable(faults)
     files = _file_names(system)
     version = "1.0" if all(u.description.fmi == 2 for u in system.units.values()) else "2.0"
@@ -220,7 +220,7 @@ class _Structure:
         self._icons = icons
         self._parallel_step = parallel_step
         self._base = parallel_step or common_divisor([u.period for u in system.units.values()])
-        self._external = [PortName(unit, port) for unit, ports in system.externals.items() for port in ports]
+        self._external = [*system.externals]
         self._connected = {*self._external, *(end for c in system.connections for end in (c.source, c.target))}
         self._types = DescribedTypes(p for u in system.units.values() for p in self._shown(u))
         self._diagram = Diagram(system, {name: self._shown(unit) for name, unit in system.units.items()})

@@ -148,10 +148,10 @@ class Ensemble:
         """Return the units' outputs and the inputs that come from outside, as they are."""
         ports = {n: u.description.outputs for n, u in self.system.units.items()}
         views = {n: i.y for n, i in self.instances.items()}
-        for name, inputs in self.system.externals.items():
-            instance = self.instances[name]
-            ports[name] = {**ports[name], **{port: instance.description.inputs[port] for port in inputs}}
-            views[name] = {**views[name], **{port: instance.u[port] for port in inputs}}
+        for end in self.system.externals:
+            instance = self.instances[end.unit]
+            ports[end.unit] = {**ports[end.unit], end.port: instance.description.inputs[end.port]}
+            views[end.unit] = {**views[end.unit], end.port: instance.u[end.port]}
         return Signals(views, ports, self)
 
     def initialize(self, slots: Sequence[Slot], compute_values: Callable[[], None]) -> None:

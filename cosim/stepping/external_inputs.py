@@ -121,12 +121,11 @@ class ExternalInputs:
         self._inputs: list[ExternalInput] = []
         self._asked: float | None = None
         self.wait: Callable[[float], None] | None = None
-        for unit, sources in system.externals.items():
-            for name, source in sources.items():
-                port = instances[unit].description.inputs[name]
-                values = instances[unit].u[name][0]
-                values[...] = entries_of(port, system.units[unit].start)
-                self._inputs.append(ExternalInput(unit, port, values, source))
+        for end, source in system.externals.items():
+            instance = instances[end.unit]
+            port, values = instance.description.inputs[end.port], instance.u[end.port][0]
+            values[...] = entries_of(port, system.units[end.unit].start)
+            self._inputs.append(ExternalInput(end.unit, port, values, source))
 
     def __bool__(self) -> bool:
         """Return whether there are any."""

@@ -189,5 +189,5 @@ def _feeding(
             copies += zip(instance.u[port], other.y[source.port], strict=True)
         if target.width and narrows(output, target):
             narrowings.append(Narrowing(str(source), name, port, target.width, other.y[source.port][0]))
-    followings = [Following(instance.u[port][0], series) for port, series in system.followed.get(name, {}).items()]
+    followings = [Following(instance.u[e.port][0], series) for e, series in system.followed.items() if e.unit == name]
     return Feeding(narrowings, joined(copies), scaled, followings)

@@ -4,8 +4,7 @@
 FMUs that a process may instantiate only once, and connections whose ports do not fit each other.
 """
 
-from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from fractions import Fraction
 from numbers import Rational
@@ -46,14 +45,14 @@ class System:
     def __init__(self) -> None:
         self.units: dict[str, PlacedUnit] = {}
         self.connections: list[Connection] = []
-        self._sources: defaultdict[str, dict[str, PortName]] = defaultdict(dict)  # by unit, by input
-        self._matches: defaultdict[PortName, list[Connection]] = defaultdict(list)  # by input, what matches it
+        self._sources: dict[str, dict[str, PortName]] = {}  # by unit, by input
+        self._matches: dict[PortName, list[Connection]] = {}  # by input, what matches it
         self._unsettled: list[TerminalFault | Ambiguity] = []  # of terminals, unless their inputs are fed otherwise
         self._unmatched: dict[tuple[str, str], str] = {}  # by two units of which nothing matches, what there is
-        self.followed: defaultdict[str, dict[str, TimeSeries]] = defaultdict(dict)
-        """By unit and input, the values over time that inputs follow."""
-        self.externals: defaultdict[str, dict[str, ExternalSource]] = defaultdict(dict)
-        """By unit and input, the sources of inputs that come from outside."""
+        self.followed: dict[PortName, TimeSeries] = {}
+        """By input, the values over time that inputs follow."""
+        self.externals: dict[PortName, ExternalSource] = {}
+        """By input, the sources of inputs that come from outside."""
         self.notes: list[str] = []
         """What who runs it should know before it starts, in lines: such as connections and values that its units do not
         have and need not have."""
@@ -166,7 +165,10 @@ class System:
 
     def _add(self, c: Connection) -> None:
         self.connections.append(c)
-        self._sources[c.target.unit][c.target.port] = c.source
+        self._feed(c)
+
+    def _feed(self, c: Connection) -> None:
+        self._sources.setdefault(c.target.unit, {})[c.target.port] = c.source
 
     def _connect_matching(self, source: Any, target: Any) -> MatchedPorts:
         a, b = unit_of(source, Causality.OUTPUT), unit_of(target, Causality.INPUT)
@@ -176,15 +178,17 @@ class System:
             self._unmatched[a, b] = matches.nothing
         self._unsettled += [x for x in (*matches.faults, *matches.ambiguities) if x not in self._unsettled]
         fed = {
-            port: f"{end} feeds it" for port, end in self._sources[b].items() if PortName(b, port) not in self._matches
+            port: f"{end} feeds it"
+            for port, end in self._sources.get(b, {}).items()
+            if PortName(b, port) not in self._matches
         }
-        fed |= dict.fromkeys(self.followed[b], "it follows values over time")
-        fed |= dict.fromkeys(self.externals[b], "it comes from outside")
+        fed |= dict.fromkeys(_ports_of(b, self.followed), "it follows values over time")
+        fed |= dict.fromkeys(_ports_of(b, self.externals), "it comes from outside")
         left = {n: fed.get(n, matches.left.get(n, "")) for n in inputs if n in {**matches.connections, **matches.left}}
         for port, c in matches.connections.items():
             if port in fed:
                 continue
-            known = self._matches[c.target]
+            known = self._matches.setdefault(c.target, [])
             if c not in known:
                 known.append(c)
                 if len(known) == 1:
@@ -196,7 +200,7 @@ class System:
         """Take back that an input was connected by its match, as something else is said of it."""
         if self._matches.pop(target, None):
             self.connections = [c for c in self.connections if c.target != target]
-            self._sources[target.unit].pop(target.port, None)  # several matches may be left, and none connected
+            self._sources.get(target.unit, {}).pop(target.port, None)  # several matches may be left, and none connected
 
     def disconnect(self, end: PortName) -> None:
         """Remove the connections of a port, or of all ports of a terminal, and what they are set to or follow.
@@ -222,13 +226,13 @@ class System:
         for sources in self._sources.values():
             for port in [p for p, source in sources.items() if source == end]:
                 del sources[port]
-        self._sources[end.unit].pop(end.port, None)
-        self.followed[end.unit].pop(end.port, None)
-        self.externals[end.unit].pop(end.port, None)
+        self._sources.get(end.unit, {}).pop(end.port, None)
+        self.followed.pop(end, None)
+        self.externals.pop(end, None)
         unit = self.units[end.unit]
         self.units[end.unit] = replace(unit, start={n: x for n, x in unit.start.items() if n != end.port})
         for target, (match,) in [(t, m) for t, m in self._matches.items() if len(m) == 1]:
-            if target.port not in self._sources[target.unit]:
+            if target.port not in self._sources.get(target.unit, {}):
                 self._add(match)
 
     def prefer_matches(self, is_preferred: Callable[[PortName], bool]) -> dict[PortName, list[PortName]]:
@@ -250,7 +254,7 @@ class System:
                 self._matches[target] = kept
                 i = next((i for i, c in enumerate(self.connections) if c.target == target), len(self.connections))
                 self.connections[i : i + 1] = kept[:1]  # in the same place: the order of connections stays
-                self._sources[target.unit][target.port] = kept[0].source
+                self._feed(kept[0])
         return unfed
 
     def allow_no_match(self, unit: str) -> None:
@@ -270,7 +274,7 @@ class System:
         if not isinstance(target, PortName):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise TypeError(f"{target!r} is not a port: give unit.u.NAME of what add returned")
         self._forget_matches(target)
-        self.followed[target.unit][target.port] = series
+        self.followed[target] = series
 
     def external(self, target: PortName, source: ExternalSource | None = None) -> None:
         """Let an input that no output feeds come from outside: its source is asked at each communication point.
@@ -289,7 +293,7 @@ class System:
         if not isinstance(target, PortName):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise TypeError(f"{target!r} is not a port: give unit.u.NAME of what add returned")
         self._forget_matches(target)
-        self.externals[target.unit][target.port] = NoSource() if source is None else source
+        self.externals[target] = NoSource() if source is None else source
 
     def check(self) -> None:
         """Check all names, values and connections.
@@ -313,13 +317,10 @@ class System:
             if c.target in fed:
                 faults.append(f"{c.target} is fed twice: by {fed[c.target]} and by {c.source}")
             fed[c.target] = c.source
-        for unit, inputs in self.followed.items():
-            for port, series in inputs.items():
-                faults += series_fault(self.units, PortName(unit, port), self._sources.get(unit, {}), series)
-        for unit, inputs in self.externals.items():
-            for port in inputs:
-                others = self._sources.get(unit, {}), self.followed.get(unit, {})
-                faults += outside_fault(self.units, PortName(unit, port), *others)
+        for end, series in self.followed.items():
+            faults += series_fault(self.units, end, self._sources.get(end.unit, {}), series)
+        for end in self.externals:
+            faults += outside_fault(self.units, end, self._sources.get(end.unit, {}), self.followed)
         if faults:
             raise WiringError(faults)
 
@@ -362,11 +363,12 @@ class System:
 
     def fed_inputs(self, unit: str) -> list[str]:
         """Return the names of the inputs of a unit that are set during a run."""
-        return [*self.sources_of(unit), *self.followed.get(unit, ()), *self.externals.get(unit, ())]
+        return [*self.sources_of(unit), *_ports_of(unit, self.followed), *_ports_of(unit, self.externals)]
 
     def _feeds(self, unit: str) -> dict[str, PortName | None]:
         """Return by input that is set during a run the output that feeds it; None where no output does."""
-        return {port: self._sources[unit].get(port) for port in self.fed_inputs(unit)}
+        sources = self._sources.get(unit, {})
+        return {port: sources.get(port) for port in self.fed_inputs(unit)}
 
     def clock_connections(self) -> list[Connection]:
         """Return the connections between clocks."""
@@ -397,3 +399,8 @@ class System:
         reason = proposed.step_fault or NO_STEP if period is None else f"its communication step is {period} s"
         self._faults.append(NoStep(name, reason))
         return Fraction(1, 100)  # any: `check` reports the fault, but more units can be added until then
+
+
+def _ports_of(unit: str, ends: Iterable[PortName]) -> list[str]:
+    """Return the ports of one unit among ends."""
+    return [end.port for end in ends if end.unit == unit]

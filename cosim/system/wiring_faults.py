@@ -128,13 +128,13 @@ def outside_fault(
     units: Mapping[str, PlacedUnit],
     target: PortName,
     sources: Mapping[str, PortName],
-    followed: Mapping[str, TimeSeries],
+    followed: Mapping[PortName, TimeSeries],
 ) -> list[str]:
-    """Return why an input cannot come from outside; `followed` are the values over time of inputs of its unit."""
+    """Return why an input cannot come from outside; `followed` are the values over time of inputs."""
     port, fault = _find(units, target, "input")
     if port is not None and target.port in sources:
         fault = f"fed by {sources[target.port]}, so it cannot come from outside"
-    elif port is not None and target.port in followed:
+    elif port is not None and target in followed:
         fault = "follows values over time, so it cannot come from outside"
     fault = fault or (external_fault(port) if port is not None else None)
     return [f"{target}: {fault}"] if fault else []

@@ -70,11 +70,12 @@ class OpenSystem:
         for c in system.connections:
             if left_out not in (c.source.unit, c.target.unit):
                 self.system.connect(c.source, c.target, c.transformation)
-        for name in self.system.units:
-            for port, series in system.followed.get(name, {}).items():
-                self.system.follow(PortName(name, port), series)
-            for port, source in system.externals.get(name, {}).items():
-                self.system.external(PortName(name, port), source)
+        for end, series in system.followed.items():
+            if end.unit in self.system.units:
+                self.system.follow(end, series)
+        for end, source in system.externals.items():
+            if end.unit in self.system.units:
+                self.system.external(end, source)
         for name, unit in self.system.units.items():
             fed = {*self.system.fed_inputs(name)}
             for port in unit.description.inputs.values():

@@ -134,7 +134,7 @@ def give_inputs(system: System, inputs: InputSources | None) -> None:
 
 def external_inputs(system: System) -> dict[str, PortName]:
     """Return the inputs of a system that come from outside, by `unit.input`."""
-    return {f"{unit}.{name}": PortName(unit, name) for unit, names in system.externals.items() for name in names}
+    return {str(end): end for end in system.externals}
 
 
 def _fault_of_unknown(names: Sequence[str], own: Mapping[str, PortName], origin: Mapping[str, Any]) -> str:

@@ -258,7 +258,7 @@ def begun_run(task: Task, master: Master) -> RunData:
         of_this_run["warnings"] = warned
     if master.system.notes:
         of_this_run["notes"] = master.system.notes
-    if outside := [f"{unit}.{name}" for unit, inputs in master.system.externals.items() for name in inputs]:
+    if outside := [str(end) for end in master.system.externals]:
         of_this_run["external_inputs"] = outside
     return _run_data(task, fmus, of_this_run)
 

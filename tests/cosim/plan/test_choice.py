@@ -14,6 +14,7 @@ from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
 from handover.cosim.stepping.stepper import GridStepper
 from handover.cosim.system.system import System
+from handover.cosim.system.time_series import HeldValue
 
 
 def build(period: Fraction = Fraction(1, 10)) -> System:
@@ -33,6 +34,15 @@ def test_a_plain_system_is_compiled(caplog: pytest.LogCaptureFixture):
     with caplog.at_level(logging.INFO, "handover.cosim.plan"), Master(build()) as master:
         assert isinstance(master.stepper, PlanStepper)
     assert caplog.records == []
+
+
+def test_one_whose_input_follows_values_no_more_is_compiled():
+    s = System()
+    unit = s.add("unit", native_fmu("gain", 2))
+    s.follow(unit.u.u, HeldValue([1.0]))
+    s.disconnect(unit.u.u)
+    with Master(s) as master:
+        assert isinstance(master.stepper, PlanStepper)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from terminal_units import described_unit
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.master.master import Master
+from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import Connection, PortName, System
@@ -53,6 +54,7 @@ def test_one_line_gives_the_run_of_single_connections(fmu: FmuOf):
             x.append(float(signals["mass.x"]))
 
         with Master(s) as master:
+            assert isinstance(master.stepper, PlanStepper)
             master.run(Fraction(1), [observe])
         return x
 

@@ -1,19 +1,40 @@
-"""What scenarios declare of their places is what they wire, and nothing of it is left out of their own units."""
+"""What scenarios declare of their places is what they wire, with nothing left out, and runs as a compiled plan."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
+from handover.cosim.master.stepper_factory import StepperFactory
+from handover.cosim.stepping.options import MasterOptions
+from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.fmus.catalog import find_unit
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.places import ports_of_place
 
+LED = "flyer_human_to_robot"
+"""A scenario whose hand can be led, by inputs from outside, for which a compiled plan does not ask."""
 
-@pytest.fixture(params=SCENARIOS)
+
+class Systems(NamedTuple):
+    """A scenario's system by `build`, and by `wire`, which fits it to the units that it gets."""
+
+    plain: System
+    fitted: System
+
+
+@pytest.fixture(scope="module", params=SCENARIOS)
 def scenario(request: pytest.FixtureRequest) -> type[Experiment[Any]]:
     return SCENARIOS[request.param]
+
+
+@pytest.fixture(scope="module")
+def systems(scenario: type[Experiment[Any]]) -> Systems:
+    experiment, parameters = scenario(), scenario.parameters_type()
+    both = (experiment.build, experiment.wire)
+    return Systems(*(make(parameters, 0, lambda unit: cached(scenario.units[unit], 3)) for make in both))
 
 
 def test_a_place_is_declared_for_each_unit_with_ports_that_its_own_unit_has(scenario: type[Experiment[Any]]):
@@ -24,13 +45,10 @@ def test_a_place_is_declared_for_each_unit_with_ports_that_its_own_unit_has(scen
         assert all(port.sentence for port in ports)
 
 
-def test_all_that_is_wired_is_declared_and_none_is_left_out_of_its_own_units(scenario: type[Experiment[Any]]):
-    experiment, parameters = scenario(), scenario.parameters_type()
-    built = [
-        make(parameters, 0, lambda unit: cached(scenario.units[unit], 3))
-        for make in (experiment.build, experiment.wire)
-    ]  # fmt: skip
-    plain, fitted = built
+def test_all_that_is_wired_is_declared_and_none_is_left_out_of_its_own_units(
+    scenario: type[Experiment[Any]], systems: Systems
+):
+    plain, fitted = systems
     assert fitted.notes == []
     assert fitted.connections == plain.connections
     for name, unit in plain.units.items():
@@ -38,3 +56,16 @@ def test_all_that_is_wired_is_declared_and_none_is_left_out_of_its_own_units(sce
         place = scenario.places[name]
         assert {*wired, *unit.start} <= {*place.required, *place.optional}, name
         assert {*fitted.units[name].start} == {*unit.start}
+
+
+def test_every_scenario_runs_as_a_compiled_plan(systems: Systems):
+    assert StepperFactory(systems.fitted, MasterOptions()).plan_obstacle is None
+
+
+def test_one_whose_hand_is_led_says_which_inputs_keep_it_from_that():
+    scenario = SCENARIOS[LED]
+    parameters = parse_parameters(scenario, ["hand=outside"])
+    system = scenario().wire(parameters, 0, lambda unit: cached(scenario.units[unit], 3))
+    reason = StepperFactory(system, MasterOptions()).plan_obstacle
+    assert reason is not None
+    assert reason.startswith("inputs come from outside: person.")

@@ -32,7 +32,7 @@ def test_the_five_inputs_of_a_hand_come_from_outside_and_nothing_else(scenario: 
         scenario().build(parse_parameters(scenario, given), 0, lambda name: cached(scenario.units[name], 3))
         for given in (["hand=outside"], [])
     )
-    assert {unit: tuple(inputs) for unit, inputs in outside.externals.items()} == {"person": INPUTS_OF_HAND}
+    assert [str(end) for end in outside.externals] == [f"person.{name}" for name in INPUTS_OF_HAND]
     assert not simulated.externals
     assert outside.connections == simulated.connections
     outside.check()
