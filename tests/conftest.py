@@ -1,7 +1,17 @@
-"""For all tests: no property is tested by the clock, and Ctrl-C is heard, whatever started the tests."""
+"""For all tests: no property is tested by the clock, Ctrl-C is heard, and what tests cost is printed at the end.
 
+Costs are CPU time of the tests' process and of the processes that it has waited for. What tests share is counted with
+the first that needs it.
+"""
+
+import resource
 import signal
+from collections import defaultdict
+from collections.abc import Generator
+from itertools import chain
+from typing import Any
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("without deadline", deadline=None)
@@ -9,3 +19,40 @@ settings.load_profile("without deadline")
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as of a shell's job in the background
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+_CPU = "CPU seconds"
+_BEGAN = pytest.StashKey[float]()
+_COSTLIEST = 10
+
+
+def _cpu() -> float:
+    used = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(u.ru_utime + u.ru_stime for u in used)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    item.stash[_BEGAN] = _cpu()
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    report.sections.append((_CPU, str(_cpu() - item.stash[_BEGAN])))
+    return report
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    costs, folders = defaultdict[str, float](float), defaultdict[str, float](float)
+    for report in chain.from_iterable(terminalreporter.stats.values()):
+        for name, value in getattr(report, "sections", ()):
+            if name == _CPU:
+                costs[report.nodeid] = max(costs[report.nodeid], float(value))
+    for test, seconds in costs.items():
+        folders[test.partition("::")[0].rpartition("/")[0]] += seconds
+    terminalreporter.section(f"CPU seconds: {sum(costs.values()):.0f}")
+    for counted in (costs, folders):
+        for name in sorted(counted, key=counted.__getitem__, reverse=True)[:_COSTLIEST]:
+            terminalreporter.line(f"{counted[name]:7.1f}  {name}")
+        terminalreporter.line("")
