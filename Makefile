@@ -2,8 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# A test file stays in one process: what its tests share is made once.
-PARALLEL := --numprocesses auto --dist loadfile
+# Each process begins with a part of the files, and takes tests from the end of another's when it has none left.
+PARALLEL := --numprocesses auto --dist worksteal
 
 WHEELS := x86_64-linux aarch64-linux x86_64-windows x86_64-darwin aarch64-darwin
 
@@ -31,7 +31,7 @@ standalone: $(VENV)/.installed-test
 
 # docs/hosts.md: every unit in every form and host; a run that was interrupted goes on.
 hosts: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -m hosts -s tests/exchange/hosts
+	$(BIN)/python -m pytest -m hosts -s tests/exchange
 
 paper: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -m paper

@@ -26,8 +26,6 @@ from handover.fmus import interpreter
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import main
 
-pytestmark = pytest.mark.slow
-
 in_ecos = pytest.mark.skipif(
     importlib.util.find_spec("ecospy") is None or not interpreter.library(),
     reason="ecospy has wheels for few platforms, and Ecos loads only a Python with a shared library",
@@ -37,6 +35,8 @@ SEED = 3
 WITH_PICTURES = ("helix_handover", "helix_reflex_grasp", "helix_use_case")
 """No form of their units that exchange pictures is one that libcosim or Ecos loads, see the last tests."""
 EXCHANGED = sorted(set(SCENARIOS) - set(WITH_PICTURES))
+IN_EVERY_HOST = ("flyer_two_robots", "ir_grasp", "vsl_hybrid")
+"""Of each robot whose scenarios can be exchanged; the others are tried in Ecos by `make hosts`."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,9 @@ def own_verdict(file: Path, name: str) -> Verdict:
     return Verdict(step, steps, values)
 
 
-@pytest.mark.parametrize("name", sorted(SCENARIOS))
-def test_every_scenario_succeeds_under_jacobi(tmp_path: Path, name: str):
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WITH_PICTURES)
+def test_a_scenario_with_pictures_succeeds_under_jacobi(tmp_path: Path, name: str):
     out = str(tmp_path / "run")
     command = ["run", name, "--algorithm", "jacobi", "--seed", str(SEED), "--no-report", "--out", out]
     done = CliRunner().invoke(main, command)
@@ -102,6 +103,7 @@ def verdict_of(folder: Path, name: str) -> Verdict:
     return own_verdict(exported(folder, name), name)
 
 
+@pytest.mark.slow
 @needs_libcosim
 @pytest.mark.parametrize("name", EXCHANGED)
 def test_an_exported_scenario_ends_in_libcosim_as_here(folder: Path, tmp_path: Path, name: str):
@@ -119,7 +121,10 @@ def test_an_exported_scenario_ends_in_libcosim_as_here(folder: Path, tmp_path: P
 
 
 @in_ecos
-@pytest.mark.parametrize("name", EXCHANGED)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.slow if n in IN_EVERY_HOST else pytest.mark.hosts) for n in EXCHANGED],
+)
 def test_an_exported_scenario_ends_in_ecos_as_here(folder: Path, tmp_path: Path, name: str):
     """To the six decimals that Ecos writes."""
     file, wanted = exported(folder, name), verdict_of(folder, name)
@@ -136,6 +141,7 @@ def test_an_exported_scenario_ends_in_ecos_as_here(folder: Path, tmp_path: Path,
     assert compared > 10
 
 
+@pytest.mark.slow
 @needs_libcosim
 def test_libcosim_knows_no_connectors_of_pictures(folder: Path, tmp_path: Path):
     job = Job({}, None, 1, ssp=exported(folder, WITH_PICTURES[0]))
@@ -143,6 +149,7 @@ def test_libcosim_knows_no_connectors_of_pictures(folder: Path, tmp_path: Path):
         job.run(tmp_path)
 
 
+@pytest.mark.slow
 @in_ecos
 def test_ecos_takes_no_ssp_of_the_version_that_fmi_3_needs(folder: Path, tmp_path: Path):
     file = exported(folder, WITH_PICTURES[0])
