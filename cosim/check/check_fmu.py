@@ -242,8 +242,10 @@ class _Check:
         self.can_continue = interface is not None
         self.interface = interface or self.root
         self.identifier = self.interface.get("modelIdentifier")
-        step = proposed_step(default_experiment(self.root).step)
-        text = f"co-simulation, {f'steps of {float(step):g} s' if step else 'no step size given: a run needs --step'}"
+        experiment = default_experiment(self.root)
+        step, presumed = proposed_step(experiment.step), experiment.presumed_step
+        run = f"a run takes {float(presumed):g} s" if presumed else "a run takes a 500th of --stop"
+        text = f"co-simulation, {f'steps of {float(step):g} s' if step else f'no step size given: {run}'}"
         return text if interface else "no co-simulation", findings
 
     def _references(self) -> tuple[str, list[Finding]]:
@@ -273,7 +275,7 @@ class _Check:
                 raise _Skipped("not tried: its description is invalid, see there") from e
             return "", [fault(e.fault)]
         experiment = default_experiment(self.root)
-        step = float(proposed_step(experiment.step) or _STEP)
+        step = float(proposed_step(experiment.step) or experiment.presumed_step or _STEP)
         capabilities = dict(_state_capabilities(self.interface, self.fmi))
         task = {
             "fmu": str(self.path.absolute()),

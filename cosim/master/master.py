@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import TypeVar
 
 from handover.cosim.check.run_faults import execution_tools, run_faults
-from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure
+from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure, WiringError
 from handover.cosim.fmu.calls import is_rounding
 from handover.cosim.fmu.failures import UnitCrashed, UnitHung, UnitTerminated
 from handover.cosim.fmu.file.archive import DESCRIPTION
@@ -50,24 +50,26 @@ def _recorders(observers: Sequence[Observer]) -> Sequence[Observer]:
 
 
 def _tell_of_faults(system: System, *, strict: bool) -> dict[Path, str]:
-    """Warn of invalid descriptions, of start values that are NaN, and of what the system notes.
+    """Warn of invalid descriptions, of what is tolerated, of start values that are NaN, and of what the system notes.
 
     Returns:
         How model descriptions break the standard, by FMU.
 
     Raises:
-        InvalidFmu: `strict` does not let them pass.
+        InvalidFmu, WiringError: `strict` does not let them pass.
     """
     untouched, others = system.untouched_faults, run_faults(u.description for u in system.units.values())
     faults = {p: "; ".join(f[p] for f in (untouched, others) if p in f) for p in (*untouched, *others)}
     if strict:
         for path, fault in faults.items():
             raise InvalidFmu(path, f"its {DESCRIPTION} is not valid: {fault}")
+        if system.tolerated:
+            raise WiringError(system.tolerated)
     for path, fault in untouched.items():
         _log.warning("%s: its %s is not valid, which does not matter here: %s", path, DESCRIPTION, fault)
     for path, fault in others.items():
         _log.warning("%s: its %s is not valid: %s", path, DESCRIPTION, fault)
-    for line in (*system.undefined_starts, *system.notes):
+    for line in (*system.tolerated, *system.undefined_starts, *system.notes):
         _log.warning("%s", line)
     return faults
 

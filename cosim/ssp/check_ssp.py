@@ -38,7 +38,8 @@ def _system(path: Path) -> Section:
         with SspFile(path) as ssp:
             units, connections = len(ssp.system.units), len(ssp.system.connections)
             until = "no stop time given: a run needs --stop" if ssp.stop is None else f"until {float(ssp.stop):g} s"
-            return Section("system", f"{ssp.name}, units: {units}, connections: {connections}, {until}")
+            text = f"{ssp.name}, units: {units}, connections: {connections}, {until}"
+            return Section("system", text, tuple(map(warning, ssp.system.tolerated)))
     except InvalidSsp as e:
         return Section("system", "", tuple(_finding(line) for line in e.faults))
 

@@ -153,6 +153,7 @@ class SspFile:
             else the one that its FMU proposes, or that is annotated for OMSimulator or libcosim.
         parameters: texts by the names of the property `parameters`, which come before what the file gives; of an array
             the values stand with commas between them, or a name such as `arm.p[1]` gives one.
+        duration: of the run, s, of which units without a step take a 500th; by default the stop time.
 
     Attributes:
         name: the system's name.
@@ -165,8 +166,9 @@ class SspFile:
     """
 
     def __init__(
-        self, path: Path, step: Fraction | None = None, parameters: Mapping[str, str] = MappingProxyType({})
-    ) -> None:
+        self, path: Path, step: Fraction | None = None, parameters: Mapping[str, str] = MappingProxyType({}),
+        duration: Fraction | None = None,
+    ) -> None:  # fmt: skip
         archive = SspArchive(path)
         structure = read_structure(archive)
         self.path, self.name = path, structure.name
@@ -182,7 +184,7 @@ class SspFile:
                 n: step or c.period or (None if proposed_step(descriptions[n].step) else structure.step)
                 for n, c in flat.components.items()
             }
-            self.system = self._build(flat, descriptions, steps, structure.unsupported)
+            self.system = self._build(flat, descriptions, steps, structure.unsupported, duration or self.stop)
             self._flat, self._structure, self._descriptions = flat, structure, descriptions
         except BaseException:
             self.close()
@@ -228,6 +230,7 @@ class SspFile:
         descriptions: dict[str, FmuDescription],
         steps: Mapping[str, Fraction | None],
         unsupported: Sequence[str],
+        duration: Fraction | None,
     ) -> System:
         faults = list(flat.faults)
         starts, partly = dict[str, dict[str, object]](), dict[str, set[str]]()
@@ -242,10 +245,11 @@ class SspFile:
             raise InvalidSsp(self.path, [*unsupported, *faults])
         system = System()
         for name, component in flat.components.items():
-            path = Path(self._folder.name) / component.member
-            unit = system.add(name, path, period=steps[name], sampled=component.sampled)
+            unit = system.add(name, descriptions[name], period=steps[name], sampled=component.sampled)
             description = split_arrays(descriptions[name], grouping.apart.get(name, ()))
             system.units[name] = replace(unit, description=description, start=starts.get(name, {}))
+        if duration is not None:
+            system.presume_steps(duration)
         for source, target, linear in grouping.wires:
             system.connect(source, target, linear)
         try:

@@ -130,8 +130,8 @@ class MasterOptions:
             project, `all` is all, also where a unit itself is named so. What a unit does then harms itself alone, and
             units that do not wait for each other step at the same time; the results are the same.
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
-        strict: whether a model description that breaks the standard is refused even where a run is possible, as where
-            a start value is out of its range or a local variable is at fault; else the master warns of it.
+        strict: whether what is not as it should be with a unit's description is refused even where a run is possible,
+            as where a start value is out of its range or no step is proposed; else the master warns of it.
 
     Raises:
         InvalidOptions: with all invalid values.

@@ -13,7 +13,13 @@ from typing import Any, overload
 
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.exceptions import WiringError
-from handover.cosim.fmu.file.default_experiment import NO_STEP, DefaultExperiment, NoStep, proposed_step
+from handover.cosim.fmu.file.default_experiment import (
+    NO_STEP,
+    DefaultExperiment,
+    NoStep,
+    presumed_step,
+    proposed_step,
+)
 from handover.cosim.fmu.file.description import FmuDescription, describe_fmu
 from handover.cosim.system.conversion import LinearTransformation, conversion
 from handover.cosim.system.matching import (
@@ -57,25 +63,26 @@ class System:
         """What who runs it should know before it starts, in lines: such as connections and values that its units do not
         have and need not have."""
         self._faults: list[str] = []
+        self._step_faults: dict[str, NoStep] = {}  # by unit that has no communication step
+        self._presumed_steps: dict[str, str] = {}  # by unit, what its step was taken from
         self._descriptions: dict[Path, FmuDescription] = {}
 
     def add(
-        self, name: str, fmu: Path | str, *, period: Fraction | None = None, sampled: bool | None = None, **start: Any
-    ) -> PlacedUnit:
+        self, name: str, fmu: Path | str | FmuDescription, *, period: Fraction | None = None,
+        sampled: bool | None = None, **start: Any,
+    ) -> PlacedUnit:  # fmt: skip
         """Add a unit under a name, with start values of its parameters and inputs.
 
-        `period` is its communication step in seconds, by default the step that its FMU proposes. `sampled` says whether
-        it computes at instants, by default as its FMU declares: see `FmuDescription`. The returned unit gives port
-        names for `connect`: inputs `unit.u.x`, outputs `unit.y.x`.
+        `period` is its communication step in seconds, by default the step that its FMU proposes, or else a 500th of its
+        default experiment, to one digit. `sampled` says whether it computes at instants, by default as its FMU
+        declares: see `FmuDescription`. The returned unit gives port names for `connect`: inputs `unit.u.x`, outputs
+        `unit.y.x`.
 
         Raises:
             InvalidFmu: the file is not a valid co-simulation FMU.
             TypeError: the period is not exact.
         """
-        path = Path(fmu)
-        if path not in self._descriptions:
-            self._descriptions[path] = describe_fmu(path)
-        description = self._descriptions[path]
+        description = fmu if isinstance(fmu, FmuDescription) else self._described(Path(fmu))
         if name in self.units:
             self._faults.append(f"two units are called {name!r}")
         period = self._period(name, description.experiment, period)
@@ -92,6 +99,15 @@ class System:
         self.units = {
             n: replace(u, period=self._period(n, u.description.experiment, period)) for n, u in self.units.items()
         }
+
+    def presume_steps(self, duration: Fraction) -> None:
+        """Give units that have no communication step a 500th of a run's duration in seconds, to one digit."""
+        if (step := presumed_step(duration)) is None:
+            return
+        for name in [n for n in self._step_faults if n in self.units]:
+            self.units[name] = replace(self.units[name], period=step)
+            self._presume(name, step, "the run")
+            del self._step_faults[name]
 
     @overload
     def connect(
@@ -303,6 +319,7 @@ class System:
         """
         faults = [
             *self._faults,
+            *self._step_faults.values(),
             *self._unmatched.values(),
             *(str(left) for x in self._unsettled if (left := x.remaining(self._feeds(x.target)))),
         ]
@@ -338,6 +355,11 @@ class System:
             if lines:
                 faults[d.path] = "; ".join(lines)
         return faults
+
+    @property
+    def tolerated(self) -> list[str]:
+        """What is not as it should be, but can be run nonetheless, a line each; see `MasterOptions.strict`."""
+        return list(self._presumed_steps.values())
 
     @property
     def undefined_starts(self) -> list[str]:
@@ -391,14 +413,26 @@ class System:
         if period is not None and not isinstance(period, Rational):  # pyright: ignore[reportUnnecessaryIsInstance]
             exact = Fraction(str(period)) if isinstance(period, float) else "1/100"
             raise TypeError(f"{name}: period = {period!r} is not exact, so time would drift; give Fraction('{exact}')")
+        self._step_faults.pop(name, None)
+        self._presumed_steps.pop(name, None)
         if period is not None and period > 0:
             return Fraction(period)
-        step = proposed_step(proposed.step) if period is None else None
-        if step is not None:
+        if period is None and (step := proposed_step(proposed.step)) is not None:
+            return step
+        if period is None and (step := proposed.presumed_step) is not None:
+            self._presume(name, step, "its default experiment")
             return step
         reason = proposed.step_fault or NO_STEP if period is None else f"its communication step is {period} s"
-        self._faults.append(NoStep(name, reason))
+        self._step_faults[name] = NoStep(name, reason)
         return Fraction(1, 100)  # any: `check` reports the fault, but more units can be added until then
+
+    def _presume(self, name: str, step: Fraction, of: str) -> None:
+        self._presumed_steps[name] = f"{name}: {NO_STEP}; {float(step):g} s is taken, a 500th of {of}"
+
+    def _described(self, path: Path) -> FmuDescription:
+        if path not in self._descriptions:
+            self._descriptions[path] = describe_fmu(path)
+        return self._descriptions[path]
 
 
 def _ports_of(unit: str, ends: Iterable[PortName]) -> list[str]:

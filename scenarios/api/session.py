@@ -36,12 +36,9 @@ from handover.scenarios.api.arguments import (
 from handover.scenarios.api.open_inputs import OpenSystem
 from handover.scenarios.execution.fmu_run import is_fmu
 from handover.scenarios.execution.request import RunRequest, check_subject
-from handover.scenarios.execution.ssp_run import is_ssp
+from handover.scenarios.execution.ssp_run import ENDLESS, is_ssp
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, Outcome
 from handover.scenarios.results.tolerated_faults import GuardedEvaluator
-
-_ANY_STOP = Fraction(10**6)
-"""Of what has no end of its own, s; a program steps as far as it likes."""
 
 
 @dataclass(frozen=True)
@@ -358,7 +355,7 @@ def open(  # noqa: A001 (handover.open is named like it)
             parameters=single_texts(name, merged(parameters, named)),
             seed=whole_number("seed", seed),
             units=unit_texts(units),
-            stop=_ANY_STOP if endless else None,
+            stop=ENDLESS if endless else None,
             step=exact("step", step),
             options=master_options(options or MasterOptions(), algorithm, isolate),
         )

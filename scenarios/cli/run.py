@@ -44,7 +44,7 @@ _STEP = _option(
     "--step",
     type=Seconds(),
     metavar="SECONDS",
-    help="Communication step of all units.  [default: what each FMU proposes]",
+    help="Communication step of all units.  [default: what each FMU proposes, else a 500th of its default experiment]",
 )
 _INPUT = _option(
     "--input",
@@ -88,8 +88,8 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
 @click.option(
     "--strict",
     is_flag=True,
-    help="Refuse an FMU whose description breaks the standard, even where it can be run nonetheless; see"
-    " `handover check`.  [default: warn]",
+    help="Refuse units whose description is not as it should be, even where they can be run nonetheless: it breaks the"
+    " standard, or proposes no step; see `handover check`.  [default: warn]",
 )
 @click.option(
     "--live",

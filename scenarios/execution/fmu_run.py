@@ -9,10 +9,11 @@ from typing import Any
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.fmu.file.default_experiment import DefaultExperiment, exact_seconds
+from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.system.system import PortName, System
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.input_file import read_inputs
-from handover.scenarios.execution.ssp_run import UntilStop, naming_step, system_experiment
+from handover.scenarios.execution.ssp_run import ENDLESS, UntilStop, naming_step, system_experiment
 from handover.scenarios.execution.unit_values import start_values
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import sha256_of
@@ -50,13 +51,15 @@ class FmuRun:
             InvalidFmu: it is not a valid co-simulation FMU.
             UsageError: neither it nor the call gives a stop time and a step, or a value or the file is invalid.
         """
-        system = System()
-        unit = system.add("unit", self.path, period=self.step)
-        d = system.units.pop(unit.name).description
+        d = describe_fmu(self.path)
         start, faults = start_values(d.settable, self.parameters)
         if faults:
             raise UsageError(f"{self.path}: {'; '.join(faults)}")
-        system.units[d.identifier] = replace(unit, name=d.identifier, start=start)
+        until, system = self._until(d.experiment), System()
+        unit = system.add(d.identifier, d, period=self.step)
+        system.units[d.identifier] = replace(unit, start=start)
+        if self.step is None and until != ENDLESS:
+            system.presume_steps(until)
         if self.inputs is not None:
             for port, series in read_inputs(self.inputs, d.inputs, start).items():
                 system.follow(PortName(d.identifier, port), series)
@@ -66,7 +69,7 @@ class FmuRun:
             raise UsageError(f"{self.path}: {'; '.join(naming_step(e.faults))}") from e
         if d.experiment.start:
             _log.warning("%s proposes to start at %g s; a run starts at 0 s", self.path, d.experiment.start)
-        return system_experiment(self.path.name, f"{d.name}, an FMU by itself", system, self._until(d.experiment))
+        return system_experiment(self.path.name, f"{d.name}, an FMU by itself", system, until)
 
     def as_source(self, stop: Fraction) -> dict[str, Any]:
         """Return what a run's folder keeps, so that it can be resumed; `reopened` reads it."""

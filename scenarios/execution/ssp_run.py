@@ -18,6 +18,9 @@ from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuO
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.results.run_folder import sha256_of
 
+ENDLESS = Fraction(10**6)
+"""The stop time of what has no end of its own, s: a program steps it as far as it likes."""
+
 
 class UntilStop(Evaluator):
     """Lets a run continue to its stop time; it succeeds if it reaches that, or a unit ends the simulation before."""
@@ -100,7 +103,7 @@ def open_experiment(
     """
     texts = _texts_by_name(path, parameters)
     try:
-        ssp = opened.enter_context(SspFile(path, step, texts))
+        ssp = opened.enter_context(SspFile(path, step, texts, None if stop == ENDLESS else stop))
     except InvalidSsp as e:
         raise InvalidSsp(e.path, naming_step(e.faults)) from e
     supervisor.heartbeat.record_scratch_folder(str(ssp.folder))

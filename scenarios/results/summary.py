@@ -254,7 +254,7 @@ def begun_run(task: Task, master: Master) -> RunData:
     fmus = {name: unit.description.path for name, unit in master.system.units.items()}
     of_this_run: _OfSomeRuns = {"system": system, "conversions": conversions_of(master.system)}
     faults = [f"{path.name}: {fault}" for path, fault in master.description_faults.items()]
-    if warned := [*faults, *master.system.undefined_starts, *master.execution_tools]:
+    if warned := [*faults, *master.system.tolerated, *master.system.undefined_starts, *master.execution_tools]:
         of_this_run["warnings"] = warned
     if master.system.notes:
         of_this_run["notes"] = master.system.notes

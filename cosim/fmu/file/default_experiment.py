@@ -16,6 +16,9 @@ SHORTEST_STEP = 1e-12
 _MAX_DENOMINATOR = 10**6
 """Of times that are taken for rounded fractions."""
 
+_PARTS = 500
+"""Steps of a default experiment whose length is not given."""
+
 NO_STEP = "its FMU proposes no communication step"
 INVALID_STEP = f"is no communication step; a number from {SHORTEST_STEP:g} s on is right"
 """What is wrong with a text that should be a step."""
@@ -46,6 +49,11 @@ class DefaultExperiment:
     step: float | None = None
     step_fault: str = ""
 
+    @property
+    def presumed_step(self) -> Fraction | None:
+        """The step to take where none is proposed, by the length of the experiment; None where that is not given."""
+        return None if self.stop is None else presumed_step(self.stop - (self.start or 0.0))
+
 
 def default_experiment(root: XmlElement) -> DefaultExperiment:
     """Read the default experiment off a model description.
@@ -74,6 +82,12 @@ def proposed_step(step: float | None) -> Fraction | None:
     if whole and abs(1 / whole - step) <= 2e-6 * step:
         return Fraction(1, whole)
     return Fraction(repr(step))
+
+
+def presumed_step(duration: float | Fraction) -> Fraction | None:
+    """Return a 500th of a duration in seconds, to one significant digit; None where that is no step."""
+    step = Fraction(f"{float(duration) / _PARTS:.0e}")
+    return step if step >= SHORTEST_STEP else None
 
 
 def exact_seconds(seconds: float) -> Fraction:

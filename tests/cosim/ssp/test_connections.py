@@ -247,12 +247,19 @@ def test_an_experiment_that_cannot_be_run_is_refused(opened: Open, start: str, s
     assert value in refusal(lambda: opened(TWO, more=more))
 
 
-def test_an_fmu_that_proposes_no_step_needs_one(tmp_path: Path):
-    fmu = decay.pack(tmp_path / "unit.fmu", b"", decay.edited((' stepSize="0.1"', "")))
+@pytest.mark.parametrize(("stop", "of_run", "taken"), [("", 3, "0.006"), (' stopTime="7"', 3, "0.01")])
+def test_an_fmu_that_proposes_no_step_takes_a_500th(tmp_path: Path, stop: str, of_run: int, taken: str):
+    """Of its own default experiment, or else of the run."""
+    fmu = decay.pack(tmp_path / "unit.fmu", b"", decay.edited((' stopTime="1" stepSize="0.1"', stop)))
     file = pack_ssp(tmp_path / "a.ssp", described(system(component("a"))), {"resources/unit.fmu": fmu})
-    assert "a: its FMU proposes no communication step; give one" in refusal(lambda: SspFile(file))
+    if not stop:
+        assert "a: its FMU proposes no communication step; give one" in refusal(lambda: SspFile(file))
+    with SspFile(file, duration=Fraction(of_run)) as ssp:
+        assert ssp.system.units["a"].period == Fraction(taken)
+        assert [f"{taken} s is taken" in line for line in ssp.system.tolerated] == [True]
     with SspFile(file, Fraction(1, 30)) as ssp:
         assert ssp.system.units["a"].period == Fraction(1, 30)
+        assert not ssp.system.tolerated
 
 
 @pytest.mark.parametrize("period", ["0", "-1/30", "1e999999999", "1/0", "", "0.1"])

@@ -19,6 +19,7 @@ from click.testing import CliRunner, Result
 from native_units import native_fmu
 from ssp_of import component, described, pack_ssp, system
 
+import handover
 from handover.cosim.exceptions import InvalidSsp
 from handover.cosim.fmu.file.default_experiment import NoStep
 from handover.cosim.record.reader import Record
@@ -213,21 +214,41 @@ def test_a_run_with_a_table_resumes_to_the_same_bytes(tmp_path: Path, monkeypatc
 def test_the_option_is_added_to_faults_of_steps_alone(tmp_path: Path):
     other = "b: a limit of 0 m; give one that is above 0 s"
     assert naming_step([NoStep("a", "none"), other]) == [f"{NoStep('a', 'none')}, such as by --step 0.01", other]
-    parts = {"resources/unit.fmu": without_step(tmp_path)}
+    parts = {"resources/unit.fmu": edited(tmp_path, b' stopTime="1" stepSize="0.01"', b"")}
     file = pack_ssp(tmp_path / "a.ssp", described(system(component("a"))), parts)
     with contextlib.ExitStack() as opened, pytest.raises(InvalidSsp, match=r"above 0 s, such as by --step 0\.01$"):
         open_experiment(file, None, None, opened)
 
 
-def test_a_step_is_named_where_the_fmu_gives_none(tmp_path: Path):
-    file = without_step(tmp_path)
-    result = run(file, "--out", tmp_path / "out")
-    assert result.exit_code == 2, result.output
-    assert "its FMU proposes no communication step; give one that is above 0 s, such as by --step 0.01" in result.output
-    told = CliRunner().invoke(main, ["check", str(file)]).output
-    assert "no step size given: a run needs --step" in told
-    assert "10 steps of 0.01 s" in told
-    assert run(file, "--step", "0.01", "--no-report", "--out", tmp_path / "out").exit_code == 0
+@pytest.mark.parametrize(
+    ("experiment", "arguments", "taken"),
+    [
+        (b'stopTime="1"', ["--stop", "0.01"], 0.002),  # the same step however long a run is
+        (b'stopTime="0.9"', ["--stop", "0.01"], 0.002),
+        (b"", ["--stop", "0.05"], 0.0001),
+    ],
+)
+def test_an_fmu_that_proposes_no_step_takes_a_500th(
+    tmp_path: Path, experiment: bytes, arguments: Sequence[str], taken: float
+):
+    file, out = edited(tmp_path, b'stopTime="1" stepSize="0.01"', experiment), tmp_path / "out"
+    result = run(file, *arguments, "--strict", "--out", out)
+    assert (result.exit_code, out.exists()) == (2, False), result.output
+    assert "mass: its FMU proposes no communication step" in result.output
+    result = run(file, *arguments, "--no-report", "--out", out)
+    assert result.exit_code == 0, result.output
+    assert Record(out / "signals.parquet").time[:3] == pytest.approx([0.0, taken, 2 * taken])
+    (line,) = json.loads((out / "run.json").read_text())["warnings"]
+    assert f"{taken:g} s is taken" in line
+    assert run(file, *arguments, "--step", "0.01", "--strict", "--no-report", "--out", tmp_path / "a").exit_code == 0
+
+
+def test_a_step_is_asked_for_where_there_is_no_time_to_take_it_from(tmp_path: Path):
+    file = edited(tmp_path, b'stopTime="1" stepSize="0.01"', b"")
+    with pytest.raises(handover.InvalidInput, match="proposes no communication step; give one"):
+        handover.open(file)
+    with handover.open(file, step=0.01) as s:
+        assert s.step(0.02) == 0.02
 
 
 def test_a_fault_that_co_simulation_does_not_touch_is_warned_of_once(tmp_path: Path):
@@ -253,10 +274,6 @@ def test_a_fault_that_co_simulation_does_not_touch_is_warned_of_once(tmp_path: P
     checked = CliRunner().invoke(main, ["check", str(file)])
     assert checked.exit_code == 1
     assert "it is the derivative of 999, which leads to no variable" in checked.output
-
-
-def without_step(folder: Path) -> Path:
-    return edited(folder, b' stepSize="0.01"', b"")
 
 
 def edited(folder: Path, old: bytes, new: bytes) -> Path:
