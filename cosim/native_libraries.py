@@ -16,6 +16,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from handover.cosim.python_process import module_command
+
 # by FMI 3.0's name of the platform: zig's name, the suffix of a shared library
 TARGETS = {
     "x86_64-linux": ("x86_64-linux-gnu.2.17", ".so"),
@@ -192,7 +194,7 @@ def zig_cc(arguments: "list[str]") -> "subprocess.CompletedProcess[str]":
     cache = cache_folder() / "zig"
     environment = {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache / "local")}
     return subprocess.run(
-        [sys.executable, "-m", "ziglang", "cc", *arguments],
+        module_command("ziglang", "cc", *arguments),
         env={**os.environ, **environment},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from importlib import import_module, metadata
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from handover.cosim.blocks.declarations import DeclarationError
@@ -296,8 +297,17 @@ def import_class(path: str) -> type[Any]:
     if not isinstance(found, type):
         own = [c for c in vars(module).values() if isinstance(c, type) and c.__module__ == module_name]
         classes = [c.__name__ for c in own if hasattr(c, "step")] or [c.__name__ for c in own]
-        raise UnknownBlock(path, f"module {module_name!r} has no class {name!r}; {nearest(name, classes)}")
+        raise UnknownBlock(
+            path, f"module {module_name!r} has no class {name!r}; {nearest(name, classes)}{_namesake(module)}"
+        )
     return found
+
+
+def _namesake(module: ModuleType) -> str:
+    """Return that another module comes before one of the working directory, if it does, else nothing."""
+    own = Path.cwd() / f"{module.__name__.replace('.', '/')}.py"
+    there = getattr(module, "__file__", None) or "Python's own"
+    return f"; it is {there}, which comes before {own}: rename that" if own.is_file() and there != str(own) else ""
 
 
 def _line_of(e: BaseException, module_name: str) -> str:

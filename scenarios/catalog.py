@@ -289,9 +289,12 @@ def scenario_of(name: str, source: Mapping[str, Any]) -> type[Experiment[Any]] |
 
 
 def search_folder(folder: Path | str) -> None:
-    """Let Python find modules in a folder, before all others; `""` names none."""
+    """Let Python find modules in a folder, after all others: a file `json.py` there is not taken for Python's own.
+
+    It is called for modules that the user names, and never else; `""` names none.
+    """
     if folder and str(folder) not in sys.path:
-        sys.path.insert(0, str(folder))
+        sys.path.append(str(folder))
 
 
 def _folder_of(scenario: type[Any]) -> str:

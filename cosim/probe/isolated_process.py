@@ -9,20 +9,15 @@ import json
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from handover.cosim.probe.finding import Finding, Level, fault, warning
+from handover.cosim.python_process import code_command
 
-_START = """
-import importlib, json, sys
-task = json.loads(sys.argv[1])
-sys.path[:] = task["path"]
-importlib.import_module(task["module"]).main(task)
-"""
+_START = "import importlib, json; importlib.import_module(sys.argv[1]).main(json.loads(sys.argv[2]))"
 _MAX_LINES = 8
 _MEANINGS = {
     "SIGSEGV": "it used memory that is not its own",
@@ -55,10 +50,10 @@ def run_isolated(module: str, task: Mapping[str, Any], folder: Path, timeout: fl
     name = module.rpartition(".")[2]
     journal, output = folder / f"{name}.jsonl", folder / f"{name}.txt"
     journal.touch()
-    whole = {**task, "module": module, "path": sys.path, "journal": str(journal)}
+    whole = {**task, "journal": str(journal)}
     with output.open("wb") as written:
         process = subprocess.Popen(
-            [sys.executable, "-c", _START, json.dumps(whole)],
+            code_command(_START, module, json.dumps(whole)),
             stdin=subprocess.DEVNULL,
             stdout=written,
             stderr=subprocess.STDOUT,

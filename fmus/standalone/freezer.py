@@ -18,6 +18,7 @@ import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from handover.cosim.python_process import import_path, module_command
 from handover.fmus.compile import cache_folder, host_platform, named_platforms
 from handover.fmus.sources import Carried, distributions_by_module
 
@@ -119,7 +120,7 @@ def _imported(block: str, carried: Carried) -> list[str]:
     """
     with tempfile.TemporaryDirectory(prefix="handover-imports-") as scratch:
         result = Path(scratch, "modules.json")
-        command = [sys.executable, str(_IMPORTED), block, json.dumps(sys.path), str(result)]
+        command = [sys.executable, str(_IMPORTED), block, json.dumps(import_path()), str(result)]
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
         if done.returncode != 0 or not result.is_file():
             why = done.stderr.strip() or f"the interpreter ends with exit status {done.returncode}"
@@ -160,7 +161,7 @@ def _freeze(names: Sequence[str], carried: Carried, folder: Path) -> None:
             options += ["--copy-metadata", package.distribution]
         for unwanted in _unwanted(names):
             options += ["--exclude-module", unwanted]
-        command = [sys.executable, "-m", "PyInstaller", *options, str(main)]
+        command = module_command("PyInstaller", *options, str(main))
         environment = {**os.environ, "PYINSTALLER_CONFIG_DIR": f"{scratch}/config", "PYTHONHASHSEED": "1"}
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False, env=environment)
         made = Path(scratch, "made", "unit")

@@ -31,13 +31,14 @@ def unit(name: str, fmi: Literal[2, 3] = 3) -> Path:
 
     Args:
         name: a unit of the catalog or of an installed package, such as "TendonArm", or the path of a block, such as
-            "my_arm:MyArm", whose module is looked for in the working directory first.
+            "my_arm:MyArm", whose module is looked for in the working directory, too.
         fmi: 2 or 3.
 
     Raises:
         InvalidInput: there is no such unit, or it cannot be built in this standard.
     """
-    search_folder(Path.cwd())
+    if ":" in name:
+        search_folder(Path.cwd())
     try:
         with errors_for_python():
             return cached(name, fmi)

@@ -13,6 +13,7 @@ from dask import config
 from distributed import Client, LocalCluster
 
 from handover.cosim.exceptions import one_line
+from handover.cosim.python_process import SAFE_PATH
 from handover.scenarios.campaign.cluster import ClusterPool
 from handover.scenarios.campaign.worker_pool import cores
 from handover.scenarios.execution.errors import PoolError
@@ -26,6 +27,7 @@ _SETTINGS = {
     "distributed.scheduler.allowed-failures": 3,
     "distributed.comm.timeouts.connect": "5s",
     "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": str(_SILENT),
+    **{f"distributed.nanny.pre-spawn-environ.{name}": value for name, value in SAFE_PATH.items()},
 }
 
 _NO_MONITORING = {
@@ -51,7 +53,8 @@ def local_cluster(workers: int | None) -> Generator[ClusterPool, None, None]:
     """
     with _quiet(), config.set({**_SETTINGS, **_NO_MONITORING}), contextlib.ExitStack() as opened:
         try:
-            with _quiet_resource_tracker(), _ignore_ctrl_c():  # threads and processes started here inherit both
+            # threads and processes started here inherit both
+            with _environment_of_resource_tracker(), _ignore_ctrl_c():
                 cluster = LocalCluster(
                     n_workers=workers or cores(),
                     threads_per_worker=1,
@@ -107,18 +110,23 @@ def _quiet() -> Generator[None, None, None]:
 
 
 @contextlib.contextmanager
-def _quiet_resource_tracker() -> Generator[None, None, None]:
-    """Let Python's resource tracker, a process that cleans up after a killed command, do so without warnings."""
-    name = "PYTHONWARNINGS"
-    before = os.environ.get(name)
-    os.environ[name] = ",".join(filter(None, [before, "ignore:resource_tracker:UserWarning"]))
+def _environment_of_resource_tracker() -> Generator[None, None, None]:
+    """Let Python's resource tracker, a process that cleans up after a killed command, do so without warnings.
+
+    Nor does it import modules from the working directory.
+    """
+    warned = filter(None, [os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker:UserWarning"])
+    changed = {"PYTHONWARNINGS": ",".join(warned), **SAFE_PATH}
+    before = {name: os.environ.get(name) for name in changed}
+    os.environ.update(changed)
     try:
         yield
     finally:
-        if before is None:
-            del os.environ[name]
-        else:
-            os.environ[name] = before
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 @contextlib.contextmanager

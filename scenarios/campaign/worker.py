@@ -20,8 +20,8 @@ from typing import Any, BinaryIO, cast
 from distributed import get_worker
 
 from handover.cosim.blocks.block import InvalidState
+from handover.cosim.python_process import module_command, without_safe_path
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, read_message, write_message
-from handover.scenarios.execution.python_process import module_command
 from handover.scenarios.results.run_folder import version_differences, versions
 
 _POLL_INTERVAL = 0.5
@@ -55,7 +55,7 @@ class ServerProcess:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
-            env={**os.environ, **dict.fromkeys(_ONE_THREAD, "1")},
+            env={**without_safe_path(), **dict.fromkeys(_ONE_THREAD, "1")},
             start_new_session=True,
         )
         self._results: queue.SimpleQueue[Any] = queue.SimpleQueue()

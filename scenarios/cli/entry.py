@@ -4,6 +4,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
+from handover.cosim.python_process import import_path
 from handover.scenarios.execution.exit_status import abort
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ def open_standard_streams() -> None:
 
 def main() -> None:
     """Run the command; loading it takes a second or so, during which Ctrl-C aborts it as later."""
+    sys.path[:] = import_path()
     open_standard_streams()
     try:
         if sys.argv[1:2] and sys.argv[1] in _SUPERVISED:

@@ -58,7 +58,7 @@ def list_command(name: str | None, place: str | None, page: Path | None, *, as_j
     """List scenarios and units, the parameters of a SCENARIO, or parameters and ports of a UNIT.
 
     Either can be your own, named MODULE:CLASS, such as my_scene:TwoLinkReach for the class TwoLinkReach in my_scene.py;
-    modules are looked for in the working directory first.
+    modules are looked for in the working directory, too.
     """
     if page is not None:
         if name is not None or place is not None or as_json:
@@ -108,9 +108,10 @@ def _subject(name: str | None, place: str | None) -> tuple[Callable[[], dict[str
 
 def _unit(name: str) -> Entry | None:
     """Return the unit of a name or a block's path, None if it is none."""
-    search_folder(Path.cwd())
     if name in UNITS:
         return UNITS[name]
+    if ":" in name:
+        search_folder(Path.cwd())
     try:
         if ":" in name and issubclass(import_class(name), Experiment):
             return None

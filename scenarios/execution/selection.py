@@ -27,12 +27,13 @@ _BLOCK = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 
 def find_scenario(name: str) -> type[Experiment[Any]]:
-    """Return the scenario of a name, or of a path such as `my_scene:TwoLinkReach`; the working directory is searched.
+    """Return the scenario of a name, or of a path such as `my_scene:TwoLinkReach`, also of the working directory.
 
     Raises:
         UsageError: there is none, and the nearest names are given; or it is not complete, and all that it lacks is.
     """
-    search_folder(Path.cwd())
+    if ":" in name:
+        search_folder(Path.cwd())
     try:
         return named_scenario(name)
     except InvalidScenario as e:
@@ -111,6 +112,8 @@ def select_fmus(
         if other and not _BLOCK.fullmatch(other) and (other not in UNITS or Path(other).exists()):
             fmus[name] = Path(other)
             continue
+        if ":" in other:
+            search_folder(Path.cwd())
         try:
             fmus[name] = built(other or unit)
         except _invalid_blocks() as e:

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.master.live_control import LiveControl
+from handover.cosim.python_process import code_command
 from handover.scenarios.execution.input_sources import recorded_input_names
-from handover.scenarios.execution.python_process import code_command
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.live.process import CONTROL_FILE

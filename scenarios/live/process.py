@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from handover.cosim.master.live_control import LiveControl
+from handover.cosim.python_process import module_command
 from handover.cosim.system.time_series import ExternalSource
-from handover.scenarios.execution.python_process import module_command
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live.shared_inputs import SharedInputs
 from handover.scenarios.live.shared_pictures import PictureWriter

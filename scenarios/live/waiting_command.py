@@ -14,7 +14,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from handover.scenarios.execution.python_process import code_command
+from handover.cosim.python_process import code_command
 
 _LOADED = (
     "handover.scenarios.cli.command",

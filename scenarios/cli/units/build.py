@@ -36,7 +36,7 @@ from handover.scenarios.results.run_folder import InvalidRunFolder, check_place
 
 
 def load_user_block(path: str, step: str | None) -> Entry:
-    """Return the unit that a path such as `spring:Spring` names; the working directory is searched first.
+    """Return the unit that a path such as `spring:Spring` names, also of the working directory.
 
     Its step is that which is given, a number or a fraction of seconds, else the block's period, else 0.01 s.
 
@@ -63,7 +63,7 @@ def _seconds(text: str) -> Fraction:
 
 
 _HELP = """Build UNITs (all by default) as FMUs for other tools. A unit of your own is named MODULE:CLASS, such as
-spring:Spring for the class Spring in spring.py; modules are looked for in the working directory first.
+spring:Spring for the class Spring in spring.py; modules are looked for in the working directory, too.
 
 A unit with pictures has no FMI 2 form, since FMI 2 knows no binary variables.
 

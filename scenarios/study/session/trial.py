@@ -17,9 +17,9 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.master.live_control import LiveControl
+from handover.cosim.python_process import module_command
 from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import scenario_of
-from handover.scenarios.execution.python_process import module_command
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.replay import Line

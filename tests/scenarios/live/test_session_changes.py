@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from handover.scenarios.execution.python_process import code_command
+from handover.cosim.python_process import code_command
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.live.play_page import PlayPage, Session
 from handover.scenarios.live.played_run import Choice, PlayedRun

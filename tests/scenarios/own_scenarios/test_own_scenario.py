@@ -44,7 +44,7 @@ def test_list_prints_scenario_controller_and_plant(here: Path):
     printed = succeeded(here, "list", SCENE)
     assert "An arm of two links reaches for a point" in printed
     assert "where the tip is to come, in W" in printed
-    assert "SpringToGoal: tau = J^T k (p_WG - p_WE) - d v" in succeeded(here, "list", "control:SpringToGoal")
+    assert "SpringToGoal: tau = J^T k (p_WG - p_WE) - d v" in succeeded(here, "list", "goal_spring:SpringToGoal")
 
 
 @pytest.mark.slow
@@ -133,13 +133,13 @@ def test_its_ssp_runs_like_it(here: Path):
 def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(here: Path):
     assert "did you mean TwoLinkReach?" in refused(here, "run", "reach:TwoLinkRech")
     assert "there is no module 'reech'" in refused(here, "run", "reech:TwoLinkReach")
-    assert "control:SpringToGoal: SpringToGoal is no scenario" in refused(here, "run", "control:SpringToGoal")
+    assert "goal_spring:SpringToGoal: SpringToGoal is no scenario" in refused(here, "run", "goal_spring:SpringToGoal")
     assert "a scenario of your own is named MODULE:CLASS" in refused(here, "run", "two_link_reach")
     assert "two_link_reach has no parameter 'goall'; did you mean goal?" in refused(
         here, "run", SCENE, "-p", "goall=1,1"
     )
-    assert "module 'control' has no class 'Spring'" in refused(
-        here, "run", SCENE, "--unit", "controller=control:Spring"
+    assert "module 'goal_spring' has no class 'Spring'" in refused(
+        here, "run", SCENE, "--unit", "controller=goal_spring:Spring"
     )
     (here / "broken.py").write_text("import nowhere_to_be_found\n")
     assert "the module nowhere_to_be_found is needed, which this Python does not have" in refused(

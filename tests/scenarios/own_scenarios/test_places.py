@@ -12,7 +12,7 @@ from handover.cosim.record.reader import Record
 
 SCENE = "placed:Placed"
 PLACED = '''
-from control import Inputs, Outputs, Params, SpringToGoal
+from goal_spring import Inputs, Outputs, Params, SpringToGoal
 from dataclasses import dataclass
 from handover.cosim.blocks.ports import output
 from handover.cosim.blocks.units import Number

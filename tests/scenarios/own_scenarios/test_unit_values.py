@@ -79,7 +79,7 @@ def test_all_faults_are_told_at_once_and_nothing_is_written(here: Path):
 
 
 SOFT = """
-from control import Inputs, Outputs, Params, SpringToGoal
+from goal_spring import Inputs, Outputs, Params, SpringToGoal
 
 
 class Soft(SpringToGoal):
@@ -96,12 +96,12 @@ def test_a_sweep_varies_the_unit_itself(here: Path):
     (here / "soft.py").write_text(SOFT)
     (here / "else").mkdir()
     succeeded(here, "build", "soft:Soft", "--fmi", "3", "--out", "else")
-    units = "controller=control:SpringToGoal,else/Soft.fmi3.fmu"
+    units = "controller=goal_spring:SpringToGoal,else/Soft.fmi3.fmu"
     sweep = ["sweep", SCENE, "arm.mass=1,2", "--unit", units, "-p", "patience=0.1", "--paired", "--out", "swept"]
     printed = succeeded(here, *sweep)
     assert "else/Soft.fmi3.fmu" in printed
     table = CampaignTable.read(here / "swept" / "runs.parquet")
-    assert list(table.column("controller")) == ["control:SpringToGoal"] * 2 + ["else/Soft.fmi3.fmu"] * 2
+    assert list(table.column("controller")) == ["goal_spring:SpringToGoal"] * 2 + ["else/Soft.fmi3.fmu"] * 2
     assert list(table.column("arm.mass")) == [1.0, 2.0] * 2
     first = [torque(run) for run in sorted((here / "swept" / "runs").iterdir())]
     np.testing.assert_allclose(first[2], 0.5 * first[0], rtol=1e-12)
@@ -113,9 +113,9 @@ def test_a_sweep_varies_the_unit_itself(here: Path):
 
 @pytest.mark.slow
 def test_units_that_cannot_be_varied_are_told_and_nothing_is_written(here: Path):
-    line = refused(here, "sweep", SCENE, "--unit", "controller=control:SpringToGoal,", "--out", "other")
-    assert "--unit controller: 'control:SpringToGoal,' has an empty item" in line
-    done = call(here, "sweep", SCENE, "--unit", "controller=control:SpringToGoal,arm:TwoLinkArm", "--out", "other")
+    line = refused(here, "sweep", SCENE, "--unit", "controller=goal_spring:SpringToGoal,", "--out", "other")
+    assert "--unit controller: 'goal_spring:SpringToGoal,' has an empty item" in line
+    done = call(here, "sweep", SCENE, "--unit", "controller=goal_spring:SpringToGoal,arm:TwoLinkArm", "--out", "other")
     assert done.returncode == 2
     assert "4 faults in the system" in done.stderr
     assert not (here / "other").exists()

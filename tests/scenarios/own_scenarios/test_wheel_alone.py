@@ -163,7 +163,7 @@ def test_a_run_has_its_record_and_a_page_with_a_replay(own: Installation):
 
 
 def test_units_and_parameters_are_swept_with_the_numbers_of_single_runs(own: Installation):
-    units = ["--unit", "controller=control:SpringToGoal,softer:Softer"]
+    units = ["--unit", "controller=goal_spring:SpringToGoal,softer:Softer"]
     printed = own.succeeded("sweep", SCENE, "arm.mass=1,2", *units, "--workers", "2", "--out", "swept")
     assert "4 of 4 runs done" in printed
     runs = sorted(folder.name for folder in (own.here / "swept" / "runs").iterdir())

@@ -17,6 +17,7 @@ from click.testing import CliRunner
 from processes import children, lives, until
 from sample_jobs import bad_job, job
 
+from handover.cosim.python_process import code_command
 from handover.cosim.record.reader import Record
 from handover.cosim.stepping.options import MasterOptions
 from handover.fmus.build import cached
@@ -25,7 +26,6 @@ from handover.scenarios.campaign.run_server import load_modules
 from handover.scenarios.campaign.table import row_of
 from handover.scenarios.campaign.worker import NotWanted, ServerLost, ServerProcess
 from handover.scenarios.cli.command import main
-from handover.scenarios.execution.python_process import code_command
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.run_folder import RunFolder
 

@@ -1,0 +1,90 @@
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from handover.cosim.python_process import code_command, module_command
+
+IMPORTED = "import json, sys; import handover.cosim; print(json.dumps([handover.cosim.__file__, *sys.argv[1:]]))"
+
+
+@pytest.fixture
+def other_copy(tmp_path: Path) -> Path:
+    """A folder with another package of the project's name, as a clone beside an installed one."""
+    for folder in ("handover", "handover/cosim"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "__init__.py").write_text("", encoding="utf-8")
+    (tmp_path / "told.py").write_text(IMPORTED, encoding="utf-8")
+    return tmp_path
+
+
+def output_of(command: Sequence[str], where: Path) -> list[str]:
+    return json.loads(subprocess.run(command, cwd=where, check=True, capture_output=True, text=True).stdout)
+
+
+def test_code_imports_what_this_process_does_wherever_it_is_called(other_copy: Path):
+    import handover.cosim
+
+    plainly = output_of([sys.executable, "-c", IMPORTED], other_copy)
+    assert plainly == [str(other_copy / "handover" / "cosim" / "__init__.py")], "what is guarded against"
+    assert output_of(code_command(IMPORTED, "a", "b c"), other_copy) == [handover.cosim.__file__, "a", "b c"]
+
+
+def test_so_does_a_module(other_copy: Path, monkeypatch: pytest.MonkeyPatch):
+    import handover.cosim
+
+    monkeypatch.setattr(sys, "path", [*sys.path, str(other_copy)])  # where it lies itself
+    assert output_of(module_command("told", "a", "{b}"), other_copy) == [handover.cosim.__file__, "a", "{b}"]
+
+
+PLANTED = ("json", "importlib", "secrets", "typing", "jinja2", "pandas", "starlette", "rich", "tomli", "numpy")
+
+
+@pytest.fixture
+def planted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory with files that are named like modules of libraries and say so when they are run."""
+    for name in PLANTED:
+        code = f"open({str(tmp_path / 'run.txt')!r}, 'a').write({name!r})\nraise SystemExit({name!r})\n"
+        (tmp_path / f"{name}.py").write_text(code, encoding="utf-8")
+    (tmp_path / "own_module.py").write_text("", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("first", [[""], []], ids=["as of a notebook", "as of a command"])
+def test_no_file_of_the_working_directory_is_taken_for_a_librarys(
+    planted: Path, monkeypatch: pytest.MonkeyPatch, first: list[str]
+):
+    monkeypatch.setattr(sys, "path", [*first, *(p for p in sys.path if p)])
+    own = "import own_module; " if first else ""  # a notebook's own modules are found all the same
+    code = f"import json, importlib, secrets, typing, jinja2, numpy; {own}print(json.dumps(len(sys.argv)))"
+    done = subprocess.run(code_command(code), capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("1\n", "")
+    assert not (planted / "run.txt").exists()
+
+
+def test_the_command_runs_none_of_them(planted: Path):
+    begin = "import handover, importlib, typing; import sys; sys.path.insert(0, ''); "  # as `python -m` and notebooks
+    call = [*code_command(begin + "from handover.scenarios.cli.entry import main; main()"), "list", "--json"]
+    done = subprocess.run(call, capture_output=True, text=True)
+    assert json.loads(done.stdout)["scenarios"], done.stderr
+    assert not (planted / "run.txt").exists()
+
+
+def test_folders_of_own_modules_come_last_and_only_where_one_is_named(planted: Path, monkeypatch: pytest.MonkeyPatch):
+    from handover.scenarios.execution.errors import UsageError
+    from handover.scenarios.execution.selection import find_scenario
+
+    before = [p for p in sys.path if p]
+    monkeypatch.setattr(sys, "path", [*before])
+    find_scenario("ir_grasp")
+    assert sys.path == before
+    with pytest.raises(UsageError, match="has no class 'Scene'"):
+        find_scenario("own_module:Scene")
+    assert sys.path == [*before, str(planted)]
+    with pytest.raises(UsageError, match="rename that"):
+        find_scenario("json:Scene")
+    assert not (planted / "run.txt").exists()
