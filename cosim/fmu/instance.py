@@ -83,14 +83,15 @@ class Instance(CheckedCalls):
         self.log.extend(log)
         return given
 
-    def enter_initialization(self, t: float, stop: float | None) -> None:
-        """Enter initialisation mode at time t."""
+    def enter_initialization(self, t: float, stop: float | None, tolerance: float | None = None) -> None:
+        """Enter initialisation mode at time t, of a run until `stop`; a tolerance is for the unit's own solver."""
         self.time = t
+        experiment = tolerance is not None, tolerance or 0.0, t, stop is not None, stop or 0.0
         if self._fmi == 2:
-            self._call("SetupExperiment", False, 0.0, t, stop is not None, stop or 0.0)
+            self._call("SetupExperiment", *experiment)
             self._call("EnterInitializationMode")
         else:
-            self._call("EnterInitializationMode", False, 0.0, t, stop is not None, stop or 0.0)
+            self._call("EnterInitializationMode", *experiment)
 
     def exit_initialization(self) -> None:
         """Leave initialisation mode; steps follow."""

@@ -80,6 +80,12 @@ class Master:
     Entering loads and initialises the units; `run` steps them; leaving terminates and frees them, whatever happened.
     If that fails where nothing else did, leaving raises the failure, after all units are freed.
 
+    Args:
+        system, options: what is run, and how.
+        heartbeat: notes the calls of units; by default one of its own.
+        stop: when the run ends, s, at the first communication point at or after it: each unit is given the end of its
+            last step as its stop time, beyond which it need not step. Without, units have no stop time.
+
     Raises:
         WiringError: the system has faults. InvalidFmu: an FMU is invalid, see `MasterOptions.strict`.
         ScheduleError: see `StepperFactory`.
@@ -87,7 +93,10 @@ class Master:
         UnitHung: one did not return; UnitCrashed: an isolated one ended its process.
     """
 
-    def __init__(self, system: System, options: MasterOptions = _PLAIN, heartbeat: Heartbeat | None = None) -> None:
+    def __init__(
+        self, system: System, options: MasterOptions = _PLAIN, heartbeat: Heartbeat | None = None,
+        stop: Fraction | None = None,
+    ) -> None:  # fmt: skip
         system.check()
         self.description_faults = _tell_of_faults(system, strict=options.strict)
         """How model descriptions break the standard, by FMU."""
@@ -97,8 +106,11 @@ class Master:
             _log.warning("%s", line)
         self.system = system
         self.options = options
+        self.stop = stop
         self._factory = StepperFactory(system, options)
         self.schedule = self._factory.schedule
+        self.tolerances = self._factory.tolerances
+        """By unit, the relative tolerance that it is given for its own solver; others choose theirs."""
         self.heartbeat = heartbeat or Heartbeat()
         self.pacer = Pacer(options.pace) if options.pace is not None else None
         """Keeps the run in step with the wall clock; None where it runs as fast as it can."""
@@ -223,7 +235,7 @@ class Master:
 
         Raises:
             UnitFailure: a unit's call failed; what observers saw before stays.
-            ValueError: `stop` lies before the time that is reached.
+            ValueError: `stop` lies before the time that is reached, or after the stop time that units were given.
             RuntimeError: the master is left, a unit failed before, or one has ended the simulation.
         """
         self._check_can_run(stop)
@@ -244,7 +256,7 @@ class Master:
 
     def _start(self) -> None:
         ensemble = self._factory.load(self.heartbeat, self._cleanups)
-        self._factory.initialize(ensemble)
+        self._factory.initialize(ensemble, self.stop)
         ensemble.host.restore()
         self._coupling = self._factory.couple(ensemble)
         self._stepper = self._factory.stepper(ensemble, self._coupling)
@@ -281,6 +293,9 @@ class Master:
                 raise RuntimeError(f"{name} failed, and the standards forbid further calls of it: make another master")
         if self.schedule.time(self.schedule.ticks(stop)) < self.time:
             raise ValueError(f"a run to {float(stop):g} s, but {self.time:g} s are reached: a later stop is valid")
+        if self.stop is not None and stop > self.stop:
+            given = f"units were given the stop time {float(self.stop):g} s"
+            raise ValueError(f"a run to {float(stop):g} s, but {given}: make the master with this stop, or with none")
 
     def _run(self, stop: Fraction, observers: Sequence[Observer], until: Callable[[], bool]) -> None:
         signals = self.signals

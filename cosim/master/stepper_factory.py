@@ -1,9 +1,10 @@
 """Chooses how a system is stepped, by its options and its units: with which ensemble, coupling and stepper."""
 
 from collections.abc import Sequence
+from fractions import Fraction
 
 from handover.cosim.fmu.heartbeat import Heartbeat
-from handover.cosim.master.isolated_units import isolated_units
+from handover.cosim.master.unit_options import isolated_units, tolerances_of
 from handover.cosim.plan.choice import log_fallback, plan_obstacle, plan_stepper
 from handover.cosim.stepping.adaptive_stepper import AdaptiveStepper, check_control, fine_tick
 from handover.cosim.stepping.ensemble import CleanupStack, Ensemble
@@ -26,15 +27,17 @@ class StepperFactory:
 
     Attributes:
         schedule: the grid and the order of the units.
+        tolerances: by unit, the relative tolerance that it is given, if any.
 
     Raises:
-        InvalidOptions: see `isolated_units`.
+        InvalidOptions: see `isolated_units` and `tolerances_of`.
         ScheduleError: see `Schedule`, `check_control` and `check_off_grid`, or there are cycles that cannot be solved.
     """
 
     def __init__(self, system: System, options: MasterOptions) -> None:
         self._system, self._options = system, options
         self._isolated = isolated_units(system, options.isolated)
+        self.tolerances = tolerances_of(system, options.unit_tolerances)
         self.schedule = Schedule(system)
         if options.adaptive is not None:
             check_control(system, options.adaptive)
@@ -62,12 +65,13 @@ class StepperFactory:
         load = EventEnsemble if self.has_events else Ensemble
         return load(self._system, heartbeat, cleanups, self._isolated)
 
-    def initialize(self, ensemble: Ensemble) -> None:
-        """Take the units through initialisation mode; algebraic loops are solved."""
+    def initialize(self, ensemble: Ensemble, stop: Fraction | None) -> None:
+        """Take the units through initialisation mode of a run until `stop`, s; algebraic loops are solved."""
         schedule = self.schedule
         ensemble.external_inputs.ask(0.0)
         values = InitialValues(ensemble, schedule.initial_groups, schedule.initial_passes, self._solver)
-        ensemble.initialize(schedule.slots, values)
+        stops = {} if stop is None else {s.unit: schedule.end_of_steps(s, stop) for s in schedule.slots}
+        ensemble.initialize(schedule.slots, values, stops, self.tolerances)
 
     def couple(self, ensemble: Ensemble) -> Coupling:
         """Return the coupling of the algorithm; where there are inputs from outside, it asks for them."""

@@ -154,12 +154,17 @@ class Ensemble:
             views[end.unit] = {**views[end.unit], end.port: instance.u[end.port]}
         return Signals(views, ports, self)
 
-    def initialize(self, slots: Sequence[Slot], compute_values: Callable[[], None]) -> None:
+    def initialize(
+        self, slots: Sequence[Slot], compute_values: Callable[[], None], stops: Mapping[str, float],
+        tolerances: Mapping[str, float],
+    ) -> None:  # fmt: skip
         """Take all units through initialisation mode.
 
         Args:
             slots: in the order in which they leave it.
             compute_values: is called in between, to set inputs and get outputs in any order.
+            stops: by unit, the end of its last step, s; where there is none, it may step on without end.
+            tolerances: by unit, the relative tolerance for its own solver; where there is none, it chooses.
 
         Raises:
             UnitFailure: a unit does not accept its start values or does not initialise.
@@ -168,7 +173,7 @@ class Ensemble:
         lost: dict[str, list[LostValue]] = {}
         for name, unit in self.system.units.items():
             self.instances[name].set_start(unit.start)
-            self.instances[name].enter_initialization(0.0, None)
+            self.instances[name].enter_initialization(0.0, stops.get(name), tolerances.get(name))
             self._note_limits(name, "its initialisation")
             lost[name] = keep_start(self.instances[name], unit.start, self.system.fed_inputs(name))
         if affected := [name for name in lost if lost[name]]:

@@ -39,9 +39,12 @@ class EventEnsemble(Ensemble):
         self._staying = dict.fromkeys(staying)
         self._warned: set[str] = set()
 
-    def initialize(self, slots: Sequence[Slot], compute_values: Callable[[], None]) -> None:
+    def initialize(
+        self, slots: Sequence[Slot], compute_values: Callable[[], None], stops: Mapping[str, float],
+        tolerances: Mapping[str, float],
+    ) -> None:  # fmt: skip
         """Take all units through initialisation mode; those with events are in event mode after that."""
-        super().initialize(slots, compute_values)
+        super().initialize(slots, compute_values, stops, tolerances)
         self._cleanups.add(self._forget_begins)
 
     @property

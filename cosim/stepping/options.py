@@ -6,7 +6,8 @@ They are checked when made, and mean the same for every system; what does not go
 
 import enum
 import math
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
 from fractions import Fraction
 from typing import Any, cast
 
@@ -130,6 +131,8 @@ class MasterOptions:
             project, `all` is all, also where a unit itself is named so. What a unit does then harms itself alone, and
             units that do not wait for each other step at the same time; the results are the same.
         pace: simulated seconds per second of wall time that a run keeps to; None: as fast as it goes.
+        unit_tolerances: relative tolerances that units are given for their own solvers, by name; `all` is all others,
+            also where a unit itself is named so. The rest get that of their default experiment, if there is one.
         strict: whether what is not as it should be with a unit's description is refused even where a run is possible,
             as where a start value is out of its range or no step is proposed; else the master warns of it.
 
@@ -149,6 +152,7 @@ class MasterOptions:
     pace: float | None = None
     strict: bool = False
     isolated: tuple[str, ...] = ()
+    unit_tolerances: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def __post_init__(self) -> None:
         given: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
@@ -160,6 +164,10 @@ class MasterOptions:
             "tolerance": (_is_above_0(given["tolerance"], int | float), "a finite number above 0"),
             "call_limit": (_is_above_0(given["call_limit"], int | float, None), "None, or a finite number above 0"),
             "isolated": (_are_names(given["isolated"]), "a tuple of units' names, `foreign` or `all`"),
+            "unit_tolerances": (
+                _are_tolerances(given["unit_tolerances"]),
+                "a mapping of units' names, or `all`, to finite numbers above 0",
+            ),
             "pace": (_is_above_0(given["pace"], int | float, None), "None, or a finite number above 0"),
         }
         faults = [f"{name} = {given[name]!r}: {valid} is right" for name, (fits, valid) in checks.items() if not fits]
@@ -179,6 +187,7 @@ class MasterOptions:
             "adaptive": control,
             "repeat_discarded": self.repeat_discarded,
             **({"isolated": list(self.isolated)} if self.isolated else {}),
+            **({"unit_tolerances": dict(self.unit_tolerances)} if self.unit_tolerances else {}),
         }
 
     @property
@@ -201,3 +210,10 @@ def _is_above_0(value: Any, kind: Any, *others: None) -> bool:
 
 def _are_names(value: Any) -> bool:
     return isinstance(value, tuple) and all(isinstance(name, str) for name in cast(tuple[Any, ...], value))
+
+
+def _are_tolerances(value: Any) -> bool:
+    if not isinstance(value, Mapping):
+        return False
+    given = cast(Mapping[Any, Any], value)
+    return _are_names(tuple(given)) and all(_is_above_0(number, int | float) for number in given.values())

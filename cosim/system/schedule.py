@@ -108,6 +108,15 @@ class Schedule:
         """Return the number of whole ticks in a duration, rounded up."""
         return math.ceil(duration / self.tick)
 
+    def end_of_steps(self, slot: Slot, stop: Fraction) -> float:
+        """Return when the last step of a unit ends that begins before `stop`, or of a sampled one at it, s.
+
+        It is as the unit computes it, t + dt, where that rounds to a later time.
+        """
+        points = self.ticks(stop)
+        steps = points // slot.every + 1 if slot in self.sampled else math.ceil(points / slot.every)
+        return max(self.time(steps * slot.every), self.time((steps - 1) * slot.every) + slot.period)
+
     def _slots(self, system: System, groups: Sequence[Group]) -> tuple[Slot, ...]:
         periods = {n: system.units[n].period for group in groups for n in group.units}
         return tuple(Slot(n, int(period / self.tick), float(period)) for n, period in periods.items())

@@ -278,6 +278,7 @@ def _of_master(master: Mapping[str, Any]) -> dict[str, Any]:
     control: Mapping[str, Any] = master.get("adaptive") or {}
     options = {key: master[key] for key in ("algorithm", "tolerance", "iterations", "extrapolation")}
     options |= {"repeat-discarded": master["repeat_discarded"], "isolate": master.get("isolated")}
+    options["unit-tolerance"] = [f"{name}={number}" for name, number in master.get("unit_tolerances", {}).items()]
     options |= {option.replace("_", "-"): control.get(name) for option, name in CONTROL_FIELDS.items()}
     return {**options, "adaptive": control.get("relative")}
 

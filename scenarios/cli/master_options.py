@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from handover.cosim.master.unit_options import ALL
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 from handover.scenarios.cli.options import HeadedOption, Seconds, WholeNumber
 from handover.scenarios.execution.errors import UsageError
@@ -66,6 +67,13 @@ _OPTIONS = (
         type=WholeNumber(min=1),
         default=_PLAIN.max_iterations,
         help="After so many iterations of one step, the run fails.",
+    ),
+    click.option(
+        "--unit-tolerance",
+        multiple=True,
+        metavar="[UNIT=]NUMBER",
+        help="Relative tolerance that a unit, or all others, is given for its own solver, if it has one; may be given"
+        " more than once.  [default: what each FMU proposes]",
     ),
     _coupling_option(
         "--extrapolation",
@@ -138,6 +146,28 @@ def isolated(isolate: Sequence[str]) -> dict[str, Any]:
     return {"isolated": tuple(dict.fromkeys(isolate))}
 
 
+def _unit_tolerances(texts: Sequence[str]) -> dict[str, float]:
+    """Return the option `--unit-tolerance` as that of `MasterOptions`.
+
+    Raises:
+        UsageError: a text is of another form, or a unit is given two.
+    """
+    found: dict[str, float] = {}
+    for text in texts:
+        unit, equals, number = text.rpartition("=")
+        unit = unit.strip() if equals else ALL
+        try:
+            tolerance = float(number)
+        except ValueError:
+            tolerance = math.nan
+        if not (unit and 0 < tolerance < math.inf):
+            raise UsageError(f"--unit-tolerance {text!r}: UNIT=NUMBER or NUMBER is right, above 0, such as 1e-6")
+        if unit in found:
+            raise UsageError(f"--unit-tolerance: {unit} is given twice")
+        found[unit] = tolerance
+    return found
+
+
 def coupling_of(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options as those of `MasterOptions`; `given` has their values by name, and no others.
 
@@ -158,4 +188,5 @@ def coupling_of(given: Mapping[str, Any]) -> dict[str, Any]:
         "adaptive": None if given["adaptive"] is None else AdaptiveStep(relative=given["adaptive"], **control),
         "repeat_discarded": given["repeat_discarded"],
         **isolated(given["isolate"]),
+        "unit_tolerances": _unit_tolerances(given["unit_tolerance"]),
     }

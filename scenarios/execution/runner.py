@@ -95,7 +95,7 @@ def run_task(
     failure: UnitFailure | None = None
     if task.every is not None:
         check_states(system)
-    master = Master(system, replace(task.options, cpu_times=True), heartbeat_of_run())
+    master = Master(system, replace(task.options, cpu_times=True), heartbeat_of_run(), task.stop_time)
     if is_supervised():
         note_crashes(master.heartbeat)
     if control is not None:

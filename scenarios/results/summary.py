@@ -111,6 +111,7 @@ class _OfSomeRuns(TypedDict, total=False):
     external_inputs: list[str]
     failure: dict[str, Any] | None
     parameter_files: dict[str, dict[str, str]]
+    experiment: dict[str, Any]
 
 
 class RunData(Configuration, _OfSomeRuns):
@@ -119,7 +120,8 @@ class RunData(Configuration, _OfSomeRuns):
     A run that started has `system` and `conversions`, `warnings` of its FMUs if there are any, `notes` on what its
     units do not have and the wiring leaves out, and the names of `external_inputs`, which came from outside; one that
     could not start has `failure`; `units` are the FMUs' names and hashes; `parameter_files` has those of the files that
-    parameters name, by these, where there are any.
+    parameters name, by these, where there are any. `experiment` is what units were given as they were initialised:
+    the run's `stop` time, s, as far as their steps reach, and `tolerances` for their own solvers, by unit.
     """
 
     source: dict[str, Any]
@@ -253,6 +255,7 @@ def begun_run(task: Task, master: Master) -> RunData:
     system = describe_system(master.system, adaptive=master.steps is not None)
     fmus = {name: unit.description.path for name, unit in master.system.units.items()}
     of_this_run: _OfSomeRuns = {"system": system, "conversions": conversions_of(master.system)}
+    of_this_run["experiment"] = {"stop": float(task.stop_time), "tolerances": master.tolerances}
     faults = [f"{path.name}: {fault}" for path, fault in master.description_faults.items()]
     if warned := [*faults, *master.system.tolerated, *master.system.undefined_starts, *master.execution_tools]:
         of_this_run["warnings"] = warned

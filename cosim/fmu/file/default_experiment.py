@@ -40,12 +40,14 @@ class DefaultExperiment:
 
     Attributes:
         start, stop: times in seconds.
+        tolerance: relative, of the unit's own solver; one that is not above 0 is None, too.
         step: communication step in seconds.
         step_fault: what is wrong with its stepSize, in one line with the place; empty where nothing is.
     """
 
     start: float | None = None
     stop: float | None = None
+    tolerance: float | None = None
     step: float | None = None
     step_fault: str = ""
 
@@ -62,16 +64,17 @@ def default_experiment(root: XmlElement) -> DefaultExperiment:
     """
     experiment = next(root.named("DefaultExperiment"), None)
     given: Mapping[str, str] = {} if experiment is None else experiment.attributes
-    start, stop = (_finite(given.get(name)) for name in ("startTime", "stopTime"))
+    start, stop, tolerance = (_finite(given.get(name)) for name in ("startTime", "stopTime", "tolerance"))
+    tolerance = tolerance if tolerance is not None and tolerance > 0 else None
     text = given.get("stepSize")
     if text is None or experiment is None:
         internal = (_step(c.attributes.get("fixedInternalStepSize")) for c in root.named("CoSimulation"))
-        return DefaultExperiment(start, stop, next(internal, None))
+        return DefaultExperiment(start, stop, tolerance, next(internal, None))
     step = _step(text)
     if step is not None:
-        return DefaultExperiment(start, stop, step)
+        return DefaultExperiment(start, stop, tolerance, step)
     where = f"stepSize={text[:80]!r} of its DefaultExperiment (line {experiment.line})"
-    return DefaultExperiment(start, stop, None, f"{where} {INVALID_STEP}")
+    return DefaultExperiment(start, stop, tolerance, None, f"{where} {INVALID_STEP}")
 
 
 def proposed_step(step: float | None) -> Fraction | None:

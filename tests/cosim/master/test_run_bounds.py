@@ -1,12 +1,14 @@
 """Runs at the edges: nothing to run, no time to run for, and runs that cannot go on."""
 
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import pytest
-from native_units import native_fmu
+from native_units import Edited, native_fmu
 
-from handover.cosim.exceptions import UnitFailure
+from handover.cosim.exceptions import InvalidOptions, UnitFailure
 from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
@@ -112,3 +114,44 @@ def test_a_unit_that_gives_nothing_has_a_record_of_times(fmi: int, compiled: boo
     with Master(s, MasterOptions(compiled=compiled)) as master, Recorder(tmp_path / "r.parquet") as recorder:
         master.run(Fraction(1, 2), [recorder])
     assert Record(tmp_path / "r.parquet").time.tolist() == [k / 10 for k in range(6)]
+
+
+@all_ways
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_units_are_given_the_end_of_their_last_step_and_none_is_asked_to_step_beyond_it(
+    options: MasterOptions, fmi: int
+):
+    s = System()
+    for name, period in (("tenths", Fraction(1, 10)), ("thirds", Fraction(1, 3)), ("slow", Fraction(3, 10))):
+        s.add(name, native_fmu("clerk", fmi), period=period)
+    with Master(s, options, stop=Fraction(1)) as master:
+        master.run(Fraction(1))
+        stops = [float(master.signals[f"{name}.stop"]) for name in s.units]
+        assert stops == [1.0, 1.0, pytest.approx(1.2)]
+        with pytest.raises(ValueError, match=r"a run to 2 s, but units were given the stop time 1 s"):
+            master.run(Fraction(2))
+
+
+@pytest.mark.parametrize("options", [MasterOptions(), MasterOptions(isolated=("all",))], ids=["here", "isolated"])
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_unit_is_given_a_tolerance_by_name_or_for_all_or_its_own(fmi: int, options: MasterOptions, edited: Edited):
+    s, own = System(), edited("clerk", fmi, ('stopTime="1"', 'stopTime="1" tolerance="1e-3"'))
+    s.add("proposing", own)
+    s.add("silent", native_fmu("clerk", fmi))
+
+    def given(tolerances: dict[str, float]) -> list[float]:
+        with Master(s, replace(options, unit_tolerances=tolerances)) as master:
+            assert float(master.signals["silent.stop"]) == -1.0
+            return [float(master.signals[f"{name}.tolerance"]) for name in s.units]
+
+    assert given({}) == [1e-3, -1.0]
+    assert given({"all": 1e-5}) == [1e-5, 1e-5]
+    assert given({"all": 1e-5, "silent": 1e-7}) == [1e-5, 1e-7]
+    with pytest.raises(InvalidOptions, match=r"there is no unit 'silnt' to give a tolerance; there are proposing"):
+        Master(s, replace(options, unit_tolerances={"silnt": 1e-5}))
+
+
+@pytest.mark.parametrize("tolerances", [{"a": 0.0}, {"a": float("nan")}, {1: 1e-3}, 1e-3])
+def test_what_is_no_tolerance_is_refused(tolerances: Any):
+    with pytest.raises(InvalidOptions, match="unit_tolerances"):
+        MasterOptions(unit_tolerances=tolerances)

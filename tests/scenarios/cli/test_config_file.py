@@ -189,6 +189,7 @@ def test_it_can_be_changed_by_the_command_line_and_be_swept(first: Path):
             extrapolation=Extrapolation.LINEAR,
             repeat_discarded=True,
             isolated=("foreign", "arm"),
+            unit_tolerances={"all": 1e-5, "arm": 1e-7},
             adaptive=AdaptiveStep(
                 relative=0.1,
                 absolute=1e-7,

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner, Result
 from failing_systems import failing_ssp, native_fmu
 
-from handover.cosim.master.isolated_units import isolated_units
+from handover.cosim.master.unit_options import isolated_units
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.fmus.build import cached

@@ -86,6 +86,27 @@ def test_inputs_stay_at_their_start_values(tmp_path: Path):
     assert record["mass.x"].tolist() == pytest.approx([0.0, 0.0625, 0.25])
 
 
+def test_a_unit_is_given_its_tolerance_and_the_stop_time_and_both_are_kept(tmp_path: Path):
+    out = tmp_path / "out"
+    given = "--stop", "0.35", "--unit-tolerance", "1e-3", "--unit-tolerance", "clerk=1e-6", "--no-report", "--out", out
+    result = run(native_fmu("clerk", 2), *given)
+    assert result.exit_code == 0, result.output
+    record = Record(out / "signals.parquet")
+    assert record["clerk.tolerance"].tolist() == [1e-6] * 5
+    assert record["clerk.stop"][0] == record.time[-1] == pytest.approx(0.4)
+    data = json.loads((out / "run.json").read_text())
+    assert data["experiment"] == {"stop": 0.35, "tolerances": {"clerk": 1e-6}}
+    assert data["master"]["unit_tolerances"] == {"all": 1e-3, "clerk": 1e-6}
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "fine", "clerk=", "=1e-3", "clerk=nan"])
+def test_what_is_no_tolerance_of_a_unit_is_refused(text: str, tmp_path: Path):
+    result = run(native_fmu("clerk", 2), "--unit-tolerance", text, "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert f"--unit-tolerance '{text}'" in result.output
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_what_is_not_continuous_is_held(tmp_path: Path, fmi: int):
     inputs = table(tmp_path, "time,truth_in,count_in\n0,true,1\n0.3,0,5\n0.7,TRUE,-2\n")

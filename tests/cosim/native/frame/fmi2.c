@@ -42,7 +42,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance, fmi2Real start,
                                fmi2Boolean has_stop, fmi2Real stop) {
-    ((Unit *)c)->kept->time = start;
+    set_up(c, has_tolerance, tolerance, start, has_stop, stop);
     return allowed(c, INSTANTIATED, "fmi2SetupExperiment") ? fmi2OK : fmi2Error;
 }
 

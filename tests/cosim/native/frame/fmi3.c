@@ -59,7 +59,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance
     Unit *unit = c;
     if (enter(unit, INSTANTIATED, INITIALIZATION, "fmi3EnterInitializationMode") != fmi3OK)
         return fmi3Error;
-    unit->kept->time = start;
+    set_up(unit, has_tolerance, tolerance, start, has_stop, stop);
     if (unit->model->initialize)
         unit->model->initialize(unit);
     return fmi3OK;

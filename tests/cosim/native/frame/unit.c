@@ -57,6 +57,12 @@ void begin(Unit *unit) {
     }
 }
 
+void set_up(Unit *unit, bool has_tolerance, double tolerance, double start, bool has_stop, double stop) {
+    unit->kept->time = unit->kept->start = start;
+    unit->kept->stop = has_stop ? stop : -1;
+    unit->kept->tolerance = has_tolerance ? tolerance : -1;
+}
+
 bool allowed(Unit *unit, int modes, const char *call) {
     if (unit->kept->mode & modes)
         return true;

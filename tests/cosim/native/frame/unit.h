@@ -74,6 +74,7 @@ typedef struct {
 /* All of it that a saved state holds lies in one block, `kept`. */
 typedef struct {
     double time, last_time, last_step;
+    double start, stop, tolerance; /* as the instance was initialised; stop and tolerance are -1 where undefined */
     int32_t mode, terminated, stale; /* stale: inputs were set since outputs were computed */
     double rates[MAX_VARIABLES][MAX_ORDER];
     _Alignas(16) unsigned char data[]; /* the unit's struct, and again as it was before the last step */
@@ -109,6 +110,7 @@ void runge_kutta(Unit *unit, Acceleration a, double h, double *x, double *v);
 Unit *new_unit(const char *token, const char *name);
 void free_unit(Unit *unit);
 void begin(Unit *unit);
+void set_up(Unit *unit, bool has_tolerance, double tolerance, double start, bool has_stop, double stop);
 bool allowed(Unit *unit, int modes, const char *call);
 const Variable *variable(Unit *unit, uint32_t reference, enum type type, bool to_set, const char *call);
 void *place(Unit *unit, const Variable *v);

@@ -1,6 +1,6 @@
-"""Which units of a system live in processes of their own."""
+"""What options say of single units by name: which live in processes of their own, and their tolerances."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from handover.cosim.exceptions import InvalidOptions
@@ -10,6 +10,7 @@ from handover.cosim.native_libraries import CompilationError
 from handover.cosim.system.system import System
 
 FOREIGN, ALL = "foreign", "all"
+"""Names that stand for several units, also where a unit itself is named so."""
 
 
 def isolated_units(system: System, wanted: Sequence[str]) -> frozenset[str]:
@@ -36,6 +37,26 @@ def isolated_units(system: System, wanted: Sequence[str]) -> frozenset[str]:
             if not ours[path]:
                 named.add(name)
     return frozenset(named)
+
+
+def tolerances_of(system: System, given: Mapping[str, float]) -> dict[str, float]:
+    """Return the relative tolerance that each unit is given; one for which nothing says any is left out.
+
+    Args:
+        system: the units.
+        given: by name of a unit, or `all` for the others; see `MasterOptions.unit_tolerances`. Of the rest, a unit's
+            own default experiment says it.
+
+    Raises:
+        InvalidOptions: a name is of no unit.
+    """
+    units = system.units
+    if unknown := [name for name in given if name != ALL and name not in units]:
+        valid = ", ".join((*units, ALL))
+        raise InvalidOptions([f"there is no unit {name!r} to give a tolerance; there are {valid}" for name in unknown])
+    proposed = {name: unit.description.experiment.tolerance for name, unit in units.items()}
+    found = {name: given.get(name, given.get(ALL, own)) for name, own in proposed.items()}
+    return {name: tolerance for name, tolerance in found.items() if tolerance is not None}
 
 
 def _check_support() -> None:
