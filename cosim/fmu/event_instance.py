@@ -48,7 +48,7 @@ class EventInstance(Instance):
         self._fed = [description.inputs[i] for i in fed]
         self._outputs = list(description.outputs.values())
         self._initialized = False
-        self._last_set: dict[str, bytes] = {}  # by input, the value that the unit was given last
+        self._last_set: dict[str, bytes] = {}  # by input, the value given last; none where its clock has begun to tick
         self._parts: dict[tuple[str, tuple[str, ...]], list[SignalBuffer]] = {}
         self._clock_calls = ClockCalls(self._call, description.clocks)
         self._flags = [ctypes.c_bool() for _ in range(5)]
@@ -84,7 +84,11 @@ class EventInstance(Instance):
         return any(p.discrete and not p.clocks and self._differs(p) for p in self._fed)
 
     def has_other_inputs(self) -> bool:
-        """Return whether an input that can be set in the present mode differs from the value that the unit has."""
+        """Return whether an input that can be set in the present mode has another value than it was given last.
+
+        One whose clock has begun to tick counts as such until it is set: a message that is the same again is another
+        message.
+        """
         return any(self._differs(p) for p in self._settable())
 
     def enter_event_mode(self) -> None:
@@ -100,12 +104,12 @@ class EventInstance(Instance):
     def tick(self, clocks: Collection[str]) -> None:
         """Activate input clocks, in event mode; `update` ends their tick."""
         self._clock_calls.tick(sorted(clocks))
-        self.active |= set(clocks)
+        self._activate(set(clocks))
 
     def ticking(self) -> set[str]:
         """Return the output clocks that tick in the present iteration; they count as active."""
         clocks = self._clock_calls.ticking()
-        self.active |= clocks
+        self._activate(clocks)
         return clocks
 
     def update(self, t: float) -> bool:
@@ -145,6 +149,14 @@ class EventInstance(Instance):
             tick = timing["ticks"][timer.clock.name]
             timer.next = None if tick is None else Fraction(tick)
 
+    def _activate(self, clocks: Collection[str]) -> None:
+        """Let clocks count as active; inputs of those that were not are to be set, whatever they were given before."""
+        begun = set(clocks) - self.active
+        self.active |= begun
+        for port in self._fed:
+            if not begun.isdisjoint(port.clocks):
+                self._last_set.pop(port.name, None)
+
     def _is_reachable(self, port: FmuPort) -> bool:
         return not port.clocks or not self._initialized or not self.active.isdisjoint(port.clocks)
 
@@ -153,7 +165,7 @@ class EventInstance(Instance):
         return [p for p in self._fed if self._is_reachable(p) and (takes_discrete or not p.discrete)]
 
     def _differs(self, port: FmuPort) -> bool:
-        return content_of(port, self.u[port.name]) != self._last_set[port.name]
+        return content_of(port, self.u[port.name]) != self._last_set.get(port.name)
 
     def _note_as_set(self, ports: Iterable[FmuPort]) -> None:
         for p in ports:

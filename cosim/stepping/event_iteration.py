@@ -17,7 +17,8 @@ class EventIteration:
 
     In an iteration the units in event mode exchange values, in the schedule's order, until none changes; then all
     update their discrete states, which ends the ticks of clocks. A unit joins when it has an event, when a clock of its
-    own is due, when an output clock makes one of its clocks tick, or when a discrete input changes.
+    own is due, when an output clock makes one of its clocks tick, or when a discrete input changes. A clocked input is
+    set at each tick of its clock, changed or not.
     """
 
     def __init__(self, ensemble: EventEnsemble, order: Sequence[str]) -> None:

@@ -70,6 +70,18 @@ def test_ticks_go_through_a_chain_at_one_instant():
     assert rows[1.0] == (11, 5, 2)
 
 
+@pytest.mark.parametrize("box", ["letter_box", "letter_box_tenths"])
+@pytest.mark.parametrize("options", [MasterOptions(), MasterOptions(isolated=("all",))], ids=["here", "isolated"])
+def test_a_message_arrives_at_each_tick_also_where_it_is_the_same_again(box: str, options: MasterOptions):
+    s = System()
+    sender, receiver = s.add("sender", native_fmu("sender")), s.add("box", native_fmu(box))
+    s.connect(sender.y.letter, receiver.u.letter)
+    if box == "letter_box":
+        s.connect(sender.y.sent, receiver.u.tick)
+    rows = observed_rows(s, Fraction(1), "box.received", options=options)
+    assert {t: row[0] for t, row in rows.items()} == {k / 10: k + 1 for k in range(11)}
+
+
 def test_a_clock_of_parameters_has_its_interval():
     s = System()
     s.add("metronome", native_fmu("metronome"), period=Fraction(1), beat=0.3)
