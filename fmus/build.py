@@ -11,7 +11,6 @@ import json
 import logging
 import os
 import sys
-import tempfile
 import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -23,6 +22,7 @@ from typing import Any
 from handover.cosim.blocks.description import describe, with_start_values
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.experiments import manifest as manifest_format
+from handover.cosim.files import scratch_folder
 from handover.cosim.fmu.file import archive as archive_format
 from handover.cosim.fmu.file.archive import TERMINALS, FmuArchive, write_archive
 from handover.cosim.fmu.file.icon import icon_files
@@ -237,9 +237,9 @@ def build(
     if experiment is not None:
         from handover.fmus.contents.reference_experiment import record_experiment  # loads FMPy, which takes long
 
-        with tempfile.TemporaryDirectory(prefix="handover-experiment-") as scratch:
+        with scratch_folder("experiment") as scratch:
             recorded = record_experiment(
-                write_archive(Path(scratch, name), files, programs), entry.step, experiment.stimulus
+                write_archive(scratch / name, files, programs), entry.step, experiment.stimulus
             )
         files |= related_files(model, source, parameter_sets, recorded)
     return write_archive(out_dir / name, files, programs)

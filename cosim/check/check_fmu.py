@@ -8,7 +8,6 @@ processes. Of an FMU with a manifest of related files this is checked, and the e
 
 import math
 import re
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
@@ -20,6 +19,7 @@ from handover.cosim.check.report import EXPERIMENTS, RUN, CheckReport, Section
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.experiments.manifest import MANIFEST, related_files
 from handover.cosim.experiments.reference_experiment import ReferenceExperiment, experiments_in
+from handover.cosim.files import scratch_folder
 from handover.cosim.fmu.file.archive import DESCRIPTION, TERMINALS, FmuArchive
 from handover.cosim.fmu.file.default_experiment import default_experiment, proposed_step
 from handover.cosim.fmu.file.description import describe_fmu
@@ -159,8 +159,8 @@ class _Skipped(Exception):
 def check_fmu(path: Path, timeout: float) -> CheckReport:
     """Check a file that is there; loading and running may each take `timeout` seconds. It never raises for the file."""
     sections: list[Section] = []
-    with tempfile.TemporaryDirectory(prefix="handover-check-", ignore_cleanup_errors=True) as scratch:
-        check = _Check(path, timeout, Path(scratch))
+    with scratch_folder("check") as scratch:
+        check = _Check(path, timeout, scratch)
         reason = ""
         for name, run_part in check.parts():
             if reason:

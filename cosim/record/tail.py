@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.record.file_lock import FileLocked, lock_file, unlock_file
+from handover.cosim.files import FileLocked, lock_file, unlock_file
 
 MAGIC = b"HANDOVER"
 HEADER = np.dtype([("magic", "S8"), ("layout", "<i8"), ("filled", "<i8"), ("first", "<i8")])

@@ -1,6 +1,5 @@
 """Checks an SSP file: the system as the master takes it, then each FMU in it by itself."""
 
-import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.report import CheckReport, Section
 from handover.cosim.exceptions import InvalidSsp
+from handover.cosim.files import scratch_folder
 from handover.cosim.fmu.file.default_experiment import NoStep
 from handover.cosim.probe.finding import Finding, fault, warning
 from handover.cosim.ssp.archive import SspArchive
@@ -22,15 +22,15 @@ def check_ssp(path: Path, timeout: float) -> Iterator[CheckReport]:
     Loading and running may each take `timeout` seconds of each FMU. It never raises for the file.
     """
     yield CheckReport(path, (_system(path),))
-    with tempfile.TemporaryDirectory(prefix="handover-check-", ignore_cleanup_errors=True) as folder:
+    with scratch_folder("check") as folder:
         try:
             archive = SspArchive(path)
             components = [component for _, component in components_of(read_structure(archive).system)]
-            archive.unpack(Path(folder))
+            archive.unpack(folder)
         except InvalidSsp:  # which the first report tells
             return
         for member in dict.fromkeys(component.member for component in components):
-            yield replace(check_fmu(Path(folder) / member, timeout), path=path / member)
+            yield replace(check_fmu(folder / member, timeout), path=path / member)
 
 
 def _system(path: Path) -> Section:

@@ -4,7 +4,7 @@ SSP 1.0 has no arrays: `a.p[1]` feeds `b.p[1]`, `a.p[2]` feeds `b.p[2]`, and so 
 connections of whole arrays, which the master copies as a whole, or splits arrays where they cannot be joined.
 """
 
-import tempfile
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -13,6 +13,7 @@ from types import MappingProxyType, TracebackType
 from typing import Any
 
 from handover.cosim.exceptions import InvalidFmu, InvalidSsp, WiringError
+from handover.cosim.files import scratch_folder
 from handover.cosim.fmu.file.default_experiment import exact_seconds, proposed_step
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.ssp.archive import SspArchive
@@ -174,9 +175,11 @@ class SspFile:
         self.path, self.name = path, structure.name
         self.stop = None if structure.stop is None else exact_seconds(structure.stop)
         self.parallel_step = structure.parallel_step
-        self._folder = tempfile.TemporaryDirectory(prefix="handover-ssp-", ignore_cleanup_errors=True)
+        self._opened = contextlib.ExitStack()
+        self.folder = self._opened.enter_context(scratch_folder("ssp"))
+        """Where its FMUs are unpacked until it is closed."""
         try:
-            archive.unpack(Path(self._folder.name))
+            archive.unpack(self.folder)
             descriptions = self._describe({n: c.member for n, c in components_of(structure.system)})
             asked = self._named(structure.system, descriptions, parameters) if parameters else {}
             flat = flatten(structure.system, descriptions, asked)
@@ -191,11 +194,6 @@ class SspFile:
             raise
 
     @property
-    def folder(self) -> Path:
-        """Where its FMUs are unpacked until it is closed."""
-        return Path(self._folder.name)
-
-    @property
     def parameters(self) -> dict[str, FmuPort]:
         """Parameters of components and of systems by the names by which they are given, starting from their values."""
         known = settable_parameters(self._structure.system, self._descriptions)
@@ -203,7 +201,7 @@ class SspFile:
 
     def close(self) -> None:
         """Remove the unpacked FMUs."""
-        self._folder.cleanup()
+        self._opened.close()
 
     def __enter__(self) -> "SspFile":
         return self
@@ -219,7 +217,7 @@ class SspFile:
         described: dict[str, FmuDescription] = {}
         for member in dict.fromkeys(members.values()):
             try:
-                described[member] = describe_fmu(Path(self._folder.name) / member)
+                described[member] = describe_fmu(self.folder / member)
             except InvalidFmu as e:
                 raise InvalidSsp(self.path, [f"{member}: {e.fault}"]) from e
         return {name: described[member] for name, member in members.items()}

@@ -8,13 +8,13 @@ import collections
 import contextlib
 import functools
 import logging
-import tempfile
 import time
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 
 from handover.cosim.exceptions import CosimError, InvalidFmu
+from handover.cosim.files import scratch_folder
 from handover.cosim.fmu.calls import State
 from handover.cosim.fmu.failures import StartValuesLost, UnitTerminated
 from handover.cosim.fmu.file.fmpy_edge import unpack
@@ -346,11 +346,11 @@ class Ensemble:
                 self.forget({name: state})
 
     def _load(self) -> None:
-        temporary = tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True)
-        self._cleanups.add(temporary.cleanup)
-        folder = Path(temporary.name)
+        temporary = contextlib.ExitStack()
+        folder = temporary.enter_context(scratch_folder("units"))
+        self._cleanups.add(temporary.close)
         self._cleanups.add(self.host.close)
-        self.heartbeat.record_scratch_folder(temporary.name)
+        self.heartbeat.record_scratch_folder(str(folder))
         unpacked: dict[Path, Path] = {}
         named: dict[Path, list[str]] = collections.defaultdict(list)
         for name, unit in self.system.units.items():

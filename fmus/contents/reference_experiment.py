@@ -25,7 +25,6 @@ number made of parameters alone, which inputs do not move.
 """
 
 import math
-import tempfile
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -57,6 +56,7 @@ from handover.cosim.experiments.signal_table import (
     unknown_columns,
     write_table,
 )
+from handover.cosim.files import scratch_folder
 from handover.cosim.fmu.file.archive import FmuArchive
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.fmu.start_values import entries_of
@@ -181,14 +181,14 @@ def record_experiment(fmu: Path, step: Fraction, stimulus: Path | None = None) -
     received = as_received(given, columns)
     shares = perturbed(given, columns, off_zero=False)
     nearby = perturbed(given, columns, off_zero=True)
-    with tempfile.TemporaryDirectory(prefix="handover-reference-") as scratch:
-        folder = Path(scratch, "fmu")
+    with scratch_folder("reference") as scratch:
+        folder = scratch / "fmu"
         FmuArchive(fmu).unpack(folder)
-        first, second = _played(d, folder, [write_table(t, columns) for t in (given, nearby)], step, Path(scratch))
+        first, second = _played(d, folder, [write_table(t, columns) for t in (given, nearby)], step, scratch)
         one, other = (read_table(content, "result", compared) for content in (first, second))
 
         def change(near: SignalTable) -> list[Difference]:
-            (result,) = _played(d, folder, [write_table(near, columns)], step, Path(scratch))
+            (result,) = _played(d, folder, [write_table(near, columns)], step, scratch)
             return differences(one, read_table(result, "result", compared), compared)
 
         tolerance = measured(differences(one, other, compared), is_measured=nearby != received)

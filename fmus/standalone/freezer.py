@@ -18,6 +18,7 @@ import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from handover.cosim.files import scratch_folder
 from handover.cosim.python_process import import_path, module_command
 from handover.fmus.compile import cache_folder, host_platform, named_platforms
 from handover.fmus.sources import Carried, distributions_by_module
@@ -118,7 +119,7 @@ def _imported(block: str, carried: Carried) -> list[str]:
 
     Those count, too, that a function imports as it is called: its sources name them.
     """
-    with tempfile.TemporaryDirectory(prefix="handover-imports-") as scratch:
+    with scratch_folder("imports") as scratch:
         result = Path(scratch, "modules.json")
         command = [sys.executable, str(_IMPORTED), block, json.dumps(import_path()), str(result)]
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
@@ -150,7 +151,7 @@ def _freezer_versions() -> list[str]:
 
 def _freeze(names: Sequence[str], carried: Carried, folder: Path) -> None:
     """Make the folder of the frozen program, whole or not at all."""
-    with tempfile.TemporaryDirectory(prefix="handover-freezing-") as scratch:
+    with scratch_folder("freezing") as scratch:
         main = shutil.copy(_MAIN, Path(scratch, "unit.py"))
         imports = "\n".join(f"import {name}" for name in names if _findable(name))
         Path(scratch, f"{_FOLLOWED}.py").write_text(imports, encoding="utf-8")

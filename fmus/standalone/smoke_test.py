@@ -3,11 +3,11 @@
 import json
 import os
 import subprocess
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from handover.cosim.files import scratch_folder
 from handover.fmus.compile import host_platform
 from handover.fmus.standalone.freezer import PROGRAM, CannotFreeze
 
@@ -29,7 +29,7 @@ def try_unit(name: str, files: Mapping[str, bytes], token: str, step: float) -> 
         CannotFreeze: a package or a data file is missing, it opens files that only this machine has, or it takes more
             than `LIMIT`.
     """
-    with tempfile.TemporaryDirectory(prefix="handover-frozen-") as scratch:
+    with scratch_folder("frozen") as scratch:
         for path, content in files.items():
             if path.startswith("resources/"):
                 file = Path(scratch, path)

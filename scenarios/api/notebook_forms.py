@@ -1,12 +1,11 @@
 """What a notebook shows of a run and of a campaign: verdict, headline, and pictures of the plots over time."""
 
 import base64
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 
 from markupsafe import Markup
 
+from handover.cosim.files import scratch_folder
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.parameters import parameters_of
 from handover.scenarios.experiment.time_plot import TimeFigure
@@ -68,9 +67,9 @@ def _cells(kind: str, texts: Sequence[str]) -> Markup:
 def _pictures(figures: Sequence[TimeFigure], record: Record) -> list[Markup]:
     from handover.scenarios.experiment.plotting import draw_time_figures  # matplotlib may not be installed
 
-    with tempfile.TemporaryDirectory(prefix="handover-") as folder:
-        drawn = draw_time_figures(figures, record.time, Path(folder))
-        files = [(Path(folder) / f"{figure.name}.png", figure.caption) for figure in drawn]
+    with scratch_folder("figures") as folder:
+        drawn = draw_time_figures(figures, record.time, folder)
+        files = [(folder / f"{figure.name}.png", figure.caption) for figure in drawn]
         return [_picture(file.read_bytes(), caption) for file, caption in files]
 
 

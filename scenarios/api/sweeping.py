@@ -138,9 +138,9 @@ def _name_of(scenario: object) -> str:
 
 def _carried_out(plan: CampaignPlan, out: Path | None, workers: PoolConfig, shown: bool) -> Campaign:
     ready = prepared(plan, lambda _checked: workers.check())
-    folder = CampaignFolder(out) if out else default_folder(ready.plan, ready.fmus)
-    folder.check(ready.plan, ready.fmus)
     with contextlib.ExitStack() as opened, bar(shown) as move, _main_module_hidden():
+        folder = CampaignFolder(out) if out else default_folder(ready.plan, ready.fmus, opened)
+        folder.check(ready.plan, ready.fmus)
 
         def tell(counts: RunCounts) -> None:
             ended = counts.ended + counts.lost

@@ -23,6 +23,7 @@ from handover.scenarios.results.run_folder import (
     check_place,
     dated_folder,
     disk_errors_reported,
+    folder_claimed,
     folder_held,
     read_object,
     sha256_of,
@@ -30,6 +31,8 @@ from handover.scenarios.results.run_folder import (
 )
 
 _FILE = "campaign.json"
+
+_BY_ANOTHER = "another command is running this campaign"
 
 PARAMETER_UNITS = "parameter_units"
 """Key of the units of measurement of units' parameters, by `UNIT.NAME`, as their FMUs declare them."""
@@ -127,12 +130,11 @@ class CampaignFolder:
             InvalidRunFolder: as by `check`; or another command has locked it, or it cannot be made.
             RecordNotWritten: it cannot be written to.
         """
-        with contextlib.ExitStack() as held:
-            with self._made():
-                held.enter_context(self.held())
-                self.check(plan, fmus)
-                with self._written(plan, fmus):
-                    check(self.path)
+        self._check_place()
+        with folder_claimed(self.path, _BY_ANOTHER):
+            self.check(plan, fmus)
+            with self._written(plan, fmus):
+                check(self.path)
             with disk_errors_reported(self.path):
                 self.runs.mkdir(exist_ok=True)
                 self.fmus.mkdir(exist_ok=True)
@@ -169,30 +171,13 @@ class CampaignFolder:
             place, form, right = (folders[0], "folder", "file") if folders else (files[0], "file", "folder")
             raise InvalidRunFolder(self.path, f"{place.relative_to(self.path)} is a {form}, not a {right}; remove it")
 
-    @contextlib.contextmanager
-    def _made(self) -> Generator[None, None, None]:
-        """Make the folder; if what follows fails, remove what was made and is empty."""
-        self._check_place()
-        absent = [p for p in (self.path, *self.path.parents) if not p.exists()]
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as e:
-            raise InvalidRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
-        try:
-            yield
-        except BaseException:
-            with contextlib.suppress(OSError):
-                for folder in absent:
-                    folder.rmdir()
-            raise
-
     def held(self) -> contextlib.AbstractContextManager[None]:
         """Lock the folder against other commands in a block.
 
         Raises:
             InvalidRunFolder: another command has locked it.
         """
-        return folder_held(self.path, "another command is running this campaign")
+        return folder_held(self.path, _BY_ANOTHER)
 
     def _counts(self, entry: Path) -> bool:
         """Return whether an entry counts: a command killed before it wrote `campaign.json` leaves some that do not."""
@@ -246,11 +231,11 @@ PLACE = Path("campaigns")
 """Where campaigns' folders are if the command names none."""
 
 
-def default_folder(plan: CampaignPlan, fmus: Mapping[str, Path]) -> CampaignFolder:
+def default_folder(plan: CampaignPlan, fmus: Mapping[str, Path], opened: contextlib.ExitStack) -> CampaignFolder:
     """Return the newest folder of this very campaign in `campaigns/` if it lacks runs, else a new one.
 
-    So a command that was interrupted resumes where it stopped, and one that was complete begins a new campaign. The
-    plan is a checked one.
+    The new one is made; `opened` removes it if it is still empty then. So a command that was interrupted resumes where
+    it stopped, and one that was complete begins a new campaign. The plan is a checked one.
     """
     wanted = identity_of(plan, fmus)
     for path in sorted(PLACE.glob(f"*_{_stem(plan)}*/"), reverse=True):
@@ -260,16 +245,14 @@ def default_folder(plan: CampaignPlan, fmus: Mapping[str, Path]) -> CampaignFold
         except InvalidRunFolder:
             continue
         if all(stored.get(key) == value for key, value in wanted.items()):
-            return _new_folder(plan) if folder.has_all(plan) else folder
-    return _new_folder(plan)
+            if not folder.has_all(plan):
+                return folder
+            break
+    return CampaignFolder(opened.enter_context(dated_folder(PLACE, _stem(plan))))
 
 
 def _stem(plan: CampaignPlan) -> str:
     return plan.experiment or named_scenario(plan.scenario).name
-
-
-def _new_folder(plan: CampaignPlan) -> CampaignFolder:
-    return CampaignFolder(dated_folder(PLACE, _stem(plan)))
 
 
 def _parameter_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, str]:

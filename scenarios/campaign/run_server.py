@@ -22,6 +22,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn
 
+from handover.cosim.files import scratch_folder
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.scenarios.campaign.run_job import (
     finish,
@@ -160,7 +161,7 @@ def load_modules(path: Path) -> None:
     They are kept by the hash of their content (`fmus/loader.py`), so an FMU that differs loads its own. To compile and
     load them is a third of a short run.
     """
-    with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
+    with zipfile.ZipFile(path) as archive, scratch_folder("server") as folder:
         if "resources/unit.json" not in archive.namelist():
             return
         unit = json.loads(archive.read("resources/unit.json"))

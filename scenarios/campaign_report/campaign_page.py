@@ -1,7 +1,6 @@
 """Writes the page of a campaign from its folder: the header, and the sections that it has."""
 
 import json
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -10,6 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from handover.cosim.exceptions import one_line
+from handover.cosim.files import scratch_folder
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.results import CampaignResults, read_results
 from handover.scenarios.campaign_report.claims_section import claims_section, comparison_section, verdict_html
@@ -135,8 +135,8 @@ def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> Non
         InvalidRunFolder: it is not the folder of a campaign, or damaged; nothing is written.
         RecordNotWritten: the disk is full.
     """
-    with tempfile.TemporaryDirectory(prefix="handover-") as figures:
-        _write(folder, read_results(folder), read_claims(folder), None, Path(figures), file)
+    with scratch_folder("figures") as figures:
+        _write(folder, read_results(folder), read_claims(folder), None, figures, file)
 
 
 def write_campaign_report(folder: CampaignFolder, file: Path | None = None, paper: PaperResults | None = None) -> None:

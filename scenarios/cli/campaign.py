@@ -231,10 +231,10 @@ def run_campaign_command(plan: CampaignPlan, out: Path | None, workers: PoolConf
     progress = CampaignProgress(sys.stderr)
     folder = None
     try:
-        with CampaignInterruption() as interruption, one_line_errors():
+        with CampaignInterruption() as interruption, one_line_errors(), contextlib.ExitStack() as opened:
             named = CampaignFolder(out) if out else None
             ready = prepared(plan, lambda checked: _check_without_units(checked, named, workers, interruption))
-            folder = named or default_folder(ready.plan, ready.fmus)
+            folder = named or default_folder(ready.plan, ready.fmus, opened)
             folder.check(ready.plan, ready.fmus)  # before anything is printed
             table = _run(ready, folder, workers, interruption, progress)
             finish(folder, table)

@@ -1,5 +1,6 @@
 """The command `handover compare`: campaigns, or runs, on one page and in one table."""
 
+import contextlib
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -71,14 +72,14 @@ def compare(
     from handover.scenarios.comparison.page import compare as compared
     from handover.scenarios.comparison.page import write_comparison
 
-    with one_line_errors():
+    with one_line_errors(), contextlib.ExitStack() as opened:
         folder = None if out is None else RunFolder(out)
         try:
             comparison = compared(folders, names, signals, metrics)
         except NotComparable as e:
             raise UsageError(str(e)) from e
-        folder = folder or RunFolder(_default(comparison.entries[0].scenario))
-        data = write_comparison(comparison, folder)
+        folder = folder or RunFolder(opened.enter_context(dated_folder(_PLACE, _stem(comparison))))
+        data = write_comparison(comparison, folder.claim(opened))
     if as_json:
         click.echo(json.dumps({"folder": str(folder.shown), **data}, indent=2, allow_nan=False))
         return
@@ -88,10 +89,10 @@ def compare(
 _PLACE = Path("comparisons")
 
 
-def _default(scenario: str) -> Path:
-    """Return a folder that is not there, named by the date and the scenario."""
-    stem = scenario.partition(":")[2] or scenario
-    return dated_folder(_PLACE, Path(stem).stem)
+def _stem(comparison: "Comparison") -> str:
+    """Return the scenario's name, by which the folder is named."""
+    scenario = comparison.entries[0].scenario
+    return Path(scenario.partition(":")[2] or scenario).stem
 
 
 def _print(comparison: "Comparison", folder: RunFolder) -> None:

@@ -70,18 +70,24 @@ def play(
         raise UsageError("handover play: not on Windows yet; `handover run` makes single runs")
     require_extra("reports", "handover play")
     require_extra("live", "handover play")
-    with one_line_errors(), contextlib.ExitStack() as opened:
-        request = RunRequest(
-            subject=scenario, parameters=parameters, seed=seed, units=replaced, stop=stop, step=step, presented=False
-        )
-        request.check_options()
-        subject = request.open(opened)
-        asked = subject.experiment
-        folder = out or dated_folder(RUNS, f"{Path(asked.name).stem}_play")
-        RunFolder(folder)  # which says where it cannot be made
-        options = _options(replaced, stop, step)
-        session = _session(request, asked, subject.parameters, options, folder, pace)
-    asyncio.run(_serve(session))
+    with contextlib.ExitStack() as made:
+        with one_line_errors(), contextlib.ExitStack() as opened:
+            request = RunRequest(
+                subject=scenario,
+                parameters=parameters,
+                seed=seed,
+                units=replaced,
+                stop=stop,
+                step=step,
+                presented=False,
+            )
+            request.check_options()
+            subject = request.open(opened)
+            asked = subject.experiment
+            folder = RunFolder(out or made.enter_context(dated_folder(RUNS, f"{Path(asked.name).stem}_play")))
+            options = _options(replaced, stop, step)
+            session = _session(request, asked, subject.parameters, options, folder.claim(made).shown, pace)
+        asyncio.run(_serve(session))
 
 
 def _options(replaced: Sequence[str], stop: Fraction | None, step: Fraction | None) -> list[str]:
@@ -121,7 +127,7 @@ async def _serve(session: "Session") -> None:
         click.echo(f"play: http://{HOST}:{listening.getsockname()[1]}/  (Ctrl-C ends the session)", err=True)
         await serve(page, page.work(), listening)
     runs = f"{page.runs} run{'' if page.runs == 1 else 's'}"
-    click.echo(f"{runs} in {session.folder}" if session.folder.exists() else "no run was begun", err=True)
+    click.echo(f"{runs} in {session.folder}" if any(session.folder.iterdir()) else "no run was begun", err=True)
 
 
 def _end_by_signals(page: "PlayPage") -> None:

@@ -77,21 +77,22 @@ class RunRequest:
     pushed: bool = False
 
     def task(self, opened: contextlib.ExitStack) -> Task:
-        """Return the task, all parts of which are checked; `opened` closes what that opens.
+        """Return the task, all parts of which are checked and whose folder is its own; `opened` closes what that opens.
 
         Raises:
             UsageError, InvalidParameter, InvalidRunFolder, CosimError: what is asked for cannot be run.
         """
         self.check_options()
         asked = self.open(opened)
-        folder = RunFolder(self.out or default_run_folder(Path(asked.experiment.name).stem))
+        stem = Path(asked.experiment.name).stem
+        folder = RunFolder(self.out or opened.enter_context(dated_folder(RUNS, stem)))
         return Task(
             experiment=asked.experiment,
             parameters=asked.parameters,
             seed=self.seed,
             fmus=self.fmus(asked.experiment),
             unit_values=asked.unit_values,
-            folder=folder,
+            folder=folder.claim(opened),
             formats=tuple(dict.fromkeys(self.formats)),
             every=self.every,
             source=asked.source,
@@ -213,8 +214,3 @@ def check_subject(subject: object) -> None:
     elif not isinstance(subject, (str, System)):
         right = "a scenario's name or class, a system, or the path of an SSP or FMU is right"
         raise UsageError(f"{subject!r} cannot be run: {right}")
-
-
-def default_run_folder(stem: str) -> Path:
-    """Return a folder in `runs/` that is not there yet, named by date, time and `stem`."""
-    return dated_folder(RUNS, stem)

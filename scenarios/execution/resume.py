@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from handover.cosim.exceptions import RecordNotWritten, nearest, one_line
+from handover.cosim.files import FileLocked
 from handover.cosim.master.checkpoint import InvalidCheckpoint
-from handover.cosim.record.file_lock import FileLocked
 from handover.cosim.record.stream import complete_record
 from handover.fmus.build import cached, is_of_cache
 from handover.scenarios.catalog import SCENARIOS, InvalidScenario, ScenarioSource

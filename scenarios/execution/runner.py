@@ -100,6 +100,8 @@ def run_task(
         note_crashes(master.heartbeat)
     if control is not None:
         master.pacer = ControlledPacer(control)
+    if resumption is None:
+        master.heartbeat.record_scratch_folder(str(task.folder.path))  # if it crashes before the folder is begun
     began, not_finite = False, list[NotFiniteData]()
     try:
         with master:
@@ -145,10 +147,9 @@ def _begin_folder(task: Task, master: Master, resumption: Resumption | None) -> 
     """Make the run's folder, and leave in the heartbeat what has to be known of the run if this process crashes."""
     if resumption is None:
         task.folder.make()
-        master.heartbeat.record_scratch_folder(str(task.folder.path))  # if it crashes before the folder is begun
     else:
         task.folder.remove_presentation()
-    task.folder.write_run(begun_run(task, master))
+    task.folder.begin(begun_run(task, master))
     if not task.presented:
         task.folder.figures.rmdir()
     places = {"folder": str(task.folder.path), "shown": str(task.folder.shown)}

@@ -9,6 +9,7 @@ from pathlib import Path
 from imageio_ffmpeg import get_ffmpeg_exe
 
 from handover.cosim.exceptions import RecordNotWritten, one_line
+from handover.cosim.files import scratch_folder
 from handover.scenarios.results.run_folder import disk_errors_reported
 
 CODECS: Mapping[str, Sequence[str]] = {
@@ -40,8 +41,8 @@ def film_to(path: Path, fps: float) -> Generator[Film, None, None]:
         RecordNotWritten: it cannot be written.
     """
     suffix, unfinished = path.suffix.lower(), path.with_name(path.name + ".part")
-    with tempfile.TemporaryDirectory(prefix="handover-film-") as folder:
-        raw = Path(folder) / "film.mkv" if suffix == ".gif" else unfinished
+    with scratch_folder("film") as folder:
+        raw = folder / "film.mkv" if suffix == ".gif" else unfinished
         try:
             look = () if suffix == ".gif" else _AS_ON_SCREENS
             frames = ("-f", "image2pipe", "-c:v", "png", "-framerate", f"{fps:.6g}", "-i", "-")

@@ -5,13 +5,13 @@ import os
 import socket
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from handover.cosim.files import scratch_folder
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.python_process import module_command
 from handover.cosim.system.time_series import ExternalSource
@@ -106,7 +106,7 @@ def live_page(
         open.
     """
     with contextlib.ExitStack() as opened:
-        scratch = Path(opened.enter_context(tempfile.TemporaryDirectory(prefix="handover-live-")))
+        scratch = opened.enter_context(scratch_folder("live"))
         control = LiveControl.create(scratch / CONTROL_FILE, pace, paused=True)
         opened.callback(control.close)
         inputs = PageInputs.create(scratch, pushes, hand)

@@ -10,10 +10,9 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 
+from handover.cosim.files import scratch_folder
 from handover.cosim.python_process import code_command
 
 _LOADED = (
@@ -40,8 +39,8 @@ class WaitingCommand:
     """
 
     def __init__(self, scenario: str) -> None:
-        self._scratch = tempfile.TemporaryDirectory(prefix="handover-play-")
-        self.folder = Path(self._scratch.name)
+        self._scratch = contextlib.ExitStack()
+        self.folder = self._scratch.enter_context(scratch_folder("play"))
         """A folder for what this process and that one share."""
         with open(self.folder / _ERRORS, "wb") as errors:
             self.process = subprocess.Popen(
@@ -82,7 +81,7 @@ class WaitingCommand:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
-        self._scratch.cleanup()
+        self._scratch.close()
 
 
 def _line() -> bytes:

@@ -8,17 +8,18 @@ import contextlib
 import errno
 import hashlib
 import importlib.metadata
+import itertools
 import json
 import os
 import platform
 import shutil
 import time
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
 from handover.cosim.exceptions import RecordNotWritten, one_line
-from handover.cosim.record.file_lock import FileLocked, folder_locked, holder_of
+from handover.cosim.files import FileLocked, folder_locked, holder_of
 
 _PACKAGES = ("handover-cosim", "fmpy", "exudyn", "numpy", "scipy", "opencv-python-headless", "pyarrow")
 
@@ -37,7 +38,7 @@ def check_place(path: Path) -> None:
     Raises:
         InvalidRunFolder: they cannot.
     """
-    existing = next(p for p in (path.absolute(), *path.absolute().parents) if p.exists())
+    existing = next(p for p in (path.absolute(), *path.absolute().parents) if os.path.exists(p))
     if not existing.is_dir():
         raise InvalidRunFolder(path, f"{existing} is a file, so no folder can be made in it")
     if not os.access(existing, os.W_OK | os.X_OK):
@@ -54,23 +55,26 @@ class RunFolder:
         shown: as the user named it.
 
     Raises:
-        InvalidRunFolder: it is not empty, not a folder, or cannot be written to. Nothing is made until `make`.
+        InvalidRunFolder: it is not empty, not a folder, or cannot be written to. Nothing is made until `claim`.
     """
 
     def __init__(self, path: Path) -> None:
         self.path, self.shown = path.absolute(), path
-        if path.exists():
-            if not path.is_dir():
-                raise InvalidRunFolder(path, "there is a file of that name; name a new or an empty folder")
-            if any(path.iterdir()):
-                raise InvalidRunFolder(path, "it is not empty; name a new or an empty folder")
+        self._claim = contextlib.ExitStack()
+        if os.path.exists(path) and not path.is_dir():
+            raise InvalidRunFolder(path, "there is a file of that name; choose a new or empty folder")
+        self._check_empty()
         check_place(path)
+
+    def _check_empty(self) -> None:
+        if os.path.isdir(self.path) and any(self.path.iterdir()):
+            raise InvalidRunFolder(self.shown, "output folder is not empty; choose a new or empty one")
 
     @classmethod
     def of_run(cls, path: Path, shown: Path | None = None) -> "RunFolder":
         """Return the existing folder of a run, which is not checked."""
         folder = cls.__new__(cls)
-        folder.path, folder.shown = path.absolute(), shown or path
+        folder.path, folder.shown, folder._claim = path.absolute(), shown or path, contextlib.ExitStack()
         return folder
 
     @property
@@ -103,8 +107,19 @@ class RunFolder:
         """Whether a run was started in it."""
         return (self.path / "run.json").is_file()
 
+    def claim(self, opened: contextlib.ExitStack) -> "RunFolder":
+        """Make the folder and keep other runs from it until it has a file; `opened` removes what is still empty.
+
+        Raises:
+            InvalidRunFolder: another run has claimed it, or it cannot be made.
+        """
+        self._claim.enter_context(folder_claimed(self.path, "another run has begun in it"))
+        opened.push(self._claim)
+        self._check_empty()
+        return self
+
     def make(self) -> None:
-        """Make the folder.
+        """Make the folder, if it is not claimed, and that of its figures.
 
         Raises:
             InvalidRunFolder: it cannot be made.
@@ -113,6 +128,15 @@ class RunFolder:
             self.figures.mkdir(parents=True)
         except OSError as e:
             raise InvalidRunFolder(self.path, f"it cannot be made: {e.strerror}") from e
+
+    def begin(self, run: Mapping[str, Any]) -> None:
+        """Write `run.json`, by which the folder belongs to this run; the claim ends.
+
+        Raises:
+            RecordNotWritten: the disk does not take it.
+        """
+        self.write_run(run)
+        self._claim.close()
 
     def remove_presentation(self) -> None:
         """Remove page and figures, which show less than the run that is resumed.
@@ -241,14 +265,76 @@ def replacing(path: Path) -> Generator[Path, None, None]:
         raise
 
 
-def dated_folder(place: Path, stem: str) -> Path:
-    """Return a folder in `place` that is not there yet, named by date, time and `stem`."""
+@contextlib.contextmanager
+def dated_folder(place: Path, stem: str) -> Generator[Path, None, None]:
+    """Make a folder in `place` that was not there, named by date, time and `stem`; remove it at the end if it is empty.
+
+    Raises:
+        InvalidRunFolder: it cannot be made.
+    """
     name = time.strftime(f"%Y-%m-%d_%H%M%S_{stem}")
-    path, number = place / name, 1
-    while path.exists():
-        number += 1
-        path = place / f"{name}_{number}"
-    return path
+    for number in itertools.count(1):
+        path = place / (name if number == 1 else f"{name}_{number}")
+        try:
+            made = _make(path, exclusive=True)
+        except FileExistsError:
+            continue
+        try:
+            yield path
+        finally:
+            _remove_empty(made)
+        return
+
+
+@contextlib.contextmanager
+def folder_claimed(path: Path, by_another: str) -> Generator[None, None, None]:
+    """Make a folder unless it is there, and lock it; at the end remove what was made and is empty.
+
+    Raises:
+        InvalidRunFolder: another process holds it, with the message `by_another`, or it cannot be made.
+    """
+    made = _make(path, exclusive=False)
+    with folder_held(path, by_another):
+        try:
+            yield
+        finally:
+            _remove_empty(made)
+
+
+_ATTEMPTS = 100
+"""How often a folder is made again in one that another process has just removed, as it was empty."""
+
+
+def _make(path: Path, *, exclusive: bool) -> list[Path]:
+    """Make a folder, and those in which it is to be; return those that were not there.
+
+    Raises:
+        FileExistsError: it is there, and is to be made exclusively. InvalidRunFolder: it cannot be made.
+    """
+    check_place(path)
+    absolute = path.absolute()
+    absent = [p for p in (absolute, *absolute.parents) if not os.path.exists(p)]
+    for attempt in range(_ATTEMPTS):
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.mkdir(exist_ok=not exclusive)
+        except FileNotFoundError as e:
+            if attempt == _ATTEMPTS - 1:
+                raise InvalidRunFolder(path, f"it cannot be made: {e.strerror}") from e
+        except OSError as e:
+            if exclusive and isinstance(e, FileExistsError):
+                raise
+            raise InvalidRunFolder(path, f"it cannot be made: {e.strerror}") from e
+        else:
+            break
+    return absent
+
+
+def _remove_empty(folders: Sequence[Path]) -> None:
+    """Remove folders, each of which is in the next one, as far as they are empty."""
+    with contextlib.suppress(OSError):
+        for folder in folders:
+            folder.rmdir()
 
 
 def sha256_of(file: Path) -> str:

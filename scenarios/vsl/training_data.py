@@ -1,7 +1,6 @@
 """Points measured on the VSL arm's own FMU, to learn its kinematics from. [Gandarias2020] sec. IV-A, eq. (9)."""
 
 import hashlib
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from handover.controllers.vsl.learned_model import Integers
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import InitializationError, InvalidFmu, UnitFailure
+from handover.cosim.files import scratch_folder
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.fmu.file.fmpy_edge import unpack
 from handover.cosim.fmu.instance import Instance
@@ -193,9 +193,9 @@ def collect(
         InvalidFmu, InitializationError, UnitFailure: the arm does not load, start or step.
     """
     rows: list[tuple[Floats, Floats]] = []
-    with tempfile.TemporaryDirectory(prefix="handover-", ignore_cleanup_errors=True) as folder:
-        unpack(d.path, Path(folder), d.fmi, d.identifier)
-        arm = Instance("arm", d, Path(folder), _WANTED["input"])
+    with scratch_folder("training") as folder:
+        unpack(d.path, folder, d.fmi, d.identifier)
+        arm = Instance("arm", d, folder, _WANTED["input"])
         try:
             _start(arm, parameters)
             q_cmd = np.zeros(3)

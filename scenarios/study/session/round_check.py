@@ -4,15 +4,14 @@ A round that anybody has changed afterwards does not stand this, nor one whose s
 """
 
 import contextlib
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from handover.cosim.files import scratch_folder
 from handover.cosim.record.reader import Record
 from handover.scenarios.execution.input_sources import played_back
 from handover.scenarios.execution.interruption import Interruption
@@ -53,8 +52,8 @@ def check_round(session: SessionFolder, planned: Round) -> RoundCheck:
         raise InvalidRunFolder(run.path, "it has no record of a round that was played to its end")
     recorded = _record(run)
     condition = planned.condition
-    with tempfile.TemporaryDirectory(prefix="handover-study-") as scratch, contextlib.ExitStack() as opened:
-        again = Path(scratch) / "again"
+    with scratch_folder("study") as scratch, contextlib.ExitStack() as opened:
+        again = scratch / "again"
         request = RunRequest(
             subject=condition.scenario,
             parameters=round_parameters(condition),

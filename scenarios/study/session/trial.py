@@ -5,7 +5,6 @@ import contextlib
 import json
 import math
 import subprocess
-import tempfile
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.files import scratch_folder
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.python_process import module_command
 from handover.cosim.record.reader import Record
@@ -114,7 +114,7 @@ class Trial:
         self.first_place: Floats | None = None
         self.led = led_hand_of(request.scenario, request.parameters)
         with contextlib.ExitStack() as resources:  # what fails here leaves nothing behind
-            place = Path(resources.enter_context(tempfile.TemporaryDirectory(prefix="handover-study-")))
+            place = resources.enter_context(scratch_folder("study"))
             self._control = LiveControl.create(place / "control", request.pace, paused=True)
             resources.callback(self._control.close)
             self._inputs = SharedInputs.create(place / "inputs", self.led.inputs, [self.led.age])

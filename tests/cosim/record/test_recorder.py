@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from signals_of import signals_of
 
 from handover.cosim.exceptions import RecordNotWritten
-from handover.cosim.record.file_lock import FileLocked
+from handover.cosim.files import FileLocked
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.record.stream import complete_record

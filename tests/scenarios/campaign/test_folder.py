@@ -1,5 +1,6 @@
 """A folder is of one campaign: one of another campaign, or of something else, is rejected and left as it was."""
 
+import contextlib
 import json
 import os
 from dataclasses import replace
@@ -9,7 +10,7 @@ from typing import Any
 import pytest
 
 from handover.cosim.exceptions import RecordNotWritten
-from handover.cosim.record.file_lock import folder_locked
+from handover.cosim.files import folder_locked
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.scenarios.campaign.folder import CampaignFolder, default_folder
 from handover.scenarios.campaign.plan import CampaignPlan
@@ -192,15 +193,23 @@ def test_without_a_folder_the_newest_incomplete_campaign_of_the_plan_goes_on(
     tmp_path: Path, fmus: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.chdir(tmp_path)
-    assert default_folder(PLAN, fmus).path.parent == Path("campaigns")
+
+    def chosen() -> Path:
+        with contextlib.ExitStack() as opened:
+            return default_folder(PLAN, fmus, opened).path
+
+    assert chosen().parent == Path("campaigns")
     for name, plan in (("2026-01-01", PLAN), ("2026-01-02", PLAN), ("2026-01-03", replace(PLAN, seed=1))):
         begin(CampaignFolder(Path(f"campaigns/{name}_ir_grasp")), plan, fmus)
     Path("campaigns/2026-01-04_ir_grasp").mkdir()
     newest = CampaignFolder(Path("campaigns/2026-01-02_ir_grasp"))
-    assert default_folder(PLAN, fmus).path == newest.path
+    assert chosen() == newest.path
     for run in PLAN.runs():
         (newest.runs / run.name).mkdir()
         assert not newest.is_done(run)
         (newest.runs / run.name / "summary.json").touch()
     assert newest.has_all(PLAN)
-    assert not default_folder(PLAN, fmus).path.exists()
+    with contextlib.ExitStack() as opened:
+        two = [default_folder(PLAN, fmus, opened).path for _ in range(2)]
+        assert len({*two, newest.path}) == 3
+    assert not any(path.exists() for path in two)

@@ -9,7 +9,7 @@ from click.testing import CliRunner, Result
 from clusters import closed_port
 from in_process_pool import InProcessPool
 
-from handover.cosim.record.file_lock import folder_locked
+from handover.cosim.files import folder_locked
 from handover.fmus.build import cached
 from handover.scenarios.campaign import local_cluster, plan_check
 from handover.scenarios.campaign.plan import CampaignPlan

@@ -209,8 +209,11 @@ ASSUMED = "what its controllers assumed"
         (("navigation.delay=0.008",), "the robot's thrust followed its state 8 ms late, of which impedance knew 0 ms"),
     ],
 )
-def test_what_the_controllers_do_not_know_is_told_by_the_values_that_the_units_got(given: tuple[str, ...], told: str):
-    task = RunRequest(subject="flyer_impedance", parameters=given).task(contextlib.ExitStack())
+def test_what_the_controllers_do_not_know_is_told_by_the_values_that_the_units_got(
+    given: tuple[str, ...], told: str, tmp_path: Path
+):
+    with contextlib.ExitStack() as opened:
+        task = RunRequest(subject="flyer_impedance", parameters=given, out=tmp_path).task(opened)
     system = experiment_system(task.experiment, task.parameters, task.seed, task.fmus, task.unit_values, task.options)
     assert model_mismatch(system.units) == (f"; {told}" if told else "")
 

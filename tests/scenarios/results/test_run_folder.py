@@ -1,10 +1,15 @@
+import contextlib
 import importlib.metadata
+import multiprocessing
 import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
-from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, versions
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, dated_folder, versions
 
 
 def test_nothing_is_made_before_it_is_asked_for(tmp_path: Path):
@@ -41,6 +46,60 @@ def test_a_place_without_permission_is_refused(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr(os, "access", denied)
     with pytest.raises(InvalidRunFolder, match="no permission"):
         RunFolder(tmp_path / "new")
+
+
+def begun_in_dated_folder(place: Path, together: Callable[[], object]) -> str:
+    """Begin a run, as toy, in a folder of its own, at the same time as others; return what its run.json says."""
+    with contextlib.ExitStack() as opened:
+        together()
+        folder = RunFolder(opened.enter_context(dated_folder(place, "toy"))).claim(opened)
+        folder.begin({"title": str(folder.path)})
+    return folder.read_run()["title"] if folder.path.is_dir() else "lost"
+
+
+def test_threads_that_begin_at_once_get_a_folder_each(tmp_path: Path):
+    at_once = threading.Barrier(8)
+    with ThreadPoolExecutor(8) as threads:
+        for turn in range(20):
+            place = tmp_path / str(turn)
+            found = [threads.submit(begun_in_dated_folder, place, at_once.wait) for _ in range(8)]
+            assert {f.result() for f in found} == {str(p) for p in place.iterdir()}
+            assert len(list(place.iterdir())) == 8
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs fork")
+def test_processes_that_begin_at_once_get_a_folder_each(tmp_path: Path):
+    of_fork = multiprocessing.get_context("fork")
+    at_once = of_fork.Barrier(4)
+    processes = [of_fork.Process(target=begun_in_dated_folder, args=(tmp_path / "runs", at_once.wait)) for _ in "abcd"]
+    for process in processes:
+        process.start()
+    for process in processes:
+        process.join()
+    folders = list((tmp_path / "runs").iterdir())
+    assert len(folders) == 4
+    assert {RunFolder.of_run(f).read_run()["title"] for f in folders} == {str(f) for f in folders}
+
+
+def test_of_two_runs_with_one_new_folder_the_second_is_refused(tmp_path: Path):
+    out = tmp_path / "a" / "b"
+    first, second = RunFolder(out), RunFolder(out)
+    with contextlib.ExitStack() as opened:
+        first.claim(opened)
+        with contextlib.ExitStack() as others, pytest.raises(InvalidRunFolder, match=f"process {os.getpid()}"):
+            second.claim(others)
+        first.begin({})
+        with contextlib.ExitStack() as others, pytest.raises(InvalidRunFolder, match="not empty"):
+            second.claim(others)
+    assert [f.name for f in out.iterdir()] == ["run.json"]
+
+
+def test_a_run_that_is_refused_leaves_no_folder(tmp_path: Path):
+    with contextlib.ExitStack() as opened:
+        RunFolder(opened.enter_context(dated_folder(tmp_path / "runs", "toy"))).claim(opened)
+        RunFolder(tmp_path / "a" / "b").claim(opened)
+        assert len(list(tmp_path.iterdir())) == 2
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_package_that_is_not_installed_is_reported(monkeypatch: pytest.MonkeyPatch):

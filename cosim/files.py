@@ -1,10 +1,12 @@
-"""Locks a file or folder for as long as a process lives.
+"""Locks a file or folder for as long as a process lives; and temporary folders that are locked while in use.
 
 Windows, where a mapped file cannot be changed by others anyway, needs none.
 """
 
 import contextlib
 import os
+import shutil
+import tempfile
 from collections.abc import Generator
 from pathlib import Path
 from typing import IO
@@ -57,25 +59,63 @@ def holder_of(path: Path) -> int | None:
 
 
 @contextlib.contextmanager
-def folder_locked(path: Path) -> Generator[None, None, None]:
+def folder_locked(path: Path) -> Generator[bool, None, None]:
     """Lock a folder against others that would change its content, without a lock file that could be left behind.
 
+    Yields:
+        Whether it is locked: neither on Windows nor on some network file systems.
+
     Raises:
-        FileLocked: it is locked already. OSError: it cannot be opened.
+        FileLocked: it is locked already, or was until it was removed. OSError: it cannot be opened.
     """
     if fcntl is None:
-        yield
+        yield False
         return
-    handle = os.open(path, os.O_RDONLY)
+    handle, locked = os.open(path, os.O_RDONLY | os.O_DIRECTORY), True
     try:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as e:
             raise FileLocked(f"{path} belongs to a run that is still going on") from e
         except OSError:  # some network file systems lock only what can be written to
-            pass
-        yield
+            locked = False
+        if not path.exists() or not os.path.samestat(os.fstat(handle), path.stat()):
+            raise FileLocked(f"{path} belonged to another process, which has removed it")
+        yield locked
     finally:
         with contextlib.suppress(OSError):
             fcntl.flock(handle, fcntl.LOCK_UN)  # also for a child process that has inherited it
         os.close(handle)
+
+
+_SCRATCH = "handover-scratch-"
+
+
+@contextlib.contextmanager
+def scratch_folder(purpose: str) -> Generator[Path, None, None]:
+    """Give a temporary folder, locked as long as it is in use; those of processes that were killed are removed first.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    remove_abandoned()
+    while True:
+        with contextlib.ExitStack() as made:
+            prefix = f"{_SCRATCH}{purpose}-"
+            folder = Path(made.enter_context(tempfile.TemporaryDirectory(prefix=prefix, ignore_cleanup_errors=True)))
+            try:
+                made.enter_context(folder_locked(folder))
+            except (FileLocked, FileNotFoundError):  # another process took it for abandoned before it was locked
+                continue
+            yield folder
+            return
+
+
+def remove_abandoned() -> None:
+    """Remove this user's scratch folders that no process holds."""
+    for path in Path(tempfile.gettempdir()).glob(f"{_SCRATCH}*"):
+        with contextlib.suppress(OSError):
+            if fcntl is not None and path.lstat().st_uid == os.geteuid():
+                with folder_locked(path) as locked:
+                    if locked:
+                        shutil.rmtree(path, ignore_errors=True)
