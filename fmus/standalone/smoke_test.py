@@ -62,12 +62,12 @@ def try_unit(name: str, files: Mapping[str, bytes], token: str, step: float) -> 
         _judge(name, json.loads(result.read_text(encoding="utf-8")), resources)
 
 
-def _environment(program: Path, scratch: str) -> dict[str, str]:
+def _environment(program: Path, scratch: Path) -> dict[str, str]:
     """Return the environment that the runtime gives the program, but for where it may write (runtime/process_*.c)."""
     if os.name == "nt":
-        writable = dict.fromkeys(("LOCALAPPDATA", "TEMP", "TMP", "USERPROFILE"), scratch)
+        writable = dict.fromkeys(("LOCALAPPDATA", "TEMP", "TMP", "USERPROFILE"), str(scratch))
         return {"SYSTEMROOT": os.environ["SYSTEMROOT"], **writable}
-    return {"LD_LIBRARY_PATH": str(program.parent / "_internal"), "HOME": scratch, "TMPDIR": scratch}
+    return {"LD_LIBRARY_PATH": str(program.parent / "_internal"), "HOME": str(scratch), "TMPDIR": str(scratch)}
 
 
 def _judge(name: str, found: Mapping[str, Any], resources: Path) -> None:

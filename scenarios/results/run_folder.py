@@ -68,7 +68,7 @@ class RunFolder:
 
     def _check_empty(self) -> None:
         if os.path.isdir(self.path) and any(self.path.iterdir()):
-            raise InvalidRunFolder(self.shown, "output folder is not empty; choose a new or empty one")
+            raise InvalidRunFolder(self.shown, "it is not empty; choose a new or empty folder")
 
     @classmethod
     def of_run(cls, path: Path, shown: Path | None = None) -> "RunFolder":

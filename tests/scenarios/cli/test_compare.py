@@ -117,7 +117,7 @@ def test_a_folder_that_is_not_empty_is_refused_and_left_alone(here: Path):
     done = compare("a", "b", "--out", "a")
     assert (done.exit_code, done.output) == (
         2,
-        "Error: folder a: it is not empty; name a new or an empty folder\n",
+        "Error: folder a: it is not empty; choose a new or empty folder\n",
     )
     assert {p.name for p in (here / "a").iterdir()} == {"campaign.json", "runs.parquet"}
 
