@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import comb
 from typing import Any, Literal
 
 import numpy as np
@@ -68,6 +69,7 @@ class DifferenceTest:
         difference: median of second minus first over the pairs; without pairs, the difference of the medians.
         interval: of the difference of pairs; None without pairs, or where they are too few or all the same.
         p: how probable so large a difference, either way, is if there is none.
+        least_p: below which p cannot fall with so many values, whatever they are.
         method: the test's name.
     """
 
@@ -75,6 +77,7 @@ class DifferenceTest:
     difference: float
     interval: Interval | None
     p: float
+    least_p: float
     method: str
 
 
@@ -130,6 +133,14 @@ def paired_test(first: Sequence[bool], second: Sequence[bool]) -> PairedTest:
     return PairedTest(only_first, only_second, float(binomtest(only_first, differ).pvalue) if differ else 1.0)
 
 
+def least_p_of_pairs(n: int) -> float:
+    """Return below what p cannot fall in tests of n pairs, McNemar's and Wilcoxon's: all of them differ in one way.
+
+    Of the 2^n ways in which signs can fall, these are two: 0.0625 of five pairs.
+    """
+    return min(1.0, 2.0 ** (1 - n))
+
+
 def sign_flip_test(differences: Sequence[int]) -> float:
     """Return the exact p-value, two-sided, that whole differences of independent pairs have a sum so far from 0.
 
@@ -171,17 +182,24 @@ def paired_difference(first: ArrayLike, second: ArrayLike) -> DifferenceTest | N
         return None
     p = float(wilcoxon(d).pvalue) if d.any() else 1.0
     interval = time_interval(d) if np.ptp(d) > 0.0 else None
-    return DifferenceTest(len(d), float(np.median(d)), interval, p, "Wilcoxon")
+    return DifferenceTest(len(d), float(np.median(d)), interval, p, least_p_of_pairs(len(d)), "Wilcoxon")
 
 
 def unpaired_difference(first: ArrayLike, second: ArrayLike) -> DifferenceTest | None:
-    """Return the test of Mann and Whitney of two groups of values, two-sided; None if one has no finite value."""
+    """Return the test of Mann and Whitney of two groups of values, two-sided; None if one has no finite value.
+
+    It is exact for small groups, also where values are the same, for which the normal distribution gives too small a p.
+    """
     x, y = (values[np.isfinite(values)] for values in (np.asarray(first, float), np.asarray(second, float)))
     if not len(x) or not len(y):
         return None
-    test: Any = stats.mannwhitneyu(x, y)
+    orders = comb(len(x) + len(y), len(x))
+    has_ties = len(np.unique(np.concatenate([x, y]))) < len(x) + len(y)
+    method: Any = stats.PermutationMethod(n_resamples=orders) if has_ties and orders <= RESAMPLES else "auto"
+    test: Any = stats.mannwhitneyu(x, y, method=method)
+    difference = float(np.median(y) - np.median(x))
     return DifferenceTest(
-        min(len(x), len(y)), float(np.median(y) - np.median(x)), None, float(test.pvalue), "Mann-Whitney"
+        min(len(x), len(y)), difference, None, float(test.pvalue), min(1.0, 2.0 / orders), "Mann-Whitney"
     )
 
 

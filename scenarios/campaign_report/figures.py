@@ -27,6 +27,8 @@ _PLOT = 4.2
 _LONGEST = 60
 """Letters of a line of a label in a list: a longer label takes several lines."""
 
+_DARK, _SOFT = "#1c2330", "#4d5866"
+
 _UNBROKEN = "\u00a0"  # a space at which `textwrap` does not break
 
 _MAX_ENTRIES = 80
@@ -84,7 +86,7 @@ def _metric(results: CampaignResults, layout: PointLayout, name: str, folder: Pa
                 x, y = _ordered(layout, places[chosen], values[chosen])
                 axes.plot(x, y, marker, ms=4, mew=width, color=colour, alpha=0.6)
             _median(axes, layout, k, (results.median(point, name), results.median_interval(point, name)), unit)
-        _set_point_axis(axes, layout)
+        _set_point_axis(axes, layout, _marks(results, column))
         _set_value_axis(axes, layout, unit.axis(words), None)
     description = results.table.description(name) or words
     intervals = " with their 95 % bootstrap intervals" if results.has_intervals else ""
@@ -95,6 +97,20 @@ def _metric(results: CampaignResults, layout: PointLayout, name: str, folder: Pa
     return Figure(f"{name}_by_point", caption)
 
 
+def _marks(results: CampaignResults, column: Floats) -> list[tuple[str, str, str]]:
+    """Return what a legend names besides the points' colours: label, marker and colour."""
+    success = results.table.column("success")
+    shown = np.concatenate([point.rows for point in results.points])
+    shown = shown[np.isfinite(column[shown])]
+    failed = [row for row in shown if success[row] is not True]
+    marks = [("median, 95 % interval" if results.has_intervals else "median", "o", _DARK)]
+    if failed:
+        marks.append(("run that failed", "x", _SOFT))
+    if len(failed) < len(shown):
+        marks.append(("run that succeeded", "o", _SOFT))
+    return marks
+
+
 def _median(
     axes: Axes, layout: PointLayout, k: int, measured: tuple[float, Interval | None], unit: DisplayUnit
 ) -> None:
@@ -103,7 +119,7 @@ def _median(
         return
     low, high = (median, median) if span is None else (span.low, span.high)
     scaled = (low * unit.factor, median * unit.factor, high * unit.factor)
-    _bar(axes, layout, float(layout.places[k]) + 0.38 * layout.room, scaled, "#1c2330")
+    _bar(axes, layout, float(layout.places[k]) + 0.38 * layout.room, scaled, _DARK)
 
 
 def _bar(axes: Axes, layout: PointLayout, place: float, span: tuple[float, float, float], colour: str) -> None:
@@ -146,8 +162,8 @@ def _set_value_axis(axes: Axes, layout: PointLayout, title: str, limits: tuple[f
         axes.set(ylabel=title, **({} if limits is None else {"ylim": limits}))
 
 
-def _set_point_axis(axes: Axes, layout: PointLayout) -> None:
-    """Label the points along their axis, and the colours in a legend."""
+def _set_point_axis(axes: Axes, layout: PointLayout, marks: Sequence[tuple[str, str, str]] = ()) -> None:
+    """Label the points along their axis, and colours and marks in a legend."""
     low, high = layout.limits
     if layout.listed:
         axes.set(ylim=(low, high), ylabel=layout.title)
@@ -160,10 +176,13 @@ def _set_point_axis(axes: Axes, layout: PointLayout) -> None:
         (axes.set_yticks if layout.listed else axes.set_xticks)(places, names)
         if not layout.listed and _crowded(names):
             axes.tick_params(axis="x", rotation=30)
-    if len(layout.group_names) > 1:
-        for colour, name in zip(COLOURS, layout.group_names, strict=False):
-            axes.plot([], [], "o", color=colour, label=name)
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=_columns(layout.group_names))
+    colours = zip(COLOURS, layout.group_names, strict=False) if len(layout.group_names) > 1 else ()
+    entries = [*((name, "o", colour) for colour, name in colours), *marks]
+    for name, marker, colour in entries:
+        axes.plot([], [], marker, color=colour, label=name)
+    if entries:
+        names = [name for name, _, _ in entries]
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=_columns(names))
 
 
 def _crowded(names: Sequence[str]) -> bool:

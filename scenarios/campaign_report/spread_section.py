@@ -81,12 +81,13 @@ def _strips(results: CampaignResults, layout: PointLayout) -> list[Strip]:
 def _traces(results: CampaignResults, layout: PointLayout, strips: Sequence[Strip]) -> list[dict[str, Any]]:
     """Return boxes by group, then strips, without their values."""
     along, across = ("y", "x") if layout.listed else ("x", "y")
-    boxes = [_box_trace(layout) for _ in layout.group_names]
+    boxed = [layout.groups[k] for k, point in enumerate(results.points) if len(point.rows) >= _MIN_BOXED]
+    boxes = [_box_trace(layout, in_legend=group in boxed[:1]) for group, _ in enumerate(layout.group_names)]
     mixed = len({succeeded for _, succeeded, _, _ in strips}) > 1
     columns = [results.table.column(n) for n in ("run", "seed", "success")]
     traces: list[dict[str, Any]] = []
     for group, succeeded, rows, places in strips:
-        name, outcome = layout.group_names[group], "succeeded" if succeeded else "not succeeded"
+        name, outcome = layout.group_names[group], _ENDED[succeeded]
         hover = [
             [run, int(seed), _ENDED[success]] for run, seed, success in zip(*(c[rows] for c in columns), strict=True)
         ]
@@ -95,7 +96,7 @@ def _traces(results: CampaignResults, layout: PointLayout, strips: Sequence[Stri
                 "type": "scatter",
                 "mode": "markers",
                 along: places,
-                "name": ", ".join(filter(None, (name, outcome if mixed or not name else ""))),
+                "name": ", ".join(filter(None, (name, outcome if mixed or not (name and succeeded) else ""))),
                 "marker": _marker(f"var(--c{group})", _SUCCESS if succeeded else _OTHER),
                 "customdata": hover,
                 "hovertemplate": f"%{{customdata[0]}}<br>seed %{{customdata[1]}}<br>%{{{across}:.4g}}"
@@ -110,7 +111,7 @@ def _marker(colour: str, symbol: str) -> dict[str, Any]:
     return {"symbol": symbol, "size": 7, "color": colour, "opacity": 0.8, "line": line}
 
 
-def _box_trace(layout: PointLayout) -> dict[str, Any]:
+def _box_trace(layout: PointLayout, *, in_legend: bool) -> dict[str, Any]:
     return {
         "type": "box",
         "orientation": "h" if layout.listed else "v",
@@ -118,7 +119,8 @@ def _box_trace(layout: PointLayout) -> dict[str, Any]:
         "line": {"color": "var(--soft)", "width": 1.2},
         "fillcolor": "rgba(128,128,128,0.10)",
         "hoverinfo": "skip",
-        "showlegend": False,
+        "name": "median, quartiles, extremes",
+        "showlegend": in_legend,
     }
 
 

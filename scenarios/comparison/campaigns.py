@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, count
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,11 @@ from handover.cosim.exceptions import nearest
 from handover.scenarios.campaign.folder import PARAMETER_UNITS
 from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign.statistics import (
+    LEVEL,
     DifferenceTest,
     PairedTest,
     holm,
+    least_p_of_pairs,
     paired_difference,
     paired_test,
     two_proportions,
@@ -245,6 +247,28 @@ class SuccessTest:
         """The test's name."""
         return "Fisher" if self.pairs is None else "McNemar"
 
+    @property
+    def paired(self) -> bool:
+        """Whether the runs have shared seeds, and the test is of these pairs."""
+        return self.pairs is not None
+
+    @property
+    def n(self) -> int:
+        """Pairs, or runs of the campaign that has fewer."""
+        return min(self.counts[1], self.counts[3])
+
+    @property
+    def least_p(self) -> float:
+        """Below which p cannot fall with so many runs, however they end."""
+        _, n, _, others = self.counts
+        return least_p_of_pairs(n) if self.paired else two_proportions(n, n, 0, others)
+
+    @property
+    def all_succeeded(self) -> bool:
+        """Whether all runs of both campaigns have succeeded, so that only their metrics can differ."""
+        succeeded, n, others_succeeded, others = self.counts
+        return succeeded == n and others_succeeded == others
+
 
 @dataclass(frozen=True, kw_only=True)
 class MetricTest:
@@ -261,6 +285,28 @@ class MetricTest:
     test: DifferenceTest
     paired: bool
     corrected: float = 1.0
+
+    @property
+    def n(self) -> int:
+        """Pairs, or values of the campaign that has fewer."""
+        return self.test.n
+
+    @property
+    def least_p(self) -> float:
+        """Below which p cannot fall with so many values."""
+        return self.test.least_p
+
+
+def bounds_of_p(tests: Iterable[SuccessTest | MetricTest]) -> list[str]:
+    """Return a sentence for each number of runs that cannot show a difference, as p cannot fall below LEVEL."""
+    too_few = {(t.paired, t.n, t.least_p) for t in tests if t.least_p >= LEVEL}
+    enough = next(n for n in count(1) if least_p_of_pairs(n) < LEVEL)
+    sentences: list[str] = []
+    for paired, n, least in sorted(too_few, reverse=True):
+        of = (f"{n} pair{'' if n == 1 else 's'}") if paired else f"{n} run{'' if n == 1 else 's'} each"
+        more = f"{enough} pairs" if paired else "more runs"
+        sentences.append(f"With {of} p cannot fall below {least:.3g}; with {more} it can be less than {LEVEL}.")
+    return sentences
 
 
 def success_tests(results: ComparedCampaigns) -> list[SuccessTest]:

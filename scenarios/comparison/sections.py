@@ -8,7 +8,13 @@ from urllib.parse import quote
 
 from markupsafe import Markup
 
-from handover.scenarios.comparison.campaigns import MAX_TESTS, ComparedCampaigns, metric_tests, success_tests
+from handover.scenarios.comparison.campaigns import (
+    MAX_TESTS,
+    ComparedCampaigns,
+    bounds_of_p,
+    metric_tests,
+    success_tests,
+)
 from handover.scenarios.comparison.entries import CampaignEntry, Difference, Entry, RunEntry
 from handover.scenarios.comparison.runs import MetricRow
 from handover.scenarios.experiment.display_unit import display_unit
@@ -126,6 +132,8 @@ def tests_section(results: ComparedCampaigns) -> Section | None:
         "Mann and Whitney's. p is two-sided; the last column is corrected for the number of tests in its table by "
         "Holm's method."
     )
+    of_metrics = [t for name in results.shown_metrics for t in metric_tests(results, name)]
+    note = " ".join([note, *bounds_of_p([*tests, *of_metrics])])
     if len(tests) > MAX_TESTS:
         note += f" Metrics are tested in the first {MAX_TESTS} of {len(tests)} cases only."
     html = Markup("").join(parts) + Markup("<p class='soft'>{}</p>").format(note)

@@ -96,6 +96,7 @@ def _success_data(results: ComparedCampaigns) -> list[dict[str, Any]]:
             **({} if t.pairs is None else {"only_first": t.pairs.only_first, "only_second": t.pairs.only_second}),
             "method": t.method,
             "p": t.p,
+            "p_least": t.least_p,
             "p_holm": t.corrected,
         }
         for t in success_tests(results)
@@ -115,6 +116,7 @@ def _metric_data(results: ComparedCampaigns, metric: str) -> list[dict[str, Any]
             "interval": _interval(t.test.interval),
             "method": t.test.method,
             "p": t.test.p,
+            "p_least": t.least_p,
             "p_holm": t.corrected,
         }
         for t in metric_tests(results, metric)

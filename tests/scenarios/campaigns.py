@@ -59,7 +59,7 @@ def campaign_metadata(
 
 
 def table_of(points: Sequence[Mapping[str, Any]], repetitions: int = 2, **more: Sequence[Any]) -> CampaignTable:
-    """Return runs that took 1 s; every second repetition failed. `more` are further columns of metrics, in m."""
+    """Return runs that took 1 s; every second repetition failed. `more`: other seeds or successes, and metrics, m."""
     runs = [(k, r) for k in range(len(points)) for r in range(repetitions)]
     columns: dict[str, Sequence[Any]] = {
         "run": [f"{k:03d}_r{r:04d}" for k, r in runs],
@@ -74,9 +74,10 @@ def table_of(points: Sequence[Mapping[str, Any]], repetitions: int = 2, **more: 
         **more,
     }
     table: Any = pa.Table.from_pydict({name: list(values) for name, values in columns.items()})
-    roles = {n: "parameter" for p in points for n in p} | dict.fromkeys(more, "metric")
+    metrics = more.keys() - {"seed", "success"}
+    roles = {n: "parameter" for p in points for n in p} | dict.fromkeys(metrics, "metric")
     fields: list[Any] = [
-        pa.field(f.name, f.type, metadata={"role": roles.get(f.name, "run"), "unit": "m" if f.name in more else "1"})
+        pa.field(f.name, f.type, metadata={"role": roles.get(f.name, "run"), "unit": "m" if f.name in metrics else "1"})
         for f in table.schema
     ]
     return CampaignTable(table.cast(pa.schema(fields)))

@@ -7,7 +7,13 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.scenarios.cli.console import open_console
-from handover.scenarios.comparison.campaigns import ComparedCampaigns, success_tests
+from handover.scenarios.comparison.campaigns import (
+    ComparedCampaigns,
+    MetricTest,
+    bounds_of_p,
+    metric_tests,
+    success_tests,
+)
 from handover.scenarios.comparison.page import Comparison, RunComparison
 from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.results.run_folder import RunFolder
@@ -43,7 +49,18 @@ def _print_campaigns(console: Console, results: ComparedCampaigns) -> None:
             texts = [unit.text(results.median(point, m)) for unit, m in zip(medians, metrics, strict=True)]
             rows.append([results.label_of(key), name, f"{point.successes} of {len(point.done)}", ends, *texts])
     _print_table(console, ("at", "campaign", "succeeded", "95 % interval", *(f"median\n{m}" for m in metrics)), rows)
-    tests = [
+    _print_tests(console, results)
+
+
+def _print_tests(console: Console, results: ComparedCampaigns) -> None:
+    """Print the tests of successes; of metrics where all runs succeed, as successes do not differ there."""
+    tests = success_tests(results)
+    by_success = [t for t in tests if not t.all_succeeded]
+    alike = {(t.key, t.first, t.second) for t in tests if t.all_succeeded}
+    of_metrics = [
+        t for m in results.shown_metrics for t in metric_tests(results, m) if (t.key, t.first, t.second) in alike
+    ]
+    successes = [
         [
             results.label_of(t.key),
             f"{t.first} – {t.second}",
@@ -51,9 +68,29 @@ def _print_campaigns(console: Console, results: ComparedCampaigns) -> None:
             t.method,
             f"{t.p:.2g}",
         ]
-        for t in success_tests(results)
+        for t in by_success
     ]
-    _print_table(console, ("at", "successes of", "", "test", "p"), tests)
+    _print_table(console, ("at", "successes of", "", "test", "p"), successes)
+    metrics = [
+        [
+            results.label_of(t.key),
+            t.metric,
+            f"{t.second} – {t.first}",
+            _difference(results, t),
+            t.test.method,
+            f"{t.test.p:.2g}",
+        ]
+        for t in of_metrics
+    ]
+    _print_table(console, ("at", "metric", "difference of", "median", "test", "p"), metrics)
+    for sentence in bounds_of_p([*by_success, *of_metrics]):
+        console.print(sentence, markup=False, soft_wrap=True)
+
+
+def _difference(results: ComparedCampaigns, test: MetricTest) -> str:
+    difference = test.test.difference
+    unit = display_unit(results.table.unit(test.metric), [difference])
+    return f"{'+' if difference > 0.0 else ''}{unit.text(difference)}"
 
 
 def _print_runs(console: Console, comparison: RunComparison) -> None:

@@ -9,6 +9,7 @@ from scipy.stats import binomtest
 from handover.scenarios.campaign.statistics import (
     compatible_counts,
     holm,
+    least_p_of_pairs,
     paired_difference,
     paired_test,
     sign_flip_test,
@@ -132,6 +133,24 @@ def test_groups_that_do_not_overlap():
     assert test is not None
     assert (test.n, test.difference, test.p) == (3, 3.0, pytest.approx(2 / 20))  # two of the 6 choose 3 orders
     assert unpaired_difference([], [1.0]) is None
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 6])
+def test_tests_of_pairs_reach_their_least_p_where_all_pairs_differ_in_one_way(n: int):
+    least = least_p_of_pairs(n)
+    assert least == (1.0, 0.5, None, None, 0.0625, 0.03125)[n - 1]
+    assert paired_test([True] * n, [False] * n).p == pytest.approx(least)
+    test = paired_difference(np.zeros(n), np.arange(1.0, n + 1.0))
+    assert test is not None
+    assert (test.p, test.least_p) == (pytest.approx(least), least)
+
+
+@pytest.mark.parametrize("first", [[1.0, 2.0, 3.0], [1.0, 1.0, 1.0]])  # the normal distribution would give 0.047
+def test_groups_of_equal_values_have_the_exact_p(first: list[float]):
+    test = unpaired_difference(first, [4.0, 4.0, 4.0])
+    assert test is not None
+    assert test.p == pytest.approx(2 / 20)
+    assert test.least_p == pytest.approx(2 / 20)
 
 
 def test_holms_correction():  # [Holm1979], each p times the number of those not smaller, never falling

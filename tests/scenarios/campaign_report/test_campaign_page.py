@@ -190,4 +190,6 @@ def test_few_runs_are_points_and_many_have_a_box_too():
         (box, *strips) = json.loads(drawn[1])["data"]
         assert box["type"] == "box"
         assert len(box["median"]) == len(box["x"]) == (2 if boxed else 0)
+        assert box["showlegend"] is boxed
+        assert [strip["name"] for strip in strips] == ["succeeded", "failed"]
         assert sum(len(strip["x"]) for strip in strips) == 2 * repetitions

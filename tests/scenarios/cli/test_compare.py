@@ -111,6 +111,18 @@ def test_without_a_folder_it_is_one_of_its_own(here: Path):
     assert all((folder / "report.html").is_file() and "_ir_grasp" in folder.name for folder in made)
 
 
+def test_where_all_runs_succeed_the_tests_of_metrics_are_printed(here: Path):
+    for name, moved in (("a", [0.01, 0.02, 0.03, 0.04, 0.05]), ("b", [0.02, 0.04, 0.06, 0.08, 0.1])):
+        table = table_of([{}], 5, moved=moved, success=[True] * 5)
+        folder_of(here / name, campaign_metadata("ir_grasp", [{}], 5), table)
+    done = compare("a", "b", "--metric", "moved")
+    assert done.exit_code == 0, done.output
+    lines = [line.split() for line in done.stdout.splitlines()]
+    assert ["all", "runs", "moved", "b", "–", "a", "+30", "mm", "Wilcoxon", "0.062"] in lines
+    assert "McNemar" not in done.stdout  # whose p is 1
+    assert "With 5 pairs p cannot fall below 0.0625" in done.stdout
+
+
 def test_a_folder_that_is_not_empty_is_refused_and_left_alone(here: Path):
     for name in ("a", "b"):
         folder_of(here / name, campaign_metadata("ir_grasp", [{}]), table_of([{}]))

@@ -8,7 +8,14 @@ import pytest
 from campaigns import campaign_metadata, folder_of, table_of
 
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.comparison.campaigns import ComparedCampaigns, metric_tests, success_tests
+from handover.scenarios.comparison import sections
+from handover.scenarios.comparison.campaigns import (
+    ComparedCampaigns,
+    SuccessTest,
+    bounds_of_p,
+    metric_tests,
+    success_tests,
+)
 from handover.scenarios.comparison.entries import NotComparable, differences_of, read_entries
 from handover.scenarios.comparison.page import compare, write_comparison
 from handover.scenarios.comparison.tables import campaigns_csv, campaigns_data
@@ -25,11 +32,7 @@ def campaign(
     seeds = [seeds_from + r for _ in points for r in range(repetitions)]
     success = more.pop("success", [r % 2 == 0 for _ in points for r in range(repetitions)])
     metrics = more.pop("metrics", {"moved": moved})
-    table = table_of(points, repetitions, **metrics)
-    for name, values in (("seed", seeds), ("success", success)):
-        whole: Any = table.table
-        index = whole.column_names.index(name)
-        table.table = whole.set_column(index, whole.schema.field(index), [values])
+    table = table_of(points, repetitions, seed=seeds, success=success, **metrics)
     folder_of(path, campaign_metadata("ir_grasp", points, repetitions, **more), table)
     return path
 
@@ -108,6 +111,29 @@ def test_runs_without_shared_seeds_are_compared_as_groups(tmp_path: Path):
     assert test.p == pytest.approx(2 / 924)  # of the 12 choose 6 tables, the two extreme ones
     assert (moved.test.method, moved.test.p) == ("Mann-Whitney", pytest.approx(2 / 924))
     assert moved.test.difference == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(("n", "least"), [(5, 0.0625), (6, None)])
+def test_too_few_pairs_for_any_verdict_are_named_with_the_least_p(tmp_path: Path, n: int, least: float | None):
+    first = campaign(tmp_path / "a", [{}], n, success=[True] * n, moved=[0.01 * k for k in range(n)])
+    second = campaign(tmp_path / "b", [{}], n, success=[False] * n, moved=[0.02 + 0.02 * k for k in range(n)])
+    results = compared(first, second)
+    tests = [*success_tests(results), *metric_tests(results, "moved")]
+    assert [(t.p if isinstance(t, SuccessTest) else t.test.p) for t in tests] == [pytest.approx(2.0 ** (1 - n))] * 2
+    sentences = bounds_of_p(tests)
+    assert len(sentences) == (least is not None)  # one for both tests
+    assert all(f"{n} pairs" in s and f"{least}" in s for s in sentences)
+    section = sections.tests_section(results)
+    assert section is not None
+    assert all(s in section.html for s in sentences)
+
+
+def test_too_few_runs_without_shared_seeds_are_named_too(tmp_path: Path):
+    first = campaign(tmp_path / "a", [{}], 3, success=[True] * 3)
+    second = campaign(tmp_path / "b", [{}], 3, seeds_from=500, success=[False] * 3)
+    (test,) = success_tests(compared(first, second))
+    assert test.p == test.least_p == pytest.approx(2 / 20)
+    assert ["3 runs each" in s for s in bounds_of_p([test])] == [True]
 
 
 def test_a_metric_that_one_lacks_is_shown_where_it_is(tmp_path: Path):
