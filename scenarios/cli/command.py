@@ -19,7 +19,8 @@ Look
 Run
   handover run helix_handover            one run; leaves a folder with a report
   handover run x.ssp --stop 5            a system from another tool, for 5 s
-  handover run x.fmu --input u.csv       one unit from any tool, with inputs from a table
+  handover run x.fmu --input u.csv --stop 5
+                                         one unit from any tool, with inputs from a table
   handover play flyer_impedance          the same in a browser, with sliders for its parameters
   handover resume runs/long              resumes a run with checkpoints
   handover sweep ir_grasp strategy=reflex,blind --repeat 20
@@ -43,7 +44,8 @@ Your own
 \b
 Exchange
   handover build TendonArm --fmi both    units for other tools
-  handover export ir_grasp --ssp x.ssp   a scenario for other tools
+  handover export ir_grasp --ssp grasp.ssp
+                                         a scenario for other tools
   handover info Their.fmu                what is in it: ports, steps, capabilities
   handover check Their.fmu               what is wrong with an FMU, whoever made it
 

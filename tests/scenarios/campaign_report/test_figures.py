@@ -25,7 +25,12 @@ def test_a_legend_names_medians_and_runs_that_failed(
     succeed: bool | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     found: list[list[str]] = []
-    monkeypatch.setattr("handover.scenarios.experiment.plotting._save", lambda c, _: found.append(_legend(c)))
+
+    def look(canvas: Canvas, _path: Path) -> None:
+        legend = canvas.axes[0].get_legend()
+        found.append([] if legend is None else [text.get_text() for text in legend.get_texts()])
+
+    monkeypatch.setattr("handover.scenarios.experiment.plotting._save", look)
     success = [k % 2 == 0 if succeed is None else succeed for k in range(8)]
     results = results_of("ir_grasp", [{"forward": f} for f in ("0.02", "0.055")], 4, moved=[0.01] * 8, success=success)
     draw_campaign(results, tmp_path)
@@ -35,11 +40,6 @@ def test_a_legend_names_medians_and_runs_that_failed(
         None: ["run that failed", "run that succeeded"],
     }
     assert found[1] == ["median, 95 % interval", *expected[succeed]]
-
-
-def _legend(canvas: Canvas) -> list[str]:
-    legend = canvas.axes[0].get_legend()
-    return [] if legend is None else [text.get_text() for text in legend.get_texts()]
 
 
 @pytest.mark.parametrize(
