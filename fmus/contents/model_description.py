@@ -22,6 +22,9 @@ LOG_CATEGORIES = {
 }
 """Descriptions of the log categories that the runtime has (runtime/log.c)."""
 
+_MAX_STEPS = 1000
+"""Of a unit's default experiment."""
+
 _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 
 
@@ -131,8 +134,14 @@ def add_log_categories(root: ET.Element) -> None:
 
 
 def add_default_experiment(root: ET.Element, model: Model) -> None:
-    """Add the start time 0 and the unit's default step."""
-    ET.SubElement(root, "DefaultExperiment", startTime="0.0", stepSize=number(float(model.step)))
+    """Add the start time 0, the unit's default step, and as stop time the first of its multiples from 1 s on.
+
+    FMPy's default is 1 s: some of its versions then ask for a last step beyond, others leave the last one out. At more
+    than 1,000 steps it takes longer ones, so that is the most.
+    """
+    steps = min(math.ceil(1 / model.step), _MAX_STEPS)
+    times = {"startTime": Fraction(0), "stopTime": steps * model.step, "stepSize": model.step}
+    ET.SubElement(root, "DefaultExperiment", {name: number(float(t)) for name, t in times.items()})
 
 
 def enumerations(variables: Iterable[Variable]) -> list[type[enum.IntEnum]]:

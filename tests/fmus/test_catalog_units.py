@@ -34,7 +34,11 @@ def test_every_unit_is_valid_or_says_why_it_has_no_such_form(name: str, fmi: int
         assert name in PICTURES
         return
     assert validate_fmu(str(file)) == []
-    terminals = describe_fmu(file).terminals
+    d = describe_fmu(file)
+    steps = 0 if d.experiment.stop is None or d.step is None else d.experiment.stop / d.step
+    assert steps == pytest.approx(round(steps), abs=1e-9)  # a host that takes both as they are ends with a whole step
+    assert 1 <= steps <= 1000
+    terminals = d.terminals
     assert (terminals.fault, {name: t.reason for name, t in terminals.by_name.items() if t.reason}) == ("", {})
     with zipfile.ZipFile(file) as archive:
         assert (TERMINALS in archive.namelist()) is (fmi == 3 or bool(terminals.by_name))
@@ -73,6 +77,11 @@ def test_every_unit_runs_in_fmpys_own_simulation(name: str, fmi: int):
     result = fmpy.simulate_fmu(str(cached(name, fmi)), stop_time=5 * step, output_interval=step, output=outputs)
     assert len(result) == 6
     assert all(np.all(np.isfinite(result[n].astype(float))) for n in outputs)
+
+
+def test_a_simulation_by_default_ends_with_a_whole_step():
+    """Of 15 ms, of which 1 s, where FMPy would stop by itself, is no multiple."""
+    assert fmpy.simulate_fmu(str(cached("IrReflex", 3)))["time"] == pytest.approx(np.arange(68) * 0.015)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

@@ -18,7 +18,9 @@ from workshop import Workshop
 from handover.cosim.blocks.description import Description, describe
 from handover.cosim.blocks.ports import parameter
 from handover.cosim.blocks.units import Number
+from handover.cosim.fmu.file.default_experiment import default_experiment
 from handover.cosim.fmu.file.description import describe_fmu
+from handover.cosim.fmu.file.xml import parse_xml
 from handover.fmus.contents.fmi2_description import fmi2_description
 from handover.fmus.contents.fmi3_description import fmi3_description
 from handover.fmus.contents.model_description import AmbiguousName, InvalidText, Model
@@ -205,6 +207,15 @@ def model_of(**parameters: tuple[Any, Any]) -> Model:
         form=Form.FMI3,
         variable_step=True,
     )
+
+
+@pytest.mark.parametrize(
+    ("step", "stop"), [("0.015", 1.005), ("1.4", 1.4), ("1/30", 1.0), ("0.001", 1.0), ("1e-5", 0.01)]
+)
+def test_a_default_experiment_is_of_whole_steps(step: str, stop: float):
+    stepped = dataclasses.replace(model_of(), step=Fraction(step))
+    for described in (fmi2_description(stepped), fmi3_description(stepped)):
+        assert default_experiment(parse_xml(described)).stop == stop
 
 
 def test_what_an_fmu_could_not_tell_apart_is_refused():
