@@ -8,9 +8,11 @@ import functools
 import importlib.util
 import xml.etree.ElementTree as ET
 import zipfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,8 +37,12 @@ SEED = 3
 WITH_PICTURES = ("helix_handover", "helix_reflex_grasp", "helix_use_case")
 """No form of their units that exchange pictures is one that libcosim or Ecos loads, see the last tests."""
 EXCHANGED = sorted(set(SCENARIOS) - set(WITH_PICTURES))
-IN_EVERY_HOST = ("flyer_two_robots", "ir_grasp", "vsl_hybrid")
-"""Of each robot whose scenarios can be exchanged; the others are tried in Ecos by `make hosts`."""
+FIRST = ("flyer_robot_to_human", "helix_handover", "ir_grasp", "vsl_hybrid")
+"""Of each robot one, which the slow tier tries; the others are tried by `make hosts`."""
+
+
+def tiered(names: Sequence[str]) -> list[Any]:
+    return [pytest.param(n, marks=pytest.mark.slow if n in FIRST else pytest.mark.hosts) for n in names]
 
 
 @dataclass(frozen=True)
@@ -84,8 +90,7 @@ def own_verdict(file: Path, name: str) -> Verdict:
     return Verdict(step, steps, values)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", WITH_PICTURES)
+@pytest.mark.parametrize("name", tiered(WITH_PICTURES))
 def test_a_scenario_with_pictures_succeeds_under_jacobi(tmp_path: Path, name: str):
     out = str(tmp_path / "run")
     command = ["run", name, "--algorithm", "jacobi", "--seed", str(SEED), "--no-report", "--out", out]
@@ -103,9 +108,8 @@ def verdict_of(folder: Path, name: str) -> Verdict:
     return own_verdict(exported(folder, name), name)
 
 
-@pytest.mark.slow
 @needs_libcosim
-@pytest.mark.parametrize("name", EXCHANGED)
+@pytest.mark.parametrize("name", tiered(EXCHANGED))
 def test_an_exported_scenario_ends_in_libcosim_as_here(folder: Path, tmp_path: Path, name: str):
     file, wanted = exported(folder, name), verdict_of(folder, name)
     assert base_step(file) == float(wanted.step)
@@ -121,10 +125,7 @@ def test_an_exported_scenario_ends_in_libcosim_as_here(folder: Path, tmp_path: P
 
 
 @in_ecos
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=pytest.mark.slow if n in IN_EVERY_HOST else pytest.mark.hosts) for n in EXCHANGED],
-)
+@pytest.mark.parametrize("name", tiered(EXCHANGED))
 def test_an_exported_scenario_ends_in_ecos_as_here(folder: Path, tmp_path: Path, name: str):
     """To the six decimals that Ecos writes."""
     file, wanted = exported(folder, name), verdict_of(folder, name)
