@@ -67,7 +67,7 @@ def read_structure(archive: SspArchive) -> SspStructure:
             system,
             _stop(part),
             _annotated_period(part, systems[0], "parallel"),
-            _step_of_others(part, systems[0]),
+            _step_of_system(part, systems[0]),
             tuple(part.unsupported),
         )
 
@@ -102,8 +102,19 @@ def _annotated(part: SspPart, e: XmlElement, kind: str) -> Iterator[XmlElement]:
             yield from annotation.children
 
 
-def _step_of_others(part: SspPart, system: XmlElement) -> Fraction | None:
-    """Return the communication step that is annotated for OMSimulator, or else for libcosim."""
+def _hinted_step(part: SspPart, e: XmlElement) -> Fraction | None:
+    """Return the communication step of a component that is annotated for libcosim; 0 s is none there, too."""
+    for child in _annotated(part, e, OSP_ANNOTATION):
+        if local(child.tag) == "StepSizeHint":
+            step = part.number(child, "value")
+            if step and not step >= SHORTEST_STEP:
+                raise part.fault(child, f"value={child.get('value')[:80]!r} {INVALID_STEP}")
+            return proposed_step(step)
+    return None
+
+
+def _step_of_system(part: SspPart, system: XmlElement) -> Fraction | None:
+    """Return the communication step that is annotated for OMSimulator, or else for libcosim, or else stated."""
     holders = [*_annotated(part, system, OMS_ANNOTATION)]
     for experiment in part.children(part.root, "ssd:DefaultExperiment"):
         holders += _annotated(part, experiment, OSP_ANNOTATION)
@@ -162,7 +173,10 @@ class _Reader:
             raise part.fault(e, f"a component for {implementation[:80]}; only co-simulation is supported")
         name, member = part.text(e, "name"), self._member(e, part.text(e, "source"))
         period, sampled = self._annotated_step(e)
-        return SspComponent(name, self._connectors(e), self._bindings(e), part.where(e, ""), member, period, sampled)
+        hint = _hinted_step(part, e)
+        return SspComponent(
+            name, self._connectors(e), self._bindings(e), part.where(e, ""), member, period, sampled, hint
+        )
 
     def _member(self, e: XmlElement, uri: str) -> str:
         try:

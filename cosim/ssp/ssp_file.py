@@ -5,7 +5,7 @@ connections of whole arrays, which the master copies as a whole, or splits array
 """
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -23,14 +23,18 @@ from handover.cosim.ssp.given_parameters import SettableParameter, named_paramet
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.ssp.reading import read_structure
 from handover.cosim.ssp.start_values import start_values
-from handover.cosim.ssp.structure import SspConnector, SspNestedSystem
+from handover.cosim.ssp.structure import SspComponent, SspConnector, SspNestedSystem, SspStructure
 from handover.cosim.system.conversion import LinearTransformation
-from handover.cosim.system.system import PortName, System
+from handover.cosim.system.system import PlacedUnit, PortName, System
 
 Wire = tuple[PortName, PortName, LinearTransformation | None]
 
 Feeds = dict[int, tuple[PortName, int, LinearTransformation | None]]
 """By entry of an input: the output, its entry, and the transformation of the value."""
+
+
+_ROUNDING = Fraction(1, 10**9)
+"""Relative difference of two steps that are written as decimals and meant to be multiples."""
 
 
 class Grouping:
@@ -150,8 +154,9 @@ class SspFile:
 
     Args:
         path: the file.
-        step: communication step of all units, s; without it each has the one of an annotation by `write_ssp`, or
-            else the one that its FMU proposes, or that is annotated for OMSimulator or libcosim.
+        step: communication step of all units, s; without it each has the one of an annotation by `write_ssp`, or else
+            the one that is annotated for libcosim, or else the system's, or else the one that its FMU proposes. Where
+            one that the file states, or that an FMU proposes, is not taken, the system's notes say so.
         parameters: texts by the names of the property `parameters`, which come before what the file gives; of an array
             the values stand with commas between them, or a name such as `arm.p[1]` gives one.
         duration: of the run, s, of which units without a step take a 500th; by default the stop time.
@@ -183,11 +188,9 @@ class SspFile:
             descriptions = self._describe({n: c.member for n, c in components_of(structure.system)})
             asked = self._named(structure.system, descriptions, parameters) if parameters else {}
             flat = flatten(structure.system, descriptions, asked)
-            steps = {
-                n: step or c.period or (None if proposed_step(descriptions[n].step) else structure.step)
-                for n, c in flat.components.items()
-            }
+            steps = {n: step or c.period or _stated_step(c, structure) for n, c in flat.components.items()}
             self.system = self._build(flat, descriptions, steps, structure.unsupported, duration or self.stop)
+            self.system.notes += _notes_on_steps(step, structure.step, self.system.units.values())
             self._flat, self._structure, self._descriptions = flat, structure, descriptions
         except BaseException:
             self.close()
@@ -279,3 +282,34 @@ class SspFile:
             return unit.start.get(name)
         names = parameter.declared.entry_names  # of an array that was split
         return " ".join(str(unit.start.get(n, unit.description.parameters[n].start)) for n in names)
+
+
+def _stated_step(component: SspComponent, structure: SspStructure) -> Fraction | None:
+    """Return the communication step that an SSP states for a component, by a hint for libcosim or for all, s.
+
+    As libcosim does, a hint is rounded down to a multiple of the system's step, of which one is the least. Where
+    `write_ssp` annotated a step for stepping in parallel, both are that one, and each unit keeps its own here.
+    """
+    base, hint = structure.step, component.hint
+    if structure.parallel_step is not None:
+        return None
+    if base is None or hint is None:
+        return hint or base
+    parts = max(1, round(hint / base))
+    return hint if abs(hint - parts * base) < hint * _ROUNDING else max(1, hint // base) * base
+
+
+def _notes_on_steps(asked: Fraction | None, stated: Fraction | None, units: Iterable[PlacedUnit]) -> list[str]:
+    """Return which communication step applies where the system states one and others differ."""
+    if asked is not None:
+        other = stated is not None and stated != asked
+        return [f"all units step by {_seconds(asked)}, as asked; the system states {_seconds(stated)}"] if other else []
+    own = {u.name: (u.period, proposed_step(u.description.experiment.step)) for u in units}
+    others = [f"{n} {_seconds(p)}" for n, (period, p) in own.items() if period == stated and p not in (None, period)]
+    if stated is None or not others:
+        return []
+    return [f"the system's step of {_seconds(stated)} is taken, not what FMUs propose: {', '.join(others)}"]
+
+
+def _seconds(step: Fraction | None) -> str:
+    return "none" if step is None else f"{float(step):g} s"

@@ -57,11 +57,16 @@ class SspElement:
 
 @dataclass(frozen=True)
 class SspComponent(SspElement):
-    """An FMU of the SSP: a member of its archive, and where that is annotated its communication step."""
+    """An FMU of the SSP: a member of its archive.
+
+    Where they are annotated it has a communication step by `write_ssp` (`period`) and the one that libcosim would take
+    as far as its base step allows (`hint`), in seconds.
+    """
 
     member: str
     period: Fraction | None
     sampled: bool | None
+    hint: Fraction | None = None
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,8 @@ class SspStructure:
     """The whole: its name, its outermost system, and the stop time of its default experiment, s.
 
     `parallel_step` is the communication step of all units where they step in parallel, if `write_ssp` annotated one.
-    `step` is the one that OMSimulator or libcosim would take, if it is annotated for them. Both are in seconds.
+    `step` is that of the system, as its default experiment states it or as it is annotated for OMSimulator or libcosim.
+    Both are in seconds.
     `unsupported` are faults: what was left out of it.
     """
 

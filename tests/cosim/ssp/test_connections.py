@@ -262,6 +262,54 @@ def test_an_fmu_that_proposes_no_step_takes_a_500th(tmp_path: Path, stop: str, o
         assert not ssp.system.tolerated
 
 
+OMS = '<o:A xmlns:o="urn:o"><o:Information><o:FixedStepMaster stepSize="0.020000"/></o:Information></o:A>'
+OSP = '<p:Algorithm xmlns:p="urn:p"><p:FixedStepAlgorithm baseStepSize="0.02"/></p:Algorithm>'
+
+
+def annotated(kind: str, inside: str) -> str:
+    return f'<ssd:Annotations><ssc:Annotation type="{kind}">{inside}</ssc:Annotation></ssd:Annotations>'
+
+
+def stating(tool: str, units: str) -> str:
+    """Return a description whose system states a step of 0.02 s as a tool writes it."""
+    whole, osp = system(units), annotated("com.opensimulationplatform", OSP)
+    return {
+        "OMSimulator": described(whole.replace("</ssd:System>", annotated("org.openmodelica", OMS) + "</ssd:System>")),
+        "libcosim": described(whole, f"<ssd:DefaultExperiment>{osp}</ssd:DefaultExperiment>"),
+        "SSP 2.0": described(whole, '<ssd:DefaultExperiment stepSize="0.02"/>', version="2.0"),
+    }[tool]
+
+
+def hinted(name: str, seconds: str) -> str:
+    hint = f'<p:StepSizeHint xmlns:p="urn:p" value="{seconds}"/>'
+    return component(name, annotated("com.opensimulationplatform", hint))
+
+
+@pytest.mark.parametrize("tool", ["OMSimulator", "libcosim", "SSP 2.0"])
+def test_the_step_of_a_system_comes_before_those_that_fmus_propose(tmp_path: Path, tool: str):
+    fmu = decay.pack(tmp_path / "unit.fmu", b"")  # proposes 0.1 s
+    file = pack_ssp(tmp_path / "a.ssp", stating(tool, component("a")), {"resources/unit.fmu": fmu})
+    with SspFile(file) as ssp:
+        assert ssp.system.units["a"].period == Fraction(1, 50)
+        assert ssp.system.notes == ["the system's step of 0.02 s is taken, not what FMUs propose: a 0.1 s"]
+    with SspFile(file, Fraction(1, 4)) as ssp:
+        assert ssp.system.units["a"].period == Fraction(1, 4)
+        assert ssp.system.notes == ["all units step by 0.25 s, as asked; the system states 0.02 s"]
+
+
+def test_a_component_s_hint_is_rounded_down_to_steps_of_the_system_as_libcosim_does(tmp_path: Path):
+    fmu = decay.pack(tmp_path / "unit.fmu", b"")
+    hints = {"a": "0.06", "b": "0.05", "c": "0.001", "d": "0"}
+    units = "".join(hinted(name, seconds) for name, seconds in hints.items())
+    file = pack_ssp(tmp_path / "a.ssp", stating("libcosim", units), {"resources/unit.fmu": fmu})
+    with SspFile(file) as ssp:
+        taken = {name: float(unit.period) for name, unit in ssp.system.units.items()}
+    assert taken == {"a": 0.06, "b": 0.04, "c": 0.02, "d": 0.02}
+    alone = pack_ssp(tmp_path / "b.ssp", described(system(hinted("a", "0.06"))), {"resources/unit.fmu": fmu})
+    with SspFile(alone) as ssp:
+        assert ssp.system.units["a"].period == Fraction("0.06")
+
+
 @pytest.mark.parametrize("period", ["0", "-1/30", "1e999999999", "1/0", "", "0.1"])
 def test_an_annotated_step_is_a_fraction(opened: Open, period: str):
     step = f'<Step xmlns="urn:handover:communication" period="{period}" sampled="true"/>'
