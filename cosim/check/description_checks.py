@@ -57,7 +57,7 @@ def _capability_findings(co_simulation: XmlElement, fmi: int) -> Iterator[Findin
             "needs other software on each machine that runs it: the tool that it was exported from, or an interpreter"
         )
     if says(co_simulation, "canBeInstantiatedOnlyOncePerProcess"):
-        yield note("can be in a system only once: it allows one instance in a process")
+        yield note("allows one instance in a process: several in a system are isolated, each in a process of its own")
     if not says(co_simulation, f"canGetAndSetFMU{'state' if fmi == 2 else 'State'}"):
         yield note("cannot be rolled back: its state can be neither kept nor restored")
 

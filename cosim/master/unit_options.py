@@ -1,5 +1,7 @@
 """What options say of single units by name: which live in processes of their own, and their tolerances."""
 
+import itertools
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -16,19 +18,21 @@ FOREIGN, ALL = "foreign", "all"
 def isolated_units(system: System, wanted: Sequence[str]) -> frozenset[str]:
     """Return the names of the units that names, `foreign` and `all` stand for; see `MasterOptions.isolated`.
 
+    Those of `units_of_one_fmu` are among them in any case.
+
     Raises:
         InvalidOptions: a name is of no unit, or units cannot have processes of their own on this machine.
     """
-    units = system.units
+    units, crowded = system.units, units_of_one_fmu(system)
     if unknown := [name for name in wanted if name not in (FOREIGN, ALL) and name not in units]:
         valid = ", ".join((*units, FOREIGN, ALL))
         raise InvalidOptions([f"there is no unit {name!r} to isolate; there are {valid}" for name in unknown])
-    if wanted:
-        _check_support()
+    if wanted or crowded:
+        _check_support("; ".join(crowded) or "no unit can be isolated")
     if ALL in wanted:
         return frozenset(units)
     ours: dict[Path, bool] = {}
-    named = {name for name in wanted if name != FOREIGN}
+    named = {name for name in wanted if name != FOREIGN} | {*itertools.chain(*crowded.values())}
     if FOREIGN in wanted:
         for name, unit in units.items():
             path = unit.description.path
@@ -37,6 +41,23 @@ def isolated_units(system: System, wanted: Sequence[str]) -> frozenset[str]:
             if not ours[path]:
                 named.add(name)
     return frozenset(named)
+
+
+def units_of_one_fmu(system: System) -> dict[str, list[str]]:
+    """Return the units of each FMU that is placed more than once though a process may hold only one instance of it.
+
+    They are by a line that says so.
+    """
+    placed: Mapping[Path, list[str]] = defaultdict(list)
+    for name, unit in system.units.items():
+        if unit.description.capabilities.once_per_process:
+            placed[unit.description.path.resolve()].append(name)
+    return {
+        f"{' and '.join(names)} are one FMU, {path.name}, of which a process may hold one instance only "
+        "(canBeInstantiatedOnlyOncePerProcess), so each lives in a process of its own": names
+        for path, names in placed.items()
+        if len(names) > 1
+    }
 
 
 def tolerances_of(system: System, given: Mapping[str, float]) -> dict[str, float]:
@@ -59,10 +80,10 @@ def tolerances_of(system: System, given: Mapping[str, float]) -> dict[str, float
     return {name: tolerance for name, tolerance in found.items() if tolerance is not None}
 
 
-def _check_support() -> None:
+def _check_support(what: str) -> None:
     try:
         reason = unavailable()
     except CompilationError as e:
         reason = str(e)
     if reason:
-        raise InvalidOptions([f"no unit can be isolated: {reason}"])
+        raise InvalidOptions([f"{what}: {reason}"])

@@ -1,7 +1,7 @@
 """Units, their parameters and the connections between them, checked before anything is loaded.
 
-`System` collects what is wired, and `System.check` reports everything that is wrong with it: names, values, clocks,
-FMUs that a process may instantiate only once, and connections whose ports do not fit each other.
+`System` collects what is wired, and `System.check` reports everything that is wrong with it: names, values, clocks, and
+connections whose ports do not fit each other.
 """
 
 from collections.abc import Callable, Iterable
@@ -38,7 +38,6 @@ from handover.cosim.system.wiring_faults import (
     clock_of,
     connection_faults,
     event_faults,
-    once_faults,
     outside_fault,
     series_fault,
     value_faults,
@@ -327,7 +326,6 @@ class System:
         for unit in self.units.values():
             faults += value_faults(unit.name, unit.description, unit.start)
             faults += event_faults(unit.name, unit.description, unit.sampled)
-        faults += once_faults((u.name, u.description) for u in self.units.values())
         fed: dict[PortName, PortName] = {}
         for c in self.connections:
             faults += connection_faults(self.units, c)

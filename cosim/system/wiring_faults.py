@@ -1,8 +1,6 @@
 """What is wrong with units as they are placed in a system, and with connections of ports: faults in words."""
 
-from collections import defaultdict
-from collections.abc import Iterable, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 from handover.cosim.blocks.start_values import fault_of
@@ -51,20 +49,6 @@ def event_faults(name: str, description: FmuDescription, sampled: bool) -> list[
     if not d.capabilities.event_mode:
         return [f"{fault}, which its FMU does not have (hasEventMode)"]
     return [f"{fault}; it cannot be placed as a sampled unit, which runs without"] if sampled else []
-
-
-def once_faults(units: Iterable[tuple[str, FmuDescription]]) -> list[str]:
-    """Return which FMUs are placed more than once though a process may hold only one instance of them."""
-    placed: Mapping[Path, list[str]] = defaultdict(list)
-    for name, d in units:
-        if d.capabilities.once_per_process:
-            placed[d.path.resolve()].append(name)
-    return [
-        f"{' and '.join(names)} are one FMU, {path.name}, of which a process may hold one instance only "
-        "(canBeInstantiatedOnlyOncePerProcess)"
-        for path, names in placed.items()
-        if len(names) > 1
-    ]
 
 
 def mismatch(a: FmuPort, b: FmuPort, transformation: LinearTransformation | None = None) -> str | None:

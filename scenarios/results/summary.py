@@ -259,8 +259,8 @@ def begun_run(task: Task, master: Master) -> RunData:
     faults = [f"{path.name}: {fault}" for path, fault in master.description_faults.items()]
     if warned := [*faults, *master.system.tolerated, *master.system.undefined_starts, *master.execution_tools]:
         of_this_run["warnings"] = warned
-    if master.system.notes:
-        of_this_run["notes"] = master.system.notes
+    if notes := [*master.system.notes, *master.isolations]:
+        of_this_run["notes"] = notes
     if outside := [str(end) for end in master.system.externals]:
         of_this_run["external_inputs"] = outside
     return _run_data(task, fmus, of_this_run)

@@ -89,7 +89,7 @@ def test_all_faults_are_reported_together(tmp_path: Path):
     ("flag", "wanted"),
     [
         ("needsExecutionTool", "needs other software"),
-        ("canBeInstantiatedOnlyOncePerProcess", "can be in a system only once"),
+        ("canBeInstantiatedOnlyOncePerProcess", "allows one instance in a process"),
     ],
 )
 def test_what_a_unit_needs_is_noted(tmp_path: Path, flag: str, wanted: str):

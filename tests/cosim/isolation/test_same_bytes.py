@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import checkpointed_runs
+import decay
+import numpy as np
 import pytest
 from both_paths import Build, everything
 from fmu_of import FmuOf
@@ -14,11 +16,13 @@ from native_units import native_fmu
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.master.checkpoint import take_checkpoint
 from handover.cosim.master.master import Master
+from handover.cosim.master.unit_options import isolated_units
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 
+ONCE = ("<CoSimulation ", '<CoSimulation canBeInstantiatedOnlyOncePerProcess="true" ')
 SECOND = Fraction(1)
 TENTH = Fraction(1, 10)
 OPTIONS = {
@@ -169,3 +173,30 @@ def test_a_run_that_is_resumed(into: tuple[str, ...], options: dict[str, Any], t
             skipped = iter([True])
             master.run(SECOND, [lambda t, y: None if next(skipped, False) else recorder(t, y)])
     assert rest.read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.parametrize("isolated", [(), ("right",), ("foreign",)])
+def test_units_that_a_process_may_hold_once_are_isolated_by_themselves(
+    decay_library: bytes, tmp_path: Path, isolated: tuple[str, ...]
+):
+    """x' = -x + u: what one keeps in global memory would be the other's, too."""
+    description = decay.spoilt("shares_memory").replace(*ONCE)
+    fmu, plain = decay.pack(tmp_path / "once.fmu", decay_library, description), native_fmu("integrator", 2)
+    system = System()
+    for name, u in (("left", 0.0), ("right", 3.0)):
+        system.add(name, fmu, u=u)
+    system.add("other", plain)
+    assert isolated_units(system, isolated) == {"left", "right"} | ({"other"} if isolated == ("foreign",) else set())
+    with Master(system, MasterOptions(isolated=isolated)) as master:
+        assert ["left and right are one FMU, once.fmu" in line for line in master.isolations] == [True]
+        master.run(SECOND)
+        found = [master.signals.plain(f"{name}.y") for name in ("left", "right")]
+    assert found == pytest.approx([np.exp(-1.0), 3.0 - 2.0 * np.exp(-1.0)])
+
+
+def test_one_unit_that_a_process_may_hold_once_stays_in_this_process(decay_library: bytes, tmp_path: Path):
+    system = System()
+    system.add("one", decay.pack(tmp_path / "once.fmu", decay_library, decay.DESCRIPTION.replace(*ONCE)))
+    system.add("sound", decay.pack(tmp_path / "sound.fmu", decay_library))
+    system.add("other", decay.pack(tmp_path / "sound.fmu", decay_library))
+    assert isolated_units(system, ()) == frozenset()

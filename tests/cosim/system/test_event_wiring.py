@@ -54,19 +54,6 @@ def test_a_unit_with_clocked_ports_is_not_taken_for_a_sampled_one():
     assert describe_fmu(native_fmu("discrete_passer", canHandleVariableCommunicationStepSize=False)).sampled
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_of_some_units_a_process_holds_one_only(fmi: int):
-    s = System()
-    fmu = native_fmu("integrator", fmi, canBeInstantiatedOnlyOncePerProcess=True)
-    for name in ("left", "right"):
-        s.add(name, fmu)
-    s.add("other", native_fmu("integrator", fmi))
-    assert faults_of(s) == (
-        f"left and right are one FMU, {fmu.name}, of which a process may hold one instance only "
-        "(canBeInstantiatedOnlyOncePerProcess)",
-    )
-
-
 def test_a_clock_that_never_ticks_is_no_clock(tmp_path: Path):
     file = edited(tmp_path / "never.fmu", native_fmu("counter_tenths"), 'intervalCounter="1"', 'intervalCounter="0"')
     with pytest.raises(InvalidFmu, match=r"its clock 'tick' ticks every 0 s from 0 s on"):
