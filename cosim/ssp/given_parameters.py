@@ -89,6 +89,13 @@ def settable_parameters(
             yield from settable_parameters(element, descriptions, here)
 
 
+def named_parameter(
+    known: Mapping[str, SettableParameter], descriptions: Mapping[str, FmuDescription], name: str
+) -> SettableParameter | None:
+    """Return the parameter of a name, which is that of an entry of an array too, or of a variable; None for none."""
+    return known.get(name) or _entry(descriptions, name)
+
+
 def named_parameters(
     known: Mapping[str, SettableParameter], descriptions: Mapping[str, FmuDescription], texts: Mapping[str, str]
 ) -> tuple[dict[tuple[str, str], SspValue], list[str]]:
@@ -100,7 +107,7 @@ def named_parameters(
     values: dict[tuple[str, str], SspValue] = {}
     faults: list[str] = []
     for name, text in texts.items():
-        parameter = known.get(name) or _entry(descriptions, name)
+        parameter = named_parameter(known, descriptions, name)
         if parameter is None:
             faults.append(f"no parameter {name!r}; {nearest(name, known)}")
         else:

@@ -19,11 +19,16 @@ from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describ
 from handover.cosim.ssp.archive import SspArchive
 from handover.cosim.ssp.connected_ports import find_entry, split_arrays
 from handover.cosim.ssp.flattening import FlatConnection, FlatSystem, Node, components_of, flatten
-from handover.cosim.ssp.given_parameters import SettableParameter, named_parameters, settable_parameters
+from handover.cosim.ssp.given_parameters import (
+    SettableParameter,
+    named_parameter,
+    named_parameters,
+    settable_parameters,
+)
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.ssp.reading import read_structure
 from handover.cosim.ssp.start_values import start_values
-from handover.cosim.ssp.structure import SspComponent, SspConnector, SspNestedSystem, SspStructure
+from handover.cosim.ssp.structure import SspComponent, SspConnector, SspStructure
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import PlacedUnit, PortName, System
 
@@ -185,13 +190,9 @@ class SspFile:
         """Where its FMUs are unpacked until it is closed."""
         try:
             archive.unpack(self.folder)
-            descriptions = self._describe({n: c.member for n, c in components_of(structure.system)})
-            asked = self._named(structure.system, descriptions, parameters) if parameters else {}
-            flat = flatten(structure.system, descriptions, asked)
-            steps = {n: step or c.period or _stated_step(c, structure) for n, c in flat.components.items()}
-            self.system = self._build(flat, descriptions, steps, structure.unsupported, duration or self.stop)
-            self.system.notes += _notes_on_steps(step, structure.step, self.system.units.values())
-            self._flat, self._structure, self._descriptions = flat, structure, descriptions
+            self._structure, self._step, self._duration = structure, step, duration or self.stop
+            self._descriptions = self._describe({n: c.member for n, c in components_of(structure.system)})
+            self._flat, self.system = self._with(parameters)
         except BaseException:
             self.close()
             raise
@@ -199,8 +200,27 @@ class SspFile:
     @property
     def parameters(self) -> dict[str, FmuPort]:
         """Parameters of components and of systems by the names by which they are given, starting from their values."""
-        known = settable_parameters(self._structure.system, self._descriptions)
-        return {p.full_name: p.described(self._value(p)) for p in known}
+        return {name: p.described(self._value(p)) for name, p in self._settable().items()}
+
+    def port(self, name: str) -> FmuPort | None:
+        """Return the declaration of a parameter by the name by which it is given; None if there is none.
+
+        Besides `parameters`, these are entries of arrays, and outputs and local variables with start values.
+        """
+        found = named_parameter(self._settable(), self._descriptions, name)
+        if found is None:
+            return None
+        port, declared = found.described(None), found.declared
+        is_entry = isinstance(declared, FmuPort) and declared.name != found.name
+        return replace(port, shape=()) if is_entry else port
+
+    def faults(self, parameters: Mapping[str, str]) -> Sequence[str]:
+        """Return what would be wrong with the file if it were opened with values of parameters."""
+        try:
+            self._with(parameters)
+        except InvalidSsp as e:
+            return e.faults
+        return ()
 
     def close(self) -> None:
         """Remove the unpacked FMUs."""
@@ -224,6 +244,23 @@ class SspFile:
             except InvalidFmu as e:
                 raise InvalidSsp(self.path, [f"{member}: {e.fault}"]) from e
         return {name: described[member] for name, member in members.items()}
+
+    def _with(self, parameters: Mapping[str, str]) -> tuple[FlatSystem, System]:
+        """Return the system with values of parameters, flat and as the master runs it.
+
+        Raises:
+            InvalidSsp: with all that is wrong with it.
+        """
+        structure, descriptions = self._structure, self._descriptions
+        asked = self._named(parameters) if parameters else {}
+        flat = flatten(structure.system, descriptions, asked)
+        steps = {n: self._step or c.period or _stated_step(c, structure) for n, c in flat.components.items()}
+        system = self._build(flat, descriptions, steps, structure.unsupported, self._duration)
+        system.notes += _notes_on_steps(self._step, structure.step, system.units.values())
+        return flat, system
+
+    def _settable(self) -> dict[str, SettableParameter]:
+        return {p.full_name: p for p in settable_parameters(self._structure.system, self._descriptions)}
 
     def _build(
         self,
@@ -261,12 +298,9 @@ class SspFile:
             raise InvalidSsp(self.path, unsupported)
         return system
 
-    def _named(
-        self, system: SspNestedSystem, descriptions: Mapping[str, FmuDescription], texts: Mapping[str, str]
-    ) -> dict[Node, SspValue]:
+    def _named(self, texts: Mapping[str, str]) -> dict[Node, SspValue]:
         """Return the values of parameters that a call gives."""
-        known = {p.full_name: p for p in settable_parameters(system, descriptions)}
-        asked, faults = named_parameters(known, descriptions, texts)
+        asked, faults = named_parameters(self._settable(), self._descriptions, texts)
         if faults:
             raise InvalidSsp(self.path, faults)
         return asked

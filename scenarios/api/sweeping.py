@@ -32,13 +32,14 @@ from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.pool_config import LazyPool, PoolConfig
 from handover.scenarios.campaign.worker_pool import RunCounts
 from handover.scenarios.execution.errors import require_extra
-from handover.scenarios.execution.request import RunRequest, check_subject
-from handover.scenarios.execution.selection import find_scenario, path_of_class
+from handover.scenarios.execution.file_experiment import settable_of
+from handover.scenarios.execution.request import RunRequest, check_subject, experiment_type
+from handover.scenarios.execution.selection import path_of_class
 from handover.scenarios.experiment.experiment import Experiment
 
 
 def sweep(
-    scenario: str | type[Experiment[Any]],
+    scenario: str | Path | type[Experiment[Any]],
     /,
     *,
     seeds: int = 1,
@@ -47,6 +48,8 @@ def sweep(
     units: Mapping[str, Path | str | Sequence[Path | str]] | None = None,
     out: Path | str | None = None,
     stop: Seconds | None = None,
+    step: Seconds | None = None,
+    inputs: Path | str | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     algorithm: str | Algorithm | None = None,
@@ -64,7 +67,8 @@ def sweep(
     is done.
 
     Args:
-        scenario: its name, or its class in a module, from which each run's process imports it.
+        scenario: its name, or its class in a module, from which each run's process imports it; or the path of an
+            `.ssp` or `.fmu` file.
         seeds: runs of each combination.
         seed: of the campaign, from which those of the runs follow.
         paired: whether all combinations get the same seeds, so that they can be compared run by run.
@@ -72,6 +76,8 @@ def sweep(
             a list varies the unit.
         out: the folder of the campaign.
         stop: as of `handover.run`.
+        step: likewise.
+        inputs: likewise.
         workers: runs at the same time, by default one a core.
         scheduler: address of a Dask scheduler whose workers do the runs.
         algorithm: as of `handover.run`.
@@ -93,12 +99,21 @@ def sweep(
         if workers is not None and scheduler is not None:
             raise InvalidInput("workers and scheduler: a scheduler has workers of its own; one of both is right")
         name = _name_of(scenario)
-        RunRequest(subject=name).check_sweepable()
-        experiment = find_scenario(name)
-        shapes = {v.name: v.shape for v in experiment.parameters()}
+        common = RunRequest(
+            subject=name,
+            seed=whole_number("seed", seed),
+            units=unit_texts(units),
+            stop=exact("stop", stop),
+            step=exact("step", step),
+            inputs=None if inputs is None else Path(inputs),
+        )
+        common.check_options()
+        experiment = experiment_type(name, common.stop, common.step, common.inputs)
+        declared = experiment.parameters() if (settable := settable_of(experiment)) is None else settable.ports.values()
+        shapes = {v.name: v.shape for v in declared}
         varied = {name: value for name, value in given.items() if _is_varied(value, shapes.get(name, ()))}
         texts = [f"{name}={_values_text(value, shapes.get(name, ()))}" for name, value in varied.items()]
-        kept_units, choices = split_units(experiment, unit_texts(units))
+        kept_units, choices = split_units(experiment, common.units)
         points = vary_units(parse_grid(experiment, texts), choices)
         fixed = texts_of({name: value for name, value in given.items() if name not in varied})
         plan = CampaignPlan(
@@ -106,12 +121,14 @@ def sweep(
             points=points,
             fixed=set_parameters(experiment, fixed, points),
             repetitions=whole_number("seeds", seeds, 1),
-            seed=whole_number("seed", seed),
+            seed=common.seed,
             paired=paired,
             units=kept_units,
             varied_units=tuple(choices),
             options=master_options(options, algorithm, isolate),
-            stop=exact("stop", stop),
+            stop=common.stop,
+            step=common.step,
+            inputs=common.inputs,
         )
         return _carried_out(plan, None if out is None else Path(out), PoolConfig(workers, scheduler), progress)
 
@@ -122,6 +139,8 @@ def _name_of(scenario: object) -> str:
     Raises:
         UsageError: it is none. InvalidInput: it is a class that they cannot find.
     """
+    if isinstance(scenario, Path):
+        return str(scenario)
     check_subject(scenario)
     if isinstance(scenario, type):
         path = path_of_class(cast(type[Experiment[Any]], scenario))
@@ -132,7 +151,7 @@ def _name_of(scenario: object) -> str:
             )
         return path
     if not isinstance(scenario, str):
-        raise InvalidInput("a system has no parameters that could be swept; a scenario has")
+        raise InvalidInput("a system has no parameters that could be swept; a scenario, an SSP or an FMU has")
     return scenario
 
 

@@ -13,7 +13,6 @@ from handover.scenarios.campaign.plan_check import PreparedPlan
 from handover.scenarios.campaign.table import CampaignTable, RunRow, row_of
 from handover.scenarios.campaign.table_writer import TableWriter
 from handover.scenarios.campaign.worker_pool import JobResult, OnRunCounts, RunCounts, RunJob, WorkerPool
-from handover.scenarios.catalog import ScenarioSource
 from handover.scenarios.results.run_folder import disk_errors_reported
 
 SignalsDeferred = Callable[[], contextlib.AbstractContextManager[None]]
@@ -59,7 +58,7 @@ class _CampaignState:
     def __init__(self, plan: CampaignPlan, folder: CampaignFolder, progress: OnRunCounts) -> None:
         self.plan, self.folder, self.progress = plan, folder, progress
         self.table = TableWriter(plan, folder.table)
-        self._source = ScenarioSource.of(plan.scenario)
+        self._source = plan.source
         self.runs = {run.name: run for run in plan.runs()}
         self._count = Counter[str]()
         self._kept = self._keep(self.runs.values())
@@ -110,15 +109,18 @@ class _CampaignState:
         return sorted(missing, key=lambda run: run.repetition)
 
     def _job(self, run: PlannedRun, fmus: Mapping[str, Path]) -> RunJob:
+        file, inputs, units = self.plan.file, self.plan.inputs, self.plan.fmus(run.point, fmus)
         return RunJob(
             name=run.name,
-            scenario=self.plan.scenario,
+            scenario=self.plan.scenario if file is None else str(units.pop(file.stem)),
             parameters=tuple(self.plan.texts(run.point)),
             seed=run.seed,
-            fmus={unit: str(path) for unit, path in self.plan.fmus(run.point, fmus).items()},
+            fmus={unit: str(path) for unit, path in units.items()},
             runs=str(self.folder.runs.absolute()),
             options=self.plan.options,
             stop=self.plan.stop,
+            step=self.plan.step,
+            inputs="" if inputs is None else str(self.folder.fmus.absolute() / inputs.name),
             log_level=self.plan.log_level,
             modules="" if self._source is None else self._source.folder,
         )

@@ -16,7 +16,7 @@ from typing import Any
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.scenarios.campaign.identity import differences, identity_of
 from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun, safe_name
-from handover.scenarios.catalog import named_scenario
+from handover.scenarios.execution.file_experiment import settable_of
 from handover.scenarios.execution.unit_values import is_unit_value
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
@@ -140,6 +140,8 @@ class CampaignFolder:
                 self.fmus.mkdir(exist_ok=True)
                 self._remove_unfinished()
                 copies = {unit: self._copy(unit, path, fmus) for unit, path in fmus.items()}
+                if plan.inputs is not None:
+                    self._copy("input", plan.inputs, fmus)
             yield copies
 
     def is_done(self, run: PlannedRun) -> bool:
@@ -200,7 +202,7 @@ class CampaignFolder:
 
     def _write(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
         """Write `campaign.json`, before anything else is there: without it, the campaign could not be resumed."""
-        experiment = named_scenario(plan.scenario)
+        experiment = plan.kind
         display = {"title": experiment.title, "headline": list(experiment.headline), "platform": platform.platform()}
         content = {**identity_of(plan, fmus), **display, PARAMETER_UNITS: _parameter_units(plan, fmus)}
         if not (self.path / _FILE).exists() or self.read() != content:
@@ -252,12 +254,15 @@ def default_folder(plan: CampaignPlan, fmus: Mapping[str, Path], opened: context
 
 
 def _stem(plan: CampaignPlan) -> str:
-    return plan.experiment or named_scenario(plan.scenario).name
+    return plan.experiment or Path(plan.kind.name).stem
 
 
 def _parameter_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, str]:
     """Return the units of measurement of the units' parameters that a plan sets, of any FMU in the unit's place."""
-    names = dict.fromkeys(n for values in (*plan.points, plan.fixed) for n in values if is_unit_value(n))
+    kind = plan.kind
+    names = dict.fromkeys(n for values in (*plan.points, plan.fixed) for n in values if is_unit_value(kind, n))
+    if (settable := settable_of(kind)) is not None:
+        return {name: port.unit.symbol for name in names if (port := settable.port(name)) is not None}
     units: dict[str, str] = {}
     for name in names:
         unit, _, parameter = name.partition(".")

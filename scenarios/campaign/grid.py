@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.blocks.variable import Causality, Kind, Variable
+from handover.cosim.blocks.variable import Causality, Declared, Kind, Variable
+from handover.cosim.fmu.file.description import FmuPort
 from handover.scenarios.campaign.plan import MAX_RUNS
+from handover.scenarios.execution.file_experiment import settable_of
 from handover.scenarios.execution.selection import replacements
 from handover.scenarios.execution.unit_values import is_unit_value, unit_values
 from handover.scenarios.experiment.experiment import Experiment
@@ -25,11 +27,12 @@ def parse_grid(experiment: type[Experiment[Any]], given: Sequence[str]) -> list[
     Raises:
         InvalidParameter: with every fault of the given texts.
     """
-    known = {v.name: v for v in experiment.parameters()}
+    known, settable = {v.name: v for v in experiment.parameters()}, settable_of(experiment)
     texts, faults = _texts_by_name(experiment, given, "name=v1,v2,... or name=START:STOP:N")
     axes: dict[str, list[str]] = {}
     for name, values in texts.items():
-        axes[name], axis_faults = _axis(known[name], values) if name in known else _axis_of_unit(name, values)
+        port = None if settable is None else settable.port(name)
+        axes[name], axis_faults = _axis(known[name], values) if name in known else _axis_of_unit(name, values, port)
         faults += [f"{name}: {fault}" for fault in axis_faults]
     points = math.prod(map(len, axes.values()))
     if points > MAX_RUNS:
@@ -50,9 +53,11 @@ def set_parameters(
     fixed, faults = _texts_by_name(experiment, given, "name=value")
     both = [name for name in fixed if any(name in point for point in varied)]
     faults += [f"{name} is varied and set by -p; one of both is right" for name in both]
-    known = {v.name: v for v in experiment.parameters()}
+    known, settable = {v.name: v for v in experiment.parameters()}, settable_of(experiment)
     for name, text in fixed.items():
-        if name in known and name not in both and _is_list(known[name], text):
+        port = None if settable is None else settable.port(name)
+        several = _is_list(known[name], text) if name in known else port is not None and _is_list_for(port, text)
+        if name not in both and several:
             faults.append(f"-p {name} takes one value; to vary it, give it without -p: {name}={text}")
     if faults:
         raise InvalidParameter(faults)
@@ -99,23 +104,33 @@ def _texts_by_name(
     experiment: type[Experiment[Any]], given: Sequence[str], form: str
 ) -> tuple[dict[str, str], list[str]]:
     """Return the texts of the scenario's and of its units' parameters in the order in which they are given."""
-    texts, faults = texts_by_name(experiment, [text for text in given if not is_unit_value(text)], form)
+    texts, faults = texts_by_name(experiment, [text for text in given if not is_unit_value(experiment, text)], form)
     try:
         texts |= unit_values(experiment, given)
     except InvalidParameter as e:
         faults += e.faults
-    order = [text.partition("=")[0] for text in given]
+    order = [text.partition("=")[0].strip() for text in given]
     return {name: texts[name] for name in dict.fromkeys(order) if name in texts}, faults
 
 
-def _axis_of_unit(name: str, text: str) -> tuple[list[str], list[str]]:
-    """Return the values of a unit's parameter as texts; what the unit takes is known only when its FMU is read."""
-    if text.count(":") == 2:
-        values, fault = _range(Variable(name=name, kind=Kind.REAL, causality=Causality.PARAMETER, start=0.0), text)
+def _axis_of_unit(name: str, text: str, port: FmuPort | None = None) -> tuple[list[str], list[str]]:
+    """Return the values of a unit's parameter as texts; what the unit takes is checked when its FMU is read.
+
+    Of a file's parameter there is the `port`: only numbers have ranges, and values of arrays stand between `;`.
+    """
+    declared = Declared(name=name, kind=Kind.REAL, causality=Causality.PARAMETER) if port is None else port
+    if text.count(":") == 2 and declared.kind in (Kind.REAL, Kind.INTEGER):
+        values, fault = _range(declared, text)
         return values, [fault] if fault else []
-    values = text.split(";" if ";" in text else ",")
+    values = text.split(";" if ";" in text or declared.shape else ",")
     faults = [f"{value} is given twice" for value in dict.fromkeys(values) if value and values.count(value) > 1]
     return values, [*faults, f"{text!r} has an empty item"] if "" in values else faults
+
+
+def _is_list_for(port: FmuPort, text: str) -> bool:
+    """Return whether a text is a list of several values of a file's parameter, and no single value."""
+    is_text = port.kind in (Kind.STRING, Kind.BINARY)
+    return not is_text and len(_axis_of_unit(port.name, text, port)[0]) > 1
 
 
 def _is_list(variable: Variable, text: str) -> bool:
@@ -153,7 +168,7 @@ def _axis(variable: Variable, text: str) -> tuple[list[str], list[str]]:
     return list(texts), list(dict.fromkeys(faults))
 
 
-def _range(variable: Variable, text: str) -> tuple[list[str], str | None]:
+def _range(variable: Declared, text: str) -> tuple[list[str], str | None]:
     """Return the values of `START:STOP:N`, rounded to 12 digits: 0.3, not 0.30000000000000004."""
     malformed = f"{text!r} is not of the form START:STOP:N"
     parts = text.split(":")

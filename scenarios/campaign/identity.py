@@ -7,7 +7,6 @@ from typing import Any, cast
 
 from handover.cosim.blocks.variable import Kind
 from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.catalog import ScenarioSource, named_scenario
 from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.results.run_folder import sha256_of, versions
 
@@ -24,12 +23,12 @@ _MAX_LENGTH = 60
 
 def identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
     """Return all that a campaign's numbers depend on, as JSON data; the plan is a checked one."""
-    source = ScenarioSource.of(plan.scenario)
+    source = plan.source
     options = {**plan.options.as_data(), "call_limit": plan.options.call_limit, "pace": plan.options.pace}
     files = _parameter_files(plan)
     return {
         "experiment": plan.experiment,
-        "scenario": plan.scenario,
+        "scenario": plan.scenario if plan.file is None else plan.file.name,
         **({} if source is None else {"source": asdict(source)}),
         "points": [dict(point) for point in plan.points],
         "fixed": dict(plan.fixed),
@@ -37,6 +36,7 @@ def identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
         "seed": plan.seed,
         "paired": plan.paired,
         "stop": None if plan.stop is None else str(plan.stop),
+        "step": None if plan.step is None else str(plan.step),
         "scenes": list(plan.scenes),
         **({"varied_units": list(plan.varied_units)} if plan.varied_units else {}),
         "units": {name: {"fmu": path.name, "sha256": sha256_of(path)} for name, path in fmus.items()},
@@ -47,13 +47,13 @@ def identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
 
 
 def _parameter_files(plan: CampaignPlan) -> dict[str, dict[str, str]]:
-    """Return names and hashes of all files that parameters of runs name, by their paths as they are given."""
-    experiment = named_scenario(plan.scenario)()
+    """Return names and hashes of all files that runs read besides FMUs, by their paths as they are given."""
+    experiment = plan.kind()
     # Names of files are texts, of which even many points have few: all others need not be parsed.
     of_text = {v.name for v in experiment.parameters() if v.kind is Kind.STRING} | {*experiment.unit_files}
     given = ({**plan.fixed, **point} for point in plan.points)
     texts = {tuple(f"{n}={text}" for n, text in values.items() if n in of_text) for values in given}
-    files: set[Path] = set()
+    files: set[Path] = set() if plan.inputs is None else {plan.inputs}
     for values in texts - {()}:
         files.update(experiment.files_read(*split_parameters(type(experiment), values)).values())
     there = [file for file in sorted(files) if file.is_file()]

@@ -5,10 +5,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from handover.cosim.stepping.options import MasterOptions
+from handover.scenarios.catalog import ScenarioSource
+from handover.scenarios.execution.request import experiment_type, is_file
+from handover.scenarios.experiment.experiment import Experiment
 
 MAX_RUNS = 100_000
 """Runs of a campaign: more of them are likelier a typing error than intended."""
@@ -44,7 +48,7 @@ class CampaignPlan:
     """Points times repetitions.
 
     Attributes:
-        scenario: its name.
+        scenario: its name, or the path of an SSP or an FMU.
         points: what is varied, a mapping of parameters' names to values, as texts, for each point.
         fixed: parameters that are the same in all runs, likewise.
         repetitions: runs of each point.
@@ -56,7 +60,9 @@ class CampaignPlan:
         varied_units: units that points give other FMUs; a point names the file or the block by the unit's name, or
             leaves it as it is in the other runs.
         options: how units are run.
-        stop: when each run ends, s; None: as the scenario says.
+        stop: when each run ends, s; None: as the scenario or the file says.
+        step: of all units of an SSP or FMU, s; None: as they propose.
+        inputs: a file of inputs over time, of an FMU.
         log_level: from which level on each run's log.txt has logs, see `logging_to_standard_error`.
         experiment: name of the published experiment that it belongs to; "" if to none.
     """
@@ -72,8 +78,29 @@ class CampaignPlan:
     varied_units: Sequence[str] = ()
     options: MasterOptions = field(default_factory=MasterOptions)
     stop: Fraction | None = None
+    step: Fraction | None = None
+    inputs: Path | None = None
     log_level: str | None = None
     experiment: str = ""
+
+    @property
+    def kind(self) -> type[Experiment[Any]]:
+        """The scenario, or the file as one.
+
+        Raises:
+            UsageError, CosimError: there is no such scenario, or the file cannot be run.
+        """
+        return experiment_type(self.scenario, self.stop, self.step, self.inputs)
+
+    @property
+    def file(self) -> Path | None:
+        """The SSP or the FMU; None of a scenario."""
+        return Path(self.scenario) if is_file(self.scenario) else None
+
+    @property
+    def source(self) -> ScenarioSource | None:
+        """Where the scenario is found again; None of one of this package, and of a file."""
+        return None if self.file else ScenarioSource.of(self.scenario)
 
     @property
     def size(self) -> int:
@@ -89,7 +116,11 @@ class CampaignPlan:
         """Return the FMU of each unit at a point, out of a campaign's FMUs, in which varied units have `unit_key`."""
         given = self.points[point]
         own = {unit: fmus[unit_key(unit, given[unit])] for unit in self.varied_units if unit in given}
-        return {name: path for name, path in fmus.items() if "=" not in name} | own
+        return {name: path for name, path in fmus.items() if not self._is_varied(name)} | own
+
+    def _is_varied(self, key: str) -> bool:
+        unit, equals, _ = key.partition("=")
+        return bool(equals) and unit in self.varied_units
 
     def runs(self) -> tuple[PlannedRun, ...]:
         """Return the runs, point by point.

@@ -10,8 +10,8 @@ from handover.cosim.master.master import Master
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.campaign.plan import MAX_REPETITIONS, MAX_RUNS, CampaignPlan, unit_key
-from handover.scenarios.execution.selection import find_scenario, replacements, select_fmus
-from handover.scenarios.execution.unit_values import built_system, is_unit_value, set_values, split_parameters
+from handover.scenarios.execution.selection import replacements, select_fmus
+from handover.scenarios.execution.unit_values import built_system, check_value, is_unit_value, split_parameters
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, text_of
 from handover.scenarios.results.tolerated_faults import scenario_code
@@ -57,7 +57,7 @@ def checked_plan(plan: CampaignPlan) -> CampaignPlan:
         UsageError: there is no such scenario.
         InvalidParameter: it has too many runs or none, or values that are invalid by themselves or together.
     """
-    experiment = find_scenario(plan.scenario)
+    experiment = plan.kind
     _check_size(plan)
     faults: dict[str, None] = {}
     fixed: dict[str, str] = {}
@@ -83,10 +83,14 @@ def checked_plan(plan: CampaignPlan) -> CampaignPlan:
 def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
     """Return the FMU of each unit: that of the plan, or the catalog's. Of units that are varied, all by `unit_key`.
 
+    Of a campaign of a file it is the file, by its name.
+
     Raises:
         UsageError: the plan names a unit that the scenario does not have, or the catalog's unit cannot be built.
     """
-    experiment = find_scenario(plan.scenario)
+    if plan.file is not None:
+        return {plan.file.stem: plan.file}
+    experiment = plan.kind
     others = replacements(experiment, [f"{name}={other}" for name, other in plan.units.items()])
     fmus: dict[str, Path] = {}
     for chosen in dict.fromkeys(_chosen_units(plan, point) for point in plan.points):
@@ -111,9 +115,8 @@ def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
         InvalidFmu, WiringError, ScheduleError: they do not make it up. ScenarioFailed: the scenario's own code did.
         InvalidParameter: a unit does not take the value of a parameter.
     """
-    experiment = find_scenario(plan.scenario)
-    instance = experiment()
-    parameters, _ = split_parameters(experiment, plan.texts(0))
+    instance = plan.kind()
+    parameters, _ = split_parameters(type(instance), plan.texts(0))
     with scenario_code(instance):
         instance.evaluator(parameters)
         instance.stop_time(parameters)
@@ -130,12 +133,12 @@ def _check_unit_values(
     experiment: Experiment[Any], system: System, plan: CampaignPlan, points: Sequence[Mapping[str, str]]
 ) -> None:
     """Check each value of a unit's parameter that the plan has for the points with the system's units."""
-    given = [item for values in (plan.fixed, *points) for item in values.items() if is_unit_value(item[0])]
+    kind = type(experiment)
+    given = [item for values in (plan.fixed, *points) for item in values.items() if is_unit_value(kind, item[0])]
     faults: dict[str, None] = {}
     for name, value in dict.fromkeys(given):
         try:
-            set_values(system, {name: value})
-            experiment.check_unit_values(system, [name])
+            check_value(experiment, system, name, value)
         except InvalidParameter as e:
             faults |= dict.fromkeys(e.faults)
     if faults:

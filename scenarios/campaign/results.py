@@ -129,10 +129,14 @@ class CampaignResults:
     @cached_property
     def headline(self) -> tuple[str, ...]:
         """Columns of the metrics that are shown first, in their order: those that any run has, without CPU time."""
-        experiment = self.experiment
-        first = () if experiment is None else experiment.headline or self.measured
+        first = self._first_metrics or self.measured
         columns = [n if n in self.table.metrics else f"{n}_metric" for n in first]
         return tuple(n for n in columns if n in self.measured and not n.startswith(("cpu_", "pace_")))
+
+    @property
+    def _first_metrics(self) -> Sequence[str]:
+        """What the scenario, or the file, names as its headline."""
+        return self.metadata.get("headline", ()) if self.experiment is None else self.experiment.headline
 
     @property
     def shown_metrics(self) -> tuple[str, ...]:
@@ -142,8 +146,7 @@ class CampaignResults:
     @cached_property
     def measured(self) -> tuple[str, ...]:
         """Columns of the metrics that any run has a value of, the headline's first and those of the cost last."""
-        experiment = self.experiment
-        first = [] if experiment is None else list(experiment.headline)
+        first = list(self._first_metrics)
 
         def place(name: str) -> tuple[int, int]:
             if name.startswith(("cpu_", "pace_", "peak_memory")):

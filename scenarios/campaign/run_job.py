@@ -17,9 +17,8 @@ from handover.scenarios.catalog import search_folder
 from handover.scenarios.execution.errors import one_line_errors
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import logging_to_standard_error
+from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import run_task
-from handover.scenarios.execution.selection import find_scenario, own_source
-from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.results.run_folder import RunFolder, is_full
 from handover.scenarios.results.summary import ElapsedTime, unstarted_run, unstarted_summary
 from handover.scenarios.results.task import Task
@@ -32,19 +31,21 @@ def run_job(job: RunJob, folder: Path) -> None:
     """Run a job into a folder, without figures or a report; if it cannot begin, the folder says why.
 
     Raises:
-        As `run_task` and `split_parameters`, without `_REFUSALS`. UsageError: there is no such scenario.
+        As `run_task` and `RunRequest.open`, without `_REFUSALS`.
     """
-    task, clock = _task(job, folder), ElapsedTime().clock()
-    try:
-        with logging_to_standard_error(job.log_level):
-            run_task(task, lambda _t, _end: None, Interruption())
-    except _REFUSALS as e:
-        _write_refusal(task, e, clock())
+    with contextlib.ExitStack() as opened:
+        task, clock = _task(job, folder, opened), ElapsedTime().clock()
+        try:
+            with logging_to_standard_error(job.log_level):
+                run_task(task, lambda _t, _end: None, Interruption())
+        except _REFUSALS as e:
+            _write_refusal(task, e, clock())
 
 
 def record_failed_job(job: RunJob, folder: Path, failure: UnitFailure, spent: ElapsedTime) -> None:
     """Write the folder of a run whose process crashed while a unit was loaded or initialised."""
-    _write_refusal(_task(job, folder), failure, spent)
+    with contextlib.ExitStack() as opened:
+        _write_refusal(_task(job, folder, opened), failure, spent)
 
 
 def _write_refusal(task: Task, refusal: CosimError, spent: ElapsedTime) -> None:
@@ -53,20 +54,26 @@ def _write_refusal(task: Task, refusal: CosimError, spent: ElapsedTime) -> None:
     task.folder.write_summary(unstarted_summary(task, refusal, spent))
 
 
-def _task(job: RunJob, folder: Path) -> Task:
+def _task(job: RunJob, folder: Path, opened: contextlib.ExitStack) -> Task:
     search_folder(job.modules)
-    experiment = find_scenario(job.scenario)
-    parameters, values = split_parameters(experiment, job.parameters)
+    request = RunRequest(
+        subject=job.scenario,
+        parameters=job.parameters,
+        stop=job.stop,
+        step=job.step,
+        inputs=Path(job.inputs) if job.inputs else None,
+    )
+    asked = request.open(opened)
     return Task(
-        experiment=experiment(),
-        parameters=parameters,
-        unit_values=values,
+        experiment=asked.experiment,
+        parameters=asked.parameters,
+        unit_values=asked.unit_values,
         seed=job.seed,
         fmus={name: Path(path) for name, path in job.fmus.items()},
         folder=RunFolder(folder),
         options=job.options,
-        stop=job.stop,
-        source=own_source(job.scenario),
+        stop=asked.stop,
+        source=asked.source,
         presented=False,
     )
 

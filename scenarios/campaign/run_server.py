@@ -85,7 +85,7 @@ class RunServer:
         with contextlib.suppress(ImportError):  # without it pyarrow goes by itself
             importlib.import_module("pandas")  # pyarrow does as a record is looked through: a tenth of a short run
         load_units(job.scenario)
-        for path in job.fmus.values():
+        for path in (*job.fmus.values(), job.scenario):
             with contextlib.suppress(Exception):  # whoever runs it says what is wrong with it
                 load_modules(Path(path))
         gc.collect()

@@ -7,6 +7,7 @@ import contextlib
 import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +15,17 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from handover.cosim.blocks.units import ONE
 from handover.cosim.blocks.variable import Causality, Kind, Variable
+from handover.cosim.exceptions import CosimError
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan, is_number
 from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable, RunRow, row_of
 from handover.scenarios.catalog import scenario_of
 from handover.scenarios.execution.errors import UsageError
-from handover.scenarios.execution.selection import find_scenario
+from handover.scenarios.execution.file_experiment import settable_of
+from handover.scenarios.execution.request import is_file
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_value
 from handover.scenarios.results.run_folder import (
@@ -152,7 +156,7 @@ def _of_run(row: RunRow, name: str) -> Any:
 
 def _set_parameters(plan: CampaignPlan) -> list[Variable]:
     """Return the parameters that the plan sets at any point, those that are varied first."""
-    known = {v.name: v for v in find_scenario(plan.scenario).parameters()}
+    known = {v.name: v for v in plan.kind.parameters()}
     names = dict.fromkeys([*(name for point in plan.points for name in point), *plan.fixed])
     return [known[name] if name in known else _of_unit(plan, name) for name in names]
 
@@ -164,8 +168,11 @@ def _of_unit(plan: CampaignPlan, name: str) -> Variable:
         return Variable(name=name, kind=Kind.STRING, causality=Causality.PARAMETER, description=described, start="")
     texts = [text for point in range(len(plan.points)) if (text := _text(plan, point, name)) is not None]
     kind, start = (Kind.REAL, math.nan) if all(map(is_number, texts)) else (Kind.STRING, "")
-    described = "value of the unit's parameter"
-    return Variable(name=name, kind=kind, causality=Causality.PARAMETER, description=described, start=start)
+    settable = settable_of(plan.kind)
+    port = None if settable is None else settable.port(name)
+    described = port.description if port is not None and port.description else "value of the unit's parameter"
+    unit = ONE if port is None else port.unit
+    return Variable(name=name, kind=kind, causality=Causality.PARAMETER, description=described, unit=unit, start=start)
 
 
 def _text(plan: CampaignPlan, point: int, name: str) -> str | None:
@@ -213,7 +220,7 @@ def rebuild_table(folder: CampaignFolder) -> None:
         InvalidRunFolder: there is no `campaign.json`, or it cannot be read.
         RecordNotWritten: the disk is full.
     """
-    plan = _plan_of(folder.read())
+    plan = _plan_of(folder)
     if plan is None:
         return
     with contextlib.ExitStack() as held:
@@ -225,17 +232,23 @@ def rebuild_table(folder: CampaignFolder) -> None:
         _complete(folder, plan)
 
 
-def _plan_of(metadata: Mapping[str, Any]) -> CampaignPlan | None:
+def _plan_of(folder: CampaignFolder) -> CampaignPlan | None:
     """Return the plan that `campaign.json` describes; None if it is another version's or damaged."""
+    metadata = folder.read()
     if metadata.get("versions") != versions():
         return None
     try:
-        if scenario_of(metadata["scenario"], metadata.get("source", {})) is None:
+        known: dict[str, Any] = {name: metadata[name] for name in _PLAN_KEYS}
+        times: dict[str, Any] = {
+            name: Fraction(metadata[name]) for name in ("stop", "step") if metadata.get(name) is not None
+        }
+        if is_file(known["scenario"]):
+            known["scenario"] = str(folder.fmus / known["scenario"])
+        elif scenario_of(known["scenario"], metadata.get("source", {})) is None:
             return None
-        varied_units = metadata.get("varied_units", ())
-        return checked_plan(CampaignPlan(**{name: metadata[name] for name in _PLAN_KEYS}, varied_units=varied_units))
-    except (UsageError, InvalidParameter, LookupError, TypeError, ValueError, AttributeError):  # the page reports it
-        return None
+        return checked_plan(CampaignPlan(**known, **times, varied_units=metadata.get("varied_units", ())))
+    except (UsageError, CosimError, InvalidParameter, LookupError, TypeError, ValueError, AttributeError):
+        return None  # the page reports it
 
 
 def _complete(folder: CampaignFolder, plan: CampaignPlan) -> None:

@@ -22,12 +22,13 @@ class RunJob:
     Attributes:
         name: of the run's folder in `runs`. While it runs, its files are in a folder of another name beside it, which
             is renamed when the run has ended, so that a folder of this name is complete.
-        scenario, parameters, seed: what to run; parameters are texts `name=value`.
+        scenario, parameters, seed: what to run; parameters are texts `name=value`. Of an SSP or an FMU, `scenario` is
+            the path of its copy.
         modules: folder in which the scenario's module is; "" if it is installed.
         fmus: the FMU of each unit.
         runs: the campaign's folder of runs.
         options: how units are run.
-        stop: when the run ends, s; None: as the scenario says.
+        stop, step, inputs: as of `RunRequest`; "" for no inputs.
         log_level: from which level on its log has logs, see `logging_to_standard_error`.
     """
 
@@ -40,6 +41,8 @@ class RunJob:
     options: MasterOptions
     modules: str = ""
     stop: Fraction | None = None
+    step: Fraction | None = None
+    inputs: str = ""
     log_level: str | None = None
 
 

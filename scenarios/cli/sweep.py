@@ -26,9 +26,9 @@ from handover.scenarios.cli.options import (
     scenario_options,
     stop_option,
 )
+from handover.scenarios.cli.run import file_options
 from handover.scenarios.execution.errors import one_line_errors, require_extra
-from handover.scenarios.execution.request import RunRequest
-from handover.scenarios.execution.selection import find_scenario
+from handover.scenarios.execution.request import RunRequest, experiment_type
 
 _HELP = """Run a SCENARIO many times: all combinations of the given values, each --repeat times.
 
@@ -39,11 +39,15 @@ NAME=VALUES is a list or a range of numbers:
   servo.alpha_0=0.1,0.2   a parameter of the unit servo, whatever FMU it is
   --unit servo=a.fmu,b.fmu  the unit itself, by files or MODULE:CLASS
 
+Parameters of FILE.fmu have its own names, those of FILE.ssp are UNIT.NAME or its own, as for `handover run -p`; results
+are the last, smallest and largest value of each output.
+
 \b
 Examples
   handover sweep ir_grasp strategy=reflex,blind,forward --repeat 20 --paired
   handover sweep helix_handover alpha=0.1:0.4:4 -p patience=30 --out alphas
   handover sweep flyer_impedance force=1:20:10 --scheduler tcp://10.0.0.5:8786
+  handover sweep x.fmu m=1,2,4 k=0:20:5 -p f=1 --stop 10
 
 The folder of a campaign has a folder for each run in runs/, and runs.parquet with a row for each: parameters, seed,
 success, metrics. The table is written as results come.
@@ -68,7 +72,7 @@ Exit status
 
 
 @click.command("sweep", cls=ConfiguredCommand, help=_HELP, context_settings={"show_default": True})
-@click.argument("scenario", metavar="SCENARIO")
+@click.argument("scenario", metavar="SCENARIO|FILE.ssp|FILE.fmu")
 @click.argument("grid", nargs=-1, metavar="[NAME=VALUES]...")
 @click.option("--repeat", type=WholeNumber(1, MAX_REPETITIONS), default=1, help="Runs of each combination.")
 @click.option(
@@ -80,6 +84,7 @@ Exit status
 @stop_option
 @log_option
 @campaign_options
+@file_options
 @master_options
 @limit_options
 def sweep(
@@ -97,6 +102,8 @@ def sweep(
     workers: int | None,
     scheduler: str | None,
     stop: Fraction | None,
+    step: Fraction | None,
+    inputs: Path | None,
     call_limit: float,
     pace: float | None,
     **coupling: Any,
@@ -106,9 +113,12 @@ def sweep(
     if not no_report:
         require_extra("reports", "report and figures", "--no-report")
     pool = pool_config(workers, scheduler)
-    RunRequest(subject=scenario).check_sweepable()
-    experiment = find_scenario(scenario)
     with one_line_errors():
+        request = RunRequest(
+            subject=scenario, parameters=parameters, seed=seed, units=replaced, stop=stop, step=step, inputs=inputs
+        )
+        request.check_options()
+        experiment = experiment_type(scenario, stop, step, inputs)
         units, choices = split_units(experiment, replaced)
         points = vary_units(parse_grid(experiment, grid), choices)
         plan = CampaignPlan(
@@ -122,6 +132,8 @@ def sweep(
             varied_units=tuple(choices),
             options=MasterOptions(**coupling_of(coupling), **limits(call_limit, pace)),
             stop=stop,
+            step=step,
+            inputs=inputs,
             log_level=log_level,
         )
     outcome = run_campaign_command(plan, out, pool, (lambda _folder, _table: None) if no_report else _write_report)

@@ -12,6 +12,7 @@ from typing import Any, cast
 from handover.cosim.record.reader import Record
 from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.campaign.results import CampaignResults, read_results
+from handover.scenarios.execution.request import is_file
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
 from handover.scenarios.results.run_facts import RunFacts, record_of
@@ -112,7 +113,7 @@ def read_entries(
 
     Raises:
         NotComparable: a folder is neither, or damaged; they are too few or too many, of both kinds, or of different
-            scenarios; or a name is given twice.
+            scenarios, where files count as versions of one; or a name is given twice.
     """
     faults = [*_faults_of_folders(folders), *_faults_of_names(folders, names)]
     campaigns: list[CampaignEntry] = []
@@ -169,10 +170,11 @@ def _faults_of_kinds(campaigns: Sequence[CampaignEntry], runs: Sequence[RunEntry
         a, b = campaigns[0].folder, runs[0].folder
         return [f"{a} is a campaign, {b} a run: compare campaigns with campaigns, or runs with runs, as {a}/runs/..."]
     entries: Sequence[Entry] = campaigns or runs
+    first = entries[0]
     return [
-        f"{e.folder} is of another scenario, {e.scenario}, than {entries[0].folder}, {entries[0].scenario}"
+        f"{e.folder} is of another scenario, {e.scenario}, than {first.folder}, {first.scenario}"
         for e in entries[1:]
-        if e.scenario != entries[0].scenario
+        if e.scenario != first.scenario and not (is_file(e.scenario) and is_file(first.scenario))
     ]
 
 

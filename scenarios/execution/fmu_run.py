@@ -4,18 +4,20 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.fmu.file.default_experiment import DefaultExperiment, exact_seconds
-from handover.cosim.fmu.file.description import describe_fmu
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.system.system import PortName, System
+from handover.cosim.system.wiring_faults import value_faults
 from handover.scenarios.execution.errors import UsageError
-from handover.scenarios.execution.input_file import read_inputs
-from handover.scenarios.execution.ssp_run import ENDLESS, UntilStop, naming_step, system_experiment
+from handover.scenarios.execution.file_experiment import FileExperiment, SettableParameters, system_experiment
+from handover.scenarios.execution.input_file import columns_of, read_inputs
+from handover.scenarios.execution.ssp_run import ENDLESS, naming_step
 from handover.scenarios.execution.unit_values import start_values
-from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import sha256_of
 
 _log = logging.getLogger(__name__)
@@ -24,6 +26,31 @@ _log = logging.getLogger(__name__)
 def is_fmu(name: str) -> bool:
     """Return whether a name is an FMU's file and not a scenario."""
     return Path(name).suffix.lower() == ".fmu"
+
+
+class FmuParameters(SettableParameters):
+    """The variables of an FMU that can be given start values: parameters, inputs, and others."""
+
+    def __init__(self, description: FmuDescription) -> None:
+        self._description = description
+
+    @property
+    def ports(self) -> Mapping[str, FmuPort]:
+        """Their declarations."""
+        return self._description.settable
+
+    @cached_property
+    def _entries(self) -> Mapping[str, FmuPort]:
+        return {name: replace(port, name=name, shape=()) for name, (port, _) in columns_of(self.ports).items()}
+
+    def port(self, name: str) -> FmuPort | None:
+        """Return the declaration of a name, which may also be that of an entry of an array; None if there is none."""
+        return self.ports.get(name) or self._entries.get(name)
+
+    def faults(self, texts: Sequence[str]) -> Sequence[str]:
+        """Return what is wrong with texts `NAME=VALUE`."""
+        start, faults = start_values(self.ports, texts)
+        return [*faults, *value_faults(self._description.identifier, self._description, start)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +71,7 @@ class FmuRun:
     stop: Fraction | None = None
     step: Fraction | None = None
 
-    def open(self) -> Experiment[UntilStop]:
+    def open(self) -> FileExperiment:
         """Return the experiment, after checking all that it is made of.
 
         Raises:
@@ -69,7 +96,8 @@ class FmuRun:
             raise UsageError(f"{self.path}: {'; '.join(naming_step(e.faults))}") from e
         if d.experiment.start:
             _log.warning("%s proposes to start at %g s; a run starts at 0 s", self.path, d.experiment.start)
-        return system_experiment(self.path.name, f"{d.name}, an FMU by itself", system, until)
+        heading = f"{d.name}, an FMU by itself"
+        return system_experiment(self.path.name, heading, system, until, settable=FmuParameters(d), alone=True)
 
     def as_source(self, stop: Fraction) -> dict[str, Any]:
         """Return what a run's folder keeps, so that it can be resumed; `reopened` reads it."""

@@ -4,6 +4,8 @@ Names of options in messages are those of the command.
 """
 
 import contextlib
+import functools
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -14,10 +16,11 @@ from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.file_experiment import system_experiment
 from handover.scenarios.execution.fmu_run import FmuRun, is_fmu
 from handover.scenarios.execution.runner import experiment_system
 from handover.scenarios.execution.selection import find_scenario, own_source, path_of_class, replacements, select_fmus
-from handover.scenarios.execution.ssp_run import is_ssp, open_experiment, source_of, system_experiment
+from handover.scenarios.execution.ssp_run import is_ssp, open_experiment, source_of
 from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.experiment.experiment import Experiment, NoParameters
 from handover.scenarios.results.run_folder import RunFolder, dated_folder
@@ -129,17 +132,6 @@ class RunRequest:
         elif "--step" in used:
             raise UsageError("--step is for an SSP or an FMU; a scenario's units have steps of their own")
 
-    def check_sweepable(self) -> None:
-        """Reject what has no parameters that could be swept.
-
-        Raises:
-            UsageError: it is an SSP or an FMU.
-        """
-        if self._is_file(is_ssp):
-            raise UsageError(f"{self.subject}: a scenario can be swept, an SSP cannot; `run` sets its parameters by -p")
-        if self._is_file(is_fmu):
-            raise UsageError(f"{self.subject}: a scenario can be swept, an FMU can be run by itself")
-
     def open(self, opened: contextlib.ExitStack) -> OpenedSubject:
         """Return what is to be run; `opened` closes what that opens.
 
@@ -198,6 +190,39 @@ class RunRequest:
 
     def _is_file(self, is_of_kind: Callable[[str], bool]) -> bool:
         return isinstance(self.subject, str) and is_of_kind(self.subject)
+
+
+def is_file(subject: object) -> bool:
+    """Return whether a subject is the path of an SSP or an FMU."""
+    return isinstance(subject, str) and (is_ssp(subject) or is_fmu(subject))
+
+
+def experiment_type(
+    subject: str, stop: Fraction | None = None, step: Fraction | None = None, inputs: Path | None = None
+) -> type[Experiment[Any]]:
+    """Return the class of what is to be run, see `RunRequest`: a scenario; or a file, open while it is the newest.
+
+    Raises:
+        UsageError, CosimError: there is no such subject.
+    """
+    if not is_file(subject):
+        return find_scenario(subject)
+    there = [file for file in (Path(subject), inputs) if file is not None and file.exists()]
+    return _type_of_file(subject, stop, step, inputs, tuple((file, file.stat().st_mtime_ns) for file in there))
+
+
+@functools.lru_cache(maxsize=1)
+def _type_of_file(
+    file: str,
+    stop: Fraction | None,
+    step: Fraction | None,
+    inputs: Path | None,
+    _versions: tuple[tuple[Path, int], ...],
+) -> type[Experiment[Any]]:
+    opened = contextlib.ExitStack()
+    found = type(RunRequest(subject=file, stop=stop, step=step, inputs=inputs).open(opened).experiment)
+    weakref.finalize(found, opened.close)
+    return found
 
 
 def check_subject(subject: object) -> None:

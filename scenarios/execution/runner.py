@@ -20,7 +20,7 @@ from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.resumption import Resumption, pack
 from handover.scenarios.execution.supervisor import heartbeat_of_run, is_supervised
 from handover.scenarios.execution.unit_values import built_system, settings_behind
-from handover.scenarios.experiment.experiment import Evaluator, Experiment, Outcome
+from handover.scenarios.experiment.experiment import Evaluator, Experiment, Metric, Outcome
 from handover.scenarios.experiment.live_inputs import let_push
 from handover.scenarios.results.not_finite import NotFiniteData, outputs_not_finite
 from handover.scenarios.results.pictures import write_picture_files
@@ -102,7 +102,7 @@ def run_task(
         master.pacer = ControlledPacer(control)
     if resumption is None:
         master.heartbeat.record_scratch_folder(str(task.folder.path))  # if it crashes before the folder is begun
-    began, not_finite = False, list[NotFiniteData]()
+    began, not_finite, recorded = False, list[NotFiniteData](), dict[str, Metric]()
     try:
         with master:
             if resumption is not None:
@@ -114,6 +114,7 @@ def run_task(
             failure = _run(task, master, evaluator, resumption, around)
             with disk_errors_reported(task.folder.signals):  # before units end: one may hang as its library is unloaded
                 not_finite = outputs_not_finite(task.folder.signals, master.system)
+                recorded = experiment.recorded_metrics(task.folder.signals)
     except InitializationError as e:
         with scenario_code(experiment):
             reason = settings_behind(e.failure.unit, experiment, parameters, task.seed, task.fmus)
@@ -122,7 +123,7 @@ def run_task(
         if not began:
             raise
         failure = failure or e
-    ended = _Ended(failure, interruption.asked, not_finite, clock())
+    ended = _Ended(failure, interruption.asked, not_finite, recorded, clock())
     return _conclude(task, master, evaluator, ended)
 
 
@@ -209,11 +210,12 @@ def _checkpoints(
 
 @dataclass(frozen=True)
 class _Ended:
-    """How a run ended: its failure, whether Ctrl-C ended it, the outputs that were not finite, and what it took."""
+    """How a run ended: its failure, whether Ctrl-C ended it, what was found in its record, and what it took."""
 
     failure: UnitFailure | None
     interrupted: bool
     not_finite: Sequence[NotFiniteData]
+    recorded: Mapping[str, Metric]
     spent: ElapsedTime
 
 
@@ -221,6 +223,7 @@ def _conclude(task: Task, master: Master, evaluator: GuardedEvaluator[Evaluator]
     """Write the summary of a run at its end, its pictures and its report."""
     failure, interrupted = ended.failure, ended.interrupted and master.ended is None
     outcome = _outcome(task, evaluator, failure, interrupted, master)
+    outcome = replace(outcome, metrics={**outcome.metrics, **ended.recorded})
     complete = failure is None and (evaluator.over or not interrupted)
     summary = finished_summary(task, outcome, master, ended.spent, failure, complete, ended.not_finite)
     task.folder.write_summary(summary)

@@ -4,50 +4,19 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from handover.cosim.exceptions import InvalidSsp
 from handover.cosim.fmu.file.default_experiment import NoStep
-from handover.cosim.record.reader import Record
+from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.ssp.ssp_file import SspFile
-from handover.cosim.system.signals import Signals
-from handover.cosim.system.system import System
 from handover.scenarios.execution import supervisor
 from handover.scenarios.execution.errors import UsageError
-from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Outcome
-from handover.scenarios.experiment.time_plot import TimeFigure
+from handover.scenarios.execution.file_experiment import FileExperiment, SettableParameters, system_experiment
 from handover.scenarios.results.run_folder import sha256_of
 
 ENDLESS = Fraction(10**6)
 """The stop time of what has no end of its own, s: a program steps it as far as it likes."""
-
-
-class UntilStop(Evaluator):
-    """Lets a run continue to its stop time; it succeeds if it reaches that, or a unit ends the simulation before."""
-
-    def __init__(self, stop: Fraction) -> None:
-        self._stop, self._t, self._ended = float(stop), 0.0, False
-
-    def __call__(self, t: float, signals: Signals) -> None:  # noqa: ARG002
-        """Note the time."""
-        self._t = t
-
-    @property
-    def over(self) -> bool:
-        """False: a run does not end before its stop time."""
-        return False
-
-    def note_end(self, unit: str, t: float) -> None:  # noqa: ARG002
-        """Note that the run has ended as it should."""
-        self._ended = True
-
-    def outcome(self) -> Outcome:
-        """Return whether the stop time was reached or a unit ended the simulation."""
-        reached = self._t >= self._stop
-        return Outcome(
-            success=reached or self._ended,
-            reason=f"ran to {self._t:g} s" + ("" if reached else f" of {self._stop:g} s"),
-        )
 
 
 def is_ssp(name: str) -> bool:
@@ -55,35 +24,24 @@ def is_ssp(name: str) -> bool:
     return Path(name).suffix.lower() == ".ssp"
 
 
-def system_experiment(
-    file_name: str, heading: str, system: System, stop: Fraction, step: Fraction | None = None
-) -> Experiment[UntilStop]:
-    """Return a system from a file as an experiment that ends at a time, s; `step` is its `parallel_step`, s."""
+class SspParameters(SettableParameters):
+    """The parameters of an SSP that is open: those of its components as `UNIT.NAME`, and its own."""
 
-    class SystemExperiment(Experiment[UntilStop]):
-        """Runs the system as it is."""
+    def __init__(self, ssp: SspFile) -> None:
+        self._ssp = ssp
 
-        name: ClassVar[str] = file_name
-        title: ClassVar[str] = heading
-        units: ClassVar[Mapping[str, str]] = {}
-        is_seeded: ClassVar[bool] = False
-        parallel_step: ClassVar[Fraction | None] = step
+    @property
+    def ports(self) -> Mapping[str, FmuPort]:
+        """Their declarations."""
+        return self._ssp.parameters
 
-        def build(self, parameters: Any, seed: int, fmu: FmuOf) -> System:  # noqa: ARG002
-            return system
+    def port(self, name: str) -> FmuPort | None:
+        """Return the declaration of a name, which may also be an output or a local variable with a start value."""
+        return self._ssp.port(name)
 
-        def stop_time(self, parameters: Any) -> Fraction:  # noqa: ARG002
-            return stop
-
-        def evaluator(self, parameters: Any) -> UntilStop:  # noqa: ARG002
-            return UntilStop(stop)
-
-        def time_figures(self, parameters: Any, record: Record) -> list[TimeFigure]:  # noqa: ARG002
-            from handover.scenarios.reporting.run_figures import figures_of_outputs  # what draws takes long to load
-
-            return figures_of_outputs(system.units, record)
-
-    return SystemExperiment()
+    def faults(self, texts: Sequence[str]) -> Sequence[str]:
+        """Return what would be wrong with the system if it had these values."""
+        return self._ssp.faults(_texts_by_name(self._ssp.path, texts))
 
 
 def open_experiment(
@@ -92,7 +50,7 @@ def open_experiment(
     step: Fraction | None,
     opened: contextlib.ExitStack,
     parameters: Sequence[str] = (),
-) -> Experiment[UntilStop]:
+) -> FileExperiment:
     """Open an SSP as an experiment; `opened` closes it.
 
     `parameters` are texts `NAME=VALUE`, see `SspFile`.
@@ -111,7 +69,8 @@ def open_experiment(
     if until is None:
         raise UsageError(f"{path}: its description has no stop time; --stop 10 lets it run for 10 s")
     heading = f"{ssp.name}, a system from {path.name}"
-    return system_experiment(path.name, heading, ssp.system, until, None if step else ssp.parallel_step)
+    parallel_step = None if step else ssp.parallel_step
+    return system_experiment(path.name, heading, ssp.system, until, parallel_step, SspParameters(ssp))
 
 
 def _texts_by_name(path: Path, given: Sequence[str]) -> dict[str, str]:

@@ -16,6 +16,7 @@ from handover.cosim.exceptions import CosimError, nearest
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.start_values import entries_of
 from handover.cosim.system.system import PlacedUnit, System
+from handover.scenarios.execution.file_experiment import SettableParameters, settable_of
 from handover.scenarios.execution.input_file import columns_of, value_of
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
@@ -39,7 +40,7 @@ def start_values(ports: Mapping[str, FmuPort], given: Sequence[str]) -> tuple[di
         elif name in seen:
             faults.append(f"{name} is given twice")
         elif name not in ports and name not in entries:
-            faults.append(f"no {_kinds(ports)} {name!r}; {nearest(name, ports)}")
+            faults.append(unknown_name(ports, name))
         else:
             port, k = (ports[name], None) if name in ports else entries[name]
             try:
@@ -50,9 +51,11 @@ def start_values(ports: Mapping[str, FmuPort], given: Sequence[str]) -> tuple[di
     return start, faults
 
 
-def _kinds(ports: Mapping[str, FmuPort]) -> str:
-    kinds = dict.fromkeys(p.causality for p in ports.values())
-    return " or ".join(k.value for k in kinds if k in (Causality.PARAMETER, Causality.INPUT)) or "parameter"
+def unknown_name(ports: Mapping[str, FmuPort], name: str) -> str:
+    """Return the fault of a name that is none of some ports, with the nearest of theirs."""
+    causalities = dict.fromkeys(p.causality for p in ports.values())
+    kinds = [c.value for c in causalities if c in (Causality.PARAMETER, Causality.INPUT)] or ["parameter"]
+    return f"no {' or '.join(kinds)} {name!r}; {nearest(name, ports)}"
 
 
 def _set(start: dict[str, Any], port: FmuPort, k: int | None, text: str) -> None:
@@ -86,20 +89,28 @@ def _entries(port: FmuPort, parts: Sequence[str]) -> list[Any]:
     return values
 
 
-def is_unit_value(text: str) -> bool:
-    """Return whether a text `NAME=VALUE` is of a unit's parameter, `UNIT.NAME=VALUE`, and not of the scenario's."""
-    return "." in text.partition("=")[0]
+def is_unit_value(experiment: type[Experiment[Any]], text: str) -> bool:
+    """Return whether a text `NAME=VALUE` is of a unit's parameter, `UNIT.NAME=VALUE`, and not of the scenario's.
+
+    All parameters of a file are those of its units.
+    """
+    return settable_of(experiment) is not None or "." in text.partition("=")[0]
 
 
 def unit_values(experiment: type[Experiment[Any]], given: Sequence[str]) -> dict[str, str]:
-    """Return the values of units' parameters among the given texts, by `UNIT.NAME`.
+    """Return the values of units' parameters among the given texts, by `UNIT.NAME`; of a file by its own names.
 
     Raises:
-        InvalidParameter: a text is of another form, names no unit of the scenario, or is given twice.
+        InvalidParameter: a text is of another form, names no unit of the scenario or no parameter of the file, or is
+            given twice.
     """
+    if (settable := settable_of(experiment)) is not None:
+        return _values_of_file(settable, given)
     values: dict[str, str] = {}
     faults: list[str] = []
-    for text in filter(is_unit_value, given):
+    for text in given:
+        if not is_unit_value(experiment, text):
+            continue
         name, equals, value = text.partition("=")
         unit, _, port = name.partition(".")
         if not equals or not port:
@@ -110,6 +121,23 @@ def unit_values(experiment: type[Experiment[Any]], given: Sequence[str]) -> dict
             faults.append(f"{name} is given twice")
         else:
             values[name] = value
+    if faults:
+        raise InvalidParameter(faults)
+    return values
+
+
+def _values_of_file(settable: SettableParameters, given: Sequence[str]) -> dict[str, str]:
+    values: dict[str, str] = {}
+    faults: list[str] = []
+    for text in given:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            faults.append(f"{text!r} is not of the form NAME=VALUE")
+        elif name in values:
+            faults.append(f"{name} is given twice")
+        elif settable.port(name) is None:
+            faults.append(unknown_name(settable.ports, name))
+        values[name] = value
     if faults:
         raise InvalidParameter(faults)
     return values
@@ -129,7 +157,7 @@ def split_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) ->
     except InvalidParameter as e:
         faults += e.faults
     try:
-        parameters = parse_parameters(experiment, [text for text in given if not is_unit_value(text)])
+        parameters = parse_parameters(experiment, [text for text in given if not is_unit_value(experiment, text)])
     except InvalidParameter as e:
         faults += e.faults
     if faults:
@@ -189,6 +217,20 @@ def settings_behind(
 
 def _equal(name: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
     return name in a and name in b and np.array_equal(a[name], b[name])
+
+
+def check_value(experiment: Experiment[Any], system: System, name: str, text: str) -> None:
+    """Check one value of a unit's parameter by itself, see `unit_values`; the value is set in a scenario's system.
+
+    Raises:
+        InvalidParameter: its unit does not take it, or the scenario can do nothing with it.
+    """
+    settable = settable_of(type(experiment))
+    if settable is None:
+        set_values(system, {name: text})
+        experiment.check_unit_values(system, [name])
+    elif faults := settable.faults([f"{name}={text}"]):
+        raise InvalidParameter(faults)
 
 
 def set_values(system: System, values: Mapping[str, str]) -> None:

@@ -220,6 +220,10 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         """Return the communication step, s, of all units where they step in parallel; by default `parallel_step`."""
         return self.parallel_step
 
+    def recorded_metrics(self, signals: Path) -> Mapping[str, Metric]:  # noqa: ARG002
+        """Return metrics of a run's record, besides those of the evaluator's outcome; none by default."""
+        return {}
+
     def evaluator_of_record(self, parameters: Any, pictures: Sequence[CameraPicture]) -> AnyEvaluator:  # noqa: ARG002
         """Return an evaluator to which a finished run is replayed from its record.
 

@@ -1,13 +1,18 @@
 """A campaign from Python: the command's, also from a program without a main guard, and resumed by the same call."""
 
+import contextlib
 import subprocess
 import sys
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
 from campaigns import campaign_metadata, folder_of, table_of
+from in_process_pool import InProcessPool
+from native_units import native_fmu
 
 import handover
+from handover.scenarios.campaign import local_cluster
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 
@@ -110,6 +115,18 @@ def test_units_are_varied(tmp_path: Path):
     assert first.reason == second.reason
 
 
-def test_files_are_not_swept():
-    with pytest.raises(handover.InvalidInput, match="a scenario can be swept, an SSP cannot"):
-        handover.sweep("a.ssp", seeds=2)
+def test_a_file_is_swept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    @contextlib.contextmanager
+    def in_process_pool(_workers: int | None) -> Generator[InProcessPool, None, None]:
+        yield InProcessPool()
+
+    monkeypatch.setattr(local_cluster, "local_cluster", in_process_pool)
+    arrays: list[list[float]] = [[1, 2, 3], [4, 5, 6]]
+    campaign = handover.sweep(native_fmu("array_passer"), u=arrays, stop=0.2, step=0.1, out=tmp_path / "c")
+    assert [point.values["u"] for point in campaign.points] == ["1,2,3", "4,5,6"]
+    assert [row["last_y[2]"] for row in campaign.rows] == [2.0, 5.0]
+    assert [float(run.metrics["max_y[3]"]) for run in campaign.runs] == [3.0, 6.0]
+    with pytest.raises(handover.InvalidInput, match="no input 'v'"):
+        handover.sweep(native_fmu("array_passer"), v=[1, 2])
+    with pytest.raises(handover.InvalidInput, match="there is no such file"):
+        handover.sweep(tmp_path / "absent.fmu", u=1)

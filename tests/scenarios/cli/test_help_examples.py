@@ -19,6 +19,7 @@ import pytest
 from campaigns import campaign_metadata, folder_of, table_of
 from click.testing import CliRunner, Result
 from killed_run import end_between
+from native_units import native_fmu
 from sample_study import same, write_study
 
 from handover.fmus.build import cached
@@ -76,6 +77,10 @@ def campaign(path: Path) -> None:
 
 def fmu(path: Path) -> None:
     shutil.copyfile(cached("Thrusters", 2), path)
+
+
+def mass(path: Path) -> None:
+    shutil.copyfile(native_fmu("mass", 2), path)
 
 
 def table(path: Path) -> None:
@@ -137,6 +142,7 @@ EXAMPLES: Mapping[str, tuple[How, Needs]] = {
     "handover sweep ir_grasp strategy=reflex,blind,forward --repeat 20 --paired": (CHECKED, {}),
     "handover sweep helix_handover alpha=0.1:0.4:4 -p patience=30 --out alphas": (CHECKED, {}),
     "handover sweep flyer_impedance force=1:20:10 --scheduler tcp://10.0.0.5:8786": (CHECKED, {}),
+    "handover sweep x.fmu m=1,2,4 k=0:20:5 -p f=1 --stop 10": (CHECKED, {"x.fmu": mass}),
     "handover study plan plan.toml": (RUN, {}),
     "handover study serve plan.toml --out DIR": (CHECKED, {}),
     "handover study power plan.toml": (SLOW, {}),

@@ -25,7 +25,8 @@ from handover.cosim.fmu.file.default_experiment import NoStep
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.scenarios.cli.command import main
-from handover.scenarios.execution.ssp_run import UntilStop, naming_step, open_experiment
+from handover.scenarios.execution.file_experiment import UntilStop
+from handover.scenarios.execution.ssp_run import naming_step, open_experiment
 
 PULL = "time,f\n0,0\n0.5,2\n0.5,-1\n0.8,1\n"
 

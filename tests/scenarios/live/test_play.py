@@ -34,7 +34,7 @@ from fractions import Fraction
 from handover.cosim.blocks.ports import parameter
 from handover.cosim.blocks.units import Second
 from handover.cosim.system.system import System
-from handover.scenarios.execution.ssp_run import UntilStop
+from handover.scenarios.execution.file_experiment import UntilStop
 from handover.scenarios.experiment.experiment import Experiment
 
 

@@ -9,11 +9,13 @@ import time
 import zipfile
 from collections.abc import Generator
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from native_units import native_fmu
 from processes import children, lives, until
 from sample_jobs import bad_job, job
 
@@ -25,6 +27,7 @@ from handover.scenarios.campaign.plan import PlannedRun
 from handover.scenarios.campaign.run_server import load_modules
 from handover.scenarios.campaign.table import row_of
 from handover.scenarios.campaign.worker import NotWanted, ServerLost, ServerProcess
+from handover.scenarios.campaign.worker_pool import RunJob
 from handover.scenarios.cli.command import main
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.run_folder import RunFolder
@@ -72,6 +75,20 @@ def test_the_signals_are_those_of_the_same_run_by_itself(
     assert not (runs / "run" / "figures").exists()
 
 
+def test_a_file_whose_unit_crashes_takes_its_run_alone(server: ServerProcess, tmp_path: Path):
+    runs, file = tmp_path / "runs", str(native_fmu("crashes_in_step", 3))
+    runs.mkdir()
+    for name, at, reason in (("bad", "0.25", "crashed"), ("good", "9", "ran to 1 s")):
+        of_file = RunJob(
+            name=name, scenario=file, parameters=(f"at={at}",), seed=1, fmus={}, runs=str(runs),
+            options=MasterOptions(), stop=Fraction(1),
+        )  # fmt: skip
+        assert server.run_job(of_file, yes).lost == ""
+        summary = json.loads((runs / name / "summary.json").read_text())
+        assert reason in summary["reason"]
+        assert (summary["failure"] is None) is (name == "good")
+
+
 def test_a_unit_that_fails_is_in_the_summary(server: ServerProcess, built: Path, tmp_path: Path):
     assert server.run_job(bad_job(tmp_path / "runs", "Raises", built), yes).lost == ""
     summary = summary_in(tmp_path / "runs")
@@ -107,7 +124,8 @@ def test_a_unit_that_does_not_start_is_in_the_summary(
 def test_a_unit_that_does_not_come_back_ends_its_run_only(
     reflex: str, kind: str, server: ServerProcess, built: Path, tmp_path: Path
 ):
-    assert server.run_job(bad_job(tmp_path / "runs", reflex, built, call_limit=0.5), yes).lost == ""
+    limit = 0.5 if kind == "hang" else None  # a crash takes longer on a loaded machine
+    assert server.run_job(bad_job(tmp_path / "runs", reflex, built, call_limit=limit), yes).lost == ""
     summary = summary_in(tmp_path / "runs")
     assert (summary["failure"]["kind"], summary["failure"]["instance"]) == (kind, "reflex")
     assert 0.0 < summary["cpu_seconds"] < 60.0
