@@ -16,7 +16,7 @@ from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.ssp.connected_ports import find_entry, ports_of, settable_names, unfed, variable_names
 from handover.cosim.ssp.given_parameters import put
 from handover.cosim.ssp.parameter_set import SspValue
-from handover.cosim.ssp.start_values import Given, chained, converted
+from handover.cosim.ssp.start_values import Given, chained, converted, unit_doubt
 from handover.cosim.ssp.structure import SspComponent, SspConnection, SspConnector, SspElement, SspEnd, SspNestedSystem
 from handover.cosim.system.conversion import LinearTransformation
 
@@ -62,13 +62,14 @@ class FlatConnection:
 class FlatSystem:
     """Components by path, connections between their variables, and values for variables by component and name.
 
-    `values_of_systems` are those of systems' own connectors.
+    `values_of_systems` are those of systems' own connectors; `tolerated` is what is not as it should be.
     """
 
     components: Mapping[str, SspComponent]
     connections: list[FlatConnection] = field(default_factory=list[FlatConnection])
     given: dict[str, dict[str, Given]] = field(default_factory=dict[str, dict[str, Given]])
     faults: list[str] = field(default_factory=list[str])
+    tolerated: list[str] = field(default_factory=list[str])
     values_of_systems: dict[Node, SspValue] = field(default_factory=dict[Node, SspValue])
 
 
@@ -134,6 +135,7 @@ class _Flattening:
             else:
                 self._connectors |= {(here, c.name): c for c in element.connectors.values()}
                 self.flat.faults += _connector_faults(element, here, self._descriptions[here])
+                self.flat.tolerated += _connector_doubts(element, here, self._descriptions[here])
                 self._bind(element, here)
         self._bind(system, path)
         for connection in system.connections:
@@ -237,14 +239,18 @@ class _Flattening:
     def _composed(self, source: Node, hops: list[tuple[SspConnection, Node]]) -> LinearTransformation | None:
         """Return the transformation of a value on its way; None where it is the master's own conversion of units."""
         total, unit = LinearTransformation(), self._unit(source)
+        ends = self._own_unit(source), self._own_unit(hops[-1][1])
         for connection, node in hops:
             following = self._unit(node)
+            doubt = unit_doubt(unit, following)
+            if doubt and not connection.keeps_units and not unit_doubt(*ends):  # of which the system says so
+                self.flat.tolerated.append(f"{connection.where}{connection.start} - {connection.end}: {doubt}")
             change = None if connection.keeps_units else converted(unit, following)
             total = total if change is None else chained(total, change)
             total = total if connection.linear is None else chained(total, connection.linear)
             unit = unit if following == UNKNOWN else following
         try:
-            own = converted(self._own_unit(source), self._own_unit(hops[-1][1])) or LinearTransformation()
+            own = converted(*ends) or LinearTransformation()
         except ValueError:  # units that cannot be converted, which `suppressUnitConversion` allows
             return total
         return None if total == own else total
@@ -285,9 +291,15 @@ def _differences(c: SspConnector, port: FmuPort) -> list[str]:
     if c.type_name in _KINDS and port.kind not in _KINDS[c.type_name]:
         differences.append(f"is of type {c.type_name} here and {port.type_name} in its FMU")
     if _differ(c.unit, port.unit):
-        undefined = "" if c.unit.defined else ", which <ssd:Units> does not define,"
-        differences.append(f"is in {c.unit.symbol}{undefined} here and in {port.unit.symbol} in its FMU")
+        differences.append(f"is in {c.unit.symbol} here and in {port.unit.symbol} in its FMU")
     return differences
+
+
+def _connector_doubts(component: SspComponent, path: str, d: FmuDescription) -> list[str]:
+    """Return of which connectors of a component the unit cannot be compared with that in its FMU."""
+    ports = ports_of(d)
+    known = [(c, entry[0]) for c in component.connectors.values() if (entry := find_entry(ports, c.name)) is not None]
+    return [f"{c.where}{path}.{c.name}: {doubt}" for c, port in known if (doubt := unit_doubt(c.unit, port.unit))]
 
 
 def _differ(a: Unit, b: Unit) -> bool:

@@ -69,6 +69,7 @@ def read_structure(archive: SspArchive) -> SspStructure:
             _annotated_period(part, systems[0], "parallel"),
             _step_of_system(part, systems[0]),
             tuple(part.unsupported),
+            tuple(part.tolerated),
         )
 
 
@@ -240,7 +241,7 @@ class _Reader:
         inside = [c for c in inside if local(c.tag) not in ("MetaData", "Signature")]
         if "source" in e.attributes:
             member = self._member(e, e.attributes["source"])
-            other = SspPart(self._archive.path, member, self._archive.read(member), wanted, part.unsupported)
+            other = SspPart(self._archive.path, member, self._archive.read(member), wanted, part)
             return other, other.root
         if len(inside) != 1:
             raise part.fault(e, f"neither a source nor one <{wanted}> inside")

@@ -27,7 +27,7 @@ from handover.cosim.ssp.given_parameters import (
 )
 from handover.cosim.ssp.parameter_set import SspValue
 from handover.cosim.ssp.reading import read_structure
-from handover.cosim.ssp.start_values import start_values
+from handover.cosim.ssp.start_values import start_value_doubts, start_values
 from handover.cosim.ssp.structure import SspComponent, SspConnector, SspStructure
 from handover.cosim.system.conversion import LinearTransformation
 from handover.cosim.system.system import PlacedUnit, PortName, System
@@ -256,6 +256,8 @@ class SspFile:
         flat = flatten(structure.system, descriptions, asked)
         steps = {n: self._step or c.period or _stated_step(c, structure) for n, c in flat.components.items()}
         system = self._build(flat, descriptions, steps, structure.unsupported, self._duration)
+        for line in (*structure.tolerated, *flat.tolerated):
+            system.tolerate(line)
         system.notes += _notes_on_steps(self._step, structure.step, system.units.values())
         return flat, system
 
@@ -277,6 +279,7 @@ class SspFile:
             known = {name: (entry, g) for name, g in given.items() if (entry := find_entry(ports, name)) is not None}
             starts[unit], partly[unit], start_faults = start_values(known)
             faults += start_faults
+            flat.tolerated += start_value_doubts(known)
         grouping = Grouping(flat.connections, descriptions, partly)
         faults += grouping.faults
         if faults:

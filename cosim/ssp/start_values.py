@@ -27,17 +27,15 @@ def chained(first: LinearTransformation, following: LinearTransformation) -> Lin
 
 
 def converted(source: Unit, target: Unit) -> LinearTransformation | None:
-    """Return the conversion from one unit to another, None where numbers pass as they are or a unit is unknown.
+    """Return the conversion from one unit to another, None where numbers pass as they are.
+
+    They do so where a unit is unknown or not defined; of the latter `unit_doubt` says so.
 
     Raises:
-        ValueError: they differ in dimension, or one of two that differ in name is not defined.
+        ValueError: they differ in dimension.
     """
-    if needs_no_conversion(source, target):
+    if needs_no_conversion(source, target) or not (source.defined and target.defined):
         return None
-    if not (source.defined and target.defined):
-        undefined = (target if source.defined else source).symbol
-        text = f"{source.symbol!r} cannot be converted to {target.symbol!r}"
-        raise ValueError(f"{text}: the unit {undefined!r} is not defined")
     if source.base != target.base:
         raise ValueError(f"{source.symbol!r} cannot be converted to {target.symbol!r}: they differ in dimension")
     try:
@@ -45,6 +43,15 @@ def converted(source: Unit, target: Unit) -> LinearTransformation | None:
     except OverflowError:
         raise ValueError(f"{source.symbol!r} is too large or too small to be converted to {target.symbol!r}") from None
     return None if change.is_identity else change
+
+
+def unit_doubt(source: Unit, target: Unit) -> str:
+    """Return that numbers pass as they are between two units of which one is not defined; empty where both are."""
+    if needs_no_conversion(source, target) or (source.defined and target.defined):
+        return ""
+    undefined = (target if source.defined else source).symbol
+    text = f"{source.symbol!r} cannot be converted to {target.symbol!r}"
+    return f"{text}: the unit {undefined!r} is not defined, so numbers are taken as they are"
 
 
 @dataclass(frozen=True)
@@ -58,6 +65,16 @@ class Given:
     value: SspValue
     unit: Unit = UNKNOWN
     then: LinearTransformation | None = None
+
+
+def start_value_doubts(given: Mapping[str, tuple[Entry, Given]]) -> list[str]:
+    """Return the values whose unit is not defined, a line each."""
+    doubts = {
+        f"{g.value.where}{name}: ": unit_doubt(g.value.unit, port.unit if g.unit == UNKNOWN else g.unit)
+        for name, ((port, _), g) in given.items()
+        if port.kind is Kind.REAL and not g.value.keeps_units
+    }
+    return [where + doubt for where, doubt in doubts.items() if doubt]
 
 
 def start_values(given: Mapping[str, tuple[Entry, Given]]) -> tuple[dict[str, Any], set[str], list[str]]:

@@ -84,7 +84,7 @@ class SspStructure:
     `parallel_step` is the communication step of all units where they step in parallel, if `write_ssp` annotated one.
     `step` is that of the system, as its default experiment states it or as it is annotated for OMSimulator or libcosim.
     Both are in seconds.
-    `unsupported` are faults: what was left out of it.
+    `unsupported` are faults: what was left out of it; `tolerated` is what is not as it should be and does not matter.
     """
 
     name: str
@@ -93,3 +93,4 @@ class SspStructure:
     parallel_step: Fraction | None = None
     step: Fraction | None = None
     unsupported: tuple[str, ...] = ()
+    tolerated: tuple[str, ...] = ()

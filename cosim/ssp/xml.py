@@ -15,7 +15,7 @@ from typing import Any
 import fmpy
 
 from handover.cosim.exceptions import InvalidSsp
-from handover.cosim.fmu.file.xml import UnsafeXml, XmlElement, parse_xml
+from handover.cosim.fmu.file.xml import UnsafeXml, XmlElement, parse_xml, with_prefixes
 
 NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
@@ -93,27 +93,30 @@ class SspPart:
         member: the file in it.
         content: the file's content.
         wanted: name of its root, such as `ssv:ParameterSet`.
-        unsupported: the list that `leave_out` writes to; an own one if it is not given.
+        of: the file that refers to it, where what is left out of it and what is tolerated is listed, too.
 
     Raises:
         InvalidSsp: it is malformed, unsafe, of another version, invalid, or has another root.
     """
 
-    def __init__(
-        self, path: Path, member: str, content: bytes, wanted: str, unsupported: list[str] | None = None
-    ) -> None:
+    def __init__(self, path: Path, member: str, content: bytes, wanted: str, of: "SspPart | None" = None) -> None:
         self.path, self.member = path, member
-        self.unsupported = [] if unsupported is None else unsupported
+        self.unsupported = list[str]() if of is None else of.unsupported
         """What was left out, all of it a fault: reading goes on, so that it is told with all others."""
+        self.tolerated = list[str]() if of is None else of.tolerated
+        """What is not as it should be and does not matter."""
         try:
-            self.root = parse_xml(content)
+            declared = with_prefixes(content)
+            self.root = parse_xml(declared)
         except UnsafeXml as e:
             raise InvalidSsp(path, [f"{member} cannot be read: {e}"]) from e
         self.check_root(self.root, wanted)
         if self.root.get("version") == "1.0":
-            faults = _schema_faults(content, wanted)
+            faults = _schema_faults(declared, wanted)
             if faults:
                 raise InvalidSsp(path, [f"{member}, {fault}" for fault in faults])
+        if declared is not content:
+            self.tolerated.append(f"{member}: it uses prefixes of names that it does not declare (xmlns)")
 
     def check_root(self, root: XmlElement, wanted: str) -> None:
         """Check the name and the version of a file's root, or of an element in its place inside another file.

@@ -54,14 +54,11 @@ class Narrowing:
                 raise UnitFailure(self.unit, f"setting {self.port}", t, "Error", (fault,))
 
 
-def narrows(output: FmuPort, target: FmuPort) -> bool:
-    """Return whether an integer output can have values that do not fit the input which it feeds."""
-    a, b = output.width, target.width
+def narrows(output: FmuPort, width: Width) -> bool:
+    """Return whether an integer output can have values that do not fit the width of the input which it feeds."""
+    own = output.width
     return (
-        output.kind is Kind.INTEGER
-        and a is not None
-        and b is not None
-        and not (b.holds(a.lowest) and b.holds(a.highest))
+        output.kind is Kind.INTEGER and own is not None and not (width.holds(own.lowest) and width.holds(own.highest))
     )
 
 
@@ -187,7 +184,10 @@ def _feeding(
             _log.info("%s (%s) -> %s.%s (%s): %s", source, output.unit, name, port, target.unit, change)
         else:
             copies += zip(instance.u[port], other.y[source.port], strict=True)
-        if target.width and narrows(output, target):
-            narrowings.append(Narrowing(str(source), name, port, target.width, other.y[source.port][0]))
+        width = target.width
+        if target.kind is Kind.ENUMERATION:
+            width = Width.INT32 if instance.description.fmi == 2 else Width.INT64
+        if width and narrows(output, width):
+            narrowings.append(Narrowing(str(source), name, port, width, other.y[source.port][0]))
     followings = [Following(instance.u[e.port][0], series) for e, series in system.followed.items() if e.unit == name]
     return Feeding(narrowings, joined(copies), scaled, followings)

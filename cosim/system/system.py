@@ -36,6 +36,7 @@ from handover.cosim.system.port_names import Connection, PlacedUnit, PortName, P
 from handover.cosim.system.time_series import ExternalSource, NoSource, TimeSeries
 from handover.cosim.system.wiring_faults import (
     clock_of,
+    connection_doubt,
     connection_faults,
     event_faults,
     outside_fault,
@@ -64,6 +65,7 @@ class System:
         self._faults: list[str] = []
         self._step_faults: dict[str, NoStep] = {}  # by unit that has no communication step
         self._presumed_steps: dict[str, str] = {}  # by unit, what its step was taken from
+        self._tolerated: list[str] = []
         self._descriptions: dict[Path, FmuDescription] = {}
 
     def add(
@@ -280,6 +282,10 @@ class System:
         """Let `check` raise a fault that whoever wires the system has found, besides those that it finds."""
         self._faults.append(fault)
 
+    def tolerate(self, line: str) -> None:
+        """Add to what is `tolerated`."""
+        self._tolerated.append(line)
+
     def follow(self, target: PortName, series: TimeSeries) -> None:
         """Let an input that no output feeds follow values over time, which are in its unit.
 
@@ -356,8 +362,9 @@ class System:
 
     @property
     def tolerated(self) -> list[str]:
-        """What is not as it should be, but can be run nonetheless, a line each; see `MasterOptions.strict`."""
-        return list(self._presumed_steps.values())
+        """What is not as it should be with a checked system that can be run nonetheless; see `MasterOptions.strict`."""
+        doubts = (connection_doubt(self.units, c) for c in self.connections)
+        return [*self._presumed_steps.values(), *self._tolerated, *filter(None, doubts)]
 
     @property
     def undefined_starts(self) -> list[str]:

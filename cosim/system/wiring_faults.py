@@ -51,17 +51,38 @@ def event_faults(name: str, description: FmuDescription, sampled: bool) -> list[
     return [f"{fault}; it cannot be placed as a sampled unit, which runs without"] if sampled else []
 
 
-def mismatch(a: FmuPort, b: FmuPort, transformation: LinearTransformation | None = None) -> str | None:
-    """Return why an output cannot feed an input, or None."""
-    if a.kind is not b.kind:
-        return f"{a.kind.value} cannot feed {b.kind.value}"
+_WHOLE = (Kind.INTEGER, Kind.ENUMERATION)
+
+
+def mismatch(a: FmuPort, b: FmuPort) -> str | None:
+    """Return why an output does not fit an input as it should, or None."""
+    return obstacle(a, b) or doubt(a, b)
+
+
+def doubt(a: FmuPort, b: FmuPort, transformation: LinearTransformation | None = None) -> str | None:
+    """Return what is not as it should be between an output and an input that it can feed, or None."""
+    if (a.kind, b.kind) == _WHOLE:
+        return "an integer is no enumeration, and must be one of its numbers"
     if a.shape != b.shape:
+        return "their shapes differ, though each has one value"
+    defined, unknown = (a.unit.defined, b.unit.defined), needs_no_conversion(a.unit, b.unit)
+    if a.kind is Kind.REAL and transformation is None and not all(defined) and not unknown:
+        undefined = b.unit.symbol if a.unit.defined else a.unit.symbol
+        return f"the unit {undefined!r} is not defined in its FMU, so it cannot be compared"
+    return None
+
+
+def obstacle(a: FmuPort, b: FmuPort, transformation: LinearTransformation | None = None) -> str | None:
+    """Return why an output cannot feed an input, or None."""
+    if a.kind is not b.kind and (a.kind, b.kind) != _WHOLE:
+        return f"{a.kind.value} cannot feed {b.kind.value}"
+    if a.shape != b.shape and not a.size == b.size == 1:
         return "their shapes differ"
     if transformation is not None:
         return transformation.fault if a.kind is Kind.REAL else f"{a.kind.value} takes no linear transformation"
-    if a.kind is Kind.REAL and (fault := _unit_mismatch(a.unit, b.unit)):
+    if a.kind is Kind.REAL and a.unit.defined and b.unit.defined and (fault := _unit_mismatch(a.unit, b.unit)):
         return fault
-    if a.kind is Kind.ENUMERATION and a.items != b.items:
+    if a.kind is b.kind is Kind.ENUMERATION and a.items != b.items:
         return "their enumerations have other items"
     if a.kind is Kind.BINARY and a.mime != b.mime:
         return "their MIME types differ"
@@ -69,12 +90,7 @@ def mismatch(a: FmuPort, b: FmuPort, transformation: LinearTransformation | None
 
 
 def _unit_mismatch(a: Unit, b: Unit) -> str | None:
-    """Compare units by their definitions, not by their names; a variable without a unit fits any."""
-    if needs_no_conversion(a, b):
-        return None
-    if not (a.defined and b.defined):
-        undefined = b.symbol if a.defined else a.symbol
-        return f"the unit {undefined!r} is not defined in its FMU, so it cannot be compared"
+    """Compare units by their definitions, not by their names."""
     if a.base != b.base:
         return "their units differ in dimension"
     unusable = next((u for u in (a, b) if not u.is_usable), None)
@@ -93,8 +109,22 @@ def connection_faults(units: Mapping[str, PlacedUnit], c: Connection) -> list[st
     b, fault_b = _find(units, c.target, "input")
     if a is None or b is None:
         return [f"{c.source} -> {c.target}: {f}" for f in (fault_a, fault_b) if f]
-    reason = mismatch(a, b, c.transformation)
+    reason = obstacle(a, b, c.transformation)
     return [f"{c.source} ({a.signature}) -> {c.target} ({b.signature}): {reason}"] if reason else []
+
+
+def connection_doubt(units: Mapping[str, PlacedUnit], c: Connection) -> str:
+    """Return in a line what is not as it should be with a connection that can be made; empty where nothing is."""
+    if clock_of(units, c.source) or clock_of(units, c.target):
+        return ""
+    a, b = (
+        units[c.source.unit].description.outputs[c.source.port],
+        units[c.target.unit].description.inputs[c.target.port],
+    )
+    reason = doubt(a, b, c.transformation)
+    return (
+        f"{c.source} ({a.signature}) -> {c.target} ({b.signature}): {reason}; it is passed as it is" if reason else ""
+    )
 
 
 def series_fault(

@@ -13,6 +13,7 @@ from typing import Any
 
 from handover.cosim.fmu.file.archive import DESCRIPTION
 from handover.cosim.fmu.file.default_experiment import is_finite
+from handover.cosim.fmu.file.xml import with_prefixes
 
 _etree: Any = importlib.import_module("lxml.etree")  # neither it nor its classes have types
 
@@ -39,13 +40,15 @@ def reduced_fmu(description: bytes) -> io.BytesIO:
     """
     archive = io.BytesIO()
     with zipfile.ZipFile(archive, "w") as z:
-        z.writestr(DESCRIPTION, _etree.tostring(_reduced(_etree.fromstring(description))))
+        z.writestr(DESCRIPTION, _etree.tostring(_reduced(_etree.fromstring(with_prefixes(description)))))
     archive.seek(0)
     return archive
 
 
 def _reduced(root: Any) -> Any:
     made = _etree.Element(root.tag, {k: root.get(k) for k in _ROOT if root.get(k) is not None})
+    if root.find("UnitDefinitions") is None:
+        root.insert(0, _etree.Element("UnitDefinitions"))
     reduce = {
         "CoSimulation": _without_children,
         "UnitDefinitions": _units,
@@ -56,7 +59,19 @@ def _reduced(root: Any) -> Any:
     for part in _PARTS:
         for element in root.findall(part):
             made.append(reduce.get(part, _as_it_is)(element))
+    _name_undefined_units(made)
     return made
+
+
+def _name_undefined_units(made: Any) -> None:
+    """Name the units that are used and not defined, without saying what they are; leave out an empty list of units."""
+    (definitions,) = made.findall("UnitDefinitions")
+    defined = {unit.get("name") for unit in _elements(definitions)}
+    used = {e.get("unit") for part in ("TypeDefinitions", "ModelVariables") for e in made.iterfind(f"{part}//*[@unit]")}
+    for name in sorted(used - defined):
+        _etree.SubElement(definitions, "Unit", name=name)
+    if not len(definitions):
+        made.remove(definitions)
 
 
 def _elements(parent: Any) -> Iterator[Any]:
@@ -122,6 +137,8 @@ def _variables_of_3(element: Any) -> Any:
     for variable in _elements(element):
         if _is_used(variable) or variable.get("valueReference") in sizes:
             kept = _copy(variable, without=("derivative", "displayUnit", "reinit", "previous"))
+            if variable.tag == "String" and "start" in kept.attrib:  # as in FMI 2
+                _etree.SubElement(kept, "Start", value=kept.attrib.pop("start"))
             kept.extend(_copy(c, without=("displayUnit",)) for c in _elements(variable) if c.tag != "Annotations")
             _without_rules_for_others(kept, [kept])
             made.append(kept)
@@ -164,6 +181,8 @@ def _structure(element: Any) -> Any:
             made.append(_copy(group))
             unknowns = [u for u in _elements(group) if group.tag == "Outputs" or int(u.get("index", "0")) in outputs]
             made[-1].extend(_copy(u, without=("dependenciesKind",)) for u in unknowns)
+            if not unknowns:
+                made.remove(made[-1])
         elif group.tag in ("Output", "InitialUnknown"):
             known = by_reference.get(group.get("valueReference"))
             if group.tag == "Output" or (known is not None and known.get("causality") == "output"):

@@ -5,6 +5,8 @@ defusedxml decides whether a document is safe; lxml, which knows the line of eac
 
 import gc
 import importlib
+import re
+import xml.parsers.expat
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -14,6 +16,11 @@ import defusedxml
 import defusedxml.ElementTree
 
 _etree: Any = importlib.import_module("lxml.etree")  # neither it nor its classes have types
+
+
+_UNBOUND_PREFIX = xml.parsers.expat.errors.codes[xml.parsers.expat.errors.XML_ERROR_UNBOUND_PREFIX]
+_PREFIX, _DECLARED = re.compile(rb"[<\s]([A-Za-z_][\w.-]*):[A-Za-z_]"), re.compile(rb"\bxmlns:([\w.-]+)\s*=")
+_ROOT_TAG = re.compile(rb"(<[A-Za-z_][\w:.-]*)([^>]*)")
 
 
 class UnsafeXml(ValueError):
@@ -76,17 +83,41 @@ class XmlElement:
 
 
 def parse_xml(content: bytes) -> XmlElement:
-    """Parse a document.
+    """Parse a document; prefixes that it does not declare do not matter, see `with_prefixes`.
 
     Raises:
         UnsafeXml: it is not well-formed, in an unknown encoding, or has a document type or entities.
     """
-    check_xml(content)
+    content = with_prefixes(content)
     try:
         parser = _etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True)
         return XmlElement(_etree.fromstring(content, parser))
     except SyntaxError as e:  # the base class of lxml's errors
         raise UnsafeXml(f"it is not well-formed: {' '.join(str(e).split())}") from e
+
+
+def with_prefixes(content: bytes) -> bytes:
+    """Return a document in which prefixes of elements and attributes that it does not declare are declared at its root.
+
+    Some tools leave that out where they annotate a file. One that declares all is returned as it is.
+
+    Raises:
+        UnsafeXml: as `parse_xml`.
+    """
+    try:
+        check_xml(content)
+    except UnsafeXml as e:
+        if not (isinstance(e.__cause__, ParseError) and e.__cause__.code == _UNBOUND_PREFIX):
+            raise
+        root = _ROOT_TAG.search(content)
+        if root is None:
+            raise
+        prefixes = set(_PREFIX.findall(content)) - set(_DECLARED.findall(root[2])) - {b"xml", b"xmlns"}
+        declared = b"".join(b' xmlns:%b="urn:undeclared:%b"' % (p, p) for p in sorted(prefixes))
+        made = content[: root.end(1)] + declared + content[root.end(1) :]
+        check_xml(made)
+        return made
+    return content
 
 
 class _Nothing:

@@ -132,7 +132,6 @@ def test_an_enumeration_that_is_said_to_be_continuous_changes_at_events(tmp_path
     [
         ('causality="input"', 'causality="imput"', "'imput' is not an element of the set"),
         ('<Real start="0"', "<Real", '"u" .* has no start value'),
-        ('<Real start="0" unit="m"/>', '<Real start="0" unit="parsec"/>', 'unit "parsec" of variable "u"'),
         (' guid="decay"', "", "attribute 'guid' is required but missing"),
         ('modelIdentifier="Decay"', "", "attribute 'modelIdentifier' is required but missing"),
         ('<Outputs><Unknown index="3"', '<Outputs><Unknown index="7"', "index 7 leads to no variable"),
@@ -210,3 +209,41 @@ def test_a_check_and_a_run_propose_the_same_step(
         assert told["interface"] == f"co-simulation, steps of {float(step):g} s"
     assert system.units["mass"].period == step
     assert told["run"].startswith(f"10 steps of {float(step):g} s")
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_unit_of_measurement_that_is_not_defined_is_warned_of(edited: Edited, fmi: int):
+    """Without a single definition, too. It fits its like; elsewhere values pass as they are, which a line says."""
+    file = edited("mass", fmi, ("<UnitDefinitions>", "<!--"), ("</UnitDefinitions>", "-->"))
+    system = System()
+    odd, sound = (system.add(name, f, f=2.0) for name, f in (("odd", file), ("sound", native_fmu("mass", fmi))))
+    system.connect(odd.y.v, sound.u.f)
+    assert "not defined" in system.untouched_faults[file]
+    (line,) = system.tolerated
+    assert line.startswith("odd.v (real m/s) -> sound.f (real N): the unit 'm/s' is not defined")
+    with Master(system) as master:
+        master.run(Fraction(1))
+        assert master.signals["odd.x"] == pytest.approx(1.0)
+
+
+def test_a_prefix_that_a_vendor_does_not_declare_is_warned_of(edited: Edited):
+    annotation = '<VendorAnnotations><Tool name="osp"><osp:View osp:x="1"/></Tool></VendorAnnotations><ModelVariables>'
+    file = edited("mass", 2, ("<ModelVariables>", annotation))
+    system = System()
+    system.add("mass", file, f=2.0)
+    assert "osp" in system.untouched_faults[file]
+    with Master(system) as master:
+        master.run(Fraction(1))
+        assert master.signals["mass.x"] == pytest.approx(1.0)
+
+
+def test_a_text_that_starts_as_in_fmi_2_is_warned_of(edited: Edited):
+    text = '<String name="label" valueReference="90" causality="parameter" variability="fixed" start="a b"/>'
+    d = describe_fmu(edited("mass", 3, ("</ModelVariables>", f"{text}</ModelVariables>")))
+    assert "'start' is not allowed" in d.untouched_fault
+    assert d.parameters["label"].start == "a b"
+
+
+def test_a_list_of_no_outputs_is_warned_of(edited: Edited):
+    file = edited("sink", 2, ("<ModelStructure />", "<ModelStructure><Outputs/></ModelStructure>"))
+    assert "Missing child element" in describe_fmu(file).untouched_fault

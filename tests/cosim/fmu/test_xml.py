@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handover.cosim.fmu.file.xml import UnsafeXml, parse_xml
+from handover.cosim.fmu.file.xml import UnsafeXml, parse_xml, with_prefixes
 
 LAUGHS = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 11))
 BILLION_LAUGHS = f'<?xml version="1.0"?><!DOCTYPE l [<!ENTITY l0 "ha">{LAUGHS}]><l>&l10;</l>'.encode()
@@ -46,6 +46,19 @@ def test_a_billion_laughs_are_refused_without_being_laughed():
 def test_what_is_not_to_be_read_is_refused(content: bytes, text: str):
     with pytest.raises(UnsafeXml, match=text):
         parse_xml(content)
+
+
+def test_prefixes_that_are_not_declared_are_made_up():
+    text = b"<?xml version='1.0'?>\n<a xmlns:k='urn:k'><k:b/><v:c w:d='1' xmlns:v='urn:v'/>\n<v:e/></a>"
+    root = parse_xml(text)
+    b, c, e = root.children
+    assert (root.tag, b.tag, c.tag, e.line) == ("a", "{urn:k}b", "{urn:v}c", 3)
+    assert len(c.attributes) == 1
+    assert with_prefixes(text.replace(b"w:", b"").replace(b"<v:e/>", b"")) == text.replace(b"w:", b"").replace(
+        b"<v:e/>", b""
+    )
+    with pytest.raises(UnsafeXml, match="mismatched tag"):
+        parse_xml(b"<a><v:b></a>")
 
 
 @given(st.binary(max_size=200) | st.text(alphabet="<>/=\"'a &;![]-?\n", max_size=80).map(str.encode))

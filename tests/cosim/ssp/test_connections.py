@@ -178,10 +178,6 @@ def test_all_faults_of_connections_are_reported_together_each_with_its_line(open
         (connectors(z="output"), "the FMU of 'a' has no variable 'z'; "),
         (connectors(y="input"), "a.y is of kind input here and of causality output in its FMU"),
         (connectors(y="output mm"), "a.y is in mm here and in m in its FMU"),
-        (
-            connectors(y="output kg"),
-            "line 3: a.y is in kg, which <ssd:Units> does not define, here and in m in its FMU",
-        ),
         (connectors(y="output").replace("Real", "Integer"), "a.y is of type Integer here and real in its FMU"),
         (connectors(u="input") * 2, "Element 'ssd:Connectors'"),
     ],
@@ -197,13 +193,26 @@ def test_units_that_do_not_fit_are_refused(opened: Open):
     assert "inner.a.y -> b.u: 'm' cannot be converted to 's': they differ in dimension" in value
 
 
-def test_a_unit_that_is_not_defined_is_refused_unless_the_fmu_has_it(opened: Open):
+def test_a_unit_that_is_not_defined_is_tolerated_with_a_line_unless_the_fmu_has_it(opened: Open):
     """Of systems' connectors too, those included that nothing goes on from."""
+    (line,) = opened(component("a", connectors(y="output kg"))).system.tolerated
+    assert line.startswith("SystemStructure.ssd, line 3: a.y: 'kg' cannot be converted to 'm': the unit 'kg' is not")
     assert opened(component("a", connectors(y="output m")), more=MM).system.units
     a, whole = component("a", PLAIN), connection("a.y", "y")
-    assert opened(system(a, whole, name="inner", before=connectors(y="output m"))).system.units
-    value = refusal(lambda: opened(system(a, whole, name="inner", before=connectors(y="output bogus"))))
-    assert "line 3: inner.a.y -> inner.y: 'm' cannot be converted to 'bogus': the unit 'bogus' is not defined" in value
+    assert not opened(system(a, whole, name="inner", before=connectors(y="output m"))).system.tolerated
+    (line,) = opened(system(a, whole, name="inner", before=connectors(y="output bogus"))).system.tolerated
+    assert "line 3: a.y - y: 'm' cannot be converted to 'bogus': the unit 'bogus' is not defined" in line
+
+
+def test_a_prefix_that_a_vendor_does_not_declare_does_not_matter(opened: Open):
+    step = '<osp:Algorithm><osp:FixedStepAlgorithm baseStepSize="0.25"/></osp:Algorithm>'
+    annotation = f'<ssc:Annotation type="com.opensimulationplatform">{step}</ssc:Annotation>'
+    more = (
+        f'<ssd:DefaultExperiment stopTime="3"><ssd:Annotations>{annotation}</ssd:Annotations></ssd:DefaultExperiment>'
+    )
+    ssp = opened(TWO, more=more)
+    assert (ssp.stop, len(ssp.system.units)) == (3, 2)
+    assert ["prefixes" in line and line.startswith("SystemStructure.ssd: ") for line in ssp.system.tolerated] == [True]
 
 
 def test_a_value_that_feeds_itself_is_refused(opened: Open):

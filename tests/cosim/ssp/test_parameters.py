@@ -167,11 +167,19 @@ def test_a_name_that_nothing_has_is_left_out_and_reported(started: Open, caplog:
         ("light|Enumeration|BLUE", "a.light: 'BLUE' is none of red, green"),
         ("mode|Integer|12", "a.mode: 12 is out of range: from 0 to 11"),
         ("u|Real|NaN", "a.u: nan is not finite"),
-        ("u|Real|1|s", "u: 's' cannot be converted to 'm': the unit 's' is not defined"),
     ],
 )
 def test_a_value_that_a_variable_cannot_have_is_refused(started: Open, given: str, text: str):
     assert text in refusal(lambda: started(one(given)))
+
+
+@pytest.mark.parametrize(("unit", "value"), [("[m]", 1.5), ("mm", 0.0015)])
+def test_a_value_in_a_unit_that_is_not_defined_is_taken_as_it_is(tmp_path: Path, unit: str, value: float):
+    fmu = decay.pack(tmp_path / "unit.fmu", b"", decay.DESCRIPTION)
+    file = pack_ssp(tmp_path / "a.ssp", described(one(f"u|Real|1.5|{unit}"), MM), {"resources/unit.fmu": fmu})
+    with SspFile(file) as ssp:
+        assert ssp.system.units["a"].start == {"u": pytest.approx(value)}
+        assert ["the unit '[m]' is not defined" in line for line in ssp.system.tolerated] == [True] * (unit == "[m]")
 
 
 def test_a_name_that_nothing_has_is_reported_with_the_nearest(started: Open, caplog: pytest.LogCaptureFixture):

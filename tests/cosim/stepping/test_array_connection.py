@@ -4,7 +4,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from native_units import native_fmu
+from native_units import Edited, native_fmu
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.fmu.event_instance import EventInstance
@@ -66,3 +66,32 @@ def test_arrays_of_other_lengths_and_other_bytes_are_refused():
     s = chain("array_passer", "binary_passer")
     with pytest.raises(WiringError, match=r"u0.y \(real \[3\] m\) -> u1.u \(binary application/x-native\)"):
         Master(s)
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_bytes_go_from_an_array_of_one_to_a_scalar(edited: Edited, compiled: bool):
+    s = System()
+    output = (
+        '<Binary name="y" valueReference="2" causality="output" variability="discrete" mimeType="application/x-native"'
+    )
+    one = f"{output} />", f'{output}><Dimension start="1"/></Binary>'
+    first = s.add("u0", edited("binary_passer", 3, one), u=DATA)
+    second = s.add("u1", native_fmu("binary_passer"))
+    s.connect(first.y.y, second.u.u)
+    assert ["u0.y (binary [1]" in line for line in s.tolerated] == [True]
+    assert last_row(s, "u1.y", MasterOptions(compiled=compiled)) == list(DATA)
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_an_integer_goes_to_an_enumeration(edited: Edited, compiled: bool):
+    kinds = "<TypeDefinitions><SimpleType name='E'><Enumeration><Item name='off' value='0'/><Item name='on' value='5'/>"
+    item = ("<DefaultExperiment", f"{kinds}</Enumeration></SimpleType></TypeDefinitions><DefaultExperiment")
+    counted = ('<Integer start="0" />', '<Enumeration declaredType="E" start="0" />')
+    s = System()
+    source = s.add("source", native_fmu("discrete_passer", 2), count_in=5)
+    target = s.add("target", edited("discrete_passer", 2, item, counted))
+    s.connect(source.y.count, target.u.count_in)
+    assert ["an integer is no enumeration" in line for line in s.tolerated] == [True]
+    with pytest.raises(WiringError, match="an integer is no enumeration"):
+        Master(s, MasterOptions(strict=True))
+    assert last_row(s, "target.count", MasterOptions(compiled=compiled)) == 5

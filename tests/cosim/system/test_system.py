@@ -13,7 +13,7 @@ from handover.cosim.exceptions import InvalidFmu, WiringError
 from handover.cosim.fmu.file.default_experiment import proposed_step
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.system import System
-from handover.cosim.system.wiring_faults import mismatch
+from handover.cosim.system.wiring_faults import doubt, mismatch, obstacle
 
 M, NM = BaseExponents(m=1), BaseExponents(kg=1, m=2, s=-2)
 
@@ -139,6 +139,28 @@ def test_units_are_compared_by_what_they_mean(a: Unit, b: Unit, fault: str | Non
     )
     found = mismatch(output, target)
     assert (found is None) if fault is None else (found is not None and fault in found)
+    assert (doubt(output, target) is not None) == (a.symbol == "furlong")  # else it can be connected, or cannot
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "is_connected"),
+    [
+        ((Kind.INTEGER, ()), (Kind.ENUMERATION, ()), True),
+        ((Kind.ENUMERATION, ()), (Kind.INTEGER, ()), False),
+        ((Kind.BINARY, (1,)), (Kind.BINARY, ()), True),
+        ((Kind.BINARY, ()), (Kind.BINARY, (1,)), True),
+        ((Kind.BINARY, (2,)), (Kind.BINARY, ()), False),
+        ((Kind.REAL, (1,)), (Kind.INTEGER, ()), False),
+    ],
+)  # fmt: skip
+def test_what_holds_the_same_values_can_be_connected_with_a_line(a: Any, b: Any, is_connected: bool):
+    output, target = (
+        FmuPort(name="x", kind=kind, shape=shape, causality=Causality.OUTPUT, fmi_type="", references=(1,))
+        for kind, shape in (a, b)
+    )
+    assert mismatch(output, target) is not None
+    assert (obstacle(output, target) is None) is is_connected
+    assert not is_connected or doubt(output, target)
 
 
 @pytest.mark.parametrize(
