@@ -5,14 +5,15 @@ import contextlib
 import signal
 import socket
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from handover.scenarios.cli.options import FiniteRange, Seconds, scenario_options, stop_option
+from handover.scenarios.cli.options import FiniteRange, HeadedCommand, scenario_options, stop_option
+from handover.scenarios.cli.run import file_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.request import RUNS, RunRequest
 from handover.scenarios.experiment.experiment import Experiment
@@ -27,20 +28,16 @@ The page has a field with a slider or a choice for each parameter, also of its u
 under way is ended and another one begins; verdicts of all runs stand side by side. Each is a run as of `handover run`,
 in a folder of its own, and the page tells that command; reports are written when the page asks for them.
 
-FILE.ssp and FILE.fmu can be played with, too: their signals are plotted. Ctrl-C ends the session.
+FILE.ssp and FILE.fmu can be played with, too: their signals are plotted, and of an FMU the inputs have fields like
+parameters, whose values they keep unless --input says others. Ctrl-C ends the session.
 """
 
 
-@click.command("play", help=_HELP, short_help="Play with a SCENARIO's parameters in a browser.")
+@click.command("play", cls=HeadedCommand, help=_HELP, short_help="Play with a SCENARIO's parameters in a browser.")
 @click.argument("scenario", metavar="SCENARIO|FILE.ssp|FILE.fmu")
 @scenario_options
 @stop_option
-@click.option(
-    "--step",
-    type=Seconds(),
-    metavar="SECONDS",
-    help="Communication step of all units of FILE.ssp or FILE.fmu.  [default: what each FMU proposes]",
-)
+@file_options
 @click.option(
     "--pace",
     type=FiniteRange(min=0, min_open=True),
@@ -62,6 +59,7 @@ def play(
     replaced: Sequence[str],
     stop: Fraction | None,
     step: Fraction | None,
+    inputs: Path | None,
     pace: float,
     out: Path | None,
 ) -> None:
@@ -79,22 +77,22 @@ def play(
                 units=replaced,
                 stop=stop,
                 step=step,
+                inputs=inputs,
                 presented=False,
             )
             request.check_options()
             subject = request.open(opened)
             asked = subject.experiment
             folder = RunFolder(out or made.enter_context(dated_folder(RUNS, f"{Path(asked.name).stem}_play")))
-            options = _options(replaced, stop, step)
+            options = _options(replaced, {"--stop": stop, "--step": step, "--input": inputs})
             session = _session(request, asked, subject.parameters, options, folder.claim(made).shown, pace)
         asyncio.run(_serve(session))
 
 
-def _options(replaced: Sequence[str], stop: Fraction | None, step: Fraction | None) -> list[str]:
+def _options(replaced: Sequence[str], others: Mapping[str, object]) -> list[str]:
     """Return the options of `handover run` that all runs of a session have."""
     given = [part for text in replaced for part in ("--unit", text)]
-    times = {"--stop": stop, "--step": step}
-    return given + [part for name, time in times.items() if time is not None for part in (name, str(time))]
+    return given + [part for name, value in others.items() if value is not None for part in (name, str(value))]
 
 
 def _session(

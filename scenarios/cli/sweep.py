@@ -30,7 +30,7 @@ from handover.scenarios.cli.run import file_options
 from handover.scenarios.execution.errors import one_line_errors, require_extra
 from handover.scenarios.execution.request import RunRequest, experiment_type
 
-_HELP = """Run a SCENARIO many times: all combinations of the given values, each --repeat times.
+_HELP = """Run a SCENARIO, an SSP or an FMU many times: all combinations of the given values, each --repeat times.
 
 \b
 NAME=VALUES is a list or a range of numbers:
@@ -57,7 +57,7 @@ unit fails is a row with its reason; a run that was lost, as with its machine, i
 --repeat adds runs. Without --out, the command resumes its newest campaign in campaigns/ if that is not complete, else
 it begins a new one.
 
-A run's seed follows from --seed, its point and its repetition. What it prints, as by --log-level, is in its log.txt.
+A run's seed follows from --seed, its point and its repetition; runs of files draw no numbers from it. What it prints, as by --log-level, is in its log.txt.
 
 Progress goes to standard error: a bar on a terminal, else a line every half minute.
 
