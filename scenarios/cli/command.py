@@ -182,7 +182,7 @@ COMMANDS = (
     DeferredCommand(
         "sweep",
         "handover.scenarios.cli.sweep:sweep",
-        help="Run a SCENARIO many times: all combinations of the given values, each --repeat times.",
+        help="Run a SCENARIO, SSP or FMU many times: all combinations of the given values, each --repeat times.",
     ),
     DeferredCommand(
         "vsl-train",

@@ -30,7 +30,7 @@ from handover.scenarios.cli.run import file_options
 from handover.scenarios.execution.errors import one_line_errors, require_extra
 from handover.scenarios.execution.request import RunRequest, experiment_type
 
-_HELP = """Run a SCENARIO, an SSP or an FMU many times: all combinations of the given values, each --repeat times.
+_HELP = """Run a SCENARIO, SSP or FMU many times: all combinations of the given values, each --repeat times.
 
 \b
 NAME=VALUES is a list or a range of numbers:

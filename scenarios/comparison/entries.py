@@ -170,11 +170,11 @@ def _faults_of_kinds(campaigns: Sequence[CampaignEntry], runs: Sequence[RunEntry
         a, b = campaigns[0].folder, runs[0].folder
         return [f"{a} is a campaign, {b} a run: compare campaigns with campaigns, or runs with runs, as {a}/runs/..."]
     entries: Sequence[Entry] = campaigns or runs
-    first = entries[0]
+    kinds = ["" if is_file(e.scenario) else e.scenario for e in entries]
     return [
-        f"{e.folder} is of another scenario, {e.scenario}, than {first.folder}, {first.scenario}"
-        for e in entries[1:]
-        if e.scenario != first.scenario and not (is_file(e.scenario) and is_file(first.scenario))
+        f"{e.folder} is of another scenario, {e.scenario}, than {entries[0].folder}, {entries[0].scenario}"
+        for e, kind in zip(entries, kinds, strict=True)
+        if kind != kinds[0]
     ]
 
 
@@ -222,7 +222,8 @@ def _fmu(unit: Any) -> str:
 
 
 def _code(entry: Entry) -> dict[str, str]:
-    digest = str(_part(entry, "source").get("sha256", ""))
+    source = _part(entry, "source")
+    digest = str(source.get("sha256", "")) if "scenario" in source else ""  # a file is among the units
     return {"code of the scenario": digest[:12]} if digest else {}
 
 

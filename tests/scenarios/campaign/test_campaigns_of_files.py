@@ -24,7 +24,8 @@ from handover.scenarios.campaign.results import read_results
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.table_writer import rebuild_table
 from handover.scenarios.comparison.campaigns import ComparedCampaigns
-from handover.scenarios.comparison.entries import read_entries
+from handover.scenarios.comparison.entries import differences_of, read_entries
+from handover.scenarios.comparison.runs import metric_rows
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.results.run_folder import InvalidRunFolder
@@ -176,3 +177,6 @@ def test_campaigns_of_two_files_are_compared(tmp_path: Path):
     for key in compared.matched:
         ours, theirs = (compared.median(point, "last_x") for point in compared.at(key).values())
         assert ours == pytest.approx(theirs)
+    _, runs = read_entries([path / "runs" / "000_m=1_r0000" for path in paths])
+    assert [row.name for row in metric_rows(runs)][:4] == ["last_x", "last_v", "min_x", "max_x"]
+    assert {(d.kind, d.name) for d in differences_of(runs)} == {("unit", "mass")}
