@@ -224,11 +224,40 @@ def own_page_reads() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_majflt
 
 
+class PolledClock:
+    """Adds up the wall time between polls, of which at most `max_gap` seconds count each.
+
+    If more has passed between two polls, this process or the machine was suspended, or busy with something else.
+
+    Args:
+        max_gap: seconds.
+        clock: returns the wall time in seconds.
+
+    Attributes:
+        seconds: that have counted since the start.
+    """
+
+    def __init__(self, max_gap: float, clock: Callable[[], float] = time.monotonic) -> None:
+        self._max_gap, self._clock = max_gap, clock
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin at zero."""
+        self.seconds, self._at = 0.0, self._clock()
+
+    def poll(self, *, counts: bool = True) -> float:
+        """Return the seconds until now; the time since the last poll is left out unless it `counts`."""
+        now = self._clock()
+        self.seconds += min(now - self._at, self._max_gap) if counts else 0.0
+        self._at = now
+        return self.seconds
+
+
 class StallTimer:
     """Measures, by polling a heartbeat, for how long the same call has been under way.
 
-    Of the time between two polls at most `max_gap` seconds count: if more has passed, the whole process or the machine
-    was suspended. Time in which the process read its memory from the disk, as where it was swapped out, does not count.
+    Of the time between two polls at most `max_gap` seconds count, see `PolledClock`. Time in which the process read its
+    memory from the disk, as where it was swapped out, does not count.
 
     Args:
         heartbeat: of the process that makes the calls.
@@ -241,10 +270,10 @@ class StallTimer:
         self, heartbeat: Heartbeat, max_gap: float, clock: Callable[[], float] = time.monotonic,
         page_reads: Callable[[], int] = own_page_reads,
     ) -> None:  # fmt: skip
-        self._heartbeat, self._max_gap, self._clock, self._page_reads = heartbeat, max_gap, clock, page_reads
+        self._heartbeat, self._clock, self._page_reads = heartbeat, PolledClock(max_gap, clock), page_reads
         self.beat: tuple[int, int] | None = None
         """The call that was under way at the last poll."""
-        self._seconds, self._checked_at, self._reads = 0.0, clock(), page_reads()
+        self._reads = page_reads()
 
     def poll(self, *, suspended: bool = False) -> float:
         """Return the seconds for which the present call has been under way, 0 where there is none.
@@ -252,11 +281,10 @@ class StallTimer:
         Args:
             suspended: whether the process that makes the calls is known to have been stopped since the last poll.
         """
-        now, beat, reads = self._clock(), self._heartbeat.beat, self._page_reads()
-        passed, self._checked_at = now - self._checked_at, now
+        beat, reads = self._heartbeat.beat, self._page_reads()
         swapped, self._reads = reads != self._reads, reads
         if beat is None or beat != self.beat:
-            self.beat, self._seconds = beat, 0.0
-        elif not suspended and not swapped:
-            self._seconds += min(passed, self._max_gap)
-        return self._seconds
+            self.beat = beat
+            self._clock.restart()
+            return 0.0
+        return self._clock.poll(counts=not suspended and not swapped)

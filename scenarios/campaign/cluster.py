@@ -4,7 +4,6 @@ import contextlib
 import itertools
 import queue
 import threading
-import time
 import uuid
 from collections.abc import Callable, Generator, Mapping, Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any, TypeVar, cast
 from distributed import Client, Future, KilledWorker
 
 from handover.cosim.exceptions import one_line
+from handover.cosim.fmu.heartbeat import PolledClock
 from handover.scenarios.campaign.worker import (
     difference,
     end_runs,
@@ -157,13 +157,13 @@ class ClusterPool:
 
     def _next(self, done: "queue.SimpleQueue[Future[JobResult]]") -> "Future[JobResult]":
         """Wait for a run's end."""
-        last_seen = time.monotonic()
+        without = PolledClock(2 * _POLL_INTERVAL)
         while True:
             with contextlib.suppress(queue.Empty):
                 return done.get(timeout=_POLL_INTERVAL)
             if self.workers:
-                last_seen = time.monotonic()
-            elif time.monotonic() - last_seen > _MAX_TIME_WITHOUT_WORKERS:
+                without.restart()
+            elif without.poll() > _MAX_TIME_WITHOUT_WORKERS:
                 raise ClusterLost(f"{self._name} has had no worker for {_MAX_TIME_WITHOUT_WORKERS:g} s")
 
     def _result(self, job: RunJob, future: "Future[JobResult]") -> JobResult:

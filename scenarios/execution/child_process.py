@@ -10,14 +10,14 @@ import select
 import signal
 import sys
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
-from handover.cosim.fmu.heartbeat import Heartbeat, StallTimer
+from handover.cosim.fmu.heartbeat import Heartbeat, PolledClock, StallTimer
 
 _POLL_INTERVAL = 0.25  # s
+_MAX_GAP = 2 * _POLL_INTERVAL  # s
 _GRACE = 5.0
 """How much later than the child itself the parent gives up a call, s.
 
@@ -97,12 +97,12 @@ class ForkedChild:
             stop_limit: seconds after which a child that stays stopped is killed; None: it may stay so for ever.
         """
         files = [self._alive] if watched is None else [self._alive, watched]
-        limits, closed, since_closed = _Limits(self._heartbeat, self.pid, stop_limit), False, _Clock()
+        limits, closed, since_closed = _Limits(self._heartbeat, self.pid, stop_limit), False, PolledClock(_MAX_GAP)
         while True:
             ready, _, _ = select.select(files, [], [], _EXIT_INTERVAL if closed else _POLL_INTERVAL)
             if self._alive in ready:  # it is about to end, or a unit has closed the pipe: see below
                 files.remove(self._alive)
-                closed, since_closed = True, _Clock()
+                closed, since_closed = True, PolledClock(_MAX_GAP)
             pid, status, spent = os.wait4(self.pid, os.WNOHANG | os.WUNTRACED | os.WCONTINUED)
             if pid and (os.WIFSTOPPED(status) or os.WIFCONTINUED(status)):
                 self.stopped = os.WIFSTOPPED(status)
@@ -119,7 +119,7 @@ class ForkedChild:
                 return None
             if limits.exceeded():
                 os.kill(self.pid, signal.SIGKILL)
-            closed = closed and since_closed.tick() < _EXIT_PATIENCE
+            closed = closed and since_closed.poll() < _EXIT_PATIENCE
 
     def kill(self) -> None:
         """Kill it and what it started, and wait until it is gone."""
@@ -154,19 +154,6 @@ class ForkedChild:
         os.close(self._parent_lives)
 
 
-class _Clock:
-    """Adds up the wall time between its ticks, of which at most two polls count: else this process was suspended."""
-
-    def __init__(self) -> None:
-        self.seconds, self._at = 0.0, time.monotonic()
-
-    def tick(self) -> float:
-        now = time.monotonic()
-        self.seconds += min(now - self._at, 2 * _POLL_INTERVAL)
-        self._at = now
-        return self.seconds
-
-
 class _Limits:
     """Says, at each poll of a child, whether it has taken longer for something than it may.
 
@@ -183,25 +170,25 @@ class _Limits:
     def __init__(self, heartbeat: Heartbeat, pid: int, stop_limit: float | None) -> None:
         self._heartbeat, self._stop_limit = heartbeat, stop_limit
         self._calls = StallTimer(heartbeat, 2 * _POLL_INTERVAL, page_reads=lambda: _page_reads(pid))
-        self._stopped: _Clock | None = None
-        self._ending = _Clock()
+        self._stopped: PolledClock | None = None
+        self._ending = PolledClock(_MAX_GAP)
         self.hung = self.given_up = False
 
     def note_suspension(self, *, stopped: bool) -> None:
         """Note that the child was stopped, or continues."""
-        self._stopped = _Clock() if stopped else None
+        self._stopped = PolledClock(_MAX_GAP) if stopped else None
 
     def exceeded(self) -> bool:
         """Poll; return whether the child is to be killed."""
         if self._stopped is not None:
             self._calls.poll(suspended=True)
-            self.given_up = self._stop_limit is not None and self._stopped.tick() >= self._stop_limit
+            self.given_up = self._stop_limit is not None and self._stopped.poll() >= self._stop_limit
             return self.given_up
         limit = self._heartbeat.limit + _GRACE if self._heartbeat.limit else float("inf")
         if self._heartbeat.status is None:
             self.hung = self._calls.poll() >= limit
-            self._ending = _Clock()
-        return self.hung or self._ending.tick() >= limit
+            self._ending = PolledClock(_MAX_GAP)
+        return self.hung or self._ending.poll() >= limit
 
 
 def _page_reads(pid: int) -> int:

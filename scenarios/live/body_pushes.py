@@ -2,12 +2,14 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from handover.scenarios.live.commands import Push
 
 SILENCE = 0.5
-"""How long a page may be silent before its push is released, s; it tells a push anew every 33 ms."""
+"""How long a page may be silent before its push is released, s; it sends a push every 33 ms."""
+_BUSY = 0.05
+"""By how much a timer comes late where the server was busy, s: what pages have sent meanwhile is yet to be read."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,19 @@ class BodyPushes:
         elif before is not None:
             before.timer.cancel()
             del self._held[page]
-        timer = asyncio.get_running_loop().call_later(self._silence, self.release, page)
-        self._held[page] = _Held(push, apply, timer)
+        self._held[page] = _Held(push, apply, self._timer(page))
         apply(push)
+
+    def _timer(self, page: object) -> asyncio.TimerHandle:
+        loop = asyncio.get_running_loop()
+        due = loop.time() + self._silence
+        return loop.call_at(due, self._release_silent, page, due)
+
+    def _release_silent(self, page: object, due: float) -> None:
+        if asyncio.get_running_loop().time() - due > _BUSY:
+            self._held[page] = replace(self._held[page], timer=self._timer(page))
+        else:
+            self.release(page)
 
     def release(self, page: object) -> None:
         """Release what a page pushes; a push of another page on that body acts again."""

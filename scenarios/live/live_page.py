@@ -58,8 +58,6 @@ _PICTURE_PERIOD = 0.1
 """How often camera pictures are looked for, s."""
 _MOST_MESSAGES = 500
 """Messages of a page within a second; it sends some thirty as it pushes."""
-_PATIENCE = 120.0
-"""How long a run may take until its first row, s."""
 _EARLY = 8.0
 """How long a device that leads a hand may come before the run's first row, s."""
 _NO_RUN = "no run has begun yet whose hand could be led"
@@ -213,10 +211,7 @@ class LivePage:
             failed: says whether its process has ended.
         """
         self.shown = self.shown or shown
-        late = time.monotonic() + _PATIENCE
-        while shown.scene is None:
-            if shown.run.has_verdict or failed() or time.monotonic() > late:
-                break
+        while shown.scene is None and not shown.run.has_verdict and not failed():
             if scene := await asyncio.to_thread(shown.run.scene):
                 shown.begin(scene)
             await asyncio.sleep(_POLL)
@@ -294,8 +289,8 @@ class LivePage:
             if record is not None:  # its last rows were never in the file of the newest ones
                 shown.scene.complete(record)
             await self._send_frame()
-            await self._send_plots(*self._viewers.ready)
-        await self._tell_end(shown)
+        await self._tell_end(shown)  # before plots, which take long to draw
+        await self._send_plots(*self._viewers.ready)
         await self._send_plots(*self._viewers.ready, unseen=True)
 
     async def _tell_end(self, shown: ShownRun) -> None:

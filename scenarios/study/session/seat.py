@@ -27,6 +27,7 @@ from typing import Any, cast
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handover.cosim.exceptions import RecordNotWritten
+from handover.cosim.fmu.heartbeat import PolledClock
 from handover.scenarios.live.connections import (
     BinaryMessage,
     MessageRate,
@@ -53,7 +54,9 @@ from handover.scenarios.study.session.trial import Trial, TrialFailed, TrialRequ
 PERIOD = 1.0 / 60.0
 """Time between two states of the run that the page gets, s."""
 SILENCE = 3.0
-"""Time without a sample of the hand after which a device is lost, and the round void, s (assumed)."""
+"""How long a run may go on without a sample of the hand before its device is lost, and the round void, s (assumed)."""
+_MAX_GAP = 0.25
+"""Of the time between two states of a run, how much counts as silence at most, s: else the run or the server stood."""
 _READY = 60.0
 """How long a page may take to draw the scene for the first time, s."""
 
@@ -80,7 +83,7 @@ class StudySeat:
         self._preparing: asyncio.Task[None] | None = None
         self._playing: asyncio.Task[None] | None = None
         self._page_ready, self._fault = asyncio.Event(), ""
-        self._last_sample = 0.0
+        self._silence = PolledClock(_MAX_GAP)
         self._practice: Practice | None = None
         self._has_tracker, self._page_clock, self._page_offset = False, DeviceClock(), math.nan
         self.on_run: Callable[[Mapping[str, Any]], Awaitable[None]] | None = None
@@ -177,9 +180,8 @@ class StudySeat:
             raise InvalidAction("the tracker leads the hand in this session")
         if trial is None:
             return
-        arrival = time.monotonic()
-        trial.lead(value, arrival)
-        self._last_sample = arrival
+        trial.lead(value, time.monotonic())
+        self._silence.restart()
 
     def _set_clock(self, value: Any) -> None:
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
@@ -198,7 +200,7 @@ class StudySeat:
             raise InvalidHandMessage(f"in this session the hand is led by: {session.session.device}")
         if session is not None and trial is not None:
             trial.lead_by_tracker(text, self._page_offset)
-            self._last_sample = time.monotonic()
+            self._silence.restart()
 
     async def tracker_came(self, *, there: bool) -> None:
         """Tell the page whether a tracker is there."""
@@ -285,14 +287,14 @@ class StudySeat:
         if self.protocol.screen == "practising":
             await self._send({"target": self.practice.test.target})
         trial.go()
-        self._last_sample = time.monotonic()
+        self._silence.restart()
         while trial.is_running:
             if self._playing is not asyncio.current_task():  # wait_for of Python 3.11 may swallow its cancellation
                 raise asyncio.CancelledError
             began = time.monotonic()
-            if began - self._last_sample > SILENCE:
+            went_on = await self._send_frame(trial)
+            if went_on and self._silence.poll() > SILENCE:  # at its end the run still writes, and asks for no hand
                 return f"{VoidCause.NO_SAMPLE.value} for {SILENCE:.0f} s: the device or the page was lost"
-            await self._send_frame(trial)
             await self._test_device(trial)
             if self.protocol.screen == "practising" and is_lost(trial):
                 trial.stop()
@@ -376,11 +378,13 @@ class StudySeat:
             await asyncio.wait([self._closing])
             self._closing = None
 
-    async def _send_frame(self, trial: Trial, *, always: bool = False) -> None:
+    async def _send_frame(self, trial: Trial, *, always: bool = False) -> bool:
+        """Send the state of a run, if it is another one than before; return whether it is."""
         frame = trial.frame(always=always)
         page = self._page
         if frame is not None and page is not None:
             await send(page, frame.packed())
+        return frame is not None
 
     async def _send(self, message: dict[str, Any]) -> None:
         page = self._page

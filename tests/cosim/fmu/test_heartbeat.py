@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from handover.cosim.fmu.heartbeat import Heartbeat, StallTimer
+from handover.cosim.fmu.heartbeat import Heartbeat, PolledClock, StallTimer
 
 
 def test_a_call_is_reported_by_names_and_time_while_it_is_under_way():
@@ -81,3 +81,17 @@ def test_only_the_time_of_one_call_adds_up():
     assert after(3600.0) == pytest.approx(0.7)  # the machine slept
     beat.end()
     assert after(0.2) == 0.0
+
+
+def test_a_polled_clock_counts_at_most_so_much_between_two_polls():
+    now = [0.0]
+    clock = PolledClock(0.5, lambda: now[0])
+
+    def after(seconds: float, *, counts: bool = True) -> float:
+        now[0] += seconds
+        return clock.poll(counts=counts)
+
+    assert [after(0.2), after(0.4), after(3600.0)] == pytest.approx([0.2, 0.6, 1.1])
+    assert [after(0.3, counts=False), after(0.3)] == pytest.approx([1.1, 1.4])
+    clock.restart()
+    assert after(0.1) == pytest.approx(0.1)

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import time
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from typing import Any
@@ -69,6 +70,18 @@ def test_a_silent_page_pushes_no_more_and_one_that_speaks_does():
         assert bodies.forces == {ROBOT.labels: NONE, GRIPPER.labels: (2.0, 0.0, 0.0)}
 
     played(act, silence=0.2)
+
+
+def test_a_push_is_held_while_the_server_is_busy():
+    async def act(pushes: BodyPushes, bodies: Bodies) -> None:
+        pushes.hold("A", Push(ROBOT, (1.0, 0.0, 0.0), POINT), bodies.apply)
+        begun = time.monotonic()
+        while time.monotonic() - begun < 0.1 + 0.2:  # with something else: what the page sends is not read
+            pass
+        await asyncio.sleep(0.0)
+        assert "A" in pushes
+
+    played(act, silence=0.1)
 
 
 def test_a_force_is_limited_by_its_body_and_a_point_by_its_distance():

@@ -1,5 +1,6 @@
 """What goes wrong as a round is played: it is void, or goes on, but never counts as what it was not."""
 
+import asyncio
 import contextlib
 import json
 import os
@@ -31,7 +32,9 @@ from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session import seat as seat_module
 from handover.scenarios.study.session.device_test import Reached
+from handover.scenarios.study.session.screen_content import VoidCause
 from handover.scenarios.study.session.served_study import line_of_round
+from handover.scenarios.study.session.trial import Frame
 
 
 def test_samples_that_cannot_be_used_are_refused_and_the_round_goes_on(tmp_path: Path):
@@ -106,6 +109,51 @@ def test_a_device_that_falls_silent_makes_the_round_void(tmp_path: Path, monkeyp
         assert "no sample of the hand" in shown["reason"]
         act(page, "next")
         assert told(page, "screen")["round"] == 1
+
+
+class RecordedTrial:
+    """A trial as its seat sees it, of so many states, whose process exits so many polls after the last one."""
+
+    hand, scene, led = HAND, "a scene", None
+
+    def __init__(self, states: int, writes: int) -> None:
+        self._states, self._polls = states, states + writes
+
+    @property
+    def is_running(self) -> bool:
+        self._polls -= 1
+        return self._polls >= 0
+
+    newest = None
+
+    def scene_content(self) -> dict[str, Any]:
+        return {}
+
+    def go(self) -> None:
+        pass
+
+    def frame(self, *, always: bool = False) -> Frame | None:
+        self._states -= 0 if always else 1
+        return Frame(0.0, 0.0, np.zeros(0)) if always or self._states >= 0 else None
+
+
+@pytest.mark.parametrize(("states", "writes", "is_void"), [(1, 20, False), (10**6, 0, True)])
+def test_silence_counts_while_the_run_goes_on_and_not_while_its_process_writes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, states: int, writes: int, is_void: bool
+):
+    monkeypatch.setattr(seat_module, "SILENCE", 0.1)
+    seat = server_of(tmp_path / "study").seat
+
+    async def told_why() -> str | None:
+        playing = asyncio.ensure_future(seat._run(RecordedTrial(states, writes)))
+        seat._playing = playing
+        await asyncio.sleep(0.0)
+        await asyncio.sleep(0.0)
+        seat._page_ready.set()
+        return await playing
+
+    why = asyncio.run(told_why())
+    assert (why is not None and VoidCause.NO_SAMPLE.value in why) == is_void, why
 
 
 def test_a_run_that_is_killed_makes_its_round_void(tmp_path: Path):
