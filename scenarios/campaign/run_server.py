@@ -88,8 +88,9 @@ class RunServer:
         for path in (*job.fmus.values(), job.scenario):
             with contextlib.suppress(Exception):  # whoever runs it says what is wrong with it
                 load_modules(Path(path))
-        gc.collect()
-        gc.freeze()  # else the collector of each child touches, and so copies, all that is loaded
+        if self._forks:
+            gc.collect()
+            gc.freeze()  # else the collector of each child touches, and so copies, all that is loaded
 
     def _run_job(self, job: RunJob, folder: Path) -> JobResult:
         try:

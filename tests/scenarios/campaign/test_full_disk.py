@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import gc
 import io
 import os
 import tempfile
@@ -101,7 +102,9 @@ def test_a_run_server_without_room_for_what_a_run_prints_answers(
     write_message(jobs, (job, str(here / ".r")))
     jobs.seek(0)
     monkeypatch.setattr(supervisor, "can_supervise", lambda: False)
+    frozen = gc.get_freeze_count()
     RunServer(jobs, results).serve()
+    assert gc.get_freeze_count() == frozen  # else libraries complain at this process's end of what was never collected
     said = os.strerror(number)
     text = JobResult(name="r", lost=f"{here} cannot be written: {said}", no_room=said if full else "")
     results.seek(0)
