@@ -5,7 +5,7 @@ import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
 
-from handover.scenarios.results.run_folder import write_whole
+from handover.scenarios.results.run_folder import make_folder_of, write_whole
 
 
 @dataclass(frozen=True)
@@ -23,11 +23,12 @@ class Page:
     height: int = 640
 
     def save(self, path: Path | str) -> "Page":
-        """Write the page to a file and return it with that as its path.
+        """Write the page to a file, whose folder is made, and return it with that as its path.
 
         Raises:
             RecordNotWritten: it cannot be written.
         """
+        make_folder_of(Path(path))
         write_whole(Path(path), self.html)
         return Page(self.html, Path(path), self.height)
 

@@ -135,8 +135,6 @@ def _check(path: Path, plots: Sequence[str], fps: float | None, *, force: bool, 
         raise UsageError(f"--out {path}: a film's name ends with {', '.join(_SUFFIXES[:-1])} or {_SUFFIXES[-1]}")
     if path.is_dir():
         raise UsageError(f"--out {path}: there is a folder of that name")
-    if not path.parent.exists():
-        raise UsageError(f"--out {path}: there is no folder {path.parent}")
     if path.exists() and not force:
         raise UsageError(f"--out {path}: it is there already; --force replaces it")
     if plots and no_plots:

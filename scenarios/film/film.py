@@ -11,6 +11,7 @@ from handover.scenarios.film import LARGEST
 from handover.scenarios.film.browser import open_camera, window_of
 from handover.scenarios.film.encoder import film_to
 from handover.scenarios.film.film_page import FilmContent, NotFilmed, film_html, most_plots
+from handover.scenarios.results.run_folder import make_folder_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +58,7 @@ def write_film(content: FilmContent, path: Path, settings: FilmSettings, report:
     _check_room(content, settings.size)
     times = frame_times(*content.span, settings)
     html = film_html(content, window_of(settings.size)[0], settings.view)
+    make_folder_of(path)
     with open_camera(html, settings.size, dark=settings.dark) as camera, film_to(path, settings.fps) as film:
         for k, t in enumerate(times.tolist()):
             report(k, len(times))

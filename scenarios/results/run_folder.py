@@ -242,6 +242,16 @@ def is_full(e: OSError) -> bool:
     return e.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
+def make_folder_of(path: Path) -> None:
+    """Make the folder of a file that is to be written where a user has named it.
+
+    Raises:
+        RecordNotWritten: it cannot be made.
+    """
+    with disk_errors_reported(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+
+
 def write_whole(path: Path, text: str) -> None:
     """Write a file atomically: it has the old or the new content, whenever the process ends.
 

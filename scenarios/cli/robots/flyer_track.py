@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from handover.scenarios.execution.errors import UsageError, one_line_errors
-from handover.scenarios.results.run_folder import RunFolder, check_place
+from handover.scenarios.results.run_folder import RunFolder, check_place, make_folder_of
 
 _PATH = click.Path(path_type=Path)
 _SIGNALS = ("person.p_WH_goal", "person.q_WH_goal", "person.finger_goal", "person.closed_goal")
@@ -51,8 +51,8 @@ def _write(run: RunFolder, out: Path) -> int:
         raise UsageError(f"{run.shown}: the run has no {', '.join(lacking)}; a handover by one free-flyer has")
     p, q, angles, closed = (record[name].tolist() for name in _SIGNALS)
     poses = (HandPose(tuple(a), tuple(b), tuple(c), bool(d)) for a, b, c, d in zip(p, q, angles, closed, strict=True))
+    make_folder_of(out)
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
         write_track(out, zip(record.time.tolist(), poses, strict=True))
     except OSError as e:
         raise UsageError(f"{out} cannot be written: {e.strerror}") from e

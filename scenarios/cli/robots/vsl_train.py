@@ -27,7 +27,7 @@ from handover.scenarios.cli.options import WholeNumber
 from handover.scenarios.execution.errors import UsageError, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import progress_bar
-from handover.scenarios.results.run_folder import replacing, write_whole
+from handover.scenarios.results.run_folder import InvalidRunFolder, check_place, make_folder_of, replacing, write_whole
 from handover.scenarios.vsl.data_file import InvalidData, read_data, write_data
 from handover.scenarios.vsl.learning_curve import curve_table, draw_curve, learning_curve
 from handover.scenarios.vsl.model_file import content_key, file_text
@@ -204,10 +204,12 @@ class _Options:
         """Write what is to be written of points and model."""
         if self.save_data:
             try:
+                make_folder_of(self.save_data)
                 with replacing(self.save_data) as unfinished:
                     write_data(unfinished, measured)
             except OSError as e:
                 raise UsageError(f"--save-data {self.save_data}: {e.strerror or e}") from e
+        make_folder_of(self.out)
         write_whole(self.out, file_text(model, self.out))
 
 
@@ -222,6 +224,7 @@ def _train(o: _Options, progress: Progress) -> list[str]:
     o.save(measured, model)
     if o.curve:
         try:
+            make_folder_of(o.curve)
             draw_curve(points, o.curve)
         except OSError as e:
             raise UsageError(f"--curve {o.curve}: {e.strerror or e}; the model is written: {o.out}") from e
@@ -344,7 +347,6 @@ def _built() -> Path:
 
 
 def _check_file(option: str, out: Path, suffixes: tuple[str, ...], more: str = "") -> None:
-    folder = out.absolute().parent
     longest = 240  # of the 255 bytes of a file's name; the unfinished file's name is longer
     if out.suffix not in suffixes:
         raise UsageError(f"{option} {out}: a name that ends in {suffixes[0]}{', ' + more if more else ''}")
@@ -352,10 +354,10 @@ def _check_file(option: str, out: Path, suffixes: tuple[str, ...], more: str = "
         raise UsageError(f"{option} {out}: the name is longer than {longest} bytes")
     if out.is_dir():
         raise UsageError(f"{option} {out}: there is a folder of that name")
-    if not folder.is_dir():
-        raise UsageError(f"{option} {out}: there is no folder {folder}")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise UsageError(f"{option} {out}: no permission to write to {folder}")
+    try:
+        check_place(out.parent)
+    except InvalidRunFolder as e:
+        raise UsageError(f"{option} {out}: {e.fault}") from e
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import click
 from handover.scenarios.cli.command import DeferredCommand, DeferringGroup
 from handover.scenarios.cli.console import open_console, print_json, print_rows
 from handover.scenarios.execution.errors import UsageError, one_line_errors
-from handover.scenarios.results.run_folder import check_place, disk_errors_reported, write_whole
+from handover.scenarios.results.run_folder import check_place, make_folder_of, write_whole
 
 if TYPE_CHECKING:
     from handover.scenarios.study.plan.plan import StudyPlan
@@ -86,8 +86,7 @@ def new(file: Path) -> None:
         if file.exists():
             raise UsageError(f"{file} is there already; name a new file")
         check_place(file.parent)
-        with disk_errors_reported(file):
-            file.parent.mkdir(parents=True, exist_ok=True)
+        make_folder_of(file)
         write_whole(file, default_plan())
     click.echo(file)
     click.echo(f"try: handover study plan {file}", err=True)

@@ -39,9 +39,14 @@ def test_a_page_without_plots_is_small_and_forbids_the_browser_to_ask_for_anythi
 
 
 def test_a_page_that_cannot_be_written_leaves_nothing(tmp_path: Path):
+    (tmp_path / "file").touch()
     with pytest.raises(RecordNotWritten, match="cannot be written"):
-        page_of(tmp_path / "missing", Markup(""))
-    assert list(tmp_path.iterdir()) == []
+        page_of(tmp_path / "file", Markup(""))
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_the_folder_of_a_page_is_made(tmp_path: Path):
+    assert page_of(tmp_path / "no" / "such", Markup("<p>text</p>"))
 
 
 class OpenElements(HTMLParser):

@@ -133,7 +133,7 @@ def test_without_pytorch_the_published_network_is_refused(tmp_path: Path, monkey
         (["--adapt", "none.json"], "none.json: it cannot be read"),
         (["--data", "none.parquet"], "it is no Parquet file that can be read"),
         (["--seed", "-1"], "-1 is not in the range"),
-        (["--out", "none/m.json"], "there is no folder"),
+        (["--out", "text.fmu/m.json"], "is a file, so no folder can be made in it"),
         (["--out", "m.txt"], "ends in .json"),
         (["--out", "m" * 250 + ".json"], "the name is longer than"),
         (["--elbow", "left"], "'left' is not one of"),
@@ -178,9 +178,10 @@ def test_an_arm_that_teaches_nothing_is_refused(arm: str, text: str, tmp_path: P
     assert not (tmp_path / "m.json").exists()
 
 
-def test_a_folder_that_goes_away_is_reported_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_folder_that_has_become_a_file_is_reported_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     def gone(training: VslTraining, measured: Measured, _progress: Progress) -> tuple[VslModel, Errors]:
         (tmp_path / "a").rmdir()
+        (tmp_path / "a").touch()
         return shipped(), training.residuals.errors(shipped(), measured.points.rows(np.arange(10)))
 
     (tmp_path / "a").mkdir()
@@ -189,7 +190,7 @@ def test_a_folder_that_goes_away_is_reported_in_a_line(tmp_path: Path, monkeypat
     monkeypatch.setattr(vsl_train_command, "content_key", key_of_made_up)
     result = call("--data", tmp_path / "d.parquet", "--out", tmp_path / "a" / "m.json")
     assert result.exit_code == 2
-    assert "No such file or directory" in result.output
+    assert "cannot be written: File exists" in result.output
     assert "Traceback" not in result.output
 
 
