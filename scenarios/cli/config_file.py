@@ -171,8 +171,10 @@ def _checked(option: click.Parameter, ctx: click.Context, value: Any) -> Any:
         return value
     several = isinstance(option, click.Option) and option.multiple
     values = cast(list[Any], value) if several and isinstance(value, list) else [value]
-    if any(isinstance(v, bool) or not isinstance(v, (str, int, float)) for v in values):
-        raise click.BadParameter("a text or a number is right" + (", or several in [...]" if several else ""))
+    is_text = isinstance(option.type, (click.types.StringParamType, click.Path, click.Choice))
+    if any(isinstance(v, bool) or not isinstance(v, str if is_text else (str, int, float)) for v in values):
+        right = "a text in quotes" if is_text else "a number, or a text that is one,"
+        raise click.BadParameter(f"{right} is right" + (", or several in [...]" if several else ""))
     texts = [_text(v) for v in values]
     given = texts if several else texts[0]
     option.type_cast_value(ctx, given)
@@ -191,6 +193,8 @@ def _texts(key: str, table: Any) -> Iterator[str]:
         entries = list(_flat(value))
         if any(not isinstance(v, (str, int, float)) for v in entries):
             raise ValueError(f"{key}.{name} = {_short(value)}: texts, numbers, true, false and lists of them are right")
+        if key == "unit" and any(not isinstance(v, str) for v in entries):
+            raise ValueError(f"{key}.{name} = {_short(value)}: a text in quotes is right")
         if key != "sweep" or not isinstance(value, list):
             yield f"{name}={','.join(map(_text, entries))}"
             continue
