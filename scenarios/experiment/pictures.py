@@ -16,7 +16,7 @@ class Mark:
 
     Attributes:
         label: what it is, such as "ball, as measured".
-        shape: "circle", "cross" or "plus".
+        shape: "circle", "dashed circle", "cross" or "plus".
         u, v: pixels from the left and from the top.
         radius: of a circle, in pixels.
         colour: as "#rrggbb".

@@ -17,9 +17,12 @@ from handover.scenarios.helix.cameras import pinholes
 from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.parameters import Parameters
 
-MEASURED, ESTIMATED = "#ffd23f", "#4fe3ff"
 _SHAPE = (720, 1280, 3)
-_SHAPES = {"p_WO": ("ball", "circle"), "p_WR": ("wrist", "cross"), "p_WG": ("gripper", "plus")}
+_POINTS = {"p_WO": ("ball", "#ffd23f"), "p_WR": ("wrist", "#4fe3ff"), "p_WG": ("gripper", "#ff8ad8")}
+"""What each point is, and its colour; how it is known is seen by the mark's shape."""
+MEASURED, ESTIMATED = "as measured", "as the controller has it"
+_SHAPES = {MEASURED: ("circle", "cross"), ESTIMATED: ("dashed circle", "plus")}
+"""Shapes of the mark of the ball, which has its size in the picture, and of the other points."""
 _SEEN_BY = {"p_WO": "vision.seen_O", "p_WR": "vision.seen_R", "p_WG": "vision.seen_R"}
 
 
@@ -57,26 +60,26 @@ def is_covered(t: float, side: Cover, parameters: Parameters) -> bool:
 
 
 def _measured(camera: Pinhole, signals: Signals) -> Iterator[Mark]:
-    for name in _SHAPES:
+    for name in _POINTS:
         if signals[_SEEN_BY[name]]:
-            yield from _mark(camera, name, signals[f"vision.{name}_meas"], "as measured", MEASURED)
+            yield from _mark(camera, name, signals[f"vision.{name}_meas"], MEASURED)
 
 
 def _estimated(camera: Pinhole, signals: Signals) -> Iterator[Mark]:
-    given = [name for name in _SHAPES if f"servo.{name}_est" in signals]
+    given = [name for name in _POINTS if f"servo.{name}_est" in signals]
     if "servo.phase" in signals and signals.text("servo.phase") == "WAIT":  # the controller has not seen both yet
         return
     for name in given:
-        yield from _mark(camera, name, signals[f"servo.{name}_est"], "as the controller has it", ESTIMATED)
+        yield from _mark(camera, name, signals[f"servo.{name}_est"], ESTIMATED)
 
 
-def _mark(camera: Pinhole, name: str, p_WP: Floats, source: str, colour: str) -> Iterator[Mark]:
+def _mark(camera: Pinhole, name: str, p_WP: Floats, source: str) -> Iterator[Mark]:
     """Yield the mark of a point, unless it is behind the camera."""
     u, v = camera.project(p_WP).tolist()
     if np.isfinite(u) and np.isfinite(v):
-        what, shape = _SHAPES[name]
+        what, colour = _POINTS[name]
         ball = float(camera.f[0]) * VisionParams().ball_radius / float(camera.depth(p_WP))
-        radius = ball if shape == "circle" else 9.0
+        shape, radius = (_SHAPES[source][0], ball) if what == "ball" else (_SHAPES[source][1], 9.0)
         yield Mark(label=f"{what}, {source}", shape=shape, u=u, v=v, radius=radius, colour=colour)
 
 

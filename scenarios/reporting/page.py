@@ -1,7 +1,7 @@
 """Writes a page of sections: one HTML file with scripts, style and data inside, which opens offline.
 
 Its Content-Security-Policy lets it run its own scripts only and forbids network requests. In its text, line breaks do
-not separate numbers from their units (`non_breaking`).
+not separate numbers from their units, and what stands between backticks is code (`typeset`).
 """
 
 import base64
@@ -17,7 +17,7 @@ import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from handover.scenarios.results.run_folder import write_whole
+from handover.scenarios.results.run_folder import make_folder_of, write_whole
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,17 +37,22 @@ class Section:
     scripts: tuple[str, ...] = ()
 
 
-_PARTS = re.compile(r"(<script\b.*?</script>|<style\b.*?</style>|<[^>]+>)", re.DOTALL)
+_PARTS = re.compile(r"(<(script|style|pre|code)\b.*?</\2>|<[^>]+>)", re.DOTALL)
+_CODE = re.compile(r"`([^`\n]+)`")
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|°|[kmµ]?m|[mµ]?s|m?N|k?g|m?rad|h|A|bar|k?Pa|[MG]B|N·m|N m|m/s|rad/s)(?![\w/]))")
 _RANGE = re.compile(r"(?<=\d) to (?=-?\d)")
 _EQUAL = re.compile(r"\b(\w) ([=<]) (?=-?\d)")
 _SPACE = "\u00a0"
 
 
-def non_breaking(html: str) -> str:
-    """Return HTML in whose text no line breaks within "5 mm", "3 to 5 %" and "p = 0.03"; scripts stay as they are."""
-    parts = _PARTS.split(html)
-    parts[::2] = [_non_breaking(text) for text in parts[::2]]
+def typeset(html: str) -> str:
+    """Return HTML in whose text no line breaks within "5 mm", "3 to 5 %" and "p = 0.03", and `this` is code.
+
+    Scripts, and what is code already, stay as they are.
+    """
+    parts = _PARTS.split(html)  # texts, then elements or tags with the elements' names
+    parts[::3] = [_CODE.sub(r"<code>\1</code>", _non_breaking(text)) for text in parts[::3]]
+    del parts[2::3]
     return "".join(parts)
 
 
@@ -60,7 +65,7 @@ _SCRIPT = "page.js"
 
 
 def write_page(path: Path, title: str, header: Markup, sections: Sequence[Section]) -> None:
-    """Write a page, whole or not at all.
+    """Write a page, whole or not at all; a folder that is not there is made.
 
     The browser runs the page's own scripts only, known by their hashes, and lets nothing in it use the network.
 
@@ -73,6 +78,7 @@ def write_page(path: Path, title: str, header: Markup, sections: Sequence[Sectio
     Raises:
         RecordNotWritten: it cannot be written.
     """
+    make_folder_of(path)
     write_whole(path, page_html(title, header, sections))
 
 
@@ -93,8 +99,8 @@ def page_html(
     scripts = [*([_plotly()] if has_plots else []), *map(asset, names)]
     return template("page.html").render(
         title=title,
-        header=Markup(non_breaking(header)),
-        sections=[replace(s, html=Markup(non_breaking(s.html))) for s in sections],
+        header=Markup(typeset(header)),
+        sections=[replace(s, html=Markup(typeset(s.html))) for s in sections],
         style=Markup(asset("page.css")),
         scripts=[Markup(s) for s in scripts],
         policy=_policy(scripts, connects=connects, works=works),

@@ -9,6 +9,7 @@
 //   page.array(packed)      a typed array of one that Plotly has packed: {dtype, bdata}; where it has {low, step}, too, its
 //                           numbers are low + n * step, and 65535 stands for NaN
 //   page.data(element)      the content of the JSON script within an element
+//   page.typeset(text)      a text as nodes: what stands between two backticks is code
 "use strict";
 const page = (() => {
   const names = ["ink", "soft", "line", "page", "card", "shade", "good", "bad", "link",
@@ -204,11 +205,14 @@ const page = (() => {
     document.documentElement.dataset.drawn = "all";
   }
 
+  const typeset = text => text.split("`").map((part, i, all) =>
+    i % 2 && i < all.length - 1 ? Object.assign(document.createElement("code"), {textContent: part}) : i % 2 ? "`" + part : part);
+
   document.addEventListener("DOMContentLoaded", drawAll);  // when the page's other scripts have run
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
   matchMedia("print").addEventListener("change", recolour);
   return {
-    colours, draw, array, data, setTime, onTime: act => clocks.push(act),
+    colours, draw, array, data, typeset, setTime, onTime: act => clocks.push(act),
     onColours: act => listeners.push(act), onDraw: act => changes.push(act), onReady: act => starts.push(act),
   };
 })();

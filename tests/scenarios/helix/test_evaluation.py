@@ -162,7 +162,9 @@ def test_marks_lie_where_the_camera_sees_what_was_measured():
     picture = follow((0.0, signals(Phase.APPROACH))).pictures()[0]
     ball, wrist, gripper = (m for m in picture.marks if m.label.endswith("measured"))
     camera = camera_of("left", camera_parameters())
-    assert (ball.shape, wrist.shape, gripper.shape) == ("circle", "cross", "plus")
+    assert (ball.shape, wrist.shape, gripper.shape) == ("circle", "cross", "cross")
+    assert len({(m.shape, m.colour) for m in picture.marks}) == 6  # each is another one in the legend
+    assert len({m.colour for m in (ball, wrist, gripper)}) == 3
     assert (wrist.u, wrist.v) == pytest.approx(tuple(camera.project(P_WR)))
     edge = camera.project(P_WG + 0.025 * camera.R_WC[:, 1])  # a ball's radius below its middle, as the camera sees it
     assert ball.radius == pytest.approx(float(np.linalg.norm(edge - np.array([ball.u, ball.v]))), rel=0.05)

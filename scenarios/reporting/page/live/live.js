@@ -203,8 +203,7 @@ const live = (() => {
     verdict.className = `verdict ${success ? "good" : "bad"}`;
     verdict.innerHTML = "<b></b> ";
     verdict.firstChild.textContent = success ? "Succeeded:" : judged ? "Failed:" : "No verdict:";
-    `${reason}.`.split("`").forEach((text, i) =>  // between two of these is a command
-      verdict.append(i % 2 ? Object.assign(document.createElement("code"), {textContent: text}) : text));
+    verdict.append(...page.typeset(`${reason}.`));
     byId("told").textContent = report ? `Its report: ${report}` : "The run has ended.";
     for (const id of ["pause", "step", "stop"]) byId(id).disabled = true;
     root.dataset.ended = success;

@@ -59,7 +59,7 @@
     }
     const links = wrong.flatMap(([name, id], i) => [i ? ", " : "", createElement("a", {href: `#${id}`, textContent: name})]);
     const others = Object.entries(told).filter(([name]) => !fields.has(name)).map(([, text]) => text).join("; ");
-    byId("fault").replaceChildren(...(wrong.length ? ["No run was begun: see ", ...links] : []), wrong.length && others ? "; " : "", others);
+    byId("fault").replaceChildren(...(wrong.length ? ["No run was begun: see ", ...links] : []), wrong.length && others ? "; " : "", ...page.typeset(others));
     byId("fault").hidden = !wrong.length && !others;
   }
 
@@ -107,7 +107,7 @@
     head.append(reset);
     const about = [field.description, field.range].filter(Boolean).join("; ");
     const root = createElement("div", {className: "field"}, head, ...(inline ? [] : rows),
-      ...(about ? [createElement("p", {className: "field-about", textContent: about})] : []), fault);
+      ...(about ? [createElement("p", {className: "field-about"}, ...page.typeset(about))] : []), fault);
     root.dataset.name = field.name;
     const first = entries[0].nodes.at(-1);
     first.id = `field-${field.name}`;
@@ -125,7 +125,7 @@
         : it.text() === field.default,
       mark() { root.classList.toggle("changed", !it.isDefault()); },
       blame(text) {
-        fault.textContent = text ?? "";
+        fault.replaceChildren(...page.typeset(text ?? ""));
         fault.hidden = !text;
         root.classList.toggle("wrong", Boolean(text));
         if (text) root.closest("details").open = true;
@@ -227,7 +227,7 @@
         createElement("td", {className: "set", textContent: changed.join(", ") || "nothing"}),
         ...(seeds ? [createElement("td", {textContent: row.seed ?? ""})] : []),
         createElement("td", {className: "reason"}, createElement("b", {className: STATE_CLASSES[row.state], textContent: row.state}),
-          row.reason ? `: ${row.reason}` : ""),
+          ...page.typeset(row.reason ? `: ${row.reason}` : "")),
         createElement("td", {className: "acts"}, ...createActions(row, seen)),
         ...names.map(([name]) => createElement("td", {className: "number", textContent: row.metrics.find(m => m.name === name)?.text ?? ""})),
       ];

@@ -142,7 +142,7 @@ def test_silence_counts_while_the_run_goes_on_and_not_while_its_process_writes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, states: int, writes: int, is_void: bool
 ):
     monkeypatch.setattr(seat_module, "SILENCE", 0.1)
-    seat = server_of(tmp_path / "study").seat
+    seat: Any = server_of(tmp_path / "study").seat
 
     async def told_why() -> str | None:
         playing = asyncio.ensure_future(seat._run(RecordedTrial(states, writes)))
