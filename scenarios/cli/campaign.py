@@ -190,10 +190,6 @@ class CampaignInterruption:
             raise KeyboardInterrupt
 
 
-Finish = Callable[[CampaignFolder, CampaignTable], None]
-"""Writes what is made of a complete campaign, such as its report."""
-
-
 @dataclass(frozen=True)
 class CampaignOutcome:
     """A complete campaign: the plan as it was checked, its folder, its runs, and their counts."""
@@ -207,6 +203,10 @@ class CampaignOutcome:
     def status(self) -> int:
         """The command's exit status: whether all runs have ended, whether or not their tasks succeeded."""
         return UNIT_FAILED if self.counts.failed or self.counts.lost else 0
+
+
+Finish = Callable[[CampaignOutcome], None]
+"""Prints the results of a complete campaign, and writes what is made of it, such as its report."""
 
 
 def pool_config(workers: int | None, scheduler: str | None) -> PoolConfig:
@@ -237,14 +237,14 @@ def run_campaign_command(plan: CampaignPlan, out: Path | None, workers: PoolConf
             folder = named or default_folder(ready.plan, ready.fmus, opened)
             folder.check(ready.plan, ready.fmus)  # before anything is printed
             table = _run(ready, folder, workers, interruption, progress)
-            finish(folder, table)
+            assert progress.counts is not None
+            outcome = CampaignOutcome(ready.plan, folder, table, progress.counts)
+            if outcome.counts.kept == outcome.counts.total:
+                click.echo(f"{folder.path} has all of its runs; nothing was run", err=True)
+            finish(outcome)
     except KeyboardInterrupt:
         _end_interrupted(folder, progress)
-    counts = progress.counts
-    assert counts is not None
-    if counts.kept == counts.total:
-        click.echo(f"{folder.path} has all of its runs; nothing was run", err=True)
-    return CampaignOutcome(ready.plan, folder, table, counts)
+    return outcome
 
 
 def _check_without_units(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.execution.progress import doing
 from handover.scenarios.results.run_folder import RunFolder, dated_folder
 
 if TYPE_CHECKING:
@@ -82,7 +83,8 @@ def compare(
         except NotComparable as e:
             raise UsageError(str(e)) from e
         folder = folder or RunFolder(opened.enter_context(dated_folder(_PLACE, _stem(comparison))))
-        data = write_comparison(comparison, folder.claim(opened))
+        with doing("drawing figures, writing the page"):
+            data = write_comparison(comparison, folder.claim(opened))
     if as_json:
         click.echo(json.dumps({"folder": str(folder.shown), **data}, indent=2, allow_nan=False))
         return

@@ -15,6 +15,7 @@ from handover.fmus.contents.fmi2_description import NoFmi2Form
 from handover.scenarios.cli.options import scenario_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.execution.progress import doing
 from handover.scenarios.execution.selection import find_scenario, replacements, select_fmus
 from handover.scenarios.execution.unit_values import built_system, split_parameters
 from handover.scenarios.results.run_folder import check_place
@@ -53,7 +54,8 @@ def export_command(
             raise UsageError(f"--ssp {file}: it is there already; --force replaces it")
         check_place(file.parent)
         others = replacements(experiment, replaced)
-        fmus = select_fmus(experiment, others, exchangeable)
+        with doing("building units"):
+            fmus = select_fmus(experiment, others, exchangeable)
         instance = experiment()
         with scenario_code(instance):
             stop = instance.stop_time(values)

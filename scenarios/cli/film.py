@@ -15,6 +15,7 @@ from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.cli.options import FiniteRange
 from handover.scenarios.execution.errors import FilmFailed, UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.execution.progress import doing
 from handover.scenarios.film import LARGEST, SMALLEST
 from handover.scenarios.results.run_folder import RunFolder, check_place
 
@@ -161,7 +162,8 @@ def _film(run: RunFolder, path: Path, plots: Sequence[str] | None, settings: "Fi
         RunFacts.read(run)  # before anything is completed: it may be no run's folder at all
         complete_signals(run)
     try:
-        content = film_content(run, plots, window_of(settings.size)[0][1])
+        with doing("reading the record"):
+            content = film_content(run, plots, window_of(settings.size)[0][1])
         for line in content.notes:
             click.echo(line, err=True)
         with _progress(sys.stderr) as report:

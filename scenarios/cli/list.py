@@ -32,6 +32,7 @@ from handover.scenarios.catalog import (
 from handover.scenarios.cli.console import open_console, print_json, print_rows
 from handover.scenarios.cli.summaries.port_tables import allowed, plain, port_rows, type_of, variable_data
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.execution.progress import doing
 from handover.scenarios.execution.selection import find_scenario
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.places import PlacePort, ports_of_place
@@ -80,7 +81,8 @@ def _write_page(file: Path) -> None:
         check_place(file.parent)
         from handover.scenarios.cli.units.units_page import write_units_page  # loads what pages are made of
 
-        write_units_page(file)
+        with doing("writing the page"):
+            write_units_page(file)
     click.echo(file)
 
 

@@ -13,16 +13,15 @@ from rich.table import Table
 from rich.text import Text
 
 from handover.cosim.exceptions import nearest
-from handover.scenarios.cli.campaign import pool_config, run_campaign_command
+from handover.scenarios.cli.campaign import CampaignOutcome, pool_config, run_campaign_command
 from handover.scenarios.cli.console import open_console
 from handover.scenarios.cli.options import HeadedCommand, WholeNumber, campaign_options
 from handover.scenarios.execution.errors import UsageError, require_extra
+from handover.scenarios.execution.progress import doing
 from handover.scenarios.results.run_folder import InvalidRunFolder
 
 if TYPE_CHECKING:
-    from handover.scenarios.campaign.folder import CampaignFolder
-    from handover.scenarios.campaign.table import CampaignTable
-    from handover.scenarios.published.published_experiment import PaperResults, PublishedExperiment
+    from handover.scenarios.published.published_experiment import PublishedExperiment
 
 _HELP = """Run a paper's EXPERIMENT, and compare its results with the published ones.
 
@@ -85,37 +84,36 @@ def paper(
     plan = plan if seed is None else replace(plan, seed=seed)
     finish = _Finish(published, report=not no_report)
     outcome = run_campaign_command(replace(plan, experiment=experiment), out, pool_config(workers, scheduler), finish)
-
-    from handover.scenarios.cli.summaries.claims import print_results
-
-    print_results(published, finish.results, finish.table, outcome.folder)
     sys.exit(outcome.status)
 
 
 class _Finish:
-    """Writes claims, figures and, unless --no-report, the page of a campaign, and keeps its `results` and `table`."""
-
-    results: PaperResults
-    table: CampaignTable
+    """Prints claims, then writes figures and, unless --no-report, the page of a campaign."""
 
     def __init__(self, experiment: PublishedExperiment, report: bool) -> None:
         self._experiment, self._report = experiment, report
 
-    def __call__(self, folder: CampaignFolder, table: CampaignTable) -> None:
+    def __call__(self, outcome: CampaignOutcome) -> None:
+        folder, table = outcome.folder, outcome.table
         from handover.scenarios.campaign_report.campaign_page import write_campaign_report
+        from handover.scenarios.cli.summaries.campaign import print_report_place
+        from handover.scenarios.cli.summaries.claims import print_results
         from handover.scenarios.published.published_experiment import PaperResults, draw_figures, write_claims
 
-        self.table = table
         try:
-            self.results = PaperResults.of(self._experiment, table, folder.runs)
+            results = PaperResults.of(self._experiment, table, folder.runs)
         except KeyError as e:
             fault = f"it is of another version of {self._experiment.name}: its runs have no {e.args[0]}"
             raise InvalidRunFolder(folder.path, fault) from e
-        write_claims(self.results.claims, folder)
+        write_claims(results.claims, folder)
+        print_results(self._experiment, results, table, folder)
         if self._report and not folder.is_reported:
-            write_campaign_report(folder, paper=self.results)
+            with doing("drawing figures, writing the report"):
+                write_campaign_report(folder, paper=results)
         else:
-            draw_figures(self._experiment, table, folder.runs, folder.figures)
+            with doing("drawing figures"):
+                draw_figures(self._experiment, table, folder.runs, folder.figures)
+        print_report_place(folder)
 
 
 def _list(experiments: Iterable[type[PublishedExperiment]]) -> None:

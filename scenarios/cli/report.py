@@ -6,6 +6,7 @@ import click
 
 from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.execution.progress import doing
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, check_place
 
 _HELP = """Write the page of the run or campaign in DIR again: one HTML file that opens offline.
@@ -38,13 +39,15 @@ def report(folder: Path, figures: bool, runs: bool, file: Path | None) -> None:
             check_place(folder)
         campaign = CampaignFolder(folder)
         if campaign.is_there:
-            _write_of_campaign(campaign, page, figures, runs)
+            with doing("drawing figures, writing the report" if figures else "writing the report"):
+                _write_of_campaign(campaign, page, figures, runs)
         elif not RunFolder.of_run(folder).is_there:
             raise UsageError(f"{folder} {OF_NEITHER}")
         elif runs:
             raise UsageError(f"{folder} is the folder of a run; --runs is for that of a campaign")
         else:
-            _write_of_run(RunFolder.of_run(folder), page, figures)
+            with doing("drawing figures, writing the report" if figures else "writing the report"):
+                _write_of_run(RunFolder.of_run(folder), page, figures)
     click.echo(f"report: {page}")
 
 

@@ -10,7 +10,7 @@ import click
 
 from handover.scenarios.cli.master_options import isolate_option, isolated
 from handover.scenarios.cli.options import limit_options, limits, log_option
-from handover.scenarios.cli.summaries.run import exit_with
+from handover.scenarios.cli.summaries.run import RunEnding
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import logging_to_standard_error, progress_bar
@@ -57,6 +57,7 @@ def resume(
         task = interrupted.task(opened)
         options = replace(task.options, **limits(call_limit, pace), **(isolated(isolate) if isolate else {}))
         task = replace(task, options=options, presented=not no_report)
-        with progress_bar(sys.stderr) as progress:
-            result = run_task(task, progress, interruption, interrupted.resumption)
-    exit_with(result, task)
+        with contextlib.ExitStack() as bar:
+            progress, ending = bar.enter_context(progress_bar(sys.stderr)), RunEnding(task, bar)
+            result = run_task(task, progress, interruption, interrupted.resumption, concluded=ending.concluded)
+    ending.exit(result)

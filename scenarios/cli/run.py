@@ -27,7 +27,7 @@ from handover.scenarios.cli.options import (
     scenario_options,
     stop_option,
 )
-from handover.scenarios.cli.summaries.run import AS_JSON, exit_with
+from handover.scenarios.cli.summaries.run import AS_JSON, RunEnding
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.input_sources import played_back
 from handover.scenarios.execution.interruption import Interruption
@@ -206,11 +206,12 @@ def run(
             task, control, observer = opened.enter_context(_live(task, pace, controls, webcam))
         elif task.inputs is None and task.experiment.led_hand(task.parameters) is not None:
             click.echo("nobody leads the hand, which stays where it is: --live lets a page lead it", err=True)
-        with progress_bar(sys.stderr) as progress:
-            result = run_task(task, progress, interruption, control=control, observer=observer)
+        with contextlib.ExitStack() as bar:
+            progress, ending = bar.enter_context(progress_bar(sys.stderr)), RunEnding(task, bar, json_to)
+            result = run_task(task, progress, interruption, None, control, observer, ending.concluded)
         if request.sources is not None:
             _tell_end_of_inputs(task.folder, float(request.sources.origin["until"]))
-    exit_with(result, task, json_to=json_to)
+    ending.exit(result)
 
 
 def _tell_end_of_inputs(folder: RunFolder, until: float) -> None:

@@ -4,17 +4,16 @@ import json
 import sys
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from handover.cosim.stepping.options import MasterOptions
-from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.grid import parse_grid, set_parameters, split_units, vary_units
 from handover.scenarios.campaign.plan import MAX_REPETITIONS, CampaignPlan
-from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.cli.campaign import pool_config, run_campaign_command
+from handover.scenarios.cli.campaign import CampaignOutcome, pool_config, run_campaign_command
 from handover.scenarios.cli.config_file import ConfiguredCommand, config_option
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import (
@@ -28,6 +27,7 @@ from handover.scenarios.cli.options import (
 )
 from handover.scenarios.cli.run import file_options
 from handover.scenarios.execution.errors import one_line_errors, require_extra
+from handover.scenarios.execution.progress import doing
 from handover.scenarios.execution.request import RunRequest, experiment_type
 
 _HELP = """Run a SCENARIO, SSP or FMU many times: all combinations of the given values, each --repeat times.
@@ -136,22 +136,25 @@ def sweep(
             inputs=inputs,
             log_level=log_level,
         )
-    outcome = run_campaign_command(plan, out, pool, (lambda _folder, _table: None) if no_report else _write_report)
-
-    from handover.scenarios.campaign.results import CampaignResults  # its statistics take long to load
-    from handover.scenarios.cli.summaries.campaign import campaign_data, print_campaign
-
-    results = CampaignResults(outcome.folder.read(), outcome.table)
-    if as_json:
-        click.echo(json.dumps(campaign_data(results, outcome.counts, outcome.folder), indent=2, allow_nan=False))
-    else:
-        print_campaign(results, outcome.counts, outcome.folder)
+    outcome = run_campaign_command(plan, out, pool, partial(_finish, as_json=as_json, report=not no_report))
     sys.exit(outcome.status)
 
 
-def _write_report(folder: CampaignFolder, _table: CampaignTable) -> None:
-    if folder.is_reported:
-        return
-    from handover.scenarios.campaign_report.campaign_page import write_campaign_report  # what draws takes long to load
+def _finish(outcome: CampaignOutcome, *, as_json: bool, report: bool) -> None:
+    """Print the results, then write the report, and print where it is."""
+    from handover.scenarios.campaign.results import CampaignResults  # its statistics take long to load
+    from handover.scenarios.cli.summaries.campaign import campaign_data, print_campaign, print_report_place
 
-    write_campaign_report(folder)
+    folder = outcome.folder
+    results = CampaignResults(folder.read(), outcome.table)
+    if not as_json:
+        print_campaign(results, outcome.counts, folder)
+    if report and not folder.is_reported:
+        with doing("drawing figures, writing the report"):
+            from handover.scenarios.campaign_report.campaign_page import write_campaign_report  # takes long to load
+
+            write_campaign_report(folder)
+    if as_json:
+        click.echo(json.dumps(campaign_data(results, outcome.counts, folder), indent=2, allow_nan=False))
+    else:
+        print_report_place(folder)

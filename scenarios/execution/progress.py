@@ -1,5 +1,6 @@
-"""What is told on standard error while a run goes on: its progress as a bar on a terminal, and logs as asked for."""
+"""What is said on standard error while a command works: progress, what it is doing, and logs as asked for."""
 
+import contextlib
 import logging
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -7,7 +8,7 @@ from typing import TextIO
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
 
@@ -40,6 +41,24 @@ def progress_bar(stream: TextIO) -> Generator[Callable[[float, float], None], No
             progress.update(task, completed=t, total=end)
 
         yield move
+
+
+@contextmanager
+def doing(what: str) -> Generator[None, None, None]:
+    """Say on standard error what is being done, where that takes seconds: in a line, which on a terminal goes again.
+
+    Args:
+        what: such as "drawing figures".
+    """
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        with contextlib.suppress(OSError):  # as where a unit has closed the stream
+            click.echo(f"{what} ...", err=True)
+        yield
+        return
+    with Progress(SpinnerColumn(), TextColumn(what), TimeElapsedColumn(), console=console, transient=True) as progress:
+        progress.add_task(what, total=None)
+        yield
 
 
 LOG_LEVELS = ("debug", "info", "warning", "error")

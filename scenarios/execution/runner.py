@@ -1,6 +1,7 @@
 """Runs an experiment once: all is checked, then the folder is made, then it runs, then its results are written."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,13 @@ from handover.scenarios.results.tolerated_faults import GuardedEvaluator, Tolera
 Progress = Callable[[float, float], None]
 """Is called with the simulated time and the time at which the run ends at the latest, in seconds."""
 
+Concluded = Callable[[RunResult], AbstractContextManager[None]]
+"""Is called with the result of a run that has its verdict; what it returns is entered while figures are drawn."""
+
+
+def _say_nothing(_result: RunResult) -> AbstractContextManager[None]:
+    return nullcontext()
+
 
 def experiment_system(
     experiment: Experiment[Any], parameters: Any, seed: int, fmus: Mapping[str, Path], unit_values: Mapping[str, str],
@@ -60,12 +68,13 @@ def experiment_system(
 
 def run_task(
     task: Task, progress: Progress, interruption: Interruption, resumption: Resumption | None = None,
-    control: LiveControl | None = None, observer: Observer | None = None,
+    control: LiveControl | None = None, observer: Observer | None = None, concluded: Concluded = _say_nothing,
 ) -> RunResult:  # fmt: skip
     """Run a scenario to its end, its failure or its interruption and write its folder; or resume a run.
 
     Where there is a `control`, another process may change its pace, pause it, and end it after its step; an `observer`
-    sees each communication point, too, as for a page that shows pictures.
+    sees each communication point, too, as for a page that shows pictures. `concluded` is given the result as soon as
+    its verdict is written; what it returns is entered while pictures, figures and report are made.
 
     Raises:
         WiringError, ScheduleError, InvalidFmu, InitializationError, StateNotSaved, InvalidRunFolder,
@@ -124,7 +133,7 @@ def run_task(
             raise
         failure = failure or e
     ended = _Ended(failure, interruption.asked, not_finite, recorded, clock())
-    return _conclude(task, master, evaluator, ended)
+    return _conclude(task, master, evaluator, ended, concluded)
 
 
 @dataclass(frozen=True)
@@ -219,7 +228,9 @@ class _Ended:
     spent: ElapsedTime
 
 
-def _conclude(task: Task, master: Master, evaluator: GuardedEvaluator[Evaluator], ended: _Ended) -> RunResult:
+def _conclude(
+    task: Task, master: Master, evaluator: GuardedEvaluator[Evaluator], ended: _Ended, concluded: Concluded
+) -> RunResult:
     """Write the summary of a run at its end, its pictures and its report."""
     failure, interrupted = ended.failure, ended.interrupted and master.ended is None
     outcome = _outcome(task, evaluator, failure, interrupted, master)
@@ -231,17 +242,18 @@ def _conclude(task: Task, master: Master, evaluator: GuardedEvaluator[Evaluator]
     master.heartbeat.record_facts(concluded=status)  # whatever crashes from here on, this is how it ended
     if failure is not None:
         task.folder.add_to_run(failure=summary["failure"])
-    faults = ToleratedFaults()
-    with faults.tolerated("the cameras' pictures could not be kept"):
-        write_picture_files(task.folder.pictures, evaluator.pictures())
-    if complete:
-        remove_checkpoint(task.folder.checkpoint)
-    if task.presented:
-        with disk_errors_reported(task.folder.path):
-            _present(task, evaluator, summary, faults)
+    result, faults = RunResult(outcome=outcome, summary=summary, failure=failure), ToleratedFaults()
+    with concluded(result):
+        with faults.tolerated("the cameras' pictures could not be kept"):
+            write_picture_files(task.folder.pictures, evaluator.pictures())
+        if complete:
+            remove_checkpoint(task.folder.checkpoint)
+        if task.presented:
+            with disk_errors_reported(task.folder.path):
+                _present(task, evaluator, summary, faults)
     if faults.lines:
         task.folder.write_summary({**summary, "left_out": faults.lines})
-    return RunResult(outcome=outcome, summary=summary, failure=failure, left_out=tuple(faults.lines))
+    return replace(result, left_out=tuple(faults.lines))
 
 
 def _outcome(

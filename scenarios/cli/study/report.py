@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.execution.progress import doing
 from handover.scenarios.results.run_folder import RunFolder, check_place
 
 if TYPE_CHECKING:
@@ -38,7 +39,8 @@ def report(folder: Path, file: Path | None) -> None:
             check_place(page.parent)
             from handover.scenarios.study.report.report_page import write_study_report
 
-            write_study_report(study, page)
+            with doing("writing the report"):
+                write_study_report(study, page)
     click.echo(f"report: {page}")
 
 
@@ -129,7 +131,8 @@ def withdraw(folder: Path, participant: str, *, delete: bool) -> None:
             if shown:
                 from handover.scenarios.study.report.report_page import write_study_report
 
-                write_study_report(study, page)
+                with doing("writing the report"):
+                    write_study_report(study, page)
     kept = f"deleted on {withdrawal.deleted}" if withdrawal.deleted else "not deleted; --delete does it"
     click.echo(
         f"{pseudonym_of(number)} withdrew on {withdrawal.ended}: in no table and no test; what was kept is {kept}"

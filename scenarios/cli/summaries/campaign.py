@@ -45,7 +45,7 @@ def campaign_data(results: CampaignResults, counts: RunCounts, folder: CampaignF
 
 
 def print_campaign(results: CampaignResults, counts: RunCounts, folder: CampaignFolder) -> None:
-    """Print how the runs of each point went, why runs failed, and where table and report are."""
+    """Print how the runs of each point went, why runs failed, and where the table is."""
     console = open_console()
     console.print(f"{results.scenario}: {format_progress(counts)}", style="bold")
     console.print(_points(results, console))
@@ -54,8 +54,12 @@ def print_campaign(results: CampaignResults, counts: RunCounts, folder: Campaign
         console.print(f"  and {left} points more")
     print_reasons(console, results.table)
     console.print(f"table: {folder.table}", markup=False, soft_wrap=True)
+
+
+def print_report_place(folder: CampaignFolder) -> None:
+    """Print where the report is, if there is one."""
     if folder.is_reported:
-        console.print(f"report: {folder.report}", markup=False, soft_wrap=True)
+        open_console().print(f"report: {folder.report}", markup=False, soft_wrap=True)
 
 
 def _points(results: CampaignResults, console: Console) -> Table:

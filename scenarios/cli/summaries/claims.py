@@ -24,7 +24,7 @@ _STYLES = {Verdict.REPRODUCED: "bold green", Verdict.NOT_REPRODUCED: "bold red",
 def print_results(
     experiment: PublishedExperiment, results: PaperResults, table: CampaignTable, folder: CampaignFolder
 ) -> None:
-    """Print tables, claims, why runs failed or were lost, and where claims, table and report are."""
+    """Print tables, claims, why runs failed or were lost, and where claims and table are."""
     console = open_console()
     console.print(f"{experiment.name}: {experiment.title}", style="bold", markup=False)
     for compared in results.tables:
@@ -43,8 +43,6 @@ def print_results(
     print_reasons(console, table)
     console.print(f"claims: {folder.path / 'claims.json'}", markup=False, soft_wrap=True)
     console.print(f"table: {folder.table}", markup=False, soft_wrap=True)
-    if folder.is_reported:
-        console.print(f"report: {folder.report}", markup=False, soft_wrap=True)
 
 
 def _print_table(console: Console, compared: ComparisonTable) -> None:

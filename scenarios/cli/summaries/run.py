@@ -1,9 +1,10 @@
 """What a command prints of a run that has ended or crashed, and with which exit status it ends."""
 
+import contextlib
 import json
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from typing import NoReturn, TextIO, cast
 
 import click
@@ -14,6 +15,7 @@ from handover.scenarios.cli.console import open_console, print_rows
 from handover.scenarios.execution.child_process import ChildEnd
 from handover.scenarios.execution.crash import Crash
 from handover.scenarios.execution.exit_status import UNIT_FAILED, status_of_run
+from handover.scenarios.execution.progress import doing
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.results.run_folder import RunFolder, disk_errors_reported
 from handover.scenarios.results.summary import RunResult, Summary
@@ -32,6 +34,11 @@ def print_summary_as_json(result: RunResult, folder: RunFolder, out: TextIO | No
 
 def print_summary(result: RunResult, headline: Sequence[str], folder: RunFolder) -> None:
     """Print how a run ended, the metrics named in the headline, and where its report or results are."""
+    _print_verdict(result, headline, folder)
+    _print_place(folder)
+
+
+def _print_verdict(result: RunResult, headline: Sequence[str], folder: RunFolder) -> None:
     console = open_console()
     summary = result.summary
     verdict = "[green]succeeded[/]" if summary["success"] else "[red]failed[/]"
@@ -44,7 +51,10 @@ def print_summary(result: RunResult, headline: Sequence[str], folder: RunFolder)
     rows += pace_rows(summary)
     rows += _conversion_rows(folder)
     print_rows(console, rows)
-    shown = folder.shown
+
+
+def _print_place(folder: RunFolder) -> None:
+    console, shown = open_console(), folder.shown
     place = f"report: {shown / folder.report.name}" if folder.report.exists() else f"results: {shown}"
     console.print(place, markup=False, soft_wrap=True)
     if folder.checkpoint.exists():
@@ -58,17 +68,52 @@ def _conversion_rows(folder: RunFolder) -> list[tuple[str, str]]:
     return [(f"converted: {ends}", change) for ends, change in conversions[:_MAX_CONVERSIONS]] + more
 
 
-def exit_with(result: RunResult, task: Task, *, json_to: TextIO | None = None) -> NoReturn:
-    """Print how a run ended, for people or, where `json_to` is given, as JSON there; exit with the status for that."""
-    if result.failure:
-        click.echo(str(result.failure), err=True)
-    for line in (*warning_lines(result.summary), *result.left_out):
-        click.echo(line, err=True)
-    if json_to is not None:
-        print_summary_as_json(result, task.folder, json_to)
-    else:
-        print_summary(result, task.experiment.headline, task.folder)
-    sys.exit(status_of_run(unit_failed=result.failure is not None, succeeded=result.outcome.success))
+class RunEnding:
+    """Prints how a run ended as soon as that is known, what the command does then, and at last where the results are.
+
+    Args:
+        task: the run.
+        bar: what is shown while the run goes on, closed at its end.
+        json_to: where the summary goes as JSON, at last; None: it is printed for people.
+    """
+
+    def __init__(self, task: Task, bar: contextlib.ExitStack, json_to: TextIO | None = None) -> None:
+        self._task, self._bar, self._json_to = task, bar, json_to
+        self._printed = False
+
+    @contextlib.contextmanager
+    def concluded(self, result: RunResult) -> Generator[None, None, None]:
+        """Print the verdict, and that figures and report are made meanwhile; for `run_task`."""
+        self._bar.close()
+        with contextlib.suppress(OSError):  # as where a unit has closed all streams: `exit` meets the error
+            self._print(result)
+        if not self._task.presented:
+            yield
+            return
+        with doing("drawing figures, writing the report"):
+            yield
+
+    def exit(self, result: RunResult) -> NoReturn:
+        """Print what is left to be said, and exit with the status of the run."""
+        if not self._printed:
+            self._print(result)
+        for line in result.left_out:
+            click.echo(line, err=True)
+        if self._json_to is not None:
+            print_summary_as_json(result, self._task.folder, self._json_to)
+        else:
+            _print_place(self._task.folder)
+        sys.exit(status_of_run(unit_failed=result.failure is not None, succeeded=result.outcome.success))
+
+    def _print(self, result: RunResult) -> None:
+        if result.failure:
+            click.echo(str(result.failure), err=True)
+        for line in warning_lines(result.summary):
+            click.echo(line, err=True)
+        if self._json_to is None:
+            _print_verdict(result, self._task.experiment.headline, self._task.folder)
+            sys.stdout.flush()
+        self._printed = True
 
 
 AS_JSON = "--json"
@@ -95,12 +140,16 @@ def report_crash(heartbeat: Heartbeat, end: ChildEnd, wall: float) -> int:
         return UNIT_FAILED if crash.failure is not None or crash.in_own_thread else _SIGNAL_STATUS + (end.signal or 0)
     try:
         result = crash.complete(crash.folder)
+        as_json = AS_JSON in sys.argv  # what crashed was the process that had read the options
+        if not as_json:
+            _print_verdict(result, (), crash.folder)
         if crash.presented:
-            _write_page(crash.folder)
-        if AS_JSON in sys.argv:  # what crashed was the process that had read the options
+            with doing("writing the report"):
+                _write_page(crash.folder)
+        if as_json:
             print_summary_as_json(result, crash.folder)
         else:
-            print_summary(result, (), crash.folder)
+            _print_place(crash.folder)
     except RecordNotWritten as e:
         sys.stderr.write(f"{e}\n")
     return UNIT_FAILED

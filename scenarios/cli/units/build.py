@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -31,6 +32,7 @@ from handover.fmus.standalone.freezer import CannotFreeze, check_standalone
 from handover.scenarios.catalog import search_folder
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
+from handover.scenarios.execution.progress import doing
 from handover.scenarios.experiment.parameter_sets import parameter_sets
 from handover.scenarios.results.run_folder import InvalidRunFolder, check_place
 
@@ -177,7 +179,7 @@ def build_command(
         make = partial(
             build, out_dir=out, scalar=scalar, experiment=ExperimentRequest(stimulus) if prove else None, **given
         )
-        for line in _build_all(entries, fmi, make, out, named=bool(units)):
+        for line in _build_all(entries, fmi, make, out, named=bool(units), is_long=prove or standalone):
             click.echo(line)
 
 
@@ -215,12 +217,14 @@ def _compile_missing(platforms: Sequence[str]) -> None:
 
 
 def _build_all(
-    entries: Sequence[Entry], fmi: str, make: Callable[..., Path], out: Path, *, named: bool
+    entries: Sequence[Entry], fmi: str, make: Callable[..., Path], out: Path, *, named: bool, is_long: bool
 ) -> Iterator[str]:
     for entry in entries:
         for version in (2, 3) if fmi == "both" else (int(fmi),):
             try:
-                yield str(_made(entry, version, make, named=named))
+                with doing(f"building {entry.name} for FMI {version}") if is_long else nullcontext():
+                    file = _made(entry, version, make, named=named)
+                yield str(file)
             except NoFmi2Form as e:
                 if named and fmi == "2":
                     raise UsageError(str(e)) from e

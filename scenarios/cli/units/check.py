@@ -16,6 +16,7 @@ from handover.cosim.probe.finding import Finding, Level
 from handover.cosim.ssp.check_ssp import check_ssp
 from handover.scenarios.cli.console import open_console
 from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.progress import doing
 from handover.scenarios.execution.ssp_run import is_ssp
 
 _FAULTS = 1
@@ -64,7 +65,12 @@ def check(files: Sequence[Path], timeout: float, as_json: bool) -> None:
 
 
 def _reports(file: Path, timeout: float) -> Iterable[CheckReport]:
-    return check_ssp(file, timeout) if is_ssp(str(file)) else (check_fmu(file, timeout),)
+    if is_ssp(str(file)):
+        yield from check_ssp(file, timeout)
+        return
+    with doing(f"checking {_visible(file.name)}"):
+        report = check_fmu(file, timeout)
+    yield report
 
 
 def _check_files_exist(files: Sequence[Path]) -> None:

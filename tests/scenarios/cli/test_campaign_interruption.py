@@ -98,7 +98,7 @@ def test_as_the_table_is_completed(tmp_path: Path):
 def test_as_the_workers_are_ended(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     workers: Any = InterruptedEnd()
     with pytest.raises(SystemExit) as caught:
-        run_campaign_command(PLAN, tmp_path / "c", workers, lambda _folder, _table: None)
+        run_campaign_command(PLAN, tmp_path / "c", workers, lambda _outcome: None)
     assert caught.value.code == 1
     assert workers.ended
     assert (

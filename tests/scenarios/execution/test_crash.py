@@ -37,7 +37,7 @@ def test_a_run_whose_unit_does_not_come_back_is_complete_to_the_last_good_step(
     going = start(tmp_path, failing_ssp(tmp_path, bad, fmi), "--out", "r", "--call-limit", "0.5")
     shown, errors = going.communicate(timeout=120)
     assert going.returncode == 3, errors
-    assert errors == text.format(fmi) + "\n"
+    assert errors == f"{text.format(fmi)}\nwriting the report ...\n"
     assert f"{bad}.ssp failed: a unit failed: " in shown
     assert shown.endswith("report: r/report.html\n")
     out = tmp_path / "r"
@@ -74,5 +74,6 @@ def test_a_unit_that_holds_the_whole_process_is_reported_by_the_parent(tmp_path:
     ssp = write_ssp(s, tmp_path / "held.ssp", "held", Fraction(1))
     going = start(tmp_path, ssp, "--out", "r", "--call-limit", "1")
     _, errors = going.communicate(timeout=120)
-    assert (going.returncode, errors) == (3, "bad: fmi3DoStep at t = 0.3 s did not return within 1 s\n")
+    said = "bad: fmi3DoStep at t = 0.3 s did not return within 1 s\nwriting the report ...\n"
+    assert (going.returncode, errors) == (3, said)
     assert Record(tmp_path / "r" / "signals.parquet").time.tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3])
