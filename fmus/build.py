@@ -111,7 +111,7 @@ def cached(name: str, fmi: int, *, scalar: bool = False, start: Mapping[str, Any
 
 def is_of_cache(fmu: Path) -> bool:
     """Return whether a file is one of those that `cached` returns."""
-    return fmu.absolute().is_relative_to(_cache())
+    return fmu.resolve().is_relative_to(_cache().resolve())
 
 
 def _cache() -> Path:

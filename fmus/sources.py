@@ -84,8 +84,7 @@ def closure(block: str) -> Carried:
     module, _, name = block.partition(":")
     if not name:
         raise UnknownBlock(block, "there is no ':' between module and class")
-    if not _is_source(_spec(module)):
-        raise UnknownBlock(block, f"module {module!r} cannot be found as Python source")
+    source_file(block)
     carried_tops = {OWN_PACKAGE, module.partition(".")[0]}
     files: dict[str, Path] = {}
     imported: set[str] = set()
@@ -157,10 +156,33 @@ def _with_packages(module: str) -> Iterator[str]:
 
 
 def _spec(module: str) -> ModuleSpec | None:
+    """Return where a module is; unlike `importlib.util.find_spec`, without importing the packages that it is in."""
+    if module in sys.modules:
+        return getattr(sys.modules[module], "__spec__", None)
+    package = module.rpartition(".")[0]
+    places: Sequence[str] | None = None
+    if package:
+        spec = _spec(package)
+        if spec is None or spec.submodule_search_locations is None:
+            return None
+        places = getattr(sys.modules.get(package), "__path__", spec.submodule_search_locations)
     try:
-        return importlib.util.find_spec(module)
+        return next(filter(None, (finder.find_spec(module, places) for finder in sys.meta_path)), None)
     except (ImportError, ValueError):
         return None
+
+
+def source_file(path: str) -> Path:
+    """Return the file of a class's module, which is not imported.
+
+    Raises:
+        UnknownBlock: it cannot be found, or is not Python source.
+    """
+    module = path.partition(":")[0]
+    spec = _spec(module)
+    if spec is None or not spec.origin or not _is_source(spec):
+        raise UnknownBlock(path, f"module {module!r} cannot be found as Python source")
+    return Path(spec.origin)
 
 
 def _is_source(spec: ModuleSpec | None) -> bool:

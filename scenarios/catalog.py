@@ -259,22 +259,43 @@ class ScenarioSource:
         scenario = named_scenario(name)
         return cls(name, _folder_of(scenario), carried_digest(f"{scenario.__module__}:{scenario.__qualname__}"))
 
-    def find(self) -> type[Experiment[Any]]:
-        """Return the scenario, from the folder where it was.
+    @property
+    def path(self) -> str:
+        """The path of its class.
 
         Raises:
-            KeyError, InvalidScenario: as `named_scenario`; also if the module of that name is another folder's.
+            KeyError: no installed package has a scenario of its name.
         """
+        return self.scenario if ":" in self.scenario else installed_scenarios()[self.scenario]
+
+    def unchanged_file(self) -> Path:
+        """Return the file of its module, whose code is compared with what it was, and not run.
+
+        Raises:
+            KeyError: no installed package has a scenario of its name.
+            InvalidScenario: its code is not here, or is not what it was.
+        """
+        from handover.fmus.sources import carried_digest, source_file  # of own scenarios alone
+
         search_folder(self.folder)
-        scenario = named_scenario(self.scenario)
-        if self.folder and (here := _folder_of(scenario)) != self.folder:
-            fault = f"its module was in {self.folder}; here a module of that name comes from {here or 'a package'}"
-            raise InvalidScenario(self.scenario, [fault])
-        return scenario
+        try:
+            file, here = source_file(self.path), carried_digest(self.path)
+        except UnknownBlock as e:
+            raise InvalidScenario(self.scenario, [e.fault]) from e
+        if here != self.sha256:
+            raise InvalidScenario(self.scenario, [f"its code, {file}, is not what the run had"])
+        return file
+
+
+_TRUSTED: set[str] = set()
+"""Modules of files that somebody has named for their code to be run, whatever folder says so."""
 
 
 def scenario_of(name: str, source: Mapping[str, Any]) -> type[Experiment[Any]] | None:
-    """Return the scenario of a run or campaign as its folder names it, None where it is not to be had here.
+    """Return the scenario of a run or campaign as its folder names it; no code is run because a folder names it.
+
+    It is this package's or an installed package's, by its name; or the class of a module that this process has imported
+    already, as the command did that runs it, or `trust_file`. None where it is none of these.
 
     Args:
         name: the scenario's.
@@ -282,10 +303,56 @@ def scenario_of(name: str, source: Mapping[str, Any]) -> type[Experiment[Any]] |
     """
     if not source:
         return SCENARIOS.get(name)
-    try:
-        return ScenarioSource(**source).find()
-    except (TypeError, KeyError, InvalidScenario):
+    path = source.get("scenario")
+    if not isinstance(path, str):
         return None
+    if path in installed_scenarios():
+        try:
+            return named_scenario(path)
+        except InvalidScenario:
+            return None
+    module, _, class_name = path.partition(":")
+    found = vars(sys.modules[module]).get(class_name) if module in sys.modules else None
+    if not isinstance(found, type) or not issubclass(found, Experiment):
+        return None
+    scenario = cast(type[Experiment[Any]], found)
+    return scenario if module in _TRUSTED or _folder_of(scenario) == source.get("folder") else None
+
+
+def untrusted_code(source: Mapping[str, Any]) -> str:
+    """Return that the own scenario's code is not run which a folder names, and what would run it; "" of all others."""
+    path, folder = source.get("scenario"), source.get("folder")
+    if not isinstance(path, str) or not isinstance(folder, str):
+        return ""
+    module, colon, _ = path.partition(":")
+    if not colon:
+        return f"its scenario {path} is not installed here"
+    file = Path(folder, f"{module.replace('.', '/')}.py")
+    named = file if folder and file.is_file() else f"{module.rpartition('.')[2]}.py"
+    return f"its scenario {path} draws them by its own code, which is run only if you name it: --trust {named}"
+
+
+def trust_file(file: Path) -> None:
+    """Import a file, of a scenario of somebody's own, so that `scenario_of` finds what is in it.
+
+    Raises:
+        InvalidScenario: there is no such file, it cannot be imported, or another module of its name comes before it.
+    """
+    file = file.absolute()
+    if file.suffix != ".py" or not file.is_file():
+        raise InvalidScenario(str(file), ["there is no such file of Python, as my_scene.py"])
+    folder, parts = file.parent, [] if file.name == "__init__.py" else [file.stem]
+    while (folder / "__init__.py").is_file():
+        folder, parts = folder.parent, [folder.name, *parts]
+    module = ".".join(parts)
+    search_folder(folder)
+    try:
+        there = import_module(module).__file__
+    except (Exception, SystemExit) as e:  # a module may raise anything while it is loaded
+        raise InvalidScenario(str(file), [f"it cannot be loaded: {type(e).__name__}: {one_line(e)}"]) from e
+    if there is None or not Path(there).samefile(file):
+        raise InvalidScenario(str(file), [f"the module {module} is {there or 'of Python itself'}: rename the file"])
+    _TRUSTED.add(module)
 
 
 def search_folder(folder: Path | str) -> None:

@@ -84,6 +84,8 @@ def system(
 def load(folder: Path | str) -> Run | Campaign:
     """Return the run or the campaign that a folder is of, also of one that was interrupted.
 
+    No code is run that the folder names: plots and replay of a scenario of your own need its module imported before.
+
     Raises:
         InvalidInput: it is the folder of neither.
     """

@@ -169,7 +169,8 @@ class Run:
 
         experiment = self._facts.experiment
         if experiment is None:
-            raise InvalidInput(f"{self.scenario} declares no replay of its runs; plot() draws signals")
+            why = "".join(f"; {line}, or import its module first" for line in self._facts.not_drawn)
+            raise InvalidInput(f"{self.scenario} has no replay of its runs here{why}; plot() draws signals")
         with errors_for_python():
             record = LackingRecord(self._record, experiment.units)
             replay = experiment.replay(parameters_of(type(experiment), self.parameters), record)

@@ -18,6 +18,7 @@ from handover.scenarios.campaign.identity import differences, identity_of
 from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun, safe_name
 from handover.scenarios.execution.file_experiment import settable_of
 from handover.scenarios.execution.unit_values import is_unit_value
+from handover.scenarios.experiment.parameters import text_of
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
     check_place,
@@ -203,8 +204,17 @@ class CampaignFolder:
     def _write(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
         """Write `campaign.json`, before anything else is there: without it, the campaign could not be resumed."""
         experiment = plan.kind
-        display = {"title": experiment.title, "headline": list(experiment.headline), "platform": platform.platform()}
-        content = {**identity_of(plan, fmus), **display, PARAMETER_UNITS: _parameter_units(plan, fmus)}
+        display: dict[str, Any] = {
+            "title": experiment.title,
+            "headline": list(experiment.headline),
+            "platform": platform.platform(),
+        }
+        units = _parameter_units(plan, fmus)
+        if plan.source is not None:  # whose code is not run to show the campaign
+            declared = experiment.parameters()
+            display["defaults"] = {v.name: text_of(v, v.start) for v in declared}
+            units |= {v.name: v.unit.symbol for v in declared}
+        content = {**identity_of(plan, fmus), **display, PARAMETER_UNITS: units}
         if not (self.path / _FILE).exists() or self.read() != content:
             write_whole(self.path / _FILE, json.dumps(content, indent=2, allow_nan=False) + "\n")
 

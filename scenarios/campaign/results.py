@@ -73,7 +73,7 @@ class CampaignResults:
 
     @cached_property
     def experiment(self) -> type[Experiment[Any]] | None:
-        """The scenario; None if it is not to be had here."""
+        """The scenario; None if it is not to be had here without running code that the folder names."""
         return scenario_of(self.scenario, self.metadata.get("source", {}))
 
     @property
@@ -115,8 +115,11 @@ class CampaignResults:
         return variable.kind in (Kind.REAL, Kind.INTEGER) and not variable.shape
 
     def is_boolean(self, parameter: str) -> bool:
-        """Whether a parameter is true or false."""
+        """Whether a parameter is true or false; of a scenario that is not to be had here, by what its values are."""
         variable = self.declared.get(parameter)
+        if self.experiment is None:
+            texts = {values[parameter] for values in self._values if parameter in values}
+            return bool(texts) and texts <= {"true", "false"}
         return variable is not None and variable.kind is Kind.BOOLEAN
 
     def unit(self, parameter: str) -> str:

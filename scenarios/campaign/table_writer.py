@@ -238,13 +238,14 @@ def _plan_of(folder: CampaignFolder) -> CampaignPlan | None:
     if metadata.get("versions") != versions():
         return None
     try:
-        known: dict[str, Any] = {name: metadata[name] for name in _PLAN_KEYS}
+        name, source = metadata["scenario"], metadata.get("source", {})
+        known: dict[str, Any] = {key: metadata[key] for key in _PLAN_KEYS}
         times: dict[str, Any] = {
-            name: Fraction(metadata[name]) for name in ("stop", "step") if metadata.get(name) is not None
+            key: Fraction(metadata[key]) for key in ("stop", "step") if metadata.get(key) is not None
         }
-        if is_file(known["scenario"]):
-            known["scenario"] = str(folder.fmus / known["scenario"])
-        elif scenario_of(known["scenario"], metadata.get("source", {})) is None:
+        if is_file(name):
+            known["scenario"] = str(folder.fmus / name)
+        elif source.get("scenario", name) != name or scenario_of(name, source) is None:
             return None
         return checked_plan(CampaignPlan(**known, **times, varied_units=metadata.get("varied_units", ())))
     except (UsageError, CosimError, InvalidParameter, LookupError, TypeError, ValueError, AttributeError):

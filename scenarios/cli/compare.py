@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from handover.scenarios.cli.options import trust_option
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.progress import doing
 from handover.scenarios.results.run_folder import RunFolder, dated_folder
@@ -61,6 +62,7 @@ Settings in which the entries differ are listed, units and versions included.
     type=click.Path(path_type=Path),
     help="Folder for the comparison, a new or an empty one.  [default: one of its own in comparisons/]",
 )
+@trust_option
 @click.option("--json", "as_json", is_flag=True, help="Print what comparison.json holds, and where it is, as JSON.")
 def compare(
     folders: Sequence[Path],

@@ -5,21 +5,25 @@ values to vary are tables by name: `parameters`, `unit` and, of `handover sweep`
 of these tables name by name.
 """
 
+import contextlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
 import click
 import tomli
+from click.core import ParameterSource
 
 from handover.cosim.exceptions import nearest, one_line
 from handover.fmus.build import is_of_cache
-from handover.scenarios.catalog import InvalidScenario, ScenarioSource, scenario_of
+from handover.fmus.catalog import UNITS
+from handover.scenarios.catalog import InvalidScenario, ScenarioSource, named_scenario
 from handover.scenarios.cli.master_options import CONTROL_FIELDS
 from handover.scenarios.cli.options import HeadedCommand
 from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.selection import is_path_of_class
 from handover.scenarios.results.run_folder import sha256_of, version_differences, versions
 
 _META = "handover.config"
@@ -37,26 +41,44 @@ class ConfigFile:
         path: the file.
         defaults: values for click's options, by the names of its parameters.
         texts: texts `NAME=VALUE`, by the names of click's parameters.
+        run: the content of a `run.json`; None for a file of options.
     """
 
     path: Path
     defaults: Mapping[str, Any] = field(default_factory=dict[str, Any])
     texts: Mapping[str, Sequence[str]] = field(default_factory=dict[str, Sequence[str]])
+    run: Mapping[str, Any] | None = None
 
-    def merge_into(self, params: dict[str, Any]) -> None:
+    def merge_into(self, ctx: click.Context) -> None:
         """Put the file's texts before those of the command line, without names that this gives.
 
-        Where the file names the scenario, the first argument of a sweep may be `NAME=VALUES`.
+        Where the file names the scenario, the first argument of a sweep may be `NAME=VALUES`. Code that the file names,
+        and that is not this package's, is said on standard error; that of a `run.json` has to be what the run had.
+
+        Raises:
+            UsageError: it is other code, or an FMU is not there.
         """
-        if "grid" in params and "=" in params["scenario"] and "scenario" in self.defaults:
+        params, from_file = ctx.params, "scenario" in self.defaults
+        if "grid" in params and "=" in params["scenario"] and from_file:
             params["grid"] = (params["scenario"], *params["grid"])
             params["scenario"] = self.defaults["scenario"]
+        elif ctx.get_parameter_source("scenario") is ParameterSource.COMMANDLINE:
+            from_file = False
         given: dict[str, Sequence[str]] = {name: params[name] for name in _TABLES.values() if name in params}
         varied_or_set = {_name(t) for name in ("parameters", "grid") for t in given.get(name, ())}
         units = {_name(t) for t in given.get("replaced", ())}
+        with _damage_reported(self.path):
+            own = _own_code(self.path, self.run, str(params["scenario"])) if from_file else []
+            of_file = self.texts.get("replaced", ())
+            has_units = self.run is not None and "replaced" in params
+            replaced = _units(self.path, self.run or {}, units) if has_units else [*of_file]
+        replaced = [text for text in replaced if _name(text) not in units]
         for name, texts in given.items():
-            ours = units if name == "replaced" else varied_or_set
-            params[name] = (*(t for t in self.texts.get(name, ()) if _name(t) not in ours), *texts)
+            texts_of_file = replaced if name == "replaced" else self.texts.get(name, ())
+            params[name] = (*(t for t in texts_of_file if name == "replaced" or _name(t) not in varied_or_set), *texts)
+        own += [text for text in replaced if _is_own(text.partition("=")[2])]
+        for line in own:
+            click.echo(f"{self.path}: this runs {line}", err=True)
 
 
 class ConfiguredCommand(HeadedCommand):
@@ -66,7 +88,7 @@ class ConfiguredCommand(HeadedCommand):
         """Parse the command line and add what the file gives."""
         rest = super().parse_args(ctx, args)
         if (config := ctx.meta.get(_META)) is not None:
-            config.merge_into(ctx.params)
+            config.merge_into(ctx)
         return rest
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -111,7 +133,9 @@ def read_config(path: Path, ctx: click.Context) -> ConfigFile:
     content = _content(path)
     options = dict(_options(ctx.command))
     tables = {key: name for key, name in _TABLES.items() if name in {p.name for p in ctx.command.params}}
+    run: Mapping[str, Any] | None = None
     if content.keys() >= _OF_RUN_JSON:
+        run = content
         content = {key: value for key, value in _of_run(path, content).items() if key in {**options, **tables}}
     faults: list[str] = []
     defaults: dict[str, Any] = {}
@@ -132,7 +156,7 @@ def read_config(path: Path, ctx: click.Context) -> ConfigFile:
             faults.append(one_line(e))
     if faults:
         raise UsageError(f"{path}: {'; '.join(faults)}")
-    return ConfigFile(path, defaults, texts)
+    return ConfigFile(path, defaults, texts, run)
 
 
 def _content(path: Path) -> dict[str, Any]:
@@ -236,45 +260,78 @@ def _name(text: str) -> str:
 
 
 def _of_run(path: Path, run: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what repeats a run, from its `run.json`; tell of files and versions that are others than it had.
+    """Return what repeats a run, from its `run.json`, but for its units; tell of files and versions that are others.
 
     Raises:
-        UsageError: it is damaged, or its scenario or an FMU is not here.
+        UsageError: it is damaged.
     """
-    if other := version_differences(versions(), run["versions"]):
-        click.echo(f"{path}: the run was of other versions: {other}", err=True)
-    try:
-        content: dict[str, Any] = {**_subject(path, run), **_of_master(run["master"])}
+    with _damage_reported(path):
+        if other := version_differences(versions(), run["versions"]):
+            click.echo(f"{path}: the run was of other versions: {other}", err=True)
+        content: dict[str, Any] = {**_subject(run), **_of_master(run["master"])}
         content |= {"seed": run["seed"], "stop": run.get("stop", content.get("stop"))}
         content |= {"checkpoint": run["checkpoint"], "format": run["formats"]}
         content["parameters"] = {**run["parameters"], **run.get("unit_values", {}), **content.get("parameters", {})}
-        content["unit"] = _units(path, run)
         for file in run.get("parameter_files", {}).values():
-            _compare(path, Path(file["file"]), file["sha256"])
-    except (KeyError, TypeError, ValueError, AttributeError) as e:
-        raise UsageError(f"{path}: it is damaged: {type(e).__name__} {one_line(e)}") from e
+            if Path(file["file"]).is_file() and not _is_unchanged(Path(file["file"]), file["sha256"]):
+                click.echo(f"{path}: {file['file']} is not the file that the run had", err=True)
     return {key: value for key, value in content.items() if value is not None}
 
 
-def _subject(path: Path, run: Mapping[str, Any]) -> dict[str, Any]:
+@contextlib.contextmanager
+def _damage_reported(path: Path) -> Generator[None, None, None]:
+    """Raise UsageError where what a `run.json` has is of another form."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, AttributeError) as e:
+        raise UsageError(f"{path}: it is damaged: {type(e).__name__} {one_line(e)}") from e
+
+
+def _subject(run: Mapping[str, Any]) -> dict[str, Any]:
     source = run["source"]
     if not source:
         return {"scenario": run["scenario"]}
+    if "scenario" in source:
+        return {"scenario": source["scenario"]}
+    file = source["ssp"] if "ssp" in source else source["fmu"]
+    given = dict(tuple(part.strip() for part in text.split("=", 1)) for text in source.get("parameters", ()))
+    return {"scenario": file, "input": source.get("input"), "step": source["step"], "parameters": given} | {
+        "stop": source["stop"]
+    }
+
+
+def _own_code(path: Path, run: Mapping[str, Any] | None, subject: str) -> list[str]:
+    """Return which code a file names as what is to be run, that is not this package's: a line, or none.
+
+    Raises:
+        UsageError: it is not what the run had, in whose `run.json` it is.
+    """
+    if run is None:
+        return [f"the code of {subject}"] if _is_own(subject) else []
+    source = run["source"]
+    cure = f"name it to run it all the same: {subject} --config {path}"
     if "scenario" not in source:
-        file = source["ssp"] if "ssp" in source else source["fmu"]
-        _compare(path, Path(file), source["sha256"])
-        given = dict(tuple(part.strip() for part in text.split("=", 1)) for text in source.get("parameters", ()))
-        return {"scenario": file, "input": source.get("input"), "step": source["step"], "parameters": given} | {
-            "stop": source["stop"]
-        }
+        if not _is_own(subject):
+            return []
+        if (
+            is_path_of_class(subject)
+            or not Path(subject).is_file()
+            or not _is_unchanged(Path(subject), source.get("sha256"))
+        ):
+            raise UsageError(f"{path}: {subject} is not the file that the run had; {cure}")
+        return [f"the units in {subject}"]
     before = ScenarioSource(**source)
     try:
-        before.find()
-    except (KeyError, InvalidScenario) as e:
-        raise UsageError(f"{path}: its scenario {before.scenario} is not here: {one_line(e)}") from e
-    if ScenarioSource.of(before.scenario) != before:
-        click.echo(f"{path}: the code of {before.scenario} is not what the run had", err=True)
-    return {"scenario": before.scenario}
+        return [f"the code of {before.scenario}: {before.unchanged_file()}, as the run had it"]
+    except KeyError:
+        raise UsageError(f"{path}: its scenario {before.scenario} is not installed here") from None
+    except InvalidScenario as e:
+        raise UsageError(f"{path}: its scenario {one_line(e)}; {cure}") from e
+
+
+def _is_own(name: str) -> bool:
+    """Return whether what is named runs code that is not this package's: a class by its path, or a file."""
+    return is_path_of_class(name) or (Path(name).suffix.lower() in (".fmu", ".ssp") and not is_of_cache(Path(name)))
 
 
 def _of_master(master: Mapping[str, Any]) -> dict[str, Any]:
@@ -287,26 +344,38 @@ def _of_master(master: Mapping[str, Any]) -> dict[str, Any]:
     return {**options, "adaptive": control.get("relative")}
 
 
-def _units(path: Path, run: Mapping[str, Any]) -> dict[str, str]:
-    """Return the FMUs of a run's units; those of the catalog that are no longer there are built again.
+def _units(path: Path, run: Mapping[str, Any], given: Container[str]) -> list[str]:
+    """Return texts `NAME=FILE` of the FMUs of a run's units; those of the catalog that are gone are built again.
+
+    Args:
+        path: the `run.json`.
+        run: its content.
+        given: units that the command line gives.
 
     Raises:
-        UsageError: another one is not there.
+        UsageError: another one is not there, or is not what the run had.
     """
-    scenario = scenario_of(run["scenario"], run["source"])
-    units: dict[str, str] = {}
+    texts: list[str] = []
     for name, file in run["files"].items():
-        own = "" if scenario is None else scenario.units.get(name, "").rpartition(":")[2]
-        if Path(file).is_file():
-            units[name] = file
-            _compare(path, Path(file), run["units"].get(name, {}).get("sha256"))
-        elif not is_of_cache(Path(file)) or not Path(file).name.startswith(f"{own}."):
+        if name in given:
+            continue
+        of_cache, unit = is_of_cache(Path(file)), Path(file).name.partition(".")[0]
+        if Path(file).is_file() and _is_unchanged(Path(file), run["units"].get(name, {}).get("sha256")):
+            texts.append(f"{name}={Path(file).absolute()}")
+        elif of_cache and unit in UNITS:
+            texts.append(f"{name}={unit}")
+        elif not of_cache or unit != _own_unit(run, name):
+            fault = "is not the file that the run had" if Path(file).is_file() else "is not there"
             cure = f"--unit {name}=FILE or {name}=MODULE:CLASS gives another"
-            raise UsageError(f"{path}: the FMU of its unit {name}, {file}, is not there; {cure}")
-    return units
+            raise UsageError(f"{path}: the FMU of its unit {name}, {file}, {fault}; {cure}")
+    return texts
 
 
-def _compare(path: Path, file: Path, sha256: str) -> None:
-    """Tell of a file that is not what the run had; one that is not there is told of later."""
-    if file.is_file() and sha256_of(file) != sha256:
-        click.echo(f"{path}: {file} is not the file that the run had", err=True)
+def _own_unit(run: Mapping[str, Any], name: str) -> str:
+    """Return the class of the own scenario's own unit of a name, whose code is what the run had; "" where unknown."""
+    scenario = named_scenario(run["source"]["scenario"]) if "scenario" in run["source"] else None
+    return "" if scenario is None else scenario.units.get(name, "").rpartition(":")[2]
+
+
+def _is_unchanged(file: Path, sha256: str | None) -> bool:
+    return sha256_of(file) == sha256

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
-from handover.scenarios.cli.options import FiniteRange
+from handover.scenarios.cli.options import FiniteRange, trust_option
 from handover.scenarios.execution.errors import FilmFailed, UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import doing
@@ -81,6 +81,7 @@ class Size(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (gene
     metavar="N",
     help=f"Frames per second.  [default: {_FPS:g}; of a GIF {_GIF_FPS:g}]",
 )
+@trust_option
 @click.option("--dark", is_flag=True, help="In the report's dark colours.")
 def film(
     folder: Path,

@@ -7,7 +7,7 @@ for those that run campaigns. Options of the master are in `handover.scenarios.c
 import math
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Any
 import click
 
 from handover.cosim.stepping.options import CALL_LIMIT
+from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.progress import LOG_LEVELS
 
 
@@ -117,6 +118,27 @@ def scenario_options(command: Callable[..., Any]) -> Callable[..., Any]:
         command = option(command)
     return command
 
+
+def _trust(ctx: click.Context, _option: click.Parameter, files: Sequence[Path]) -> None:
+    from handover.scenarios.catalog import InvalidScenario, trust_file  # of own scenarios alone
+
+    for file in () if ctx.resilient_parsing else files:
+        try:
+            trust_file(file)
+        except InvalidScenario as e:
+            raise UsageError(f"--trust {e}") from e
+
+
+trust_option = click.option(
+    "--trust",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE.py",
+    expose_value=False,
+    callback=_trust,
+    help="Run the code of this file, which holds a scenario of your own, to draw its plots and its replay. No code is"
+    " run because a folder names it.",
+)
 
 stop_option = click.option(
     "--stop",

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
+from handover.scenarios.cli.options import trust_option
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.progress import doing
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, check_place
@@ -20,6 +21,7 @@ With --runs, each run of a campaign gets its page, too, to which the campaign's 
 
 @click.command("report", help=_HELP, short_help="Write the page of a run or of a campaign.")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@trust_option
 @click.option("--figures", is_flag=True, help="Draw the figures again, too, as PNG and SVG, into DIR/figures.")
 @click.option("--runs", is_flag=True, help="Write the pages of a campaign's runs, too, into DIR/runs/NAME.")
 @click.option(

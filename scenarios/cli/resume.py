@@ -25,8 +25,9 @@ signals; only the times that it took differ. Units and versions must be those th
 only --isolate is kept with the run: give the others again where they are wanted. Where the run cannot be resumed, its
 record is completed all the same.
 
-A checkpoint is data, but a unit is a program: the run's run.json names the FMUs that are loaded. Where the folder is
-somebody else's, see that they are yours.
+A checkpoint is data, but a unit is a program, and so is a scenario of one's own: the run's run.json names them. What is
+not this package's is listed before it is run; with other code than the run began with, it is not resumed. Where the
+folder is somebody else's, see that the code is yours.
 """
 
 
@@ -54,6 +55,8 @@ def resume(
             require_extra("reports", "report and figures", "--no-report")
         opened.enter_context(run_folder.held())
         interrupted = InterruptedRun(run_folder)
+        for line in interrupted.own_code():
+            click.echo(f"this runs {line}", err=True)
         task = interrupted.task(opened)
         options = replace(task.options, **limits(call_limit, pace), **(isolated(isolate) if isolate else {}))
         task = replace(task, options=options, presented=not no_report)

@@ -263,7 +263,7 @@ def _live(
             control, inputs = opened.enter_context(controlled_from(controls, pushes, hand))
         else:
             address, control, inputs = opened.enter_context(
-                live_page(task.folder.path, pace or 1.0, pushes, hand, webcam)
+                live_page(task.folder.path, pace or 1.0, pushes, hand, webcam, task.source.get("scenario", ""))
             )
             click.echo(f"live: {address}  (the run begins once the page is open)", err=True)
         if sources := inputs.sources():

@@ -76,6 +76,7 @@ class ComparedCampaigns(CampaignResults):
         metadata: dict[str, Any] = {
             "scenario": entries[0].scenario,
             "source": entries[0].metadata.get("source", {}),
+            "headline": entries[0].metadata.get("headline", []),
             "points": [{**dict(key), ENTRY: entries[k].name} for key, k in pairs],
             "fixed": {},
             "repetitions": 1,
@@ -87,7 +88,7 @@ class ComparedCampaigns(CampaignResults):
         """Return the numbers of a campaign's points by the values that tell points apart."""
         points: dict[Key, list[int]] = {}
         for number, values in enumerate(entry.metadata["points"]):
-            full = full_parameters(entry.results.experiment, {**entry.metadata["fixed"], **values})
+            full = full_parameters(entry.results, {**entry.metadata["fixed"], **values})
             key = tuple((name, full[name]) for name in self.keys if name in full)
             points.setdefault(key, []).append(number)
         return points

@@ -13,7 +13,6 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.campaign.results import CampaignResults, read_results
 from handover.scenarios.execution.request import is_file
-from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
 from handover.scenarios.results.run_facts import RunFacts, record_of
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
@@ -55,7 +54,7 @@ class CampaignEntry:
         points: Sequence[Mapping[str, str]] = self.results.metadata["points"]
         fixed: Mapping[str, str] = self.results.metadata["fixed"]
         shared = {n: text for n, text in points[0].items() if all(point.get(n) == text for point in points)}
-        return full_parameters(self.results.experiment, {**fixed, **shared})
+        return full_parameters(self.results, {**fixed, **shared})
 
 
 @dataclass(frozen=True)
@@ -86,13 +85,15 @@ class RunEntry:
 Entry = CampaignEntry | RunEntry
 
 
-def full_parameters(experiment: type[Experiment[Any]] | None, given: Mapping[str, str]) -> dict[str, str]:
+def full_parameters(results: CampaignResults, given: Mapping[str, str]) -> dict[str, str]:
     """Return the texts of a scenario's parameters, those that are not given at their defaults.
 
-    Texts that this version of the scenario does not take stay as they are.
+    Texts that this version of the scenario does not take stay as they are. Of a scenario that is not to be had here
+    defaults are those that the campaign's folder has.
     """
+    experiment = results.experiment
     if experiment is None:
-        return dict(given)
+        return {**results.metadata.get("defaults", {}), **given}
     declared = experiment.parameters()
     known = {v.name for v in declared}
     try:

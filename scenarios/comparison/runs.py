@@ -148,6 +148,7 @@ def _plots_of(entry: RunEntry, record: Record, left_out: list[str]) -> Sequence[
     """Return the plots that the scenario makes of a run, without what the run's units do not give."""
     experiment = entry.facts.experiment
     if experiment is None:
+        left_out += [f"{entry.name} lacks {line}" for line in entry.facts.not_drawn]
         return ()
     faults, known, plots = ToleratedFaults(), LackingRecord(record, experiment.units), list[TimePlot]()
     with faults.tolerated(f"{entry.name} has no curves of the scenario's plots"):

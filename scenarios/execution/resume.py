@@ -11,7 +11,7 @@ from handover.cosim.files import FileLocked
 from handover.cosim.master.checkpoint import InvalidCheckpoint
 from handover.cosim.record.stream import complete_record
 from handover.fmus.build import cached, is_of_cache
-from handover.scenarios.catalog import SCENARIOS, InvalidScenario, ScenarioSource
+from handover.scenarios.catalog import SCENARIOS, InvalidScenario, ScenarioSource, named_scenario
 from handover.scenarios.execution.fmu_run import reopened
 from handover.scenarios.execution.input_sources import recorded_input_names, resumed_inputs
 from handover.scenarios.execution.resumption import Resumption
@@ -71,8 +71,26 @@ class InterruptedRun:
             counted = self.resumption.checkpoint.rows
             raise InvalidCheckpoint(folder.checkpoint, f"it counts {counted} rows, the record beside it has {rows}")
 
+    def own_code(self) -> list[str]:
+        """Return what `task` and the run will run that is not this package's, a line each; nothing of it is run here.
+
+        Raises:
+            InvalidRunFolder: the code of the scenario is not what it was, or `run.json` is damaged.
+        """
+        lines: list[str] = []
+        source, units = self._object("source"), self._object("units")
+        if "scenario" in source:
+            before = self._own_source(source)
+            lines.append(f"the code of {before.scenario}: {self._unchanged(before)}, as the run began with it")
+        for name, file in self._object("files").items():
+            path, known = Path(str(file)), units.get(name)
+            unchanged = isinstance(known, dict) and path.is_file() and sha256_of(path) == cast(Any, known).get("sha256")
+            if unchanged and not is_of_cache(path):
+                lines.append(f"the FMU of its unit {name}: {file}")
+        return lines + [f"the units in {source[kind]}" for kind in ("ssp", "fmu") if kind in source]
+
     def task(self, opened: contextlib.ExitStack) -> Task:
-        """Return what the run was to do; `opened` closes what that opens.
+        """Return what the run was to do; `opened` closes what that opens. A scenario of one's own is imported.
 
         Raises:
             InvalidRunFolder: the scenario, an FMU or a file that a parameter names is not what it was.
@@ -138,18 +156,28 @@ class InterruptedRun:
 
     def _own_scenario(self, source: Mapping[str, Any]) -> Experiment[Any]:
         """Return a scenario that is not this package's, if it is what it was."""
-        before = ScenarioSource(**source)
+        before = self._own_source(source)
+        self._unchanged(before)
         try:
-            experiment = before.find()
+            return named_scenario(before.scenario)()
+        except InvalidScenario as e:
+            raise InvalidRunFolder(self.folder.path, f"its scenario is not here: {e}") from e
+
+    def _own_source(self, source: Mapping[str, Any]) -> ScenarioSource:
+        try:
+            return ScenarioSource(**source)
+        except TypeError as e:
+            raise InvalidRunFolder(self.folder.path, f"its run.json is damaged: 'source' is {source!r:.60}") from e
+
+    def _unchanged(self, before: ScenarioSource) -> Path:
+        """Return the file of the scenario's module, whose code is what it was."""
+        try:
+            return before.unchanged_file()
         except KeyError:
             missing = f"its scenario {before.scenario!r} is not installed here"
             raise InvalidRunFolder(self.folder.path, missing) from None
         except InvalidScenario as e:
-            raise InvalidRunFolder(self.folder.path, f"its scenario is not here: {e}") from e
-        if ScenarioSource.of(before.scenario) != before:
-            changed = f"the code of its scenario {before.scenario} is not what the run began with"
-            raise InvalidRunFolder(self.folder.path, f"{changed}; begin a new run")
-        return experiment()
+            raise InvalidRunFolder(self.folder.path, f"{e}; begin a new run") from e
 
     def _fmu_experiment(self, source: Mapping[str, Any]) -> Experiment[Any]:
         run, files = reopened(source)

@@ -26,6 +26,11 @@ _BLOCK = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 """The path of a block, `my_arm:MyArm`; a drive's letter is followed by a slash."""
 
 
+def is_path_of_class(text: str) -> bool:
+    """Return whether a text is the path of a class, as of a block or a scenario of one's own, and no file's."""
+    return _BLOCK.fullmatch(text) is not None
+
+
 def find_scenario(name: str) -> type[Experiment[Any]]:
     """Return the scenario of a name, or of a path such as `my_scene:TwoLinkReach`, also of the working directory.
 

@@ -91,6 +91,7 @@ def film_content(folder: RunFolder, names: Sequence[str] | None, height: int) ->
         why = e.args[0] if e.args else e
         faults.lines.append(f"the run is of another version of {facts.scenario}, so its scene is left out: {why}")
     if facts.experiment is None:
+        faults.lines += facts.not_drawn
         own = [p for f in figures_of_outputs(facts.run.get("units", {}), record) for p in f.plots]
     plots = [] if names is None else _chosen(own, record, names) if names else own[: 2 if height >= _TWO_PLOTS else 1]
     if replay is None and not plots:

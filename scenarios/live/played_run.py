@@ -16,8 +16,10 @@ import numpy as np
 
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.python_process import code_command
+from handover.fmus.sources import source_file
 from handover.scenarios.execution.input_sources import recorded_input_names
 from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.execution.selection import is_path_of_class
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.live.process import CONTROL_FILE
 from handover.scenarios.live.waiting_command import WaitingCommand
@@ -142,7 +144,8 @@ class PlayedRun:
 
     def write_report(self) -> str:
         """Write its page; return why that failed, "" if it did not."""
-        given = code_command(_ENTRY, "report", str(self.watched.folder.path))
+        own = ["--trust", str(source_file(self._subject))] if is_path_of_class(self._subject) else []
+        given = code_command(_ENTRY, "report", str(self.watched.folder.path), *own)
         done = subprocess.run(given, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
         self.has_report = done.returncode == 0
         return "" if self.has_report else (done.stderr.strip().splitlines() or ["it could not be written"])[-1]

@@ -90,7 +90,12 @@ class PageInputs:
 
 @contextlib.contextmanager
 def live_page(
-    folder: Path, pace: float, pushes: Mapping[str, int], hand: LedHand | None = None, webcam: Path | None = None
+    folder: Path,
+    pace: float,
+    pushes: Mapping[str, int],
+    hand: LedHand | None = None,
+    webcam: Path | None = None,
+    scenario: str = "",
 ) -> Generator[tuple[str, LiveControl, PageInputs], None, None]:
     """Serve the page of a run that will write a folder; at the end, wait until pages have been told of the run's end.
 
@@ -100,6 +105,7 @@ def live_page(
         pushes: names and sizes of the inputs of bodies that the page may push.
         hand: what the page, or a tracker, may lead.
         webcam: folder of the files by which a webcam leads it; None where it is not offered.
+        scenario: path of the class of the run's scenario, which the page's process imports; "" for this package's.
 
     Yields:
         The page's address, the run's controls, and the inputs that the page sets. The run is paused until a page is
@@ -113,7 +119,7 @@ def live_page(
         opened.callback(inputs.close)
         listening = opened.enter_context(socket.create_server((HOST, 0)))
         number = listening.fileno()
-        given = [str(folder), str(scratch), str(number), *([] if webcam is None else [str(webcam)])]
+        given = [str(folder), str(scratch), str(number), scenario, *([] if webcam is None else [str(webcam)])]
         command = module_command("handover.scenarios.live", *given)
         server = subprocess.Popen(command, pass_fds=(number,), stdin=subprocess.PIPE)  # by its end it sees this one's
         assert server.stdin is not None

@@ -74,6 +74,7 @@ def draw_run(folder: RunFolder) -> list[str]:
 def _draw_record(facts: RunFacts, record: Record, to: Path, faults: ToleratedFaults) -> None:
     experiment = facts.experiment
     if experiment is None:
+        faults.lines += facts.not_drawn
         with faults.tolerated("the outputs could not be drawn"):
             draw_time_figures(figures_of_outputs(facts.run.get("units", {}), record), record.time, to)
         return

@@ -65,6 +65,7 @@ def _sections_of_scenario(
     facts: RunFacts, record: Record | None, faults: ToleratedFaults
 ) -> tuple[Section | None, Section | None]:
     """Return the scenario's replay and plots of the record; one that says why where they cannot be made."""
+    faults.lines += facts.not_drawn
     experiment = facts.experiment
     if experiment is None or record is None:
         return None, None

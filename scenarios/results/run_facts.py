@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.variable import indices_of, subscript
 from handover.cosim.exceptions import one_line
 from handover.cosim.record.reader import Record
-from handover.scenarios.catalog import scenario_of
+from handover.scenarios.catalog import scenario_of, untrusted_code
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.summary import MetricData, RunData, Summary, faults_of, unwritten_summary
@@ -28,7 +28,7 @@ class RunFacts:
     Attributes:
         folder: the run's.
         run, summary: contents of `run.json` and `summary.json`; for a run that was killed, a summary that says so.
-        experiment: the scenario, if it is to be had here; None for an SSP.
+        experiment: the scenario, if it is to be had here without running code that the folder names; None for an SSP.
         ended: whether the run wrote its summary.
     """
 
@@ -55,6 +55,12 @@ class RunFacts:
         scenario = scenario_of(run["scenario"], run.get("source", {}))
         experiment = None if scenario is None else scenario()
         return cls(folder=folder, run=run, summary=summary, experiment=experiment, ended=ended)
+
+    @property
+    def not_drawn(self) -> list[str]:
+        """That plots and replay are left out since they need code that is not trusted: a line, or none."""
+        code = untrusted_code(self.run.get("source", {})) if self.experiment is None else ""
+        return [f"plots over time and replay: {code}"] if code else []
 
     @property
     def scenario(self) -> str:

@@ -297,8 +297,9 @@ def _conditions(plan: PlanTable) -> tuple[list[str], list[str], list[Condition]]
 
 
 def _scenario(name: str, table: PlanTable) -> type[Experiment[Any]] | None:
+    """Return the scenario of a name; no path of a class is taken, whose code would be run as a folder is read."""
     try:
-        return named_scenario(name)
+        return named_scenario(name if name in SCENARIOS else installed_scenarios()[name])
     except KeyError:
         known = [*SCENARIOS, *installed_scenarios()]
         table.faults.append(f"{table.where}.scenario: no scenario {name!r}; {nearest(name, known)}")

@@ -34,7 +34,10 @@ def test_it_runs_and_its_report_is_written_again_from_elsewhere(here: Path, tmp_
     record = Record(here / "first" / "signals.parquet")
     assert np.linalg.norm(record["arm.p_WE"][-1] - [0.4, 0.3]) < 0.005
     (here / "first" / "report.html").unlink()
-    succeeded(tmp_path, "report", str(here / "first"), "--figures")
+    untrusted = call(tmp_path, "report", str(here / "first"))
+    assert f"--trust {here / 'reach.py'}" in untrusted.stderr
+    succeeded(tmp_path, "report", str(here / "first"), "--figures", "--trust", str(here / "reach.py"))
+    assert (here / "first" / "figures" / "1_distance.png").exists()
     page = (here / "first" / "report.html").read_text(encoding="utf-8")
     assert "An arm of two links reaches for a point" in page
     assert "where the tip is to come" in page
@@ -77,9 +80,11 @@ def test_a_run_that_was_interrupted_is_resumed_and_not_with_other_code(here: Pat
     before = (here / "reach.py").read_text()
     (here / "reach.py").write_text(before + "\n# changed\n")
     line = call(tmp_path, "resume", str(here / "cut")).stderr
-    assert "the code of its scenario reach:TwoLinkReach is not what the run began with" in line
+    assert f"reach:TwoLinkReach: its code, {here / 'reach.py'}, is not what the run had" in line
     (here / "reach.py").write_text(before)
-    succeeded(tmp_path, "resume", str(here / "cut"), "--no-report")
+    resumed = call(tmp_path, "resume", str(here / "cut"), "--no-report")
+    assert resumed.returncode == 0, resumed.stderr
+    assert f"this runs the code of reach:TwoLinkReach: {here / 'reach.py'}" in resumed.stderr
     signals = [(here / name / "signals.parquet").read_bytes() for name in ("whole", "cut")]
     assert signals[0] == signals[1]
 
@@ -117,7 +122,7 @@ def test_a_sweep_goes_on_after_a_kill_and_its_report_is_written_from_elsewhere(h
     assert "An arm of two links reaches for a point" in page
     run = next(here.glob("goals/runs/0*/run.json"))
     assert json.loads(run.read_text())["source"]["folder"] == str(here)
-    succeeded(tmp_path, "report", str(run.parent))
+    succeeded(tmp_path, "report", str(run.parent), "--trust", str(here / "reach.py"))
 
 
 @pytest.mark.slow

@@ -26,6 +26,21 @@ def test_a_plan_in_whose_rounds_nobody_can_lead_a_hand_is_refused(tmp_path: Path
     assert "tasks.robot_to_human, rigid: in flyer_impedance nobody outside can lead a hand" in refused.output
 
 
+@pytest.mark.parametrize(
+    "command", ["plan {}/plan.toml", "report {}", "export {}", "replay {} P01 1", "replay {} P01 1 --check"]
+)
+def test_no_code_is_run_because_a_plan_names_it(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    marker = tmp_path / "marker"
+    (tmp_path / "foreign_scene.py").write_text(f"open({str(marker)!r}, 'w')\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "plan.toml").write_text(default_plan().replace("flyer_robot_to_human", "foreign_scene:Scene"), "utf-8")
+    refused = study(*command.format(tmp_path).split())
+    assert refused.exit_code == 2, refused.output
+    assert "no scenario 'foreign_scene:Scene'" in refused.output
+    assert not marker.exists()
+
+
 def test_a_new_plan_can_be_followed_as_it_is(tmp_path: Path):
     file = tmp_path / "mine" / "plan.toml"
     assert study("new", file).exit_code == 0
