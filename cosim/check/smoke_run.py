@@ -20,7 +20,7 @@ from handover.cosim.fmu.file.description import KINDS, FmuDescription, FmuPort, 
 from handover.cosim.fmu.file.xml import parse_xml
 from handover.cosim.probe.finding import Finding, abbreviated, fault, note, warning
 from handover.cosim.probe.isolated_process import Journal
-from handover.cosim.probe.probed_instance import ProbedInstance, failure, log_tail
+from handover.cosim.probe.probed_instance import ProbedInstance, failure, log_tail, probed
 
 STEPS = 10
 _REPEATED = 5  # steps that are done again from a state
@@ -97,7 +97,7 @@ class SmokeRun:
         self._check_internal(unit)
 
     def _instance(self, name: str) -> ProbedInstance:
-        return ProbedInstance(name, self.description, self.folder, self.journal)
+        return probed(name, self.description, self.folder, self.journal)
 
     def _steps(self, unit: ProbedInstance) -> list[dict[str, bytes]]:
         seen: list[dict[str, bytes]] = []

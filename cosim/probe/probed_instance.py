@@ -11,19 +11,25 @@ import numpy as np
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import UnitFailure, log_lines
 from handover.cosim.fmu.buffers import SignalBuffer
+from handover.cosim.fmu.calls import is_rounding
+from handover.cosim.fmu.event_instance import EventInstance
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.fmu.instance import Instance
 from handover.cosim.probe.finding import Finding, fault
 from handover.cosim.probe.isolated_process import Journal
 
 _WITHOUT_NUMBERS = (Kind.STRING, Kind.BINARY)
+MAX_EVENTS = 1000
+"""Events in a step, and updates at an event, after which a unit counts as one that does not go on."""
+
 _MAX_LINES = 24  # of a unit's log
 
 
 class ProbedInstance(Instance):
     """A unit under test. Its inputs, strings and binaries aside, are held at their start values.
 
-    It runs without event mode; clocked ports, which can be reached only there, are left alone.
+    It runs without event mode, see `ProbedEventInstance`; clocked ports, which can be reached only there, are left
+    alone.
 
     Raises:
         InvalidFmu: as `Instance`.
@@ -142,6 +148,73 @@ class ProbedInstance(Instance):
     def _call(self, name: str, *arguments: Any) -> None:
         self._journal.begins(self._prefix + name, self.time)
         super()._call(name, *arguments)
+
+
+class ProbedEventInstance(ProbedInstance, EventInstance):
+    """A unit under test that runs in event mode: its clocks tick, and its steps end at events."""
+
+    def start(self, t: float, given: Mapping[str, Any] | None = None) -> None:
+        """Go through initialisation and the first events."""
+        super().start(t, given)
+        self._settle()
+
+    def advance(self, dt: float) -> None:
+        """Advance by dt, from event to event."""
+        target = self.time + dt
+        self.set_inputs()
+        for _ in range(MAX_EVENTS):
+            known = [self.next_event, *(float(timer.next) for timer in self.timers if timer.next is not None)]
+            end = min([target, *(t for t in known if t is not None and t > self.time)])
+            self.step(self.time, end - self.time)
+            if self._step_returns.event or self.time < target or end in known:
+                self._settle()
+            if self.time >= target or is_rounding(self.time - target, target):
+                break
+        else:
+            raise UnitFailure(self.name, f"{self._prefix}DoStep", self.time, f"over {MAX_EVENTS} events in a step")
+        self.get_outputs()
+
+    def reset(self) -> None:
+        """Reset the unit, which is neither initialised nor in event mode then."""
+        super().reset()
+        self._initialized = self.in_event_mode = False
+        self.active.clear()
+
+    def keep_state(self) -> Any:
+        """Return the unit's state; the times of its events are kept here, for the state that is kept last."""
+        self._timing = self.get_timing()
+        return super().keep_state()
+
+    def restore(self, state: Any, t: float) -> None:
+        """Restore a state that was kept at time t, with the times of events."""
+        self.set_timing(self._timing)
+        super().restore(state, t)
+
+    def _settle(self) -> None:
+        """Handle the events of this instant, and return to step mode."""
+        if not self.in_event_mode:
+            self.enter_event_mode()
+        for _ in range(MAX_EVENTS):
+            due = [timer.clock.name for timer in self.timers if timer.is_due(self.time)]
+            if due:
+                self.tick(due)
+            self.get_outputs()
+            self.ticking()
+            if not self.update(self.time) and not any(timer.is_due(self.time) for timer in self.timers):
+                break
+        else:
+            raise UnitFailure(self.name, "fmi3UpdateDiscreteStates", self.time, f"wants over {MAX_EVENTS} updates")
+        self.enter_step_mode()
+
+
+def probed(name: str, description: FmuDescription, folder: Path, journal: Journal) -> ProbedInstance:
+    """Return a unit under test, in event mode where a run would be.
+
+    Raises:
+        InvalidFmu: as `Instance`.
+    """
+    events = description.capabilities.event_mode and not description.sampled
+    return (ProbedEventInstance if events else ProbedInstance)(name, description, folder, journal)
 
 
 def _start_of(port: FmuPort) -> Any:

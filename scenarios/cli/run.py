@@ -44,8 +44,8 @@ _STEP = _option(
     "--step",
     type=Seconds(),
     metavar="SECONDS",
-    help="Communication step of all units.  [default: what an SSP states, else what each FMU proposes, else a 500th of its"
-    " default experiment]",
+    help="Communication step of all units.  [default: what an SSP states, else what each FMU proposes, else a 500th of"
+    " its default experiment]",
 )
 _INPUT = _option(
     "--input",

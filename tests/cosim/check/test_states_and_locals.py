@@ -1,13 +1,19 @@
 """A check tells by how much a restored state is off, and which variables a unit's library does not know."""
 
 import zipfile
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
 from native_units import native_fmu
 
 from handover.cosim.check.check_fmu import check_fmu
+from handover.cosim.fmu.file.fmpy_edge import unpack
+from handover.cosim.master.master import Master
 from handover.cosim.probe.finding import Finding, Level
+from handover.cosim.probe.isolated_process import Journal
+from handover.cosim.probe.probed_instance import probed
+from handover.cosim.system.system import System
 
 
 def found_in_run(file: Path) -> list[Finding]:
@@ -77,3 +83,30 @@ def with_locals(folder: Path, fmi: int, references: dict[str, int]) -> Path:
             content = source.read(name)
             target.writestr(name, content.replace(b"</ModelVariables>", "".join(rows).encode() + b"</ModelVariables>"))
     return file
+
+
+@pytest.mark.parametrize("announces", [False, True])
+def test_a_unit_with_event_mode_is_tried_as_in_a_run(tmp_path: Path, announces: bool):
+    """A ball bounces within steps: a step returns early, or the unit says when its next event is."""
+    system = System()
+    system.add("ball", native_fmu("ball"), period=Fraction(1, 10), announces=announces)
+    d, seen = system.units["ball"].description, list[float]()
+    unpack(d.path, tmp_path / "ball", d.fmi, d.identifier)
+    unit = probed("ball", d, tmp_path / "ball", Journal(tmp_path / "journal"))
+    unit.start(0.0, {"announces": announces})
+    with Master(system) as master:
+        for k in range(1, 11):
+            unit.advance(0.1)
+            master.run(Fraction(k, 10))
+            assert unit.y["h"][0][0] == pytest.approx(master.signals.plain("ball.h"), abs=1e-9)
+            seen.append(unit.time)
+        assert unit.y["bounces"][0][0] == master.signals.plain("ball.bounces") == 1
+    unit.free()
+    assert seen == pytest.approx([k / 10 for k in range(1, 11)])
+
+
+@pytest.mark.parametrize("unit", ["ball", "counter_tenths", "watch"])
+def test_units_with_event_mode_pass(unit: str):
+    report = check_fmu(native_fmu(unit), timeout=60.0)
+    assert report.passed, [f.line for s in report.sections for f in s.findings]
+    assert "second instance, reset" in report.sections[-1].summary
