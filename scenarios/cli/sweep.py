@@ -57,7 +57,8 @@ unit fails is a row with its reason; a run that was lost, as with its machine, i
 --repeat adds runs. Without --out, the command resumes its newest campaign in campaigns/ if that is not complete, else
 it begins a new one.
 
-A run's seed follows from --seed, its point and its repetition; runs of files draw no numbers from it. What it prints, as by --log-level, is in its log.txt.
+A run's seed follows from --seed, its point and its repetition; runs of files draw no numbers from it. What a run
+prints, as by --log-level, is in its log.txt.
 
 Progress goes to standard error: a bar on a terminal, else a line every half minute.
 
