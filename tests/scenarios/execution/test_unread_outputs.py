@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -11,6 +12,7 @@ from native_units import native_fmu
 from ssp_of import component, described, pack_ssp, system
 
 import handover
+from handover.cosim.record.reader import Record
 from handover.cosim.system.system import System
 from handover.scenarios.cli.command import main
 from handover.scenarios.results.not_finite import MAX_LINES, not_finite_lines, outputs_not_finite
@@ -33,6 +35,10 @@ def test_a_run_ends_with_a_line_and_goes_on_until_then(tmp_path: Path, fmi: int,
     (told,) = summary["not_finite"]
     assert (told["instance"], told["output"], told["value"]) == ("gives_nan", "y", "NaN")
     assert told["time"] == pytest.approx(0.3)
+    y, metrics = Record(tmp_path / "r" / "signals.parquet")["gives_nan.y"], summary["metrics"]
+    finite = y[np.isfinite(y)]
+    assert [metrics[name]["value"] for name in ("min_y", "max_y")] == [finite.min(), finite.max()]
+    assert metrics["last_y"]["value"] == (float(y[-1]) if np.isfinite(y[-1]) else None)
 
 
 def test_page_and_result_have_the_line(tmp_path: Path):

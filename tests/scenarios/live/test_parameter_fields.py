@@ -1,10 +1,16 @@
 """The fields that `handover play` offers for parameters: their sliders, which there are, and what is told of faults."""
 
+from pathlib import Path
+
 import pytest
+from click.testing import CliRunner
+from native_units import native_fmu
 
 from handover.cosim.blocks.variable import Causality, Declared, Kind
+from handover.scenarios.cli.command import main
 from handover.scenarios.execution.request import RunRequest
-from handover.scenarios.live.parameter_fields import field_groups, field_of, without_call
+from handover.scenarios.live.parameter_fields import faults_by_name, field_groups, field_of, without_call
+from handover.scenarios.live.play_page import Session
 
 
 @pytest.mark.parametrize(
@@ -30,6 +36,27 @@ def test_a_parameter_of_an_algorithm_that_no_session_runs_by_is_shown_only_where
         names = [field.name for group in groups for field in group.fields]
         assert ("parallel_step" in names) == bool(given)
         assert "force" in names
+
+
+def test_a_session_of_an_fmu_has_fields_of_its_inputs_and_gives_a_file_of_them_to_all_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    sessions: list[Session] = []
+
+    async def serve(session: Session) -> None:
+        sessions.append(session)
+
+    monkeypatch.setattr("handover.scenarios.cli.play._serve", serve)
+    file = tmp_path / "f.csv"
+    file.write_text("time,f\n0,0\n1,2\n", encoding="utf-8")
+    arguments = ["play", str(native_fmu("mass", 2)), "-p", "k=2", "--input", str(file), "--out", str(tmp_path / "p")]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.output
+    [session] = sessions
+    assert {"m", "k", "f"} <= {*session.names}
+    assert (session.options, session.request.inputs) == (["--input", str(file)], file)
+    assert faults_by_name(session.first().of(session.request), session.names) == {}
+    assert "last_x" in session.headline
 
 
 def test_a_fault_is_told_without_the_call_that_refused_it():
