@@ -15,6 +15,7 @@ from handover.controllers.ir_grasp.parameters import Params
 from handover.cosim.blocks.ports import Floats
 
 _RANK_TOLERANCE = 1e-12
+_ANYWHERE = np.full(4, np.inf)
 _GROWTH, _SHRINKAGE = 2.0, 0.5  # of the factor on alpha, by whether a step lessened the cost (assumed)
 
 
@@ -117,6 +118,7 @@ class Descent:
     Attributes:
         steps: Gauss-Newton steps made.
         best: command of the pose of least cost; empty before the first measurement.
+        is_held: whether the reach held the wrist back in the last step.
     """
 
     def __init__(self, params: Params) -> None:
@@ -126,6 +128,7 @@ class Descent:
         self._high = np.array([*(pregrasp[:3] + p.reach), p.sigma_limit])
         self.steps = 0
         self.best: X = ()
+        self.is_held = False
         self._min_cost = math.inf
         self._jacobian: Floats = np.zeros((0, 4))
         self._x: Floats = np.zeros(4)
@@ -154,8 +157,13 @@ class Descent:
 
     def next_command(self, command: X) -> X:
         """Return command + alpha dx, eqs. (9) and (10), within max_step and the reach."""
+        free, goal = (self._next(command, limits) for limits in ((-_ANYWHERE, _ANYWHERE), (self._low, self._high)))
+        self.is_held = bool(np.any((free < self._low)[:3] | (free > self._high)[:3]))
+        return tuple(goal.tolist())
+
+    def _next(self, command: X, limits: tuple[Floats, Floats]) -> Floats:
         p = self._params
-        goal = bounded_step(
+        return bounded_step(
             self._jacobian,
             self._r,
             np.array(command),
@@ -163,9 +171,8 @@ class Descent:
             damping=p.damping,
             alpha=p.alpha * self._trust,
             max_step=p.max_step,
-            limits=(self._low, self._high),
+            limits=limits,
         )
-        return tuple(goal.tolist())
 
     def judge(self, x: X, r: Floats, command: X) -> Verdict:
         """Count a step that led to residuals r at inputs x, update the Jacobian by it, and return what follows."""
@@ -187,14 +194,14 @@ class Descent:
             return Verdict.BACK
         return Verdict.PROBE if p.literal or self._since_probing >= p.probe_every else Verdict.STEP
 
-    def get_state(self) -> tuple[tuple[int, int, int], tuple[float, float, X], tuple[Floats, Floats, Floats]]:
+    def get_state(self) -> tuple[tuple[int, int, int, bool], tuple[float, float, X], tuple[Floats, Floats, Floats]]:
         """Return counters, alpha's factor, the best pose, and the linear approximation."""
-        counters = (self.steps, self._stalled, self._since_probing)
+        counters = (self.steps, self._stalled, self._since_probing, self.is_held)
         return counters, (self._trust, self._min_cost, self.best), (self._jacobian, self._x, self._r)
 
     def set_state(
-        self, state: tuple[tuple[int, int, int], tuple[float, float, X], tuple[Floats, Floats, Floats]]
+        self, state: tuple[tuple[int, int, int, bool], tuple[float, float, X], tuple[Floats, Floats, Floats]]
     ) -> None:
         """Restore a state that `get_state` gave."""
         counters, (self._trust, self._min_cost, self.best), (self._jacobian, self._x, self._r) = state
-        self.steps, self._stalled, self._since_probing = counters
+        self.steps, self._stalled, self._since_probing, self.is_held = counters

@@ -45,6 +45,7 @@ class Termination(enum.IntEnum):
     USED_UP = 5
     CENTRED = 6
     CONTACT = 7
+    REACH = 8
 
 
 class Following:
@@ -296,7 +297,7 @@ class Following:
         if self._path > p.path_limit:
             return Termination.USED_UP
         if left > 0.0:
-            return Termination.USED_UP if stuck else Termination.NONE
+            return Termination.REACH if stuck else Termination.NONE
         d = self._filter.distances[self._in_cost]
         if cost(self._weight * (d - p.target)) <= p.threshold:
             return Termination.REACHED

@@ -88,8 +88,9 @@ class IrReflex:
     - PROBE: each input in turn, and back, by its probing move, be it beyond the reach. Every probe_every steps;
       between, Broyden's update of J.
     - STEP: x + alpha dx within max_step and the reach. A step that raises f is undone and alpha halved.
-    - CLOSE: when f is at most the threshold, or at the best pose if steps, recoveries or progress end (`Stop`). A
-      hand whose recoveries end with the object out of sight closes where it is: it may have pushed the object along.
+    - CLOSE: when f is at most the threshold, or at the best pose if steps, recoveries or progress end, or the wrist
+      stands at the limit of its reach (`Stop`). A hand whose recoveries end with the object out of sight closes where
+      it is: it may have pushed the object along.
     - PULL, SHAKE, DONE: pull_distance back, then a sine across.
 
     That is the correction PAPER; FAST comes slowly to the pre-grasp pose and corrects on the move (`Following`):
@@ -284,11 +285,15 @@ class IrReflex:
         """Steps 4 and 5: approach, or move around the object."""
         p, x = self.params, self._move.goal
         motion = self._recovery.motion(case, may_close=x[3] + p.recovery_closing <= p.sigma_limit)
-        goal = self._descent.within_reach(displaced(x, motion))
+        wanted = displaced(x, motion)
+        goal = self._descent.within_reach(wanted)
         self._closings += only_lags
         self._recoveries += 1
         if self._recoveries > p.max_recoveries or (goal == x and not only_lags):
-            self._close(Stop.OUT_OF_SIGHT if case is Visibility.NONE else Stop.PATIENCE)
+            unseen = case is Visibility.NONE
+            held = goal[:3] != wanted[:3]
+            stop = Stop.REACH if held else Stop.OUT_OF_SIGHT if unseen else Stop.PATIENCE
+            self._close(stop, at_best=not unseen)
         else:
             self._start(Phase.APPROACH if case is Visibility.NONE else Phase.RECOVER, goal, 0)
 
@@ -321,7 +326,9 @@ class IrReflex:
         r = self._residuals(self._distances(reading.ticks))
         verdict = self._descent.judge(reading.x, r, self._move.goal)
         if verdict in STOPS:
-            self._close(STOPS[verdict])
+            is_small = verdict is Verdict.REACHED
+            held = self._descent.is_held and not is_small
+            self._close(Stop.REACH if held else STOPS[verdict], at_best=not is_small)
         elif verdict is Verdict.BACK:
             self._start(Phase.CHECK, self._descent.best, self.params.scans)
         elif verdict is Verdict.PROBE:
@@ -333,14 +340,14 @@ class IrReflex:
         """Return to step 3; counted, since readings at the edge of sight could lead there for ever."""
         self._recoveries += 1
         if self._recoveries > self.params.max_recoveries:
-            self._close(Stop.PATIENCE)
+            self._close(Stop.PATIENCE, at_best=True)
             return
         self._start(Phase.CHECK, self._move.goal, self.params.scans)
 
-    def _close(self, stop: Stop) -> None:
+    def _close(self, stop: Stop, *, at_best: bool = False) -> None:
         """Grasp the object: here, or, if the cost is not small but fingers still see, from the best pose known."""
         self._stop = stop
-        x = self._descent.best if stop in (Stop.STALLED, Stop.PATIENCE) and self._descent.best else self._move.goal
+        x = self._descent.best if at_best and self._descent.best else self._move.goal
         self._start(Phase.CLOSE, (*x[:3], 1.0), 0, self.params.closing_time)
 
     def _shake(self) -> None:

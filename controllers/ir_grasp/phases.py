@@ -26,11 +26,12 @@ class Phase(enum.IntEnum):
 class Stop(enum.IntEnum):
     """Why the refinement ended.
 
-    The cost is small, steps, recoveries, reach or way are used up, there is no progress, no finger sees the object, or
-    the strategy has no refinement. Of the correction on the move: ways across change nothing of what is seen while a
-    finger touches the object, which so goes along (PUSHED; also where no joint is measured); the object is deep between
-    two fingers that are equally far from it, or presses a finger outwards there (CONTACT). Of the strategy CONTACT: it
-    felt the object between the fingers, or its way ahead was at its end before (REACH).
+    The cost is small, steps, recoveries or way are used up, there is no progress, no finger sees the object, the limit
+    of the wrist's reach is in the way of the next move (REACH), or the strategy has no refinement. Of the correction on
+    the move: ways across change nothing of what is seen while a finger touches the object, which so goes along (PUSHED;
+    also where no joint is measured); the object is deep between two fingers that are equally far from it, or presses a
+    finger outwards there (CONTACT). Of the strategy CONTACT: it felt the object between the fingers, or its way ahead
+    was at its end before (REACH).
     """
 
     RUNNING = 0
@@ -52,6 +53,7 @@ TERMINATIONS = {
     Termination.SETTLED: Stop.STALLED,
     Termination.LOST: Stop.OUT_OF_SIGHT,
     Termination.USED_UP: Stop.PATIENCE,
+    Termination.REACH: Stop.REACH,
     Termination.PUSHED: Stop.PUSHED,
     Termination.CENTRED: Stop.CENTRED,
     Termination.CONTACT: Stop.CONTACT,

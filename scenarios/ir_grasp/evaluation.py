@@ -1,6 +1,8 @@
 """Evaluates an infrared grasp by ground truth, which the hand's controller does not see."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -8,6 +10,7 @@ from handover.controllers.ir_grasp.parameters import Correction, Strategy
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import PlacedUnit
 from handover.plants.ir_grasp.hand import sensor_rays
 from handover.plants.ir_grasp.parameters import OUT_OF_RANGE
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
@@ -22,6 +25,15 @@ _BODIES = 2
 _LEFT_BEHIND = 0.04
 """How far an object that is held may have stayed behind the hand since the pull began, m (assumed): less than the
 width of [Luberto]'s objects and the fingers on them, so that it is still where they closed."""
+
+_PUSHED = 0.02
+"""How far an object is pushed before the hand closes from which the verdict says so, m (assumed): a finger's width."""
+
+_AT_LIMIT = 0.9
+"""Part of its reach from which the wrist stands at its limit: the last step may have been held back (assumed)."""
+
+_AXES = (("x", "m"), ("y", "m"), ("heading", "rad"))
+"""Directions of the wrist's reach, in W."""
 
 _COST = "cost f of thumb and ring as the hand began to close, [Luberto] eq. (4)"
 
@@ -85,6 +97,18 @@ class GraspEvaluator(Evaluator):
         self._at_start: dict[str, Metric] = {}
         self._at_closing: dict[str, Metric] = {}
         self._stop = ""
+        self._displaced = 0.0
+        self._reach: tuple[Floats, Floats] | None = None  # the pre-grasp pose, and how far the wrist may go from it
+        self._at_limit = ""
+
+    def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
+        """Keep the controller's reach about the pre-grasp pose, if it has such parameters."""
+        reach = "fast_reach" if self.parameters.correction is Correction.FAST else "reach"
+        given: Mapping[str, Any] = units["reflex"].start if "reflex" in units else {}
+        if {"p_WH_pregrasp", "yaw_pregrasp"} <= given.keys():
+            most = given.get(reach, getattr(ReflexParams(), reach))
+            pregrasp = np.array([*np.asarray(given["p_WH_pregrasp"]), float(given["yaw_pregrasp"])])
+            self._reach = (pregrasp, np.array(most, dtype=np.float64))
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Follow phases, hand and object."""
@@ -152,6 +176,8 @@ class GraspEvaluator(Evaluator):
         displaced = float(np.linalg.norm(signals["scene.p_WO"] - self._p_WO_start - carried))
         stop = int(_given(signals, "reflex.stop"))
         offset = self._offset(signals)
+        self._displaced = displaced
+        beyond = self._follow_limit(signals, offset) if self._stop == "reach" else {}
         metrics = {
             "final_cost": Metric(math.nan if blind else cost, "m2", what_of_cost),
             "steps": Metric(int(_given(signals, "reflex.steps")), "1", _STEPS[p.correction]),
@@ -165,7 +191,9 @@ class GraspEvaluator(Evaluator):
                 displaced, "m", "how far the object was pushed before the hand closed, less what the ground carried it"
             ),
             "offset_at_grasp": Metric(
-                offset, "m", "distance of the object's middle from that of thumb's and ring's pads as the hand closes"
+                float(np.linalg.norm(offset)),
+                "m",
+                "distance of the object's middle from that of thumb's and ring's pads as the hand closes",
             ),
             "stop": Metric(stop, "1", f"why the refinement ended, by number: {stop} is {self._stop}"),
         }
@@ -175,16 +203,40 @@ class GraspEvaluator(Evaluator):
             unmet = " (meets nothing)" if np.isnan(true[i]) else ""
             metrics[f"final_distance_{finger}"] = Metric(float(seen[i]), "m", f"{what}, by [Luberto] eq. (11){unseen}")
             metrics[f"true_distance_{finger}"] = Metric(float(true[i]), "m", f"{what}, true along the beam{unmet}")
+        metrics |= beyond
         self._at_closing = {name: m for name, m in metrics.items() if _SIGNALS.get(name, "scene.range") in signals}
 
-    def _offset(self, signals: Signals) -> float:
-        """Return how far the middle of the object is from the middle between the pads of thumb and ring, in m."""
+    def _follow_limit(self, signals: Signals, offset: Floats) -> dict[str, Metric]:
+        """Keep at which limit of its reach the wrist closes; return how far beyond the object is, if along an axis."""
+        if self._reach is None or not np.any(self._reach[1] > 0.0):
+            return {}
+        pregrasp, reach = self._reach
+        away = np.array([*signals["reflex.p_WH_cmd"], float(signals["reflex.yaw_cmd"])]) - pregrasp
+        shares = np.abs(away) / np.where(reach > 0.0, reach, np.inf)
+        k = int(np.argmax(shares))
+        axis, unit = _AXES[k]
+        if shares[k] < _AT_LIMIT:
+            self._at_limit = "the next move would leave the wrist's reach"
+            return {}
+        scaled, shown = (1e3, "mm") if unit == "m" else (math.degrees(1.0), "°")
+        how = f"{scaled * away[k]:+.0f} {shown} of at most {scaled * reach[k]:.0f} {shown}"
+        self._at_limit = f"the wrist was at the limit of its reach in {axis}, {how} from the pre-grasp pose"
+        if unit != "m":
+            return {}
+        beyond = math.copysign(1.0, away[k]) * float(offset[k])
+        where = f"{1e3 * abs(beyond):.0f} mm {'beyond' if beyond > 0.0 else 'short of'} the fingers' middle"
+        self._at_limit += f", and the object's middle {where} in {axis}"
+        text = f"object's middle beyond that of thumb's and ring's pads in {axis}, the wrist at its limit there"
+        return {"beyond_reach": Metric(beyond, "m", text)}
+
+    def _offset(self, signals: Signals) -> Floats:
+        """Return the object's middle, seen from the middle between the pads of thumb and ring, in W, m."""
         p_WH, yaw, yaw_O = signals["scene.p_WH"], float(signals["scene.yaw"]), float(signals["scene.yaw_O"])
         pads, _ = sensor_rays(p_WH, yaw, signals["scene.q"])
         x, y = self.parameters.solid.parts[0].centroid
         c, s = math.cos(yaw_O), math.sin(yaw_O)
         middle = signals["scene.p_WO"] + np.array([c * x - s * y, s * x + c * y])
-        return float(np.linalg.norm(middle - pads[list(IN_COST)].mean(axis=0)))
+        return middle - pads[list(IN_COST)].mean(axis=0)
 
     def _count(self, phase: str, signals: Signals) -> None:
         command = (
@@ -237,6 +289,10 @@ class GraspEvaluator(Evaluator):
             refined = f"pulled back at {self._entered['PULL']:.1f} s"
         else:
             refined = f"closed at {closed_at:.1f} s{f' ({self._stop})' if self._stop else ''}"
+            if self._at_limit:
+                refined += f", as {self._at_limit}"
+            if self._displaced > _PUSHED:
+                refined += f", having pushed the object {1e3 * self._displaced:.0f} mm before"
         if success:
             return f"{refined}; the object came along with the hand and stayed in it"
         if closed is None:

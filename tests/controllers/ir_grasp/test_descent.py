@@ -1,6 +1,7 @@
 from typing import Any
 
 import numpy as np
+import pytest
 
 from handover.controllers.ir_grasp.descent import Descent, Verdict
 from handover.controllers.ir_grasp.parameters import Params
@@ -69,3 +70,13 @@ def test_commands_stay_within_reach():
     low = Descent(Params()).within_reach((-9.0, -9.0, -9.0, -9.0))
     assert np.allclose(low, [-0.3, -0.1, -0.6, 0.0])
     assert Descent(Params()).within_reach((9.0, 9.0, 9.0, 9.0))[3] == Params().sigma_limit
+
+
+@pytest.mark.parametrize(("ahead", "held"), [(0.0, False), (0.0999, True)])
+def test_a_step_that_would_leave_the_reach_is_held_back(ahead: float, held: bool):
+    d, p = Descent(Params()), Params()
+    x = (float(p.p_WH_pregrasp[0]) + ahead, float(p.p_WH_pregrasp[1]), p.yaw_pregrasp, p.sigma_pregrasp)
+    d.measure(x, np.array([0.04, 0.04]), x)
+    d.probed(np.array([[-1.0, 0.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0]]))  # both distances fall as the hand goes ahead
+    assert d.next_command(x)[0] <= p.p_WH_pregrasp[0] + p.reach[0]
+    assert d.is_held is held

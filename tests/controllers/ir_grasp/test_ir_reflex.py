@@ -177,7 +177,7 @@ def test_each_case_makes_the_hand_move_as_its_action_says(case: Visibility):
 def test_a_hand_that_sees_nothing_goes_forward_to_its_reach_and_closes():
     seen = run(Scene(p_WO=(5.0, 0.0)), IrReflex(pregrasp(-0.15, 0.0)))
     closing = next(y for y in seen if y.phase is Phase.CLOSE)
-    assert closing.stop is Stop.OUT_OF_SIGHT
+    assert closing.stop is Stop.REACH
     assert closing.p_WH_cmd == pytest.approx([-0.15 + Params().reach[0], 0.0])
 
 
@@ -191,7 +191,7 @@ def test_readings_that_alternate_between_the_sides_end_and_lead_forward():
         across = max(across, abs(scene.x[1]))
         if y.phase is Phase.CLOSE:
             break
-    assert y.stop is Stop.PATIENCE
+    assert y.stop is Stop.REACH
     assert y.p_WH_cmd[0] > -0.15 + 3 * Params().recovery_step
     assert across <= 0.021
 

@@ -1,13 +1,17 @@
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from handover.controllers.ir_grasp.ir_reflex import Phase, Stop
+from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import PlacedUnit
+from handover.plants.ir_grasp.hand import sensor_rays
 from handover.scenarios.ir_grasp.evaluation import GraspEvaluator
 from handover.scenarios.ir_grasp.parameters import Parameters
 
@@ -23,6 +27,7 @@ def signals(
     index: tuple[float, float] = (0.05, 0.05),
     thumb: float = 0.01,
     p_ground: tuple[float, float] = (0.0, 0.0),
+    stop: Stop = Stop.THRESHOLD,
 ) -> Signals:
     """Return what a hand along x, and an object at a place in its frame, would show.
 
@@ -49,7 +54,7 @@ def signals(
         show("reflex", name, Kind.REAL, value)
     show("reflex", "p_WH_cmd", Kind.REAL, [p_WH, 0.0])
     show("reflex", "steps", Kind.INTEGER, 4)
-    for name, item in (("phase", phase), ("stop", Stop.THRESHOLD)):
+    for name, item in (("phase", phase), ("stop", stop)):
         show("reflex", name, Kind.ENUMERATION, int(item), items=tuple((i.name, int(i)) for i in type(item)))
     return Signals(units, ports, None)
 
@@ -94,6 +99,27 @@ def test_a_hand_that_closed_beside_the_object_says_where_it_is():
     outcome = grasp(*done, at_closing=signals(Phase.PULL, **beside)).outcome()
     assert not outcome.success
     assert "does not touch the object, 170 mm ahead of the wrist and +30 mm beside it" in outcome.reason
+
+
+def test_a_hand_that_closed_at_its_limit_says_at_which_and_how_far_beyond_the_object_is():
+    evaluator = GraspEvaluator(Parameters())
+    placed = SimpleNamespace(start={"p_WH_pregrasp": [-0.1, 0.01], "yaw_pregrasp": 0.0})
+    evaluator.note_units({"reflex": cast(PlacedUnit, placed)})
+    reach = float(ReflexParams().reach[0])
+    seen = signals(Phase.CLOSE, p_WH=-0.1 + reach, p_HO=(0.30, 0.0), stop=Stop.REACH)
+    evaluator(0.0, signals(Phase.REACH, p_WH=-0.25))
+    evaluator(3.0, seen)
+    evaluator(4.0, signals(Phase.PULL))
+    evaluator(5.0, signals(Phase.DONE))
+    evaluator(5.4, signals(Phase.DONE))
+    outcome = evaluator.outcome()
+    pads, _ = sensor_rays(np.array([-0.1 + reach, 0.0]), 0.0, np.zeros(8))
+    middle = seen["scene.p_WO"][0] + evaluator.parameters.solid.parts[0].centroid[0]
+    beyond = middle - pads[[0, 2]].mean(axis=0)[0]
+    assert outcome.metrics["beyond_reach"].value == pytest.approx(beyond)
+    assert f"limit of its reach in x, +{1e3 * reach:.0f} mm of at most {1e3 * reach:.0f} mm" in outcome.reason
+    pushed = np.linalg.norm(seen["scene.p_WO"] - signals(Phase.REACH, p_WH=-0.25)["scene.p_WO"])
+    assert f"pushed the object {1e3 * pushed:.0f} mm" in outcome.reason
 
 
 def test_a_controller_that_is_done_before_its_hand_closed_has_failed():
