@@ -20,7 +20,7 @@ from handover.cosim.master.checkpoint import Checkpoint, check_states, take_chec
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.signals import Signals
-from handover.cosim.system.system import System
+from handover.cosim.system.system import PortName, System
 from handover.scenarios.api.arguments import (
     InvalidInput,
     Seconds,
@@ -85,6 +85,7 @@ class Session:
         """When a run of the scenario ends at the latest, s."""
         self._evaluator: GuardedEvaluator[Evaluator] = GuardedEvaluator(experiment.bound_evaluator(parameters))
         self._evaluator.note_units(self._open.system.units)
+        self._pushes = experiment.pushes(parameters)
         self._asked, self._seen = Fraction(0), -1.0
         self._master = Master(self._open.system, options)
         self._master.__enter__()
@@ -221,7 +222,8 @@ class Session:
         if self._open.place is not None:
             for name, views in self._open.place.outputs.items():
                 views[0][:] = state.free[f"{self._open.place.unit.name}.{name}"]
-        self._given, self._judged = set(state.given), self._all_signals(state.given)
+        self._given = set(state.given)
+        self._judged = self._judged_signals()
         self._asked, self._seen = state.asked, state.checkpoint.time if state.asked else -1.0
 
     def close(self) -> None:
@@ -274,14 +276,21 @@ class Session:
             self._judged = self._judged_signals()
 
     def _judged_signals(self) -> Signals:
-        """Return what the evaluation sees."""
-        return self._all_signals(self._given)
+        """Return what the evaluation sees: outputs, and the inputs by which somebody may push bodies."""
+        return self._all_signals(self._given, [end for push in self._pushes for end in push.inputs])
 
-    def _all_signals(self, given: Collection[str] | None = None) -> Signals:
-        """Return the outputs of all units, and those of the unit that is left out as they were set, or some of them."""
+    def _all_signals(self, given: Collection[str] | None = None, inputs: Sequence[PortName] = ()) -> Signals:
+        """Return the outputs of all units, those of the unit that is left out as they were set, or some of them.
+
+        Besides, the free ones of some inputs.
+        """
         ensemble, place = self._master.ensemble, self._open.place
-        views = {name: i.y for name, i in ensemble.instances.items()}
-        ports = {name: u.description.outputs for name, u in self._open.system.units.items()}
+        views = {name: {**i.y} for name, i in ensemble.instances.items()}
+        ports = {name: {**u.description.outputs} for name, u in self._open.system.units.items()}
+        for end in inputs:
+            if str(end) in self._open.free:
+                views[end.unit][end.port] = ensemble.instances[end.unit].u[end.port]
+                ports[end.unit][end.port] = self._open.system.units[end.unit].description.inputs[end.port]
         if place is not None:
             shown = {name: port for name, port in place.ports.items() if given is None or name in given}
             views = {**views, place.unit.name: {name: place.outputs[name] for name in shown}}

@@ -6,6 +6,7 @@ point, and reports are made of what `time_figures`, `draw`, `replay` and `publis
 
 import abc
 import enum
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
@@ -108,10 +109,35 @@ class Evaluator(abc.ABC):
             raise InvalidState(f"it is not the state of a {type(self).__name__}")
         vars(self).update(cast(dict[str, Any], attributes))
 
-    def bind(self, parameters: Any) -> None:
-        """Let states hold the scenario's parameters, and their enumerations, wherever they stand in it."""
+    def bind(self, parameters: Any, pushes: Sequence[Pushable] = ()) -> None:
+        """Let states hold the scenario's parameters, and their enumerations, wherever they stand in it.
+
+        Pushes by hand on these bodies are followed by `note_pushes`.
+        """
         values = [getattr(parameters, f.name) for f in fields(parameters)] if is_dataclass(parameters) else []
         vars(self)[_BOUND] = (type(parameters), *dict.fromkeys(type(v) for v in values if isinstance(v, enum.Enum)))
+        vars(self)[_PUSHES] = {push.labels[0]: f"{push.unit}.{push.force}" for push in pushes}
+        vars(self)[_PUSHED] = {}
+
+    def note_pushes(self, t: float, signals: Signals) -> None:
+        """Keep when, s, and how hard at most, N, somebody has pushed each body by hand; see `Experiment.pushes`."""
+        for body, name in vars(self).get(_PUSHES, {}).items():
+            if name in signals and (force := math.hypot(*signals.plain(name))) > 0.0:
+                _, greatest = vars(self)[_PUSHED].get(body, (t, 0.0))
+                vars(self)[_PUSHED][body] = (t, max(greatest, force))
+
+    @property
+    def pushed_by_hand(self) -> str:
+        """Which bodies somebody has pushed by hand, and how hard, as the end of a sentence; "" if nobody has."""
+        pushed: Mapping[str, tuple[float, float]] = vars(self).get(_PUSHED, {})
+        which = [f"the {body} by hand, with up to {force:.1f} N" for body, (_, force) in pushed.items()]
+        return f"; besides, somebody pushed {' and '.join(which)}" if which else ""
+
+    @property
+    def last_pushed(self) -> float:
+        """When somebody last pushed a body by hand, s; minus infinity if nobody has."""
+        pushed: Mapping[str, tuple[float, float]] = vars(self).get(_PUSHED, {})
+        return max((t for t, _ in pushed.values()), default=-math.inf)
 
     @property
     def _all_records(self) -> tuple[type[Any], ...]:
@@ -120,8 +146,8 @@ class Evaluator(abc.ABC):
         return tuple(own.values())
 
 
-_BOUND = "_bound"
-_NOT_KEPT = ("parameters", _BOUND)
+_BOUND, _PUSHES, _PUSHED = "_bound", "_pushes", "_pushed_bodies"
+_NOT_KEPT = ("parameters", _BOUND, _PUSHES)
 
 
 AnyEvaluator = TypeVar("AnyEvaluator", bound=Evaluator)
@@ -213,7 +239,7 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
     def bound_evaluator(self, parameters: Any) -> AnyEvaluator:
         """Return the evaluator of one run, whose states may hold the parameters."""
         evaluator = self.evaluator(parameters)
-        evaluator.bind(parameters)
+        evaluator.bind(parameters, self.pushes(parameters))
         return evaluator
 
     def step_in_parallel(self, parameters: Any) -> Fraction | None:  # noqa: ARG002

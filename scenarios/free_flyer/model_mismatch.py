@@ -3,14 +3,12 @@
 Both sides are taken from the values that the units got, whether by the scenario's parameters or by the units' own.
 """
 
-import math
 from collections.abc import Mapping
 from typing import Any, cast
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.plants.free_flyer.robot.thrusters import Propulsion
 from handover.scenarios.free_flyer.parameters import ROBOTS, Body
@@ -18,7 +16,6 @@ from handover.scenarios.free_flyer.parameters import ROBOTS, Body
 _BODY = {"mass": "mass", "I_B": "inertia", "p_BG": "arm"}
 _LINKS = {"link": "arm's links", "mass_L": "links' mass", "I_L": "links' inertia"}
 """What a robot has in common with its controllers' model of it, by the name of the parameter."""
-_PUSHES_BY_HAND = ("robot.f_P", "robot.f_Q")
 _CONTROLLERS = ("impedance", "pose")
 _TOLERANCE = 1e-3
 """Share by which values differ that are not the same."""
@@ -36,20 +33,10 @@ def model_mismatch(units: Mapping[str, PlacedUnit]) -> str:
     return "".join(f"; {part}" for part in parts)
 
 
-def push_by_hand(signals: Signals) -> float:
-    """Return the force, N, with which somebody at a live page pushes the robot; 0 where nobody can."""
-    return max((math.hypot(*signals.plain(name)) for name in _PUSHES_BY_HAND if name in signals), default=0.0)
-
-
-def pushed_by_hand(greatest: float) -> str:
-    """Return that somebody pushed the robot, with so many N at most, as the end of a sentence; "" if nobody has."""
-    return f"; besides, somebody pushed the robot by hand, with up to {greatest:.1f} N" if greatest else ""
-
-
 def assumed_body(controller: PlacedUnit, otherwise: Body) -> Body:
     """Return the robot as a controller takes it to be; what it has no parameter of, as `otherwise` says."""
     has = controller.description.parameters
-    given = {name: _array(controller, name) for name in _BODY if name in has}
+    given = {name: array_of(controller, name) for name in _BODY if name in has}
     mass = _number(controller, "mass") if "mass" in has else otherwise.mass
     return Body(mass, given.get("I_B", otherwise.I_B), given.get("p_BG", otherwise.p_BG))
 
@@ -80,7 +67,7 @@ def _stuck(thrusters: PlacedUnit | None, whose: str) -> list[str]:
     propulsion = str(_value(thrusters, "propulsion")).lower()
     if propulsion not in (Propulsion.NOZZLES.name.lower(), str(int(Propulsion.NOZZLES))):
         return []
-    shut = [str(k + 1) for k, part in enumerate(_array(thrusters, "flapper_range").tolist()) if part == 0.0]
+    shut = [str(k + 1) for k, part in enumerate(array_of(thrusters, "flapper_range").tolist()) if part == 0.0]
     if not shut:
         return []
     which = f"nozzle {shut[0]} was" if len(shut) == 1 else f"nozzles {', '.join(shut)} were"
@@ -91,13 +78,13 @@ def _unlike(robot: PlacedUnit, controller: PlacedUnit) -> list[str]:
     """Return in what a controller's model differs from the robot."""
     joints, assumed = (int(_number(u, "joints")) for u in (robot, controller))
     if joints != assumed:  # fixed joints: the controller takes all links for one body
-        whole = _number(robot, "mass") + float(np.sum(_array(robot, "mass_L")[:joints]))
+        whole = _number(robot, "mass") + float(np.sum(array_of(robot, "mass_L")[:joints]))
         return _compared("mass", np.array([whole]), controller, "mass")
     names = _BODY | (_LINKS if joints else {})
     found: list[str] = []
     for name, what in names.items():
         if name in robot.description.parameters:
-            actual = _array(robot, name)
+            actual = array_of(robot, name)
             found += _compared(what, actual[:joints] if name in _LINKS else actual, controller, name)
     return found
 
@@ -106,7 +93,7 @@ def _compared(what: str, actual: Floats, controller: PlacedUnit, name: str) -> l
     """Return how a quantity of the robot differs from what a controller assumes of it, in a list; none if it knows."""
     if name not in controller.description.parameters:
         return []
-    assumed = _array(controller, name)[: len(actual)]
+    assumed = array_of(controller, name)[: len(actual)]
     scale = float(np.max(np.abs(assumed), initial=0.0))
     if assumed.shape != actual.shape or np.allclose(actual, assumed, rtol=_TOLERANCE, atol=_TOLERANCE * scale):
         return []
@@ -120,10 +107,11 @@ def _number(unit: PlacedUnit | None, name: str) -> float:
     """Return a parameter's value; 0 of a unit that is not there, or has none of that name."""
     if unit is None or name not in unit.description.parameters:
         return 0.0
-    return float(_array(unit, name).ravel()[0])
+    return float(array_of(unit, name).ravel()[0])
 
 
-def _array(unit: PlacedUnit, name: str) -> Floats:
+def array_of(unit: PlacedUnit, name: str) -> Floats:
+    """Return a parameter's value in its shape, of a number in (1,): as given, or as its FMU declares it."""
     shape = unit.description.parameters[name].shape
     return np.array(cast(Any, _value(unit, name)), dtype=np.float64).reshape(shape or (1,))
 

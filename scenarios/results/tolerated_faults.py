@@ -7,6 +7,7 @@ figures, replay, pictures) may then raise anything. The run, its record and the 
 import traceback
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Generic
 
@@ -127,6 +128,7 @@ class GuardedEvaluator(Evaluator, Generic[AnyEvaluator]):
         self._t = t
         with self._guarded(f"the evaluation failed at t = {t:.6g} s"):
             if not self.fault:
+                self.evaluator.note_pushes(t, signals)
                 self.evaluator(t, signals)
 
     @property
@@ -171,7 +173,8 @@ class GuardedEvaluator(Evaluator, Generic[AnyEvaluator]):
         """Return the evaluator's verdict, or that there is none."""
         with self._guarded("the verdict failed"):
             if not self.fault:
-                return self.evaluator.outcome()
+                outcome = self.evaluator.outcome()
+                return replace(outcome, reason=outcome.reason + self.evaluator.pushed_by_hand)
         return Outcome(success=False, reason=f"not judged: {self.fault}")
 
     @contextmanager

@@ -25,8 +25,9 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.free_flyer.model_mismatch import model_mismatch, push_by_hand, pushed_by_hand
+from handover.scenarios.free_flyer.model_mismatch import model_mismatch
 from handover.scenarios.free_flyer.push.arm_parameters import ArmPushParameters, ArmTarget
+from handover.scenarios.free_flyer.push.hand_push import HAND_SIGNALS, HandPush, hand_push_at
 from handover.scenarios.free_flyer.push.impedance_evaluation import (
     REST_ANGLE,
     REST_POSITION,
@@ -56,29 +57,40 @@ Columns = dict[str, Floats]
 
 def columns_of(record: Record) -> Columns:
     """Return a record's motion by signal, and its time as `t`."""
-    return {"t": record.time, **{name: record[name] for name in SIGNALS}}
+    names = [*SIGNALS, *(name for name in HAND_SIGNALS if name in record)]
+    return {"t": record.time, **{name: record[name] for name in names}}
 
 
 def errors_with_arm(motion: Columns, target: ArmTarget) -> Errors:
     """Return the errors, actual and by k_D xt' = B_x x'' + C_x x' + k_B x' - f_ext, one row a period of the controller.
 
     x'' is the mean over a period and B_x, C_x x' those of its middle; damping and actual error are of its beginning,
-    when the controller measured. Where units step in parallel, thrust and push act some steps later: by how many is
-    seen in the motion, as in `impedance_evaluation.errors_of`.
+    when the controller measured. f_ext is Jbar^T u_ext, u_ext of the push and what somebody does by hand. Where units
+    step in parallel, thrust and push act some steps later: by how many is seen in the motion, as in
+    `impedance_evaluation.errors_of`.
     """
-    steps = steps_of_period(motion["t"])
-    found = [_errors(motion, steps, *late, target) for late in itertools.product(range(steps), (0, 1))]
+    steps, t = steps_of_period(motion["t"]), motion["t"]
+    by_hand = HandPush.of(motion, len(t))
+    wrenches = by_hand.wrenches(t, *(motion[f"robot.{name}"] for name in ("q_WB", "w_WB", "q_WG")))
+    delays = (0,) if by_hand.is_none else (0, 1)
+    found = [
+        _errors(motion, steps, late, np.hstack(wrenches), target)
+        for late in itertools.product(range(steps), (0, 1), delays)
+    ]
     return min(found, key=lambda errors: sum(errors.disagreement))
 
 
-def _errors(motion: Columns, steps: int, late: int, push_delay: int, target: ArmTarget) -> Errors:
-    """Return the errors with thrust and push that act so many steps later than they were asked for."""
+def _errors(motion: Columns, steps: int, delays: tuple[int, int, int], by_hand: Floats, target: ArmTarget) -> Errors:
+    """Return the errors with thrust, push and pushes by hand that act so many steps later than they were asked for."""
+    late, push_delay, hand_delay = delays
     held = np.arange(late, len(motion["t"]), steps)
     seen, R_WD, g = (held - late)[:-1], target.R_WG, target.gains
-    f_G, tau_G = (mean_between(motion["t"], motion[f"push.{w}_G"], held, push_delay) for w in ("f", "tau"))
+    push = mean_between(motion["t"], np.hstack([motion["push.f_G"], motion["push.tau_G"]]), held, push_delay)
+    hand = mean_between(motion["t"], by_hand, held, hand_delay)
     actual, calculated = np.zeros((len(seen), 6)), np.zeros((len(seen), 6))
     for k, row in enumerate(seen):
-        wrench = _inertial_wrench(motion, held[k], held[k + 1], target) - np.concatenate([f_G[k], tau_G[k]])
+        inertial, to_gripper = _inertial_wrench(motion, held[k], held[k + 1], target)
+        wrench = inertial - push[k] - hand[k, 6:] - to_gripper @ hand[k, :6]
         v_D, w_D = np.transpose(R_WD) @ motion["robot.v_WG"][row], np.transpose(R_WD) @ motion["robot.w_WG"][row]
         pull = np.transpose(R_WD) @ wrench[:3] + g.damping_translation @ v_D
         twist = np.transpose(R_WD) @ wrench[3:] + g.damping_rotation @ w_D
@@ -92,8 +104,8 @@ def _errors(motion: Columns, steps: int, late: int, push_delay: int, target: Arm
     return Errors(motion["t"][seen], actual[:, :3], calculated[:, :3], actual[:, 3:], calculated[:, 3:])
 
 
-def _inertial_wrench(motion: Columns, first: int, last: int, target: ArmTarget) -> Floats:
-    """Return B_x x'' + C_x x' in the middle between two rows, (6,), in W."""
+def _inertial_wrench(motion: Columns, first: int, last: int, target: ArmTarget) -> tuple[Floats, Floats]:
+    """Return B_x x'' + C_x x' in the middle between two rows, (6,), in W, and the base's part of J_bar^T, (6, 6)."""
 
     def middle(name: str) -> Floats:
         return (motion[name][first] + motion[name][last]) / 2.0
@@ -106,7 +118,9 @@ def _inertial_wrench(motion: Columns, first: int, last: int, target: ArmTarget) 
     B, C = mass_matrix(chain)[:size, :size], coriolis_matrix(chain)[:size, :size]
     xi_dot = np.concatenate([middle("robot.v_WB"), middle("robot.w_WB"), v_J])[:size]
     x_2 = np.concatenate([motion[f"robot.{v}_WG"][last] - motion[f"robot.{v}_WG"][first] for v in ("v", "w")]) / dt
-    return OperationalSpace.of(J, B).B_x @ x_2 + operational_bias(J, J_rate, B, C, xi_dot)
+    space = OperationalSpace.of(J, B)
+    wrench = space.B_x @ x_2 + operational_bias(J, J_rate, B, C, xi_dot)
+    return wrench, np.transpose(space.J_bar)[:, :6]
 
 
 class ArmImpedanceEvaluator(Evaluator):
@@ -122,7 +136,7 @@ class ArmImpedanceEvaluator(Evaluator):
         self._saturated, self._t, self._astray, self._spins = 0, 0.0, 0.0, False
         self._greatest = [0.0, 0.0]
         self._stability: dict[str, Metric] = {}
-        self._mismatch, self._by_hand = "", 0.0
+        self._mismatch = ""
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
         """Keep what the controllers do not know of the robot."""
@@ -132,9 +146,8 @@ class ArmImpedanceEvaluator(Evaluator):
         """Keep the motion and follow the errors."""
         if not self._rows:
             self._stability = stability_metrics(signals, ("impedance",))
-        self._rows.append([t, *(signals[name] for name in SIGNALS)])
+        self._rows.append([t, *(signals[name] for name in SIGNALS), *hand_push_at(signals)])
         self._saturated += bool(signals["thrusters.saturated"])
-        self._by_hand = max(self._by_hand, push_by_hand(signals))
         away = float(np.linalg.norm(signals["robot.p_WG"] - self._p_WG))
         cosine = (np.trace(np.transpose(self._R_WG) @ rotation_of(signals["robot.q_WG"])) - 1.0) / 2.0
         turned = math.acos(min(1.0, max(-1.0, float(cosine))))
@@ -150,20 +163,25 @@ class ArmImpedanceEvaluator(Evaluator):
 
     @property
     def _at_rest(self) -> bool:
-        return self._t - max(self._astray, self.parameters.end) >= RESTING
+        return self._t - max(self._astray, self._end) >= RESTING
+
+    @property
+    def _end(self) -> float:
+        """When the last push ended, s, be it by hand."""
+        return max(self.parameters.end, self.last_pushed)
 
     def outcome(self) -> Outcome:
         """Return whether the gripper rests again and agreed with the model, why, and the metrics."""
         if len(self._rows) < 2:
             return Outcome(success=False, reason="stopped before the first step")
-        names = ("t", *SIGNALS)
+        names = ("t", *SIGNALS, *HAND_SIGNALS)
         motion = {name: np.array(column) for name, column in zip(names, zip(*self._rows, strict=True), strict=True)}
         by = errors_with_arm(motion, self.parameters.target()).disagreement
         bounds = paper_values("free_flyer", "published")["model_agreement"]
         agrees = by[0] <= bounds[0] and by[1] <= bounds[1]
         metrics = self._metrics(motion, by)
         back = (
-            f"the gripper was back at rest {max(0.0, self._astray - self.parameters.end):.1f} s after the push"
+            f"the gripper was back at rest {max(0.0, self._astray - self._end):.1f} s after the push"
             if self._at_rest
             else f"the gripper was not back at rest at {self._t:.1f} s"
         )
@@ -174,7 +192,7 @@ class ArmImpedanceEvaluator(Evaluator):
         reason = f"{back}, {joined} {verb} the impedance model {extent}{bound}{self._stopped_joints(motion)}"
         return Outcome(
             success=self._at_rest and agrees,
-            reason=reason + self._mismatch + pushed_by_hand(self._by_hand),
+            reason=reason + self._mismatch,
             metrics=metrics,
         )
 
@@ -211,6 +229,6 @@ class ArmImpedanceEvaluator(Evaluator):
             **self._stability,
         }
         if self._at_rest:
-            settled = max(0.0, self._astray - self.parameters.end)
+            settled = max(0.0, self._astray - self._end)
             metrics["settling_time"] = Metric(settled, "s", "from the end of the push until the gripper stays at rest")
         return metrics

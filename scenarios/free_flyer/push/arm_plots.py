@@ -14,10 +14,11 @@ from handover.scenarios.free_flyer.push.arm_evaluation import columns_of, errors
 from handover.scenarios.free_flyer.push.arm_parameters import ArmPushParameters
 from handover.scenarios.free_flyer.push.push_plots import (
     CAPTION,
+    CAPTION_OF_PUSH,
     errors_over_time,
     phases_of_push,
     plot_thrust,
-    push_over_time,
+    pushes_over_time,
 )
 from handover.scenarios.free_flyer.replay import frame_at, hand_pushes, push_arrows
 from handover.scenarios.free_flyer.scene import EDGE
@@ -50,9 +51,7 @@ def figures_of_arm_push(parameters: ArmPushParameters, record: Record) -> list[T
             columns=2,
         ),
         TimeFigure(name="thrust", caption=CAPTION, plots=plot_thrust(record, ("impedance",), phases), columns=2),
-        TimeFigure(
-            name="push", caption="The push on the gripper in W.", plots=[push_over_time(parameters, record, phases)]
-        ),
+        TimeFigure(name="push", caption=CAPTION_OF_PUSH, plots=pushes_over_time(parameters, record, phases)),
     ]
 
 

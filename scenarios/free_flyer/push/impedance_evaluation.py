@@ -4,8 +4,9 @@ The gripper's pose error is compared with the one by the impedance model, [Ferna
 `errors_of` computes from the actual motion.
 """
 
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,12 +15,14 @@ from numpy.typing import NDArray
 
 from handover.controllers.free_flyer.ports import PERIOD
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.free_flyer.model_mismatch import assumed_body, model_mismatch, push_by_hand, pushed_by_hand
+from handover.scenarios.free_flyer.model_mismatch import assumed_body, model_mismatch
 from handover.scenarios.free_flyer.parameters import Behaviour, Body, ImpedanceParameters
+from handover.scenarios.free_flyer.push.hand_push import HAND_SIGNALS, HandPush, hand_push_at
 from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
 
 REST_POSITION, REST_ANGLE = 0.010, 0.030
@@ -40,7 +43,7 @@ class Motion:
     """The motion and the push at communication points, one row each, in W and SI units; quaternions scalar first.
 
     The wrench `f_G`, `tau_G` of a row is the mean since the row before. It acted on the gripper in that step, or where
-    units step in parallel, in the next.
+    units step in parallel, in the next. `by_hand` is what somebody pushed the robot with besides; None: nobody did.
     """
 
     t: Floats
@@ -50,11 +53,14 @@ class Motion:
     w_WB: Floats
     f_G: Floats
     tau_G: Floats
+    by_hand: HandPush | None = None
 
     @classmethod
-    def of(cls, rows: Sequence[Sequence[Any]]) -> "Motion":
-        """Return the motion that rows of the fields' values make up."""
-        return cls(*(np.array(column) for column in zip(*rows, strict=True)))
+    def of(cls, signals: Record | Mapping[str, Floats], t: Floats) -> "Motion":
+        """Return the motion that signals at times t, s, make up."""
+        by_hand = HandPush.of(signals, len(t))
+        columns = [signals[name] for name in MOTION_SIGNALS]
+        return cls(t, *columns, by_hand=None if by_hand.is_none else by_hand)
 
 
 @dataclass(frozen=True)
@@ -95,7 +101,7 @@ def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour, model: Bo
     """Return the errors by eq. (4.4), k_D xt' = B_x x'' + (C_x + k_B) x' - f_ext, with rest at no rotation.
 
     Velocities are twists, so B_x x'' + C_x x' - f_ext is the propulsion's wrench, taken at the gripper: what changes
-    the body's momentum, less the push. It is computed as the mean over a period of the controller, with the push's
+    the body's momentum, less all pushes. It is computed as the mean over a period of the controller, with the push's
     impulse. All else is of the instant of its sample; since thrust is held in the robot's frame, the mean is turned
     back by half the period's turn. Where units step in parallel, push and thrust act some steps later than they were
     asked for: by how many is seen in the motion, where any other number disagrees more.
@@ -108,9 +114,8 @@ def errors_of(motion: Motion, p_WG_goal: Floats, behaviour: Behaviour, model: Bo
     """
     steps = steps_of_period(motion.t)
     found = [
-        _errors(motion, _Delays(steps, thrust, push), p_WG_goal, behaviour, model)
-        for thrust in range(steps)
-        for push in (0, 1)
+        _errors(motion, _Delays(steps, *late), p_WG_goal, behaviour, model)
+        for late in itertools.product(range(steps), (0, 1), (0, 1) if motion.by_hand else (0,))
     ]
     return min(found, key=lambda errors: sum(errors.disagreement))
 
@@ -122,11 +127,12 @@ def steps_of_period(t: Floats) -> int:
 
 @dataclass(frozen=True)
 class _Delays:
-    """Steps in a period of the controller, and by how many its thrust and the push act later than asked for."""
+    """Steps in a period of the controller, and by how many its thrust and the pushes act later than asked for."""
 
     steps: int
     thrust: int
     push: int
+    by_hand: int
 
 
 def _errors(motion: Motion, delays: _Delays, p_WG_goal: Floats, behaviour: Behaviour, model: Body) -> Errors:
@@ -136,7 +142,7 @@ def _errors(motion: Motion, delays: _Delays, p_WG_goal: Floats, behaviour: Behav
     gains = paper_values("free_flyer", f"gains_{behaviour.item}")
     m, I_B = model.mass, model.I_B
     held = np.arange(delays.thrust, len(motion.t), delays.steps)
-    force, torque = _propulsion(motion, held, delays.push, model)
+    force, torque = _propulsion(motion, held, delays, model)
     seen = (held - delays.thrust)[:-1]
     R_WB = Rotation.from_quat(motion.q_WB[seen], scalar_first=True)
     torque_G: Floats = torque - np.cross(R_WB.apply(model.p_BG), force) + gains["k_B_rotational"] * motion.w_WB[seen]
@@ -150,7 +156,7 @@ def _errors(motion: Motion, delays: _Delays, p_WG_goal: Floats, behaviour: Behav
     )
 
 
-def _propulsion(motion: Motion, rows: NDArray[np.intp], push_delay: int, model: Body) -> tuple[Floats, Floats]:
+def _propulsion(motion: Motion, rows: NDArray[np.intp], delays: _Delays, model: Body) -> tuple[Floats, Floats]:
     """Return force, and torque about B, of the propulsion in W at the beginning of each interval between two rows."""
     from scipy.spatial.transform import Rotation
 
@@ -158,12 +164,17 @@ def _propulsion(motion: Motion, rows: NDArray[np.intp], push_delay: int, model: 
     R_WB = Rotation.from_quat(motion.q_WB[rows], scalar_first=True)
     r_W: Floats = R_WB.apply(model.p_BG)
     dt = np.diff(t)[:, np.newaxis]
-    f_G, tau_G = (mean_between(motion.t, a, rows, push_delay) for a in (motion.f_G, motion.tau_G))
+    f_G, tau_G = (mean_between(motion.t, a, rows, delays.push) for a in (motion.f_G, motion.tau_G))
+    f_B, tau_B = np.zeros((2, len(dt), 3))
+    if motion.by_hand is not None:
+        wrenches = motion.by_hand.wrenches(motion.t, motion.q_WB, motion.w_WB, motion.q_WB)
+        f_B, tau_B, f_Q, tau_Q = (mean_between(motion.t, a, rows, delays.by_hand) for a in wrenches)
+        f_G, tau_G = f_G + f_Q, tau_G + tau_Q
     v_WB = motion.v_WG[rows] - np.cross(w_WB, r_W)
     w_B: Floats = R_WB.apply(w_WB, inverse=True)
     L_W: Floats = R_WB.apply(_times(I_B, w_B))
-    force: Floats = m * np.diff(v_WB, axis=0) / dt - f_G
-    torque: Floats = np.diff(L_W, axis=0) / dt - np.cross((r_W[:-1] + r_W[1:]) / 2, f_G) - tau_G
+    force: Floats = m * np.diff(v_WB, axis=0) / dt - f_G - f_B
+    torque: Floats = np.diff(L_W, axis=0) / dt - np.cross((r_W[:-1] + r_W[1:]) / 2, f_G) - tau_G - tau_B
     half_turn = Rotation.from_rotvec((w_WB[:-1] + w_WB[1:]) * dt / 4)
     return half_turn.apply(force, inverse=True), half_turn.apply(torque, inverse=True)
 
@@ -171,7 +182,7 @@ def _propulsion(motion: Motion, rows: NDArray[np.intp], push_delay: int, model: 
 def mean_between(t: Floats, means: Floats, rows: NDArray[np.intp], delay: int) -> Floats:
     """Return the mean between each two rows, of means over the step before each row that acted `delay` steps later."""
     acting = means[1:] if delay == 0 else means[:-delay]
-    impulse: Floats = np.vstack([np.zeros((1, 3)), np.cumsum(acting * np.diff(t)[:, np.newaxis], axis=0)])
+    impulse: Floats = np.vstack([np.zeros((1, means.shape[1])), np.cumsum(acting * np.diff(t)[:, np.newaxis], axis=0)])
     mean: Floats = np.diff(impulse[rows], axis=0) / np.diff(t[rows])[:, np.newaxis]
     return mean
 
@@ -217,7 +228,7 @@ class ImpedanceEvaluator(Evaluator):
         self._greatest = [0.0, 0.0]
         self._last = (0.0, 0.0)
         self._stability: dict[str, Metric] = {}
-        self._mismatch, self._model, self._by_hand = "", parameters.model, 0.0
+        self._mismatch, self._model = "", parameters.model
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
         """Keep what the controller takes the robot to be, and what it does not know of it."""
@@ -230,9 +241,8 @@ class ImpedanceEvaluator(Evaluator):
         if not self._rows:
             self._stability = stability_metrics(signals, ("impedance",))
         seen = [signals[name] for name in MOTION_SIGNALS]
-        self._rows.append([t, *seen])
+        self._rows.append([t, *seen, *hand_push_at(signals)])
         self._saturated += bool(signals["thrusters.saturated"])
-        self._by_hand = max(self._by_hand, push_by_hand(signals))
         away = math.dist(seen[0].tolist(), self._goal)
         turned = 2.0 * math.acos(min(1.0, abs(float(seen[2][0]))))
         self._t, self._last = t, (away, turned)
@@ -248,15 +258,22 @@ class ImpedanceEvaluator(Evaluator):
 
     @property
     def _at_rest(self) -> bool:
-        return self._t - max(self._astray, self.parameters.end) >= RESTING
+        return self._t - max(self._astray, self._end) >= RESTING
+
+    @property
+    def _end(self) -> float:
+        """When the last push ended, s, be it by hand."""
+        return max(self.parameters.end, self.last_pushed)
 
     @property
     def _settled(self) -> float:
-        return max(0.0, self._astray - self.parameters.end)
+        return max(0.0, self._astray - self._end)
 
     def errors(self) -> Errors:
         """Return the errors, actual and by the model."""
-        return errors_of(Motion.of(self._rows), self.p_WG_goal, self.parameters.behaviour, self._model)
+        t, *columns = (np.array(column) for column in zip(*self._rows, strict=True))
+        signals: dict[str, Floats] = dict(zip((*MOTION_SIGNALS, *HAND_SIGNALS), columns, strict=True))
+        return errors_of(Motion.of(signals, t), self.p_WG_goal, self.parameters.behaviour, self._model)
 
     def outcome(self) -> Outcome:
         """Return whether the robot rests again and agreed with the model, why, and the metrics."""
@@ -291,19 +308,19 @@ class ImpedanceEvaluator(Evaluator):
         )
         joined = "and" if agrees is self._at_rest else "but"
         thrust = f"; more was commanded than the thrusters give for {100 * share:.0f} % of the time" if share else ""
-        besides = self._mismatch + pushed_by_hand(self._by_hand)
-        return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}{besides}"
+        return f"{self._back()}{'' if self._at_rest and agrees else ','} {joined} {model}{thrust}{self._mismatch}"
 
     def _back(self) -> str:
         """Return whether the gripper came back to rest, as a clause of the reason."""
         p = self.parameters
         if self._at_rest:
-            return f"the gripper was back at rest, within {_BAND}, {self._settled:.1f} s after the push"
+            last = "the push" if self._end == p.end else "the last push, by hand"
+            return f"the gripper was back at rest, within {_BAND}, {self._settled:.1f} s after {last}"
         if self._spins:
             return f"the robot was out of control at {self._t:.1f} s, turning by more than {SPINNING:.0f} rad/s"
         if self._t < float(p.stop) - 0.02:
             return f"stopped at {self._t:.1f} s, before the robot could come to rest"
         return (
-            f"the gripper did not come back to rest, within {_BAND} for {RESTING:g} s, in {p.patience:g} s: "
+            f"the gripper did not come back to rest, within {_BAND} for {RESTING:g} s, in {self._t - self._end:.3g} s: "
             f"{1000 * self._last[0]:.0f} mm and {math.degrees(self._last[1]):.1f}° away at the end"
         )

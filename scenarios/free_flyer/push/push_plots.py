@@ -12,7 +12,8 @@ from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.time_plot import Curve, Phase, Stroke, TimeFigure, TimePlot
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters, Wrench
-from handover.scenarios.free_flyer.push.impedance_evaluation import MOTION_SIGNALS, Motion, errors_of
+from handover.scenarios.free_flyer.push.hand_push import HandPush
+from handover.scenarios.free_flyer.push.impedance_evaluation import Motion, errors_of
 
 _BEYOND = 2.0
 """Range of the plots, over the thrusters' maximum output: a command may be twenty times as much."""
@@ -20,6 +21,7 @@ _ROOM = 1.1
 """Range of the plots over the largest value, where that is smaller."""
 _QUANTITIES = (("f", "Force", "N"), ("tau", "Torque", "N·m"))
 
+CAPTION_OF_PUSH = "The push on the gripper in W, and what somebody pushed the robot with by hand, if anybody did."
 CAPTION = "Force and torque on the robot in B; dotted: as commanded, where the thrusters give less, cut off far beyond."
 
 
@@ -66,7 +68,7 @@ def figures_of_push(parameters: ImpedanceParameters, record: Record) -> list[Tim
     """Return the figures of actual and calculated errors, and of the push with thrust; none of a single instant."""
     if len(record.time) < 2:
         return []
-    motion = Motion(record.time, *(record[name] for name in MOTION_SIGNALS))
+    motion = Motion.of(record, record.time)
     p_WG_goal = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])
     errors = errors_of(motion, p_WG_goal, parameters.behaviour, parameters.model)
     turned, turned_model = (np.degrees(values) for values in errors.without_jumps)
@@ -90,8 +92,8 @@ def figures_of_push(parameters: ImpedanceParameters, record: Record) -> list[Tim
         ),
         TimeFigure(
             name="push",
-            caption="The push on the gripper in W.",
-            plots=[push_over_time(parameters, record, phases)],
+            caption=CAPTION_OF_PUSH,
+            plots=pushes_over_time(parameters, record, phases),
         ),
     ]
 
@@ -139,15 +141,26 @@ def _to_the_end(values: Floats) -> Floats:
     return np.append(values, np.nan)
 
 
-def push_over_time(parameters: ImpedanceParameters, record: Record, phases: Sequence[Phase]) -> TimePlot:
-    """Return the push, force or torque, on the gripper over time."""
+def pushes_over_time(parameters: ImpedanceParameters, record: Record, phases: Sequence[Phase]) -> list[TimePlot]:
+    """Return the push, force or torque, on the gripper over time, and forces of pushes by hand."""
     signal, quantity, unit = (
         ("push.f_G", "force", "N") if parameters.kind is Wrench.FORCE else ("push.tau_G", "torque", "N·m")
     )
-    values = record[signal]
+    title = f"The push: {quantity} on the gripper in W"
+    by_hand = HandPush.of(record, len(record.time))
+    return [
+        _along_axes(title, f"push: {quantity}", unit, record[signal], phases),
+        *(
+            _along_axes(f"By hand: force on the {body} in W", "by hand: force", "N", force, phases)
+            for body, force in (("robot", by_hand.f_P), ("gripper", by_hand.f_Q))
+            if force.any()
+        ),
+    ]
+
+
+def _along_axes(title: str, quantity: str, unit: str, values: Floats, phases: Sequence[Phase]) -> TimePlot:
     curves = [
         Curve(label=axis, values=values[:, i], held=True, stroke=stroke)
         for i, (axis, stroke) in enumerate(_AXES.items())
     ]
-    title = f"The push: {quantity} on the gripper in W"
-    return TimePlot(title=title, quantity=f"push: {quantity}", unit=unit, curves=curves, phases=phases)
+    return TimePlot(title=title, quantity=quantity, unit=unit, curves=curves, phases=phases)

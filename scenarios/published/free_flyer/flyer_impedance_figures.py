@@ -12,7 +12,7 @@ from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.plotting import COLOURS, figure, legend_below
 from handover.scenarios.free_flyer.parameters import Axis, Behaviour, ImpedanceParameters, Wrench
-from handover.scenarios.free_flyer.push.impedance_evaluation import MOTION_SIGNALS, Errors, Motion, errors_of
+from handover.scenarios.free_flyer.push.impedance_evaluation import Errors, Motion, errors_of
 from handover.scenarios.published.free_flyer.push_runs import (
     DURATIONS,
     Push,
@@ -64,7 +64,7 @@ def _draw_kind(rows: PushRuns, runs: Path, folder: Path, behaviour: Behaviour, k
 
 
 def _errors_of(record: Record, behaviour: Behaviour) -> Errors:
-    motion = Motion(record.time, *(record[name] for name in MOTION_SIGNALS))
+    motion = Motion.of(record, record.time)
     p_WG_goal = np.array(paper_values("free_flyer", "push_place")["p_WG_goal"])
     return errors_of(motion, p_WG_goal, behaviour, ImpedanceParameters().model)
 
