@@ -15,6 +15,7 @@ from handover.scenarios.free_flyer.handover.person_evaluation import Cause, Miss
 from handover.scenarios.free_flyer.handover.transfer import Approach, Transfer
 from handover.scenarios.free_flyer.model_mismatch import model_mismatch
 from handover.scenarios.free_flyer.parameters import HandoverParameters
+from handover.scenarios.free_flyer.penetration import HandInCube
 from handover.scenarios.free_flyer.robot_wiring import SATURATED_SHARE, stability_metrics
 
 _GATE = ("gate_error", "tolerance", "gate_speed")
@@ -67,9 +68,12 @@ class HandoverEvaluator(Evaluator):
     contact with at least one of the participants" once it was held at all, [Fernandes2020] sec. 3.1.2, and the robot
     took an empty gripper for a failed reception, and a full one that had opened for a failed delivery, as often as it
     had one. Where it closes on an object that it had released and that floats, before the object is lost for good, the
-    delivery has failed, not yet the handover. A failure has a `Cause`, the metric `decided_by`, which is told apart by
-    what the person did (`PersonsDeeds`). A robot that gives up after the last transfer, on its way back, has handed the
-    object over, but not ended the handover: see the metric `handed_over`.
+    delivery has failed, not yet the handover. It must not have been torn out of the closed gripper, even if that caught
+    it again, nor the hand have been in the robot (`HandInCube`).
+
+    A failure has a `Cause`, the metric `decided_by`, by what the person did (`PersonsDeeds`). A robot that gives up
+    after the last transfer, on its way back, has handed the object over, but not ended the handover: see the metric
+    `handed_over`.
 
     Attributes:
         phases: phases of the robot and when they began, s, in chronological order; a phase may recur.
@@ -77,7 +81,7 @@ class HandoverEvaluator(Evaluator):
         transfers: those that the robot signalled for.
     """
 
-    records = (Metric, Transfer, Approach, PersonsDeeds, Miss)
+    records = (Metric, Transfer, Approach, PersonsDeeds, Miss, HandInCube)
 
     def __init__(self, parameters: HandoverParameters, receivers: Sequence[str], failures: int = 0) -> None:
         self.parameters, self.receivers, self.failures = parameters, tuple(receivers), failures
@@ -98,6 +102,8 @@ class HandoverEvaluator(Evaluator):
         self._track_end = end_of_track(parameters.hand_track)
         self._deeds = PersonsDeeds(led=parameters.is_led, by_track=bool(parameters.hand_track))
         self._off: float | None = None  # of the object from the fingers that last closed on nothing, m
+        self._torn: float | None = None
+        self._in_cube = HandInCube()
         self._undelivered = False
         self._empty = self._full = self._disturbed = 0
         self._stability, self._mismatch = dict[str, Metric](), ""
@@ -121,6 +127,7 @@ class HandoverEvaluator(Evaluator):
         if codes != self._codes:
             self._change(t, signals, (x, y, z))
             self._codes = codes
+        self._in_cube.follow(t, signals, "robot", "person.p_WH")
         phase, holder, transfer = self._phase, self._holder, self._under_way
         if transfer is not None:
             transfer.hardest = max(transfer.hardest, math.hypot(*plain("person.f_H")))
@@ -133,7 +140,7 @@ class HandoverEvaluator(Evaluator):
             if phase in ("SIGNAL", "CHECK_VELOCITY"):
                 # an object in the gripper pulls at it by its own inertia, too: there the hand tells a touch
                 felt = plain("person.f_H" if holder == "GRIPPER" else "person.f_G")
-                self.transfers[-1].touched |= holder == "BOTH" or any(felt)
+                self.transfers[-1].touched |= holder == "BOTH" or any(felt) or self.last_pushed == t
             if phase == "CHECK_VELOCITY":
                 self.transfers[-1].waited(plain("decision.speed_G"))
 
@@ -163,6 +170,7 @@ class HandoverEvaluator(Evaluator):
                 self._off = self._deeds.from_fingers(signals)
             self._enter(phase, left, t, p_WG, signals)
         if holder != self._holder:
+            self._follow_tear(t, holder, signals)
             self.holders.append((holder, t))
             self._receive(holder, t)
 
@@ -196,6 +204,13 @@ class HandoverEvaluator(Evaluator):
             self._angles["full"] = min(self._angles.get("full", math.inf), angle)
         else:
             self._angles["empty"] = max(self._angles.get("empty", 0.0), angle)
+
+    def _follow_tear(self, t: float, holder: str, signals: Signals) -> None:
+        """Keep when a gripper that is to be closed first lost to the hand what it held, even if it catches it again."""
+        to_hand = holder == "HAND" if self._holder == "GRIPPER" else holder in ("HAND", "FREE")
+        if self._torn is None and self._holder in ("GRIPPER", "BOTH") and to_hand:
+            is_closed = "decision.closure" in signals and signals.plain("decision.closure") > 0.5
+            self._torn = t if is_closed else None
 
     def _receive(self, holder: str, t: float) -> None:
         if holder == "FREE" and len(self.holders) > 1 and self._lost is None:
@@ -246,7 +261,9 @@ class HandoverEvaluator(Evaluator):
     def outcome(self) -> Outcome:
         """Return whether the object changed hands as it should, why, and the metrics."""
         success = (
-            self._handed_over
+            self._torn is None
+            and self._in_cube.since is None
+            and self._handed_over
             and self._phase == "DONE"
             and self._failed == self._empty >= self.failures
             and self._failed_deliveries == self._full
@@ -316,6 +333,11 @@ class HandoverEvaluator(Evaluator):
 
     def _failure(self) -> tuple[Cause, str]:
         """Return why the object was lost, or the robot did not finish, or finished otherwise than it should."""
+        if self._torn is not None:
+            text = f"the object was torn out of the closed gripper at {self._torn:.1f} s"
+            return Cause.TORN_OUT, f"{text}; {self._where}"
+        if self._in_cube.since is not None:
+            return Cause.HAND_IN_CUBE, f"{self._in_cube.reason}; {self._where}"
         if self._lost is not None:
             return self._loss(*self._lost)
         if self._is_forsaken and self._under_way is not None:
@@ -346,7 +368,7 @@ class HandoverEvaluator(Evaluator):
     def _loss(self, t: float, holder: str, phase: str) -> tuple[Cause, str]:
         """Return why the object was lost at t by a holder in a phase of the robot."""
         if holder == "GRIPPER" and phase in _OPENING:
-            return self._deeds.released(t, self.transfers[-1].seen if self.transfers else "")
+            return self._deeds.released(t, self.transfers[-1].seen if self.transfers else "", self.last_pushed)
         if holder == "HAND":
             return self._deeds.dropped(t)
         before = _PEOPLE.get(holder, "both")

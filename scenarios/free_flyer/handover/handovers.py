@@ -27,6 +27,7 @@ from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.free_flyer.handover.handover_evaluation import HandoverEvaluator
 from handover.scenarios.free_flyer.handover.led_hand import faults_of_person, leader
 from handover.scenarios.free_flyer.parameters import Hand, HandoverParameters, Task, TaskParameters
+from handover.scenarios.free_flyer.penetration import start_faults
 from handover.scenarios.free_flyer.places import PLACES_OF_HANDOVER
 from handover.scenarios.free_flyer.published import published_of_giving, published_of_receiving
 from handover.scenarios.free_flyer.robot_wiring import (
@@ -131,12 +132,13 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         return s
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:
-        """Reject an arm that nothing drives, values without effect, and a person's traits where no person is simulated.
+        """Reject starts in each other, an arm that nothing drives, values without effect, and traits of no person.
 
         Raises:
             InvalidParameter: with all such values.
         """
-        if faults := undriven_joints(system) + idle_values(system, given) + faults_of_person(system, given):
+        faults = undriven_joints(system) + idle_values(system, given) + faults_of_person(system, given)
+        if faults := faults + start_faults(system.units):
             raise InvalidParameter(faults)
 
     def stop_time(self, parameters: HandoverParameters) -> Fraction:

@@ -55,6 +55,8 @@ class Cause(enum.IntEnum):
     OTHER = 14
     NOT_SETTLED = 15
     NOT_RETREATED = 16
+    TORN_OUT = 17
+    HAND_IN_CUBE = 18
 
     @property
     def words(self) -> str:
@@ -174,14 +176,19 @@ class PersonsDeeds:
             self.let_go = (t, held_before)
         self.activity = activity
 
-    def released(self, t: float, seen: str) -> tuple[Cause, str]:
-        """Return why a robot that had `seen` something let go of an object that nobody had taken, lost at t."""
+    def released(self, t: float, seen: str, pushed: float) -> tuple[Cause, str]:
+        """Return why a robot that had `seen` something let go of an object that nobody had taken, lost at t.
+
+        It was last pushed by hand at `pushed`, s.
+        """
         opened = f"the robot opened its gripper though the person did not hold the object, which was lost at {t:.1f} s"
         if self.let_go is not None and self.let_go[1] == "BOTH":
             return Cause.RELEASED_UNHELD, f"{opened}: the person had let go of it at {self.let_go[0]:.1f} s, unfelt"
         if self.bump is not None and t - self.bump[0] < _SHORTLY:
             bumped = f"what it felt was the open hand, which bumped the object with {self.bump[1]:.1f} N"
             return Cause.BUMPED, f"{opened}: {bumped} at {self.bump[0]:.1f} s"
+        if t - pushed < _SHORTLY:
+            return Cause.RELEASED_UNHELD, f"{opened}: what it felt was the push by hand on itself, until {pushed:.1f} s"
         felt = ", but ".join(filter(None, ("" if self.pulled else "nobody had pulled", seen)))
         return Cause.RELEASED_UNHELD, f"{opened}: {self._missed() or felt or 'why is unknown'}"
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from itertools import product
 
 import numpy as np
 
@@ -24,7 +25,8 @@ from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.free_flyer.handover.handover_evaluation import counted, not_over, within_patience
 from handover.scenarios.free_flyer.model_mismatch import model_mismatch
-from handover.scenarios.free_flyer.parameters import TeamParameters, TeamTask
+from handover.scenarios.free_flyer.parameters import ROBOTS, TeamParameters, TeamTask
+from handover.scenarios.free_flyer.penetration import HandInCube
 from handover.scenarios.free_flyer.two_robots.team_member import OneRobot, TeamCause
 
 _SETTLING = 1.0
@@ -42,7 +44,8 @@ class TeamEvaluator(Evaluator):
 
     It is a success when at the end all grippers or all of the person's hands hold the object, and no others, when
     somebody held it all the time since somebody first did, and when no gripper kept it for longer than half a second
-    after the other let go: an object that hangs at one robot swings about it. Where a gripper closes
+    after the other let go: an object that hangs at one robot swings about it. It must not have been torn out of a
+    closed gripper, even if that caught it again, nor a hand have been in a robot (`HandInCube`). Where a gripper closes
     again on an object that was released and floats, the delivery has failed, not yet the handover; the robots must have
     noticed as often. Nor may a robot that has let go run into the box, which nothing simulates: `clearance` is the
     least gap between jaws and box from then on.
@@ -52,7 +55,7 @@ class TeamEvaluator(Evaluator):
         done: when the receiver had the object alone, s; None before.
     """
 
-    records = (Metric, OneRobot, Box)
+    records = (Metric, OneRobot, Box, HandInCube)
 
     def __init__(self, parameters: TeamParameters) -> None:
         self.parameters = parameters
@@ -74,6 +77,7 @@ class TeamEvaluator(Evaluator):
         self._gap, self._clearance = 0.0, math.inf
         self._box = Box(scale(0.5, vector(np.array(large["object_size"]))))
         self._failed = 0
+        self._in_cube = HandInCube()
         self._mismatch = ""
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
@@ -94,6 +98,8 @@ class TeamEvaluator(Evaluator):
             self._change(t, signals, codes)
             self._codes = codes
         self._follow_grippers(t, signals)
+        for r, hand in product(ROBOTS, self.parameters.hand_numbers):
+            self._in_cube.follow(t, signals, f"robot_{r}", f"person.p_WH_{hand}")
         if self._grippers == 3:
             self._internal = max(self._internal, abs(_internal_force(signals)))
         if self._signalled and (self.done is None or t < self.done + _SETTLING):
@@ -198,8 +204,9 @@ class TeamEvaluator(Evaluator):
             and all(robot.phase == "DONE" and robot.failed_deliveries == robot.full for robot in self.robots)
             and (self._grippers, self._hands) == self._receivers
             and self._gap <= _ALONE
-            and not any(robot.torn for robot in self.robots)
+            and all(robot.torn is None for robot in self.robots)
             and self._clearance > 0.0
+            and self._in_cube.since is None
         )
         cause, reason = (TeamCause.NONE, self._success()) if success else self._failure()
         codes = ", ".join(f"{item.value} {item.words}" for item in TeamCause)
@@ -272,9 +279,11 @@ class TeamEvaluator(Evaluator):
 
     def _failure(self) -> tuple[TeamCause, str]:
         for i, robot in enumerate(self.robots, 1):
-            if robot.torn:
-                t = robot.let_go or 0.0
-                return TeamCause.TORN_OUT, f"the object was torn out of closed gripper {i} at {t:.1f} s"
+            if robot.torn is not None:
+                text = f"the object was torn out of closed gripper {i} at {robot.torn:.1f} s; {self._where}"
+                return TeamCause.TORN_OUT, text
+        if self._in_cube.since is not None:
+            return TeamCause.HAND_IN_CUBE, f"{self._in_cube.reason}; {self._where}"
         if self._gap > _ALONE:
             return TeamCause.ONE_LET_GO_ALONE, self._alone()
         if self._lost is not None:

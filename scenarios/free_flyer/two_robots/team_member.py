@@ -22,10 +22,11 @@ class TeamCause(enum.IntEnum):
     DELIVERIES_FAILED = Cause.DELIVERIES_FAILED
     OUT_OF_TIME = Cause.OUT_OF_TIME
     OTHER = Cause.OTHER
+    TORN_OUT = Cause.TORN_OUT
+    HAND_IN_CUBE = Cause.HAND_IN_CUBE
     ONE_HAND_HELD = 101
     ONE_LET_GO_ALONE = 102
     ONE_RECEIVED_ALONE = 103
-    TORN_OUT = 104
     RAN_INTO_IT = 105
 
     @property
@@ -47,7 +48,7 @@ class OneRobot:
         holds: whether its gripper holds the object.
         took: when it last began to, s; None before.
         let_go: when it last ceased to, s; None before and while it holds it.
-        torn: whether its gripper was to be closed then.
+        torn: when it first ceased to though its gripper was to be closed, s; None: never.
         farthest: greatest distance of the gripper from its handover place while it yields, m.
         failed_deliveries: how many it has counted.
         full: how many there were: times that it had closed again on what it had released.
@@ -63,7 +64,7 @@ class OneRobot:
     holds: bool = False
     took: float | None = None
     let_go: float | None = None
-    torn: bool = False
+    torn: float | None = None
     farthest: float = 0.0
     failed_deliveries: int = 0
     full: int = 0
@@ -87,7 +88,9 @@ class OneRobot:
     def hold(self, holds: bool, commanded: bool, t: float) -> None:
         """Take in whether the gripper holds the object, and is commanded to."""
         if self.holds and not holds:
-            self.let_go, self.torn = t, commanded
+            self.let_go = t
+            if commanded and self.torn is None:
+                self.torn = t
         elif holds and not self.holds:
             self.took, self.let_go = t, None
         self.holds = holds

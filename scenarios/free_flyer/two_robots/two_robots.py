@@ -17,6 +17,7 @@ from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.free_flyer.parameters import ROBOTS, Hand, Hands, TeamParameters, TeamTask
+from handover.scenarios.free_flyer.penetration import start_faults
 from handover.scenarios.free_flyer.places import PLACES_OF_TEAM
 from handover.scenarios.free_flyer.robot_wiring import (
     PUSHES_OF_TEAM,
@@ -124,12 +125,12 @@ class TwoRobots(Experiment[TeamEvaluator]):
         return s
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:
-        """Reject an arm that nothing drives, and values without effect.
+        """Reject starts in each other, an arm that nothing drives, and values without effect.
 
         Raises:
             InvalidParameter: with all such values.
         """
-        if faults := undriven_joints(system) + idle_values(system, given):
+        if faults := undriven_joints(system) + idle_values(system, given) + start_faults(system.units):
             raise InvalidParameter(faults)
 
     def stop_time(self, parameters: TeamParameters) -> Fraction:

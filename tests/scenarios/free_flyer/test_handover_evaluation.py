@@ -32,6 +32,8 @@ def signals(
     on_hand: bool = True,
     angle: float = 0.6,
     goal: Sequence[float] | None = None,
+    closed: bool = False,
+    hand: Sequence[float] | None = None,
 ) -> Signals:
     loop = {"pole_radius": [0.99], "damping_ratio": [0.3], "pole_frequency": [2.7]}
     values: dict[str, dict[str, Any]] = {
@@ -45,6 +47,7 @@ def signals(
             "p_WG_goal": PLACE if goal is None else np.array(goal),
             "failed_receptions": [failed],
             "failed_deliveries": [undelivered],
+            "closure": [float(closed)],
         },
         "person": {
             "holder": [int(holder)],
@@ -53,6 +56,9 @@ def signals(
             "gripper_angle": [angle],
         },
     }
+    if hand is not None:
+        values["person"]["p_WH"] = np.array(hand)
+        values["robot"] |= {"p_WB": PLACE + np.array([0.3, 0.0, away]), "q_WB": np.array([1.0, 0.0, 0.0, 0.0])}
     items = {"phase": Phase, "holder": Holder}
     units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
         unit: {name: (np.array(value),) for name, value in ys.items()} for unit, ys in values.items()
@@ -65,7 +71,7 @@ def signals(
                 causality=Causality.OUTPUT,
                 fmi_type="",
                 references=(),
-                shape=(3,) if name in ("p_WG", "v_WG", "p_WG_goal", "f_G", "f_H") else (),
+                shape=ys[name].shape if isinstance(ys[name], np.ndarray) else (),
                 items=tuple((i.name, int(i)) for i in items[name]) if name in items else (),
             )
             for name in ys
@@ -123,6 +129,36 @@ def test_an_object_that_floated_free_was_not_handed_over_even_if_it_was_caught()
     outcome = follow(to_person(), *moments).outcome()
     assert not outcome.success
     assert "lost at 23.8 s" in outcome.reason
+
+
+@pytest.mark.parametrize("rebound", [0, 1, 2])
+def test_an_object_torn_out_of_the_closed_gripper_fails_whether_it_was_caught_again_or_not(rebound: int):
+    moments = given()
+    torn = [
+        (23.1, signals(Phase.CHECK_VELOCITY, Holder.HAND, closed=True)),
+        (23.2, signals(Phase.CHECK_VELOCITY, Holder.BOTH, closed=True)),
+        (23.3, signals(Phase.CHECK_VELOCITY, Holder.HAND, closed=True)),
+    ]
+    outcome = follow(to_person(), *moments[:7], *torn[: 1 + rebound], *moments[7:]).outcome()
+    assert not outcome.success
+    assert outcome.metrics["decided_by"].value == Cause.TORN_OUT
+    assert "at 23.1 s" in outcome.reason
+
+
+def test_what_slips_out_of_closed_fingers_with_no_hand_at_it_is_not_torn_out():
+    moments = [*given()[:4], (20.5, signals(Phase.CHECK_VELOCITY, Holder.FREE, closed=True))]
+    assert follow(to_person(), *moments).outcome().metrics["decided_by"].value == Cause.SLIPPED
+
+
+@pytest.mark.parametrize(("x", "inside"), [(0.35, 0.1375), (0.14, 0.0275), (0.10, 0.0)])
+def test_a_hand_that_was_in_the_robots_cube_has_not_received_anything(x: float, inside: float):
+    moments = given()
+    moments.insert(6, (22.5, signals(Phase.CHECK_VELOCITY, Holder.GRIPPER, hand=(x, -0.07, 0.05))))
+    outcome = follow(to_person(), *moments).outcome()
+    assert outcome.success == (inside == 0.0)
+    if inside:
+        assert outcome.metrics["decided_by"].value == Cause.HAND_IN_CUBE
+        assert f"up to {1e3 * inside:.0f} mm inside" in outcome.reason
 
 
 def test_a_lost_object_ends_the_run_soon():

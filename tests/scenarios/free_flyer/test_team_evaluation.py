@@ -113,12 +113,26 @@ def test_robots_that_do_not_notice_a_failed_delivery_have_not_succeeded():
     assert cause(evaluator) is TeamCause.OTHER
 
 
+def test_an_object_torn_out_of_closed_grippers_fails_even_if_they_catch_it_again():
+    evaluator = TeamEvaluator(TeamParameters())
+    evaluator(20.0, signals(Phase.SIGNAL, 3, closed=True))
+    evaluator(21.0, signals(Phase.CHECK_VELOCITY, 3, 3, closed=True))
+    evaluator(21.1, signals(Phase.CHECK_VELOCITY, 2, 3, closed=True))
+    evaluator(21.2, signals(Phase.CHECK_VELOCITY, 3, 3, closed=True))
+    evaluator(22.0, signals(Phase.RELEASE_OBJECT, 3, 3))
+    evaluator(22.4, signals(Phase.RELEASE_OBJECT, 0, 3))
+    evaluator(30.0, signals(Phase.DONE, 0, 3))
+    evaluator(31.0, signals(Phase.DONE, 0, 3))
+    assert cause(evaluator) is TeamCause.TORN_OUT
+    assert "gripper 1 at 21.1 s" in evaluator.outcome().reason
+
+
 def cause(evaluator: TeamEvaluator) -> TeamCause:
     return TeamCause(int(evaluator.outcome().metrics["decided_by"].value))
 
 
 def test_causes_that_one_robot_has_too_have_its_numbers():
     shared = [cause for cause in TeamCause if cause.name in Cause.__members__]
-    assert len(shared) == 10
+    assert len(shared) == 12
     assert all(cause == Cause[cause.name] for cause in shared)
     assert min(cause for cause in TeamCause if cause not in shared) > max(Cause)
