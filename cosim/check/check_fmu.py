@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
-from handover.cosim.check.described_variable import DescribedVariable, variables_of
 from handover.cosim.check.description_checks import description_findings, interface_findings, says
 from handover.cosim.check.experiment_check import ExperimentCheck
 from handover.cosim.check.report import EXPERIMENTS, RUN, CheckReport, Section
@@ -22,6 +21,7 @@ from handover.cosim.experiments.reference_experiment import ReferenceExperiment,
 from handover.cosim.files import scratch_folder
 from handover.cosim.fmu.file.archive import DESCRIPTION, TERMINALS, FmuArchive
 from handover.cosim.fmu.file.default_experiment import default_experiment, proposed_step
+from handover.cosim.fmu.file.described_variable import DescribedVariable, variables_of
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.cosim.fmu.file.fmpy_edge import (
     checked_xml,

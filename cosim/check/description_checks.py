@@ -10,8 +10,8 @@ from collections import defaultdict
 from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
-from handover.cosim.check.described_variable import REALS, DescribedVariable
 from handover.cosim.fmu.file.default_experiment import default_experiment
+from handover.cosim.fmu.file.described_variable import REALS, DescribedVariable
 from handover.cosim.fmu.file.model_structure import lost_references
 from handover.cosim.fmu.file.xml import XmlElement
 from handover.cosim.probe.finding import Finding, fault, note, warning

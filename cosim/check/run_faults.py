@@ -9,9 +9,9 @@ import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from handover.cosim.check.described_variable import variables_of
 from handover.cosim.check.description_checks import description_findings, interface_findings
 from handover.cosim.fmu.file.archive import FmuArchive, is_of_this_project
+from handover.cosim.fmu.file.described_variable import variables_of
 from handover.cosim.fmu.file.description import FmuDescription
 from handover.cosim.fmu.file.fmpy_edge import checked_xml, in_one_line
 from handover.cosim.fmu.file.xml import collection_paused

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.check.described_variable import variables_of
+from handover.cosim.blocks.variable import Kind
 from handover.cosim.exceptions import InvalidFmu, UnitFailure
 from handover.cosim.fmu.file.archive import DESCRIPTION
-from handover.cosim.fmu.file.description import KINDS, FmuDescription, FmuPort, describe_fmu
+from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
+from handover.cosim.fmu.file.internal_variables import LOCAL, ports_inside
 from handover.cosim.fmu.file.xml import parse_xml
 from handover.cosim.probe.finding import Finding, abbreviated, fault, note, warning
 from handover.cosim.probe.isolated_process import Journal
@@ -244,25 +244,11 @@ def _value_findings(port: FmuPort, values: Any, t: float) -> Iterator[Finding]:
         yield warning(f"{wrong[0]} is no item of its type", where=where)
 
 
-def _internal(folder: Path, fmi: int) -> Iterator[FmuPort]:
-    """Yield the local variables and calculated parameters of an unpacked FMU that can be read at any time."""
-    root = parse_xml((folder / DESCRIPTION).read_bytes())
-    variables = variables_of(root, fmi)
-    starts_of = {v.reference: v.values.get("start") for v in variables}
-    for v in variables:
-        shape, kind = v.shape(starts_of), KINDS.get(v.type)
-        is_internal = v.causality in ("local", "calculatedParameter") and "clocks" not in v.element.attributes
-        if is_internal and kind is not None and shape is not None and 0 not in shape and v.reference.isdecimal():
-            references = (int(v.reference),)
-            yield FmuPort(
-                name=v.name, kind=kind, causality=Causality.OUTPUT, fmi_type=v.type, references=references, shape=shape
-            )
-
-
 def main(task: Mapping[str, Any]) -> None:
     """Run the FMU `task["fmu"]`, unpacked in `task["folder"]`."""
     journal = Journal(Path(task["journal"]))
     description, folder = describe_fmu(Path(task["fmu"])), Path(task["folder"])
+    inside = ports_inside(parse_xml((folder / DESCRIPTION).read_bytes()), description.fmi, LOCAL)
     run = SmokeRun(
         description,
         folder,
@@ -272,7 +258,7 @@ def main(task: Mapping[str, Any]) -> None:
         keeps_state=task["keeps_state"],
         serialises=task["serialises"],
         allows_two=task["allows_two"],
-        internal=tuple(_internal(folder, description.fmi)),
+        internal=tuple(port for _, port in inside.values()),
     )
     run.run_all()
     journal.begins("unloading the library")

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.record.columns import column_metadata
-from handover.cosim.record.reader import SUBSCRIPT, Record
+from handover.cosim.record.reader import Record, columns_of_signals
 from handover.cosim.record.stream import stream_of, stream_schema, tail_of
 from handover.cosim.record.tail import HEADER, MAGIC, DamagedTail, block_arrays
 
@@ -50,9 +50,7 @@ class GrowingRecord(Record):
             raise NoRows from e
         self.places: dict[str, tuple[int, int]] = dict(zip(self._schema.names[1:], layout["places"], strict=True))
         """By column, the part of a row and the index in it."""
-        self._columns: dict[str, list[str]] = {}
-        for name in self._schema.names:
-            self._columns.setdefault(SUBSCRIPT.sub("", name), []).append(name)
+        self._columns = columns_of_signals(self._schema.names)
         self._about = dict(column_metadata(self._schema))
         self.newest: list[NDArray[Any]] = []
         """The values of the newest row, in the block's parts."""

@@ -3,13 +3,16 @@
 `RecordedSignals` replays a record row by row, as an observer of the run saw its signals.
 """
 
+import math
 import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.variable import indices_of
 from handover.cosim.exceptions import nearest
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.time_series import TimeSeries
@@ -25,9 +28,7 @@ class Record:
         import pyarrow.parquet as pq  # slow to import, and scenarios import this class before there is any record
 
         self._table = pq.read_table(path)
-        self._columns: dict[str, list[str]] = {}
-        for name in self._table.column_names:
-            self._columns.setdefault(SUBSCRIPT.sub("", name), []).append(name)
+        self._columns = columns_of_signals(self._table.column_names)
         self.time = self._values("time")
 
     def __contains__(self, signal: object) -> bool:
@@ -43,11 +44,9 @@ class Record:
         if signal not in self._columns:
             raise KeyError(f"no signal {signal!r}; {nearest(signal, self._columns)}")
         names = self._columns[signal]
-        last_subscript = SUBSCRIPT.search(names[-1])
-        if last_subscript is None:
-            return self._values(names[0])
-        shape = tuple(int(i) for i in last_subscript[1].split(","))
-        return np.column_stack([self._values(n) for n in names]).reshape(-1, *shape)
+        if names == [signal]:
+            return self._values(signal)
+        return np.column_stack([self._values(n) for n in names]).reshape(-1, *_indices(names[-1]))
 
     def series(self, signal: str) -> TimeSeries:
         """Return a signal's values as they were held, for an input that is to take them once more.
@@ -90,6 +89,33 @@ class Record:
 
     def _values(self, name: str) -> NDArray[Any]:
         return self._table.column(name).to_numpy()
+
+
+def _indices(name: str) -> tuple[int, ...]:
+    """Return the indices at the end of a column's name; none of a scalar."""
+    found = SUBSCRIPT.search(name)
+    return () if found is None else tuple(int(i) for i in found[1].split(","))
+
+
+def columns_of_signals(names: Iterable[str]) -> dict[str, list[str]]:
+    """Return a record's columns by the signals that they belong to: all entries of an array, or one column.
+
+    Entries that are not those of a whole array, as where a unit counts them from 0, are signals by themselves.
+    """
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(SUBSCRIPT.sub("", name), []).append(name)
+    columns: dict[str, list[str]] = {}
+    for signal, parts in groups.items():
+        columns |= {signal: parts} if _is_whole(signal, parts) else {name: [name] for name in parts}
+    return columns
+
+
+def _is_whole(signal: str, names: Sequence[str]) -> bool:
+    """Return whether columns are a scalar, or all entries of an array in their order, counted from 1."""
+    shape = _indices(names[-1])
+    is_of_size = math.prod(shape) == len(names)
+    return names == [signal] or (is_of_size and [_indices(name) for name in names] == indices_of(shape))
 
 
 class RecordedSignals(Signals):

@@ -45,6 +45,7 @@ def run(
     inputs: Path | str | None = None,
     inputs_from: Path | str | None = None,
     formats: Sequence[str] = (),
+    record: str | Sequence[str] = (),
     checkpoint: Seconds | None = None,
     algorithm: str | Algorithm | None = None,
     isolate: str | Sequence[str] = (),
@@ -71,6 +72,7 @@ def run(
         inputs: of an FMU: a CSV file of its inputs over time.
         inputs_from: folder of a run whose inputs from outside, such as a hand's, are played back.
         formats: of the record besides Parquet: `csv`, `mat`.
+        record: local variables and parameters of units to record, too: `UNIT.NAME`, with `*` and `?` as wildcards.
         checkpoint: simulated seconds between checkpoints, from which `handover resume` continues.
         algorithm: `jacobi`, `gauss-seidel`, `fixed-point` or `newton`.
         isolate: units in processes of their own: names, `foreign` or `all`.
@@ -101,6 +103,7 @@ def run(
             inputs=None if inputs is None else Path(inputs),
             sources=None if inputs_from is None else played_back(Path(inputs_from)),
             formats=formats_of(formats),
+            recorded=(record,) if isinstance(record, str) else tuple(record),
             every=exact("checkpoint", checkpoint),
             options=master_options(options, algorithm, isolate),
             presented=report,

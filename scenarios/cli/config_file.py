@@ -270,7 +270,7 @@ def _of_run(path: Path, run: Mapping[str, Any]) -> dict[str, Any]:
             click.echo(f"{path}: the run was of other versions: {other}", err=True)
         content: dict[str, Any] = {**_subject(run), **_of_master(run["master"])}
         content |= {"seed": run["seed"], "stop": run.get("stop", content.get("stop"))}
-        content |= {"checkpoint": run["checkpoint"], "format": run["formats"]}
+        content |= {"checkpoint": run["checkpoint"], "format": run["formats"], "record": run.get("recorded")}
         content["parameters"] = {**run["parameters"], **run.get("unit_values", {}), **content.get("parameters", {})}
         for file in run.get("parameter_files", {}).values():
             if Path(file["file"]).is_file() and not _is_unchanged(Path(file["file"]), file["sha256"]):

@@ -129,6 +129,14 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
     help="Format of the record; may be given more than once. Parquet is always written.  [default: parquet]",
 )
 @_record_option(
+    "--record",
+    "recorded",
+    multiple=True,
+    metavar="UNIT.NAME",
+    help="Record a local variable or parameter of a unit, too; * and ? stand for any characters, as in 'arm.*'. May be"
+    " given more than once.  [default: the outputs, or where there are none, the local variables]",
+)
+@_record_option(
     "--checkpoint",
     "every",
     type=Seconds(),
@@ -147,6 +155,7 @@ def run(
     step: Fraction | None,
     inputs: Path | None,
     formats: Sequence[str],
+    recorded: Sequence[str],
     every: Fraction | None,
     no_report: bool,
     live: bool,
@@ -193,6 +202,7 @@ def run(
             inputs=inputs,
             sources=None if inputs_from is None else played_back(inputs_from),
             formats=formats,
+            recorded=recorded,
             every=every,
             presented=not no_report,
             pushed=push,

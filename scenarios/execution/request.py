@@ -61,7 +61,7 @@ class RunRequest:
         step: of all units of an SSP or FMU, s.
         inputs: a file of inputs over time, of an FMU by itself.
         sources: who gives values to inputs from outside, see `played_back`.
-        formats, every, options, presented, pushed: as of `Task`.
+        formats, every, options, presented, pushed, recorded: as of `Task`.
     """
 
     subject: str | System | type[Experiment[Any]]
@@ -78,6 +78,7 @@ class RunRequest:
     options: MasterOptions = field(default_factory=MasterOptions)
     presented: bool = True
     pushed: bool = False
+    recorded: Sequence[str] = ()
 
     def task(self, opened: contextlib.ExitStack) -> Task:
         """Return the task, all parts of which are checked and whose folder is its own; `opened` closes what that opens.
@@ -102,6 +103,7 @@ class RunRequest:
             options=self.options,
             presented=self.presented,
             pushed=self.pushed,
+            recorded=self.recorded,
             stop=asked.stop,
             inputs=self.sources,
         )

@@ -113,6 +113,7 @@ class InterruptedRun:
                 every=None if every is None else Fraction(every),
                 source=description["source"],
                 unit_values=description.get("unit_values", {}),
+                recorded=tuple(description.get("recorded", ())),
                 options=self.resumption.options,
                 stop=None if stop is None else Fraction(stop),
                 inputs=resumed_inputs(self.folder, description.get("inputs"), pushes, hand),

@@ -6,15 +6,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from handover.cosim.exceptions import InitializationError, UnitFailure
+from handover.cosim.exceptions import InitializationError, UnitFailure, WiringError
 from handover.cosim.master.checkpoint import Checkpointer, check_states, remove_checkpoint
 from handover.cosim.master.live_control import ControlledPacer, LiveControl
 from handover.cosim.master.master import Master
 from handover.cosim.plan.memory import note_crashes
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.options import Algorithm, MasterOptions
+from handover.cosim.system.recorded_variables import record_variables
 from handover.cosim.system.signals import ObserveAfter, Observer, Signals
 from handover.cosim.system.system import System
+from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.exit_status import status_of_run
 from handover.scenarios.execution.input_sources import give_inputs
 from handover.scenarios.execution.interruption import Interruption
@@ -100,6 +102,10 @@ def run_task(
     if task.pushed:
         let_push(system, experiment.pushes(parameters))
     give_inputs(system, task.inputs)
+    try:
+        record_variables(system, task.recorded)
+    except WiringError as e:
+        raise UsageError(f"--record: {'; '.join(e.faults)}") from e
     evaluator.note_units(system.units)
     failure: UnitFailure | None = None
     if task.every is not None:

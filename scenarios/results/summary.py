@@ -30,14 +30,15 @@ from handover.scenarios.results.task import Task
 class _OfSomeConfigurations(TypedDict, total=False):
     unit_values: dict[str, str]
     stop: str
+    recorded: list[str]
     inputs: dict[str, Any]
 
 
 class Configuration(_OfSomeConfigurations):
     """What determines a run's signals; `seed` is None where nothing is random, `master` as `MasterOptions.as_data`.
 
-    `unit_values`, `stop`, s, and `inputs`, where those from outside came from, are there only if some are given, see
-    `Task`.
+    `unit_values`, `stop`, s, `recorded`, and `inputs`, where those from outside came from, are there only if some are
+    given, see `Task`.
     """
 
     scenario: str
@@ -153,6 +154,8 @@ def configuration(task: Task) -> Configuration:
     given: _OfSomeConfigurations = {"unit_values": dict(task.unit_values)} if task.unit_values else {}
     if task.stop is not None:
         given["stop"] = str(task.stop)
+    if task.recorded:
+        given["recorded"] = list(task.recorded)
     if task.inputs is not None:
         given["inputs"] = dict(task.inputs.origin)
     return Configuration(

@@ -46,6 +46,7 @@ class Task:
         stop: when the run ends, s, at the first communication point at or after it; None: as the scenario says.
         inputs: who gives values to inputs from outside; None: as the scenario says, by itself nobody.
         pushed: whether bodies that can be pushed may be: then forces and points are inputs from outside.
+        recorded: patterns `UNIT.NAME` of local variables and parameters that are recorded, see `record_variables`.
     """
 
     experiment: Experiment[Any]
@@ -62,6 +63,7 @@ class Task:
     stop: Fraction | None = None
     inputs: InputSources | None = None
     pushed: bool = False
+    recorded: Sequence[str] = ()
 
     @property
     def stop_time(self) -> Fraction:

@@ -322,3 +322,67 @@ def test_a_default_experiment_that_stops_before_it_starts_is_refused(tmp_path: P
     result = run(turned, "--step", "0.1", "--out", tmp_path / "out")
     assert result.exit_code == 2, result.output
     assert "it proposes to stop at 1 s, though to start at 2 s; --stop 10 lets it run from 0 to 10 s" in result.output
+
+
+@pytest.fixture(scope="module")
+def decay_library(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    return decay.compiled(tmp_path_factory.mktemp("decay"))
+
+
+INSIDE = (
+    '"local" variability="continuous"><Real unit="m"/>',
+    '"local" variability="continuous"><Real unit="m"/></ScalarVariable><ScalarVariable name="p[2]" valueReference="2" '
+    'causality="local" variability="continuous"><Real/>',
+)
+WITHOUT_OUTPUTS = (
+    ('causality="output" variability="continuous"><Real unit="m" max="100"/>', 'causality="local"><Real unit="m"/>'),
+    ("<Outputs>", "<!--"),
+    ("</InitialUnknowns>", "-->"),
+)
+
+
+def test_variables_inside_of_a_unit_are_recorded_where_they_are_asked_for(decay_library: bytes, tmp_path: Path):
+    """x' = -x + u from 1, so x = u + (1 - u) exp(-t), of which y is a copy."""
+    file = decay.pack(tmp_path / "decay.fmu", decay_library, decay.edited(INSIDE, ('index="3"', 'index="4"')))
+    out = tmp_path / "out"
+    arguments = ("-p", "u=3", "--record", "Decay.x", "--record", "D*.p[?]", "--no-report")
+    result = run(file, *arguments, "--checkpoint", "0.5", "--out", out)
+    assert result.exit_code == 0, result.output
+    record = Record(out / "signals.parquet")
+    assert set(record.signals) == {"Decay.y", "Decay.x", "Decay.p[2]"}
+    for name in record.signals:
+        assert record[name] == pytest.approx(3.0 - 2.0 * np.exp(-record.time))
+    again = run("--config", out / "run.json", "--no-report", "--out", tmp_path / "again")
+    assert again.exit_code == 0, again.output
+    assert (tmp_path / "again" / "signals.parquet").read_bytes() == (out / "signals.parquet").read_bytes()
+
+
+@pytest.mark.parametrize(("pattern", "wanted"), [("Decay.z*", "Decay.x"), ("arm.x", "Decay.*"), ("x", "Decay.*")])
+def test_what_is_not_there_cannot_be_recorded(decay_library: bytes, tmp_path: Path, pattern: str, wanted: str):
+    file = decay.pack(tmp_path / "decay.fmu", decay_library)
+    result = run(file, "--record", pattern, "--out", tmp_path / "out")
+    assert (result.exit_code, (tmp_path / "out").exists()) == (2, False)
+    assert f"--record: {pattern}: no local variable or parameter of a unit; " in result.output
+    assert wanted in result.output
+
+
+def test_a_unit_without_outputs_leaves_its_local_variables(decay_library: bytes, tmp_path: Path):
+    file = decay.pack(tmp_path / "decay.fmu", decay_library, decay.edited(*WITHOUT_OUTPUTS))
+    handover.run(file, out=tmp_path / "out", u=3.0)
+    record = Record(tmp_path / "out" / "signals.parquet")
+    assert set(record.signals) == {"Decay.x", "Decay.y"}
+    assert record["Decay.x"] == pytest.approx(3.0 - 2.0 * np.exp(-record.time))
+    assert ["no outputs" in line for line in json.loads((tmp_path / "out" / "run.json").read_text())["notes"]] == [True]
+    handover.run(file, out=tmp_path / "asked", record="Decay.y")
+    assert Record(tmp_path / "asked" / "signals.parquet").signals == ("Decay.y",)
+
+
+def test_parameters_are_recorded_in_any_standard_and_system(tmp_path: Path):
+    system = handover.System()
+    for fmi in (2, 3):
+        system.add(f"mass{fmi}", native_fmu("mass", fmi), x0=float(fmi))
+    handover.run(system, stop=0.02, out=tmp_path / "out", record=["mass?.x0", "mass3.k"])
+    record = Record(tmp_path / "out" / "signals.parquet")
+    assert [record[f"mass{fmi}.x0"].tolist() for fmi in (2, 3)] == [[2.0] * 3, [3.0] * 3]
+    assert [name for name in ("mass2.k", "mass3.k") if name in record] == ["mass3.k"]
+    assert record.unit("mass3.x0") == "m"
