@@ -10,7 +10,9 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module, metadata
+from importlib.machinery import EXTENSION_SUFFIXES, SOURCE_SUFFIXES, ExtensionFileLoader, FileFinder, SourceFileLoader
 from pathlib import Path
+from types import CodeType
 from typing import Any, cast
 
 from handover.cosim.blocks.declarations import DeclarationError
@@ -277,7 +279,7 @@ class ScenarioSource:
         """
         from handover.fmus.sources import carried_digest, source_file  # of own scenarios alone
 
-        search_folder(self.folder)
+        import_from_source(self.folder)
         try:
             file, here = source_file(self.path), carried_digest(self.path)
         except UnknownBlock as e:
@@ -338,6 +340,8 @@ def trust_file(file: Path) -> None:
     Raises:
         InvalidScenario: there is no such file, it cannot be imported, or another module of its name comes before it.
     """
+    from handover.fmus.sources import source_file  # of own scenarios alone
+
     file = file.absolute()
     if file.suffix != ".py" or not file.is_file():
         raise InvalidScenario(str(file), ["there is no such file of Python, as my_scene.py"])
@@ -345,14 +349,56 @@ def trust_file(file: Path) -> None:
     while (folder / "__init__.py").is_file():
         folder, parts = folder.parent, [folder.name, *parts]
     module = ".".join(parts)
-    search_folder(folder)
+    import_from_source(folder)
     try:
-        there = import_module(module).__file__
+        if not (there := source_file(module)).samefile(file):
+            raise InvalidScenario(str(file), [f"the module {module} is {there}: rename the file"])
+        import_module(module)
+    except InvalidScenario:
+        raise
     except (Exception, SystemExit) as e:  # a module may raise anything while it is loaded
         raise InvalidScenario(str(file), [f"it cannot be loaded: {type(e).__name__}: {one_line(e)}"]) from e
-    if there is None or not Path(there).samefile(file):
-        raise InvalidScenario(str(file), [f"the module {module} is {there or 'of Python itself'}: rename the file"])
     _TRUSTED.add(module)
+
+
+class _SourceLoader(SourceFileLoader):
+    """Loads a module from its source alone."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        """Return the code of the source, whatever is in `__pycache__`."""
+        path = self.get_filename(fullname)
+        return self.source_to_code(self.get_data(path), path)  # pyright: ignore[reportUnknownMemberType]
+
+
+_FROM_SOURCE: set[Path] = set()
+
+
+def import_from_source(folder: Path | str) -> None:
+    """Search a folder as `search_folder` does; bytecode in it is not run, which need not be that of the source there.
+
+    So what a person has read, or a hash was compared of, is what runs.
+    """
+    if not folder:
+        return
+    if not _FROM_SOURCE:
+        sys.path_hooks.insert(0, _finder_of_source)
+    _FROM_SOURCE.add(Path(folder).absolute())
+    for path in [*sys.path_importer_cache]:
+        if _is_from_source(path):
+            del sys.path_importer_cache[path]
+    search_folder(folder)
+
+
+def _is_from_source(path: str) -> bool:
+    place = Path(path).absolute()
+    installed = {"site-packages", "dist-packages"} & set(place.parts)
+    return not installed and any(place.is_relative_to(folder) for folder in _FROM_SOURCE)
+
+
+def _finder_of_source(path: str) -> FileFinder:
+    if not _is_from_source(path) or not Path(path).is_dir():
+        raise ImportError(path)
+    return FileFinder(path, (ExtensionFileLoader, EXTENSION_SUFFIXES), (_SourceLoader, SOURCE_SUFFIXES))
 
 
 def search_folder(folder: Path | str) -> None:

@@ -264,8 +264,13 @@ def write_whole(path: Path, text: str) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Generator[Path, None, None]:
-    """Give the place of an unfinished file, which takes that of `path` at the end, or goes away on any error."""
+    """Give the place of an unfinished file, which takes that of `path` at the end, or goes away on any error.
+
+    What is there already is removed: a link in a folder of somebody else would have another file written.
+    """
     unfinished = path.with_name(path.name + ".part")
+    with disk_errors_reported(path):
+        unfinished.unlink(missing_ok=True)
     try:
         yield unfinished
         os.replace(unfinished, path)

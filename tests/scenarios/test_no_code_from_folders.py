@@ -5,8 +5,10 @@ run is shown by `--trust`, which runs it.
 """
 
 import json
+import py_compile
 import sys
 from collections.abc import Callable, Generator
+from importlib.util import cache_from_source
 from pathlib import Path
 from typing import Any
 
@@ -180,9 +182,18 @@ def test_a_file_that_is_named_is_run(marker: Path, tmp_path: Path):
     run = run_of(tmp_path / "theirs" / "a", sources(tmp_path / "theirs")[0])
     refused = call("report", run, "--trust", tmp_path / "foreign_scene.py")
     assert (refused.exit_code, marker.exists()) == (2, False)
-    done = call("report", run, "--trust", tmp_path / "theirs" / "foreign_scene.py")
+    named = tmp_path / "theirs" / "foreign_scene.py"
+    other = tmp_path / "other.py"
+    other.write_text(f"open({str(tmp_path / 'bytecode')!r}, 'w')\n", encoding="utf-8")
+    py_compile.compile(
+        str(other), cache_from_source(str(named)), invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH
+    )
+    (run / "report.html.part").symlink_to(tmp_path / "mine.txt")
+    done = call("report", run, "--trust", named)
     assert (done.exit_code, marker.exists()) == (0, True), done.output
     assert "Height by the planted code" in (run / "report.html").read_text(encoding="utf-8")
+    assert not (tmp_path / "bytecode").exists()  # what runs is what stands in the file
+    assert not (tmp_path / "mine.txt").exists()
 
 
 def repeated(source: dict[str, Any], folder: Path, **more: Any) -> Result:

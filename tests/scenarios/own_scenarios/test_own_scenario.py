@@ -37,7 +37,7 @@ def test_it_runs_and_its_report_is_written_again_from_elsewhere(here: Path, tmp_
     untrusted = call(tmp_path, "report", str(here / "first"))
     assert f"--trust {here / 'reach.py'}" in untrusted.stderr
     succeeded(tmp_path, "report", str(here / "first"), "--figures", "--trust", str(here / "reach.py"))
-    assert (here / "first" / "figures" / "1_distance.png").exists()
+    assert "TwoLinkReach draws them by its own code" not in (here / "first" / "report.html").read_text(encoding="utf-8")
     page = (here / "first" / "report.html").read_text(encoding="utf-8")
     assert "An arm of two links reaches for a point" in page
     assert "where the tip is to come" in page
