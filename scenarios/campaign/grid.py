@@ -13,7 +13,7 @@ from handover.cosim.fmu.file.description import FmuPort
 from handover.scenarios.campaign.plan import MAX_RUNS
 from handover.scenarios.execution.file_experiment import settable_of
 from handover.scenarios.execution.selection import replacements
-from handover.scenarios.execution.unit_values import is_unit_value, unit_values
+from handover.scenarios.execution.unit_values import canonical_text, is_unit_value, unit_values
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_value, text_of, texts_by_name
 
@@ -123,6 +123,8 @@ def _axis_of_unit(name: str, text: str, port: FmuPort | None = None) -> tuple[li
         values, fault = _range(declared, text)
         return values, [fault] if fault else []
     values = text.split(";" if ";" in text or declared.shape else ",")
+    if port is not None:
+        values = [canonical_text(port, value) for value in values]
     faults = [f"{value} is given twice" for value in dict.fromkeys(values) if value and values.count(value) > 1]
     return values, [*faults, f"{text!r} has an empty item"] if "" in values else faults
 

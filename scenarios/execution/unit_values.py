@@ -19,7 +19,7 @@ from handover.cosim.system.system import PlacedUnit, System
 from handover.scenarios.execution.file_experiment import SettableParameters, settable_of
 from handover.scenarios.execution.input_file import columns_of, value_of
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters, text_of
+from handover.scenarios.experiment.parameters import InvalidParameter, number_text, parse_parameters, text_of
 from handover.scenarios.results.tolerated_faults import scenario_code
 
 
@@ -135,12 +135,30 @@ def _values_of_file(settable: SettableParameters, given: Sequence[str]) -> dict[
             faults.append(f"{text!r} is not of the form NAME=VALUE")
         elif name in values:
             faults.append(f"{name} is given twice")
-        elif settable.port(name) is None:
+        elif (port := settable.port(name)) is None:
             faults.append(unknown_name(settable.ports, name))
-        values[name] = value
+        else:
+            values[name] = canonical_text(port, value)
     if faults:
         raise InvalidParameter(faults)
     return values
+
+
+def canonical_text(port: FmuPort, text: str) -> str:
+    """Return the one text for all texts of a value of a file's parameter: `1`, `1.0` and `+1` are the same number.
+
+    What is no value of the parameter stays as it is.
+    """
+    try:
+        if port.kind is Kind.REAL:
+            return ",".join(number_text(float(part)) for part in text.split(","))
+        if port.kind is Kind.INTEGER:
+            return ",".join(str(int(part)) for part in text.split(","))
+        if port.kind is Kind.BOOLEAN:
+            return ",".join(str(bool(value_of(port, part))).lower() for part in text.split(","))
+    except ValueError:
+        pass
+    return text.strip() if port.kind is Kind.ENUMERATION else text
 
 
 def split_parameters(experiment: type[Experiment[Any]], given: Sequence[str]) -> tuple[Any, dict[str, str]]:

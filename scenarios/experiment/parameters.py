@@ -114,10 +114,11 @@ def text_of(variable: Variable, value: Any) -> str:
         return str(bool(value)).lower()
     if variable.enumeration is not None:
         return str(value.name).lower()
-    return ",".join(map(_number_text, np.asarray(value).reshape(-1).tolist()))
+    return ",".join(map(number_text, np.asarray(value).reshape(-1).tolist()))
 
 
-def _number_text(number: float) -> str:
+def number_text(number: float) -> str:
+    """Return the shortest text of a number that is read as it."""
     short = f"{number:g}"
     return short if float(short) == number else repr(number)
 

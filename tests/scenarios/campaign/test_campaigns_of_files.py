@@ -96,12 +96,19 @@ def test_arrays_are_lists_of_arrays(tmp_path: Path):
     assert table.column("u").tolist() == ["1,2,3", "4,5,6"]
 
 
+def test_a_value_is_the_same_however_it_is_written():
+    plan = prepared(plan_of(native_fmu("mass", 2), "m=1.0,2e0", "k=0:1.50:2", fixed=("f=+0.10",))).plan
+    assert [dict(point) for point in plan.points][:2] == [{"m": "1", "k": "0"}, {"m": "1", "k": "1.5"}]
+    assert plan.fixed == {"f": "0.1"}
+
+
 @pytest.mark.parametrize(
     ("grid", "fixed", "fault"),
     [
         (("mas=1,2",), (), "no parameter or input 'mas'; did you mean m"),
         (("m=1,heavy",), (), "m = 'heavy': a number is right"),
         (("m=1,inf",), (), "mass.m: inf is not finite"),
+        (("m=1,1.0",), (), "m: 1 is given twice"),
         (("m=1:2:x",), (), "is not of the form START:STOP:N"),
         (("m=1,2",), ("m=3",), "m is varied and set by -p"),
         (("m=1,2",), ("k=3,4",), "-p k takes one value; to vary it, give it without -p: k=3,4"),
