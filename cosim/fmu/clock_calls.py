@@ -78,28 +78,30 @@ class ClockCalls:
 class ClockTimer:
     """The times of a time-based input clock.
 
-    Periodic clocks (constant, fixed, tunable) tick at shift + k * interval; the interval is the description's, or else
-    the one that the unit returns while it is initialised (the parameters that it may depend on do not change in a run).
+    Periodic clocks (constant, fixed, tunable) tick at start + shift + k * interval; the interval is the description's,
+    or else the one that the unit returns while it is initialised (the parameters that it may depend on do not change in
+    a run).
     A changing clock gives the interval to its next tick whenever it has ticked, a countdown clock in any event mode.
 
     Attributes:
         next: the time of the next tick, s; None while a countdown has not begun.
     """
 
-    def __init__(self, clock: FmuClock, calls: ClockCalls) -> None:
-        """Read from the unit, in initialisation mode, what the description leaves open."""
+    def __init__(self, clock: FmuClock, calls: ClockCalls, start: Fraction) -> None:
+        """Read from the unit, in initialisation mode of a run from `start` on, what the description leaves open."""
         self.clock = clock
         self._calls = calls
         self.next: Fraction | None = None
         if clock.variability in ("changing", "countdown"):
-            self._count_from(Fraction(0))
+            self._count_from(start)
             return
-        self.next, self._interval = clock.shift, clock.interval
+        shift, self._interval = clock.shift, clock.interval
         if clock.interval is None:
             self._interval, _ = calls.interval(clock.name)
-            self.next = calls.shift(clock.name)
+            shift = calls.shift(clock.name)
         if not self._interval:
             raise ValueError(f"its clock {clock.name!r} ticks every {self._interval} s")
+        self.next = start + shift
 
     def is_due(self, t: float) -> bool:
         """Whether it ticks at t."""

@@ -15,6 +15,7 @@ from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.buffers import SignalBuffer, Views, content_of
 from handover.cosim.fmu.clock_calls import ClockCalls, ClockTimer
 from handover.cosim.fmu.failures import UnitTerminated
+from handover.cosim.fmu.file.default_experiment import exact_seconds
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.cosim.fmu.heartbeat import Heartbeat
 from handover.cosim.fmu.instance import Instance
@@ -62,7 +63,7 @@ class EventInstance(Instance):
         """
         timed = [c for c in self.description.clocks.values() if c.is_input and not c.is_triggered]
         try:
-            self.timers = [ClockTimer(c, self._clock_calls) for c in timed]
+            self.timers = [ClockTimer(c, self._clock_calls, exact_seconds(self.time)) for c in timed]
         except ValueError as e:
             raise UnitFailure(self.name, "fmi3ExitInitializationMode", self.time, str(e), tuple(self.log)) from e
         super().exit_initialization()

@@ -191,7 +191,7 @@ class Master:
         """Simulated time in seconds."""
         if self.ended is not None:
             return self.ended.reached
-        return 0.0 if self._stepper is None else self._stepper.time
+        return float(self.schedule.start) if self._stepper is None else self._stepper.time
 
     @property
     def cpu(self) -> "dict[str, array.array[float]]":
@@ -358,7 +358,7 @@ class Master:
 
     def _on_grid(self, t: float) -> float:
         """Return the exact time of a tick where t is one but for rounding."""
-        exact = self.schedule.time(round(Fraction(t) / self.schedule.tick))
+        exact = self.schedule.time(round((Fraction(t) - self.schedule.start) / self.schedule.tick))
         return exact if is_rounding(t - exact, exact) else t
 
     def _waiting(self, until: Callable[[], bool]) -> Callable[[float], None]:

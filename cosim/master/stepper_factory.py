@@ -68,7 +68,7 @@ class StepperFactory:
     def initialize(self, ensemble: Ensemble, stop: Fraction | None) -> None:
         """Take the units through initialisation mode of a run until `stop`, s; algebraic loops are solved."""
         schedule = self.schedule
-        ensemble.external_inputs.ask(0.0)
+        ensemble.external_inputs.ask(float(schedule.start))
         values = InitialValues(ensemble, schedule.initial_groups, schedule.initial_passes, self._solver)
         stops = {} if stop is None else {s.unit: schedule.end_of_steps(s, stop) for s in schedule.slots}
         ensemble.initialize(schedule.slots, values, stops, self.tolerances)

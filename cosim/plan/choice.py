@@ -20,7 +20,7 @@ from handover.cosim.system.system import System
 _log = logging.getLogger(__name__)
 
 _MAX_TICKS = 2**63
-"""Numerators and denominators of a tick must be below this: the loop has 64 bits for them."""
+"""Numbers of a time grid must be below this: the loop has 64 bits for them."""
 
 
 def plan_stepper(
@@ -59,8 +59,8 @@ def plan_obstacle(schedule: Schedule, system: System, options: MasterOptions, *,
         return f"inputs follow values over time: {_named(system.followed)}"
     if system.externals:
         return f"inputs come from outside: {_named(system.externals)}"
-    if max(schedule.tick.numerator, schedule.tick.denominator) >= _MAX_TICKS:
-        return f"a tick of {schedule.tick} s is too long a fraction"
+    if max(abs(number) for number in schedule.grid) >= _MAX_TICKS:
+        return f"a tick of {schedule.tick} s is too long a fraction, from {schedule.start} s on"
     return None
 
 

@@ -1,4 +1,4 @@
-/* ticks * numerator / denominator, rounded once: the same bits as Python's division of whole numbers. */
+/* (offset + ticks * numerator) / denominator, rounded once: the same bits as Python's division of whole numbers. */
 #include <math.h>
 
 #include "plan.h"
@@ -7,8 +7,7 @@ typedef unsigned __int128 Wide;
 
 static const uint64_t EXACT = (uint64_t)1 << 53; /* whole numbers up to here are doubles */
 
-double exact_time(uint64_t ticks, uint64_t numerator, uint64_t denominator) {
-    Wide product = (Wide)ticks * numerator;
+static double quotient_of(Wide product, uint64_t denominator) {
     if (product == 0)
         return 0;
     if (product <= EXACT && denominator <= EXACT)
@@ -31,4 +30,11 @@ double exact_time(uint64_t ticks, uint64_t numerator, uint64_t denominator) {
         shift--;
     }
     return ldexp((double)((uint64_t)quotient | more), -shift);
+}
+
+double exact_time(int64_t offset, uint64_t ticks, uint64_t numerator, uint64_t denominator) {
+    Wide passed = (Wide)ticks * numerator, before = offset < 0 ? -(Wide)offset : (Wide)offset;
+    if (offset >= 0)
+        return quotient_of(passed + before, denominator);
+    return passed < before ? -quotient_of(before - passed, denominator) : quotient_of(passed - before, denominator);
 }

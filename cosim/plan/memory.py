@@ -66,6 +66,7 @@ class Plan(ctypes.Structure):
         ("n_arrive", ctypes.c_int64),
         ("n_depart", ctypes.c_int64),
         ("n_groups", ctypes.c_int64),
+        ("offset", ctypes.c_int64),
         ("numerator", ctypes.c_uint64),
         ("denominator", ctypes.c_uint64),
         ("tick", ctypes.c_int64),
@@ -115,7 +116,7 @@ def _loaded(file: Path) -> ctypes.CDLL:
     library = ctypes.CDLL(str(file))
     plan = ctypes.POINTER(Plan)
     library.plan_time.restype = ctypes.c_double
-    library.plan_time.argtypes = (ctypes.c_uint64, ctypes.c_uint64, ctypes.c_uint64)
+    library.plan_time.argtypes = (ctypes.c_int64, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_uint64)
     library.plan_free_kept.argtypes = (ctypes.POINTER(Kept), ctypes.c_int64)
     library.plan_free_kept.restype = None
     library.plan_arrive.argtypes = (plan, ctypes.c_int64)

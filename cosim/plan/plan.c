@@ -17,8 +17,8 @@
 #define API __attribute__((visibility("default")))
 #endif
 
-API double plan_time(uint64_t ticks, uint64_t numerator, uint64_t denominator) {
-    return exact_time(ticks, numerator, denominator);
+API double plan_time(int64_t offset, uint64_t ticks, uint64_t numerator, uint64_t denominator) {
+    return exact_time(offset, ticks, numerator, denominator);
 }
 
 API void plan_free_kept(Kept *kept, int64_t n) {
@@ -59,7 +59,7 @@ static enum outcome arrive(Plan *plan, int64_t last) {
         if (plan->groups[i].due < tick)
             tick = plan->groups[i].due;
     plan->tick = tick;
-    plan->time = exact_time((uint64_t)tick, plan->numerator, plan->denominator);
+    plan->time = exact_time(plan->offset, (uint64_t)tick, plan->numerator, plan->denominator);
     ((volatile double *)plan->heartbeat)[TIME] = plan->time;
     enum outcome outcome = carry_out_all(plan, plan->arrive, plan->n_arrive, true);
     if (outcome != PAUSED)

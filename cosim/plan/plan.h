@@ -129,6 +129,7 @@ typedef struct {
     const Segment *arrive, *depart;
     Group *groups;
     int64_t n_arrive, n_depart, n_groups;
+    int64_t offset; /* of tick 0, in parts of a second as the numerator has them */
     uint64_t numerator, denominator; /* of a tick in seconds */
     int64_t tick;
     double time;
@@ -145,7 +146,7 @@ typedef struct {
     Warned *warned;                /* of each operation */
 } Plan;
 
-double exact_time(uint64_t ticks, uint64_t numerator, uint64_t denominator);
+double exact_time(int64_t offset, uint64_t ticks, uint64_t numerator, uint64_t denominator);
 enum outcome carry_out(Plan *plan, const Segment *segment);
 
 #endif

@@ -65,7 +65,7 @@ def read_structure(archive: SspArchive) -> SspStructure:
         return SspStructure(
             part.text(part.root, "name"),
             system,
-            _stop(part),
+            *_times(part),
             _annotated_period(part, systems[0], "parallel"),
             _step_of_system(part, systems[0]),
             tuple(part.unsupported),
@@ -73,17 +73,17 @@ def read_structure(archive: SspArchive) -> SspStructure:
         )
 
 
-def _stop(part: SspPart) -> float | None:
+def _times(part: SspPart) -> tuple[float, float | None]:
+    """Return start and stop time of the default experiment, s."""
     for experiment in part.children(part.root, "ssd:DefaultExperiment"):
         start = part.number(experiment, "startTime", 0.0)
-        if start != 0:
-            raise part.fault(experiment, f"the default experiment starts at {start:g} s; only 0 s can be run")
-        if "stopTime" in experiment.attributes:
-            stop = part.number(experiment, "stopTime")
-            if stop <= 0:
-                raise part.fault(experiment, f"the default experiment ends at {stop:g} s; above 0 s is right")
-            return stop
-    return None
+        if "stopTime" not in experiment.attributes:
+            return start, None
+        stop = part.number(experiment, "stopTime")
+        if stop <= start:
+            raise part.fault(experiment, f"the default experiment ends at {stop:g} s; above {start:g} s is right")
+        return start, stop
+    return 0.0, None
 
 
 def _annotated_period(part: SspPart, e: XmlElement, name: str) -> Fraction | None:

@@ -164,11 +164,12 @@ class SspFile:
             one that the file states, or that an FMU proposes, is not taken, the system's notes say so.
         parameters: texts by the names of the property `parameters`, which come before what the file gives; of an array
             the values stand with commas between them, or a name such as `arm.p[1]` gives one.
-        duration: of the run, s, of which units without a step take a 500th; by default the stop time.
+        start, stop: of the run, s, by default those of its default experiment; units without a step take a 500th of
+            what lies between them.
 
     Attributes:
         name: the system's name.
-        system: the system, checked.
+        system: the system, checked; its run starts at the given time, or at that of the default experiment.
         stop: the stop time of its default experiment, s, if it has one.
         parallel_step: communication step of all units where they step in parallel, s, if `write_ssp` annotated one.
 
@@ -178,7 +179,7 @@ class SspFile:
 
     def __init__(
         self, path: Path, step: Fraction | None = None, parameters: Mapping[str, str] = MappingProxyType({}),
-        duration: Fraction | None = None,
+        start: Fraction | None = None, stop: Fraction | None = None,
     ) -> None:  # fmt: skip
         archive = SspArchive(path)
         structure = read_structure(archive)
@@ -190,7 +191,10 @@ class SspFile:
         """Where its FMUs are unpacked until it is closed."""
         try:
             archive.unpack(self.folder)
-            self._structure, self._step, self._duration = structure, step, duration or self.stop
+            self._structure, self._step = structure, step
+            self._start = exact_seconds(structure.start) if start is None else start
+            end = self.stop if stop is None else stop
+            self._duration = None if end is None else end - self._start
             self._descriptions = self._describe({n: c.member for n, c in components_of(structure.system)})
             self._flat, self.system = self._with(parameters)
         except BaseException:
@@ -258,6 +262,7 @@ class SspFile:
         system = self._build(flat, descriptions, steps, structure.unsupported, self._duration)
         for line in (*structure.tolerated, *flat.tolerated):
             system.tolerate(line)
+        system.start = self._start
         system.notes += _notes_on_steps(self._step, structure.step, system.units.values())
         return flat, system
 

@@ -79,7 +79,7 @@ class SspNestedSystem(SspElement):
 
 @dataclass(frozen=True)
 class SspStructure:
-    """The whole: its name, its outermost system, and the stop time of its default experiment, s.
+    """The whole: its name, its outermost system, and start and stop time of its default experiment, s.
 
     `parallel_step` is the communication step of all units where they step in parallel, if `write_ssp` annotated one.
     `step` is that of the system, as its default experiment states it or as it is annotated for OMSimulator or libcosim.
@@ -89,6 +89,7 @@ class SspStructure:
 
     name: str
     system: SspNestedSystem
+    start: float
     stop: float | None
     parallel_step: Fraction | None = None
     step: Fraction | None = None

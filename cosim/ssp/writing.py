@@ -239,8 +239,9 @@ class _Structure:
         self._add_master(system)
         self._types.add_enumerations(root, "ssd")
         self._types.add_units(root, "ssd")
-        until = {} if stop is None else {"stopTime": repr(float(stop))}
-        experiment = ET.SubElement(root, "ssd:DefaultExperiment", {"startTime": "0.0", **until})
+        times = {"startTime": self._system.start, "stopTime": stop}
+        given = {name: repr(float(t)) for name, t in times.items() if t is not None}
+        experiment = ET.SubElement(root, "ssd:DefaultExperiment", given)
         annotation = _annotation(ET.SubElement(experiment, "ssd:Annotations"), OSP_ANNOTATION)
         algorithm = ET.SubElement(annotation, "osp:Algorithm")  # in which libcosim takes even an xmlns for one
         ET.SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(float(self._base)))

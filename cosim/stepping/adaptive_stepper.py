@@ -13,7 +13,7 @@ from handover.cosim.stepping.iteration import NotConverged
 from handover.cosim.stepping.options import AdaptiveStep
 from handover.cosim.stepping.step_control import PiController, StepError, StepStatistics, WorstSignal
 from handover.cosim.stepping.stepper import Coupling
-from handover.cosim.system.schedule import Schedule, Slot
+from handover.cosim.system.schedule import Schedule, Slot, TimeGrid
 from handover.cosim.system.system import System
 
 _MAY_BE_TOO_LONG = (UnitDiscarded, NotFinite, NotConverged)
@@ -72,10 +72,11 @@ class AdaptiveStepper:
     def __init__(
         self, schedule: Schedule, coupling: Coupling, ensemble: Ensemble, control: AdaptiveStep, order: int
     ) -> None:
-        self.time = 0.0
+        self.time = schedule.time(0)
         self.statistics = StepStatistics()
         self._schedule, self._coupling, self._ensemble = schedule, coupling, ensemble
         self._grid = fine_tick(schedule, control)
+        self._times = TimeGrid.of(schedule.start, self._grid)
         self._per_tick = int(schedule.tick / self._grid)
         self._tick = self._last = 0
         self._due = {s.unit: 0 for s in schedule.sampled}
@@ -138,7 +139,7 @@ class AdaptiveStepper:
         """Restore what `get_state` returned."""
         self._tick, self._wanted = state["tick"], state["wanted"]
         self._due, self._acted = dict(state["due"]), dict(state["acted"])
-        self.time = self._seconds(self._tick)
+        self.time = self._times.time(self._tick)
         self._coupling.set_state(state["coupling"])
         self._ensemble.external_inputs.set_state(state["external"])
         self._controller.set_state(state["controller"])
@@ -167,7 +168,7 @@ class AdaptiveStepper:
         cut = length < self._wanted  # by a communication point, which says nothing of the error of longer steps
         self._wanted = self._within_limits(max(proposed, self._wanted) if cut else proposed)
         self._tick += length
-        self.time = self._seconds(self._tick)
+        self.time = self._times.time(self._tick)
         return True
 
     def _worst_error(self, length: int) -> WorstSignal:
@@ -183,8 +184,8 @@ class AdaptiveStepper:
     def _step(self, tick: int, length: int) -> None:
         step = self._seconds(length)
         slots = [Slot(unit, length, step) for unit in self._units]
-        self._coupling.depart(self._seconds(tick), (), slots)
-        self._coupling.arrive(self._seconds(tick + length), (), slots)
+        self._coupling.depart(self._times.time(tick), (), slots)
+        self._coupling.arrive(self._times.time(tick + length), (), slots)
 
     def _length(self) -> int:
         """Return the length to try: as wanted, but up to the next communication point, in parts of similar length."""
@@ -199,7 +200,7 @@ class AdaptiveStepper:
         return length if self._largest is None else min(length, self._largest // 2 * 2)
 
     def _seconds(self, ticks: int) -> float:
-        """Convert ticks to seconds, rounded once."""
+        """Return a length in ticks in seconds, rounded once."""
         return ticks * self._grid.numerator / self._grid.denominator
 
 

@@ -170,17 +170,17 @@ class Ensemble:
             UnitFailure: a unit does not accept its start values or does not initialise.
             StartValuesLost: values of units do not hold; see `keep_start`.
         """
-        lost: dict[str, list[LostValue]] = {}
+        start, lost = float(self.system.start), dict[str, list[LostValue]]()
         for name, unit in self.system.units.items():
             self.instances[name].set_start(unit.start)
-            self.instances[name].enter_initialization(0.0, stops.get(name), tolerances.get(name))
+            self.instances[name].enter_initialization(start, stops.get(name), tolerances.get(name))
             self._note_limits(name, "its initialisation")
             lost[name] = keep_start(self.instances[name], unit.start, self.system.fed_inputs(name))
         if affected := [name for name in lost if lost[name]]:
-            raise StartValuesLost(affected, 0.0, [value for name in affected for value in lost[name]])
+            raise StartValuesLost(affected, start, [value for name in affected for value in lost[name]])
         compute_values()
         for slot in slots:
-            self.feed(slot.unit, 0.0)
+            self.feed(slot.unit, start)
             self.instances[slot.unit].exit_initialization()
             self._end_at_close(self.instances[slot.unit])
             self.publish(slot.unit)
@@ -205,12 +205,12 @@ class Ensemble:
         return self._feedings[unit]
 
     def feed_known(self, unit: str, known: Collection[str]) -> None:
-        """Set only the inputs whose sources are among the known units; the others keep their values.
+        """Set at the start only the inputs whose sources are among the known units; the others keep their values.
 
         Raises:
             UnitFailure: the unit does not accept them.
         """
-        self.gather(unit, 0.0)
+        self.gather(unit, float(self.system.start))
         self.set_known(unit, known)
 
     def set_known(self, unit: str, known: Collection[str]) -> None:

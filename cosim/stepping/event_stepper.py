@@ -22,8 +22,8 @@ class Course:
     """The last step of a continuous unit, from `begun` to `reached`, in seconds, and whether it ended at an event."""
 
     period: Fraction
-    begun: Fraction = Fraction(0)
-    reached: Fraction = Fraction(0)
+    begun: Fraction
+    reached: Fraction
     event: bool = False
 
 
@@ -45,21 +45,21 @@ class EventStepper:
     """
 
     def __init__(self, schedule: Schedule, ensemble: EventEnsemble, coupling: Coupling) -> None:
-        self.time = 0.0
-        self._now = Fraction(0)
+        self.time = schedule.time(0)
+        self._start = self._now = schedule.start
         self._schedule = schedule
         self._ensemble = ensemble
         self._coupling = coupling
         self._periods = {s.unit: s.every * schedule.tick for s in schedule.slots}
-        self._courses = {s.unit: Course(self._periods[s.unit]) for s in schedule.continuous}
-        self._due = {s.unit: Fraction(0) for s in schedule.sampled}
+        self._courses = {s.unit: Course(self._periods[s.unit], self._start, self._start) for s in schedule.continuous}
+        self._due = dict.fromkeys((s.unit for s in schedule.sampled), self._start)
         self._acted: dict[str, Fraction] = {}
         self._iteration = EventIteration(ensemble, [s.unit for s in schedule.slots])
         self._adapting = {n for n in self._courses if ensemble.system.units[n].description.capabilities.varies_step}
 
     def arrive(self, last: int) -> bool:
         """Go to the next point at which a unit is due or has an event, and settle events; see `Stepper`."""
-        stop = last * self._schedule.tick
+        stop = self._start + last * self._schedule.tick
         self._now = min((stop, *self._due.values(), *(c.reached for c in self._courses.values())), key=float)
         self.time = float(self._now)
         flagged = self._flagged()
@@ -156,7 +156,8 @@ class EventStepper:
 
     def _is_between(self) -> bool:
         """Whether a unit at this point is there before its period has passed."""
-        return any(float(c.reached) == self.time and c.reached % c.period for c in self._courses.values())
+        courses = self._courses.values()
+        return any(float(c.reached) == self.time and (c.reached - self._start) % c.period for c in courses)
 
     def _roll_back(self) -> None:
         """Roll back the units that are ahead and step them to this point, where they can."""
@@ -170,7 +171,7 @@ class EventStepper:
     def _target(self, unit: str) -> Fraction:
         """Return when a step from here ends: after the period, or at an event that is known before."""
         period = self._courses[unit].period
-        target = (math.floor(self._now / period) + 1) * period
+        target = self._start + (math.floor((self._now - self._start) / period) + 1) * period
         while float(target) <= self.time:
             target += period
         event_units = self._ensemble.event_units

@@ -113,7 +113,7 @@ class LinearExtrapolation:
 
     def __init__(self, system: System, instances: Mapping[str, Instance], tick: Fraction) -> None:
         self._instances = instances
-        self._tick = float(tick)
+        self._start, self._tick = float(system.start), float(tick)
         self._at = dict.fromkeys(instances, 0)
         self._histories: dict[str, dict[str, SampleHistory]] = {name: {} for name in instances}
         self._lines: dict[str, list[_Line]] = {name: [] for name in instances}
@@ -130,7 +130,7 @@ class LinearExtrapolation:
 
     def feed(self, unit: str, t: float, dt: float, ends: Mapping[str, NDArray[np.float64]] = _NONE) -> None:
         """Write the extrapolated inputs for a step from t to t + dt; `ends` are presumed values at its end, by port."""
-        at, long = 2 * self._ticks(t), self._ticks(dt)
+        at, long = 2 * self._ticks(t - self._start), self._ticks(dt)
         for line in self._lines[unit]:
             if line.port in ends:
                 line.extrapolate_to(ends[line.port], dt)
@@ -139,7 +139,7 @@ class LinearExtrapolation:
 
     def step(self, unit: str) -> None:
         """Record that a unit has stepped."""
-        self._at[unit] = self._ticks(self._instances[unit].time)
+        self._at[unit] = self._ticks(self._instances[unit].time - self._start)
 
     def publish(self, unit: str) -> None:
         """Record a unit's outputs at its present tick."""

@@ -113,22 +113,23 @@ class InitialValues:
                     self._solve(group)
 
     def _solve(self, group: Group) -> None:
+        start = float(self._ensemble.system.start)
         interface = Interface(self._ensemble, group.back(group.units))
         derivatives = ChainedDerivatives(self._ensemble, group, interface)
 
         def g(x: Floats) -> Floats:
             for unit in group.units:
-                self._ensemble.gather(unit, 0.0)
+                self._ensemble.gather(unit, start)
                 interface.write(unit, x)
                 self._ensemble.set_known(unit, self._known)
                 self._ensemble.publish(unit)
-            return interface.read(0.0)
+            return interface.read(start)
 
         def jacobian() -> Floats | None:
             return derivatives() if derivatives.are_given else None
 
         solver = self._make_solver(interface)
         try:
-            solver.solve(g, interface.read(0.0), jacobian)
+            solver.solve(g, interface.read(start), jacobian)
         except Unsolved as e:
-            raise not_converged(group.units, 0.0, e, interface, solver.magnitudes, group.message) from e
+            raise not_converged(group.units, start, e, interface, solver.magnitudes, group.message) from e

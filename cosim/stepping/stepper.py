@@ -114,7 +114,7 @@ class GridStepper:
         self, schedule: Schedule, coupling: Coupling, extrapolation: LinearExtrapolation | None = None
     ) -> None:
         self._extrapolation = extrapolation
-        self.time = 0.0
+        self.time = schedule.time(0)
         self._schedule = schedule
         self._coupling = coupling
         self._tick = 0

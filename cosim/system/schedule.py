@@ -5,6 +5,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 from handover.cosim.exceptions import ScheduleError
 from handover.cosim.system.loops import (
@@ -24,6 +25,24 @@ Feedthrough = Mapping[str, Collection[str]]
 """By output, the inputs that it depends on directly."""
 
 _MAX_TICKS_PER_STEP = 10_000  # of the shortest period; more means that the periods have no sensible common divisor
+
+
+class TimeGrid(NamedTuple):
+    """Exact times: after n ticks, (offset + n * numerator) / denominator seconds."""
+
+    offset: int
+    numerator: int
+    denominator: int
+
+    @classmethod
+    def of(cls, start: Fraction, tick: Fraction) -> "TimeGrid":
+        """Return the grid of times at whole ticks from a start on, both in seconds."""
+        denominator = math.lcm(start.denominator, tick.denominator)
+        return cls(int(start * denominator), int(tick * denominator), denominator)
+
+    def time(self, ticks: int) -> float:
+        """Return the time after so many ticks, s, rounded once."""
+        return (self.offset + ticks * self.numerator) / self.denominator
 
 
 @dataclass(frozen=True)
@@ -55,6 +74,9 @@ class Schedule:
     In initialization mode, dependencies may be others, and all loops can be solved.
 
     Attributes:
+        start: when the run starts, s: the time of tick 0.
+        tick: in seconds.
+        grid: the times of all ticks.
         loops: the algebraic loops that are solved at the steps.
         spanning: the units in `continuous` whose steps may span a communication point at which another unit is due.
         declared_loops: those that FMUs declare, which have to be solved.
@@ -67,7 +89,8 @@ class Schedule:
 
     def __init__(self, system: System) -> None:
         units = list(system.units.values())
-        self.tick = _tick(units)
+        self.start, self.tick = system.start, _tick(units)
+        self.grid = TimeGrid.of(self.start, self.tick)
         parts = [u for u in units if u.sampled], [u for u in units if not u.sampled]
         steps = [_arranged(system, part, initial=False) for part in parts]
         start = [
@@ -101,12 +124,12 @@ class Schedule:
         return self.continuous + self.sampled
 
     def time(self, ticks: int) -> float:
-        """Return the time after so many ticks, rounded once."""
-        return ticks * self.tick.numerator / self.tick.denominator
+        """Return the time after so many ticks, s, rounded once."""
+        return self.grid.time(ticks)
 
-    def ticks(self, duration: Fraction) -> int:
-        """Return the number of whole ticks in a duration, rounded up."""
-        return math.ceil(duration / self.tick)
+    def ticks(self, t: Fraction) -> int:
+        """Return the number of whole ticks from the start to a time in seconds, rounded up."""
+        return math.ceil((t - self.start) / self.tick)
 
     def end_of_steps(self, slot: Slot, stop: Fraction) -> float:
         """Return when the last step of a unit ends that begins before `stop`, or of a sampled one at it, s.

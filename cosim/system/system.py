@@ -51,6 +51,8 @@ class System:
     def __init__(self) -> None:
         self.units: dict[str, PlacedUnit] = {}
         self.connections: list[Connection] = []
+        self.start = Fraction(0)
+        """When its run starts, s, exactly."""
         self._sources: dict[str, dict[str, PortName]] = {}  # by unit, by input
         self._matches: dict[PortName, list[Connection]] = {}  # by input, what matches it
         self._unsettled: list[TerminalFault | Ambiguity] = []  # of terminals, unless their inputs are fed otherwise
@@ -329,6 +331,8 @@ class System:
             *(str(left) for x in self._unsettled if (left := x.remaining(self._feeds(x.target)))),
         ]
         faults += [ambiguity(to, [c.source for c in cs]) for to, cs in self._matches.items() if len(cs) > 1]
+        if not isinstance(self.start, Rational):  # pyright: ignore[reportUnnecessaryIsInstance]
+            faults.append(f"its start, {self.start!r}, is not exact; give Fraction('{self.start!r}')")
         for unit in self.units.values():
             faults += value_faults(unit.name, unit.description, unit.start)
             faults += event_faults(unit.name, unit.description, unit.sampled)

@@ -136,6 +136,23 @@ def exact(name: str, seconds: Seconds | None) -> Fraction | None:
     return None if seconds is None else positive_seconds(name, seconds)
 
 
+def exact_time(name: str, seconds: Seconds | None) -> Fraction | None:
+    """Return a time that may be 0, negative, or left open, exactly; None for None.
+
+    Raises:
+        InvalidInput: it is not a finite number.
+    """
+    if seconds is None or isinstance(seconds, Fraction):
+        return seconds
+    try:
+        fits = math.isfinite(seconds)
+    except TypeError:
+        fits = False
+    if not fits:
+        raise InvalidInput(f"{name} = {seconds!r}: a finite number of seconds is right")
+    return exact_seconds(float(seconds))
+
+
 def whole_number(name: str, value: Any, least: int = 0) -> int:
     """Return a whole number, such as a seed.
 

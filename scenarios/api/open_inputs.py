@@ -66,6 +66,7 @@ class OpenSystem:
         if left_out is not None:
             _check_place(system, left_out)
         self.system, self.free = System(), dict[str, HeldValue]()
+        self.system.start = system.start
         self.system.units = {name: unit for name, unit in system.units.items() if name != left_out}
         for c in system.connections:
             if left_out not in (c.source.unit, c.target.unit):

@@ -12,6 +12,7 @@ from handover.scenarios.api.arguments import (
     Seconds,
     errors_for_python,
     exact,
+    exact_time,
     formats_of,
     master_options,
     merged,
@@ -40,6 +41,7 @@ def run(
     seed: int = 0,
     units: Mapping[str, Path | str] | None = None,
     out: Path | str | None = None,
+    start: Seconds | None = None,
     stop: Seconds | None = None,
     step: Seconds | None = None,
     inputs: Path | str | None = None,
@@ -67,6 +69,7 @@ def run(
         seed: of all random numbers of a scenario.
         units: what takes the place of a scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`.
         out: the folder for the results, new or empty.
+        start: of a system, an SSP or an FMU: when it starts, s; by default as its file says, or at 0 s.
         stop: when it ends, s, if its evaluation does not end it before; only a system has no stop time of its own.
         step: of an SSP or FMU: the communication step of all units, s.
         inputs: of an FMU: a CSV file of its inputs over time.
@@ -98,6 +101,7 @@ def run(
             seed=whole_number("seed", seed),
             units=unit_texts(units),
             out=None if out is None else Path(out),
+            start=exact_time("start", start),
             stop=exact("stop", stop),
             step=exact("step", step),
             inputs=None if inputs is None else Path(inputs),

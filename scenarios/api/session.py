@@ -2,6 +2,7 @@
 
 import contextlib
 import copy
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -26,6 +27,7 @@ from handover.scenarios.api.arguments import (
     Seconds,
     errors_for_python,
     exact,
+    exact_time,
     master_options,
     merged,
     positive_seconds,
@@ -86,7 +88,7 @@ class Session:
         self._evaluator: GuardedEvaluator[Evaluator] = GuardedEvaluator(experiment.bound_evaluator(parameters))
         self._evaluator.note_units(self._open.system.units)
         self._pushes = experiment.pushes(parameters)
-        self._asked, self._seen = Fraction(0), -1.0
+        self._asked, self._seen = self._open.system.start, -math.inf
         self._master = Master(self._open.system, options)
         self._master.__enter__()
         self._given = self._needed_outputs(experiment, left_out) | {*given}
@@ -132,7 +134,7 @@ class Session:
         return self._run(self._asked + positive_seconds("duration", duration))
 
     def start(self) -> float:
-        """Let units that sample at 0 s act, and the evaluation begin, as the first step would; return the time.
+        """Let units that sample at the start act, and the evaluation begin, as the first step would; return the time.
 
         Raises:
             UnitFailure: a unit failed.
@@ -330,6 +332,7 @@ def open(  # noqa: A001 (handover.open is named like it)
     seed: int = 0,
     place: str | None = None,
     units: Mapping[str, Path | str] | None = None,
+    start: Seconds | None = None,
     step: Seconds | None = None,
     algorithm: str | Algorithm | None = None,
     isolate: str | Sequence[str] = (),
@@ -344,6 +347,7 @@ def open(  # noqa: A001 (handover.open is named like it)
         seed: likewise.
         place: a unit that is left out; its outputs are set instead, `s["unit.port"] = value`.
         units: what takes the place of a scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`.
+        start: of a system, an SSP or an FMU: the time from which it is stepped, s, as of `handover.run`.
         step: of an SSP or FMU: the communication step of all units, s.
         algorithm: `jacobi`, `gauss-seidel`, `fixed-point` or `newton`.
         isolate: units in processes of their own: names, `foreign` or `all`.
@@ -364,6 +368,7 @@ def open(  # noqa: A001 (handover.open is named like it)
             parameters=single_texts(name, merged(parameters, named)),
             seed=whole_number("seed", seed),
             units=unit_texts(units),
+            start=exact_time("start", start),
             stop=ENDLESS if endless else None,
             step=exact("step", step),
             options=master_options(options or MasterOptions(), algorithm, isolate),

@@ -15,6 +15,7 @@ from handover.scenarios.api.arguments import (
     Seconds,
     errors_for_python,
     exact,
+    exact_time,
     master_options,
     merged,
     text_of_value,
@@ -47,6 +48,7 @@ def sweep(
     paired: bool = True,
     units: Mapping[str, Path | str | Sequence[Path | str]] | None = None,
     out: Path | str | None = None,
+    start: Seconds | None = None,
     stop: Seconds | None = None,
     step: Seconds | None = None,
     inputs: Path | str | None = None,
@@ -75,7 +77,8 @@ def sweep(
         units: what takes the place of the scenario's units, by their names: files of FMUs, or blocks as `my_arm:MyArm`;
             a list varies the unit.
         out: the folder of the campaign.
-        stop: as of `handover.run`.
+        start: as of `handover.run`.
+        stop: likewise.
         step: likewise.
         inputs: likewise.
         workers: runs at the same time, by default one a core.
@@ -103,12 +106,13 @@ def sweep(
             subject=name,
             seed=whole_number("seed", seed),
             units=unit_texts(units),
+            start=exact_time("start", start),
             stop=exact("stop", stop),
             step=exact("step", step),
             inputs=None if inputs is None else Path(inputs),
         )
         common.check_options()
-        experiment = experiment_type(name, common.stop, common.step, common.inputs)
+        experiment = experiment_type(name, common.start, common.stop, common.step, common.inputs)
         declared = experiment.parameters() if (settable := settable_of(experiment)) is None else settable.ports.values()
         shapes = {v.name: v.shape for v in declared}
         varied = {name: value for name, value in given.items() if _is_varied(value, shapes.get(name, ()))}
@@ -126,6 +130,7 @@ def sweep(
             units=kept_units,
             varied_units=tuple(choices),
             options=master_options(options, algorithm, isolate),
+            start=common.start,
             stop=common.stop,
             step=common.step,
             inputs=common.inputs,

@@ -118,6 +118,7 @@ class _CampaignState:
             fmus={unit: str(path) for unit, path in units.items()},
             runs=str(self.folder.runs.absolute()),
             options=self.plan.options,
+            start=self.plan.start,
             stop=self.plan.stop,
             step=self.plan.step,
             inputs="" if inputs is None else str(self.folder.fmus.absolute() / inputs.name),

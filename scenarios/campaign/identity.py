@@ -35,6 +35,7 @@ def identity_of(plan: CampaignPlan, fmus: Mapping[str, Path]) -> dict[str, Any]:
         "repetitions": plan.repetitions,
         "seed": plan.seed,
         "paired": plan.paired,
+        **({} if plan.start is None else {"start": str(plan.start)}),
         "stop": None if plan.stop is None else str(plan.stop),
         "step": None if plan.step is None else str(plan.step),
         "scenes": list(plan.scenes),

@@ -60,6 +60,7 @@ class CampaignPlan:
         varied_units: units that points give other FMUs; a point names the file or the block by the unit's name, or
             leaves it as it is in the other runs.
         options: how units are run.
+        start: when each run of an SSP or FMU starts, s; None: as the file says.
         stop: when each run ends, s; None: as the scenario or the file says.
         step: of all units of an SSP or FMU, s; None: as they propose.
         inputs: a file of inputs over time, of an FMU.
@@ -77,6 +78,7 @@ class CampaignPlan:
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     varied_units: Sequence[str] = ()
     options: MasterOptions = field(default_factory=MasterOptions)
+    start: Fraction | None = None
     stop: Fraction | None = None
     step: Fraction | None = None
     inputs: Path | None = None
@@ -90,7 +92,7 @@ class CampaignPlan:
         Raises:
             UsageError, CosimError: there is no such scenario, or the file cannot be run.
         """
-        return experiment_type(self.scenario, self.stop, self.step, self.inputs)
+        return experiment_type(self.scenario, self.start, self.stop, self.step, self.inputs)
 
     @property
     def file(self) -> Path | None:

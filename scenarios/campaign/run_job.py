@@ -59,6 +59,7 @@ def _task(job: RunJob, folder: Path, opened: contextlib.ExitStack) -> Task:
     request = RunRequest(
         subject=job.scenario,
         parameters=job.parameters,
+        start=job.start,
         stop=job.stop,
         step=job.step,
         inputs=Path(job.inputs) if job.inputs else None,

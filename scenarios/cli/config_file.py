@@ -296,7 +296,8 @@ def _subject(run: Mapping[str, Any]) -> dict[str, Any]:
     file = source["ssp"] if "ssp" in source else source["fmu"]
     given = dict(tuple(part.strip() for part in text.split("=", 1)) for text in source.get("parameters", ()))
     return {"scenario": file, "input": source.get("input"), "step": source["step"], "parameters": given} | {
-        "stop": source["stop"]
+        "start": source.get("start"),
+        "stop": source["stop"],
     }
 
 

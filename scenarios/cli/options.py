@@ -69,6 +69,23 @@ class WholeNumber(click.IntRange):
         return int(super().convert(number, param, ctx))
 
 
+class Instant(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (generic in newer versions only)
+    """A time in seconds, such as 0.01, 1/30 or -2, taken exactly."""
+
+    name = "seconds"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Fraction:
+        """Return the time."""
+        digits = str(value).removeprefix("-")
+        try:
+            seconds = Fraction(digits) if _FORM.fullmatch(digits) else None
+        except (ValueError, ZeroDivisionError):
+            seconds = None
+        if seconds is None or seconds > sys.float_info.max:
+            self.fail(f"{value!r} is not a time in seconds, such as 0.01, 1/30 or -2", param, ctx)
+        return -seconds if str(value).startswith("-") else seconds
+
+
 _FORM = re.compile(r"[\d.]+(e[-+]?\d{1,3})?|\d+/\d+", re.IGNORECASE)
 """Exact fractions of larger exponents would take long to compute."""
 

@@ -20,6 +20,7 @@ from handover.scenarios.cli.console import reserve_stdout
 from handover.scenarios.cli.master_options import coupling_of, master_options
 from handover.scenarios.cli.options import (
     HeadedOption,
+    Instant,
     Seconds,
     limit_options,
     limits,
@@ -47,6 +48,12 @@ _STEP = _option(
     help="Communication step of all units.  [default: what an SSP states, else what each FMU proposes, else a 500th of"
     " its default experiment]",
 )
+_START = _option(
+    "--start",
+    type=Instant(),
+    metavar="SECONDS",
+    help="When a run starts, such as 10 or -2.  [default: what the file's default experiment says, else 0]",
+)
 _INPUT = _option(
     "--input",
     "inputs",
@@ -58,8 +65,8 @@ _INPUT = _option(
 
 
 def file_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `--step` and `--input`, which are for SSPs and FMUs."""
-    return _STEP(_INPUT(command))
+    """Add `--start`, `--step` and `--input`, which are for SSPs and FMUs."""
+    return _START(_STEP(_INPUT(command)))
 
 
 _HELP = """Run a SCENARIO once and write summary, signals, figures and a report into a folder.
@@ -151,6 +158,7 @@ def run(
     seed: int,
     replaced: Sequence[str],
     out: Path | None,
+    start: Fraction | None,
     stop: Fraction | None,
     step: Fraction | None,
     inputs: Path | None,
@@ -197,6 +205,7 @@ def run(
             seed=seed,
             units=replaced,
             out=out,
+            start=start,
             stop=stop,
             step=step,
             inputs=inputs,

@@ -102,6 +102,7 @@ def sweep(
     log_level: str | None,
     workers: int | None,
     scheduler: str | None,
+    start: Fraction | None,
     stop: Fraction | None,
     step: Fraction | None,
     inputs: Path | None,
@@ -116,10 +117,17 @@ def sweep(
     pool = pool_config(workers, scheduler)
     with one_line_errors():
         request = RunRequest(
-            subject=scenario, parameters=parameters, seed=seed, units=replaced, stop=stop, step=step, inputs=inputs
+            subject=scenario,
+            parameters=parameters,
+            seed=seed,
+            units=replaced,
+            start=start,
+            stop=stop,
+            step=step,
+            inputs=inputs,
         )
         request.check_options()
-        experiment = experiment_type(scenario, stop, step, inputs)
+        experiment = experiment_type(scenario, start, stop, step, inputs)
         units, choices = split_units(experiment, replaced)
         points = vary_units(parse_grid(experiment, grid), choices)
         plan = CampaignPlan(
@@ -132,6 +140,7 @@ def sweep(
             units=units,
             varied_units=tuple(choices),
             options=MasterOptions(**coupling_of(coupling), **limits(call_limit, pace)),
+            start=start,
             stop=stop,
             step=step,
             inputs=inputs,

@@ -137,10 +137,10 @@ def _data(call: Call | None, t: float, end: ChildEnd) -> dict[str, Any]:
 
 
 def _complete_record(folder: RunFolder) -> float:
-    """Complete a record and return the time at which it ends, s."""
+    """Complete a record and return how long it is, s."""
     try:
         complete_record(folder.signals)
     except FileNotFoundError:  # it crashed before it recorded
         return 0.0
     time = Record(folder.signals).time
-    return float(time[-1]) if len(time) else 0.0
+    return float(time[-1] - time[0]) if len(time) else 0.0

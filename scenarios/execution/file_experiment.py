@@ -116,7 +116,7 @@ def system_experiment(
         settable: its parameters.
         alone: whether it is one unit, whose outputs are named without it.
     """
-    outputs = _shown_outputs(system, alone=alone)
+    begin, outputs = system.start, _shown_outputs(system, alone=alone)
     file_settable, shown_first = settable, _headline(outputs)
 
     class SystemExperiment(FileExperiment):
@@ -125,6 +125,7 @@ def system_experiment(
         name: ClassVar[str] = file_name
         title: ClassVar[str] = heading
         headline: ClassVar[tuple[str, ...]] = shown_first
+        start: ClassVar[Fraction] = begin
         parallel_step: ClassVar[Fraction | None] = step
         settable: ClassVar[SettableParameters | None] = file_settable
 

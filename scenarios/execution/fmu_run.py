@@ -1,6 +1,5 @@
 """One FMU as an experiment: it runs alone until its stop time, its inputs constant at their start or from a file."""
 
-import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -16,11 +15,9 @@ from handover.cosim.system.wiring_faults import value_faults
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.file_experiment import FileExperiment, SettableParameters, system_experiment
 from handover.scenarios.execution.input_file import columns_of, read_inputs
-from handover.scenarios.execution.ssp_run import ENDLESS, naming_step
+from handover.scenarios.execution.ssp_run import ENDLESS, checked_stop, naming_step
 from handover.scenarios.execution.unit_values import start_values
 from handover.scenarios.results.run_folder import sha256_of
-
-_log = logging.getLogger(__name__)
 
 
 def is_fmu(name: str) -> bool:
@@ -53,7 +50,7 @@ class FmuParameters(SettableParameters):
         return [*faults, *value_faults(self._description.identifier, self._description, start)]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class FmuRun:
     """What a run of one FMU is made of.
 
@@ -62,12 +59,13 @@ class FmuRun:
         parameters: texts `NAME=VALUE`, of parameters and of inputs at the start, in their own units; an array's values
             stand with commas between them, or `NAME[1]=VALUE` gives one.
         inputs: a file of inputs over time, see `read_inputs`; the others stay at their start values.
-        stop, step: in seconds; without them those of its default experiment.
+        start, stop, step: in seconds; without them those of its default experiment.
     """
 
     path: Path
     parameters: Sequence[str] = ()
     inputs: Path | None = None
+    start: Fraction | None = None
     stop: Fraction | None = None
     step: Fraction | None = None
 
@@ -83,10 +81,11 @@ class FmuRun:
         if faults:
             raise UsageError(f"{self.path}: {'; '.join(faults)}")
         until, system = self._until(d.experiment), System()
+        system.start = self._from(d.experiment)
         unit = system.add(d.identifier, d, period=self.step)
         system.units[d.identifier] = replace(unit, start=start)
         if self.step is None and until != ENDLESS:
-            system.presume_steps(until)
+            system.presume_steps(until - system.start)
         if self.inputs is not None:
             for port, series in read_inputs(self.inputs, d.inputs, start).items():
                 system.follow(PortName(d.identifier, port), series)
@@ -94,30 +93,23 @@ class FmuRun:
             system.check()
         except WiringError as e:
             raise UsageError(f"{self.path}: {'; '.join(naming_step(e.faults))}") from e
-        if d.experiment.start:
-            _log.warning("%s proposes to start at %g s; a run starts at 0 s", self.path, d.experiment.start)
         heading = f"{d.name}, an FMU by itself"
         return system_experiment(self.path.name, heading, system, until, settable=FmuParameters(d), alone=True)
 
-    def as_source(self, stop: Fraction) -> dict[str, Any]:
+    def as_source(self, start: Fraction, stop: Fraction) -> dict[str, Any]:
         """Return what a run's folder keeps, so that it can be resumed; `reopened` reads it."""
         files = {"fmu": str(self.path.absolute()), "sha256": sha256_of(self.path)}
         if self.inputs is not None:
             files |= {"input": str(self.inputs.absolute()), "input_sha256": sha256_of(self.inputs)}
-        times = {"stop": str(stop), "step": None if self.step is None else str(self.step)}
+        times = {"start": str(start), "stop": str(stop), "step": None if self.step is None else str(self.step)}
         return {**files, **times, "parameters": list(self.parameters)}
 
+    def _from(self, experiment: DefaultExperiment) -> Fraction:
+        return exact_seconds(experiment.start or 0.0) if self.start is None else self.start
+
     def _until(self, experiment: DefaultExperiment) -> Fraction:
-        if self.stop is not None:
-            return self.stop
-        proposed, start = experiment.stop, experiment.start or 0.0
-        if proposed is not None and 0 < proposed <= start:
-            reason = f"it proposes to stop at {proposed:g} s, though to start at {start:g} s"
-            raise UsageError(f"{self.path}: {reason}; --stop 10 lets it run from 0 to 10 s")
-        if proposed is None or proposed <= 0:
-            reason = "it proposes no stop time" if proposed is None else f"it proposes to stop at {proposed:g} s"
-            raise UsageError(f"{self.path}: {reason}; --stop 10 lets it run from 0 to 10 s")
-        return exact_seconds(proposed)
+        proposed = None if experiment.stop is None else exact_seconds(experiment.stop)
+        return checked_stop(self.path, self._from(experiment), self.stop, proposed)
 
 
 def reopened(source: Mapping[str, Any]) -> tuple[FmuRun, dict[Path, str]]:
@@ -128,6 +120,7 @@ def reopened(source: Mapping[str, Any]) -> tuple[FmuRun, dict[Path, str]]:
         path=Path(source["fmu"]),
         parameters=source["parameters"],
         inputs=inputs,
+        start=Fraction(source.get("start", "0")),
         stop=Fraction(source["stop"]),
         step=step,
     )

@@ -24,7 +24,7 @@ class _Pace(ProgressColumn):
 def progress_bar(stream: TextIO) -> Generator[Callable[[float, float], None], None, None]:
     """Show a bar during a run, where the stream is a terminal; give the function that updates it.
 
-    The function takes the simulated time and the time at which the run ends at the latest, in seconds.
+    The function takes the simulated seconds until now, and those of the whole run at most.
     """
     columns = (
         TextColumn("simulated {task.completed:6.1f} s of at most {task.total:.0f} s"),

@@ -4,6 +4,7 @@ Names of options in messages are those of the command.
 """
 
 import contextlib
+import copy
 import functools
 import weakref
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +21,7 @@ from handover.scenarios.execution.file_experiment import system_experiment
 from handover.scenarios.execution.fmu_run import FmuRun, is_fmu
 from handover.scenarios.execution.runner import experiment_system
 from handover.scenarios.execution.selection import find_scenario, own_source, path_of_class, replacements, select_fmus
-from handover.scenarios.execution.ssp_run import is_ssp, open_experiment, source_of
+from handover.scenarios.execution.ssp_run import checked_stop, is_ssp, open_experiment, source_of
 from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.experiment.experiment import Experiment, NoParameters
 from handover.scenarios.results.run_folder import RunFolder, dated_folder
@@ -57,6 +58,7 @@ class RunRequest:
         seed: of all random numbers.
         units: texts `NAME=FILE` or `NAME=MODULE:CLASS`, of what takes the place of a scenario's units.
         out: the run's folder, new or empty; None for one of its own in `runs/`.
+        start: when the run starts, s, of a system, an SSP or an FMU; they may have a time of their own.
         stop: when the run ends, s; a scenario, an SSP and an FMU may have a time of their own.
         step: of all units of an SSP or FMU, s.
         inputs: a file of inputs over time, of an FMU by itself.
@@ -69,6 +71,7 @@ class RunRequest:
     seed: int = 0
     units: Sequence[str] = ()
     out: Path | None = None
+    start: Fraction | None = None
     stop: Fraction | None = None
     step: Fraction | None = None
     inputs: Path | None = None
@@ -118,8 +121,9 @@ class RunRequest:
         of_scenarios = {"-p": self.parameters, "--seed": self.seed, "--unit": self.units}
         of_files = {"--stop": self.stop, "--step": self.step, "--input": self.inputs}
         used = [name for name, value in {**of_scenarios, **of_files}.items() if value]
+        used += ["--start"] if self.start is not None else []
         if isinstance(self.subject, System):
-            if wrong := [name for name in used if name != "--stop"]:
+            if wrong := [name for name in used if name not in ("--start", "--stop")]:
                 raise UsageError(f"{', '.join(wrong)}: a system has its parameters, units, inputs and steps inside")
         elif self._is_file(is_ssp):
             if wrong := [name for name in ("--seed", "--unit") if name in used]:
@@ -133,6 +137,8 @@ class RunRequest:
             raise UsageError("--input is for an FMU that runs by itself; a scenario's inputs are wired in it")
         elif "--step" in used:
             raise UsageError("--step is for an SSP or an FMU; a scenario's units have steps of their own")
+        elif "--start" in used:
+            raise UsageError("--start is for an SSP or an FMU; a scenario begins at 0 s")
 
     def open(self, opened: contextlib.ExitStack) -> OpenedSubject:
         """Return what is to be run; `opened` closes what that opens.
@@ -143,18 +149,20 @@ class RunRequest:
         if isinstance(self.subject, System):
             if self.stop is None:
                 raise UsageError("a system has no stop time of its own; --stop 10 lets it run for 10 s")
-            return OpenedSubject(system_experiment("system", "a system wired in Python", self.subject, self.stop))
+            system = copy.copy(self.subject)
+            system.start = system.start if self.start is None else self.start
+            stop = checked_stop(Path("system"), system.start, self.stop, None)
+            return OpenedSubject(system_experiment("system", "a system wired in Python", system, stop))
         if isinstance(self.subject, type):
             return self._of_class(self.subject)
         path = self.path
         if is_ssp(self.subject):
-            of_ssp = open_experiment(path, self.stop, self.step, opened, self.parameters)
-            until = of_ssp.stop_time(NoParameters())
-            return OpenedSubject(of_ssp, source=source_of(path, until, self.step, self.parameters))
+            of_ssp = open_experiment(path, self.stop, self.step, opened, self.parameters, self.start)
+            return OpenedSubject(of_ssp, source=source_of(path, *_times_of(of_ssp), self.step, self.parameters))
         if is_fmu(self.subject):
-            alone = FmuRun(path=path, parameters=self.parameters, inputs=self.inputs, stop=self.stop, step=self.step)
+            alone = FmuRun(path, self.parameters, self.inputs, self.start, self.stop, self.step)
             of_fmu = alone.open()
-            return OpenedSubject(of_fmu, source=alone.as_source(of_fmu.stop_time(NoParameters())))
+            return OpenedSubject(of_fmu, source=alone.as_source(*_times_of(of_fmu)))
         scenario = find_scenario(self.subject)
         values = split_parameters(scenario, self.parameters)
         return OpenedSubject(scenario(), *values, own_source(self.subject), self.stop)
@@ -194,14 +202,20 @@ class RunRequest:
         return isinstance(self.subject, str) and is_of_kind(self.subject)
 
 
+def _times_of(experiment: Experiment[Any]) -> tuple[Fraction, Fraction]:
+    """Return start and stop time of what is run of a file, s."""
+    return experiment.start, experiment.stop_time(NoParameters())
+
+
 def is_file(subject: object) -> bool:
     """Return whether a subject is the path of an SSP or an FMU."""
     return isinstance(subject, str) and (is_ssp(subject) or is_fmu(subject))
 
 
 def experiment_type(
-    subject: str, stop: Fraction | None = None, step: Fraction | None = None, inputs: Path | None = None
-) -> type[Experiment[Any]]:
+    subject: str, start: Fraction | None = None, stop: Fraction | None = None, step: Fraction | None = None,
+    inputs: Path | None = None,
+) -> type[Experiment[Any]]:  # fmt: skip
     """Return the class of what is to be run, see `RunRequest`: a scenario; or a file, open while it is the newest.
 
     Raises:
@@ -210,19 +224,21 @@ def experiment_type(
     if not is_file(subject):
         return find_scenario(subject)
     there = [file for file in (Path(subject), inputs) if file is not None and file.exists()]
-    return _type_of_file(subject, stop, step, inputs, tuple((file, file.stat().st_mtime_ns) for file in there))
+    return _type_of_file(subject, start, stop, step, inputs, tuple((file, file.stat().st_mtime_ns) for file in there))
 
 
 @functools.lru_cache(maxsize=1)
 def _type_of_file(
     file: str,
+    start: Fraction | None,
     stop: Fraction | None,
     step: Fraction | None,
     inputs: Path | None,
     _versions: tuple[tuple[Path, int], ...],
 ) -> type[Experiment[Any]]:
     opened = contextlib.ExitStack()
-    found = type(RunRequest(subject=file, stop=stop, step=step, inputs=inputs).open(opened).experiment)
+    request = RunRequest(subject=file, start=start, stop=stop, step=step, inputs=inputs)
+    found = type(request.open(opened).experiment)
     weakref.finalize(found, opened.close)
     return found
 

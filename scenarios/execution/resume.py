@@ -153,7 +153,8 @@ class InterruptedRun:
         if not file.is_file() or sha256_of(file) != source["sha256"]:
             raise InvalidRunFolder(self.folder.path, f"{file} is not the file that the run began with")
         times = Fraction(source["stop"]), None if step is None else Fraction(step)
-        return open_experiment(file, *times, opened, source.get("parameters", ()))
+        start = Fraction(source.get("start", "0"))
+        return open_experiment(file, *times, opened, source.get("parameters", ()), start)
 
     def _own_scenario(self, source: Mapping[str, Any]) -> Experiment[Any]:
         """Return a scenario that is not this package's, if it is what it was."""

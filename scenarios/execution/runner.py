@@ -42,7 +42,7 @@ from handover.scenarios.results.task import Task
 from handover.scenarios.results.tolerated_faults import GuardedEvaluator, ToleratedFaults, scenario_code
 
 Progress = Callable[[float, float], None]
-"""Is called with the simulated time and the time at which the run ends at the latest, in seconds."""
+"""Is called with the simulated seconds until now, and those of the whole run at most."""
 
 Concluded = Callable[[RunResult], AbstractContextManager[None]]
 """Is called with the result of a run that has its verdict; what it returns is entered while figures are drawn."""
@@ -178,13 +178,13 @@ def _run(
     around: _Surroundings,
 ) -> UnitFailure | None:  # fmt: skip
     """Step until the end, and record; return the failure that it ended with, if any."""
-    stop, interruption = task.stop_time, around.interruption
+    start, stop, interruption = task.experiment.start, task.stop_time, around.interruption
     rows = 0 if resumption is None else resumption.checkpoint.rows
     with Recorder(task.folder.signals, task.formats, after=rows) as recorder:
         checkpoints = _checkpoints(task, master, recorder, evaluator, around.clock)
 
         def report_progress(t: float, _signals: Signals) -> None:
-            around.progress(t, float(stop))
+            around.progress(t - float(start), float(stop - start))
 
         def write_due_checkpoints(t: float, signals: Signals) -> None:
             for checkpointer in checkpoints:

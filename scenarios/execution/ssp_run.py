@@ -50,6 +50,7 @@ def open_experiment(
     step: Fraction | None,
     opened: contextlib.ExitStack,
     parameters: Sequence[str] = (),
+    start: Fraction | None = None,
 ) -> FileExperiment:
     """Open an SSP as an experiment; `opened` closes it.
 
@@ -57,20 +58,34 @@ def open_experiment(
 
     Raises:
         InvalidSsp: see `SspFile`; where a unit has no step, it names `--step`.
-        UsageError: neither the file nor the command gives a stop time, or a text is of another form.
+        UsageError: neither the file nor the command gives a stop time after the start, or a text is of another form.
     """
     texts = _texts_by_name(path, parameters)
     try:
-        ssp = opened.enter_context(SspFile(path, step, texts, None if stop == ENDLESS else stop))
+        ssp = opened.enter_context(SspFile(path, step, texts, start, None if stop == ENDLESS else stop))
     except InvalidSsp as e:
         raise InvalidSsp(e.path, naming_step(e.faults)) from e
     supervisor.heartbeat.record_scratch_folder(str(ssp.folder))
-    until = stop or ssp.stop
-    if until is None:
-        raise UsageError(f"{path}: its description has no stop time; --stop 10 lets it run for 10 s")
+    until = checked_stop(path, ssp.system.start, stop, ssp.stop)
     heading = f"{ssp.name}, a system from {path.name}"
     parallel_step = None if step else ssp.parallel_step
     return system_experiment(path.name, heading, ssp.system, until, parallel_step, SspParameters(ssp))
+
+
+def checked_stop(path: Path, start: Fraction, asked: Fraction | None, proposed: Fraction | None) -> Fraction:
+    """Return when a run of a file ends that starts at a time, s: as asked, or as the file proposes.
+
+    Raises:
+        UsageError: neither gives a time, or one that is not after the start.
+    """
+    later = f"--stop {float(start + 10):g} lets it run from {float(start):g} to {float(start + 10):g} s"
+    stop = proposed if asked is None else asked
+    if stop is None:
+        raise UsageError(f"{path}: it proposes no stop time; {later}")
+    if stop <= start:
+        whose = "it proposes to stop" if asked is None else "it is to stop"
+        raise UsageError(f"{path}: {whose} at {float(stop):g} s, and starts at {float(start):g} s; {later}")
+    return stop
 
 
 def _texts_by_name(path: Path, given: Sequence[str]) -> dict[str, str]:
@@ -88,8 +103,10 @@ def naming_step(faults: Sequence[str]) -> list[str]:
     return [f"{f}, such as by --step 0.01" if isinstance(f, NoStep) else f for f in faults]
 
 
-def source_of(path: Path, stop: Fraction, step: Fraction | None, parameters: Sequence[str]) -> dict[str, Any]:
+def source_of(
+    path: Path, start: Fraction, stop: Fraction, step: Fraction | None, parameters: Sequence[str]
+) -> dict[str, Any]:
     """Return what a run's folder keeps of an SSP so that the run can be resumed: the file, times and given values."""
-    times = {"stop": str(stop), "step": None if step is None else str(step)}
+    times = {"start": str(start), "stop": str(stop), "step": None if step is None else str(step)}
     given = {"parameters": list(parameters)} if parameters else {}
     return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **times, **given}

@@ -182,6 +182,8 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
     of the evaluator's outcome."""
     unit_files: ClassVar[tuple[str, ...]] = ()
     """Values of units' parameters, as `UNIT.NAME`, that name files which these read."""
+    start: ClassVar[Fraction] = Fraction(0)
+    """When a run starts, s; that of a scenario at 0 s."""
     is_seeded: ClassVar[bool] = True
     """Whether it draws random numbers, which follow from the seed."""
     parallel_step: ClassVar[Fraction | None] = None

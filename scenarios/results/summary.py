@@ -122,7 +122,7 @@ class RunData(Configuration, _OfSomeRuns):
     units do not have and the wiring leaves out, and the names of `external_inputs`, which came from outside; one that
     could not start has `failure`; `units` are the FMUs' names and hashes; `parameter_files` has those of the files that
     parameters name, by these, where there are any. `experiment` is what units were given as they were initialised:
-    the run's `stop` time, s, as far as their steps reach, and `tolerances` for their own solvers, by unit.
+    the run's `start` and `stop`, s, the latter as far as their steps reach, and by unit `tolerances` of its solver.
     """
 
     source: dict[str, Any]
@@ -180,7 +180,7 @@ def finished_summary(
         success=outcome.success,
         reason=outcome.reason,
         metrics={name: metric_data(metric) for name, metric in metrics.items()},
-        simulated_seconds=master.time,
+        simulated_seconds=master.time - float(master.system.start),
         **steps,
         wall_seconds=spent.wall,
         cpu_seconds=spent.cpu,
@@ -258,7 +258,8 @@ def begun_run(task: Task, master: Master) -> RunData:
     system = describe_system(master.system, adaptive=master.steps is not None)
     fmus = {name: unit.description.path for name, unit in master.system.units.items()}
     of_this_run: _OfSomeRuns = {"system": system, "conversions": conversions_of(master.system)}
-    of_this_run["experiment"] = {"stop": float(task.stop_time), "tolerances": master.tolerances}
+    times = {"start": float(master.system.start), "stop": float(task.stop_time)}
+    of_this_run["experiment"] = {**times, "tolerances": master.tolerances}
     faults = [f"{path.name}: {fault}" for path, fault in master.description_faults.items()]
     if warned := [*faults, *master.system.tolerated, *master.system.undefined_starts, *master.execution_tools]:
         of_this_run["warnings"] = warned

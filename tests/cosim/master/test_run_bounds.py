@@ -5,15 +5,19 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from native_units import Edited, native_fmu
 
-from handover.cosim.exceptions import InvalidOptions, UnitFailure
+from handover.cosim.exceptions import InvalidOptions, UnitFailure, WiringError
 from handover.cosim.master.master import Master
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, MasterOptions
+from handover.cosim.system.port_names import PortName
+from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
+from handover.cosim.system.time_series import TimeSeries
 
 OPTIONS = {
     "plan": MasterOptions(),
@@ -155,3 +159,56 @@ def test_a_unit_is_given_a_tolerance_by_name_or_for_all_or_its_own(fmi: int, opt
 def test_what_is_no_tolerance_is_refused(tolerances: Any):
     with pytest.raises(InvalidOptions, match="unit_tolerances"):
         MasterOptions(unit_tolerances=tolerances)
+
+
+STARTS = [Fraction(7, 3), Fraction(-5, 3), Fraction(10**6) + Fraction(1, 10)]
+
+
+def observed_from(start: Fraction, options: MasterOptions) -> tuple[list[float], list[tuple[float, ...]]]:
+    """Run units at several rates, one of them sampled, for 2 s; return times and outputs."""
+    s, times, rows = System(), list[float](), list[tuple[float, ...]]()
+    s.start = start
+    s.add("mass", native_fmu("mass", 2), period=Fraction(1, 16), k=10.0, x0=1.0)
+    s.add("ramp", native_fmu("integrator", 3), u=1.0, period=Fraction(1, 4))
+    s.add("sampled", native_fmu("gain", 3), sampled=True, period=Fraction(1, 2))
+    s.connect(PortName("mass", "x"), PortName("sampled", "u"))
+    with Master(s, options, stop=start + 2) as master:
+        assert master.time == float(start)
+
+        def observe(t: float, y: Signals) -> None:
+            times.append(t)
+            rows.append(tuple(float(y[name]) for name in ("mass.x", "ramp.x", "sampled.y")))
+
+        master.run(start + 2, [observe])
+    return times, rows
+
+
+@all_ways
+@pytest.mark.parametrize("start", STARTS, ids=float)
+def test_a_run_from_another_start_is_the_same_at_later_times(start: Fraction, options: MasterOptions):
+    times, rows = observed_from(start, options)
+    from_0, expected = observed_from(Fraction(0), options)
+    assert times == [float(start + Fraction(t)) for t in from_0]
+    assert len(times) > 4
+    np.testing.assert_allclose(rows, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_units_are_given_the_start_and_inputs_follow_values_from_it_on(fmi: int):
+    s = System()
+    s.start = Fraction(5)
+    s.add("clerk", native_fmu("clerk", fmi), period=Fraction(1, 2))
+    passer = s.add("gain", native_fmu("gain", fmi), period=Fraction(1, 2))
+    s.follow(passer.u.u, TimeSeries([0.0, 10.0], [[0.0], [20.0]], linear=True))
+    seen: list[tuple[float, ...]] = []
+    with Master(s) as master:
+        names = "clerk.start", "clerk.now", "gain.y"
+        master.run(Fraction(6), [lambda t, y: seen.append((t, *(float(y[n]) for n in names)))])
+    assert seen == [(5.0, 5.0, 5.0, 10.0), (5.5, 5.0, 5.5, 10.0), (6.0, 5.0, 6.0, 11.0)]
+
+
+def test_a_start_that_is_not_exact_is_refused():
+    s = ramp()
+    s.start = 0.1  # type: ignore[assignment]
+    with pytest.raises(WiringError, match=r"its start, 0\.1, is not exact; give Fraction\('0\.1'\)"):
+        s.check()

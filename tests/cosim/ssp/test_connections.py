@@ -244,13 +244,22 @@ def test_indices_of_version_2_are_refused_by_name(opened: Open):
     assert "startIndices is not supported" in refusal(lambda: opened(TWO, indexed, version="2.0"))
 
 
-@pytest.mark.parametrize(("start", "stop", "wanted"), [("0", "2.5", "5/2"), ("0.0", "0.3333333333333333", "1/3")])
-def test_the_stop_time_is_the_default_experiment_s(opened: Open, start: str, stop: str, wanted: str):
-    more = f'<ssd:DefaultExperiment startTime="{start}" stopTime="{stop}"/>'
-    assert str(opened(TWO, more=more).stop) == wanted
+@pytest.mark.parametrize(
+    ("start", "stop", "wanted"),
+    [
+        ("0", "2.5", ("0", "5/2")),
+        ("-1.5", "0.3333333333333333", ("-3/2", "1/3")),
+        ("0.3333333333333333", "1", ("1/3", "1")),
+    ],
+)
+def test_start_and_stop_time_are_the_default_experiment_s(opened: Open, start: str, stop: str, wanted: tuple[str, str]):
+    ssp = opened(TWO, more=f'<ssd:DefaultExperiment startTime="{start}" stopTime="{stop}"/>')
+    assert (str(ssp.system.start), str(ssp.stop)) == wanted
 
 
-@pytest.mark.parametrize(("start", "stop", "value"), [("1", "2", "only 0 s can be run"), ("0", "-1", "ends at -1 s")])
+@pytest.mark.parametrize(
+    ("start", "stop", "value"), [("2", "2", "ends at 2 s; above 2 s"), ("0", "-1", "ends at -1 s")]
+)
 def test_an_experiment_that_cannot_be_run_is_refused(opened: Open, start: str, stop: str, value: str):
     more = f'<ssd:DefaultExperiment startTime="{start}" stopTime="{stop}"/>'
     assert value in refusal(lambda: opened(TWO, more=more))
@@ -263,7 +272,7 @@ def test_an_fmu_that_proposes_no_step_takes_a_500th(tmp_path: Path, stop: str, o
     file = pack_ssp(tmp_path / "a.ssp", described(system(component("a"))), {"resources/unit.fmu": fmu})
     if not stop:
         assert "a: its FMU proposes no communication step; give one" in refusal(lambda: SspFile(file))
-    with SspFile(file, duration=Fraction(of_run)) as ssp:
+    with SspFile(file, stop=Fraction(of_run)) as ssp:
         assert ssp.system.units["a"].period == Fraction(taken)
         assert [f"{taken} s is taken" in line for line in ssp.system.tolerated] == [True]
     with SspFile(file, Fraction(1, 30)) as ssp:

@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import pytest
 from native_units import native_fmu
-from observed_rows import grid, observed_rows
+from observed_rows import observed_rows
 
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.stepping.options import Algorithm, MasterOptions
@@ -14,18 +14,20 @@ ALGORITHMS = [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL]
 TENTH = Fraction(1, 10)
 
 
+@pytest.mark.parametrize("start", [Fraction(0), Fraction(1, 3)])
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_counters_at_three_rates_count_exactly(algorithm: Algorithm):
+def test_counters_at_three_rates_count_exactly_from_the_start_on(algorithm: Algorithm, start: Fraction):
     rates = {"tenths": 10, "quarters": 4, "thirds": 3}
     s = System()
     for name in rates:
         s.add(name, native_fmu(f"counter_{name}"), period=Fraction(1))
+    s.start = start
     names = [f"{name}.count" for name in rates]
-    rows = observed_rows(s, Fraction(30), *names, options=MasterOptions(algorithm=algorithm))
-    assert list(rows) == sorted({t for rate in rates.values() for t in grid(rate, 30)})
+    rows = observed_rows(s, start + 20, *names, options=MasterOptions(algorithm=algorithm))
+    ticks = {rate: [float(start + Fraction(k, rate)) for k in range(20 * rate + 1)] for rate in rates.values()}
+    assert list(rows) == sorted({t for times in ticks.values() for t in times})
     for i, rate in enumerate(rates.values()):
-        counts = {t: row[i] for t, row in rows.items() if t in set(grid(rate, 30))}
-        assert counts == {k / rate: k + 1 for k in range(30 * rate + 1)}
+        assert [rows[t][i] for t in ticks[rate]] == [k + 1 for k in range(20 * rate + 1)]
 
 
 def test_a_clocked_value_goes_from_tick_to_tick():

@@ -156,6 +156,19 @@ def test_a_system_is_not_changed_by_being_opened():
     assert not system.followed
 
 
+def test_it_begins_at_the_start_that_is_given(tmp_path: Path):
+    fmu = shutil.copyfile(native_fmu("clerk"), tmp_path / "clerk.fmu")
+    with handover.open(fmu, start=-2, step=0.25) as s:
+        assert (s.time, s["clerk.start"], s["clerk.stop"]) == (-2.0, -2.0, -1.0)  # no stop time is defined
+        assert s.step(0.25) == s["clerk.now"] == -1.75
+        saved = s.save()
+        s.step(1)
+        s.restore(saved)
+        assert s.step(0.25) == s["clerk.now"] == -1.5
+    with pytest.raises(handover.InvalidInput, match="a scenario begins at 0 s"):
+        handover.open("ir_grasp", start=1)
+
+
 def test_an_ssp_and_an_fmu_are_stepped(tmp_path: Path):
     fmu = shutil.copyfile(native_fmu("gain"), tmp_path / "gain.fmu")
     with handover.open(fmu, a=3, u=2) as s:

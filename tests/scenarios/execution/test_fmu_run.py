@@ -96,8 +96,44 @@ def test_a_unit_is_given_its_tolerance_and_the_stop_time_and_both_are_kept(tmp_p
     assert record["clerk.tolerance"].tolist() == [1e-6] * 5
     assert record["clerk.stop"][0] == record.time[-1] == pytest.approx(0.4)
     data = json.loads((out / "run.json").read_text())
-    assert data["experiment"] == {"stop": 0.35, "tolerances": {"clerk": 1e-6}}
+    assert data["experiment"] == {"start": 0.0, "stop": 0.35, "tolerances": {"clerk": 1e-6}}
     assert data["master"]["unit_tolerances"] == {"all": 1e-3, "clerk": 1e-6}
+
+
+@pytest.mark.parametrize(
+    ("given", "start", "times"),
+    [
+        ((), 2.0, [2.0, 2.5, 3.0]),
+        (("--start", "2.25", "--stop", "3.25"), 2.25, [2.25, 2.75, 3.25]),
+        (("--start", "-1", "--stop", "1/4"), -1.0, [-1.0, -0.5, 0.0, 0.5]),
+    ],
+)
+def test_a_run_starts_where_the_fmu_or_the_command_says(
+    given: Sequence[str], start: float, times: list[float], tmp_path: Path
+):
+    fmu = edited(tmp_path, b'startTime="0" stopTime="1"', b'startTime="2" stopTime="3"', "clerk")
+    out, again = tmp_path / "out", tmp_path / "again"
+    result = run(fmu, "--step", "0.5", *given, "--no-report", "--out", out)
+    assert result.exit_code == 0, result.output
+    record = Record(out / "signals.parquet")
+    assert record.time.tolist() == record["clerk.now"].tolist() == times
+    assert set(record["clerk.start"].tolist()) == {start}
+    summary, data = (json.loads((out / f"{name}.json").read_text()) for name in ("summary", "run"))
+    assert summary["simulated_seconds"] == times[-1] - start
+    assert data["experiment"]["start"] == start
+    assert run(fmu, "--config", out / "run.json", "--no-report", "--out", again).exit_code == 0
+    assert (again / "signals.parquet").read_bytes() == (out / "signals.parquet").read_bytes()
+
+
+def test_a_start_at_or_after_the_stop_and_one_of_a_scenario_are_refused(tmp_path: Path):
+    out = tmp_path / "out"
+    for subject, given, told in (
+        (native_fmu("clerk"), ("--start", "1"), "it proposes to stop at 1 s, and starts at 1 s; --stop 11 lets it run"),
+        (native_fmu("clerk"), ("--start", "3", "--stop", "2"), "it is to stop at 2 s, and starts at 3 s; --stop 13"),
+        ("ir_grasp", ("--start", "0"), "--start is for an SSP or an FMU; a scenario begins at 0 s"),
+    ):
+        result = run(subject, *given, "--out", out)
+        assert (result.exit_code, told in result.output, out.exists()) == (2, True, False), result.output
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "fine", "clerk=", "=1e-3", "clerk=nan"])
@@ -210,8 +246,19 @@ def test_inputs_are_for_an_fmu_alone(tmp_path: Path):
         assert "for an FMU that runs by itself" in result.output
 
 
-def test_a_run_with_a_table_resumes_to_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    arguments = [native_fmu("mass", 2), "--input", table(tmp_path, PULL), "-p", "k=30", "--checkpoint", "0.25"]
+@pytest.mark.parametrize("start", ["0", "-0.2"])
+def test_a_run_with_a_table_resumes_to_the_same_bytes(start: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    arguments = [
+        native_fmu("mass", 2),
+        "--input",
+        table(tmp_path, PULL),
+        "-p",
+        "k=30",
+        "--checkpoint",
+        "0.25",
+        "--start",
+        start,
+    ]
     arguments += ["--call-limit", "0"]  # observers are called in the main thread, where Ctrl-C is heard at once
     whole, parted = tmp_path / "whole", tmp_path / "parted"
     assert run(*arguments, "--no-report", "--out", whole).exit_code == 0
@@ -298,9 +345,9 @@ def test_a_fault_that_co_simulation_does_not_touch_is_warned_of_once(tmp_path: P
     assert "it is the derivative of 999, which leads to no variable" in checked.output
 
 
-def edited(folder: Path, old: bytes, new: bytes) -> Path:
+def edited(folder: Path, old: bytes, new: bytes, unit: str = "mass") -> Path:
     file = folder / "edited.fmu"
-    with zipfile.ZipFile(native_fmu("mass", 3)) as source, zipfile.ZipFile(file, "w") as target:
+    with zipfile.ZipFile(native_fmu(unit, 3)) as source, zipfile.ZipFile(file, "w") as target:
         for name in source.namelist():
             content = source.read(name)
             assert old in content or name != "modelDescription.xml"
@@ -321,7 +368,7 @@ def test_a_default_experiment_that_stops_before_it_starts_is_refused(tmp_path: P
             archive.writestr(name, content)
     result = run(turned, "--step", "0.1", "--out", tmp_path / "out")
     assert result.exit_code == 2, result.output
-    assert "it proposes to stop at 1 s, though to start at 2 s; --stop 10 lets it run from 0 to 10 s" in result.output
+    assert "it proposes to stop at 1 s, and starts at 2 s; --stop 12 lets it run from 2 to 12 s" in result.output
 
 
 @pytest.fixture(scope="module")

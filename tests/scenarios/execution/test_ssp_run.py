@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 from failing_systems import failing_ssp
+from native_units import native_fmu
 
 import handover
 from handover.cosim.record.reader import Record
@@ -69,6 +70,20 @@ def test_stop_and_step_of_the_call_come_first(spring: Path, tmp_path: Path):
     assert Record(out / "signals.parquet").time.tolist() == [0.0, 0.25, 0.5]
 
 
+def test_a_run_starts_where_the_file_or_the_call_says(tmp_path: Path):
+    s, file = System(), tmp_path / "a.ssp"
+    s.start = Fraction(2)
+    s.add("clerk", native_fmu("clerk", 2), period=Fraction(1, 2))
+    write_ssp(s, file, "a", Fraction(3))
+    for given, times in (((), [2.0, 2.5, 3.0]), (("--start", "1"), [1.0, 1.5, 2.0, 2.5, 3.0])):
+        out = tmp_path / f"from {times[0]}"
+        assert run(file, *given, "--no-report", "--out", out).exit_code == 0
+        record = Record(out / "signals.parquet")
+        assert record.time.tolist() == record["clerk.now"].tolist() == times
+        assert record["clerk.start"][0] == times[0]
+    assert run(file, "--start", "3", "--out", tmp_path / "none").exit_code == 2
+
+
 def test_a_unit_that_fails_ends_the_run_with_status_3_and_keeps_the_record(spring: Path, tmp_path: Path):
     out = tmp_path / "out"
     result = run(packed(spring, tmp_path, Fraction(2), tears=0.45), "--out", out)
@@ -112,7 +127,7 @@ def test_of_a_run_that_ended_where_it_began_nothing_is_drawn(spring: Path, tmp_p
 def test_without_a_stop_time_one_is_asked_for(spring: Path, tmp_path: Path):
     result = run(packed(spring, tmp_path), "--out", tmp_path / "out")
     assert result.exit_code == 2, result.output
-    assert "no stop time; --stop 10 lets it run for 10 s" in result.output
+    assert "proposes no stop time; --stop 10 lets it run from 0 to 10 s" in result.output
     assert not (tmp_path / "out").exists()
 
 
