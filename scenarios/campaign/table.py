@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from handover.cosim.exceptions import nearest, one_line
-from handover.scenarios.campaign.plan import PlannedRun
+from handover.scenarios.campaign.plan import PlannedRun, safe_name
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.results.run_folder import InvalidRunFolder
 from handover.scenarios.results.summary import metric_of
@@ -41,11 +41,15 @@ class CampaignTable:
         """
         file = path / "runs.parquet" if path.is_dir() else path
         try:
-            return cls(pq.read_table(file))
+            table = cls(pq.read_table(file))
         except FileNotFoundError as e:
             raise InvalidRunFolder(file.parent, f"it has no {file.name}; {_REMEDY}") from e
         except (OSError, pa.ArrowException) as e:
             raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}; {_REMEDY}") from e
+        for name in table.column("run") if "run" in table.table.column_names else ():
+            if not isinstance(name, str) or name.startswith(".") or safe_name(name) != name:  # not in the folder
+                raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {name!r:.60} is no run's name")
+        return table
 
     def __len__(self) -> int:
         """Return the number of rows."""

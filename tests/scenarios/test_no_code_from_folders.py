@@ -177,6 +177,17 @@ def test_no_name_of_a_module_is_taken_from_a_folder(marker: Path, tmp_path: Path
     assert not marker.exists()
 
 
+def test_a_campaigns_table_names_no_folder_outside(tmp_path: Path):
+    theirs, mine = campaign_of(tmp_path / "theirs", sources(tmp_path)[0]), run_of(tmp_path / "mine", {})
+    table: Any = pq.read_table(theirs / "runs.parquet")
+    column: Any = pa.array(["../../mine"] * len(table))
+    pq.write_table(table.set_column(table.column_names.index("run"), "run", column), theirs / "runs.parquet")
+    refused = call("report", theirs, "--runs")
+    assert refused.exit_code == 2, refused.output
+    assert "is no run's name" in refused.output
+    assert not (mine / "report.html").exists()
+
+
 def test_a_file_that_is_named_is_run(marker: Path, tmp_path: Path):
     plant(tmp_path / "theirs", marker)
     run = run_of(tmp_path / "theirs" / "a", sources(tmp_path / "theirs")[0])
