@@ -1,11 +1,11 @@
 """A system from a file, or wired in Python, as an experiment: it runs until its stop time, and its outputs are shown.
 
-The metrics of such a run are the last value of each of its outputs in the record, and the smallest and the largest.
+The metrics of such a run are the last value of each signal in its record, of numbers the smallest and the largest, too.
 """
 
 import abc
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
@@ -14,7 +14,7 @@ import numpy as np
 
 from handover.cosim.blocks.variable import Kind, element_names
 from handover.cosim.fmu.file.description import FmuPort
-from handover.cosim.record.reader import Record
+from handover.cosim.record.reader import SUBSCRIPT, Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Metric, Outcome
@@ -86,15 +86,6 @@ def settable_of(experiment: type[Experiment[Any]]) -> SettableParameters | None:
     return experiment.settable if issubclass(experiment, FileExperiment) else None
 
 
-@dataclass(frozen=True)
-class _ShownOutput:
-    """A number that is recorded: its column, its name in metrics, and whether its range is one of them."""
-
-    column: str
-    name: str
-    ranged: bool
-
-
 def system_experiment(
     file_name: str,
     heading: str,
@@ -114,10 +105,10 @@ def system_experiment(
         stop: when it ends, s.
         step: its `parallel_step`, s.
         settable: its parameters.
-        alone: whether it is one unit, whose outputs are named without it.
+        alone: whether it is one unit, whose outputs have its name in no metric.
     """
-    begin, outputs = system.start, _shown_outputs(system, alone=alone)
-    file_settable, shown_first = settable, _headline(outputs)
+    units, shown_first = (tuple(system.units) if alone else ()), _headline(system, alone=alone)
+    begin, file_settable = system.start, settable
 
     class SystemExperiment(FileExperiment):
         """Runs the system as it is."""
@@ -139,7 +130,7 @@ def system_experiment(
             return UntilStop(stop)
 
         def recorded_metrics(self, signals: Path) -> Mapping[str, Metric]:
-            return _metrics(signals, outputs)
+            return _metrics(signals, units)
 
         def time_figures(self, parameters: Any, record: Record) -> list[TimeFigure]:  # noqa: ARG002
             from handover.scenarios.reporting.run_figures import figures_of_outputs  # what draws takes long to load
@@ -149,59 +140,61 @@ def system_experiment(
     return SystemExperiment()
 
 
-def _shown_outputs(system: System, *, alone: bool) -> list[_ShownOutput]:
-    found: list[_ShownOutput] = []
+def _headline(system: System, *, alone: bool) -> tuple[str, ...]:
+    """Return the names of metrics that summaries show: all of the outputs' where they are few, else last values."""
+    last: list[str] = []
+    ranges: list[str] = []
     for unit, placed in system.units.items():
         for port in placed.description.outputs.values():
             if port.kind in (Kind.STRING, Kind.BINARY) or port.size > MAX_ENTRIES:
                 continue
-            ranged = port.kind in (Kind.REAL, Kind.INTEGER)
-            for name in element_names(port):
-                column = f"{unit}.{name}"
-                found.append(_ShownOutput(column, name if alone else column, ranged))
-    return found
+            names = [name if alone else f"{unit}.{name}" for name in element_names(port)]
+            last += [f"last_{name}" for name in names]
+            if port.kind in (Kind.REAL, Kind.INTEGER):
+                ranges += [f"{end}_{name}" for name in names for end in ("min", "max")]
+    few = len(last) + len(ranges) <= _MAX_HEADLINE
+    return tuple([*last, *ranges] if few else last[:_MAX_HEADLINE])
 
 
-def _headline(outputs: Sequence[_ShownOutput]) -> tuple[str, ...]:
-    """Return the names of metrics that summaries show: all of them where they are few, else the first last values."""
-    names = _metric_names(outputs)
-    return tuple(names if len(names) <= _MAX_HEADLINE else names[: min(len(outputs), _MAX_HEADLINE)])
-
-
-def _metric_names(outputs: Sequence[_ShownOutput]) -> list[str]:
-    ranges = [f"{end}_{o.name}" for o in outputs if o.ranged for end in ("min", "max")]
-    return [*(f"last_{o.name}" for o in outputs), *ranges]
-
-
-def _metrics(signals: Path, outputs: Sequence[_ShownOutput]) -> dict[str, Metric]:
+def _metrics(signals: Path, alone: Sequence[str]) -> dict[str, Metric]:
     """Return the metrics of a record; values that are not finite have no part in the smallest and the largest.
 
     The record is read a part at a time. A run that recorded nothing has none.
+
+    Args:
+        signals: the record.
+        alone: the unit whose name is left out of those of metrics, if there is one.
     """
-    import pyarrow.parquet as pq  # slow to import
+    import pyarrow.parquet as pq  # slow to import, as what imports it
+
+    from handover.cosim.record.columns import column_metadata
 
     if not signals.exists():
         return {}
     file = pq.ParquetFile(signals)
-    schema = file.schema_arrow
-    recorded = [o for o in outputs if o.column in schema.names]
-    last: dict[str, float] = {}
-    low = {o.column: np.nan for o in recorded}
-    high = dict(low)
-    for batch in file.iter_batches(columns=[o.column for o in recorded], use_threads=False):
-        for o in recorded if batch.num_rows else ():
-            values = np.asarray(batch.column(o.column).to_numpy(zero_copy_only=False), dtype=np.float64)
+    about = dict(column_metadata(file.schema_arrow))
+    entries = Counter(SUBSCRIPT.sub("", column) for column in about)
+    columns = [c for c in about if c != "time" and entries[SUBSCRIPT.sub("", c)] <= MAX_ENTRIES]
+    last = dict.fromkeys(columns, np.nan)
+    low, high = dict(last), dict(last)
+    rows = 0
+    for batch in file.iter_batches(columns=columns, use_threads=False):
+        rows += batch.num_rows
+        for column in columns if batch.num_rows else ():
+            values = np.asarray(batch.column(column).to_numpy(zero_copy_only=False), dtype=np.float64)
             finite = values[np.isfinite(values)]
-            last[o.column] = float(values[-1])
-            if o.ranged and len(finite):
-                low[o.column] = float(np.fmin(low[o.column], finite.min()))
-                high[o.column] = float(np.fmax(high[o.column], finite.max()))
+            last[column] = float(values[-1])
+            if len(finite):
+                low[column] = float(np.fmin(low[column], finite.min()))
+                high[column] = float(np.fmax(high[column], finite.max()))
     found: dict[str, Metric] = {}
-    for o in recorded if last else ():
-        metadata: Mapping[bytes, bytes] = schema.field(o.column).metadata or {}
-        unit = metadata.get(b"unit", b"1").decode() if o.ranged else "1"
-        found[f"last_{o.name}"] = Metric(last[o.column], unit, f"last value of {o.name}")
-        if o.ranged:
-            found[f"min_{o.name}"] = Metric(low[o.column], unit, f"smallest value of {o.name}")
-            found[f"max_{o.name}"] = Metric(high[o.column], unit, f"largest value of {o.name}")
-    return {name: found[name] for name in _metric_names(outputs) if name in found}
+    ranges: dict[str, Metric] = {}
+    for column in columns if rows else ():
+        name, unit = column, about[column]["unit"]
+        for prefix in (f"{unit_name}." for unit_name in alone):
+            name = name.removeprefix(prefix)
+        found[f"last_{name}"] = Metric(last[column], unit, f"last value of {name}")
+        if not about[column]["items"] and str(file.schema_arrow.field(column).type) != "bool":
+            ranges[f"min_{name}"] = Metric(low[column], unit, f"smallest value of {name}")
+            ranges[f"max_{name}"] = Metric(high[column], unit, f"largest value of {name}")
+    return {**found, **ranges}

@@ -7,6 +7,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import decay
+import numpy as np
 import pytest
 from campaigns import carried_out
 from in_process_pool import InProcessPool
@@ -87,6 +89,16 @@ def test_an_ssp_is_swept_by_names_of_units(tmp_path: Path):
     first, second = columns(table, "last_first.y", "last_second.y")
     assert first == pytest.approx([2.0, 2.0, 3.0, 3.0])
     assert second == pytest.approx([20.0, 21.0, 30.0, 31.0])
+
+
+def test_local_variables_of_a_unit_without_outputs_are_metrics(tmp_path: Path):
+    """x' = -x from the given x, which is no output here."""
+    local = ('"local" variability="continuous"><Real', '"local" initial="exact"><Real start="1"')
+    hidden = ('causality="output"', 'causality="local"')
+    file = decay.pack(tmp_path / "decay.fmu", decay.compiled(tmp_path), decay.edited(local, hidden))
+    plan = plan_of(file, "x=1,3", stop=Fraction(1))
+    table = CampaignTable.read(carried_out(plan, tmp_path / "c").table)
+    assert table.column("last_x").tolist() == pytest.approx([np.exp(-1.0), 3.0 * np.exp(-1.0)])
 
 
 def test_arrays_are_lists_of_arrays(tmp_path: Path):
