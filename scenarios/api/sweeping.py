@@ -54,6 +54,7 @@ def sweep(
     inputs: Path | str | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    record: str | Sequence[str] = (),
     algorithm: str | Algorithm | None = None,
     isolate: str | Sequence[str] = (),
     options: MasterOptions | None = None,
@@ -83,6 +84,7 @@ def sweep(
         inputs: likewise.
         workers: runs at the same time, by default one a core.
         scheduler: address of a Dask scheduler whose workers do the runs.
+        record: as of `handover.run`; of a file they are metrics, too.
         algorithm: as of `handover.run`.
         isolate: likewise.
         options: likewise.
@@ -134,6 +136,7 @@ def sweep(
             stop=common.stop,
             step=common.step,
             inputs=common.inputs,
+            recorded=(record,) if isinstance(record, str) else tuple(record),
         )
         return _carried_out(plan, None if out is None else Path(out), PoolConfig(workers, scheduler), progress)
 

@@ -121,6 +121,7 @@ class _CampaignState:
             start=self.plan.start,
             stop=self.plan.stop,
             step=self.plan.step,
+            recorded=tuple(self.plan.recorded),
             inputs="" if inputs is None else str(self.folder.fmus.absolute() / inputs.name),
             log_level=self.plan.log_level,
             modules="" if self._source is None else self._source.folder,

@@ -64,6 +64,7 @@ class CampaignPlan:
         stop: when each run ends, s; None: as the scenario or the file says.
         step: of all units of an SSP or FMU, s; None: as they propose.
         inputs: a file of inputs over time, of an FMU.
+        recorded: as of `Task`.
         log_level: from which level on each run's log.txt has logs, see `logging_to_standard_error`.
         experiment: name of the published experiment that it belongs to; "" if to none.
     """
@@ -82,6 +83,7 @@ class CampaignPlan:
     stop: Fraction | None = None
     step: Fraction | None = None
     inputs: Path | None = None
+    recorded: Sequence[str] = ()
     log_level: str | None = None
     experiment: str = ""
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from handover.cosim.master.master import Master
+from handover.cosim.system.recorded_variables import record_variables
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.campaign.plan import MAX_REPETITIONS, MAX_RUNS, CampaignPlan, unit_key
@@ -126,6 +127,7 @@ def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
     for chosen, number in first.items():
         system = built_system(instance, parameters, plan.seed, plan.fmus(number, fmus), {})
         _check_unit_values(instance, system, plan, [p for p in plan.points if _chosen_units(plan, p) == chosen])
+        record_variables(system, plan.recorded)
         Master(system, plan.options)
 
 

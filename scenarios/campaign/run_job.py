@@ -75,6 +75,7 @@ def _task(job: RunJob, folder: Path, opened: contextlib.ExitStack) -> Task:
         options=job.options,
         stop=asked.stop,
         source=asked.source,
+        recorded=job.recorded,
         presented=False,
     )
 

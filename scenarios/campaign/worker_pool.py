@@ -28,7 +28,7 @@ class RunJob:
         fmus: the FMU of each unit.
         runs: the campaign's folder of runs.
         options: how units are run.
-        start, stop, step, inputs: as of `RunRequest`; "" for no inputs.
+        start, stop, step, inputs, recorded: as of `RunRequest`; "" for no inputs.
         log_level: from which level on its log has logs, see `logging_to_standard_error`.
     """
 
@@ -44,6 +44,7 @@ class RunJob:
     stop: Fraction | None = None
     step: Fraction | None = None
     inputs: str = ""
+    recorded: tuple[str, ...] = ()
     log_level: str | None = None
 
 

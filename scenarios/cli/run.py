@@ -81,6 +81,15 @@ is not, and such a unit ends the command.
 """
 
 _record_option = partial(click.option, cls=HeadedOption, heading="Record")
+recorded_option = _record_option(
+    "--record",
+    "recorded",
+    multiple=True,
+    metavar="UNIT.NAME",
+    help="Record a local variable or parameter of a unit, too; * and ? stand for any characters, as in 'arm.*'. May be"
+    " given more than once.  [default: the outputs, or where there are none, the local variables]",
+)
+"""For commands that record runs."""
 
 
 @click.command("run", cls=ConfiguredCommand, help=_HELP, context_settings={"show_default": True})
@@ -135,14 +144,7 @@ _record_option = partial(click.option, cls=HeadedOption, heading="Record")
     type=click.Choice(list(RECORD_FORMATS)),
     help="Format of the record; may be given more than once. Parquet is always written.  [default: parquet]",
 )
-@_record_option(
-    "--record",
-    "recorded",
-    multiple=True,
-    metavar="UNIT.NAME",
-    help="Record a local variable or parameter of a unit, too; * and ? stand for any characters, as in 'arm.*'. May be"
-    " given more than once.  [default: the outputs, or where there are none, the local variables]",
-)
+@recorded_option
 @_record_option(
     "--checkpoint",
     "every",

@@ -25,7 +25,7 @@ from handover.scenarios.cli.options import (
     scenario_options,
     stop_option,
 )
-from handover.scenarios.cli.run import file_options
+from handover.scenarios.cli.run import file_options, recorded_option
 from handover.scenarios.execution.errors import one_line_errors, require_extra
 from handover.scenarios.execution.progress import doing
 from handover.scenarios.execution.request import RunRequest, experiment_type
@@ -40,7 +40,7 @@ NAME=VALUES is a list or a range of numbers:
   --unit servo=a.fmu,b.fmu  the unit itself, by files or MODULE:CLASS
 
 Parameters of FILE.fmu have its own names, those of FILE.ssp are UNIT.NAME or its own, as for `handover run -p`; results
-are the last, smallest and largest value of each output.
+are the last, smallest and largest value of each output, and of what --record names.
 
 \b
 Examples
@@ -86,6 +86,7 @@ Exit status
 @log_option
 @campaign_options
 @file_options
+@recorded_option
 @master_options
 @limit_options
 def sweep(
@@ -106,6 +107,7 @@ def sweep(
     stop: Fraction | None,
     step: Fraction | None,
     inputs: Path | None,
+    recorded: Sequence[str],
     call_limit: float,
     pace: float | None,
     **coupling: Any,
@@ -144,6 +146,7 @@ def sweep(
             stop=stop,
             step=step,
             inputs=inputs,
+            recorded=tuple(recorded),
             log_level=log_level,
         )
     outcome = run_campaign_command(plan, out, pool, partial(_finish, as_json=as_json, report=not no_report))

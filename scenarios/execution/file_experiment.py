@@ -107,7 +107,7 @@ def system_experiment(
         settable: its parameters.
         alone: whether it is one unit, whose outputs have its name in no metric.
     """
-    units, shown_first = (tuple(system.units) if alone else ()), _headline(system, alone=alone)
+    prefix, shown_first = f"{next(iter(system.units))}." if alone else "", _headline(system, alone=alone)
     begin, file_settable = system.start, settable
 
     class SystemExperiment(FileExperiment):
@@ -130,7 +130,7 @@ def system_experiment(
             return UntilStop(stop)
 
         def recorded_metrics(self, signals: Path) -> Mapping[str, Metric]:
-            return _metrics(signals, units)
+            return _metrics(signals, prefix)
 
         def time_figures(self, parameters: Any, record: Record) -> list[TimeFigure]:  # noqa: ARG002
             from handover.scenarios.reporting.run_figures import figures_of_outputs  # what draws takes long to load
@@ -156,23 +156,25 @@ def _headline(system: System, *, alone: bool) -> tuple[str, ...]:
     return tuple([*last, *ranges] if few else last[:_MAX_HEADLINE])
 
 
-def _metrics(signals: Path, alone: Sequence[str]) -> dict[str, Metric]:
+def _metrics(signals: Path, prefix: str) -> dict[str, Metric]:
     """Return the metrics of a record; values that are not finite have no part in the smallest and the largest.
 
     The record is read a part at a time. A run that recorded nothing has none.
 
     Args:
         signals: the record.
-        alone: the unit whose name is left out of those of metrics, if there is one.
+        prefix: what is left out of the names of signals.
     """
-    import pyarrow.parquet as pq  # slow to import, as what imports it
+    import pyarrow as pa  # slow to import, as what imports it
+    import pyarrow.parquet as pq
 
     from handover.cosim.record.columns import column_metadata
 
     if not signals.exists():
         return {}
     file = pq.ParquetFile(signals)
-    about = dict(column_metadata(file.schema_arrow))
+    schema: Any = file.schema_arrow
+    about = dict(column_metadata(schema))
     entries = Counter(SUBSCRIPT.sub("", column) for column in about)
     columns = [c for c in about if c != "time" and entries[SUBSCRIPT.sub("", c)] <= MAX_ENTRIES]
     last = dict.fromkeys(columns, np.nan)
@@ -190,11 +192,9 @@ def _metrics(signals: Path, alone: Sequence[str]) -> dict[str, Metric]:
     found: dict[str, Metric] = {}
     ranges: dict[str, Metric] = {}
     for column in columns if rows else ():
-        name, unit = column, about[column]["unit"]
-        for prefix in (f"{unit_name}." for unit_name in alone):
-            name = name.removeprefix(prefix)
+        name, unit = column.removeprefix(prefix), about[column]["unit"]
         found[f"last_{name}"] = Metric(last[column], unit, f"last value of {name}")
-        if not about[column]["items"] and str(file.schema_arrow.field(column).type) != "bool":
+        if not about[column]["items"] and not pa.types.is_boolean(schema.field(column).type):
             ranges[f"min_{name}"] = Metric(low[column], unit, f"smallest value of {name}")
             ranges[f"max_{name}"] = Metric(high[column], unit, f"largest value of {name}")
     return {**found, **ranges}

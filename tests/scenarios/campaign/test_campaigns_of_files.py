@@ -14,7 +14,7 @@ from campaigns import carried_out
 from in_process_pool import InProcessPool
 from native_units import native_fmu
 
-from handover.cosim.exceptions import InvalidFmu
+from handover.cosim.exceptions import InvalidFmu, WiringError
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
 from handover.scenarios.campaign.campaign import run_campaign
@@ -99,6 +99,16 @@ def test_local_variables_of_a_unit_without_outputs_are_metrics(tmp_path: Path):
     plan = plan_of(file, "x=1,3", stop=Fraction(1))
     table = CampaignTable.read(carried_out(plan, tmp_path / "c").table)
     assert table.column("last_x").tolist() == pytest.approx([np.exp(-1.0), 3.0 * np.exp(-1.0)])
+
+
+def test_what_is_recorded_besides_outputs_is_a_metric_and_part_of_the_campaign(tmp_path: Path):
+    plan = plan_of(native_fmu("mass", 2), "m=1,2", fixed=("d=3",), recorded=("mass.d",))
+    folder = carried_out(plan, tmp_path / "c")
+    assert CampaignTable.read(folder.table).column("max_d").tolist() == [3.0, 3.0]
+    with pytest.raises(InvalidRunFolder, match=r"recorded is mass\.d there, not given in this command"):
+        folder.check(replace(plan, recorded=()), prepared(plan).fmus)
+    with pytest.raises(WiringError, match=r"mass\.e"):
+        prepared(replace(plan, recorded=("mass.e",)))
 
 
 def test_arrays_are_lists_of_arrays(tmp_path: Path):
