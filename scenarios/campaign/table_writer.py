@@ -241,7 +241,7 @@ def _plan_of(folder: CampaignFolder) -> CampaignPlan | None:
         name, source = metadata["scenario"], metadata.get("source", {})
         known: dict[str, Any] = {key: metadata[key] for key in _PLAN_KEYS}
         times: dict[str, Any] = {
-            key: Fraction(metadata[key]) for key in ("stop", "step") if metadata.get(key) is not None
+            key: Fraction(metadata[key]) for key in ("start", "stop", "step") if metadata.get(key) is not None
         }
         if is_file(name):
             known["scenario"] = str(folder.fmus / name)

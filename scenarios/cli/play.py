@@ -57,6 +57,7 @@ def play(
     parameters: Sequence[str],
     seed: int,
     replaced: Sequence[str],
+    start: Fraction | None,
     stop: Fraction | None,
     step: Fraction | None,
     inputs: Path | None,
@@ -75,6 +76,7 @@ def play(
                 parameters=parameters,
                 seed=seed,
                 units=replaced,
+                start=start,
                 stop=stop,
                 step=step,
                 inputs=inputs,
@@ -84,7 +86,7 @@ def play(
             subject = request.open(opened)
             asked = subject.experiment
             folder = RunFolder(out or made.enter_context(dated_folder(RUNS, f"{Path(asked.name).stem}_play")))
-            options = _options(replaced, {"--stop": stop, "--step": step, "--input": inputs})
+            options = _options(replaced, {"--start": start, "--stop": stop, "--step": step, "--input": inputs})
             session = _session(request, asked, subject.parameters, options, folder.claim(made).shown, pace)
         asyncio.run(_serve(session))
 

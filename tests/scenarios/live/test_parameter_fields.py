@@ -49,12 +49,13 @@ def test_a_session_of_an_fmu_has_fields_of_its_inputs_and_gives_a_file_of_them_t
     monkeypatch.setattr("handover.scenarios.cli.play._serve", serve)
     file = tmp_path / "f.csv"
     file.write_text("time,f\n0,0\n1,2\n", encoding="utf-8")
-    arguments = ["play", str(native_fmu("mass", 2)), "-p", "k=2", "--input", str(file), "--out", str(tmp_path / "p")]
+    arguments = ["play", str(native_fmu("mass", 2)), "-p", "k=2", "--input", str(file), "--start", "-1"]
+    arguments += ["--out", str(tmp_path / "p")]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.output
     [session] = sessions
     assert {"m", "k", "f"} <= {*session.names}
-    assert (session.options, session.request.inputs) == (["--input", str(file)], file)
+    assert (session.options, session.request.inputs) == (["--start", "-1", "--input", str(file)], file)
     assert faults_by_name(session.first().of(session.request), session.names) == {}
     assert "last_x" in session.headline
 
