@@ -52,6 +52,9 @@ _SHIPPED = {
 
 _PERIOD = Fraction(1, 50)  # s
 
+LENGTHS = ("L_1", "L_2", "L_3")
+"""Parameters of the links' lengths: of the kinematics, of planners and of the arm."""
+
 
 class Method(enum.IntEnum):
     """How joint angles are commanded and the tip's position is estimated."""
@@ -196,13 +199,14 @@ class HybridKinematics:
     tracker sees the tip itself.
 
     `outside` reports that the input of g or h is outside the polytope of its training; see `Domain` for what follows.
-    It cannot tell that the arm is another: with stiffer links the inputs are the same. `model_mismatch` does, by the
-    tracker in closed loop or by IMUs, see `ImuTip` and `ModelMonitor`. Without either, or while links shake, it cannot
-    be known, and the last answer stays, false at first. On paths at 0.5 to 1.5 bar with 25 to 100 g the innovation by
-    IMUs is 3.9 mm at most on the arm that was learned from, 4.3 mm with links 10 % heavier (error as before), and above
-    the limit of 4 mm in the cases tried in which stiffer or softer links double the error. Friction that doubles it
-    shows as its direction turns alone, and in one of two cases. On the arm that was learned from, while it swings, IMUs
-    may add to the error.
+    The angle of joint 1, about which the arm is symmetric, decides nothing, and a load only by the currents. It cannot
+    tell that the arm is another: with stiffer links the inputs are the same. `model_mismatch` does, by the tracker in
+    closed loop or by IMUs, see `ImuTip` and `ModelMonitor`. Without either, or while links shake, it cannot be known,
+    and the last answer stays, false at first. On paths at 0.5 to 1.5 bar with 25 to 100 g the innovation by IMUs is 3.9
+    mm at most on the arm that was learned from, 4.3 mm with links 10 % heavier (error as before), and above the limit
+    of 4 mm in the cases tried in which stiffer or softer links double the error. Friction that doubles it shows as its
+    direction turns alone, and in one of two cases. On the arm that was learned from, while it swings, IMUs may add to
+    the error.
 
     Raises:
         UnusedParameters: by the constructor, for MODEL_BASED with a model, friction_compensation, vibration_damping, or
@@ -344,7 +348,8 @@ def _model(p: Params, kinematics: VslKinematics) -> VslModel:
     Raises:
         InvalidModel: there is none, it cannot be read, is of another kind, or was trained for other links than these.
     """
-    kind, remedy = p.learned.name.lower(), train_command(p.learned, friction_compensation=p.friction_compensation)
+    kind = p.learned.name.lower()
+    remedy = train_command(p.learned, kinematics, friction_compensation=p.friction_compensation)
     source = p.model or f"{kind}{' with friction compensation' if p.friction_compensation else ''}, as it ships"
     if p.model:
         model = read_model(Path(p.model))
@@ -370,10 +375,17 @@ def _model(p: Params, kinematics: VslKinematics) -> VslModel:
     return model
 
 
-def train_command(learned: Learned, *, friction_compensation: bool) -> str:
-    """Return the command that trains such a model."""
+def train_command(learned: Learned, kinematics: VslKinematics, *, friction_compensation: bool) -> str:
+    """Return the command that trains such a model for such links."""
     kind = "" if learned is Learned.CUBIC else f" --learned {learned.name.lower()}"
-    return f"handover vsl-train{kind}{' --friction-compensation' if friction_compensation else ''}"
+    elbow = "" if kinematics.elbow is Elbow.UP else f" --elbow {kinematics.elbow.name.lower()}"
+    usual = Params()
+    links = "".join(
+        f" --arm {name}={length!r}"
+        for name in LENGTHS
+        if (length := float(getattr(kinematics, name))) != getattr(usual, name)
+    )
+    return f"handover vsl-train{kind}{' --friction-compensation' if friction_compensation else ''}{elbow}{links}"
 
 
 def _geometry_text(k: VslKinematics) -> str:

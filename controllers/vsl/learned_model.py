@@ -101,12 +101,15 @@ class Domain:
         z = (x - self.mean) / self.scale
         return np.where((z < self._low) | (z > self._high), 0.0, 1.0 / self.scale)
 
-    def outside(self, x: Floats) -> bool:
+    def outside(self, x: Floats, *, turned: bool = False) -> bool:
         """Return whether inputs x, shape (inputs,), lie outside the polytope, that is, surely beyond the training.
 
-        What is no number lies outside.
+        What is no number lies outside. If `turned`, the first input is an angle about an axis of symmetry, which
+        decides nothing: the polytope is that of the other inputs.
         """
-        return not bool(np.all(self._directions @ ((x - self.mean) / self.scale) <= self.hull))
+        rows = self._directions[:, 0] == 0.0 if turned else slice(None)
+        inside = self._directions[rows] @ ((x - self.mean) / self.scale) <= self.hull[rows]
+        return not bool(np.all(inside) and np.isfinite(x[0]))
 
     @cached_property
     def _low(self) -> Floats:
@@ -303,10 +306,18 @@ class VslModel:
         return self.nominal.predict(np.concatenate([q_meas[1:], p_meas])), np.array([lever_2, lever_3])
 
     def outside(self, q_ref: Floats, q_meas: Floats, p_meas: Floats, i_meas: Floats) -> bool:
-        """Return whether either is evaluated outside the polytope of its training."""
-        return self.inverse.domain.outside(inputs_of(q_ref, p_meas, i_meas)) or self.forward.domain.outside(
-            self._forward_inputs(q_meas, p_meas, i_meas)
-        )
+        """Return whether either is evaluated outside the polytope of its training.
+
+        Joint 1 turns the arm about the vertical, by which residuals in the arm's plane do not change: its angle decides
+        nothing, except of networks that give angles and positions themselves.
+        """
+        turned, forward = not self.is_absolute, self.forward.domain
+        if self.inverse.domain.outside(inputs_of(q_ref, p_meas, i_meas), turned=turned):
+            return True
+        if self.forward_input is ForwardInput.Q or self.is_absolute:
+            return forward.outside(self._forward_inputs(q_meas, p_meas, i_meas), turned=turned)
+        bearing = math.atan2(float(forward.mean[1]), float(forward.mean[0]))  # X turned back to the training's middle
+        return forward.outside(self._forward_inputs(np.array([bearing, *q_meas[1:]]), p_meas, i_meas))
 
     def _forward_inputs(self, q_meas: Floats, p_meas: Floats, i_meas: Floats) -> Floats:
         posture = q_meas if self.forward_input is ForwardInput.Q else self.kinematics.forward(q_meas)

@@ -4,12 +4,15 @@ One factor each for all links, gears or joints, and a scatter that is drawn for 
 own: the same arm in every run with that seed.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
+from handover.controllers.vsl.hybrid_kinematics import LENGTHS
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.system.system import PlacedUnit
 from handover.plants.vsl.parameters import Params as ArmParams
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.vsl.parameters import Parameters
@@ -28,6 +31,9 @@ _MEANINGS = {
     "friction_factor": "friction of the gear of {} over the usual one",
     "joint_factor": "stiffness of {} behind the encoder over the usual one",
 }
+
+_ASSUMING = ("planner", "kinematics")
+"""Units that assume lengths of the links."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +65,26 @@ class Arm:
             else:
                 found[name] = Metric(value, "m", f"length of link {name[-1]}, of which the controller knows nothing")
         return found
+
+
+def unlike_lengths(units: Mapping[str, PlacedUnit]) -> str:
+    """Return which links of the arm are not as long as kinematics or planner assume, as the end of a sentence."""
+    found: list[str] = []
+    for name in LENGTHS:
+        usual = float(getattr(ArmParams(), name))
+        actual, *assumed = (_length(units, unit, name, usual) for unit in ("arm", *_ASSUMING))
+        wrong = [f"the {unit} took it for {x:g} m" for unit, x in zip(_ASSUMING, assumed, strict=True) if x != actual]
+        if wrong:
+            found.append(f"; {name} of the arm was {actual:g} m, and {' and '.join(wrong)}")
+    return "".join(found)
+
+
+def _length(units: Mapping[str, PlacedUnit], unit: str, name: str, otherwise: float) -> float:
+    if unit not in units:
+        return otherwise
+    declared = units[unit].description.parameters
+    stated = units[unit].start.get(name, declared[name].start if name in declared else otherwise)
+    return float(stated if stated is not None else otherwise)
 
 
 def arm_of(parameters: Parameters) -> Arm:

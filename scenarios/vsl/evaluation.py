@@ -4,16 +4,18 @@ A `PathPoint` is kept for each desired point, with the arm's positions at the en
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
-from handover.scenarios.vsl.arms import arm_of
+from handover.scenarios.vsl.arms import arm_of, unlike_lengths
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
+from handover.scenarios.vsl.training_data import beyond_loads, is_heavy
 
 
 def _point(signals: Signals, name: str) -> Floats:
@@ -85,7 +87,7 @@ def distance_to_path(p: Floats, path: Floats) -> float:
     return float(np.min(np.linalg.norm(start + share[:, None] * along - p, axis=1)))
 
 
-_EXTRAPOLATION_TO_REPORT = 0.1
+EXTRAPOLATION_TO_REPORT = 0.1
 """Share of points at which a model had to extrapolate from which on the verdict says so (assumed)."""
 
 _REACH_SPAN = 0.01
@@ -109,6 +111,7 @@ class PathEvaluator(Evaluator):
         self.points: list[PathPoint] = []
         self.completed: float | None = None
         self._monitored = isinstance(parameters, HybridParameters) and parameters.is_monitored
+        self._lengths = ""
         self._began: float | None = None
         self._t = 0.0
         self._start: Floats = np.zeros(3)
@@ -117,11 +120,20 @@ class PathEvaluator(Evaluator):
         self._moving = False
         self._lowest = math.inf
 
+    def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
+        """Keep which links are not as long as planner and kinematics assume."""
+        self._lengths = unlike_lengths(units)
+
     def __call__(self, t: float, signals: Signals) -> None:
         """Follow the planner; keep a point when the planner proceeds to the next."""
         goal, moving = signals["planner.p_WG_goal"], bool(signals["planner.moving"])
         if self._goal is not None and self._moving and not (moving and np.array_equal(goal, self._goal)):
-            self.points.append(PathPoint.take(t, self._goal, signals, monitored=self._monitored))
+            point = PathPoint.take(t, self._goal, signals, monitored=self._monitored)
+            held = self.parameters.loads().at(t)
+            load = self.parameters.load if held is None else held[0]
+            if point.outside is not None and self.hybrid:
+                point = replace(point, outside=point.outside or is_heavy(load))
+            self.points.append(point)
         if moving and self._began is None:
             self._began = t
             self._start = goal if self._goal is None else self._goal
@@ -162,11 +174,12 @@ class PathEvaluator(Evaluator):
         digits = 1 if f"{1000 * error:.1f}" != f"{1000 * tolerance:.1f}" else 3
         share = metrics["outside"].value if "outside" in metrics else 0.0
         beyond = ""
-        if share >= _EXTRAPOLATION_TO_REPORT:
+        if share >= EXTRAPOLATION_TO_REPORT:
             beyond = f"; the model had to extrapolate at {100 * share:.0f} % of the points"
+            beyond += beyond_loads(max([self.parameters.load, *self.parameters.masses]))
         return (
             f"the path was completed at {self.completed:.1f} s; mean error of the tip {1000 * error:.{digits}f} mm, "
-            f"{verdict} the tolerance of {1000 * tolerance:.{digits}f} mm{beyond}{self._dip}"
+            f"{verdict} the tolerance of {1000 * tolerance:.{digits}f} mm{beyond}{self._dip}{self._lengths}"
         )
 
     @property

@@ -5,7 +5,6 @@ import zipfile
 from pathlib import Path
 
 from handover.controllers.vsl.hybrid_kinematics import train_command
-from handover.controllers.vsl.kinematics import Elbow
 from handover.controllers.vsl.learned_model import VslModel
 from handover.controllers.vsl.model_text import model_text
 
@@ -13,7 +12,7 @@ _MODULE = '''"""The trained model of `HybridKinematics` that ships, as JSON.
 
 Generated; when the sources of the arm (plants/vsl/) have changed, run again
 
-    {command} --points {points} --seed {seed}{elbow} --out controllers/vsl/{name}
+    {command} --points {points} --seed {seed} --out controllers/vsl/{name}
 """
 
 DEFAULT_MODEL = """\\
@@ -43,7 +42,6 @@ def file_text(model: VslModel, path: Path) -> str:
     if path.suffix != ".py":
         return text
     provenance = model.provenance
-    elbow = "" if model.kinematics.elbow is Elbow.UP else " --elbow down"
-    command = train_command(model.kind, friction_compensation=model.friction != (0.0, 0.0))
+    command = train_command(model.kind, model.kinematics, friction_compensation=model.friction != (0.0, 0.0))
     points, seed = provenance["points"]["measured"], provenance["seed"]
-    return _MODULE.format(command=command, name=path.name, points=points, seed=seed, elbow=elbow, text=text)
+    return _MODULE.format(command=command, name=path.name, points=points, seed=seed, text=text)

@@ -77,7 +77,8 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
         ),
         "kinematics": Place(
             required=PLACES["kinematics"].required,
-            optional={n: PLACES["kinematics"].optional[n] for n in ("q_ref", "qd_ref", "q_meas", "p_meas", "i_meas")},
+            optional={n: PLACES["kinematics"].optional[n] for n in ("q_ref", "qd_ref", "q_meas", "p_meas", "i_meas")}
+            | {"outside": "its share of the time is a metric"},
             remarks=PLACES["kinematics"].remarks,
         ),
         "arm": Place(

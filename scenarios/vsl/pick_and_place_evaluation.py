@@ -1,15 +1,21 @@
 """Parameters of a pick and place, and its evaluation by ground truth; origins of the defaults are in `paper.toml`."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from handover.controllers.vsl.hybrid_kinematics import Method
 from handover.controllers.vsl.pick_and_place import PHASES, TaskPhase
 from handover.cosim.blocks.ports import Floats, Vector3, parameter
 from handover.cosim.blocks.units import Kilogram, Metre, MetrePerSecond, Pascal, Second
 from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import PlacedUnit
 from handover.plants.vsl.parameters import MAX_PRESSURE
 from handover.scenarios.experiment.experiment import Evaluator, Metric, Outcome
+from handover.scenarios.vsl.arms import unlike_lengths
+from handover.scenarios.vsl.evaluation import EXTRAPOLATION_TO_REPORT
+from handover.scenarios.vsl.training_data import beyond_loads, is_heavy
 
 _TOUCHES = {"pick": (TaskPhase.DESCEND, TaskPhase.GRASP), "place": (TaskPhase.LOWER, TaskPhase.RELEASE)}
 """Parts of the task in which something is touched."""
@@ -19,6 +25,9 @@ _MAX_HEIGHT_ERROR = 0.01
 
 _ON_THE_WAY = (TaskPhase.CARRY, TaskPhase.SOFTEN)
 """Parts in which the object is to hang above the table."""
+
+_HANGING = (TaskPhase.LIFT, *_ON_THE_WAY)
+"""Parts in which it hangs freely: a face that presses on the gripper is in no training."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,15 +96,26 @@ class PickAndPlaceEvaluator(Evaluator):
         self._t = 0.0
         self._phase = 0
         self._was_held = self._held = self._done = False
+        self._lengths, self._is_learned = "", True
+        self._asked = self._outside = 0
         self._p_WO = np.array(parameters.pick)
         self._p_WG_goal: Floats | None = None
         """While it carries, where the tip is to be when the next goal is set."""
+
+    def note_units(self, units: Mapping[str, PlacedUnit]) -> None:
+        """Keep whether the kinematics use a learned model, and which links are not as long as they assume."""
+        self._lengths = unlike_lengths(units)
+        method = units["kinematics"].start.get("method") if "kinematics" in units else None
+        self._is_learned = str(method).upper() not in ("MODEL_BASED", str(int(Method.MODEL_BASED)))
 
     def __call__(self, t: float, signals: Signals) -> None:
         """Take in what is touched, carried and put down."""
         self._t, self._phase = t, int(signals["planner.phase"])
         self._held, self._done = bool(signals["gripper.held"]), bool(signals["planner.done"])
         self._was_held = self._was_held or self._held
+        if self._is_learned and self._held and self._phase in _HANGING and "kinematics.outside" in signals:
+            self._asked += 1
+            self._outside += bool(signals["kinematics.outside"]) or is_heavy(self.parameters.mass)
         p_WO = np.array(signals["gripper.p_WO"])
         if self._held and self._phase in _ON_THE_WAY and signals["arm.f_G"] > 0.0:
             self.dragged += float(np.hypot(*(p_WO - self._p_WO)[:2]))
@@ -123,7 +143,17 @@ class PickAndPlaceEvaluator(Evaluator):
         """Return whether the object lies where it is to lie, and was not dragged there."""
         put_down = self.over and self._was_held and not self._held
         success = put_down and max(self.place_error, self.dragged) <= self.parameters.tolerance
-        return Outcome(success=success, reason=self._reason(put_down), metrics=self._metrics())
+        reason = self._reason(put_down) + self._extrapolated + self._lengths
+        return Outcome(success=success, reason=reason, metrics=self._metrics())
+
+    @property
+    def _extrapolated(self) -> str:
+        """That the model was asked about what it was not trained on, as the end of a sentence."""
+        share = self._outside / max(self._asked, 1)
+        if share < EXTRAPOLATION_TO_REPORT:
+            return ""
+        text = f"; the model had to extrapolate for {100 * share:.0f} % of the way with the object"
+        return text + beyond_loads(self.parameters.mass)
 
     def _reason(self, put_down: bool) -> str:
         if put_down:
@@ -140,7 +170,9 @@ class PickAndPlaceEvaluator(Evaluator):
 
     def _metrics(self) -> dict[str, Metric]:
         what = "largest force as the tip comes down to"
+        outside = "share of the time with the object for which the model had to extrapolate, by inputs or its mass"
         return {
+            **({"outside": Metric(self._outside / self._asked, "1", outside)} if self._asked else {}),
             "pick_force": Metric(self.force["pick"], "N", f"{what} the object"),
             "place_force": Metric(self.force["place"], "N", f"{what} put it down"),
             "place_error": Metric(self.place_error, "m", "horizontal distance of the object from its place at the end"),

@@ -29,13 +29,13 @@ from handover.scenarios.vsl.data_file import links_of
 from handover.scenarios.vsl.model_file import content_key
 from handover.scenarios.vsl.residuals import Errors, Pairs, Residuals, lengths_of
 from handover.scenarios.vsl.training_data import (
-    STRETCH,
     Dataset,
     Measured,
     collect,
     describe_arm,
     parameters_of,
     plain_parameters,
+    stretch_of,
 )
 
 Progress = Callable[[float, float], None]
@@ -310,9 +310,9 @@ class VslTraining:
             raise NothingToLearn(self.fmu, f"the same at all points, whatever is commanded: {names}")
 
     def _within_reach(self, p_WG: Floats) -> NDArray[np.bool_]:
-        min_reach, _ = self.kinematics.reach
+        low, high = stretch_of(self.kinematics)
         from_shoulder = lengths_of(p_WG - np.array([0.0, 0.0, self.kinematics.L_1]))
-        return (from_shoulder <= STRETCH) & (from_shoulder >= min_reach + 0.001)
+        return (from_shoulder <= high) & (from_shoulder >= low)
 
 
 _OTHER = {ForwardInput.Q: ForwardInput.X, ForwardInput.X: ForwardInput.Q}

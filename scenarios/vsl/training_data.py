@@ -34,7 +34,13 @@ SAG = 0.075
 """Maximum height of the commanded above the wanted tip, m, at the largest radius, where the arm sags about as much."""
 
 STRETCH = 0.44
-"""Distance from the shoulder up to which tips are commanded and kept, m: rigid kinematics are singular beyond it."""
+"""Greatest distance from the shoulder to which tips are commanded and kept, m."""
+
+_SINGULAR, _FOLDED = 0.01, 0.001
+"""Metres within the outer limit of rigid links' reach, beyond which they are singular, and beyond the inner one."""
+
+LEAST_SPAN = 0.05
+"""Width of the ring about the shoulder in which points can be measured, m, that is worth it (assumed)."""
 
 PRESSURES = (3e4, 2.2e5)
 """Pressures of each link, Pa; the published ones are 0.5e5 to 2e5."""
@@ -122,6 +128,16 @@ class Measured:
         for values in (*vars(self.points).values(), self.order.astype(np.float64)):
             digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
         return digest.hexdigest()
+
+
+def is_heavy(load: float) -> bool:
+    """Return whether a load at the gripper, kg, is heavier than any that models are trained with."""
+    return load > LOADS[1] + 1e-9
+
+
+def beyond_loads(load: float) -> str:
+    """Return that a load, kg, is beyond the training, as the end of a clause; "" if it is not."""
+    return f", with {1e3 * load:.0f} g, and was trained up to {1e3 * LOADS[1]:.0f} g" if is_heavy(load) else ""
 
 
 def describe_arm(fmu: Path) -> FmuDescription:
@@ -239,11 +255,24 @@ def _settled(arm: Instance, before: int) -> Floats:
     return total / _KEPT
 
 
+def measured_reach(kinematics: VslKinematics) -> tuple[float, float]:
+    """Return from which to which distance from the axis, m, points at the shoulder's height can be measured."""
+    low, high = stretch_of(kinematics)
+    return max(low, RADII[0]), min(high, RADII[1])
+
+
+def stretch_of(kinematics: VslKinematics) -> tuple[float, float]:
+    """Return from which to which distance from the shoulder, m, tips are commanded and kept."""
+    inner, outer = kinematics.reach
+    return inner + _FOLDED, min(STRETCH, round(outer - _SINGULAR, 9))
+
+
 def _commanded_tip(kinematics: VslKinematics, rng: np.random.Generator) -> Floats:
     """Return a point to command the tip to, shape (3,), m."""
     while True:
         radius, height, lift = rng.uniform(*RADII), rng.uniform(*HEIGHTS), rng.uniform(0.0, SAG)
         theta_1 = rng.uniform(-MAX_THETA_1, MAX_THETA_1)
         p_WG = np.array([radius * np.cos(theta_1), radius * np.sin(theta_1), height + lift * (radius / RADII[1]) ** 2])
-        if np.hypot(radius, p_WG[2] - kinematics.L_1) <= STRETCH:
+        low, high = stretch_of(kinematics)
+        if low <= np.hypot(radius, p_WG[2] - kinematics.L_1) <= high:
             return p_WG

@@ -3,7 +3,7 @@
 import math
 import os
 import sys
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +13,7 @@ import click
 import numpy as np
 
 from handover.controllers.vsl.fit_network import EPOCHS, NoPyTorch, torch_or_refusal
-from handover.controllers.vsl.hybrid_kinematics import Params
+from handover.controllers.vsl.hybrid_kinematics import LENGTHS, Params
 from handover.controllers.vsl.kinematics import Elbow, Unreachable, VslKinematics
 from handover.controllers.vsl.learned_model import ForwardInput, Learned, VslModel
 from handover.controllers.vsl.model_text import InvalidModel, read_model
@@ -33,7 +33,7 @@ from handover.scenarios.vsl.learning_curve import curve_table, draw_curve, learn
 from handover.scenarios.vsl.model_file import content_key, file_text
 from handover.scenarios.vsl.residuals import Errors
 from handover.scenarios.vsl.training import MIN_POINTS, NothingToLearn, Progress, VslTraining
-from handover.scenarios.vsl.training_data import Measured, describe_arm
+from handover.scenarios.vsl.training_data import LEAST_SPAN, RADII, Measured, describe_arm, measured_reach
 
 _PATH = click.Path(path_type=Path)
 
@@ -75,7 +75,12 @@ class _ArmFailed(click.ClickException):
 )
 @click.option("--elbow", type=_ELBOW, default="up", help="Which way the elbow points.")
 @click.option("--plant", type=_PATH, help="FMU of the arm [default: VslArm, built from its sources].")
-@click.option("--arm", multiple=True, metavar="NAME=VALUE", help="Parameter of the arm, as of one that differs.")
+@click.option(
+    "--arm",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Parameter of the arm, as of one that differs; lengths of links are the kinematics', too, but with --adapt.",
+)
 @click.option("--learned", type=_LEARNED, default="cubic", help="What corrects rigid kinematics.")
 @click.option(
     "--forward-input", type=_FORWARD, default="q", help="What eq. (10) takes: angles, or X = f(q) as printed."
@@ -160,15 +165,14 @@ class _Options:
         if kind is Learned.PUBLISHED and self.adapt is None:
             torch_or_refusal()
 
-    @property
-    def kinematics(self) -> VslKinematics:
-        """Rigid links as HybridKinematics has them."""
-        p = Params(elbow=Elbow[self.elbow.upper()])
-        return VslKinematics(p.L_1, p.L_2, p.L_3, p.elbow)
+    def training(self, kinematics: VslKinematics | None = None, seed: int = 0) -> VslTraining:
+        """Return the training on the arm's FMU; the seed is for what is drawn where none is given.
 
-    def training(self, kinematics: VslKinematics, seed: int = 0) -> VslTraining:
-        """Return the training on the arm's FMU; the seed is for what is drawn where none is given."""
+        Without kinematics, rigid links are as long as the arm's own.
+        """
         fmu = self.plant or _built()
+        if kinematics is None:
+            kinematics = _rigid_links(fmu, _arm_values(fmu, self.arm), Elbow[self.elbow.upper()])
         return VslTraining(
             fmu=fmu,
             kinematics=kinematics,
@@ -215,7 +219,7 @@ class _Options:
 
 def _train(o: _Options, progress: Progress) -> list[str]:
     """Train, write, and return what is to be printed."""
-    training = o.training(o.kinematics)
+    training = o.training()
     measured = o.measured(training, progress)
     o.check_number(measured, MIN_POINTS // 2, "to train on")
     model, errors = training.learn(measured, progress)
@@ -324,6 +328,26 @@ def _arm_values(fmu: Path, given: Sequence[str]) -> dict[str, Any]:
         if fault := fault_of(port, values[name]):
             raise UsageError(f"--arm {text}: {fault}")
     return values
+
+
+def _rigid_links(fmu: Path, arm: Mapping[str, Any], elbow: Elbow) -> VslKinematics:
+    """Return rigid links that are as long as the arm's; lengths that it does not tell are those of HybridKinematics.
+
+    Raises:
+        UsageError: they do not reach over the workspace in which points are measured.
+    """
+    usual, declared = Params(), describe_arm(fmu).parameters
+    starts = {name: declared[name].start for name in LENGTHS if name in declared}
+    lengths = [float(arm.get(name) or starts.get(name) or getattr(usual, name)) for name in LENGTHS]
+    L_1, L_2, L_3 = lengths
+    kinematics = VslKinematics(L_1, L_2, L_3, elbow)
+    low, high = measured_reach(kinematics)
+    if high - low < LEAST_SPAN:
+        raise UsageError(
+            f"links of {L_2:g} and {L_3:g} m: points are measured from {RADII[0]:g} to {RADII[1]:g} m "
+            f"from the axis of joint 1, where these reach no span of {LEAST_SPAN:g} m; take longer or more equal ones"
+        )
+    return kinematics
 
 
 def _names(options: set[str]) -> str:

@@ -127,7 +127,7 @@ def test_what_was_not_trained_on_is_reported():
     strange = [
         dataclasses.replace(USUAL, p_meas=np.array([4e5, 1e5])),
         dataclasses.replace(USUAL, i_meas=np.array([0.0, 3.0, 0.0])),
-        dataclasses.replace(USUAL, q_ref=np.array([1.5, 0.5, -1.0])),
+        dataclasses.replace(USUAL, q_ref=np.array([0.0, 2.5, -1.0])),
         dataclasses.replace(USUAL, q_meas=np.array([0.0, 2.5, -1.0])),
     ]
     for u in strange:
@@ -136,6 +136,18 @@ def test_what_was_not_trained_on_is_reported():
         assert np.all(np.isfinite(y.q_cmd))
         assert np.all(np.abs(y.q_cmd - u.q_ref) < 0.6)
     assert not unit.step(0.0, 0.02, USUAL).outside
+
+
+@pytest.mark.parametrize("learned", SHIPPED)
+def test_joint_1_turns_the_arm_within_the_training(learned: Learned):
+    turn = np.array([1.4, 0.0, 0.0])
+    u = dataclasses.replace(USUAL, q_ref=USUAL.q_ref + turn, q_meas=USUAL.q_meas + turn)
+    unit = HybridKinematics(Params(i_lag=0.0, learned=learned))
+    y, before = unit.step(0.0, 0.02, u), unit.step(0.0, 0.02, USUAL)
+    assert not y.outside
+    bent, usual = (math.dist(e.p_WG_est, ARM.forward(at.q_meas)) for e, at in ((y, u), (before, USUAL)))
+    assert abs(bent - usual) < 2e-3  # m; what it is held to at its edge
+    assert unit.step(0.0, 0.02, dataclasses.replace(u, q_ref=np.array([np.nan, *USUAL.q_ref[1:]]))).outside
 
 
 def test_currents_are_smoothed_by_two_lags():

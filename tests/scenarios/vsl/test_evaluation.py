@@ -1,3 +1,4 @@
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,8 +8,12 @@ from numpy.typing import NDArray
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
+from handover.fmus.build import cached
+from handover.scenarios.vsl.arms import unlike_lengths
 from handover.scenarios.vsl.evaluation import PathEvaluator, distance_to_path
 from handover.scenarios.vsl.parameters import HybridParameters, Parameters
+from handover.scenarios.vsl.path_experiments import PathExperiment
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -143,6 +148,28 @@ def test_the_hybrid_reports_its_forward_model_and_of_extrapolation():
     assert metrics["model_error"].value == pytest.approx(0.0015)  # 2.5 mm below the point, taken to be 1 mm below it
     assert metrics["servo_error"].value == pytest.approx(0.001)
     assert metrics["outside"].value == 0.5
+
+
+@pytest.mark.parametrize(("load", "load_steps", "share"), [(0.075, "", 0.0), (0.2, "", 1.0), (0.075, "0:0.2", 1.0)])
+def test_loads_beyond_the_training_are_extrapolation(load: float, load_steps: str, share: float):
+    parameters = HybridParameters(load=load, load_steps=load_steps)
+    outcome = follow(PathEvaluator(parameters, hybrid=True), *path(0.003, 0.003)).outcome()
+    assert outcome.metrics["outside"].value == share
+    assert ("with 200 g, and was trained up to 130 g" in outcome.reason) == (share > 0.0)
+
+
+def test_links_that_the_controllers_take_for_others_are_named():
+    system = System()
+    for name, unit in PathExperiment.units.items():
+        system.add(name, cached(unit, 3))
+    system.units["arm"] = replace(system.units["arm"], start={"L_2": 0.3})
+    text = unlike_lengths(system.units)
+    assert text.count("0.225 m") == 2
+    assert "L_2 of the arm was 0.3 m" in text
+    for name in ("planner", "kinematics"):
+        system.units[name] = replace(system.units[name], start={"L_2": 0.3})
+    assert unlike_lengths(system.units) == ""
+    assert unlike_lengths({}) == ""
 
 
 def test_distance_to_a_path_is_to_its_nearest_leg_or_corner():

@@ -2,7 +2,7 @@
 
 import pathlib
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -103,6 +103,22 @@ def test_an_object_that_is_dragged_to_its_place_is_not_placed():
     assert dragged.reason.endswith(
         "it came down too early and was dragged over 60 mm of the table, above the tolerance of 10 mm"
     )
+
+
+@pytest.mark.parametrize(("mass", "asked", "share"), [(0.3, False, 1.0), (0.13, False, 0.0), (0.13, True, 1.0)])
+def test_a_load_beyond_the_training_is_extrapolation_while_it_is_held(mass: float, asked: bool, share: float):
+    evaluator = PickAndPlaceEvaluator(PickAndPlaceParameters(mass=mass))
+    at = np.array([0.3, 0.0, 0.1])
+    for k, (phase, held) in enumerate(
+        ((TaskPhase.DESCEND, False), (TaskPhase.GRASP, True), (TaskPhase.LIFT, True), (TaskPhase.CARRY, True))
+    ):
+        arm = {"arm.f_G": 0.0, "arm.p_WG": at, "planner.phase": phase, "planner.done": False}
+        task = {"planner.p_WG_goal": at, "gripper.held": held, "gripper.p_WO": at, "kinematics.outside": asked}
+        evaluator(0.1 * k, cast(Any, {**arm, **task}))
+    outcome = evaluator.outcome()
+    assert outcome.metrics["outside"].value == share
+    assert ("trained up to 130 g" in outcome.reason) == (mass > 0.13)
+    assert ("extrapolate" in outcome.reason) == (share > 0.0)
 
 
 def test_on_a_table_higher_than_the_shoulder_the_arm_starts_above_it(tmp_path: Path):

@@ -11,16 +11,17 @@ from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 import pytest
-from vsl_training_points import ARM, TRAINING, call, key_of_made_up, made_up, nobody, shipped
+from vsl_training_points import TRAINING, call, key_of_made_up, made_up, nobody, shipped
 
 from handover.controllers.vsl.default_model import DEFAULT_MODEL
+from handover.controllers.vsl.hybrid_kinematics import HybridKinematics, InvalidModel, Params
 from handover.controllers.vsl.kinematics import Elbow
 from handover.controllers.vsl.learned_model import ForwardInput, VslModel
-from handover.controllers.vsl.model_text import parse_model, read_model
+from handover.controllers.vsl.model_text import read_model
 from handover.fmus.build import build_block
 from handover.scenarios.cli.robots import vsl_train as vsl_train_command
 from handover.scenarios.vsl import learning_curve as curve_module
@@ -47,6 +48,27 @@ def test_the_same_seed_gives_the_same_model_in_both_forms(tmp_path: Path):
     assert text["seed"] == 1
     assert 300 < sum(text["points"][k] for k in ("training", "validation", "test")) <= 400
     assert text["mean_test_errors_m"]["forward_hybrid"] < 0.1 * text["mean_test_errors_m"]["forward_model_based"]
+
+
+def test_the_command_that_a_refusal_advises_makes_the_model_that_is_lacking(tmp_path: Path):
+    links: dict[str, Any] = {"L_1": 0.2, "L_2": 0.3, "L_3": 0.26, "elbow": Elbow.DOWN}
+    with pytest.raises(InvalidModel) as refused:
+        HybridKinematics(Params(**links))
+    advice = re.search(r"`handover vsl-train(.*)`", str(refused.value))
+    assert advice is not None
+    result = call(*advice[1].split(), "--points", "400", "--out", tmp_path / "m.json")
+    assert result.exit_code == 0, result.output
+    HybridKinematics(Params(**links, model=str(tmp_path / "m.json")))
+    arm = read_model(tmp_path / "m.json").provenance
+    assert all(arm["arm"]["parameters"][name] == value for name, value in links.items() if name != "elbow")
+    assert arm["mean_test_errors_m"]["forward_hybrid"] < 0.1 * arm["mean_test_errors_m"]["forward_model_based"]
+
+
+def test_links_that_do_not_reach_over_the_workspace_are_refused(tmp_path: Path):
+    result = call("--arm", "L_2=0.12", "--arm", "L_3=0.12", "--out", tmp_path / "m.json")
+    assert result.exit_code == 2
+    assert "links of 0.12 and 0.12 m" in result.output
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_errors_fall_along_the_learning_curve():
@@ -192,15 +214,6 @@ def test_a_folder_that_has_become_a_file_is_reported_in_a_line(tmp_path: Path, m
     assert result.exit_code == 2
     assert "cannot be written: File exists" in result.output
     assert "Traceback" not in result.output
-
-
-def test_the_elbow_is_the_models(tmp_path: Path):
-    result = call("--points", "400", "--elbow", "down", "--out", tmp_path / "m.py")
-    assert result.exit_code == 0, result.output
-    module = types.ModuleType("m")
-    exec((tmp_path / "m.py").read_text(), vars(module))
-    assert parse_model(vars(module)["DEFAULT_MODEL"], "m").kinematics == replace(ARM, elbow=Elbow.DOWN)
-    assert "--seed 0 --elbow down --out" in (module.__doc__ or "")
 
 
 def test_ctrl_c_leaves_the_file_of_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
