@@ -7,6 +7,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from handover.scenarios.campaign.results import CampaignResults
+from handover.scenarios.execution.request import is_file
 from handover.scenarios.experiment.display_unit import display_unit
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.reporting.html import rows_table
@@ -24,7 +25,10 @@ def setting_section(results: CampaignResults) -> Section:
         _part("Versions", {n: str(v) for n, v in metadata.get("versions", {}).items()}),
         _fmus(metadata.get("units", {})),
     ]
-    defaults = "Parameters that are neither varied nor fixed have the scenario's defaults; each run's run.json has all."
+    others = "Parameters that are neither varied nor fixed have"
+    defaults = f"{others} the scenario's defaults; each run's run.json has all."
+    if is_file(results.scenario):
+        defaults = f"{others} the values that the file gives."
     html = Markup("<div class='columns'>{}</div><p class='soft'>{}</p>").format(Markup().join(parts), defaults)
     return Section(anchor="setting", title="Setting", html=html)
 
