@@ -4,9 +4,11 @@
 published values are made here; graph, plots, pictures and replay in their own modules.
 """
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from markupsafe import Markup
 
@@ -53,7 +55,7 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> list[str]:
         *_sections_of_units(facts),
         parameters_section(facts),
         master_section(facts),
-        files_section(facts),
+        files_section(facts, (file or folder.report).absolute().parent),
     ]
     heading = f"{facts.scenario}: {_verdict(facts).lower()}"
     left_out = list(dict.fromkeys([*facts.summary.get("left_out", ()), *faults.lines]))
@@ -219,13 +221,28 @@ def _warnings(facts: RunFacts) -> list[str]:
     return [*map(str, facts.run.get("warnings", [])), *warning_lines(facts.summary)]
 
 
-def files_section(facts: RunFacts) -> Section:
-    """Return the files in the run's folder, and the versions that it ran with."""
+def files_section(facts: RunFacts, place: Path) -> Section:
+    """Return the command that repeats the run, its folder's files, and the versions that it ran with.
+
+    Args:
+        facts: of the run.
+        place: absolute folder of the page, from which it links the files.
+    """
     path = facts.folder.path
     files = [(name, what) for name, what in _FILES.items() if _has_content(path / name)]
+    links = {name: quote(Path(os.path.relpath(path / name, place)).as_posix()) for name, _ in files}
     versions, units = facts.run.get("versions", {}), facts.run.get("units", {})
-    html = template("run_files.html").render(files=files, units=units, versions=versions)
+    html = template("run_files.html").render(
+        files=files, links=links, units=units, versions=versions, command=repeating_command(facts)
+    )
     return Section(anchor="files", title="Files", html=Markup(html))
+
+
+def repeating_command(facts: RunFacts) -> str:
+    """Return the command that makes the same run once more, called in its folder; "" of what a program has wired."""
+    if facts.experiment is None and not facts.run.get("source"):
+        return ""
+    return "handover run --config run.json" + (" --inputs-from ." if facts.run.get("external_inputs") else "")
 
 
 def _has_content(path: Any) -> bool:

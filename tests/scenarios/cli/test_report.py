@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,12 @@ def test_page_and_figures_are_those_that_the_run_wrote(grasp: Path, copy: Path):
 
 def test_the_page_goes_where_it_is_asked_for(copy: Path, tmp_path: Path):
     assert report(copy, "--out", tmp_path / "page.html")[0] == 0
-    assert "ir_grasp: succeeded" in (tmp_path / "page.html").read_text()
+    page = (tmp_path / "page.html").read_text()
+    assert "ir_grasp: succeeded" in page
+    linked = re.findall('<a href="([^#"]*)"><code>', page)
+    assert "run.json" in {Path(link).name for link in linked}
+    assert all((tmp_path / link).exists() for link in linked), linked
+    assert "<code>handover run --config run.json</code>" in page
     assert not (copy / "report.html").exists()
     assert report(copy, "--out", tmp_path) == (2, f"Error: {tmp_path} is a folder; name a file for the page\n")
 
