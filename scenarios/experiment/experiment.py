@@ -21,7 +21,7 @@ from handover.cosim.blocks.variable import Causality, Variable
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit, System
-from handover.scenarios.experiment.live_inputs import LedHand, Pushable
+from handover.scenarios.experiment.live_inputs import HandHint, LedHand, Pushable
 from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place, fit_places
@@ -276,6 +276,10 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
 
         Its inputs are declared in `build` by `System.external`.
         """
+        return None
+
+    def hand_hint(self, parameters: Any, record: Record) -> HandHint | None:  # noqa: ARG002
+        """Return what helps who leads that hand in the last row of a record; by default nothing does."""
         return None
 
     def cycle(self) -> tuple[str, ...]:

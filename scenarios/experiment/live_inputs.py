@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.system import PortName, System
 from handover.cosim.system.time_series import NoSource
 
@@ -73,3 +74,22 @@ class LedHand:
     def age(self) -> str:
         """The input that tells how old the sample is."""
         return f"{self.unit}.age"
+
+
+@dataclass(frozen=True)
+class HandHint:
+    """What helps who leads a hand, at an instant of a run.
+
+    Attributes:
+        p_WH: where the hand is, in W, m.
+        goal: where it is to be; None where it need not go anywhere yet.
+        within_reach: whether it is near enough to do there what is asked.
+        holds: whether it holds the object.
+        advice: what is to be done now, in a short sentence.
+    """
+
+    p_WH: Floats
+    goal: Floats | None
+    within_reach: bool = False
+    holds: bool = False
+    advice: str = ""

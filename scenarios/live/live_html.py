@@ -1,11 +1,13 @@
 """The live page as HTML, and what it is told of a run that begins."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 from markupsafe import Markup
 
 from handover.cosim.blocks.ports import Floats
+from handover.scenarios.experiment.live_inputs import HandHint
 from handover.scenarios.experiment.time_plot import TimePlot
 from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.webcam import WEBCAM_SCRIPTS
@@ -26,9 +28,16 @@ def begun_content(shown: ShownRun) -> dict[str, Any]:
     assert scene is not None
     surroundings = {name: str(html) for name, html in scene.surroundings().items()}
     pushes = [{"bodies": push.labels, "greatest": push.greatest} for push in shown.pushes]
-    facts = {"title": shown.run.title, "scene": scene.content(), "signals": list(scene.signals), "pushes": pushes}
+    content = scene.content() if shown.seat is None else scene.content_for_person()
+    facts = {"title": shown.run.title, "scene": content, "signals": list(scene.signals), "pushes": pushes}
     task = "" if shown.seat is None else shown.seat.task
     return {**facts, **surroundings, "hand": shown.seat is not None, "task": task}
+
+
+def hint_content(hint: HandHint) -> dict[str, Any]:
+    """Return what a page is told at an instant to help who leads a hand; see `HandHint`."""
+    goal = None if hint.goal is None else hint.goal.tolist()
+    return {**asdict(hint), "p_WH": hint.p_WH.tolist(), "goal": goal}
 
 
 def live_html(
@@ -61,7 +70,7 @@ def live_html(
         scripts=(
             *(*SCENE_SCRIPTS, "phases.js", "scene/side_view.js", "hand/hand_input.js"),
             *(WEBCAM_SCRIPTS if webcam else ()),
-            *("live/live_hand.js", "live/live.js", "live/push.js", *scripts),
+            *("live/live_hand.js", "live/hand_hints.js", "live/live.js", "live/push.js", *scripts),
         ),
     )
     return page_html(title, Markup(""), [section], connects=True, works=webcam)

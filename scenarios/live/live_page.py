@@ -44,7 +44,7 @@ from handover.scenarios.live.connections import (
     too_many,
 )
 from handover.scenarios.live.hand_seat import accept, refuse
-from handover.scenarios.live.live_html import begun_content, figure_json, live_html
+from handover.scenarios.live.live_html import begun_content, figure_json, hint_content, live_html
 from handover.scenarios.live.live_scene import LiveScene
 from handover.scenarios.live.shown_run import ShownRun
 from handover.scenarios.live.viewers import Viewers
@@ -314,7 +314,8 @@ class LivePage:
         if self._size not in (None, len(data)):  # other things are drawn than before
             await self._tell_scene(*self._viewers.pages)
         self._size = len(data)
-        head = json.dumps({"time": scene.time, "phase": scene.phase})
+        hint = None if self.shown.seat is None else scene.hand_hint
+        head = json.dumps({"time": scene.time, "phase": scene.phase, "hint": hint and hint_content(hint)})
         for page in self._viewers.ready:
             await self._viewers.send(page, head)
             await self._viewers.send(page, data.astype("<f8").tobytes())

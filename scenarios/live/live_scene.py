@@ -13,7 +13,7 @@ from handover.cosim.record.growing_record import GrowingRecord
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Experiment
-from handover.scenarios.experiment.live_inputs import LedHand, Pushable
+from handover.scenarios.experiment.live_inputs import HandHint, LedHand, Pushable
 from handover.scenarios.experiment.replay import Body, Line, Replay
 from handover.scenarios.experiment.time_plot import Curve, TimePlot, phases_of
 from handover.scenarios.live.hand_messages import HandSample
@@ -145,6 +145,13 @@ class LiveScene:
         with self._faults.tolerated("pushes"):
             return () if self._experiment is None else self._experiment.pushes(self._parameters)
         return ()
+
+    @property
+    def hand_hint(self) -> HandHint | None:
+        """What helps who leads a hand; None where nothing does."""
+        with self._faults.tolerated("hints for the hand"):
+            return None if self._experiment is None else self._experiment.hand_hint(self._parameters, self._record)
+        return None
 
     @property
     def newest(self) -> Record:

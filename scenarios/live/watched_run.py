@@ -1,5 +1,6 @@
 """A run under way as the live page's server sees it: its folder, its growing record, its end."""
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -75,7 +76,7 @@ class WatchedRun:
 
     @property
     def verdict(self) -> dict[str, object]:
-        """Return whether it has a verdict, whether it succeeded, why, and where its report is."""
+        """Return whether it has a verdict, whether it succeeded, why, where its report is, and what makes it again."""
         try:
             summary = self.folder.read_summary()
         except InvalidRunFolder as e:
@@ -87,6 +88,7 @@ class WatchedRun:
             "success": bool(summary.get("success")),
             "reason": str(summary.get("reason", "")),
             "report": str(self.folder.report) if self.folder.report.is_file() else "",
+            "again": f"handover run --config {shlex.quote(str(self.folder.path / 'run.json'))} --live",
         }
 
     @property

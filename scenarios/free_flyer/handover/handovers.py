@@ -18,12 +18,13 @@ import numpy as np
 from handover.cosim.record.reader import Record
 from handover.cosim.system.system import PortName, System
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
-from handover.scenarios.experiment.live_inputs import LedHand, Pushable
+from handover.scenarios.experiment.live_inputs import HandHint, LedHand, Pushable
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
+from handover.scenarios.free_flyer.handover.hand_hints import hand_hint
 from handover.scenarios.free_flyer.handover.handover_evaluation import HandoverEvaluator
 from handover.scenarios.free_flyer.handover.led_hand import faults_of_person, leader
 from handover.scenarios.free_flyer.parameters import Hand, HandoverParameters, Task, TaskParameters
@@ -156,6 +157,10 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         x, y, z = (float(n) for n in person["p_WH_0"])
         return LedHand("person", (x, y, z), float(person["arm_reach"]), self.asked)
 
+    def hand_hint(self, parameters: HandoverParameters, record: Record) -> HandHint | None:  # noqa: ARG002
+        """Return where the hand is to be, and what is to be done there."""
+        return hand_hint(record, self.receivers)
+
     def parameter_files(self, parameters: HandoverParameters) -> Mapping[str, Path]:
         """Return the track that leads the hand."""
         return {"hand_track": Path(parameters.hand_track)} if parameters.hand_track else {}
@@ -283,6 +288,10 @@ class HandoverOfTask(FlyerHandover):
     def led_hand(self, parameters: HandoverParameters) -> LedHand | None:
         """Return that of the task's scenario."""
         return _of_task(parameters).led_hand(parameters)
+
+    def hand_hint(self, parameters: HandoverParameters, record: Record) -> HandHint | None:
+        """Return that of the task's scenario."""
+        return _of_task(parameters).hand_hint(parameters, record)
 
     def evaluator(self, parameters: HandoverParameters) -> HandoverEvaluator:
         """Return that of the task's scenario."""

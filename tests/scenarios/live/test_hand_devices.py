@@ -165,7 +165,7 @@ def test_keys_turn_the_hand_as_they_lie_on_the_keyboard(browser: Browser, tmp_pa
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (400, 800)])
-def test_hand_and_gripper_are_both_seen_at_first(browser: Browser, tmp_path: Path, size: tuple[int, int]):
+def test_the_hand_is_seen_at_first_from_behind_it(browser: Browser, tmp_path: Path, size: tuple[int, int]):
     with live_run(tmp_path / "led", *GIVEN, scenario=SCENARIO) as (address, run):
         with shown(browser, address) as page:
             page.set_viewport_size({"width": size[0], "height": size[1]})
@@ -173,9 +173,7 @@ def test_hand_and_gripper_are_both_seen_at_first(browser: Browser, tmp_path: Pat
             if size[0] < 1000:  # the page was opened as a wider one
                 page.locator("[data-view=start]").click()
             assert page.evaluate(SEEN_SHARE, "hand") > 0.9
-            assert page.evaluate(SEEN_SHARE, "gripper") > 0.4  # the rest is behind its own jaws
-            azimuth = page.evaluate("live.scene.spherical().azimuth")  # the gripper opens to -x, the hand is at its +y
-            assert azimuth == pytest.approx(0.75 * np.pi, abs=0.05)
+            assert abs(page.evaluate("live.scene.spherical().azimuth")) > 0.9 * np.pi  # the robot comes from +x
             end_run(page)
         run.wait(timeout=120)
 

@@ -129,14 +129,22 @@ const handInput = (() => {
         goTo(p.clone().addScaledVector(axes()[2], WHEEL * pixels));
         send();
       },
+    };
+    // Keys are the hand's wherever the focus is, but where it takes keys itself; the space bar would press a button.
+    const TAKES_KEYS = "select, textarea, input:not([type=checkbox], [type=radio], [type=button], [type=submit])";
+    const isKey = event => device === "pointer" && !event.ctrlKey && !event.metaKey && !event.altKey
+      && (event.code === "Space" || event.code in KEYS) && !event.target.closest?.(TAKES_KEYS);
+    const keyListeners = {
       keydown(event) {
-        if (device !== "pointer" || event.ctrlKey || event.metaKey || event.altKey) return;
-        if (event.code === "Space") { if (!event.repeat) grasp(!closed); }
-        else if (KEYS[event.code]) held.add(event.code);
-        else return;
+        if (!isKey(event)) return;
+        if (event.code !== "Space") held.add(event.code);
+        else if (!event.repeat) grasp(!closed);
         event.preventDefault();
       },
-      keyup: event => held.delete(event.code),
+      keyup(event) {
+        held.delete(event.code);
+        if (isKey(event)) event.preventDefault();  // Firefox presses a button now
+      },
       blur: () => held.clear(),
     };
 
@@ -152,6 +160,7 @@ const handInput = (() => {
     }
 
     for (const [name, act] of Object.entries(listeners)) element.addEventListener(name, act, {capture: true, passive: false});
+    for (const [name, act] of Object.entries(keyListeners)) window.addEventListener(name, act, {capture: name !== "blur"});
     const timer = setInterval(tick, 1000 / 60);
     if (element.tabIndex < 0) element.tabIndex = 0;
 
@@ -176,6 +185,7 @@ const handInput = (() => {
         clearInterval(timer);
         device = "nothing";
         for (const [name, act] of Object.entries(listeners)) element.removeEventListener(name, act, {capture: true});
+        for (const [name, act] of Object.entries(keyListeners)) window.removeEventListener(name, act, {capture: name !== "blur"});
       },
     };
     return api;

@@ -19,11 +19,12 @@ const live = (() => {
     scene: null, run: null, session: false, send, on(name, act) { (listeners[name] ??= []).push(act); }, get hand() { return lead?.hand; },
     get isUnderWay() { return Boolean(api.run) && !over && !isLost; },
   };
-  let viewport = null, slots = [], size = 0, paused = true, link = null, over = false, isLost = false, lead = null, side = null;
+  let hints = null, viewport = null, slots = [], size = 0, paused = true, link = null, over = false, isLost = false, lead = null, side = null;
 
   // Puts the scene of a run in the place of the one before, seen from where that was seen, unless a hand is led only now.
   function beginRun(run) {
     const before = lead || !run.hand ? viewport?.scene.viewpoint() : null;
+    hints?.close();
     side?.close();
     viewport?.close();
     viewport = null;
@@ -37,7 +38,6 @@ const live = (() => {
       host.append(byId("scene-of-run").content.cloneNode(true));
       for (const part of ["views", "legend"]) host.querySelector(".replay-" + part).outerHTML = run[part];
       viewport = createViewport(root, content);
-      if (run.hand) viewport?.scene.setStart(eyeOnHandAndGripper(viewport.scene));
       if (viewport) createRecorder(viewport, () => readout.value);
       if (before) viewport?.scene.setViewpoint(before);
     }
@@ -45,6 +45,7 @@ const live = (() => {
     lead = isLed ? createHandControl(viewport.element, viewport.scene.camera) : null;
     side = isLed ? createSideView(viewport.element.parentElement, viewport.scene, content, sidesOfHandover(viewport.scene)) : null;
     if (side) side.shown = byId("hand-side-view").checked;
+    hints = isLed ? createHandHints(viewport, content.low[2]) : null;
     byId("hand").hidden = byId("hand-help").hidden = !lead;
     byId("task").hidden = !lead || !run.task;
     byId("task").textContent = run.task;
@@ -130,6 +131,7 @@ const live = (() => {
       select.value = pace;
     } else if ("time" in message) {
       progress.add(message.time);
+      hints?.show(over ? null : message.hint);
       readout.value = `${message.time.toFixed(2)} s${message.phase ? ", " + message.phase : ""}`;
     } else if (message.plots) drawPlots(message.plots);
     else if (message.pictures) showPictures(message.pictures);
@@ -194,8 +196,9 @@ const live = (() => {
     send("see", [...shown].map(part => [...plots.children].indexOf(part)).filter(i => i >= 0));
   }
 
-  function endRun({judged, success, reason, report}) {
+  function endRun({judged, success, reason, report, again}) {
     over = true;
+    hints?.show(null);
     const verdict = byId("verdict");
     verdict.hidden = false;
     byId("waiting").hidden = byId("push-help").hidden = byId("task").hidden = true;
@@ -204,6 +207,11 @@ const live = (() => {
     verdict.innerHTML = "<b></b> ";
     verdict.firstChild.textContent = success ? "Succeeded:" : judged ? "Failed:" : "No verdict:";
     verdict.append(...page.typeset(`${reason}.`));
+    if (api.session) {
+      const button = Object.assign(document.createElement("button"), {type: "button", textContent: "again"});
+      button.addEventListener("click", () => byId("again").click());
+      verdict.append(" ", button);
+    } else if (again) verdict.append(" ", ...page.typeset(`Again: \`${again}\`.`));
     byId("told").textContent = report ? `Its report: ${report}` : "The run has ended.";
     for (const id of ["pause", "step", "stop"]) byId(id).disabled = true;
     root.dataset.ended = success;
@@ -234,7 +242,10 @@ const live = (() => {
   byId("pause").addEventListener("click", () => send(paused ? "go" : "pause"));
   byId("step").addEventListener("click", () => send("step"));
   byId("stop").addEventListener("click", () => send("stop"));
-  byId("pace").addEventListener("change", ({target}) => send("pace", Number(target.value)));
+  byId("pace").addEventListener("change", ({target}) => {
+    send("pace", Number(target.value));
+    if (lead) target.blur();  // keys are the hand's again
+  });
 
   link = new WebSocket(`ws://${location.host}/run`);
   link.binaryType = "arraybuffer";

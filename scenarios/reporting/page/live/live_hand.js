@@ -3,25 +3,8 @@
 //   lead.hand      see handInput; null until the server has told where the hand is
 //   lead.close()   leads it no more
 //   sidesOfHandover(scene)       labels of what a view from the side shows before the other
-//   eyeOnHandAndGripper(scene)   from where to look first at a scene in which a hand is led; null where it has no gripper
 "use strict";
 const sidesOfHandover = scene => scene.points("gripper").length ? ["gripper", "robot"] : ["hand", "object"];
-
-// Aslant at the gripper's opening, so that hand and jaws lie beside each other, from that side on which the hand is: it is
-// nearer than the robot then, which does not hide it.
-const eyeOnHandAndGripper = scene => {
-  const ASLANT = 45 * Math.PI / 180, ELEVATION = 0.6;  // from where it opens to; rise over distance
-  const middleOf = label => {
-    const points = scene.points(label).filter(p => p.every(Number.isFinite));
-    return [0, 1].map(i => points.reduce((sum, p) => sum + p[i], 0) / points.length);
-  };
-  const [hand, gripper, robot] = ["hand", "gripper", "robot"].map(middleOf);
-  if (![...hand, ...gripper, ...robot].every(Number.isFinite)) return null;
-  const opening = Math.atan2(gripper[1] - robot[1], gripper[0] - robot[0]);
-  const [one, other] = [-ASLANT, ASLANT].map(angle => [Math.cos(opening + angle), Math.sin(opening + angle), ELEVATION]);
-  const nearness = ([x, y]) => x * (hand[0] - gripper[0]) + y * (hand[1] - gripper[1]);
-  return nearness(one) > nearness(other) ? one : other;
-};
 
 const createHandControl = (element, eye) => {
   const part = name => document.getElementById("hand-" + name);
@@ -132,7 +115,10 @@ const createHandControl = (element, eye) => {
     link?.close();
   }
 
-  part("device").addEventListener("change", choose, {signal: closed.signal});
+  part("device").addEventListener("change", () => {
+    part("device").blur();  // keys are the hand's again
+    choose();
+  }, {signal: closed.signal});
   part("side")?.addEventListener("change", choose, {signal: closed.signal});
   part("grasp").addEventListener("click", () => lead.hand?.grasp(!lead.hand.pose().closed), {signal: closed.signal});
   choose();

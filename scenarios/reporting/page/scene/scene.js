@@ -11,7 +11,6 @@
 //   scene.show(u)                 everything u frames after the first; u may lie between two
 //   scene.setView(name)           looks from one of scene.views: "start", "front", "side", "top";
 //                                 side is from that end of x which the eye is nearer to at the start
-//   scene.setStart([x, y, z])     lets "start" be that direction, and looks so; null changes nothing
 //   scene.lookFrom([x, y, z])     looks from that side, along a vector of W that points to the eye
 //   scene.follows = true          the view moves with the body of that label from now on
 //   scene.setVisible(label, yes), scene.visible(label)
@@ -159,7 +158,7 @@ const createScene = (() => {
       () => { moving.ratio = 0.5; },
     ]);
 
-    let request = 0, requestedAt = 0, rest = 0, follows = false, start = eye;
+    let request = 0, requestedAt = 0, rest = 0, follows = false;
     const pixelsPerMetre = () => element.clientHeight / (2 * Math.tan(FIELD / 2) * camera.position.distanceTo(controls.target));
     function render() {
       request = 0;
@@ -252,10 +251,7 @@ const createScene = (() => {
         requestRender();
       },
       lookFrom,
-      setView: name => lookFrom(VIEWS[name]?.(eye) ?? start),
-      setStart(towards) {
-        if (towards) lookFrom(start = towards);
-      },
+      setView: name => lookFrom(VIEWS[name]?.(eye) ?? eye),
       get follows() { return follows; },
       set follows(yes) { follows = Boolean(yes && follow); },
       setVisible(label, yes) {
