@@ -7,7 +7,7 @@ of these tables name by name.
 
 import contextlib
 import json
-from collections.abc import Callable, Container, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -68,7 +68,7 @@ class ConfigFile:
         varied_or_set = {_name(t) for name in ("parameters", "grid") for t in given.get(name, ())}
         units = {_name(t) for t in given.get("replaced", ())}
         with _damage_reported(self.path):
-            own = _own_code(self.path, self.run, str(params["scenario"])) if from_file else []
+            self._say(_own_code(self.path, self.run, str(params["scenario"])) if from_file else [])
             of_file = self.texts.get("replaced", ())
             has_units = self.run is not None and "replaced" in params
             replaced = _units(self.path, self.run or {}, units) if has_units else [*of_file]
@@ -76,8 +76,11 @@ class ConfigFile:
         for name, texts in given.items():
             texts_of_file = replaced if name == "replaced" else self.texts.get(name, ())
             params[name] = (*(t for t in texts_of_file if name == "replaced" or _name(t) not in varied_or_set), *texts)
-        own += [text for text in replaced if _is_own(text.partition("=")[2])]
-        for line in own:
+        self._say(text for text in replaced if _is_own(text.partition("=")[2]))
+
+    def _say(self, own_code: Iterable[str]) -> None:
+        """Say which code that is not this package's is about to be run."""
+        for line in own_code:
             click.echo(f"{self.path}: this runs {line}", err=True)
 
 
@@ -373,9 +376,13 @@ def _units(path: Path, run: Mapping[str, Any], given: Container[str]) -> list[st
 
 
 def _own_unit(run: Mapping[str, Any], name: str) -> str:
-    """Return the class of the own scenario's own unit of a name, whose code is what the run had; "" where unknown."""
-    scenario = named_scenario(run["source"]["scenario"]) if "scenario" in run["source"] else None
-    return "" if scenario is None else scenario.units.get(name, "").rpartition(":")[2]
+    """Return the class of the own scenario's own unit of a name; "" where its code is not what the run had."""
+    try:
+        source = ScenarioSource(**run["source"])
+        source.unchanged_file()
+        return named_scenario(source.scenario).units.get(name, "").rpartition(":")[2]
+    except (KeyError, TypeError, InvalidScenario):
+        return ""
 
 
 def _is_unchanged(file: Path, sha256: str | None) -> bool:
