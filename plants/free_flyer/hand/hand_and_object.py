@@ -213,9 +213,12 @@ class HandAndObject:
 
     def _check_overlap(self, G: Frame) -> None:
         p, faults = self._p, list[str]()
-        apart = distance(self._hand.p, G.p)
-        if apart < p.fist_radius + p.palm_width:
-            faults.append(f"the hand starts in the gripper, {apart:.3g} m from G; p_WH_0 must be farther away")
+        apart, least = distance(self._hand.p, G.p), p.fist_radius + p.palm_width
+        if apart < least:
+            faults.append(
+                f"the hand starts in the gripper, {least - apart:.3g} m deep: p_WH_0 is {apart:.3g} m from G, "
+                f"and must be {least:.3g} m at least"
+            )
         if self._gripper.touches(G, self._object.body):
             faults.append("the object starts in the gripper's palm; move p_WO_0 or the robot's start")
         if self._gripper.crushes(G, self._object.body):

@@ -251,10 +251,11 @@ class LargeObjectAndHands:
         p, body, faults = self._p, self._object.body, list[str]()
         for i, (gripper, G) in enumerate(zip(self._grippers, Gs, strict=True), 1):
             for hand in self._pair.hands:
-                apart = distance(hand.p, G.p)
-                if apart < p.fist_radius + p.palm_width:
+                apart, least = distance(hand.p, G.p), p.fist_radius + p.palm_width
+                if apart < least:
                     faults.append(
-                        f"a hand starts in gripper {i}, {apart:.3g} m from its G; p_WH_0 must be farther away"
+                        f"a hand starts in gripper {i}, {least - apart:.3g} m deep: {apart:.3g} m from its G, of which "
+                        f"p_WH_0 must leave {least:.3g} m at least"
                     )
             if gripper.touches(G, body):
                 faults.append(f"a handle starts in the palm of gripper {i}; move p_WO_0 or the robot's start")
