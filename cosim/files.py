@@ -1,11 +1,14 @@
-"""Locks a file or folder for as long as a process lives; and temporary folders that are locked while in use.
+"""Files and folders of this machine: locked, temporary, and read as what they should be.
 
-Windows, where a mapped file cannot be changed by others anyway, needs none.
+Locks end with the process that holds them. Windows, where a mapped file cannot be changed by others anyway, needs none.
 """
 
 import contextlib
+import errno
+import math
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Generator
 from pathlib import Path
@@ -119,3 +122,43 @@ def remove_abandoned() -> None:
                 with folder_locked(path) as locked:
                     if locked:
                         shutil.rmtree(path, ignore_errors=True)
+
+
+_MIB = 1 << 20
+MOST = 64 * _MIB
+"""Bytes of a file that is read as a whole, unless it is another number."""
+
+
+def check_regular(path: Path, most: float = math.inf) -> None:
+    """Check that there is a regular file of a sane size, before others open it: devices and pipes hang, or never end.
+
+    Raises:
+        OSError: it is none, or longer than `most` bytes.
+    """
+    _check_status(path, path.stat(), most)
+
+
+def read_regular(path: Path, most: float = MOST) -> bytes:
+    """Return the content of a regular file.
+
+    Raises:
+        OSError: it cannot be read, is no regular file, or longer than `most` bytes.
+    """
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    try:
+        _check_status(path, os.fstat(handle), most)
+    except OSError:
+        os.close(handle)
+        raise
+    with open(handle, "rb") as file:
+        return file.read()
+
+
+def _check_status(path: Path, status: os.stat_result, most: float) -> None:
+    if stat.S_ISDIR(status.st_mode):
+        raise IsADirectoryError(errno.EISDIR, "it is a folder, not a file", str(path))
+    if not stat.S_ISREG(status.st_mode):
+        raise OSError(errno.EINVAL, "it is a device or a pipe, not a file", str(path))
+    if status.st_size > most:
+        fault = f"it has {status.st_size / _MIB:.0f} MiB; at most {most / _MIB:.0f} MiB are read"
+        raise OSError(errno.EINVAL, fault, str(path))

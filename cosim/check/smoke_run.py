@@ -17,6 +17,7 @@ from handover.cosim.exceptions import InvalidFmu, UnitFailure
 from handover.cosim.fmu.file.archive import DESCRIPTION
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.fmu.file.internal_variables import LOCAL, ports_inside
+from handover.cosim.fmu.file.large_description import LARGE
 from handover.cosim.fmu.file.xml import parse_xml
 from handover.cosim.probe.finding import Finding, abbreviated, fault, note, warning
 from handover.cosim.probe.isolated_process import Journal
@@ -248,7 +249,8 @@ def main(task: Mapping[str, Any]) -> None:
     """Run the FMU `task["fmu"]`, unpacked in `task["folder"]`."""
     journal = Journal(Path(task["journal"]))
     description, folder = describe_fmu(Path(task["fmu"])), Path(task["folder"])
-    inside = ports_inside(parse_xml((folder / DESCRIPTION).read_bytes()), description.fmi, LOCAL)
+    content = (folder / DESCRIPTION).read_bytes()
+    inside = {} if len(content) > LARGE else ports_inside(parse_xml(content), description.fmi, LOCAL)
     run = SmokeRun(
         description,
         folder,

@@ -21,11 +21,13 @@ from typing import Any
 
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.exceptions import CosimError, one_line
+from handover.cosim.files import check_regular
 from handover.cosim.fmu.unit_warnings import WarningData
 from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
+from handover.cosim.typed_data import Count, decoded
 
 _log = logging.getLogger(__name__)
 
@@ -175,6 +177,25 @@ def remove_checkpoint(path: Path) -> None:
     _unfinished(path).unlink(missing_ok=True)
 
 
+@dataclass(frozen=True)
+class _Format:
+    """By which other versions are told from damage."""
+
+    format: int
+
+
+@dataclass(frozen=True)
+class _Header:
+    """What `checkpoint.json` holds; earlier versions kept no warnings."""
+
+    time: float
+    rows: Count
+    stepper: dict[str, Any]
+    units: list[str]
+    sha256: dict[str, str]
+    warnings: list[WarningData] = field(default_factory=list[WarningData])
+
+
 def read_checkpoint(path: Path) -> Checkpoint:
     """Read a checkpoint. It takes no more memory than the file is long.
 
@@ -182,16 +203,15 @@ def read_checkpoint(path: Path) -> Checkpoint:
         InvalidCheckpoint: there is none, or it is damaged or of another version.
     """
     try:
+        check_regular(path)
         with zipfile.ZipFile(path) as archive:
             if compressed := [e.filename for e in archive.infolist() if e.compress_type != zipfile.ZIP_STORED]:
                 raise InvalidCheckpoint(path, f"{compressed[0]} in it is compressed; checkpoints are written without")
-            header = json.loads(archive.read("checkpoint.json"))
-            if header["format"] != _FORMAT:
-                raise InvalidCheckpoint(
-                    path, f"a checkpoint of format {header['format']}; format {_FORMAT} can be read"
-                )
-            names: list[str] = header["units"]
-            digests: dict[str, str] = header["sha256"]
+            described = archive.read("checkpoint.json")
+            if (written := decoded(described, _Format).format) != _FORMAT:
+                raise InvalidCheckpoint(path, f"a checkpoint of format {written}; format {_FORMAT} can be read")
+            header = decoded(described, _Header)
+            names, digests = header.units, header.sha256
 
             def read(part: str) -> bytes:
                 content = archive.read(part)
@@ -200,14 +220,14 @@ def read_checkpoint(path: Path) -> Checkpoint:
                 return content
 
             return Checkpoint(
-                time=header["time"],
-                rows=header["rows"],
-                stepper=header["stepper"],
+                time=header.time,
+                rows=header.rows,
+                stepper=header.stepper,
                 units={name: read(f"{i}.state") for i, name in enumerate(names)},
                 contents={name: unpack_state(read(f"{i}.contents")) for i, name in enumerate(names)},
                 cpu={name: read(f"{i}.cpu") for i, name in enumerate(names)},
                 kept=read("kept"),
-                warnings=header.get("warnings", []),  # earlier versions kept none
+                warnings=header.warnings,
             )
     except FileNotFoundError as e:
         raise InvalidCheckpoint(path, "there is no checkpoint; a run writes them with --checkpoint SECONDS") from e

@@ -4,7 +4,6 @@ The rows of a run under way lie in a memory-mapped file (`signals.tail`, see `Re
 only after a row is whole. Who maps that file, too, sees each row as it comes; the run knows nothing of it.
 """
 
-import json
 import mmap
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from handover.cosim.record.columns import column_metadata
 from handover.cosim.record.reader import Record, columns_of_signals
 from handover.cosim.record.stream import stream_of, stream_schema, tail_of
-from handover.cosim.record.tail import HEADER, MAGIC, DamagedTail, block_arrays
+from handover.cosim.record.tail import HEADER, MAGIC, DamagedTail, block_arrays, read_layout
 
 _TRIES = 20
 """How often a row is read anew that the run overwrites meanwhile."""
@@ -44,11 +43,13 @@ class GrowingRecord(Record):
             if header["magic"][0] != MAGIC:
                 raise NoRows
             size = int(header["layout"][0])
-            layout = json.loads(self._map[HEADER.itemsize : HEADER.itemsize + size])
+            layout = read_layout(self._map, size)
             self._counters, self._times, self._rows = block_arrays(self._map, layout, HEADER.itemsize + size)
         except (OSError, ValueError, DamagedTail) as e:
             raise NoRows from e
-        self.places: dict[str, tuple[int, int]] = dict(zip(self._schema.names[1:], layout["places"], strict=True))
+        self.places: dict[str, tuple[int, int]] = dict(
+            zip(self._schema.names[1:], layout.get("places", []), strict=True)
+        )
         """By column, the part of a row and the index in it."""
         self._columns = columns_of_signals(self._schema.names)
         self._about = dict(column_metadata(self._schema))

@@ -13,6 +13,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from handover.cosim.files import check_regular
 from handover.cosim.fmu.host_process import opened_file
 from handover.cosim.record.columns import RecordColumns
 from handover.cosim.record.formats import RECORD_FORMATS
@@ -87,6 +88,7 @@ def stream_schema(path: Path) -> "pa.Schema":
     Raises:
         OSError: there is no such file, or its schema is not complete.
     """
+    check_regular(path)
     try:
         with pa.OSFile(str(path), "rb") as source, pa.ipc.open_stream(source) as stream:
             return stream.schema
@@ -139,10 +141,12 @@ def complete_record(path: Path) -> int:
         return finish_record(path, (), lambda: stream_batches(stream))
     try:
         written = sum(batch.num_rows for batch in stream_batches(stream))
-        columns = RecordColumns(stream_schema(stream), block.layout["places"])
-        last = columns.batch(block, min(written - int(block.counters[1]), block.filled))
-        formats: Sequence[str] = block.layout["formats"]
-        return finish_record(path, formats, lambda: _chained(stream, last))
+        columns = RecordColumns(stream_schema(stream), block.layout.get("places", []))
+        try:
+            last = columns.batch(block, min(written - int(block.counters[1]), block.filled))
+        except LookupError as e:
+            raise DamagedTail(f"{tail_of(path)} has other columns than {stream}") from e
+        return finish_record(path, block.layout.get("formats", []), lambda: _chained(stream, last))
     finally:
         block.close()
         if not stream.exists():
@@ -209,5 +213,6 @@ def _chained(stream: Path, last: "pa.RecordBatch") -> Iterable["pa.RecordBatch"]
 
 
 def _rows_in(path: Path) -> int:
+    check_regular(path)
     rows: int = pq.read_metadata(path).num_rows
     return rows

@@ -3,14 +3,17 @@
 import contextlib
 import json
 import mmap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
+from typing_extensions import NotRequired, TypedDict
 
-from handover.cosim.files import FileLocked, lock_file, unlock_file
+from handover.cosim.files import FileLocked, check_regular, lock_file, unlock_file
+from handover.cosim.typed_data import Count, decoded
 
 MAGIC = b"HANDOVER"
 HEADER = np.dtype([("magic", "S8"), ("layout", "<i8"), ("filled", "<i8"), ("first", "<i8")])
@@ -27,6 +30,19 @@ class Part(NamedTuple):
 
     values: NDArray[Any]
     rows: NDArray[Any]
+
+
+class Layout(TypedDict):
+    """How a block's file is laid out, and what whoever completes the record must know.
+
+    `parts` have their dtype and number of values a row; `places` are the part and the index in it of each column, and
+    `formats` those of the record besides Parquet.
+    """
+
+    capacity: Annotated[int, Meta(ge=1, le=2**31)]
+    parts: list[tuple[Annotated[str, Meta(pattern=r"^[<>|=][a-z][0-9]{1,2}$")], Count]]
+    places: NotRequired[list[tuple[Count, Count]]]
+    formats: NotRequired[list[Literal["parquet", "csv", "mat"]]]
 
 
 class DamagedTail(ValueError):
@@ -56,13 +72,15 @@ class RecordBlock:
         if header["magic"][0] != MAGIC:
             raise DamagedTail("it does not begin as the last rows of a record do")
         size = int(header["layout"][0])
-        self.layout: dict[str, Any] = json.loads(file[HEADER.itemsize : HEADER.itemsize + size])
+        self.layout = read_layout(file, size)
         self._file, self._handle = file, handle
         self.capacity = int(self.layout["capacity"])
         self.counters, self.time, rows = block_arrays(file, self.layout, HEADER.itemsize + size)
         self.parts: list[Part] = []
         for i, (dtype, n) in enumerate(self.layout["parts"]):
             self.parts.append(Part(sources[i] if sources is not None else np.zeros(n, dtype), rows[i]))
+        if not (0 <= self.counters[0] <= self.capacity and self.counters[1] >= 0):
+            raise DamagedTail(f"it counts {self.counters[0]} rows of {self.capacity} after {self.counters[1]}")
 
     @classmethod
     def create(cls, path: Path, sources: Sequence[NDArray[Any]], about: dict[str, Any]) -> "RecordBlock":
@@ -99,6 +117,7 @@ class RecordBlock:
         Raises:
             FileLocked: that process still runs. DamagedTail: the file is not whole. OSError: it cannot be read.
         """
+        check_regular(path)
         handle = open(path, "r+b")  # noqa: SIM115 (kept open: it carries the lock)
         try:
             lock_file(handle)
@@ -148,8 +167,17 @@ class RecordBlock:
             self._file.close()
 
 
+def read_layout(file: mmap.mmap, size: int) -> "Layout":
+    """Return the layout of a block's file, which has so many bytes.
+
+    Raises:
+        ValueError: it is damaged.
+    """
+    return decoded(file[HEADER.itemsize : HEADER.itemsize + max(size, 0)], Layout)
+
+
 def block_arrays(
-    file: mmap.mmap, layout: Mapping[str, Any], end: int
+    file: mmap.mmap, layout: "Layout", end: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], list[NDArray[Any]]]:
     """Return counters, times and the rows of each part of a block's file, whose layout ends at a byte."""
     counters: NDArray[np.int64] = np.frombuffer(file, dtype=np.int64, count=2, offset=16)

@@ -15,6 +15,7 @@ from handover.cosim.exceptions import CosimError, UnitFailure, nearest
 from handover.cosim.fmu.file.default_experiment import exact_seconds
 from handover.cosim.record.formats import RECORD_FORMATS
 from handover.cosim.stepping.options import CALL_LIMIT, Algorithm, MasterOptions
+from handover.cosim.typed_data import GREATEST_SEED
 from handover.scenarios.execution.errors import (
     ClusterLost,
     RunNotWritten,
@@ -157,10 +158,11 @@ def whole_number(name: str, value: Any, least: int = 0) -> int:
     """Return a whole number, such as a seed.
 
     Raises:
-        InvalidInput: it is none, or less than `least`.
+        InvalidInput: it is none, less than `least`, or beyond 64 bits.
     """
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < least:
-        raise InvalidInput(f"{name} = {value!r}: a whole number from {least} on is right")
+    is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.bool_))
+    if not is_whole or not least <= value <= GREATEST_SEED:
+        raise InvalidInput(f"{name} = {value!r:.60}: a whole number from {least} to {GREATEST_SEED} is right")
     return int(cast(Any, value))
 
 

@@ -11,14 +11,19 @@ import platform
 import shutil
 from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from msgspec import Meta
+from typing_extensions import TypedDict
 
 from handover.cosim.fmu.file.description import describe_fmu
+from handover.cosim.typed_data import ExactSeconds, Seed
 from handover.scenarios.campaign.identity import differences, identity_of
 from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun, safe_name
 from handover.scenarios.execution.file_experiment import settable_of
 from handover.scenarios.execution.unit_values import is_unit_value
 from handover.scenarios.experiment.parameters import text_of
+from handover.scenarios.results.folder_data import FileData, FmuData, SourceData
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
     check_place,
@@ -40,6 +45,31 @@ PARAMETER_UNITS = "parameter_units"
 
 OF_NEITHER = f"is the folder of neither a run (no run.json) nor a campaign (no {_FILE})"
 """What is said of a folder where a run's or a campaign's is right."""
+
+
+class _OfSomeCampaigns(TypedDict, total=False):
+    source: SourceData
+    parameter_units: dict[str, str]
+    title: str
+    headline: list[str]
+    units: dict[str, FmuData]
+    parameter_files: dict[str, FileData]
+    versions: dict[str, str]
+    experiment: str | None
+    paired: bool
+    stop: ExactSeconds | None
+    scenes: list[str]
+    varied_units: list[str]
+
+
+class CampaignData(_OfSomeCampaigns):
+    """What `campaign.json` holds: see `identity_of`, and what is needed to show the campaign."""
+
+    scenario: str
+    points: list[dict[str, str]]
+    fixed: dict[str, str]
+    repetitions: Annotated[int, Meta(ge=1, le=10**6)]
+    seed: Seed
 
 
 class CampaignFolder:
@@ -87,7 +117,7 @@ class CampaignFolder:
         Raises:
             InvalidRunFolder: it is not the folder of a campaign, or damaged.
         """
-        return read_object(self.path / _FILE, f"it is not the folder of a campaign: it has no {_FILE}")
+        return read_object(self.path / _FILE, f"it is not the folder of a campaign: it has no {_FILE}", CampaignData)
 
     def check(self, plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
         """Check that a campaign can begin or be resumed here; nothing is written.

@@ -248,7 +248,6 @@ def _is_array(text: str) -> bool:
 DEFAULTS = "nothing changed"
 """Label of a point at which no varied parameter is set."""
 
-_FORMS: Mapping[str, type] = {"scenario": str, "points": list, "fixed": dict, "repetitions": int, "seed": int}
 _COLUMNS = ("run", "point", "repetition", "seed", "status", "success", "reason", "cpu_seconds", "wall_seconds")
 
 
@@ -259,11 +258,6 @@ def read_results(folder: CampaignFolder) -> CampaignResults:
         InvalidRunFolder: it is not the folder of a campaign, or one of the files is damaged.
     """
     content = folder.read()
-    faults = [f"{n!r} is {content.get(n)!r:.40}" for n, form in _FORMS.items() if not isinstance(content.get(n), form)]
-    if not faults and not all(isinstance(p, dict) for p in content["points"]):
-        faults = ["its points are not mappings of parameters to values"]
-    if faults:
-        raise InvalidRunFolder(folder.path, f"its campaign.json is damaged: {'; '.join(faults)}")
     table = CampaignTable.read(folder.table)
     missing = [name for name in _COLUMNS if name not in table.table.column_names]
     if missing:

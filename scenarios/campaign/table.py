@@ -1,6 +1,5 @@
 """Reads the table of a campaign, a row for each run that has ended, and the row of one run from its folder."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,8 +11,11 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from handover.cosim.exceptions import nearest, one_line
+from handover.cosim.files import check_regular
+from handover.cosim.typed_data import InvalidData, read_typed
 from handover.scenarios.campaign.plan import PlannedRun, safe_name
 from handover.scenarios.experiment.experiment import Metric
+from handover.scenarios.results.folder_data import Summary
 from handover.scenarios.results.run_folder import InvalidRunFolder
 from handover.scenarios.results.summary import metric_of
 
@@ -41,6 +43,7 @@ class CampaignTable:
         """
         file = path / "runs.parquet" if path.is_dir() else path
         try:
+            check_regular(file)
             table = cls(pq.read_table(file))
         except FileNotFoundError as e:
             raise InvalidRunFolder(file.parent, f"it has no {file.name}; {_REMEDY}") from e
@@ -146,11 +149,11 @@ def row_of(run: PlannedRun, folder: Path) -> RunRow | None:
     A summary has no seed where the scenario draws no random numbers.
     """
     try:
-        summary: Any = json.loads((folder / "summary.json").read_bytes())
+        summary: dict[str, Any] = {**read_typed(folder / "summary.json", Summary)}
         if summary["seed"] not in (run.seed, None) or (summary["failure"] is None and not summary["complete"]):
             return None
         return _row(run, summary)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, InvalidData, KeyError):
         return None
 
 

@@ -1,15 +1,15 @@
 """Writes the page of a campaign from its folder: the header, and the sections that it has."""
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
 from handover.cosim.exceptions import one_line
 from handover.cosim.files import scratch_folder
+from handover.cosim.typed_data import read_typed
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.results import CampaignResults, read_results
 from handover.scenarios.campaign_report.claims_section import claims_section, comparison_section, verdict_html
@@ -118,8 +118,8 @@ def read_claims(folder: CampaignFolder) -> Sequence[Claim]:
     if not file.exists():
         return ()
     try:
-        return [Claim.from_data(entry) for entry in cast(list[Mapping[str, Any]], json.loads(file.read_bytes()))]
-    except (KeyError, TypeError, ValueError) as e:
+        return [Claim.from_data(entry) for entry in read_typed(file, list[dict[str, Any]])]
+    except (OSError, KeyError, TypeError, ValueError) as e:
         fault = f"its {file.name} is damaged: {one_line(e)}; run the same `handover paper` command again to rewrite it"
         raise InvalidRunFolder(folder.path, fault) from e
 

@@ -17,6 +17,8 @@ import tomli
 from click.core import ParameterSource
 
 from handover.cosim.exceptions import nearest, one_line
+from handover.cosim.files import read_regular
+from handover.cosim.typed_data import checked, decoded
 from handover.fmus.build import is_of_cache
 from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import InvalidScenario, ScenarioSource, named_scenario
@@ -24,6 +26,7 @@ from handover.scenarios.cli.master_options import CONTROL_FIELDS
 from handover.scenarios.cli.options import HeadedCommand
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.selection import is_path_of_class
+from handover.scenarios.results.folder_data import RunData
 from handover.scenarios.results.run_folder import sha256_of, version_differences, versions
 
 _META = "handover.config"
@@ -165,14 +168,12 @@ def read_config(path: Path, ctx: click.Context) -> ConfigFile:
 def _content(path: Path) -> dict[str, Any]:
     form = "JSON" if path.suffix.lower() == ".json" else "TOML"
     try:
-        content: Any = (json.loads if form == "JSON" else tomli.loads)(path.read_text(encoding="utf-8"))
+        text = read_regular(path)
+        return decoded(text, dict[str, Any]) if form == "JSON" else tomli.loads(text.decode())
     except OSError as e:
         raise UsageError(f"{path}: it cannot be read: {e.strerror or e}") from e
     except (ValueError, RecursionError) as e:  # of both parsers, and of bytes that are not UTF-8
-        raise UsageError(f"{path}: it is not {form}: {one_line(e)}") from e
-    if not isinstance(content, dict):
-        raise UsageError(f'{path}: an object of options is right, such as {{"seed": 3}}')
-    return cast(dict[str, Any], content)
+        raise UsageError(f'{path}: it is not {form} of options, such as {{"seed": 3}}: {one_line(e)}') from e
 
 
 def _options(command: click.Command) -> Iterator[tuple[str, click.Parameter]]:
@@ -269,6 +270,7 @@ def _of_run(path: Path, run: Mapping[str, Any]) -> dict[str, Any]:
         UsageError: it is damaged.
     """
     with _damage_reported(path):
+        checked(run, RunData)
         if other := version_differences(versions(), run["versions"]):
             click.echo(f"{path}: the run was of other versions: {other}", err=True)
         content: dict[str, Any] = {**_subject(run), **_of_master(run["master"])}

@@ -1,11 +1,13 @@
 """Entry point of the command `handover`: standard streams, Ctrl-C from the first instant, and the supervised child."""
 
+import contextlib
+import errno
 import os
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from handover.cosim.python_process import import_path
-from handover.scenarios.execution.exit_status import abort
+from handover.scenarios.execution.exit_status import UNIT_FAILED, abort
 
 if TYPE_CHECKING:
     from handover.cosim.fmu.heartbeat import Heartbeat
@@ -51,7 +53,24 @@ def _command() -> None:
         from handover.scenarios.cli.command import main as command
     except KeyboardInterrupt:
         abort()
-    command()
+    try:
+        try:
+            command()
+        finally:
+            with contextlib.suppress(BrokenPipeError):
+                sys.stdout.flush()
+    except OSError as e:
+        if e.errno not in (errno.ENOSPC, errno.EDQUOT) or e.filename is not None:
+            raise
+        _end_unprinted(e)
+
+
+def _end_unprinted(e: OSError) -> NoReturn:
+    """End a command whose output has no room where it goes, as on a full disk; what is left of it goes nowhere."""
+    with open(os.devnull, "w", encoding="utf-8") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+    print(f"Error: standard output cannot be written: {e.strerror}", file=sys.stderr)
+    sys.exit(UNIT_FAILED)
 
 
 def _report_crash(heartbeat: "Heartbeat", end: "ChildEnd", wall: float) -> int:

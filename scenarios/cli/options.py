@@ -16,6 +16,7 @@ from typing import Any
 import click
 
 from handover.cosim.stepping.options import CALL_LIMIT
+from handover.cosim.typed_data import GREATEST_SEED
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.progress import LOG_LEVELS
 
@@ -65,7 +66,9 @@ class WholeNumber(click.IntRange):
         except (TypeError, ValueError, OverflowError):
             number = None
         if number is None or (isinstance(value, float) and not value.is_integer()):
-            self.fail(f"{value!r} is no whole number.", param, ctx)
+            self.fail(f"{value!r:.60} is no whole number.", param, ctx)
+        if self.max is not None and number > self.max:
+            self.fail(f"{value!s:.60} is not in the range {self._describe_range()}.", param, ctx)
         return int(super().convert(number, param, ctx))
 
 
@@ -85,6 +88,9 @@ class Instant(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (g
             self.fail(f"{value!r} is not a time in seconds, such as 0.01, 1/30 or -2", param, ctx)
         return -seconds if str(value).startswith("-") else seconds
 
+
+SEED = WholeNumber(0, GREATEST_SEED)
+"""Of all random numbers of a run, or of a campaign."""
 
 _FORM = re.compile(r"[\d.]+(e[-+]?\d{1,3})?|\d+/\d+", re.IGNORECASE)
 """Exact fractions of larger exponents would take long to compute."""
@@ -118,7 +124,7 @@ _SCENARIO_OPTIONS = (
         metavar="NAME=VALUE",
         help="Set a parameter of the scenario, see `handover list SCENARIO`; or of a unit: UNIT.NAME=VALUE.",
     ),
-    click.option("--seed", type=WholeNumber(min=0), default=0, help="Seed of all random numbers."),
+    click.option("--seed", type=SEED, default=0, help="Seed of all random numbers."),
     click.option(
         "--unit",
         "replaced",

@@ -15,7 +15,7 @@ from rich.text import Text
 from handover.cosim.exceptions import nearest
 from handover.scenarios.cli.campaign import CampaignOutcome, pool_config, run_campaign_command
 from handover.scenarios.cli.console import open_console
-from handover.scenarios.cli.options import HeadedCommand, WholeNumber, campaign_options
+from handover.scenarios.cli.options import SEED, HeadedCommand, campaign_options
 from handover.scenarios.execution.errors import UsageError, require_extra
 from handover.scenarios.execution.progress import doing
 from handover.scenarios.results.run_folder import InvalidRunFolder
@@ -47,7 +47,7 @@ Exit status
 @click.command("paper", cls=HeadedCommand, help=_HELP, context_settings={"show_default": True})
 @click.argument("experiment", required=False, metavar="[EXPERIMENT]")
 @click.option("--quick", is_flag=True, help="A fraction of the runs; most claims need all.")
-@click.option("--seed", type=WholeNumber(min=0), help="Seed of the campaign.  [default: the experiment's]")
+@click.option("--seed", type=SEED, help="Seed of the campaign.  [default: the experiment's]")
 @click.option(
     "--model",
     type=click.Path(dir_okay=False, path_type=Path),

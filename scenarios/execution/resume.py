@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from handover.cosim.exceptions import RecordNotWritten, nearest, one_line
 from handover.cosim.files import FileLocked
@@ -65,7 +65,7 @@ class InterruptedRun:
         if folder.read_summary().get("complete"):
             raise InvalidRunFolder(folder.path, "the run is complete; there is nothing to resume")
         rows = complete_signals(folder)
-        self._check_versions(self._object("versions"))
+        self._check_versions(self._description.get("versions", {}))
         self.resumption = Resumption(folder.checkpoint)
         if rows < self.resumption.checkpoint.rows:
             counted = self.resumption.checkpoint.rows
@@ -78,13 +78,13 @@ class InterruptedRun:
             InvalidRunFolder: the code of the scenario is not what it was, or `run.json` is damaged.
         """
         lines: list[str] = []
-        source, units = self._object("source"), self._object("units")
+        source, units = self._description.get("source", {}), self._object("units")
         if "scenario" in source:
             before = self._own_source(source)
             lines.append(f"the code of {before.scenario}: {self._unchanged(before)}, as the run began with it")
-        for name, file in self._object("files").items():
+        for name, file in self._description.get("files", {}).items():
             path, known = Path(str(file)), units.get(name)
-            unchanged = isinstance(known, dict) and path.is_file() and sha256_of(path) == cast(Any, known).get("sha256")
+            unchanged = known is not None and path.is_file() and sha256_of(path) == known["sha256"]
             if unchanged and not is_of_cache(path):
                 lines.append(f"the FMU of its unit {name}: {file}")
         return lines + [f"the units in {source[kind]}" for kind in ("ssp", "fmu") if kind in source]
@@ -126,12 +126,6 @@ class InterruptedRun:
         self._check_parameter_files()
         self._check_fmus(task)
         return task
-
-    def _object(self, name: str) -> Mapping[str, Any]:
-        content = self._description.get(name, {})
-        if not isinstance(content, dict):
-            raise InvalidRunFolder(self.folder.path, f"its run.json is damaged: {name!r} is no object")
-        return cast(Mapping[str, Any], content)
 
     def _check_versions(self, before: Mapping[str, str]) -> None:
         if other := version_differences(versions(), before):
@@ -191,21 +185,18 @@ class InterruptedRun:
     def _fmu(self, name: str, unit: str) -> Path:
         """Return a unit's file; if it is gone, or damaged in the folder of built units, the unit built again."""
         path = Path(self._description["files"][name])
-        before = self._object("units").get(name, {}).get("sha256")
+        before = self._description.get("units", {}).get(name, {}).get("sha256")
         if path.is_file() and (sha256_of(path) == before or not is_of_cache(path)):
             return path
         return cached(unit, 3)
 
     def _check_parameter_files(self) -> None:
         faults: list[str] = []
-        for name, entry in self._object("parameter_files").items():
-            if not isinstance(entry, dict) or not {"file", "sha256"} <= entry.keys():
-                raise InvalidRunFolder(self.folder.path, f"its run.json is damaged: parameter_files has {name} {entry}")
-            known = cast(dict[str, str], entry)
-            file = Path(known["file"])
+        for name, entry in self._description.get("parameter_files", {}).items():
+            file = Path(entry["file"])
             if not file.is_file():
                 faults.append(f"{file}, which its parameter {name} names, is not there any more")
-            elif sha256_of(file) != known["sha256"]:
+            elif sha256_of(file) != entry["sha256"]:
                 faults.append(f"{file}, which its parameter {name} names, is not the file that the run began with")
         if faults:
             raise InvalidRunFolder(self.folder.path, "; ".join(faults))
@@ -213,7 +204,7 @@ class InterruptedRun:
     def _check_fmus(self, task: Task) -> None:
         system = built_system(task.experiment, task.parameters, task.seed, task.fmus, task.unit_values)
         here = {name: unit.description.path for name, unit in system.units.items()}
-        before = {name: unit.get("sha256") for name, unit in self._object("units").items()}
+        before = {name: unit.get("sha256") for name, unit in self._description.get("units", {}).items()}
         other = [f"{name} ({here[name]})" for name in here if before.get(name) != sha256_of(here[name])]
         if other:
             raise InvalidRunFolder(

@@ -32,7 +32,6 @@ from handover.scenarios.results.run_folder import disk_errors_reported
 from handover.scenarios.results.summary import (
     ElapsedTime,
     RunResult,
-    Summary,
     begun_run,
     crash_facts,
     failure_reason,
@@ -278,7 +277,9 @@ def _outcome(
     return seen
 
 
-def _present(task: Task, evaluator: GuardedEvaluator[Evaluator], summary: Summary, faults: ToleratedFaults) -> None:
+def _present(
+    task: Task, evaluator: GuardedEvaluator[Evaluator], summary: Mapping[str, Any], faults: ToleratedFaults
+) -> None:
     """Draw figures and write the page; what fails of them is left out, with a line in the page that says so."""
     from handover.scenarios.reporting.run_figures import draw_figures  # plots take long to load
     from handover.scenarios.reporting.run_page import write_run_page

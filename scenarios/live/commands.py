@@ -19,14 +19,19 @@ Of a session of runs, besides:
 | `report` | number of a run that is over | writes its page |
 """
 
-import json
 import math
 from collections.abc import Collection, Sequence
-from typing import Any, NamedTuple, cast
+from dataclasses import dataclass
+from typing import Annotated, Any, NamedTuple, TypeVar
+
+from msgspec import Meta
 
 from handover.cosim.master.live_control import LiveControl
+from handover.cosim.typed_data import InvalidData, Seed, checked, decoded
 from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.live.played_run import Choice
+
+T = TypeVar("T")
 
 COMMANDS = ("pace", "pause", "go", "step", "stop", "choose", "see", "push")
 LONGEST = 1000
@@ -39,6 +44,37 @@ _FAR = 5.0
 
 class InvalidCommand(ValueError):
     """What came over a connection is no command of the page."""
+
+
+_PACE: Any = Annotated[float, Meta(ge=0.0, le=_HIGHEST_PACE)]
+_PlotNumber = Annotated[int, Meta(ge=0, lt=_MOST_PLOTS)]
+_Coordinate = Annotated[float, Meta(ge=-_FAR, le=_FAR)]
+
+
+@dataclass
+class _Members:
+    """A command as it came."""
+
+    command: str
+    value: Any = None
+
+
+@dataclass
+class _Chosen:
+    """The value of `set`."""
+
+    parameters: dict[str, str]
+    seed: Seed | None = None
+    push: bool = False
+
+
+@dataclass
+class _Pushed:
+    """The value of `push`."""
+
+    body: str
+    force: tuple[float, float, float]
+    point: tuple[_Coordinate, _Coordinate, _Coordinate]
 
 
 class Command(NamedTuple):
@@ -57,15 +93,10 @@ def parse_command(text: str, longest: int = LONGEST) -> Command:
     if len(text) > longest:
         raise InvalidCommand(f"a command has {longest} characters at most, this one {len(text)}")
     try:
-        content: Any = json.loads(text)
-    except (ValueError, RecursionError) as e:  # the latter of brackets within brackets
-        raise InvalidCommand("it is not JSON") from e
-    if not isinstance(content, dict):
-        raise InvalidCommand('it is not of the form {"command": NAME, "value": VALUE}')
-    members = cast(dict[str, Any], content)
-    if not isinstance(members.get("command"), str):
-        raise InvalidCommand('it is not of the form {"command": NAME, "value": VALUE}')
-    return Command(members["command"], members.get("value"))
+        members = decoded(text, _Members)
+    except InvalidData as e:
+        raise InvalidCommand(f'{{"command": NAME, "value": VALUE}} is right: {e}') from e
+    return Command(members.command, members.value)
 
 
 def pace_of(value: Any) -> float:
@@ -74,9 +105,9 @@ def pace_of(value: Any) -> float:
     Raises:
         InvalidCommand: it says none.
     """
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value <= _HIGHEST_PACE:
-        raise InvalidCommand(f"pace takes simulated seconds per second, up to {_HIGHEST_PACE:g}; 0: as fast as it goes")
-    return float(value) or math.inf
+    right = f"pace takes simulated seconds per second, up to {_HIGHEST_PACE:g}; 0: as fast as it goes"
+    pace: float = _checked(value, _PACE, right)
+    return pace or math.inf
 
 
 def control_run(control: LiveControl, command: Command) -> None:
@@ -104,10 +135,11 @@ def signal_names(value: Any, known: Collection[str]) -> list[str]:
     Raises:
         InvalidCommand: it names no signals, unknown ones, or too many.
     """
-    names: list[Any] = cast(list[Any], value) if isinstance(value, list) else [None]
-    if not all(isinstance(name, str) and name in known for name in names) or len(names) > _MOST_CHOSEN:
-        raise InvalidCommand(f"choose takes up to {_MOST_CHOSEN} names of signals")
-    return [str(name) for name in names]
+    right = f"choose takes up to {_MOST_CHOSEN} names of signals"
+    names = _checked(value, list[str], right)
+    if not set(names) <= set(known) or len(names) > _MOST_CHOSEN:
+        raise InvalidCommand(right)
+    return names
 
 
 def plot_numbers(value: Any) -> set[int]:
@@ -116,10 +148,7 @@ def plot_numbers(value: Any) -> set[int]:
     Raises:
         InvalidCommand: it says none.
     """
-    numbers: list[Any] = cast(list[Any], value) if isinstance(value, list) else [None]
-    if not all(isinstance(n, int) and 0 <= n < _MOST_PLOTS for n in numbers):
-        raise InvalidCommand("see takes numbers of plots")
-    return {int(n) for n in numbers}
+    return _checked(value, set[_PlotNumber], "see takes numbers of plots")
 
 
 def choice_of(value: Any, known: Collection[str], *, seeded: bool) -> Choice:
@@ -128,18 +157,11 @@ def choice_of(value: Any, known: Collection[str], *, seeded: bool) -> Choice:
     Raises:
         InvalidCommand: it says none.
     """
-    right = InvalidCommand('set takes {"parameters": {NAME: TEXT}, "seed": NUMBER}, with names of parameters')
-    members = cast(dict[str, Any], value) if isinstance(value, dict) else {}
-    parameters: Any = members.get("parameters")
-    seed: Any = members.get("seed")
-    if not isinstance(parameters, dict) or not members.keys() <= {"parameters", "seed", "push"}:
-        raise right
-    texts = cast(dict[str, Any], parameters)
-    if not all(name in known and isinstance(text, str) for name, text in texts.items()):
-        raise right
-    if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int) or seed < 0):
-        raise right
-    return Choice(dict(texts), (seed or 0) if seeded else None, members.get("push") is True)
+    right = 'set takes {"parameters": {NAME: TEXT}, "seed": NUMBER}, with names of parameters'
+    chosen = _checked(value, _Chosen, right)
+    if not chosen.parameters.keys() <= set(known):
+        raise InvalidCommand(right)
+    return Choice(chosen.parameters, (chosen.seed or 0) if seeded else None, chosen.push)
 
 
 class Push(NamedTuple):
@@ -160,24 +182,15 @@ def push_of(value: Any, known: Sequence[Pushable]) -> Push | None:
         raise InvalidCommand("nothing can be pushed in this run")
     if value is None:
         return None
-    members = cast(dict[str, Any], value) if isinstance(value, dict) else {}
-    bodies = [push for push in known if members.get("body") in push.labels]
+    most = f"three finite numbers each of force, and of point, {_FAR:g} m at most"
+    pushed = _checked(value, _Pushed, f"push takes a body, {most}")
+    bodies = [push for push in known if pushed.body in push.labels]
     if not bodies:
         labels = ", ".join(label for push in known for label in push.labels)
         raise InvalidCommand(f"push takes a body that can be pushed: {labels}")
-    greatest = bodies[0].greatest * (1.0 + 1e-9)
-    force, point = _three(members.get("force"), greatest), _three(members.get("point"), _FAR)
-    if force is None or point is None or math.hypot(*force) > greatest:
-        most = f"{bodies[0].greatest:g} N at most"
-        raise InvalidCommand(f"push takes three finite numbers each of force, {most}, and of point, {_FAR:g} m at most")
-    return Push(bodies[0], force, point)
-
-
-def _three(value: Any, most: float) -> tuple[float, ...] | None:
-    """Return three finite numbers of at most `most` each, None if it is something else."""
-    numbers: list[Any] = cast(list[Any], value) if isinstance(value, list) else []
-    fit = all(isinstance(n, (int, float)) and not isinstance(n, bool) and abs(n) <= most for n in numbers)
-    return tuple(map(float, numbers)) if fit and len(numbers) == 3 else None
+    if math.hypot(*pushed.force) > bodies[0].greatest * (1.0 + 1e-9):
+        raise InvalidCommand(f"push takes a force of {bodies[0].greatest:g} N at most")
+    return Push(bodies[0], pushed.force, pushed.point)
 
 
 def run_number(value: Any, known: Collection[int]) -> int:
@@ -186,6 +199,15 @@ def run_number(value: Any, known: Collection[int]) -> int:
     Raises:
         InvalidCommand: it is none of those that there are.
     """
-    if isinstance(value, bool) or not isinstance(value, int) or value not in known:
-        raise InvalidCommand("it takes the number of a run that is over")
-    return int(value)
+    number = _checked(value, int, right := "it takes the number of a run that is over")
+    if number not in known:
+        raise InvalidCommand(right)
+    return number
+
+
+def _checked(value: Any, declared: type[T], right: str) -> T:
+    """Return a command's value; if it is not of the declared type, raise InvalidCommand with what would be right."""
+    try:
+        return checked(value, declared)
+    except InvalidData as e:
+        raise InvalidCommand(f"{right}: {e}") from e

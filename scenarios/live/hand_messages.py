@@ -24,12 +24,12 @@ with WebSocket's code 1009, whose reason says that limit; on live pages more tha
 1008.
 """
 
-import json
 import math
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, cast
 
+from handover.cosim.typed_data import InvalidData, decoded
 from handover.plants.free_flyer.hand.hand_kinematics import CLOSED, JOINT_MAX, JOINTS, STRAIGHT
 from handover.scenarios.experiment.live_inputs import LedHand
 
@@ -94,10 +94,9 @@ def parse_hand_message(text: str) -> HandSample:
     if len(text) > LONGEST:
         raise InvalidHandMessage(f"a sample has {LONGEST} characters at most, this one {len(text)}")
     try:
-        content: Any = json.loads(text)
-    except (ValueError, RecursionError) as e:
-        raise InvalidHandMessage("it is not JSON") from e
-    return hand_sample(content)
+        return hand_sample(decoded(text, dict[str, Any]))
+    except InvalidData as e:
+        raise InvalidHandMessage(f"an object with p_WH, q_WH, closed or angles, and stamp is right: {e}") from e
 
 
 def hand_sample(content: Any) -> HandSample:

@@ -26,7 +26,7 @@ from handover.scenarios.reporting.replay_section import replay_section
 from handover.scenarios.reporting.time_plots import explorer_section, time_plots_section
 from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.run_facts import RunFacts, record_of
-from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
+from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.tables import format_conversion, format_metric, master_rows, warning_lines
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
@@ -52,7 +52,8 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> list[str]:
         plots,
         pictures_section(folder),
         _explorer(record, faults),
-        *_sections_of_units(facts),
+        graph_section(facts.run),
+        cpu_section(facts.summary),
         parameters_section(facts),
         master_section(facts),
         files_section(facts, (file or folder.report).absolute().parent),
@@ -119,14 +120,6 @@ def _explorer(record: Record | None, faults: ToleratedFaults) -> Section | None:
     with faults.tolerated("the signals could not be drawn"):
         return None if record is None else explorer_section(record)
     return None
-
-
-def _sections_of_units(facts: RunFacts) -> Sequence[Section | None]:
-    try:
-        return graph_section(facts.run), cpu_section(facts.summary)
-    except (KeyError, TypeError, AttributeError, ValueError, IndexError) as e:
-        fault = f"its description of the units is damaged: {type(e).__name__} {e}"
-        raise InvalidRunFolder(facts.folder.path, fault) from e
 
 
 _VERSIONS = {"handover-cosim": "handover-cosim", "python": "Python"}
@@ -197,18 +190,10 @@ def parameters_section(facts: RunFacts) -> Section | None:
 
 
 def master_section(facts: RunFacts) -> Section | None:
-    """Return how the units were coupled, which units of measure were converted, and what was warned of.
-
-    Raises:
-        InvalidRunFolder: the folder's description of it is damaged.
-    """
-    try:
-        rows = master_rows(facts.summary) if "master" in facts.summary else []
-        conversions = [format_conversion(c) for c in facts.run.get("conversions", [])]
-        warnings, notes = _warnings(facts), [str(line) for line in facts.run.get("notes", [])]
-    except (KeyError, TypeError, ValueError, AttributeError) as e:
-        fault = f"its description of the master is damaged: {type(e).__name__} {e}"
-        raise InvalidRunFolder(facts.folder.path, fault) from e
+    """Return how the units were coupled, which units of measure were converted, and what was warned of."""
+    rows = master_rows(facts.summary) if "master" in facts.summary else []
+    conversions = [format_conversion(c) for c in facts.run.get("conversions", [])]
+    warnings, notes = _warnings(facts), facts.run.get("notes", [])
     if not (rows or conversions or warnings or notes):
         return None
     messages = (("Warnings", warnings), ("Notes", notes))
@@ -218,7 +203,7 @@ def master_section(facts: RunFacts) -> Section | None:
 
 def _warnings(facts: RunFacts) -> list[str]:
     """Return what was warned of before the run, and what its units warned of in it."""
-    return [*map(str, facts.run.get("warnings", [])), *warning_lines(facts.summary)]
+    return [*facts.run.get("warnings", []), *warning_lines(facts.summary)]
 
 
 def files_section(facts: RunFacts, place: Path) -> Section:

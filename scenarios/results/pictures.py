@@ -4,11 +4,14 @@ import json
 import re
 import shutil
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from handover.cosim.exceptions import one_line
+from msgspec import Meta
+
+from handover.cosim.files import read_regular
+from handover.cosim.typed_data import FilePath, InvalidData, read_typed
 from handover.scenarios.experiment.pictures import CameraPicture, Mark
 from handover.scenarios.results.run_folder import InvalidRunFolder, disk_errors_reported, write_whole
 
@@ -43,20 +46,32 @@ def read_picture_files(folder: Path) -> list[CameraPicture]:
         InvalidRunFolder: `pictures.json` or a picture is damaged.
     """
     index = folder / "pictures.json"
-    if not index.is_file():
+    if not index.exists():
         return []
     try:
-        return [_picture(folder, entry) for entry in json.loads(index.read_bytes())]
+        return [_picture(folder, entry) for entry in read_typed(index, list[_Entry])]
     except OSError as e:
         raise InvalidRunFolder(folder.parent, f"its picture {e.filename} cannot be read: {e.strerror}") from e
-    except (ValueError, TypeError, KeyError) as e:
-        raise InvalidRunFolder(folder.parent, f"its pictures.json is damaged: {one_line(e)}") from e
+    except InvalidData as e:
+        raise InvalidRunFolder(folder.parent, f"its pictures.json is damaged: {e}") from e
 
 
-def _picture(folder: Path, entry: dict[str, Any]) -> CameraPicture:
-    marks = tuple(Mark(**mark) for mark in entry["marks"])
-    jpeg = (folder / Path(entry["file"]).name).read_bytes()
-    return CameraPicture(jpeg=jpeg, marks=marks, **{name: entry[name] for name in _KEYS})
+@dataclass(frozen=True, kw_only=True)
+class _Entry:
+    """A picture as `pictures.json` describes it."""
+
+    t: float
+    camera: str
+    role: str
+    width: Annotated[int, Meta(ge=1, le=100_000)]
+    height: Annotated[int, Meta(ge=1, le=100_000)]
+    file: FilePath
+    marks: list[Mark]
+
+
+def _picture(folder: Path, entry: _Entry) -> CameraPicture:
+    jpeg = read_regular(folder / Path(entry.file).name)
+    return CameraPicture(jpeg=jpeg, marks=tuple(entry.marks), **{name: getattr(entry, name) for name in _KEYS})
 
 
 def _plain(name: str) -> str:

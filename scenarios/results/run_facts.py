@@ -5,20 +5,19 @@ All is checked as it is read, since folders come from other versions, and from b
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.variable import indices_of, subscript
 from handover.cosim.exceptions import one_line
+from handover.cosim.files import check_regular
 from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import scenario_of, untrusted_code
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
-from handover.scenarios.results.summary import MetricData, RunData, Summary, faults_of, unwritten_summary
+from handover.scenarios.results.summary import unwritten_summary
 from handover.scenarios.results.tables import format_value
-
-_NEEDED = {"run.json": ("scenario", "parameters"), "summary.json": ("success", "reason", "metrics")}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,12 +45,9 @@ class RunFacts:
             InvalidRunFolder: it is not the folder of a run, or one of the files is damaged.
         """
         run, summary = folder.read_run(), folder.read_summary()
-        _check(folder, "run.json", run, RunData)
         ended = bool(summary)
         if not ended:
             summary = unwritten_summary(run)
-        _check(folder, "summary.json", summary, Summary)
-        _check_metrics(folder, cast(Mapping[str, Any], summary["metrics"]))
         scenario = scenario_of(run["scenario"], run.get("source", {}))
         experiment = None if scenario is None else scenario()
         return cls(folder=folder, run=run, summary=summary, experiment=experiment, ended=ended)
@@ -81,24 +77,8 @@ class RunFacts:
     def parameters(self) -> Sequence[tuple[str, str, str]]:
         """Name, value with unit, and description of each parameter."""
         if "told_parameters" in self.run:
-            return [(str(row[0]), str(row[1]), str(row[2])) for row in self.run["told_parameters"]]
+            return [(name, value, description) for name, value, description in self.run["told_parameters"]]
         return [(name, format_value(value), "") for name, value in self.run["parameters"].items()]
-
-
-def _check(folder: RunFolder, file: str, content: Mapping[str, Any], declared: type[Any]) -> None:
-    faults = [f"it has no {name!r}" for name in _NEEDED[file] if name not in content] + faults_of(content, declared)
-    rows = content.get("told_parameters", [])
-    if isinstance(rows, list) and any(not isinstance(row, list) or len(row) != 3 for row in rows):  # pyright: ignore
-        faults.append("'told_parameters' are not rows of three")
-    if faults:
-        raise InvalidRunFolder(folder.path, f"its {file} is damaged: {'; '.join(faults)}")
-
-
-def _check_metrics(folder: RunFolder, metrics: Mapping[str, Any]) -> None:
-    for name, metric in metrics.items():
-        data = cast(dict[str, Any], metric) if isinstance(metric, dict) else {}
-        if not {"value", "unit"} <= data.keys() or faults_of(data, MetricData):
-            raise InvalidRunFolder(folder.path, f"its summary.json is damaged: metric {name!r} is {metric!r:.60}")
 
 
 def whole_record_of(folder: RunFolder) -> Record | None:
@@ -110,6 +90,7 @@ def whole_record_of(folder: RunFolder) -> Record | None:
     if not folder.signals.exists():
         return None
     try:
+        check_regular(folder.signals)
         return Record(folder.signals)
     except (OSError, ValueError, KeyError) as e:  # Arrow's exceptions are subclasses of these
         raise InvalidRunFolder(folder.path, f"its {folder.signals.name} is damaged: {one_line(e)}") from e

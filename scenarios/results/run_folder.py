@@ -10,16 +10,21 @@ import hashlib
 import importlib.metadata
 import itertools
 import json
+import math
 import os
 import platform
 import shutil
 import time
 from collections.abc import Generator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar
 
-from handover.cosim.exceptions import RecordNotWritten, one_line
-from handover.cosim.files import FileLocked, folder_locked, holder_of
+from handover.cosim.exceptions import RecordNotWritten
+from handover.cosim.files import FileLocked, folder_locked, holder_of, read_regular
+from handover.cosim.typed_data import InvalidData, read_typed
+from handover.scenarios.results.folder_data import RunData, Summary
+
+T = TypeVar("T")
 
 _PACKAGES = ("handover-cosim", "fmpy", "exudyn", "numpy", "scipy", "opencv-python-headless", "pyarrow")
 
@@ -181,7 +186,7 @@ class RunFolder:
         Raises:
             InvalidRunFolder: it is missing or damaged.
         """
-        return read_object(self.path / "run.json", "it is not the folder of a run: it has no run.json")
+        return read_object(self.path / "run.json", "it is not the folder of a run: it has no run.json", RunData)
 
     def read_summary(self) -> dict[str, Any]:
         """Return what `write_summary` wrote; an empty dict if the run has not written it.
@@ -190,24 +195,28 @@ class RunFolder:
             InvalidRunFolder: it is damaged.
         """
         file = self.path / "summary.json"
-        return read_object(file, "") if file.exists() else {}
+        return read_object(file, "it has no summary.json", Summary) if file.exists() else {}
 
 
-def read_object(file: Path, missing: str) -> dict[str, Any]:
-    """Return the JSON object in a file of a folder.
+def read_object(file: Path, missing: str, declared: Any = dict[str, Any]) -> dict[str, Any]:
+    """Return the JSON object in a file of a folder, of a declared type.
 
     Raises:
-        InvalidRunFolder: it is damaged, or it cannot be read, with the message `missing`.
+        InvalidRunFolder: it is damaged, cannot be read, or is not there, with the message `missing`.
     """
+    return read_file(file, missing, declared)
+
+
+def read_file(file: Path, missing: str, declared: type[T]) -> T:
+    """Return what a JSON file of a folder holds, likewise."""
     try:
-        content = json.loads(file.read_bytes())
-    except OSError as e:
+        return read_typed(file, declared)
+    except FileNotFoundError as e:
         raise InvalidRunFolder(file.parent, missing) from e
-    except ValueError as e:
-        raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}") from e
-    if not isinstance(content, dict):
-        raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: it holds no JSON object")
-    return cast(dict[str, Any], content)
+    except OSError as e:
+        raise InvalidRunFolder(file.parent, f"its {file.name} cannot be read: {e.strerror}") from e
+    except InvalidData as e:
+        raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {e}") from e
 
 
 @contextlib.contextmanager
@@ -354,7 +363,7 @@ def _remove_empty(folders: Sequence[Path]) -> None:
 
 def sha256_of(file: Path) -> str:
     """Return a file's SHA-256 in hexadecimal."""
-    return hashlib.sha256(file.read_bytes()).hexdigest()
+    return hashlib.sha256(read_regular(file, math.inf)).hexdigest()
 
 
 def hashes_of_files(files: Mapping[str, Path]) -> dict[str, dict[str, str]]:

@@ -1,4 +1,4 @@
-"""A run's `summary.json` (how it went) and `run.json` (what was run): declared, made, and checked as they are read.
+"""Makes a run's `summary.json` (how it went) and `run.json` (what was run), which `folder_data` declares.
 
 However a run ends, its summary is made here: `finished_summary`, also where a unit failed; `crashed_summary`, where the
 run's process ended; `unstarted_summary`, where it could not begin; and `unwritten_summary`, of a run that wrote none.
@@ -10,16 +10,15 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import UnionType
-from typing import Any, TypedDict, get_args, get_origin, get_type_hints, is_typeddict
+from typing import Any
 
 import numpy as np
 
 from handover.cosim.exceptions import CosimError, InitializationError, UnitFailure, one_line
-from handover.cosim.fmu.unit_warnings import WarningData
 from handover.cosim.master.master import Master
 from handover.scenarios.experiment.display_unit import unit_symbol
 from handover.scenarios.experiment.experiment import Metric, Outcome
+from handover.scenarios.results.folder_data import Configuration, MetricData, UnitData
 from handover.scenarios.results.not_finite import NotFiniteData
 from handover.scenarios.results.run_folder import hashes_of_files, sha256_of, versions
 from handover.scenarios.results.system_facts import describe_system, own_period, run_metrics
@@ -27,113 +26,14 @@ from handover.scenarios.results.tables import conversions_of, format_value
 from handover.scenarios.results.task import Task
 
 
-class _OfSomeConfigurations(TypedDict, total=False):
-    unit_values: dict[str, str]
-    stop: str
-    recorded: list[str]
-    inputs: dict[str, Any]
-
-
-class Configuration(_OfSomeConfigurations):
-    """What determines a run's signals; `seed` is None where nothing is random, `master` as `MasterOptions.as_data`.
-
-    `unit_values`, `stop`, s, `recorded`, and `inputs`, where those from outside came from, are there only if some are
-    given, see `Task`.
-    """
-
-    scenario: str
-    parameters: dict[str, Any]
-    seed: int | None
-    master: dict[str, Any]
-
-
-class MetricData(TypedDict):
-    """A metric. Values that are not finite are None, since JSON has neither infinity nor NaN."""
-
-    value: float | None
-    unit: str
-    description: str
-
-
-class UnitData(TypedDict):
-    """A unit's FMU and step in words, its number of steps and its CPU time, None where unknown."""
-
-    name: str
-    model: str
-    step: str
-    steps: int | None
-    cpu_seconds: float | None
-
-
-class _OfSomeSummaries(TypedDict, total=False):
-    steps: dict[str, Any]
-    pace: dict[str, Any]
-    ended: dict[str, Any]
-    warnings: list[WarningData]
-    not_finite: list[NotFiniteData]
-    left_out: list[str]
-
-
-class Summary(Configuration, _OfSomeSummaries):
-    """How a run went: one that is not `complete` can be resumed; `failure` is as `UnitFailure.as_data`, or None.
-
-    Runs with adaptive steps have `steps`, see `StepStatistics`; those paced by real time have `pace`, see `PaceReport`;
-    those that a unit ended have its request in `ended`, as `UnitTerminated.as_data`. `warnings` has the calls that
-    answered Warning, by unit, and `not_finite` the outputs that are NaN or infinite in the record, where there are any.
-    `left_out` says, a line each, which figures, pictures or parts of the report could not be made.
-    """
-
-    complete: bool
-    success: bool
-    reason: str
-    metrics: dict[str, MetricData]
-    simulated_seconds: float
-    wall_seconds: float
-    cpu_seconds: float
-    units: list[UnitData]
-    failure: dict[str, Any] | None
-
-
 @dataclass(frozen=True, kw_only=True)
 class RunResult:
     """A run after its end; where a unit failed, `failure` says how. For `left_out` see `Summary`."""
 
     outcome: Outcome
-    summary: Summary
+    summary: Mapping[str, Any]
     failure: UnitFailure | None = None
     left_out: tuple[str, ...] = ()
-
-
-class _OfSomeRuns(TypedDict, total=False):
-    system: dict[str, Any]
-    conversions: list[dict[str, Any]]
-    warnings: list[str]
-    notes: list[str]
-    external_inputs: list[str]
-    failure: dict[str, Any] | None
-    parameter_files: dict[str, dict[str, str]]
-    experiment: dict[str, Any]
-
-
-class RunData(Configuration, _OfSomeRuns):
-    """What another process needs to resume a run, or to present it: see `Task` and `Experiment`.
-
-    A run that started has `system` and `conversions`, `warnings` of its FMUs if there are any, `notes` on what its
-    units do not have and the wiring leaves out, and the names of `external_inputs`, which came from outside; one that
-    could not start has `failure`; `units` are the FMUs' names and hashes; `parameter_files` has those of the files that
-    parameters name, by these, where there are any. `experiment` is what units were given as they were initialised:
-    the run's `start` and `stop`, s, the latter as far as their steps reach, and by unit `tolerances` of its solver.
-    """
-
-    source: dict[str, Any]
-    files: dict[str, str]
-    formats: list[str]
-    checkpoint: str | None
-    title: str
-    headline: list[str]
-    told_parameters: list[list[str]]
-    units: dict[str, dict[str, str]]
-    versions: dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -149,16 +49,16 @@ class ElapsedTime:
         return lambda: ElapsedTime(time.perf_counter() - wall, time.process_time() - cpu)
 
 
-def configuration(task: Task) -> Configuration:
+def configuration(task: Task) -> dict[str, Any]:
     """Return what determines a run's signals."""
-    given: _OfSomeConfigurations = {"unit_values": dict(task.unit_values)} if task.unit_values else {}
+    given: dict[str, Any] = {"unit_values": dict(task.unit_values)} if task.unit_values else {}
     if task.stop is not None:
         given["stop"] = str(task.stop)
     if task.recorded:
         given["recorded"] = list(task.recorded)
     if task.inputs is not None:
         given["inputs"] = dict(task.inputs.origin)
-    return Configuration(
+    return dict[str, Any](
         **given,
         scenario=task.experiment.name,
         parameters={v.name: _plain(getattr(task.parameters, v.name)) for v in task.experiment.parameters()},
@@ -170,11 +70,11 @@ def configuration(task: Task) -> Configuration:
 def finished_summary(
     task: Task, outcome: Outcome, master: Master, spent: ElapsedTime, failure: UnitFailure | None, complete: bool,
     not_finite: Sequence[NotFiniteData] = (),
-) -> Summary:  # fmt: skip
+) -> dict[str, Any]:  # fmt: skip
     """Return the summary of a run that came to its end, failed, or was interrupted."""
     metrics = {**outcome.metrics, **run_metrics(task.experiment, master)}
-    steps: _OfSomeSummaries = {} if master.steps is None else {"steps": asdict(master.steps)}
-    summary = Summary(
+    steps: dict[str, Any] = {} if master.steps is None else {"steps": asdict(master.steps)}
+    summary = dict[str, Any](
         **configuration(task),
         complete=complete,
         success=outcome.success,
@@ -207,15 +107,15 @@ def crash_facts(task: Task, master: Master) -> dict[str, Any]:
 
 
 def crashed_summary(
-    configuration: Configuration,
+    configuration: Mapping[str, Any],
     units: Sequence[tuple[str, str, str]],
     reason: str,
     failure: dict[str, Any],
     simulated: float,
     spent: ElapsedTime,
-) -> Summary:
+) -> dict[str, Any]:
     """Return the summary of a run whose process crashed after so many simulated seconds."""
-    return Summary(
+    return dict[str, Any](
         **configuration,
         complete=False,
         success=False,
@@ -229,10 +129,10 @@ def crashed_summary(
     )
 
 
-def unstarted_summary(task: Task, refusal: CosimError, spent: ElapsedTime) -> Summary:
+def unstarted_summary(task: Task, refusal: CosimError, spent: ElapsedTime) -> dict[str, Any]:
     """Return the summary of a run that could not start."""
     reason = failure_reason(refusal) if isinstance(refusal, UnitFailure) else one_line(refusal)
-    return Summary(
+    return dict[str, Any](
         **configuration(task),
         complete=False,
         success=False,
@@ -253,11 +153,11 @@ def unwritten_summary(run: Mapping[str, Any]) -> dict[str, Any]:
     return {"success": False, "reason": reason, "metrics": dict[str, Any](), "complete": False, **kept}
 
 
-def begun_run(task: Task, master: Master) -> RunData:
+def begun_run(task: Task, master: Master) -> dict[str, Any]:
     """Return the content of `run.json` for a run that starts."""
     system = describe_system(master.system, adaptive=master.steps is not None)
     fmus = {name: unit.description.path for name, unit in master.system.units.items()}
-    of_this_run: _OfSomeRuns = {"system": system, "conversions": conversions_of(master.system)}
+    of_this_run: dict[str, Any] = {"system": system, "conversions": conversions_of(master.system)}
     times = {"start": float(master.system.start), "stop": float(task.stop_time)}
     of_this_run["experiment"] = {**times, "tolerances": master.tolerances}
     faults = [f"{path.name}: {fault}" for path, fault in master.description_faults.items()]
@@ -270,7 +170,7 @@ def begun_run(task: Task, master: Master) -> RunData:
     return _run_data(task, fmus, of_this_run)
 
 
-def unstarted_run(task: Task, refusal: CosimError) -> RunData:
+def unstarted_run(task: Task, refusal: CosimError) -> dict[str, Any]:
     """Return the content of `run.json` for a run that could not start."""
     return _run_data(task, task.fmus, {"failure": _error_data(refusal)})
 
@@ -315,19 +215,11 @@ def _given_rows(task: Task) -> list[list[str]]:
     return rows if task.stop is None else [*rows, ["stop", f"{float(task.stop):g} s", "given stop time of the run"]]
 
 
-def faults_of(content: Mapping[str, Any], declared: type[Any]) -> list[str]:
-    """Return which entries of a file are not of the declared type; entries may be missing, as in other versions."""
-    types = {name: _json_types(hint) for name, hint in get_type_hints(declared).items() if name in content}
-    return [
-        f"{name!r} is {content[name]!r:.40}" for name, valid in types.items() if not isinstance(content[name], valid)
-    ]
-
-
-def _run_data(task: Task, fmus: Mapping[str, Path], of_this_run: _OfSomeRuns) -> RunData:
+def _run_data(task: Task, fmus: Mapping[str, Path], of_this_run: dict[str, Any]) -> dict[str, Any]:
     hashes = {path: sha256_of(path) for path in dict.fromkeys(fmus.values())}
     if files := hashes_of_files(task.experiment.files_read(task.parameters, task.unit_values)):
         of_this_run = {**of_this_run, "parameter_files": files}
-    return RunData(
+    return dict[str, Any](
         **configuration(task),
         source=dict(task.source),
         files={name: str(path.absolute()) for name, path in task.fmus.items()},
@@ -360,14 +252,6 @@ def _error_data(refusal: CosimError) -> dict[str, Any]:
         return refusal.as_data()
     of_no_unit = {"instance": None, "call": None, "time": 0.0, "log": list[str]()}
     return {"kind": "refused", "status": one_line(refusal), **of_no_unit}
-
-
-def _json_types(declaration: Any) -> tuple[type, ...]:
-    """Return the types that values of a declared type can have when they are read from JSON."""
-    if isinstance(declaration, UnionType):
-        return tuple(json_type for part in get_args(declaration) for json_type in _json_types(part))
-    declared: type = get_origin(declaration) or declaration
-    return (dict,) if is_typeddict(declared) else (float, int) if declared is float else (declared,)
 
 
 def _plain(value: Any) -> Any:

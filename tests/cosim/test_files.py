@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from handover.cosim.files import scratch_folder
+from handover.cosim.files import read_regular, scratch_folder
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs fork and locks")
@@ -24,3 +24,18 @@ def test_what_a_killed_process_left_is_removed_and_what_is_in_use_stays(
         with scratch_folder("check") as later:
             assert {used, later} == {*tmp_path.glob("handover-scratch-*")}
     assert [p.name for p in tmp_path.iterdir()] == ["handover-of-somebody"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs pipes and devices")
+def test_only_regular_files_of_a_sane_size_are_read(tmp_path: Path):
+    pipe, device, large, link = (tmp_path / name for name in ("pipe", "device", "large", "link"))
+    os.mkfifo(pipe)
+    device.symlink_to("/dev/zero")
+    large.touch()
+    os.truncate(large, 2**40)
+    (tmp_path / "text").write_text("text")
+    link.symlink_to("text")
+    assert read_regular(link) == b"text"
+    for path, fault in ((pipe, "pipe"), (device, "device"), (large, "1048576 MiB; at most 64"), (tmp_path, "a folder")):
+        with pytest.raises(OSError, match=fault):
+            read_regular(path)

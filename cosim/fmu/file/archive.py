@@ -137,6 +137,8 @@ class FmuArchive:
         self._by_name = {name: m for name, m in by_name.items() if name}
         self.names = tuple(self._by_name)
         self._opened: zipfile.ZipFile | None = None
+        self.reduced_description: bytes | None = None
+        """Of a large description, what is left of it, see `large_description`; None before it is asked for."""
 
     @property
     def outdated_methods(self) -> tuple[str, ...]:

@@ -40,6 +40,8 @@ KINDS = {
 }
 """Kinds by the standards' types; clocks, and types of later standards, have none."""
 _WIDTHS = {"Real": Width.FLOAT64, "Integer": Width.INT32, **{w.value: w for w in Width}}
+_MOST_ENTRIES = 2**28
+"""Of an array: 2 GiB of reals."""
 _ELEMENT = re.compile(r"(?P<base>.+)\[(?P<indices>\d+(,\d+)*)\]$")
 
 
@@ -210,6 +212,9 @@ def describe_fmu(path: Path) -> FmuDescription:
     ports = [_port(v, units, mimes) for v in md.modelVariables if v.causality in ("parameter", "input", "output")]
     starting = [_port(v, units, mimes) for v in md.modelVariables if _is_started(v)]
     ports = [p for p in ports if p is not None]
+    if large := [p for p in ports if p.size > _MOST_ENTRIES]:
+        shape = ",".join(map(str, large[0].shape))
+        raise InvalidFmu(path, f"its {large[0].name} [{shape:.60}] has more than {_MOST_ENTRIES} entries")
     grouped = _group_elements(ports)
     by_causality: dict[Causality, dict[str, FmuPort]] = {c: {} for c in Causality}
     for p in grouped:

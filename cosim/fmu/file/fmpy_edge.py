@@ -17,6 +17,7 @@ from fmpy.validation import validate_model_description
 
 from handover.cosim.exceptions import InvalidFmu, one_line
 from handover.cosim.fmu.file.archive import DESCRIPTION, FmuArchive
+from handover.cosim.fmu.file.large_description import description_of, xml_source_of
 from handover.cosim.fmu.file.library_format import HEAD, shortage
 from handover.cosim.fmu.file.model_structure import lost_references
 from handover.cosim.fmu.file.reduced_description import reduced_fmu
@@ -78,11 +79,11 @@ def read_description(path: Path) -> tuple[ModelDescription, XmlElement, str]:
     root = checked_xml(archive)
     fmi, fault = version_of(path, root), ""
     try:
-        md: Any = fmpy.read_model_description(archive.xml_source())
+        md: Any = fmpy.read_model_description(xml_source_of(archive))
     except Exception as e:  # FMPy raises plain Exception for unknown elements, lxml its own for malformed XML
         fault = _fault_of(e, root, fmi)
         try:
-            md = fmpy.read_model_description(reduced_fmu(archive.description()))
+            md = fmpy.read_model_description(reduced_fmu(description_of(archive)))
         except Exception:  # as above: the fault is in what co-simulation reads
             raise InvalidFmu(path, f"its {DESCRIPTION} is not valid: {fault}") from e
     if md.coSimulation is None:
@@ -107,14 +108,16 @@ def in_one_line(problems: Sequence[str]) -> str:
     return "; ".join(problems[:_MAX_PROBLEMS]) + more
 
 
-def checked_xml(archive: FmuArchive) -> XmlElement:
+def checked_xml(archive: FmuArchive, *, whole: bool = False) -> XmlElement:
     """Return the root of an FMU's model description, after checking every XML file that FMPy's reader opens.
+
+    Unless it is to be `whole`, a large one is reduced, see `large_description`.
 
     Raises:
         InvalidFmu: a file is malformed or unsafe to read.
     """
     try:
-        root = parse_xml(archive.description())
+        root = parse_xml(archive.description() if whole else description_of(archive))
     except UnsafeXml as e:
         raise InvalidFmu(archive.path, f"its {DESCRIPTION} cannot be read: {e}") from e
     if _BUILD_DESCRIPTION in archive.names:
@@ -148,7 +151,7 @@ def problems_of(path: Path) -> tuple[list[str], str]:
     """
     archive = FmuArchive(path)
     try:
-        fmpy.read_model_description(archive.xml_source(), validate_variable_names=True, validate_model_structure=True)
+        fmpy.read_model_description(xml_source_of(archive), validate_variable_names=True, validate_model_structure=True)
     except ValidationError as e:
         problems = [str(p) for p in cast(list[Any], e.problems)]
     except Exception as e:  # FMPy's reader raises KeyError, ValueError, ... for descriptions that it cannot interpret
@@ -156,7 +159,7 @@ def problems_of(path: Path) -> tuple[list[str], str]:
     else:
         return [], ""
     try:
-        md: Any = fmpy.read_model_description(archive.xml_source(), validate=False)
+        md: Any = fmpy.read_model_description(xml_source_of(archive), validate=False)
         problems += validate_model_description(md, validate_variable_names=True, validate_model_structure=True)
     except Exception as e:  # as above
         return problems, f"{type(e).__name__}: {one_line(e)}"

@@ -28,7 +28,7 @@ def internal_ports(path: Path, fmi: int) -> dict[str, tuple[str, FmuPort]]:
     Raises:
         InvalidFmu: the file cannot be read.
     """
-    return ports_inside(checked_xml(FmuArchive(path)), fmi, (*LOCAL, *PARAMETERS))
+    return ports_inside(checked_xml(FmuArchive(path), whole=True), fmi, (*LOCAL, *PARAMETERS))
 
 
 def ports_inside(root: XmlElement, fmi: int, causalities: tuple[str, ...]) -> dict[str, tuple[str, FmuPort]]:

@@ -23,7 +23,7 @@ from handover.cosim.exceptions import CosimError, UnitFailure, nearest
 from handover.fmus.binaries import NotCompiled
 from handover.fmus.build import cached
 from handover.fmus.compile import CompilationError, UnknownPlatform
-from handover.scenarios.cli.options import WholeNumber
+from handover.scenarios.cli.options import SEED, WholeNumber
 from handover.scenarios.execution.errors import UsageError, require_extra
 from handover.scenarios.execution.interruption import Interruption
 from handover.scenarios.execution.progress import progress_bar
@@ -70,7 +70,7 @@ class _ArmFailed(click.ClickException):
 )
 @click.option(
     "--seed",
-    type=WholeNumber(min=0),
+    type=SEED,
     help="Seed of all random numbers [default: 0; with --adapt the next after that of the model's points].",
 )
 @click.option("--elbow", type=_ELBOW, default="up", help="Which way the elbow points.")

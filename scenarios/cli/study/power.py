@@ -8,7 +8,7 @@ import click
 from rich.table import Table
 
 from handover.scenarios.cli.console import open_console, print_json
-from handover.scenarios.cli.options import FiniteRange
+from handover.scenarios.cli.options import SEED, FiniteRange
 from handover.scenarios.cli.study.group import checked_plan
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 
@@ -74,7 +74,7 @@ _MOST = 200
     help="The standard deviation in points of the scale, on which ties depend. The default is assumed.",
 )
 @click.option("--repeat", type=click.IntRange(100, 100000), default=2000, show_default=True, help="Simulated studies.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of their random numbers.")
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Of their random numbers.")
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON, with intervals of the simulation.")
 def power(
     file: Path,

@@ -5,7 +5,7 @@ import json
 import shlex
 import sys
 from collections.abc import Generator, Sequence
-from typing import NoReturn, TextIO, cast
+from typing import NoReturn, TextIO
 
 import click
 
@@ -18,7 +18,7 @@ from handover.scenarios.execution.exit_status import UNIT_FAILED, status_of_run
 from handover.scenarios.execution.progress import doing
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.results.run_folder import RunFolder, disk_errors_reported
-from handover.scenarios.results.summary import RunResult, Summary
+from handover.scenarios.results.summary import RunResult
 from handover.scenarios.results.tables import format_conversion, format_metric, pace_rows, warning_lines
 from handover.scenarios.results.task import Task
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
@@ -157,7 +157,7 @@ def report_crash(heartbeat: Heartbeat, end: ChildEnd, wall: float) -> int:
 
 def _report_concluded(folder: RunFolder) -> None:
     """Print what a run left that had ended."""
-    summary, headline = cast(Summary, folder.read_summary()), folder.read_run().get("headline", ())
+    summary, headline = folder.read_summary(), folder.read_run().get("headline", ())
     result = RunResult(outcome=Outcome(success=summary["success"], reason=summary["reason"]), summary=summary)
     for line in (*warning_lines(summary), *summary.get("left_out", ())):
         click.echo(line, err=True)

@@ -10,15 +10,16 @@ No name, no picture and no video of a person is kept.
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from handover.cosim.typed_data import Count
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
     check_place,
     disk_errors_reported,
-    read_object,
+    read_file,
     write_whole,
 )
 from handover.scenarios.study.folder.codebook import (
@@ -50,7 +51,7 @@ class Session:
         started: date and time by ISO 8601.
     """
 
-    number: int
+    number: Count
     device: str
     device_settings: Mapping[str, Any]
     language: str
@@ -92,7 +93,15 @@ class RoundRecord:
     latency_p95_ms: float | None = None
     latency_max_ms: float | None = None
     age_at_use_ms: float | None = None
-    missed_deadlines: int | None = None
+    missed_deadlines: Count | None = None
+
+
+@dataclass(frozen=True)
+class _KeptRound:
+    """What a round's file holds; `answers` are the ratings by statement, None before they are given."""
+
+    record: RoundRecord
+    answers: Mapping[str, int] | None = None
 
 
 class SessionFolder:
@@ -119,13 +128,8 @@ class SessionFolder:
         Raises:
             InvalidRunFolder: there is none, or its session.json is damaged.
         """
-        data = read_object(path / "session.json", "no session has begun in it: it has no session.json")
-        try:
-            session = Session(**{f.name: data[f.name] for f in fields(Session)})
-            is_right = session.pseudonym == path.name and session.pilot == plan.pilot
-        except (KeyError, TypeError) as e:
-            raise InvalidRunFolder(path, f"its session.json is damaged: {type(e).__name__} {e}") from e
-        if not is_right:
+        session = read_file(path / "session.json", "no session has begun in it: it has no session.json", Session)
+        if session.pseudonym != path.name or session.pilot != plan.pilot:
             raise InvalidRunFolder(path, "its session.json is of another participant, or of another study")
         return cls(path, plan, session)
 
@@ -136,9 +140,14 @@ class SessionFolder:
     def _file(self, number: int) -> Path:
         return self.path / "rounds" / f"{number:02d}.json"
 
-    def _kept(self, number: int) -> dict[str, Any] | None:
-        """Return what is known of a round, None if it has not been played to its end."""
-        return read_object(self._file(number), "") if self._file(number).is_file() else None
+    def _kept(self, number: int) -> "_KeptRound | None":
+        """Return what is known of a round, None if it has not been played to its end.
+
+        Raises:
+            InvalidRunFolder: its file is damaged.
+        """
+        file = self._file(number)
+        return read_file(file, f"it has no {file.name}", _KeptRound) if file.exists() else None
 
     @property
     def records(self) -> dict[int, RoundRecord]:
@@ -147,28 +156,20 @@ class SessionFolder:
         Raises:
             InvalidRunFolder: a file is damaged.
         """
-        found: dict[int, RoundRecord] = {}
-        for planned in self.rounds:
-            kept = self._kept(planned.number)
-            if kept is None:
-                continue
-            try:
-                found[planned.number] = RoundRecord(**kept["record"])
-            except (KeyError, TypeError) as e:
-                raise InvalidRunFolder(self.path, f"its {self._file(planned.number).name} is damaged: {e}") from e
-        return found
+        kept = {planned.number: self._kept(planned.number) for planned in self.rounds}
+        return {number: of.record for number, of in kept.items() if of is not None}
 
     @property
     def answers(self) -> dict[int, dict[str, int]]:
         """Ratings by statement of the rounds that were rated, by their numbers."""
         kept = {r.number: self._kept(r.number) for r in self.rounds}
-        return {number: dict(of["answers"]) for number, of in kept.items() if of is not None and of.get("answers")}
+        return {number: dict(of.answers) for number, of in kept.items() if of is not None and of.answers}
 
     @property
     def questionnaire(self) -> dict[str, str] | None:
         """Answers to the questions after the last round; None if they were not asked yet."""
         file = self.path / "questionnaire.json"
-        return {k: str(v) for k, v in read_object(file, "").items()} if file.is_file() else None
+        return read_file(file, "it has no questionnaire.json", dict[str, str]) if file.exists() else None
 
     @property
     def next_round(self) -> Round | None:
@@ -238,7 +239,7 @@ class SessionFolder:
         if planned is None or planned.number != number:
             raise ValueError(f"round {number} cannot be kept: {planned and planned.number} is the next one")
         data = {name: None if isinstance(v, float) and math.isnan(v) else v for name, v in asdict(record).items()}
-        self._keep(number, {"record": data, "answers": None})
+        self._keep(number, data, None)
 
     def record_void_attempt(self, attempt: VoidAttempt) -> None:
         """Keep an attempt at a round that does not count; the round is still to be played.
@@ -266,7 +267,7 @@ class SessionFolder:
                 faults.append(f"{name} = {value!r}: a whole number from {low} to {high} is right")
         if faults or kept is None:
             raise ValueError("; ".join(faults))
-        self._keep(number, {**kept, "answers": {name: int(answers[name]) for name in self.plan.statements}})
+        self._keep(number, asdict(kept.record), {name: int(answers[name]) for name in self.plan.statements})
 
     def record_questionnaire(self, answers: Mapping[str, str]) -> None:
         """Keep the answers to the questions after the last round; a question may stay without one.
@@ -286,7 +287,8 @@ class SessionFolder:
         write_whole(self.path / "questionnaire.json", json.dumps(kept, indent=2) + "\n")
         self.write_tables()
 
-    def _keep(self, number: int, content: Mapping[str, Any]) -> None:
+    def _keep(self, number: int, record: Mapping[str, Any], answers: Mapping[str, int] | None) -> None:
+        content = {"record": record, "answers": answers}
         write_whole(self._file(number), json.dumps(content, indent=2, allow_nan=False) + "\n")
         self.write_tables()
 

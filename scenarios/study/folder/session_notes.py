@@ -3,12 +3,13 @@
 import json
 import shutil
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from handover.scenarios.results.run_folder import InvalidRunFolder, disk_errors_reported, read_object, write_whole
+from handover.cosim.typed_data import Count
+from handover.scenarios.results.run_folder import disk_errors_reported, read_file, read_object, write_whole
 
 
 @dataclass(frozen=True)
@@ -23,11 +24,18 @@ class VoidAttempt:
         folder: where its run was put aside, in `rounds/`; "" if there was none.
     """
 
-    number: int
-    attempt: int
+    number: Count
+    attempt: Count
     ended: str
     reason: str
     folder: str
+
+
+@dataclass(frozen=True)
+class _KeptAttempts:
+    """What their file holds."""
+
+    attempts: list[VoidAttempt]
 
 
 @dataclass(frozen=True)
@@ -69,7 +77,7 @@ class SessionNotes:
         Raises:
             InvalidRunFolder: its file is damaged.
         """
-        return read_object(self._practice, "") if self._practice.is_file() else None
+        return read_object(self._practice, "it has no practice.json") if self._practice.exists() else None
 
     def keep_practice(self, shown: Mapping[str, Any]) -> None:
         """Keep what the practice showed.
@@ -86,13 +94,7 @@ class SessionNotes:
         Raises:
             InvalidRunFolder: its file is damaged.
         """
-        if not self._withdrawn.is_file():
-            return None
-        kept = read_object(self._withdrawn, "")
-        of = {f.name: kept[f.name] for f in fields(Withdrawal) if f.name in kept}
-        if not isinstance(of.get("ended"), str):
-            raise InvalidRunFolder(self._path, f"its {self._withdrawn.name} is damaged: it does not say when")
-        return Withdrawal(**of)
+        return read_file(self._withdrawn, "it has no withdrawn.json", Withdrawal) if self._withdrawn.exists() else None
 
     def keep_withdrawal(self, withdrawal: Withdrawal) -> None:
         """Note that the participant has withdrawn.
@@ -122,13 +124,9 @@ class SessionNotes:
         Raises:
             InvalidRunFolder: their file is damaged.
         """
-        if not self._attempts.is_file():
+        if not self._attempts.exists():
             return []
-        kept = read_object(self._attempts, "")
-        try:
-            return [VoidAttempt(**{f.name: of[f.name] for f in fields(VoidAttempt)}) for of in kept["attempts"]]
-        except (KeyError, TypeError) as e:
-            raise InvalidRunFolder(self._path, f"its {self._attempts.name} is damaged: {e}") from e
+        return read_file(self._attempts, "it has no void_attempts.json", _KeptAttempts).attempts
 
     def attempts_at(self, number: int) -> int:
         """Return how many attempts at a round do not count."""

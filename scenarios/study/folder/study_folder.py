@@ -11,6 +11,7 @@ from collections.abc import Generator
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from handover.cosim.files import read_regular
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
     RunFolder,
@@ -69,7 +70,7 @@ class StudyFolder:
         if not file.is_file():
             raise InvalidRunFolder(path, "it is not the folder of a study: it has no plan.toml")
         try:
-            return cls(path, parse_plan(file.read_text(encoding="utf-8"), file))
+            return cls(path, parse_plan(read_regular(file).decode(), file))
         except (OSError, UnicodeDecodeError, InvalidPlan) as e:
             raise InvalidRunFolder(path, f"its plan.toml is damaged: {e}") from e
 

@@ -14,6 +14,7 @@ from typing import Any
 import tomli
 
 from handover.cosim.exceptions import nearest, one_line
+from handover.cosim.files import read_regular
 from handover.scenarios.catalog import SCENARIOS, InvalidScenario, installed_scenarios, named_scenario
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
@@ -185,7 +186,7 @@ def read_plan(path: Path) -> StudyPlan:
         InvalidPlan: it cannot be read, or with all its faults.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_regular(path).decode()
     except OSError as e:
         raise InvalidPlan(path, [f"it cannot be read: {e.strerror or e}"]) from e
     except ValueError as e:

@@ -1,8 +1,8 @@
 """Messages of a study's page as the server takes them: texts, of a bounded length, so many a second."""
 
-import json
-from typing import Any, cast
+from typing import Any
 
+from handover.cosim.typed_data import InvalidData, decoded
 from handover.scenarios.study.session.protocol import InvalidAction
 
 LONGEST = 20_000
@@ -25,10 +25,9 @@ def parse_message(text: str) -> tuple[str, Any]:
     if len(text) > LONGEST:
         raise InvalidAction(f"a message has {LONGEST} characters at most, this one {len(text)}")
     try:
-        content: Any = json.loads(text)
-    except (ValueError, RecursionError) as e:
-        raise InvalidAction("it is not JSON") from e
-    members = cast(dict[str, Any], content) if isinstance(content, dict) else {}
+        members = decoded(text, dict[str, Any])
+    except InvalidData as e:
+        raise InvalidAction(f"an object is right: {e}") from e
     if len(members) != 1 or not members.keys() <= _MESSAGES:
         raise InvalidAction(f"it is not an object with one of {', '.join(sorted(_MESSAGES))}")
     return next(iter(members.items()))

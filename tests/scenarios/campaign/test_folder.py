@@ -128,7 +128,7 @@ def test_another_fmu_and_another_version_are_refused(folder: CampaignFolder, fmu
 
 @pytest.mark.parametrize(
     ("damage", "text"),
-    [("{", "its campaign.json is damaged: "), ("[]", "it holds no JSON object"), ("{}", "not given")],
+    [("{", "its campaign.json is damaged: "), ("[]", "Expected `object`"), ("{}", "missing required field")],
 )
 def test_a_damaged_campaign_json_is_refused(folder: CampaignFolder, fmus: dict[str, Path], damage: str, text: str):
     (folder.path / "campaign.json").write_text(damage)

@@ -81,10 +81,8 @@ def test_it_is_left_alone_while_a_command_works_on_the_campaign(folder: Campaign
     assert folder.table.read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    "change", [{"versions": {"handover-cosim": "9.9"}}, {"scenario": "juggle"}, {"points": 3}, {"points": [3]}]
-)
-def test_a_damaged_campaign_or_one_of_another_version_is_left(change: dict[str, object], folder: CampaignFolder):
+@pytest.mark.parametrize("change", [{"versions": {"handover-cosim": "9.9"}}, {"scenario": "juggle"}])
+def test_a_campaign_of_another_version_is_left(change: dict[str, object], folder: CampaignFolder):
     before = cut(folder, rows=1)
     file = folder.path / "campaign.json"
     file.write_text(json.dumps({**json.loads(file.read_text(encoding="utf-8")), **change}), encoding="utf-8")

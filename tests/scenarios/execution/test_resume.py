@@ -21,8 +21,9 @@ from handover.scenarios.cli.summaries.run import print_summary
 from handover.scenarios.execution import resumption
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.experiment.parameters import parse_parameters
+from handover.scenarios.results.folder_data import Summary
 from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.results.summary import RunResult, Summary
+from handover.scenarios.results.summary import RunResult
 
 fcntl = pytest.importorskip("fcntl")
 

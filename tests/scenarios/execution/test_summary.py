@@ -10,15 +10,14 @@ import pytest
 from flyer_runs import run, task_of
 
 from handover.cosim.exceptions import WiringError
+from handover.cosim.typed_data import decoded
 from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
+from handover.scenarios.results.folder_data import RunData, Summary
 from handover.scenarios.results.summary import (
     ElapsedTime,
-    RunData,
-    Summary,
     configuration,
     crashed_summary,
-    faults_of,
     metric_data,
     unstarted_run,
     unstarted_summary,
@@ -30,7 +29,7 @@ from handover.scenarios.results.tables import format_metric
 def assert_of(declared: type[Any], content: Any) -> None:
     """Assert that a file has all that every run has, and nothing that is not declared, or else than declared."""
     assert declared.__required_keys__ <= set(content) <= set(declared.__annotations__)
-    assert faults_of(json.loads(json.dumps(content)), declared) == []
+    assert decoded(json.dumps(content), declared) == json.loads(json.dumps(content))
 
 
 def test_however_a_run_ends_its_files_are_of_one_declaration(tmp_path: Path):

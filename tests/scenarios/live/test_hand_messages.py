@@ -50,15 +50,15 @@ def test_joints_say_whether_a_hand_grasps_unless_it_is_said():
     [
         ("{", "not JSON"),
         ("[" * 1500, "not JSON"),
-        ("[]", "no object"),
+        ("[]", "an object with p_WH"),
         ("{}", "p_WH: 3 finite numbers are right; q_WH: 4 finite numbers are right; stamp: "),
         (" " * (LONGEST + 1), f"{LONGEST} characters at most"),
         (text(p_WH=[0.0, 0.0]), r"p_WH: 3 finite numbers are right, not \[0\.0, 0\.0\]"),
-        (text(p_WH=[0.0, 0.0, float("nan")]), "p_WH: 3 finite numbers"),
+        (text(p_WH=[0.0, 0.0, float("nan")]), "not JSON"),
         (text(p_WH=[0.0, 0.0, 10**400]), "p_WH: 3 finite numbers"),
         (text(p_WH=[0.0, 0.0, True]), "p_WH: 3 finite numbers"),
         (text(q_WH=[0, 0, 0, 0]), "q_WH: a quaternion of norm 1 is right, not 0"),
-        (text(stamp=float("inf")), "stamp: a finite number"),
+        (text(stamp=float("inf")), "not JSON"),
         (text(closed=1), "closed: true or false"),
         (text(closed=None), "closed or angles: one of them"),
         (text(angles=[0.0] * 13), "angles: 14 finite numbers"),
@@ -157,6 +157,6 @@ def test_a_device_that_looks_at_pictures_first_tells_how_long_that_takes():
     ages = [t - clock.monotonic(t - 0.08, t, sent=t - 0.001) for t in np.arange(0.0, 1.0, 0.03)]
     assert ages == pytest.approx([0.079] * len(ages), abs=1e-9)
     assert parse_hand_message(text(stamp=5, sent=5.08)).sent == 5.08
-    for sent in (4.9, float("inf"), "soon"):
+    for sent in (4.9, "soon"):
         with pytest.raises(InvalidHandMessage, match="sent: a finite number of seconds is right, not before stamp"):
             parse_hand_message(text(sent=sent))

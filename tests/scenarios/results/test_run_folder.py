@@ -1,5 +1,6 @@
 import contextlib
 import importlib.metadata
+import json
 import multiprocessing
 import os
 import threading
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from handover.scenarios.results.run_facts import RunFacts
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, dated_folder, versions
 
 
@@ -53,8 +55,8 @@ def begun_in_dated_folder(place: Path, together: Callable[[], object]) -> str:
     with contextlib.ExitStack() as opened:
         together()
         folder = RunFolder(opened.enter_context(dated_folder(place, "toy"))).claim(opened)
-        folder.begin({"title": str(folder.path)})
-    return folder.read_run()["title"] if folder.path.is_dir() else "lost"
+        folder.begin({"scenario": str(folder.path), "parameters": {}})
+    return folder.read_run()["scenario"]
 
 
 def test_threads_that_begin_at_once_get_a_folder_each(tmp_path: Path):
@@ -78,7 +80,7 @@ def test_processes_that_begin_at_once_get_a_folder_each(tmp_path: Path):
         process.join()
     folders = list((tmp_path / "runs").iterdir())
     assert len(folders) == 4
-    assert {RunFolder.of_run(f).read_run()["title"] for f in folders} == {str(f) for f in folders}
+    assert {RunFolder.of_run(f).read_run()["scenario"] for f in folders} == {str(f) for f in folders}
 
 
 def test_of_two_runs_with_one_new_folder_the_second_is_refused(tmp_path: Path):
@@ -108,3 +110,36 @@ def test_a_package_that_is_not_installed_is_reported(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(importlib.metadata, "version", missing)
     assert versions()["exudyn"] == "not installed"
+
+
+@pytest.mark.parametrize(
+    ("file", "change"),
+    [
+        ("run.json", {"scenario": 1}),
+        ("run.json", {"parameters": []}),
+        ("run.json", {"checkpoint": "-1"}),
+        ("run.json", {"checkpoint": "1/0"}),
+        ("run.json", {"seed": 10**310}),
+        ("run.json", {"formats": [".../../x"]}),
+        ("run.json", {"files": {"arm": "\0"}}),
+        ("run.json", {"told_parameters": [["a", "b"]]}),
+        ("run.json", {"system": {"connections": [{"source": "a", "target": "b.c"}]}}),
+        ("summary.json", {"success": "yes"}),
+        ("summary.json", {"metrics": {"error": {"value": "1", "unit": "m"}}}),
+        ("summary.json", {"simulated_seconds": "long"}),
+        ("summary.json", {"units": [{"name": "arm"}]}),
+        ("summary.json", {"warnings": [{"instance": "arm", "calls": 3, "time": 0.0, "message": ""}]}),
+        ("summary.json", {"pace": {"pace": 1.0}}),
+    ],
+)
+def test_a_damaged_file_is_refused(tmp_path: Path, file: str, change: dict[str, object]):
+    contents = {
+        "run.json": {"scenario": "toy", "parameters": {}, "source": {}},
+        "summary.json": {"success": True, "reason": "", "metrics": {}},
+    }
+    for name, content in contents.items():
+        (tmp_path / name).write_text(json.dumps(content))
+    assert RunFacts.read(RunFolder.of_run(tmp_path)).scenario == "toy"
+    (tmp_path / file).write_text(json.dumps({**contents[file], **change}))
+    with pytest.raises(InvalidRunFolder, match=f"its {file} is damaged"):
+        RunFacts.read(RunFolder.of_run(tmp_path))

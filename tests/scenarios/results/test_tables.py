@@ -15,8 +15,8 @@ from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
 from handover.scenarios.cli.command import main
 from handover.scenarios.reporting.run_page import write_run_page
+from handover.scenarios.results.folder_data import Summary
 from handover.scenarios.results.run_folder import RunFolder
-from handover.scenarios.results.summary import Summary
 from handover.scenarios.results.tables import master_rows, pace_rows
 
 
