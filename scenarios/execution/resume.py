@@ -78,7 +78,7 @@ class InterruptedRun:
             InvalidRunFolder: the code of the scenario is not what it was, or `run.json` is damaged.
         """
         lines: list[str] = []
-        source, units = self._description.get("source", {}), self._object("units")
+        source, units = self._description.get("source", {}), self._description.get("units", {})
         if "scenario" in source:
             before = self._own_source(source)
             lines.append(f"the code of {before.scenario}: {self._unchanged(before)}, as the run began with it")
