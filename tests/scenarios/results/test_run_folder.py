@@ -133,7 +133,7 @@ def test_a_package_that_is_not_installed_is_reported(monkeypatch: pytest.MonkeyP
     ],
 )
 def test_a_damaged_file_is_refused(tmp_path: Path, file: str, change: dict[str, object]):
-    contents = {
+    contents: dict[str, dict[str, object]] = {
         "run.json": {"scenario": "toy", "parameters": {}, "source": {}},
         "summary.json": {"success": True, "reason": "", "metrics": {}},
     }
