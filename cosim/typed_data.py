@@ -28,6 +28,8 @@ Seed = Annotated[int, Meta(ge=0, le=GREATEST_SEED)]
 """A seed of random numbers."""
 ExactSeconds = Annotated[str, Meta(pattern=r"^(?!0+(/|$))[0-9]{1,308}(/[1-9][0-9]{0,307})?$")]
 """A positive number of seconds, as `str` writes a fraction."""
+ExactTime = Annotated[str, Meta(pattern=r"^-?[0-9]{1,308}(/[1-9][0-9]{0,307})?$")]
+"""A time in seconds, likewise; it may be 0 or before 0 s."""
 FilePath = Annotated[str, Meta(pattern=r"^[^\x00]+$", max_length=4096)]
 """The path of a file."""
 

@@ -17,7 +17,7 @@ from msgspec import Meta
 from typing_extensions import TypedDict
 
 from handover.cosim.fmu.file.description import describe_fmu
-from handover.cosim.typed_data import ExactSeconds, Seed
+from handover.cosim.typed_data import ExactTime, Seed
 from handover.scenarios.campaign.identity import differences, identity_of
 from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun, safe_name
 from handover.scenarios.execution.file_experiment import settable_of
@@ -57,7 +57,7 @@ class _OfSomeCampaigns(TypedDict, total=False):
     versions: dict[str, str]
     experiment: str | None
     paired: bool
-    stop: ExactSeconds | None
+    stop: ExactTime | None
     scenes: list[str]
     varied_units: list[str]
 

@@ -9,7 +9,7 @@ from msgspec import Meta
 from typing_extensions import NotRequired, TypedDict
 
 from handover.cosim.fmu.unit_warnings import WarningData
-from handover.cosim.typed_data import Count, ExactSeconds, FilePath, NotNegative, Seed
+from handover.cosim.typed_data import Count, ExactSeconds, ExactTime, FilePath, NotNegative, Seed
 from handover.scenarios.results.not_finite import NotFiniteData
 
 PortName = Annotated[str, Meta(pattern=r".\..")]
@@ -41,7 +41,7 @@ class MasterData(TypedDict):
 
 class _OfSomeConfigurations(TypedDict, total=False):
     unit_values: dict[str, str]
-    stop: ExactSeconds | None
+    stop: ExactTime | None
     recorded: list[str]
     inputs: dict[str, Any]
 
@@ -133,7 +133,7 @@ class Summary(_OfSomeSummaries):
     seed: NotRequired[Seed | None]
     master: NotRequired[MasterData]
     unit_values: NotRequired[dict[str, str]]
-    stop: NotRequired[ExactSeconds | None]
+    stop: NotRequired[ExactTime | None]
     recorded: NotRequired[list[str]]
     inputs: NotRequired[dict[str, Any]]
     complete: NotRequired[bool]
@@ -215,7 +215,8 @@ class SourceData(TypedDict, total=False):
     ssp: FilePath
     fmu: FilePath
     sha256: str
-    stop: ExactSeconds
+    start: ExactTime
+    stop: ExactTime
     step: ExactSeconds | None
     parameters: list[str]
     input: FilePath
