@@ -37,7 +37,7 @@ def test_without_a_name_it_lists_the_experiments():
         (["ir-tabel"], "no experiment 'ir-tabel': did you mean ir-table?"),
         (["ir-table", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "one of both is right"),
         (["ir-table", "--workers", "0"], "0 is not in the range x>=1"),
-        (["ir-table", "--seed", "-1"], "-1 is not in the range x>=0"),
+        (["ir-table", "--seed", "-1"], "-1 is not in the range 0<=x<="),
         (["ir-table", "--model", "m.json"], "ir-table has no use for a trained model"),
         (["vsl-2", "--model", "none.json"], "none.json: it cannot be read"),
     ],
