@@ -52,7 +52,7 @@ def hand_hint(record: Record, receivers: Sequence[str]) -> HandHint | None:
 
 def _taking(record: Record, p_WH: Floats, holder: str, *, closed: bool) -> HandHint | None:
     if holder == "BOTH":
-        return HandHint(p_WH, None, holds=True, advice="You hold it: pull firmly until the gripper opens.")
+        return HandHint(p_WH, None, holds=True, advice="You hold it: pull until the gripper opens.")
     R_WO, p_WO = rotation_of(record["person.q_WO"][-1]), record["person.p_WO"][-1]
     goal = p_WO + R_WO @ _HOLD
     x, y, z = R_WO.T @ (p_WH - goal)

@@ -139,7 +139,7 @@ def test_the_page_of_all_units_has_each_with_its_icon_and_ports(tmp_path: Path, 
         monkeypatch.setattr(f"{module}.installed_units", lambda: {"Lost": "nowhere:Lost"})
     file = tmp_path / "units.html"
     result = call("list", "--html", file)
-    assert (result.exit_code, result.output) == (0, f"{file}\n")
+    assert (result.exit_code, result.stdout) == (0, f"{file}\n")
     html = file.read_text()
     assert re.findall(r'<article class="unit" id="unit-(.*?)"', html) == [*FEW, "Lost"]
     for name in FEW:
