@@ -7,7 +7,7 @@ PARALLEL := --numprocesses auto --dist worksteal
 
 WHEELS := x86_64-linux aarch64-linux x86_64-windows x86_64-darwin aarch64-darwin
 
-.PHONY: demo test test-slow fuzz paper real-time standalone hosts lint bench pictures icons wheels install clean
+.PHONY: demo test test-slow fuzz paper real-time standalone hosts lint bench pictures notebook icons wheels install clean
 
 demo: $(VENV)/.installed
 	$(BIN)/handover run helix_handover
@@ -48,6 +48,10 @@ bench: $(VENV)/.installed-test
 # The README's pictures; needs chromium, too.
 pictures: $(VENV)/.installed-test
 	$(BIN)/python docs/pictures.py
+
+# The outputs in docs/python.ipynb.
+notebook: $(VENV)/.installed-test
+	$(BIN)/python tests/test_notebook.py
 
 # The units' icons as PNG, of their drawings in fmus/icons/.
 icons: $(VENV)/.installed-test

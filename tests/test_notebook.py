@@ -1,5 +1,10 @@
-"""The notebook runs from top to bottom, and shows what it says: verdict, figures, graph, tables, replay."""
+"""The notebook shows what it says, and its outputs are those of its cells. Run as a program, writes them there.
 
+`make notebook` does that. What depends on the machine, or is as large as a page, is left out of the file.
+"""
+
+import re
+import tempfile
 from pathlib import Path
 from typing import Any, cast
 
@@ -8,74 +13,150 @@ import pytest
 from nbclient import NotebookClient
 
 NOTEBOOK = Path(__file__).parent.parent / "docs" / "python.ipynb"
+LARGEST = 500_000
+"""Letters of an output that the file keeps."""
+
+_NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?")
+_PICTURE = re.compile(r"data:image/png;base64,[\w+/=]+")
+_VARYING = (
+    (_PICTURE, "PICTURE"),
+    (re.compile(r"\d{4}-\d\d-\d\d_\d{6}"), "DATE"),
+    (re.compile(r"(CPU [^<]*</td><td[^>]*>)[^<]*"), r"\1TIME"),
+)
+
+Output = dict[str, Any]
 
 
-pytestmark = pytest.mark.slow
+def read() -> Any:
+    return cast(Any, nbformat).read(NOTEBOOK, as_version=4)
 
 
-@pytest.fixture(scope="module")
-def executed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, Any]]]:
-    """Return the outputs of each cell by its first line, after the notebook was executed in an empty folder."""
-    folder = tmp_path_factory.mktemp("notebook")
-    notebook = cast(Any, nbformat).read(NOTEBOOK, as_version=4)
-    NotebookClient(
-        notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
-    ).execute()
-    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    return {cell.source.splitlines()[0]: cell.outputs for cell in cells}
+def executed(folder: Path) -> Any:
+    """Return the notebook after its cells were run in a folder."""
+    notebook = read()
+    client = NotebookClient(
+        notebook,
+        timeout=300,
+        kernel_name="python3",
+        record_timing=False,
+        resources={"metadata": {"path": str(folder)}},
+    )
+    client.execute()
+    return notebook
 
 
-def shown(executed: dict[str, list[dict[str, Any]]], begin: str, kind: str) -> str:
+def kept(output: Output) -> Output | None:
+    """Return what the file keeps of an output: no bar that is gone, no page, and no text beside a picture or table."""
+    if "data" not in output:
+        return output
+    data = {kind: value for kind, value in output["data"].items() if 0 < len(value) <= LARGEST}
+    if output["output_type"] == "display_data" and not data.keys() - {"text/plain"}:
+        return None
+    return {**output, "data": {kind: v for kind, v in data.items() if kind != "text/plain" or len(data) == 1}}
+
+
+def outputs_of(notebook: Any) -> dict[str, list[Output]]:
+    """Return the outputs of each cell with code by its first line."""
+    return {cell.source.splitlines()[0]: cell.outputs for cell in notebook.cells if cell.cell_type == "code"}
+
+
+COMMITTED = outputs_of(read())
+
+
+def shown(begin: str, kind: str) -> str:
     """Return what a cell shows of a kind, a MIME type; the cell is named by how it begins."""
-    (outputs,) = (outputs for line, outputs in executed.items() if line.startswith(begin))
+    (outputs,) = (outputs for line, outputs in COMMITTED.items() if line.startswith(begin))
     found = [o["data"][kind] for o in outputs if kind in o.get("data", {})]
     assert found, [list(o.get("data", o)) for o in outputs]
     return found[-1]
 
 
-def printed(executed: dict[str, list[dict[str, Any]]], begin: str) -> str:
-    (outputs,) = (outputs for line, outputs in executed.items() if line.startswith(begin))
+def printed(begin: str) -> str:
+    (outputs,) = (outputs for line, outputs in COMMITTED.items() if line.startswith(begin))
     return "".join(o["text"] for o in outputs if o["output_type"] == "stream")
 
 
-def test_a_run_shows_its_verdict_and_plots(executed: dict[str, list[dict[str, Any]]]):
-    html = shown(executed, "run = ", "text/html")
+def test_a_run_shows_its_verdict_and_plots():
+    html = shown("run = ", "text/html")
     assert "succeeded</span>" in html
     assert html.count("data:image/png;base64,") == 2
 
 
-def test_its_progress_was_a_bar_that_is_gone(executed: dict[str, list[dict[str, Any]]]):
-    (outputs,) = (outputs for line, outputs in executed.items() if line.startswith("run = "))
-    bars = [o for o in outputs if o["output_type"] == "display_data"]
-    assert len(bars) == 1
-    assert bars[0]["data"]["text/html"] == ""
+def test_a_plot_is_a_picture():
+    assert len(shown("run.plot(", "image/png")) > 20_000
 
 
-def test_a_plot_is_a_picture(executed: dict[str, list[dict[str, Any]]]):
-    assert len(shown(executed, "run.plot(", "image/png")) > 20_000
+def test_numbers_have_units():
+    assert "0.150 mm - how far the object was pushed" in printed("moved = ")
+    assert "(945, 2) m" in printed("moved = ")
 
 
-def test_numbers_have_units(executed: dict[str, list[dict[str, Any]]]):
-    assert "0.150 mm - how far the object was pushed" in printed(executed, "moved = ")
-    assert "(945, 2) m" in printed(executed, "moved = ")
-    assert "scene.yaw" in shown(executed, "moved = ", "text/html")
+def test_a_system_is_a_graph_and_a_unit_a_table():
+    assert shown("handover.system(", "text/html").count("<rect") == 5
+    assert "<b>Inputs" in shown("handover.describe(", "text/html")
 
 
-def test_a_replay_is_a_frame(executed: dict[str, list[dict[str, Any]]]):
-    assert shown(executed, "run.replay(", "text/html").startswith("<iframe srcdoc=")
-
-
-def test_a_system_is_a_graph_and_a_unit_a_table(executed: dict[str, list[dict[str, Any]]]):
-    assert shown(executed, "handover.system(", "text/html").count("<rect") == 5
-    assert "<b>Inputs" in shown(executed, "handover.describe(", "text/html")
-
-
-def test_a_campaign_shows_its_rates(executed: dict[str, list[dict[str, Any]]]):
-    html = shown(executed, "campaign = ", "text/html")
+def test_a_campaign_shows_its_rates():
+    html = shown("campaign = ", "text/html")
     assert "2 of 2" in html
     assert "0 of 2" in html
 
 
-def test_steps_and_episodes_end(executed: dict[str, list[dict[str, Any]]]):
-    assert "m after" in printed(executed, "with handover.open(")
-    assert printed(executed, "env = ").split()[0] in ("0.0", "1.0")
+def test_steps_and_episodes_end():
+    assert "m after" in printed("with handover.open(")
+    assert printed("env = ").split()[0] in ("0.0", "1.0")
+
+
+def test_the_file_is_small_and_knows_nothing_of_the_machine_that_made_it():
+    text = NOTEBOOK.read_text(encoding="utf-8")
+    assert len(text) < 1_000_000
+    assert not re.search(r"/(root|home|tmp|Users|work)/|[A-Z]:\\\\Users|\bat 0x[0-9a-f]{6}", _PICTURE.sub("", text))
+    assert all(outputs for line, outputs in COMMITTED.items() if line != "import handover")
+
+
+@pytest.mark.slow
+def test_the_outputs_are_those_of_the_cells(tmp_path: Path):
+    made = outputs_of(executed(tmp_path))
+    replay = made["run.replay()"][0]["data"]["text/html"]
+    assert replay.startswith("<iframe srcdoc=")
+    bars = [o for line in ("run = ", "campaign = ") for k in made if k.startswith(line) for o in made[k]]
+    assert [o["data"]["text/html"] for o in bars if o["output_type"] == "display_data"] == ["", ""]  # gone at the end
+    for line, outputs in COMMITTED.items():
+        again = [k for o in made[line] if (k := kept(o)) is not None]
+        assert len(again) == len(outputs), line
+        for old, new in zip(outputs, again, strict=True):
+            assert_alike(old, new)
+
+
+def assert_alike(old: Output, new: Output) -> None:
+    """Assert that two outputs have the same texts, and numbers to the digits that show; of pictures, that both are."""
+    assert old["output_type"] == new["output_type"]
+    texts = ({"text": o["text"]} if "text" in o else dict(o["data"]) for o in (old, new))
+    before, after = ({k: _plain(k, v) for k, v in of.items()} for of in texts)
+    assert before.keys() == after.keys()
+    for kind, text in before.items():
+        assert _NUMBER.split(text) == _NUMBER.split(after[kind])
+        numbers = [[float(n) for n in _NUMBER.findall(t)] for t in (text, after[kind])]
+        assert numbers[1] == pytest.approx(numbers[0], rel=0.02, abs=0.002)
+
+
+def _plain(kind: str, text: str) -> str:
+    """Return a text without what differs from day to day; "" of a picture."""
+    for pattern, name in _VARYING:
+        text = pattern.sub(name, text)
+    return "" if kind == "image/png" else text
+
+
+def main() -> None:
+    """Run the notebook's cells, and write their outputs into it."""
+    with tempfile.TemporaryDirectory(prefix="handover-") as folder:
+        notebook = executed(Path(folder))
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            cell.outputs = [cast(Any, nbformat).from_dict(k) for o in cell.outputs if (k := kept(o)) is not None]
+    notebook.metadata["language_info"] = {"name": "python"}
+    cast(Any, nbformat).write(notebook, NOTEBOOK)
+
+
+if __name__ == "__main__":
+    main()

@@ -349,6 +349,10 @@ class System:
         if faults:
             raise WiringError(faults)
 
+    def __repr__(self) -> str:
+        """Return its units' names."""
+        return f"<system of {', '.join(self.units) or 'no units'}>"
+
     def _repr_html_(self) -> str:
         from handover.cosim.system.graph import system_svg  # of notebooks alone
 

@@ -188,6 +188,11 @@ class FmuDescription:
         """All variables that can be given start values."""
         return {**self.parameters, **self.inputs, **self.initial}
 
+    def __repr__(self) -> str:
+        """Return what it is; all that it has is too long for a line."""
+        counts = f"{len(self.inputs)} inputs, {len(self.outputs)} outputs, {len(self.parameters)} parameters"
+        return f"<FMI {self.fmi} unit {self.name}: {counts}>"
+
     def _repr_html_(self) -> str:
         from handover.cosim.fmu.file.port_table import description_html  # of notebooks alone
 
