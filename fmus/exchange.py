@@ -40,6 +40,15 @@ class InvalidOutput(TypeError):
         self.variable, self.value = variable, value
 
 
+class InvalidReturn(TypeError):
+    """A method of a block returned something else than it must; `example` is what would be right."""
+
+    def __init__(self, method: str, value: object, example: str) -> None:
+        shown = "" if value is None else f": {' '.join(repr(value).split()):.80}"
+        kind = "None" if value is None else type(value).__name__
+        super().__init__(f"{method} returned {kind}{shown}; expected {example}")
+
+
 def input_reader(buffers: Buffers) -> Callable[[], Any]:
     """Return a function that fills an inputs object, always the same one, from the buffers and returns it.
 
@@ -64,7 +73,7 @@ def input_reader(buffers: Buffers) -> Callable[[], Any]:
 def output_writer(buffers: Buffers) -> Callable[[Any], None]:
     """Return a function that writes a block's outputs into the buffers.
 
-    It raises InvalidOutput if an output is not of its declared type or shape, AttributeError if one is missing. It
+    It raises InvalidOutput if an output is not of its declared type or shape, InvalidReturn if it gets no outputs. It
     tries the exact types first, which is fast; only if that fails it goes through the outputs one after another,
     converts what may be converted and finds the output at fault.
     """
@@ -82,6 +91,13 @@ def output_writer(buffers: Buffers) -> Callable[[Any], None]:
             write_exact(y)
         except (struct.error, TypeError, ValueError, OverflowError):
             write_checked(y)
+        except AttributeError as error:
+            outputs = layout.description.outputs_type
+            if isinstance(y, outputs):
+                raise
+            names = ", ".join(f"{v.name}=..." for v in layout.description.outputs)
+            method = f"outputs or step of {layout.description.name}"
+            raise InvalidReturn(method, y, f"its outputs, such as {outputs.__name__}({names})") from error
 
     def write_checked(y: Any) -> None:
         try:

@@ -7,7 +7,7 @@ from typing import Any
 from handover.cosim.blocks.block import InvalidAdvance, InvalidState
 from handover.cosim.blocks.description import describe, with_start_values
 from handover.fmus.buffers import Buffers, join, split
-from handover.fmus.exchange import derivative_reader, input_reader, output_writer
+from handover.fmus.exchange import InvalidReturn, derivative_reader, input_reader, output_writer
 from handover.fmus.layout import Form, Layout
 from handover.fmus.parameters import read_parameters
 from handover.fmus.table import table
@@ -171,5 +171,9 @@ class Slave:
     def _make(self) -> None:
         """Make a block from the parameters; if that fails, the previous block and its parameters are kept."""
         block = self._type(read_parameters(self._buffers))
-        self._fresh = block.get_state()
+        fresh: object = block.get_state()
+        if not isinstance(fresh, bytes):
+            expected = 'bytes, such as pack_state((self.q, self.v)), or b"" without a state'
+            raise InvalidReturn(f"get_state of {self._type.__name__}", fresh, expected)
+        self._fresh = fresh
         self._block, self._made_from = block, self._buffers.parameters()

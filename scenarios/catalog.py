@@ -19,6 +19,8 @@ from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.exceptions import one_line
 from handover.fmus.catalog import UNITS, UnknownBlock, UnknownUnit, find_unit, import_class
 from handover.scenarios.experiment.experiment import Experiment
+from handover.scenarios.experiment.places import Place
+from handover.scenarios.experiment.returned_types import Expected, WrongType, mapping_to, sequence_of
 
 GROUP = "handover.scenarios"
 """The group of entry points that name scenarios; each is the path of a class."""
@@ -214,6 +216,14 @@ def named_scenario(name: str) -> type[Experiment[Any]]:
     return scenario
 
 
+_OF_CLASSES: Mapping[str, Expected] = {
+    "headline": sequence_of(str, '("distance",)'),
+    "unit_files": sequence_of(str, '("controller.model",)'),
+    "places": mapping_to(Place, '{"controller": Place(required={"tau": "joint 1 first"})}'),
+}
+"""Class attributes of a scenario whose other types would be taken for something else, as a text for its letters."""
+
+
 def _faults_of(named: type[Any]) -> list[str]:
     """Return what keeps a class from being a scenario that runs."""
     if not issubclass(named, Experiment):
@@ -226,6 +236,11 @@ def _faults_of(named: type[Any]) -> list[str]:
         faults.append(f"its parameters are invalid: {one_line(e)}")
     if scenario.name in SCENARIOS and scenario is not SCENARIOS[scenario.name]:
         faults.append(f"its name {scenario.name!r} is that of a scenario of this package; give it another")
+    for name, expected in _OF_CLASSES.items():
+        try:
+            expected.check(f"its {name!r} is", getattr(scenario, name))
+        except WrongType as e:
+            faults.append(str(e))
     units: Any = getattr(scenario, "units", None)
     if not isinstance(units, Mapping):
         return [*faults, "it has no 'units', a mapping such as {'arm': 'my_arm:MyArm'}"]

@@ -60,6 +60,7 @@ def one_line_errors() -> Generator[None, None, None]:
     from handover.fmus.catalog import PackageFailure
     from handover.fmus.compile import CompilationError, UnknownPlatform
     from handover.scenarios.experiment.parameters import InvalidParameter
+    from handover.scenarios.experiment.returned_types import WrongType
     from handover.scenarios.results.run_folder import InvalidRunFolder
     from handover.scenarios.results.tolerated_faults import ScenarioFailed
 
@@ -74,7 +75,7 @@ def one_line_errors() -> Generator[None, None, None]:
     except WiringError as e:
         number = f"{len(e.faults)} fault{'s' if len(e.faults) > 1 else ''}"
         raise UsageError(f"{number} in the system: {'; '.join(e.faults)}") from e
-    except (CosimError, InvalidParameter, InvalidRunFolder, ScenarioFailed) as e:
+    except (CosimError, InvalidParameter, InvalidRunFolder, ScenarioFailed, WrongType) as e:
         raise UsageError(str(e)) from e
     except (PoolError, NotCompiled, UnknownPlatform, PackageFailure) as e:
         raise UsageError(str(e)) from e

@@ -97,6 +97,8 @@ def run_task(
         if task.every is not None:
             evaluator.packed()
         experiment.stop_time(parameters)
+        experiment.cycle()
+        experiment.parameter_files(parameters)
     system = experiment_system(experiment, parameters, task.seed, task.fmus, task.unit_values, task.options)
     if task.pushed:
         let_push(system, experiment.pushes(parameters))

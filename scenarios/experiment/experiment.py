@@ -11,7 +11,9 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from fractions import Fraction
+from inspect import getattr_static
 from pathlib import Path
+from types import FunctionType
 from typing import Any, ClassVar, Generic, TypeVar, cast
 
 from handover.cosim.blocks.block import InvalidState
@@ -26,6 +28,20 @@ from handover.scenarios.experiment.paper import PublishedValue
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place, fit_places
 from handover.scenarios.experiment.replay import Replay
+from handover.scenarios.experiment.returned_types import (
+    FILES,
+    FLAG,
+    NAMES,
+    NUMBER,
+    SECONDS,
+    TEXT,
+    Expected,
+    WrongType,
+    check_methods,
+    instance_of,
+    mapping_to,
+    sequence_of,
+)
 from handover.scenarios.experiment.time_plot import TimeFigure, TimePlot
 
 FmuOf = Callable[[str], Path]
@@ -40,6 +56,14 @@ class Metric:
     unit: str = "1"
     description: str = ""
 
+    def __post_init__(self) -> None:
+        """Refuse a value that is no number.
+
+        Raises:
+            WrongType: it is none.
+        """
+        NUMBER.check("a Metric's value is", self.value)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
@@ -48,6 +72,16 @@ class Outcome:
     success: bool
     reason: str
     metrics: Mapping[str, Metric] = field(default_factory=dict[str, Metric])
+
+    def __post_init__(self) -> None:
+        """Refuse fields of other types.
+
+        Raises:
+            WrongType: one is.
+        """
+        FLAG.check("an Outcome's success is", self.success)
+        TEXT.check("an Outcome's reason is", self.reason)
+        mapping_to(Metric, '{"distance": Metric(0.004, "m")}').check("an Outcome's metrics are", self.metrics)
 
 
 class Evaluator(abc.ABC):
@@ -60,6 +94,10 @@ class Evaluator(abc.ABC):
 
     records: ClassVar[tuple[type[Any], ...]] = ()
     """Dataclasses, named tuples and enumerations of which its attributes are made, besides plain data."""
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        super().__init_subclass__(**given)
+        check_methods(cls, _OF_EVALUATORS)
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:  # noqa: B027 (most tasks are judged by the signals alone)
         """Take in, before a run begins or is resumed, which units are there and what they are set to, by name.
@@ -146,6 +184,13 @@ class Evaluator(abc.ABC):
         return tuple(own.values())
 
 
+_OF_EVALUATORS: Mapping[str, Expected] = {
+    "over": FLAG,
+    "outcome": instance_of(Outcome, 'Outcome(success=True, reason="the tip is at the goal")'),
+    "pictures": sequence_of(CameraPicture, "[CameraPicture(...)]"),
+}
+"""What its methods must return."""
+
 _BOUND, _PUSHES, _PUSHED = "_bound", "_pushes", "_pushed_bodies"
 _NOT_KEPT = ("parameters", _BOUND, _PUSHES)
 
@@ -193,6 +238,7 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
+        check_methods(cls, _OF_SCENARIOS)
         if "name" not in vars(cls):
             cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", cls.__name__).lower()
         if "title" not in vars(cls) and vars(cls).get("__doc__"):
@@ -239,8 +285,15 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         """Return the evaluator of one run."""
 
     def bound_evaluator(self, parameters: Any) -> AnyEvaluator:
-        """Return the evaluator of one run, whose states may hold the parameters."""
+        """Return the evaluator of one run, whose states may hold the parameters.
+
+        Raises:
+            WrongType: its `over` is a method, which is true before anything has happened.
+        """
         evaluator = self.evaluator(parameters)
+        if isinstance(over := getattr_static(evaluator, "over"), FunctionType):
+            example = "@property in the line above def over(self) -> bool"
+            raise WrongType(f"{type(evaluator).__name__}.over is", over, "a property", example)
         evaluator.bind(parameters, self.pushes(parameters))
         return evaluator
 
@@ -319,9 +372,32 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         return ()
 
 
+def _is_step(value: object) -> bool:
+    return value is None or isinstance(value, Fraction)
+
+
 @dataclass(frozen=True)
 class Figure:
     """A figure of a run: file name within the figures folder, without suffix, and caption."""
 
     name: str
     caption: str
+
+
+_OF_SCENARIOS: Mapping[str, Expected] = {
+    "build": instance_of(System, "the s = System() whose units it adds and connects"),
+    "stop_time": SECONDS,
+    "evaluator": instance_of(Evaluator, "ReachEvaluator(parameters), of a subclass of Evaluator"),
+    "step_in_parallel": Expected("a Fraction of a second or None", "Fraction(1, 500)", _is_step),
+    "parameter_files": FILES,
+    "led_hand": instance_of(LedHand, 'LedHand("person", (0.0, 0.3, 0.4), 0.5)', optional=True),
+    "cycle": NAMES,
+    "time_figures": sequence_of(
+        TimeFigure, '[TimeFigure(name="distance", caption="From the tip to the goal.", plots=[TimePlot(...)])]'
+    ),
+    "draw": sequence_of(Figure, '[Figure("scene", "The arm at its goal.")]'),
+    "replay": instance_of(Replay, "Replay(lines=[Line(...)])", optional=True),
+    "pushes": sequence_of(Pushable, "[Pushable(...)]"),
+    "published": sequence_of(PublishedValue, "[PublishedValue(...)]"),
+}
+"""What the methods of a scenario must return."""

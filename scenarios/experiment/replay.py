@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
+from handover.scenarios.experiment.returned_types import Expected, is_series, sequence_of
 from handover.scenarios.experiment.time_plot import Phase
 
 
@@ -147,6 +148,14 @@ class Line:
     trail: bool = False
     opacity: float = 1.0
 
+    def __post_init__(self) -> None:
+        """Refuse points of another shape.
+
+        Raises:
+            WrongType: they have one.
+        """
+        _POINTS.check(f"the points of Line {self.label!r} are", self.points)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
@@ -166,6 +175,27 @@ class Body:
     p_WB: Floats
     q_WB: Floats | None = None
     opacity: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse positions and orientations of other shapes.
+
+        Raises:
+            WrongType: one has.
+        """
+        _PLACES.check(f"p_WB of Body {self.label!r} is", self.p_WB)
+        if self.q_WB is not None:
+            _TURNS.check(f"q_WB of Body {self.label!r} is", self.q_WB)
+
+
+_POINTS = Expected(
+    "an array of shape (rows, n, 3), or (1, n, 3)",
+    'record["arm.p_WE"][:, None, :]',
+    lambda points: is_series(points, (None, None, 3)),
+)
+_PLACES = Expected("an array of shape (rows, 3), or (1, 3)", 'record["robot.p_WB"]', lambda p: is_series(p, (None, 3)))
+_TURNS = Expected("an array of shape (rows, 4), or (1, 4)", 'record["robot.q_WB"]', lambda q: is_series(q, (None, 4)))
+_LINES = sequence_of(Line, '[Line(label="arm", colour="#2f6db5", points=points)]')
+_BODIES = sequence_of(Body, '[Body(label="robot", colour="#2f6db5", mesh=ball(0.1), p_WB=record["robot.p_WB"])]')
 
 
 class PersonView(NamedTuple):
@@ -208,3 +238,13 @@ class Replay:
     floor: float | None = None
     follow: str = ""
     person_view: PersonView | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse lines and bodies of other types.
+
+        Raises:
+            WrongType: one is.
+        """
+        _LINES.check("the lines of a Replay are", self.lines)
+        _LINES.check("the fixed lines of a Replay are", self.fixed)
+        _BODIES.check("the bodies of a Replay are", self.bodies)

@@ -9,6 +9,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
+from handover.scenarios.experiment.returned_types import Expected, is_series, sequence_of
 
 COLOURS = ("#2f6db5", "#d1602b", "#3c8d53", "#8357a8", "#a37a10", "#4d5866", "#c2487f", "#1f8a94", "#7d5a3c")
 """Colours of curves, in the order of use; the same as `var(--c0)` and on of page.css in its light scheme."""
@@ -37,6 +38,14 @@ class Curve:
     stroke: Stroke = "solid"
     group: str = ""
 
+    def __post_init__(self) -> None:
+        """Refuse values that are no series of numbers.
+
+        Raises:
+            WrongType: they are none.
+        """
+        SERIES.check(f"the values of Curve {self.label!r} are", self.values)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Level:
@@ -53,6 +62,16 @@ class Phase:
     begin: float
     end: float
     name: str
+
+
+SERIES = Expected(
+    "an array of numbers of shape (rows,), one a row of the record",
+    'record["arm.p_WE"][:, 0]',
+    lambda values: is_series(values, (None,)),
+)
+_CURVES = sequence_of(Curve, '[Curve(label="x", values=record["arm.p_WE"][:, 0])]')
+_LEVELS = sequence_of(Level, '[Level("threshold", 0.005)]')
+_PHASES = sequence_of(Phase, 'phases_of(record, "servo.phase")')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +98,16 @@ class TimePlot:
     logarithmic: bool = False
     limits: tuple[float | None, float | None] = (None, None)
     palette: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse curves, levels and phases of other types.
+
+        Raises:
+            WrongType: one is.
+        """
+        _CURVES.check(f"the curves of TimePlot {self.title!r} are", self.curves)
+        _LEVELS.check(f"the levels of TimePlot {self.title!r} are", self.levels)
+        _PHASES.check(f"the phases of TimePlot {self.title!r} are", self.phases)
 
     @property
     def axis_label(self) -> str:
@@ -121,6 +150,9 @@ class TimePlot:
         return len(self.curves) + len(self.levels) > 1 or any(c.label != self.quantity for c in self.curves)
 
 
+_PLOTS = sequence_of(TimePlot, '[TimePlot(title="Distance", quantity="distance", unit="mm", curves=[Curve(...)])]')
+
+
 @dataclass(frozen=True, kw_only=True)
 class TimeFigure:
     """Plots that a figure for papers draws below each other, sharing time.
@@ -135,6 +167,14 @@ class TimeFigure:
     caption: str
     plots: Sequence[TimePlot]
     columns: int = 1
+
+    def __post_init__(self) -> None:
+        """Refuse plots of another type.
+
+        Raises:
+            WrongType: they are.
+        """
+        _PLOTS.check(f"the plots of TimeFigure {self.name!r} are", self.plots)
 
 
 def phases_of(record: Record, signal: str, names: Mapping[int, str] | None = None) -> tuple[Phase, ...]:

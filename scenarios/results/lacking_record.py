@@ -17,7 +17,8 @@ from handover.cosim.blocks.variable import Kind, Variable
 from handover.cosim.record.reader import Record
 from handover.fmus.catalog import UnknownBlock, UnknownUnit, find_unit, import_class
 from handover.scenarios.experiment.replay import Body, Replay
-from handover.scenarios.experiment.time_plot import TimeFigure, TimePlot
+from handover.scenarios.experiment.returned_types import WrongType
+from handover.scenarios.experiment.time_plot import SERIES, TimeFigure, TimePlot
 
 
 class LackingRecord(Record):
@@ -78,7 +79,13 @@ class LackingRecord(Record):
         return [f for f in kept if f.plots]
 
     def drawable_plots(self, plots: Sequence[TimePlot]) -> Sequence[TimePlot]:
-        """Return plots with the curves that have values, each in its colour; a plot without any is left out."""
+        """Return plots with the curves that have values, each in its colour; a plot without any is left out.
+
+        Raises:
+            WrongType: a curve has more or fewer values than the record has rows.
+        """
+        for plot in plots:
+            self._check_rows(plot)
         if not self.lacking:
             return plots
         kept: list[TimePlot] = []
@@ -88,6 +95,12 @@ class LackingRecord(Record):
                 palette = tuple(dict.fromkeys([*plot.palette, *(c.group or c.label for c in plot.curves)]))
                 kept.append(replace(plot, curves=curves, palette=palette))
         return kept
+
+    def _check_rows(self, plot: TimePlot) -> None:
+        for curve in plot.curves:
+            if len(curve.values) != len(self.time):
+                what = f"the values of Curve {curve.label!r} in TimePlot {plot.title!r} are"
+                raise WrongType(what, curve.values, f"{SERIES.right}, here {len(self.time)}", SERIES.example)
 
     def drawable_replay(self, replay: Replay) -> Replay | None:
         """Return a replay without what has no place at any time; None if nothing has one."""

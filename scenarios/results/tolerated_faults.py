@@ -18,6 +18,7 @@ from handover.cosim.system.system import PlacedUnit
 from handover.scenarios.experiment.experiment import AnyEvaluator, Evaluator, Experiment, Outcome
 from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.pictures import CameraPicture
+from handover.scenarios.experiment.returned_types import WrongType
 
 _MAX_MESSAGE = 200  # characters
 
@@ -28,6 +29,8 @@ def fault_line(e: BaseException) -> str:
     where = ([f for f in frames if _is_users(f)] or [f for f in frames if _is_ours(f)] or frames)[-1:]
     place = f" ({Path(where[0].filename).name}, line {where[0].lineno})" if where else ""
     message = one_line(e)
+    if isinstance(e, WrongType):  # names the method where no line of the user's is on the way
+        return f"{message}{place if any(map(_is_users, frames)) else ''}"
     if len(message) > _MAX_MESSAGE:  # of libraries such as Qhull: a page of advice
         message = f"{message[:_MAX_MESSAGE]}..."
     name = type(e).__name__

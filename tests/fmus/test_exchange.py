@@ -9,7 +9,7 @@ from sample_units import every_kind, eye
 
 from handover.cosim.blocks.description import describe
 from handover.fmus.buffers import Buffers
-from handover.fmus.exchange import InvalidOutput, input_reader, output_writer
+from handover.fmus.exchange import InvalidOutput, InvalidReturn, input_reader, output_writer
 from handover.fmus.layout import Layout
 
 
@@ -58,6 +58,14 @@ def test_bytes_of_another_type_or_without_room_are_refused(value: Any):
     y = eye.Outputs(brighter=np.zeros((720, 1280, 3), np.uint8), note_back=b"")
     with pytest.raises(InvalidOutput, match="output 'note_back' is declared as binary"):
         write(eye.Eye, y, note_back=value)
+
+
+@pytest.mark.parametrize("y", [None, {"b": 1.0}, 1.0])
+def test_what_are_no_outputs_is_refused_with_what_would_be(y: Any):
+    with pytest.raises(
+        InvalidReturn, match=r"^outputs or step of EveryKind returned .*; expected .* Outputs\(.*b=\.\.\."
+    ):
+        output_writer(Buffers(Layout(describe(every_kind.EveryKind))))(y)
 
 
 def test_the_items_of_an_enumeration_are_named():

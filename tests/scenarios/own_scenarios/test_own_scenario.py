@@ -1,12 +1,15 @@
 """A scenario outside of the package, from the tutorial's text: run, listed, swept, resumed, reported, exported."""
 
+import importlib.util
 import json
 import os
 import shlex
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,6 +44,38 @@ def test_it_runs_and_its_report_is_written_again_from_elsewhere(here: Path, tmp_
     page = (here / "first" / "report.html").read_text(encoding="utf-8")
     assert "An arm of two links reaches for a point" in page
     assert "where the tip is to come" in page
+    assert "Distance to the goal" in page
+    assert (here / "first" / "figures" / "distance.png").is_file()
+
+
+def loaded(file: Path) -> Any:
+    """Return a module of the tutorial."""
+    spec = importlib.util.spec_from_file_location(f"tutorial_{file.stem}", file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module.__name__] = module  # dataclasses look for it
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_tutorials_figure_is_the_distance_to_the_goal(here: Path):
+    reach = loaded(here / "reach.py")
+    record = {"arm.p_WE": np.array([[0.3, 0.6], [0.3, 0.5], [0.0, 0.2]])}
+    (figure,) = reach.TwoLinkReach().time_figures(reach.Parameters(), record)
+    assert figure.plots[0].curves[0].values == pytest.approx([0.0, 100.0, 500.0])
+
+
+def test_the_tutorials_generator_goes_on_from_a_state_bit_for_bit(here: Path):
+    encoders = loaded(here / "encoders.py")
+    u = encoders.Inputs(q=np.array([0.5, 1.0]))
+    block, other = (encoders.NoisyEncoders(encoders.Params(sigma=0.01, seed=seed)) for seed in (1, 2))
+    block.step(0.0, 0.01, u)
+    state = block.get_state()
+    ahead = [block.step(0.01 * k, 0.01, u).q_meas for k in range(1, 200)]
+    other.set_state(state)
+    assert np.array_equal(ahead, [other.step(0.01 * k, 0.01, u).q_meas for k in range(1, 200)])
+    assert np.std(np.subtract(ahead, u.q)) == pytest.approx(0.01, rel=0.1)
 
 
 def test_list_prints_scenario_controller_and_plant(here: Path):

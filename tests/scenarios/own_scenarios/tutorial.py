@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 TUTORIAL = Path(__file__).parents[3] / "docs" / "tutorial.md"
-_FILE = re.compile(r"^## \d+\. [^\n]*`(?P<name>\w+\.py)`\n.*?^```python\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL)
+_FILE = re.compile(r"^##+ [^\n]*`(?P<name>\w+\.py)`\n.*?^```python\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL)
 SOFTER = """
 from goal_spring import Inputs, Outputs, Params, SpringToGoal
 
@@ -25,9 +25,9 @@ COMMAND = [sys.executable, "-c", "from handover.scenarios.cli.entry import main;
 
 
 def write_files(folder: Path) -> None:
-    """Write arm.py, goal_spring.py and reach.py into a folder."""
+    """Write arm.py, goal_spring.py, encoders.py and reach.py into a folder."""
     files = {m["name"]: m["code"] for m in _FILE.finditer(TUTORIAL.read_text(encoding="utf-8"))}
-    assert set(files) == {"arm.py", "goal_spring.py", "reach.py"}
+    assert set(files) == {"arm.py", "goal_spring.py", "encoders.py", "reach.py"}
     for name, code in files.items():
         (folder / name).write_text(code, encoding="utf-8")
 
