@@ -10,6 +10,7 @@ from types import FunctionType, MethodType
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 def _article(name: str) -> str:
@@ -94,7 +95,7 @@ def is_series(values: object, shape: tuple[int | None, ...]) -> bool:
     if not isinstance(values, np.ndarray | list | tuple):
         return False
     try:
-        array: Any = np.asarray(values)
+        array: NDArray[Any] = np.asarray(cast(Any, values))
     except ValueError:  # rows of several lengths
         return False
     fits = all(n is None or n == m for n, m in zip(shape, array.shape, strict=False))

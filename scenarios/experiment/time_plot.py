@@ -70,7 +70,7 @@ SERIES = Expected(
     lambda values: is_series(values, (None,)),
 )
 _CURVES = sequence_of(Curve, '[Curve(label="x", values=record["arm.p_WE"][:, 0])]')
-_LEVELS = sequence_of(Level, '[Level("threshold", 0.005)]')
+_LEVELS = sequence_of(Level, '[Level(label="threshold", value=0.005)]')
 _PHASES = sequence_of(Phase, 'phases_of(record, "servo.phase")')
 
 

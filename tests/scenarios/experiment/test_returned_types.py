@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from handover.scenarios import catalog
 from handover.scenarios.catalog import InvalidScenario, named_scenario
 from handover.scenarios.cli.command import main
+from handover.scenarios.experiment import experiment, replay, time_plot
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, Metric, Outcome
 from handover.scenarios.experiment.replay import Line, Replay
-from handover.scenarios.experiment.returned_types import WrongType
+from handover.scenarios.experiment.returned_types import Expected, WrongType
 from handover.scenarios.experiment.time_plot import Curve, TimeFigure, TimePlot
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
@@ -22,14 +24,21 @@ PLOT = TimePlot(title="x", quantity="x", unit="", curves=[CURVE])
 FIGURE = TimeFigure(name="x", caption="", plots=[PLOT])
 
 
+def giving(value: Any) -> Any:
+    def give(*_: Any) -> Any:
+        return value
+
+    return give
+
+
 def scenario(**returned: Any) -> Any:
     """Return a scenario, or an evaluator, whose methods return what is given."""
-    methods: dict[str, Any] = {name: lambda *_, value=value: value for name, value in returned.items()}
+    methods = {name: giving(value) for name, value in returned.items()}
     return type("Wrong", (Experiment,), methods | dict.fromkeys({"build", "stop_time", "evaluator"} - {*methods}))()
 
 
 def evaluator(**returned: Any) -> Any:
-    methods: dict[str, Any] = {name: lambda *_, value=value: value for name, value in returned.items()}
+    methods = {name: giving(value) for name, value in returned.items()}
     others = dict.fromkeys({"__call__", "over", "outcome"} - {*methods})
     if "over" in methods:
         methods["over"] = property(methods["over"])
@@ -78,7 +87,7 @@ def test_an_evaluator_whose_end_is_a_method_is_refused_before_the_run():
     class Forgetful(Evaluator):
         def __call__(self, t: float, signals: Any) -> None: ...
 
-        def over(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+        def over(self) -> bool:  # pyright: ignore[reportIncompatibleMethodOverride]
             return False
 
         def outcome(self) -> Outcome:
@@ -113,6 +122,25 @@ def test_what_they_return_is_checked_where_it_is_made(make: Any):
         make()
     (line,) = faults.lines
     assert re.search(r"^not drawn: .*; expected .*, such as .*\(test_returned_types.py, line \d+\)$", line)
+
+
+def test_the_examples_are_of_the_types_that_they_stand_for():
+    record = {"arm.p_WE": np.zeros((3, 3)), "robot.p_WB": np.zeros((3, 3)), "robot.q_WB": np.zeros((3, 4))}
+    known = {name: value for module in (experiment, replay, time_plot, catalog) for name, value in vars(module).items()}
+    known |= {"np": np, "p": np.zeros(3), "record": record, "points": np.zeros((3, 2, 3))}
+    expected: list[Any] = []
+    for value in known.values():
+        expected += cast(dict[str, Any], value).values() if type(value) is dict else [value]
+    tried = 0
+    for each in (e for e in expected if isinstance(e, Expected) and "..." not in e.example):
+        try:
+            code = compile(each.example, "example", "eval")
+        except SyntaxError:  # in words
+            continue
+        if not {"self", "phases_of"} & {*code.co_names}:
+            assert each.fits(eval(code, known)), each.example
+            tried += 1
+    assert tried > 15
 
 
 SCENE = """
