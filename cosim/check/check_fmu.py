@@ -211,7 +211,8 @@ class _Check:
             warning("compressed in a way that the standards do not know", where=name, cure="use deflate")
             for name in self.archive.outdated_methods
         ]
-        size, n = self.path.stat().st_size, len(self.archive.names)
+        is_folder, n = self.path.is_dir(), len(self.archive.names)
+        size = sum(map(self.archive.size, self.archive.names)) if is_folder else self.path.stat().st_size
         return f"{n} file{'s' if n != 1 else ''} in {math.ceil(size / 1000)} kB", findings
 
     def _description(self) -> tuple[str, list[Finding]]:

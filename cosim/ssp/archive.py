@@ -1,14 +1,14 @@
-"""An SSP's zip archive, which is checked before anything is unpacked."""
+"""An SSP's zip archive, which is checked before anything is unpacked, or its unpacked folder, or that by its `.ssd`."""
 
 import posixpath
-from collections.abc import Generator
+from collections.abc import Collection, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import ClassVar
 from urllib.parse import unquote, urlsplit
 
 from handover.cosim.exceptions import InvalidFmu, InvalidSsp, nearest
-from handover.cosim.fmu.file.archive import FmuArchive
+from handover.cosim.fmu.file.archive import DESCRIPTION, FmuArchive
 from handover.cosim.ssp.xml import STRUCTURE
 
 
@@ -17,17 +17,30 @@ class _Packed(FmuArchive):
     description_name: ClassVar[str] = STRUCTURE
 
 
+def ssp_root(path: Path) -> Path:
+    """Return the file or the folder that holds all of an SSP: of an `.ssd` the folder that it is in."""
+    return path.parent if path.suffix.lower() == ".ssd" else path
+
+
 class SspArchive:
     """A zip archive with SystemStructure.ssd at its top, and the files that it refers to by relative URIs.
+
+    Or a folder with all that; or an `.ssd` of any name in a folder.
+
+    Attributes:
+        structure_name: name of the `.ssd`.
 
     Raises:
         InvalidSsp: no such file, not a zip archive, or with members that must not be unpacked.
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        self.path, root = path, ssp_root(path)
+        self.structure_name = STRUCTURE if root == path else path.name
         with _ssp_errors(path):
-            self._packed = _Packed(path)
+            if root != path and not path.is_file():
+                raise InvalidFmu(path, "there is no such file")
+            self._packed = _Packed(root)
         self._files = frozenset(n for n in self._packed.names if not n.endswith("/"))
 
     @contextmanager
@@ -46,6 +59,8 @@ class SspArchive:
         Raises:
             InvalidSsp: it is missing or damaged.
         """
+        if self.structure_name != STRUCTURE:
+            return self.read(self.structure_name)
         with _ssp_errors(self.path):
             return self._packed.description()
 
@@ -58,14 +73,14 @@ class SspArchive:
         with _ssp_errors(self.path):
             return self._packed.read(member)
 
-    def unpack(self, folder: Path) -> None:
-        """Unpack everything into a folder, after all of it has been verified.
+    def unpack(self, folder: Path, members: Collection[str]) -> None:
+        """Unpack FMUs into a folder, after all of them have been verified; of an archive, all that is in it.
 
         Raises:
             InvalidSsp: a member is damaged, or cannot be written to the folder.
         """
         with _ssp_errors(self.path):
-            self._packed.unpack(folder)
+            self._packed.unpack(folder, None if self._packed.what == "archive" else members)
 
     def member(self, uri: str) -> str:
         """Return the member that a URI refers to from SystemStructure.ssd.
@@ -81,7 +96,7 @@ class SspArchive:
         member = posixpath.normpath(unquote(parts.path))
         if member.split("/")[0] == "..":
             raise ValueError(f"{uri!r} leads out of the SSP")
-        if member not in self._files:
+        if member not in self._files and f"{member}/{DESCRIPTION}" not in self._files:
             raise ValueError(f"there is no {member!r} in the SSP; {nearest(member, self._files)}")
         return member
 

@@ -26,7 +26,7 @@ def check_ssp(path: Path, timeout: float) -> Iterator[CheckReport]:
         try:
             archive = SspArchive(path)
             components = [component for _, component in components_of(read_structure(archive).system)]
-            archive.unpack(folder)
+            archive.unpack(folder, {component.member for component in components})
         except InvalidSsp:  # which the first report tells
             return
         for member in dict.fromkeys(component.member for component in components):

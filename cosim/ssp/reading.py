@@ -29,7 +29,6 @@ from handover.cosim.ssp.xml import (
     OMS_ANNOTATION,
     OSP_ANNOTATION,
     STEP_ANNOTATION,
-    STRUCTURE,
     SspPart,
     local,
     short_name,
@@ -56,7 +55,7 @@ def read_structure(archive: SspArchive) -> SspStructure:
         InvalidSsp: it is malformed, or refers to what is missing, or to what is not supported and cannot be left out.
     """
     with archive.opened():
-        part = SspPart(archive.path, STRUCTURE, archive.structure(), "ssd:SystemStructureDescription")
+        part = SspPart(archive.path, archive.structure_name, archive.structure(), "ssd:SystemStructureDescription")
         systems = list(part.children(part.root, "ssd:System"))
         if len(systems) != 1:
             raise part.fault(part.root, f"there are {len(systems)} outermost systems; one is right")

@@ -190,12 +190,13 @@ class SspFile:
         self.folder = self._opened.enter_context(scratch_folder("ssp"))
         """Where its FMUs are unpacked until it is closed."""
         try:
-            archive.unpack(self.folder)
+            members = {n: c.member for n, c in components_of(structure.system)}
+            archive.unpack(self.folder, set(members.values()))
             self._structure, self._step = structure, step
             self._start = exact_seconds(structure.start) if start is None else start
             end = self.stop if stop is None else stop
             self._duration = None if end is None else end - self._start
-            self._descriptions = self._describe({n: c.member for n, c in components_of(structure.system)})
+            self._descriptions = self._describe(members)
             self._flat, self.system = self._with(parameters)
         except BaseException:
             self.close()

@@ -35,9 +35,10 @@ class Connection:
 
 
 class PortNames:
-    """Makes names of ports and terminals by attribute: `arm.y.p_WG`. `System.check` checks whether there is such a one.
+    """Makes names of ports and terminals by attribute or key: `arm.y.p_WG`, `arm.y["any name"]`.
 
-    By itself it stands for all inputs, or all outputs, of its unit: `System.connect(arm.y, camera.u)`.
+    `System.check` checks whether there is such a one. By itself it stands for all inputs, or all outputs, of its unit:
+    `System.connect(arm.y, camera.u)`.
     """
 
     def __init__(self, unit: str, causality: Causality) -> None:
@@ -47,6 +48,9 @@ class PortNames:
     def __getattr__(self, port: str) -> PortName:
         if port.startswith("__"):
             raise AttributeError(port)
+        return PortName(self._unit, port)
+
+    def __getitem__(self, port: str) -> PortName:
         return PortName(self._unit, port)
 
     def __repr__(self) -> str:

@@ -23,7 +23,8 @@ Inside = Mapping[str, tuple[str, FmuPort]]
 def record_variables(system: System, patterns: Sequence[str]) -> None:
     """Let local variables and parameters of a wired system be seen, by patterns `UNIT.NAME`.
 
-    In these, `*` and `?` stand for any characters. Where no patterns are given and no unit has an output, the local variables of all are seen, which a note says.
+    In these, `*` and `?` stand for any characters. Where no patterns are given and no unit has an output, the local
+    variables of all are seen, which a note says.
 
     Raises:
         WiringError: a pattern names nothing that can be recorded.

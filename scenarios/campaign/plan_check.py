@@ -1,16 +1,18 @@
 """Checks all of a campaign's plan before any of its runs begins."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
 from handover.cosim.master.master import Master
+from handover.cosim.ssp.archive import ssp_root
 from handover.cosim.system.recorded_variables import record_variables
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.campaign.plan import MAX_REPETITIONS, MAX_RUNS, CampaignPlan, unit_key
+from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.selection import replacements, select_fmus
 from handover.scenarios.execution.unit_values import built_system, check_value, is_unit_value, split_parameters
 from handover.scenarios.experiment.experiment import Experiment
@@ -87,9 +89,11 @@ def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
     Of a campaign of a file it is the file, by its name.
 
     Raises:
-        UsageError: the plan names a unit that the scenario does not have, or the catalog's unit cannot be built.
+        UsageError: the plan names a unit that the scenario does not have, the catalog's unit cannot be built, or an FMU
+            or SSP is unpacked: a campaign keeps copies of files.
     """
     if plan.file is not None:
+        _check_packed([plan.file])
         return {plan.file.stem: plan.file}
     experiment = plan.kind
     others = replacements(experiment, [f"{name}={other}" for name, other in plan.units.items()])
@@ -98,7 +102,14 @@ def unit_fmus(plan: CampaignPlan) -> dict[str, Path]:
         varied = {unit: other for unit, other in zip(plan.varied_units, chosen, strict=True) if other}
         found = select_fmus(experiment, {**others, **varied}, lambda unit: cached(unit, 3))
         fmus |= {unit_key(name, varied[name]) if name in varied else name: path for name, path in found.items()}
+    _check_packed(fmus.values())
     return fmus
+
+
+def _check_packed(files: Iterable[Path]) -> None:
+    if unpacked := [str(file) for file in files if ssp_root(file).is_dir()]:
+        how = "a campaign keeps copies of files: zip what is in the folder to a file that ends with .fmu or .ssp"
+        raise UsageError(f"{', '.join(unpacked)}: {how}")
 
 
 def _chosen_units(plan: CampaignPlan, point: Mapping[str, str]) -> tuple[str, ...]:

@@ -73,6 +73,7 @@ _HELP = """Run a SCENARIO once and write summary, signals, figures and a report 
 
 FILE.ssp is a system from another tool (SSP 1.0 or 2.0), or from `handover export`: it runs until its stop time.
 FILE.fmu is one unit, from any tool: it runs by itself, with its parameters set by -p and its inputs by --input.
+Folders to which these were unpacked run, too, and a system by its FILE.ssd in one.
 
 Ctrl-C ends the run after its step; what was recorded until then is kept. Ctrl-C again aborts.
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.exceptions import WiringError
+from handover.cosim.fmu.file.archive import DESCRIPTION
 from handover.cosim.fmu.file.default_experiment import DefaultExperiment, exact_seconds
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.system.system import PortName, System
@@ -21,8 +22,8 @@ from handover.scenarios.results.run_folder import sha256_of
 
 
 def is_fmu(name: str) -> bool:
-    """Return whether a name is an FMU's file and not a scenario."""
-    return Path(name).suffix.lower() == ".fmu"
+    """Return whether a name is an FMU's file, or the folder of an unpacked one, and not a scenario."""
+    return Path(name).suffix.lower() == ".fmu" or (Path(name) / DESCRIPTION).is_file()
 
 
 class FmuParameters(SettableParameters):

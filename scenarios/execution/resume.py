@@ -10,6 +10,7 @@ from handover.cosim.exceptions import RecordNotWritten, nearest, one_line
 from handover.cosim.files import FileLocked
 from handover.cosim.master.checkpoint import InvalidCheckpoint
 from handover.cosim.record.stream import complete_record
+from handover.cosim.ssp.archive import ssp_root
 from handover.fmus.build import cached, is_of_cache
 from handover.scenarios.catalog import SCENARIOS, InvalidScenario, ScenarioSource, named_scenario
 from handover.scenarios.execution.fmu_run import reopened
@@ -84,7 +85,7 @@ class InterruptedRun:
             lines.append(f"the code of {before.scenario}: {self._unchanged(before)}, as the run began with it")
         for name, file in self._description.get("files", {}).items():
             path, known = Path(str(file)), units.get(name)
-            unchanged = known is not None and path.is_file() and sha256_of(path) == known["sha256"]
+            unchanged = known is not None and path.exists() and sha256_of(path) == known["sha256"]
             if unchanged and not is_of_cache(path):
                 lines.append(f"the FMU of its unit {name}: {file}")
         return lines + [f"the units in {source[kind]}" for kind in ("ssp", "fmu") if kind in source]
@@ -144,7 +145,7 @@ class InterruptedRun:
         if "fmu" in source:
             return self._fmu_experiment(source)
         file, step = Path(source["ssp"]), source["step"]
-        if not file.is_file() or sha256_of(file) != source["sha256"]:
+        if not file.exists() or sha256_of(ssp_root(file)) != source["sha256"]:
             raise InvalidRunFolder(self.folder.path, f"{file} is not the file that the run began with")
         times = Fraction(source["stop"]), None if step is None else Fraction(step)
         start = Fraction(source.get("start", "0"))
@@ -178,7 +179,7 @@ class InterruptedRun:
     def _fmu_experiment(self, source: Mapping[str, Any]) -> Experiment[Any]:
         run, files = reopened(source)
         for file, sha256 in files.items():
-            if not file.is_file() or sha256_of(file) != sha256:
+            if not file.exists() or sha256_of(file) != sha256:
                 raise InvalidRunFolder(self.folder.path, f"{file} is not the file that the run began with")
         return run.open()
 
@@ -186,7 +187,7 @@ class InterruptedRun:
         """Return a unit's file; if it is gone, or damaged in the folder of built units, the unit built again."""
         path = Path(self._description["files"][name])
         before = self._description.get("units", {}).get(name, {}).get("sha256")
-        if path.is_file() and (sha256_of(path) == before or not is_of_cache(path)):
+        if path.exists() and (sha256_of(path) == before or not is_of_cache(path)):
             return path
         return cached(unit, 3)
 

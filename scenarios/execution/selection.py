@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import nearest, suggestion
 from handover.fmus.catalog import UNITS, UnknownBlock, UnknownUnit, find_unit, import_class
 from handover.scenarios.catalog import (
     SCENARIOS,
@@ -29,6 +29,32 @@ _BLOCK = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 def is_path_of_class(text: str) -> bool:
     """Return whether a text is the path of a class, as of a block or a scenario of one's own, and no file's."""
     return _BLOCK.fullmatch(text) is not None
+
+
+NO_UNPACKED = (
+    "a folder with neither modelDescription.xml, as of an unpacked FMU, nor SystemStructure.ssd, as of an unpacked SSP,"
+    " at its top"
+)
+"""What is wrong with a folder that is to be run or checked."""
+
+
+def nothing_at(path: Path) -> str:
+    """Return that there is nothing at a path, with the names of what is there that are most like its."""
+    if not path.parent.is_dir():
+        return f"there is no such file or folder, nor a folder {path.parent}"
+    near = suggestion(path.name, [p.name for p in path.parent.iterdir()])
+    return "there is no such file or folder" + (f"; {near}" if near else "")
+
+
+def _path_fault(name: str) -> str:
+    """Return what is wrong with a name that is meant as a path of a file or folder; empty where it is not."""
+    path = Path(name)
+    if path.is_dir():
+        return NO_UNPACKED
+    if path.exists():
+        return "a file, and no scenario; what can be run ends with .fmu, .ssp or .ssd"
+    is_meant = "/" in name or "\\" in name or (":" not in name and path.suffix)
+    return nothing_at(path) if is_meant else ""
 
 
 def find_scenario(name: str) -> type[Experiment[Any]]:
@@ -52,6 +78,8 @@ def find_scenario(name: str) -> type[Experiment[Any]]:
                 f"{name} is a file, not a scenario: a study's plan is opened by handover study serve {name}, "
                 f"values of options by --config {name}"
             ) from None
+        if fault := _path_fault(name):
+            raise UsageError(f"{name}: {fault}") from None
         own = "" if name in "".join(valid) else "; a scenario of your own is named MODULE:CLASS"
         raise UsageError(f"no scenario {name!r}: {nearest(name, valid)}{own}") from None
 

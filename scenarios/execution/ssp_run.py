@@ -9,7 +9,9 @@ from typing import Any
 from handover.cosim.exceptions import InvalidSsp
 from handover.cosim.fmu.file.default_experiment import NoStep
 from handover.cosim.fmu.file.description import FmuPort
+from handover.cosim.ssp.archive import ssp_root
 from handover.cosim.ssp.ssp_file import SspFile
+from handover.cosim.ssp.xml import STRUCTURE
 from handover.scenarios.execution import supervisor
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.file_experiment import FileExperiment, SettableParameters, system_experiment
@@ -20,8 +22,8 @@ ENDLESS = Fraction(10**6)
 
 
 def is_ssp(name: str) -> bool:
-    """Return whether a name is an SSP's file and not a scenario."""
-    return Path(name).suffix.lower() == ".ssp"
+    """Return whether a name is an SSP's file, its `.ssd` or its unpacked folder, and not a scenario."""
+    return Path(name).suffix.lower() in (".ssp", ".ssd") or (Path(name) / STRUCTURE).is_file()
 
 
 class SspParameters(SettableParameters):
@@ -109,4 +111,4 @@ def source_of(
     """Return what a run's folder keeps of an SSP so that the run can be resumed: the file, times and given values."""
     times = {"start": str(start), "stop": str(stop), "step": None if step is None else str(step)}
     given = {"parameters": list(parameters)} if parameters else {}
-    return {"ssp": str(path.absolute()), "sha256": sha256_of(path), **times, **given}
+    return {"ssp": str(path.absolute()), "sha256": sha256_of(ssp_root(path)), **times, **given}

@@ -362,8 +362,12 @@ def _remove_empty(folders: Sequence[Path]) -> None:
 
 
 def sha256_of(file: Path) -> str:
-    """Return a file's SHA-256 in hexadecimal."""
-    return hashlib.sha256(read_regular(file, math.inf)).hexdigest()
+    """Return a file's SHA-256 in hexadecimal; of a folder, that of the list of its files with theirs."""
+    if not file.is_dir():
+        return hashlib.sha256(read_regular(file, math.inf)).hexdigest()
+    inside = sorted(path for path in file.rglob("*") if path.is_file())
+    listed = "".join(f"{sha256_of(path)}  {path.relative_to(file).as_posix()}\n" for path in inside)
+    return hashlib.sha256(listed.encode()).hexdigest()
 
 
 def hashes_of_files(files: Mapping[str, Path]) -> dict[str, dict[str, str]]:

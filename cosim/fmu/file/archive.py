@@ -1,4 +1,4 @@
-"""Reads and writes the zip archives of FMUs and SSPs.
+"""Reads the zip archives of FMUs and SSPs, or folders that they were unpacked to, and writes archives.
 
 An archive from elsewhere is checked before anything is unpacked: no member may lead out of the folder, fill the disk,
 or be unreadable (`archive_faults`). Archives that are written have the same bytes for the same files (`write_archive`).
@@ -8,15 +8,16 @@ import contextlib
 import io
 import os
 import re
+import shutil
 import stat
 import struct
 import uuid
 import zipfile
 import zlib
 from collections import defaultdict
-from collections.abc import Collection, Generator, Iterable, Mapping, Sequence
+from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
-from typing import ClassVar
+from typing import IO, ClassVar
 
 from handover.cosim.exceptions import InvalidFmu, one_line
 
@@ -112,23 +113,12 @@ _DAMAGE = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OS
 _MAX_TEXT = 512 * _MIB  # of one XML file
 
 
-class FmuArchive:
-    """A zip archive whose members may be read and unpacked: nothing in it leads out of a folder or fills the disk.
+class _Zip:
+    """The members of a zip archive, which may be read and unpacked: nothing in it leads out of a folder."""
 
-    Attributes:
-        names: paths of all members, folders with a slash at the end.
-
-    Raises:
-        InvalidFmu: no such file, not a zip archive, or with members that must not be unpacked; the message lists them.
-    """
-
-    kind: ClassVar[str] = "FMU"
-    description_name: ClassVar[str] = DESCRIPTION
-    """Name of the description, which is at the top of the archive."""
-
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, kind: str) -> None:
         self.path = path
-        self._members = _members(path, self.kind, self.description_name)
+        self._members = _members(path, kind)
         faults = archive_faults(self._members, path.stat().st_size)
         if faults:
             raise InvalidFmu(path, "; ".join(faults))
@@ -136,14 +126,42 @@ class FmuArchive:
         by_name = {_path(m.orig_filename): m for m in self._members}
         self._by_name = {name: m for name, m in by_name.items() if name}
         self.names = tuple(self._by_name)
+        self.outdated_methods = tuple(m.orig_filename for m in self._members if m.compress_type not in STANDARD_METHODS)
+        self.as_named = all(name == m.orig_filename for name, m in self._by_name.items())
         self._opened: zipfile.ZipFile | None = None
         self.reduced_description: bytes | None = None
         """Of a large description, what is left of it, see `large_description`; None before it is asked for."""
 
-    @property
-    def outdated_methods(self) -> tuple[str, ...]:
-        """Members in a compression that the standards do not allow: they must be stored or deflated."""
-        return tuple(m.orig_filename for m in self._members if m.compress_type not in STANDARD_METHODS)
+    @contextlib.contextmanager
+    def opened(self) -> Generator[None, None, None]:
+        """Keep the file open for many calls of `open`, as opening it reads its list of members each time."""
+        self._opened = zipfile.ZipFile(self.path)
+        try:
+            yield
+        finally:
+            self._opened.close()
+            self._opened = None
+
+    def size(self, name: str) -> int:
+        """Return a member's unpacked size in bytes."""
+        return self._by_name[name].file_size
+
+    @contextlib.contextmanager
+    def open(self, name: str) -> Generator[IO[bytes], None, None]:
+        """Open a member."""
+        with (
+            contextlib.nullcontext(self._opened) if self._opened else zipfile.ZipFile(self.path) as z,
+            z.open(self._by_name[name]) as file,
+        ):
+            yield file
+
+    def unpack(self, folder: Path, _names: Iterable[str]) -> None:
+        """Unpack everything into a folder."""
+        with zipfile.ZipFile(self.path) as z:
+            z.extractall(folder)
+            for member in z.infolist():
+                if (member.external_attr >> 16) & stat.S_IXUSR and not member.is_dir():
+                    _make_executable(folder / member.filename)
 
     def _check_copies(self) -> None:
         """Check that members of one path have one content."""
@@ -171,6 +189,82 @@ class FmuArchive:
         except _DAMAGE as e:
             raise InvalidFmu(self.path, f"the archive is damaged: {one.filename}: {one_line(e)}") from e
 
+
+class _Folder:
+    """The files of an unpacked archive. Nothing is written to it."""
+
+    outdated_methods = ()
+    as_named = True
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.names = tuple(_files_in(path))
+
+    def opened(self) -> contextlib.AbstractContextManager[None]:
+        """Do nothing: files are opened one by one."""
+        return contextlib.nullcontext()
+
+    def size(self, name: str) -> int:
+        """Return a file's size in bytes."""
+        return (self.path / name).stat().st_size
+
+    @contextlib.contextmanager
+    def open(self, name: str) -> Generator[IO[bytes], None, None]:
+        """Open a file."""
+        with (self.path / name).open("rb") as file:
+            yield file
+
+    def unpack(self, folder: Path, names: Iterable[str]) -> None:
+        """Copy files into a folder."""
+        for name in names:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(self.path / name, folder / name)
+
+
+def _files_in(folder: Path) -> Iterator[str]:
+    """Yield the paths of a folder's files, with slashes, in the order of their names."""
+    count = 0
+    for here, folders, files in os.walk(folder):
+        folders.sort()
+        for name in sorted(files):
+            count += 1
+            if count > _MAX_FILES:
+                raise InvalidFmu(folder, f"the folder holds over {_MAX_FILES} files")
+            if (file := Path(here) / name).is_file():
+                yield file.relative_to(folder).as_posix()
+
+
+class FmuArchive:
+    """An FMU's zip archive, or the folder that it was unpacked to, whose files may be read and unpacked.
+
+    Nothing in an archive leads out of a folder or fills the disk.
+
+    Attributes:
+        names: paths of all members, folders of an archive with a slash at the end.
+
+    Raises:
+        InvalidFmu: no such file, not a zip archive, or with members that must not be unpacked; the message lists them.
+    """
+
+    kind: ClassVar[str] = "FMU"
+    description_name: ClassVar[str] = DESCRIPTION
+    """Name of the description, which is at the top of the archive."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._files = _Folder(path) if path.is_dir() else _Zip(path, self.kind)
+        self.names = self._files.names
+
+    @property
+    def outdated_methods(self) -> tuple[str, ...]:
+        """Members in a compression that the standards do not allow: they must be stored or deflated."""
+        return self._files.outdated_methods
+
+    @property
+    def what(self) -> str:
+        """What it is: `archive` or `folder`."""
+        return "folder" if isinstance(self._files, _Folder) else "archive"
+
     def description(self) -> bytes:
         """Return the content of modelDescription.xml, or of another kind of archive's description.
 
@@ -182,30 +276,27 @@ class FmuArchive:
             return self.read(expected)
         deeper = [n for n in self.names if n.endswith(f"/{expected}")]
         other_case = [n for n in self.names if n.lower() == expected.lower()]
-        if deeper:
+        if deeper and self.what == "folder":
+            reason = f"it is at {deeper[0]}; give that folder"
+        elif deeper:
             reason = f"it is at {deeper[0]}; zip what is in that folder, not the folder"
         elif other_case:
             reason = f"there is {other_case[0]}; upper and lower case count"
         else:
-            reason = f"the archive holds {listed(self.names) or 'nothing'}"
-        raise InvalidFmu(self.path, f"no {expected} at the top of the archive: {reason}")
+            reason = f"the {self.what} holds {listed(self.names) or 'nothing'}"
+        raise InvalidFmu(self.path, f"no {expected} at the top of the {self.what}: {reason}")
 
     @contextlib.contextmanager
     def opened(self) -> Generator[None, None, None]:
-        """Keep the file open for many calls of `read`, as opening it reads its list of members each time.
+        """Keep the file open for many calls of `read`.
 
         Raises:
             InvalidFmu: it is damaged.
         """
-        try:
-            self._opened = zipfile.ZipFile(self.path)
-        except _DAMAGE as e:
-            raise InvalidFmu(self.path, f"the archive is damaged: {one_line(e)}") from e
-        try:
+        with contextlib.ExitStack() as stack:
+            with self._damage_reported():
+                stack.enter_context(self._files.opened())
             yield
-        finally:
-            self._opened.close()
-            self._opened = None
 
     def read(self, name: str) -> bytes:
         """Return a text member's content.
@@ -213,15 +304,12 @@ class FmuArchive:
         Raises:
             InvalidFmu: it is damaged, or longer than 512 MiB.
         """
-        try:
-            with contextlib.nullcontext(self._opened) if self._opened else zipfile.ZipFile(self.path) as z:
-                member = self._by_name[name]
-                size = member.file_size
-                if size > _MAX_TEXT:
-                    raise InvalidFmu(self.path, f"{name} has {size / _MIB:.0f} MiB; at most 512 MiB are read")
-                return z.read(member)
-        except _DAMAGE as e:
-            raise InvalidFmu(self.path, f"the archive is damaged: {name}: {one_line(e)}") from e
+        with self._damage_reported(name):
+            size = self._files.size(name)
+            if size > _MAX_TEXT:
+                raise InvalidFmu(self.path, f"{name} has {size / _MIB:.0f} MiB; at most 512 MiB are read")
+            with self._files.open(name) as file:
+                return file.read()
 
     def xml_source(self) -> str | io.BytesIO:
         """Return what others, which know no `./` before a path, read the XML files from: the path, or a copy of those.
@@ -229,7 +317,7 @@ class FmuArchive:
         Raises:
             InvalidFmu: one is damaged, or longer than 512 MiB.
         """
-        if all(path == m.orig_filename for path, m in self._by_name.items()):
+        if self._files.as_named:
             return str(self.path)
         copy = io.BytesIO()
         with zipfile.ZipFile(copy, "w") as z:
@@ -241,7 +329,7 @@ class FmuArchive:
 
     def size(self, name: str) -> int:
         """Return a member's unpacked size in bytes."""
-        return self._by_name[name].file_size
+        return self._files.size(name)
 
     def head(self, name: str, size: int) -> bytes:
         """Return the first bytes of a member.
@@ -249,45 +337,48 @@ class FmuArchive:
         Raises:
             InvalidFmu: it is damaged.
         """
-        try:
-            with zipfile.ZipFile(self.path) as z, z.open(self._by_name[name]) as file:
-                return file.read(size)
-        except _DAMAGE as e:
-            raise InvalidFmu(self.path, f"the archive is damaged: {name}: {one_line(e)}") from e
+        with self._damage_reported(name), self._files.open(name) as file:
+            return file.read(size)
 
     def verify(self) -> None:
-        """Read every member to its end, against its checksum.
+        """Read every member to its end, an archive's against its checksum.
 
         Raises:
             InvalidFmu: a member is damaged.
         """
-        name = ""
-        try:
-            with zipfile.ZipFile(self.path) as z:
-                for member in z.infolist():
-                    name = member.filename
-                    with z.open(member) as file:
-                        while file.read(_MIB):
-                            pass
-        except _DAMAGE as e:
-            where = "" if name in str(e) else f"{name}: "
-            raise InvalidFmu(self.path, f"the archive is damaged: {where}{one_line(e)}") from e
+        self._verify(self.names)
 
-    def unpack(self, folder: Path) -> None:
+    def _verify(self, names: Iterable[str]) -> None:
+        with self.opened():
+            for name in (n for n in names if not n.endswith("/")):
+                with self._damage_reported(name), self._files.open(name) as file:
+                    while file.read(_MIB):
+                        pass
+
+    def unpack(self, folder: Path, members: Collection[str] | None = None) -> None:
         """Unpack everything into a folder, after all of it has been verified.
+
+        Of a folder, only these members are copied if some are given, which may be folders themselves.
 
         Raises:
             InvalidFmu: a member is damaged, or the folder does not take it.
         """
-        self.verify()
+        names = self.names
+        if members is not None:
+            names = tuple(n for n in names if n in members or any(n.startswith(f"{m}/") for m in members))
+        self._verify(names)
         try:
-            with zipfile.ZipFile(self.path) as z:
-                z.extractall(folder)
-                for member in z.infolist():
-                    if (member.external_attr >> 16) & stat.S_IXUSR and not member.is_dir():
-                        _make_executable(folder / member.filename)
+            self._files.unpack(folder, names)
         except _DAMAGE as e:
             raise InvalidFmu(self.path, f"cannot be unpacked: {one_line(e)}") from e
+
+    @contextlib.contextmanager
+    def _damage_reported(self, name: str = "") -> Generator[None, None, None]:
+        try:
+            yield
+        except _DAMAGE as e:
+            where = "" if name in str(e) else f"{name}: "
+            raise InvalidFmu(self.path, f"the {self.what} is damaged: {where}{one_line(e)}") from e
 
 
 def _make_executable(file: Path) -> None:
@@ -296,14 +387,7 @@ def _make_executable(file: Path) -> None:
     file.chmod(mode | (mode & 0o444) >> 2)
 
 
-def folder_fault(description_name: str = DESCRIPTION) -> str:
-    """Return the fault of a path that is a folder instead of an archive with a file `description_name` at its top."""
-    return f"a folder, not a file; zip what is in it, with {description_name} at the top"
-
-
-def _members(path: Path, kind: str, description_name: str) -> list[zipfile.ZipInfo]:
-    if path.is_dir():
-        raise InvalidFmu(path, folder_fault(description_name))
+def _members(path: Path, kind: str) -> list[zipfile.ZipInfo]:
     if not path.is_file():
         raise InvalidFmu(path, NO_FILE_FAULT if path.exists() else "there is no such file")
     try:

@@ -11,12 +11,14 @@ from rich.text import Text
 
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.report import EXPERIMENTS, CheckReport, Section
-from handover.cosim.fmu.file.archive import NO_FILE_FAULT, folder_fault
+from handover.cosim.fmu.file.archive import NO_FILE_FAULT
 from handover.cosim.probe.finding import Finding, Level
 from handover.cosim.ssp.check_ssp import check_ssp
 from handover.scenarios.cli.console import open_console
 from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.fmu_run import is_fmu
 from handover.scenarios.execution.progress import doing
+from handover.scenarios.execution.selection import NO_UNPACKED
 from handover.scenarios.execution.ssp_run import is_ssp
 
 _FAULTS = 1
@@ -78,7 +80,8 @@ def _check_files_exist(files: Sequence[Path]) -> None:
     for file in files:
         try:
             if file.is_dir():
-                faults.append(f"{file}: {folder_fault()}")
+                if not is_ssp(str(file)) and not is_fmu(str(file)):
+                    faults.append(f"{file}: {NO_UNPACKED}")
             elif file.exists() and not file.is_file():  # opening a pipe would wait for its writer
                 faults.append(f"{file}: {NO_FILE_FAULT}")
             else:

@@ -16,6 +16,7 @@ from handover.scenarios.cli.console import open_console, print_json, print_rows
 from handover.scenarios.cli.summaries.port_tables import port_rows, variable_data
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.fmu_run import is_fmu
+from handover.scenarios.execution.selection import nothing_at
 from handover.scenarios.execution.ssp_run import is_ssp
 
 _HELP = """Tell what is in FILE, an FMU (2.0 or 3.0, co-simulation) or an SSP: names, steps, capabilities, parameters,
@@ -41,7 +42,12 @@ _CAPABILITIES = {
 def info(file: Path, *, as_json: bool) -> None:
     """Tell what is in an FMU or an SSP."""
     if not is_fmu(str(file)) and not is_ssp(str(file)):
-        right = "a file that ends with .fmu or .ssp is right; of units and scenarios, see `handover list`"
+        if not file.exists():
+            raise UsageError(f"{file}: {nothing_at(file)}")
+        right = (
+            "a file that ends with .fmu, .ssp or .ssd, or its unpacked folder, is right; of units and scenarios, see"
+        )
+        right += " `handover list`"
         raise UsageError(f"{file}: {right}")
     with one_line_errors():
         if is_ssp(str(file)):

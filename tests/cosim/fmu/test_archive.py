@@ -225,9 +225,9 @@ def test_whatever_happens_to_an_archive_it_is_unpacked_or_refused(tmp_path: Path
 
 
 def test_what_is_no_file_is_reported(tmp_path: Path):
-    for path, value in ((tmp_path, "zip what is in it"), (Path(os.devnull), "not a regular file")):
+    for path, value in ((tmp_path, "at the top of the folder"), (Path(os.devnull), "not a regular file")):
         with pytest.raises(InvalidFmu, match=value):
-            FmuArchive(path)
+            FmuArchive(path).description()
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from native_units import native_fmu
+from native_units import Edited, native_fmu
 
 from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
@@ -12,7 +12,7 @@ from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import InvalidFmu, WiringError
 from handover.cosim.fmu.file.default_experiment import proposed_step
 from handover.cosim.fmu.file.description import FmuPort
-from handover.cosim.system.system import System
+from handover.cosim.system.system import PortName, System
 from handover.cosim.system.wiring_faults import doubt, mismatch, obstacle
 
 M, NM = BaseExponents(m=1), BaseExponents(kg=1, m=2, s=-2)
@@ -201,3 +201,13 @@ def test_all_units_get_one_step():
     s.set_step(Fraction(1, 500))
     assert {u.period for u in s.units.values()} == {Fraction(1, 500)}
     s.check()
+
+
+def test_a_port_whose_name_is_no_identifier_is_named_by_key(edited: Edited):
+    file = edited("mass", 2, ('name="x"', 'name="der(x) / a b"'))
+    system = System()
+    first, second = system.add("first", file), system.add("second", file)
+    assert first.y["der(x) / a b"] == PortName("first", "der(x) / a b")
+    assert second.u["f"] == second.u.f
+    system.connect(first.y["der(x) / a b"], second.u.f)
+    assert any("first.der(x) / a b (real m)" in fault for fault in faults_of(system))  # m is no N

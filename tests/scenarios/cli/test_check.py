@@ -146,7 +146,7 @@ def test_files_that_are_not_there_are_all_reported_before_anything_is_checked(br
     result = check(broken, tmp_path / "missing.fmu", tmp_path, Path(os.devnull))
     assert result.exit_code == 2
     assert "missing.fmu: no such file" in result.output
-    assert f"{tmp_path}: a folder, not a file" in result.output
+    assert f"{tmp_path}: a folder with neither modelDescription.xml" in result.output
     assert f"{os.devnull}: not a regular file" in result.output
     assert "archive" not in result.output
 

@@ -27,6 +27,7 @@ from handover.cosim.system.signals import Signals
 from handover.scenarios.cli.command import main
 from handover.scenarios.execution.file_experiment import UntilStop
 from handover.scenarios.execution.ssp_run import naming_step, open_experiment
+from handover.scenarios.results.run_folder import sha256_of
 
 PULL = "time,f\n0,0\n0.5,2\n0.5,-1\n0.8,1\n"
 
@@ -433,3 +434,77 @@ def test_parameters_are_recorded_in_any_standard_and_system(tmp_path: Path):
     assert [record[f"mass{fmi}.x0"].tolist() for fmi in (2, 3)] == [[2.0] * 3, [3.0] * 3]
     assert [name for name in ("mass2.k", "mass3.k") if name in record] == ["mass3.k"]
     assert record.unit("mass3.x0") == "m"
+
+
+def unpacked(file: Path, folder: Path) -> Path:
+    """Unpack an archive into a folder that nobody may write to."""
+    with zipfile.ZipFile(file) as archive:
+        archive.extractall(folder)
+    for path in [*folder.rglob("*"), folder]:
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    return folder
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_the_folder_of_an_fmu_does_what_the_file_does(tmp_path: Path):
+    file = native_fmu("mass", 2)
+    folder = unpacked(file, tmp_path / "my mass")
+    before = contents(folder)
+    for subject, out in ((file, "a"), (folder, "b")):
+        result = run(subject, "-p", "f=2", "--checkpoint", "0.5", "--no-report", "--out", tmp_path / out)
+        assert result.exit_code == 0, result.output
+    assert (tmp_path / "b" / "signals.parquet").read_bytes() == (tmp_path / "a" / "signals.parquet").read_bytes()
+    for command in ("check", "info"):
+        assert CliRunner().invoke(main, [command, str(folder)]).exit_code == 0
+    assert contents(folder) == before
+    swept = CliRunner().invoke(main, ["sweep", str(folder), "--sweep", "f=0,1", "--out", str(tmp_path / "campaign")])
+    assert (swept.exit_code, (tmp_path / "campaign").exists()) == (2, False), swept.output
+    assert len(sha256_of(folder)) == 64
+    (tmp_path / "other").mkdir()
+    assert sha256_of(folder) != sha256_of(tmp_path / "other")
+
+
+def test_the_folder_of_an_ssp_does_what_the_file_does(tmp_path: Path):
+    """Its FMU is a folder itself, and beside it lies what is not of it; a description may have any name."""
+    description, mass = described(system(component("mass"))), native_fmu("mass", 3)
+    file = pack_ssp(tmp_path / "a.ssp", description, {"resources/unit.fmu": mass})
+    folder = tmp_path / "system"
+    unpacked(mass, folder / "resources" / "unit.fmu")
+    (folder / "SystemStructure.ssd").write_text(description, encoding="utf-8")
+    (folder / "other.ssd").write_text(description, encoding="utf-8")
+    before = contents(folder)
+    for subject, out in ((file, "a"), (folder, "b"), (folder / "other.ssd", "c")):
+        result = run(subject, "--stop", "1", "-p", "mass.x0=3", "--no-report", "--out", tmp_path / out)
+        assert result.exit_code == 0, result.output
+        assert CliRunner().invoke(main, ["check", str(subject)]).exit_code == 0
+    records = [(tmp_path / out / "signals.parquet").read_bytes() for out in "abc"]
+    assert records == records[:1] * 3
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [
+        ("here/mas.fmu", "there is no such file"),
+        ("here/mass", "there is no such file or folder; did you mean mass.fmu?"),
+        ("nowhere/mass", "there is no such file or folder, nor a folder nowhere"),
+        ("mass.fmuu", "there is no such file or folder"),
+        ("here", "a folder with neither modelDescription.xml"),
+        ("here/notes.txt", "a file, and no scenario"),
+        ("here/none.ssd", "there is no such file"),
+    ],
+)
+def test_a_path_where_nothing_is_is_told_as_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, wanted: str
+):
+    (tmp_path / "here").mkdir()
+    for file in ("mass.fmu", "notes.txt"):
+        (tmp_path / "here" / file).write_bytes(b"")
+    monkeypatch.chdir(tmp_path)
+    result = run(name)
+    assert result.exit_code == 2
+    assert result.output.startswith(f"Error: {name}: {wanted}")
+    assert "ir_grasp" not in result.output
