@@ -169,7 +169,9 @@ def _fault(name: str, what: str, where: str, depth: float, out: Floats) -> str:
 
 @dataclass
 class HandInCube:
-    """How deep a hand has been in the cube of a robot, m, at most, and since when, s; None: never.
+    """How deep the middle of a hand has been in the cube of a robot, and since when, s; None: never.
+
+    A hand that only grazes the cube would be felt, and pass.
 
     Attributes:
         depth: at most, m.
@@ -185,11 +187,11 @@ class HandInCube:
         if not all(name in signals for name in names):
             return
         (x, y, z), q, (h_x, h_y, h_z) = (signals.plain(name) for name in names)
-        half, radius = 0.5 * _edge(), _hand_radius()
-        if math.dist((x, y, z), (h_x, h_y, h_z)) > 1.8 * half + radius:
+        half = 0.5 * _edge()
+        if math.dist((x, y, z), (h_x, h_y, h_z)) > 1.8 * half:
             return
         seen = inverse_rotate(rotation_matrix((q[0], q[1], q[2], q[3])), subtract((h_x, h_y, h_z), (x, y, z)))
-        depth = radius - Box((half, half, half)).distance(seen)
+        depth = -Box((half, half, half)).distance(seen)
         if depth > max(self.depth, _LEAST):
             self.depth, self.since = depth, t if self.since is None else self.since
 
@@ -197,16 +199,11 @@ class HandInCube:
     def reason(self) -> str:
         """That nothing kept the hand out of the cube, as a sentence's main part."""
         return (
-            f"a hand was up to {1e3 * self.depth:.0f} mm inside a robot's cube, from {self.since or 0.0:.1f} s on, "
-            "which nothing simulates"
+            f"a hand's middle was up to {1e3 * self.depth:.0f} mm inside a robot's cube, from "
+            f"{self.since or 0.0:.1f} s on, which nothing simulates"
         )
 
 
 @cache
 def _edge() -> float:
     return float(paper_values("free_flyer", "scene")["edge"])
-
-
-@cache
-def _hand_radius() -> float:
-    return float(paper_values("free_flyer", "person")["fist_radius"])
