@@ -214,8 +214,8 @@ def _show(axis: Axes, picture: CameraPicture, rows: tuple[int, int]) -> None:
     axis.set_axis_off()
     axis.set(xlim=_COLUMNS, ylim=rows)
     for mark in picture.marks:
-        style: dict[str, Any] = {"color": mark.colour, "lw": 1.2}
-        if mark.shape == "circle":
+        style: dict[str, Any] = {"color": mark.colour, "lw": 1.2, "ls": "--" if "dashed" in mark.shape else "-"}
+        if "circle" in mark.shape:
             axis.add_patch(Circle((mark.u, mark.v), mark.radius, fill=False, **style))
         else:
             axis.plot(mark.u, mark.v, {"cross": "x", "plus": "+"}[mark.shape], ms=8, color=mark.colour, mew=1.4)

@@ -7,8 +7,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from matplotlib.figure import Figure as Canvas
 
 from handover.cosim.blocks.ports import Floats
+from handover.scenarios.experiment.pictures import CameraPicture, Mark
+from handover.scenarios.helix import plots
 from handover.scenarios.ir_grasp.plots import FINGER_COLOURS, FINGER_NAMES
 
 ROOT = Path(__file__).parent.parent.parent
@@ -40,3 +43,13 @@ def centre(file: Path, colour: str) -> Floats:
 def test_the_fingers_in_the_picture_are_as_in_the_figure_of_today(grasp: Path, finger: str, colour: str):
     kept, drawn = centre(DOCS / "ir_grasp.png", colour), centre(grasp / "figures" / "scene.png", colour)
     assert kept == pytest.approx(drawn, abs=10.0), f"{finger}: run `make pictures`, look at docs/ and commit it"
+
+
+def test_every_shape_of_a_mark_is_drawn():
+    axes = Canvas().subplots()
+    shapes = re.findall(r'"([a-z ]+)"', (Mark.__doc__ or "").partition("shape: ")[2].partition("\n")[0])
+    marks = [Mark(label="ball", shape=shape, u=20.0, v=20.0) for shape in shapes]
+    pixels = np.zeros((40, 40, 3), np.uint8)
+    plots._show(axes, CameraPicture.take(t=0.0, camera="left", role="", pixels=pixels, marks=marks), (40, 0))  # pyright: ignore[reportPrivateUsage]
+    assert [patch.get_linestyle() for patch in axes.patches] == ["-", "--"]
+    assert [line.get_marker() for line in axes.lines] == ["x", "+"]
