@@ -56,6 +56,6 @@ def refused(folder: Path, *arguments: str) -> str:
     done = call(folder, *arguments)
     assert done.returncode == 2, done.stderr + done.stdout
     assert {p.name for p in folder.iterdir()} <= before
-    (line,) = [line for line in done.stderr.strip().splitlines() if not line.endswith(" ...")]  # which says what is done
+    (line,) = [line for line in done.stderr.strip().splitlines() if not line.endswith(" ...")]
     assert "Traceback" not in line
     return line
