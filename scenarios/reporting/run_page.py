@@ -26,7 +26,7 @@ from handover.scenarios.reporting.replay_section import replay_section
 from handover.scenarios.reporting.time_plots import explorer_section, time_plots_section
 from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.run_facts import RunFacts, record_of
-from handover.scenarios.results.run_folder import RunFolder
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.results.tables import format_conversion, format_metric, master_rows, warning_lines
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
@@ -52,8 +52,7 @@ def write_run_page(folder: RunFolder, file: Path | None = None) -> list[str]:
         plots,
         pictures_section(folder),
         _explorer(record, faults),
-        graph_section(facts.run),
-        cpu_section(facts.summary),
+        *_sections_of_units(facts),
         parameters_section(facts),
         master_section(facts),
         files_section(facts, (file or folder.report).absolute().parent),
@@ -120,6 +119,14 @@ def _explorer(record: Record | None, faults: ToleratedFaults) -> Section | None:
     with faults.tolerated("the signals could not be drawn"):
         return None if record is None else explorer_section(record)
     return None
+
+
+def _sections_of_units(facts: RunFacts) -> Sequence[Section | None]:
+    try:
+        return graph_section(facts.run), cpu_section(facts.summary)
+    except (KeyError, ValueError) as e:  # an icon that is no picture, or a connection of a unit that is not listed
+        fault = f"its description of the units is damaged: {type(e).__name__} {e}"
+        raise InvalidRunFolder(facts.folder.path, fault) from e
 
 
 _VERSIONS = {"handover-cosim": "handover-cosim", "python": "Python"}

@@ -82,7 +82,7 @@ def test_its_report_is_a_page(folder: Path):
 def test_a_damaged_folder_is_refused(tmp_path: Path):
     plan, table = campaign_metadata("ir_grasp", [{}]), table_of([{}])
     folder_of(tmp_path, {name: value for name, value in plan.items() if name != "points"}, table)
-    with pytest.raises(handover.InvalidInput, match=r"its campaign\.json is damaged: 'points' is None"):
+    with pytest.raises(handover.InvalidInput, match=r"its campaign\.json is damaged: "):
         handover.load(tmp_path)
     folder_of(tmp_path, plan, CampaignTable(table.table.drop_columns(["status"])))
     with pytest.raises(handover.InvalidInput, match="it has no column status"):

@@ -145,8 +145,8 @@ def test_a_papers_campaign_of_another_version_says_what_is_left_out(tmp_path: Pa
     ("file", "content", "fault"),
     [
         ("campaign.json", "", "its campaign.json is damaged"),
-        ("campaign.json", "[]", "holds no JSON object"),
-        ("campaign.json", '{"scenario": "ir_grasp", "points": 3}', "'points' is 3"),
+        ("campaign.json", "[]", "Expected `object`"),
+        ("campaign.json", '{"scenario": "ir_grasp", "points": 3}', "Expected `array`, got `int`"),
         ("runs.parquet", "nothing", "its runs.parquet is damaged"),
         ("claims.json", '[{"claim": "x"}]', "its claims.json is damaged"),
     ],

