@@ -129,8 +129,6 @@ class _Zip:
         self.outdated_methods = tuple(m.orig_filename for m in self._members if m.compress_type not in STANDARD_METHODS)
         self.as_named = all(name == m.orig_filename for name, m in self._by_name.items())
         self._opened: zipfile.ZipFile | None = None
-        self.reduced_description: bytes | None = None
-        """Of a large description, what is left of it, see `large_description`; None before it is asked for."""
 
     @contextlib.contextmanager
     def opened(self) -> Generator[None, None, None]:
@@ -254,6 +252,8 @@ class FmuArchive:
         self.path = path
         self._files = _Folder(path) if path.is_dir() else _Zip(path, self.kind)
         self.names = self._files.names
+        self.reduced_description: bytes | None = None
+        """Of a large description, what is left of it, see `large_description`; None before it is asked for."""
 
     @property
     def outdated_methods(self) -> tuple[str, ...]:
