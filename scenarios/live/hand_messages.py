@@ -27,9 +27,12 @@ with WebSocket's code 1009, whose reason says that limit; on live pages more tha
 import math
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, cast
+from dataclasses import dataclass
+from typing import Annotated, Any, NamedTuple
 
-from handover.cosim.typed_data import InvalidData, decoded
+from msgspec import Meta
+
+from handover.cosim.typed_data import InvalidData, checked, decoded
 from handover.plants.free_flyer.hand.hand_kinematics import CLOSED, JOINT_MAX, JOINTS, STRAIGHT
 from handover.scenarios.experiment.live_inputs import LedHand
 
@@ -41,7 +44,6 @@ _ROUNDING = 1e-6
 """Metres and radians by which a sample may be beyond its limits."""
 _UNIT = 0.01
 """How far a quaternion's norm may be from 1."""
-_LONGEST_NAME = 60
 _CLOCK_JUMP = 10.0
 """How much more or less a device's clock may have gone on than this computer's since the sample before, s (assumed)."""
 _WINDOW = 600
@@ -50,6 +52,22 @@ _WINDOW = 600
 
 class InvalidHandMessage(ValueError):
     """What came is no sample of a hand, or not one that may be used."""
+
+
+_Joint = Annotated[float, Meta(ge=-_ROUNDING, le=JOINT_MAX + _ROUNDING)]
+
+
+@dataclass(frozen=True)
+class _SentSample:
+    """A sample as it came, see the table above."""
+
+    p_WH: tuple[float, float, float]
+    q_WH: tuple[float, float, float, float]
+    stamp: float
+    closed: bool | None = None
+    angles: Annotated[tuple[_Joint, ...], Meta(min_length=JOINTS, max_length=JOINTS)] | None = None
+    device: Annotated[str, Meta(max_length=60)] = ""
+    sent: float | None = None
 
 
 class HandSample(NamedTuple):
@@ -94,75 +112,42 @@ def parse_hand_message(text: str) -> HandSample:
     if len(text) > LONGEST:
         raise InvalidHandMessage(f"a sample has {LONGEST} characters at most, this one {len(text)}")
     try:
-        return hand_sample(decoded(text, dict[str, Any]))
+        content: Any = decoded(text, object)
     except InvalidData as e:
-        raise InvalidHandMessage(f"an object with p_WH, q_WH, closed or angles, and stamp is right: {e}") from e
+        raise InvalidHandMessage(str(e)) from e
+    return hand_sample(content)
 
 
 def hand_sample(content: Any) -> HandSample:
     """Return the sample that an object says.
 
     Raises:
-        InvalidHandMessage: it says none, with all that is wrong.
+        InvalidHandMessage: it says none.
     """
-    if not isinstance(content, dict):
-        raise InvalidHandMessage("it is no object with p_WH, q_WH, closed or angles, and stamp")
-    members, faults = cast(dict[str, Any], content), list[str]()
-
-    def numbers(name: str, size: int) -> tuple[float, ...]:
-        given: Any = members.get(name)
-        values = [_number(x) for x in cast(list[Any], given)] if isinstance(given, list) else []
-        if len(values) != size or not all(map(math.isfinite, values)):
-            wrong = "" if given is None else f", not {_shown(given)}"
-            faults.append(f"{name}: {size} finite numbers are right{wrong}")
-            return (math.nan,) * size
-        return tuple(values)
-
-    p, q = numbers("p_WH", 3), numbers("q_WH", 4)
-    norm = math.hypot(*q)
-    if math.isfinite(norm) and abs(norm - 1.0) > _UNIT:
+    try:
+        sent = checked(content, _SentSample)
+    except InvalidData as e:
+        raise InvalidHandMessage(f"an object with p_WH, q_WH, closed or angles, and stamp is right: {e}") from e
+    faults = list[str]()
+    norm = math.hypot(*sent.q_WH)
+    if abs(norm - 1.0) > _UNIT:
         faults.append(f"q_WH: a quaternion of norm 1 is right, not {norm:.3g}")
-    stamp = _number(members.get("stamp"))
-    if not math.isfinite(stamp):
-        faults.append("stamp: a finite number of seconds is right")
-    sent = _number(members["sent"]) if "sent" in members else None
-    if sent is not None and not stamp <= sent < math.inf:
-        faults.append("sent: a finite number of seconds is right, not before stamp")
-    closed, device = members.get("closed"), members.get("device", "")
-    if "closed" in members and not isinstance(closed, bool):
-        faults.append("closed: true or false is right")
-    if not isinstance(device, str) or len(device) > _LONGEST_NAME:
-        faults.append(f"device: a name of up to {_LONGEST_NAME} characters is right")
-    if "angles" in members:
-        angles = numbers("angles", JOINTS)
-        beyond = [f"[{k}] is {a:.4g}" for k, a in enumerate(angles) if not -_ROUNDING <= a <= JOINT_MAX + _ROUNDING]
-        if beyond and all(map(math.isfinite, angles)):
-            faults.append(f"angles: joints are within 0 and {JOINT_MAX:.4f} rad, {', '.join(beyond)}")
-        closed = _grasps(angles) if closed is None else closed
-    else:
-        if closed is None:
-            faults.append("closed or angles: one of them is needed")
-        angles = CLOSED if closed else STRAIGHT
+    if sent.sent is not None and sent.sent < sent.stamp:
+        faults.append(f"sent: {sent.sent:.6g} s is before stamp, {sent.stamp:.6g} s")
+    if sent.closed is None and sent.angles is None:
+        faults.append("closed or angles: one of them is needed")
     if faults:
         raise InvalidHandMessage("; ".join(faults))
-    q = tuple(x / norm for x in q)
-    return HandSample(p, q, tuple(min(max(a, 0.0), JOINT_MAX) for a in angles), bool(closed), stamp, str(device), sent)
-
-
-def _shown(given: Any) -> str:
-    """Return what was given, of a length that a message can have."""
-    text = repr(given)
-    return text if len(text) <= _LONGEST_NAME else f"{text[:_LONGEST_NAME]}..."
-
-
-def _number(value: Any) -> float:
-    """Return a number of JSON, NaN for what is none or beyond all numbers."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return math.nan
-    try:
-        return float(value)
-    except OverflowError:
-        return math.nan
+    angles = (CLOSED if sent.closed else STRAIGHT) if sent.angles is None else sent.angles
+    return HandSample(
+        sent.p_WH,
+        tuple(x / norm for x in sent.q_WH),
+        tuple(min(max(a, 0.0), JOINT_MAX) for a in angles),
+        _grasps(angles) if sent.closed is None else sent.closed,
+        sent.stamp,
+        sent.device,
+        sent.sent,
+    )
 
 
 def _grasps(angles: Sequence[float]) -> bool:

@@ -51,20 +51,23 @@ def test_joints_say_whether_a_hand_grasps_unless_it_is_said():
         ("{", "not JSON"),
         ("[" * 1500, "not JSON"),
         ("[]", "an object with p_WH"),
-        ("{}", "p_WH: 3 finite numbers are right; q_WH: 4 finite numbers are right; stamp: "),
+        ("{}", "`p_WH`"),
         (" " * (LONGEST + 1), f"{LONGEST} characters at most"),
-        (text(p_WH=[0.0, 0.0]), r"p_WH: 3 finite numbers are right, not \[0\.0, 0\.0\]"),
+        (text(p_WH=[0.0, 0.0]), r"\.p_WH"),
         (text(p_WH=[0.0, 0.0, float("nan")]), "not JSON"),
-        (text(p_WH=[0.0, 0.0, 10**400]), "p_WH: 3 finite numbers"),
-        (text(p_WH=[0.0, 0.0, True]), "p_WH: 3 finite numbers"),
+        (text(p_WH=[0.0, 0.0, 10**400]), "p_WH|not JSON"),
+        (text(p_WH=[0.0, 0.0, True]), r"\.p_WH\[2\]"),
         (text(q_WH=[0, 0, 0, 0]), "q_WH: a quaternion of norm 1 is right, not 0"),
         (text(stamp=float("inf")), "not JSON"),
-        (text(closed=1), "closed: true or false"),
+        (text(closed=1), r"\.closed"),
         (text(closed=None), "closed or angles: one of them"),
-        (text(angles=[0.0] * 13), "angles: 14 finite numbers"),
-        (text(angles=[2.0] * 14), r"angles: joints are within 0 and 1\.5708"),
-        (text(angles=[0.0] * 3 + [2.0] + [0.0] * 10), r"angles: joints are within .* rad, \[3\] is 2$"),
-        (text(device="m" * 61), "device: a name of up to 60"),
+        (text(angles=[0.0] * 13), r"length >= 14 - at `\$\.angles"),
+        (text(angles=[0.0] * 3 + [2.0] + [0.0] * 10), r"1\.57.*\.angles\[3\]"),
+        (text(angles=[0.0] * 13 + [-0.1]), r"\.angles\[13\]"),
+        (text(device="m" * 61), r"length <= 60 - at `\$\.device"),
+        (text(sent=4.9), "sent: 4.9 s is before stamp, 5 s"),
+        (text(sent="soon"), r"\.sent"),
+        (text(q_WH=[2, 0, 0, 0], sent=4.9), "q_WH.*; sent: "),
     ],
 )
 def test_what_is_no_sample_is_refused_with_the_reason(sent: str, why: str):
@@ -157,6 +160,3 @@ def test_a_device_that_looks_at_pictures_first_tells_how_long_that_takes():
     ages = [t - clock.monotonic(t - 0.08, t, sent=t - 0.001) for t in np.arange(0.0, 1.0, 0.03)]
     assert ages == pytest.approx([0.079] * len(ages), abs=1e-9)
     assert parse_hand_message(text(stamp=5, sent=5.08)).sent == 5.08
-    for sent in (4.9, "soon"):
-        with pytest.raises(InvalidHandMessage, match="sent: a finite number of seconds is right, not before stamp"):
-            parse_hand_message(text(sent=sent))
