@@ -75,6 +75,7 @@ def folder_locked(path: Path) -> Generator[bool, None, None]:
         yield False
         return
     handle, locked = os.open(path, os.O_RDONLY | os.O_DIRECTORY), True
+    status = os.fstat(handle)
     try:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -82,13 +83,14 @@ def folder_locked(path: Path) -> Generator[bool, None, None]:
             raise FileLocked(f"{path} belongs to a run that is still going on") from e
         except OSError:  # some network file systems lock only what can be written to
             locked = False
-        if not path.exists() or not os.path.samestat(os.fstat(handle), path.stat()):
+        if not path.exists() or not os.path.samestat(status, path.stat()):
             raise FileLocked(f"{path} belonged to another process, which has removed it")
         yield locked
     finally:
-        with contextlib.suppress(OSError):
-            fcntl.flock(handle, fcntl.LOCK_UN)  # also for a child process that has inherited it
-        os.close(handle)
+        with contextlib.suppress(OSError):  # a unit has closed it, which has unlocked it
+            if os.path.samestat(status, os.fstat(handle)):
+                fcntl.flock(handle, fcntl.LOCK_UN)  # also for a child process that has inherited it
+                os.close(handle)
 
 
 _SCRATCH = "handover-scratch-"

@@ -152,17 +152,17 @@ def _freezer_versions() -> list[str]:
 def _freeze(names: Sequence[str], carried: Carried, folder: Path) -> None:
     """Make the folder of the frozen program, whole or not at all."""
     with scratch_folder("freezing") as scratch:
-        main = shutil.copy(_MAIN, Path(scratch, "unit.py"))
+        main = str(shutil.copy(_MAIN, Path(scratch, "unit.py")))
         imports = "\n".join(f"import {name}" for name in names if _findable(name))
         Path(scratch, f"{_FOLLOWED}.py").write_text(imports, encoding="utf-8")
         options = ["--noconfirm", "--onedir", "--log-level", "ERROR", "--name", "unit"]
-        options += ["--distpath", f"{scratch}/made", "--workpath", f"{scratch}/work", "--specpath", scratch]
-        options += ["--paths", scratch, "--hidden-import", _FOLLOWED]
+        options += ["--distpath", f"{scratch}/made", "--workpath", f"{scratch}/work", "--specpath", str(scratch)]
+        options += ["--paths", str(scratch), "--hidden-import", _FOLLOWED]
         for package in carried.packages():
             options += ["--copy-metadata", package.distribution]
         for unwanted in _unwanted(names):
             options += ["--exclude-module", unwanted]
-        command = module_command("PyInstaller", *options, str(main))
+        command = module_command("PyInstaller", *options, main)
         environment = {**os.environ, "PYINSTALLER_CONFIG_DIR": f"{scratch}/config", "PYTHONHASHSEED": "1"}
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False, env=environment)
         made = Path(scratch, "made", "unit")

@@ -21,10 +21,9 @@ Of a session of runs, besides:
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple, TypeVar
 
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.typed_data import InvalidData, Seed, checked, decoded
@@ -51,16 +50,14 @@ _PlotNumber = Annotated[int, Meta(ge=0, lt=_MOST_PLOTS)]
 _Coordinate = Annotated[float, Meta(ge=-_FAR, le=_FAR)]
 
 
-@dataclass
-class _Members:
+class _Members(Struct, forbid_unknown_fields=True):
     """A command as it came."""
 
     command: str
     value: Any = None
 
 
-@dataclass
-class _Chosen:
+class _Chosen(Struct, forbid_unknown_fields=True):
     """The value of `set`."""
 
     parameters: dict[str, str]
@@ -68,8 +65,7 @@ class _Chosen:
     push: bool = False
 
 
-@dataclass
-class _Pushed:
+class _Pushed(Struct, forbid_unknown_fields=True):
     """The value of `push`."""
 
     body: str

@@ -101,7 +101,7 @@ def run_of(path: Path, source: dict[str, Any], scenario: str = "scene") -> Path:
         "units": {},
         "formats": [],
     }
-    master = {"algorithm": "jacobi", "tolerance": 1e-6, "iterations": 9, "extrapolation": "hold"}
+    master = {"algorithm": "jacobi", "tolerance": 1e-6, "iterations": 9, "extrapolation": "hold", "adaptive": None}
     run |= {"versions": versions(), "checkpoint": None, "master": {**master, "repeat_discarded": False}}
     (path / "run.json").write_text(json.dumps(run))
     (path / "summary.json").write_text(json.dumps({"success": True, "reason": "it ended", "metrics": {}}))

@@ -147,7 +147,7 @@ class SessionFolder:
             InvalidRunFolder: its file is damaged.
         """
         file = self._file(number)
-        return read_file(file, f"it has no {file.name}", _KeptRound) if file.exists() else None
+        return read_file(file, f"it has no {file.name}", _KeptRound) if file.is_file() else None
 
     @property
     def records(self) -> dict[int, RoundRecord]:

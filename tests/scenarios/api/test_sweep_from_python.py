@@ -95,7 +95,7 @@ def test_a_damaged_folder_is_refused(tmp_path: Path):
         ({"strategi": ["blind"], "forward": -1}, "did you mean strategy?"),
         ({"strategy": ["blind", "blink"]}, "'blink' is none of"),
         ({"strategy": []}, "strategy: the list of values is empty"),
-        ({"seeds": 0}, "seeds = 0: a whole number from 1 on is right"),
+        ({"seeds": 0}, "seeds = 0: a whole number from 1 to "),
         ({"workers": 1, "scheduler": "tcp://1.2.3.4:5"}, "a scheduler has workers of its own"),
     ],
 )

@@ -37,7 +37,7 @@ def assert_passes(unit: str, fmi: int) -> None:
     except NoFmi2Form:
         pytest.skip("FMI 2 has no binary variables")
     assert result.exit_code == 0, result.output
-    (report,) = json.loads(result.output)
+    (report,) = json.loads(result.stdout)
     assert all(c["result"] in ("ok", "note") for c in report["checks"]), result.output
     assert "second instance, reset" in report["checks"][-1]["summary"]
 
@@ -58,7 +58,7 @@ def test_every_unit_of_the_catalog_passes(unit: str, fmi: int):
 def test_a_fault_is_reported_with_status_1(broken: Path):
     result = check(broken)
     assert result.exit_code == 1
-    lines = result.output.splitlines()
+    lines = result.stdout.splitlines()
     assert lines[0] == str(broken)
     assert lines[1].split() == ["fault", "archive"]
     assert lines[2] == " " * 11 + (
@@ -113,7 +113,7 @@ def test_a_source_that_python_cannot_read_is_reported_with_file_and_line(
     place = source.removeprefix("resources/sources/")
     output = re.search(rf"- instantiation: SyntaxError: {fault}.*\({place}, line 2\)", result.output, re.DOTALL)
     assert output, result.output
-    lines = result.output.splitlines()
+    lines = result.stdout.splitlines()
     assert any(line.startswith(" " * 13 + "|   File ") and line.endswith(f'{source}", line 2') for line in lines)
     assert any(line.startswith(" " * 13 + f"| SyntaxError: {fault}") for line in lines)
 
@@ -133,7 +133,7 @@ def test_of_an_ssp_the_system_is_checked_and_then_each_unit(tmp_path: Path, outp
     file = pack_ssp(tmp_path / "x.ssp", described(wired), {"resources/Push.fmu": cached("Push", 3).read_bytes()})
     result = check(file, "--json")
     assert result.exit_code == status, result.output
-    whole, unit = json.loads(result.output)
+    whole, unit = json.loads(result.stdout)
     assert whole["file"] == str(file)
     assert whole["passed"] == (status == 0)
     told = " ".join(finding["what"] for finding in whole["checks"][0]["findings"])
@@ -159,7 +159,7 @@ def test_a_usage_error_is_refused(arguments: list[str]):
 def test_json_holds_what_was_found(broken: Path):
     result = check("--json", broken)
     assert result.exit_code == 1
-    (report,) = json.loads(result.output)
+    (report,) = json.loads(result.stdout)
     assert report["file"] == str(broken)
     assert not report["passed"]
     assert [c["result"] for c in report["checks"]] == ["fault"] + 5 * ["not reached"]
@@ -194,4 +194,4 @@ def test_a_reader_who_leaves_does_not_change_the_status(broken: Path, tmp_path: 
         done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, check=False, cwd=tmp_path)
     finally:
         os.close(writing)
-    assert (done.returncode, done.stderr) == (1, "")
+    assert (done.returncode, done.stderr) == (1, "checking broken.fmu ...\n")

@@ -76,7 +76,7 @@ def test_an_ssps_units_and_connections(tmp_path: Path):
 def test_what_has_no_information_is_refused_in_one_line(tmp_path: Path):
     for file, told in (
         (tmp_path / "none.fmu", "there is no such file"),
-        (tmp_path / "grasp.zip", "a file that ends with .fmu or .ssp is right"),
+        (Path(__file__), "a file that ends with .fmu, .ssp or .ssd"),
     ):
         result = call("info", file)
         assert result.exit_code == 2

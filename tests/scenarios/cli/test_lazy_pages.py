@@ -12,7 +12,7 @@ from handover.scenarios.cli.command import COMMANDS, DeferredCommand, main
 
 PAGES = {"scipy.stats", "plotly", "networkx", "tsdownsample", "distributed", "handover.scenarios.reporting.page"}
 HEAVY = {"matplotlib", "scipy", "cv2", "plotly", "distributed", "dask", "pyarrow", "fmpy", "control", "exudyn"}
-HELP = HEAVY | {"numpy", "rich", "pymunk", "handover.cosim", "handover.fmus"}
+HELP = HEAVY | {"numpy", "rich", "pymunk", "handover.cosim.blocks", "handover.cosim.fmu", "handover.fmus"}
 _CALL = """
 import sys
 from handover.scenarios.cli.entry import main

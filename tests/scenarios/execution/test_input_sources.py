@@ -157,10 +157,10 @@ def test_a_run_that_goes_on_after_its_recorded_inputs_says_when_they_end(tmp_pat
 def test_a_folder_without_inputs_from_outside_is_refused(tmp_path: Path):
     with pytest.raises(InvalidRunFolder, match="not the folder of a run"):
         played_back(tmp_path)
-    (tmp_path / "run.json").write_text("{}")
+    (tmp_path / "run.json").write_text('{"scenario": "a", "parameters": {}}')
     with pytest.raises(InvalidRunFolder, match="the run had no inputs from outside"):
         played_back(tmp_path)
-    (tmp_path / "run.json").write_text('{"external_inputs": ["mass.f"]}')
+    (tmp_path / "run.json").write_text('{"scenario": "a", "parameters": {}, "external_inputs": ["mass.f"]}')
     with pytest.raises(InvalidRunFolder, match="no record"):
         played_back(tmp_path)
 

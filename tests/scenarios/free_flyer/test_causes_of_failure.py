@@ -39,7 +39,8 @@ STAGED = (
     ),
     Staged(Cause.OUT_OF_REACH, "came no nearer than", RECEIVES, {"patience": 3.0}),
     Staged(Cause.MISSED_BY_HAND, "the last of 3 times", parameters=ASIDE, seed=1),
-    Staged(Cause.PUSHED_BESIDE, "the push went past the gripper", RECEIVES, ASIDE, seed=3),
+    Staged(Cause.PUSHED_BESIDE, "the push went past the gripper", RECEIVES, ASIDE, seed=1),
+    Staged(Cause.HAND_IN_CUBE, "inside a robot's cube", RECEIVES, ASIDE, seed=3),
     Staged(Cause.NOT_FELT, "stayed below the threshold", parameters={"strength": 0.2, "patience": 20.0}),
     Staged(Cause.NOT_TRIED, "the person did not pull", parameters={**NOBODY, "patience": 20.0}),
     Staged(Cause.BUMPED, "which bumped the object", parameters={"skill": 0.0}),
@@ -60,7 +61,7 @@ STAGED = (
         "was lost at",
         parameters={**SLIPPERY, "person.object_mass": 2.0, "person.centring_time": 100.0},
     ),
-    Staged(Cause.DELIVERIES_FAILED, "was empty, and had not opened", parameters=SLIPPERY),
+    Staged(Cause.TORN_OUT, "torn out of the closed gripper", parameters=SLIPPERY),
     Staged(
         Cause.DELIVERIES_FAILED,
         "still held what it had released",

@@ -247,10 +247,10 @@ def test_the_readmes_command_refuses_who_is_not_the_page(tmp_path: Path):
         with connect(f"ws://{host}/run", origin=f"http://{host}") as page:  # pyright: ignore[reportArgumentType]
             wrong = {
                 "{": "not JSON",
-                "[]": "not of the form",
+                "[]": "is right: Expected",
                 '{"command": "fly"}': "no command 'fly'",
                 '{"command": "pace", "value": -1}': "pace takes",
-                '{"command": "pace", "value": NaN}': "pace takes",
+                '{"command": "pace", "value": NaN}': "not JSON",
                 '{"command": "choose", "value": ["secret"]}': "names of signals",
                 '{"command": "see", "value": "all"}': "numbers of plots",
                 " " * 1500: "1000 characters",

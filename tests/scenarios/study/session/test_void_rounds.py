@@ -41,9 +41,9 @@ def test_samples_that_cannot_be_used_are_refused_and_the_round_goes_on(tmp_path:
     with page_of(server_of(tmp_path / "study")) as page:
         to_round(page)
         wrong: list[tuple[dict[str, Any], str]] = [
-            ({**HAND, "stamp": 1.0, "p_WH": [float("nan"), 0.0, 0.0]}, "p_WH: 3 finite numbers"),
+            ({**HAND, "stamp": 1.0, "p_WH": [1.0, 0.0]}, "p_WH"),
             ({**HAND, "stamp": 1.0, "p_WH": [9.0, 0.0, 0.0]}, "reaches"),
-            ({**HAND, "stamp": float("inf")}, "stamp"),
+            ({**HAND, "stamp": "now"}, "stamp"),
             ({**HAND, "stamp": 0.5}, "not after the one before"),
         ]
         page.send(json.dumps({"hand": {**HAND, "stamp": 0.9}}))
