@@ -14,6 +14,9 @@ FINGERS = len(_AZIMUTHS)
 KNUCKLE = 0.05
 """How far before G along z_G the fingers are joined to the gripper's stem, m."""
 
+LINK_RADIUS, PALM_RADIUS = 0.0042, 0.0125
+"""Of the fingers' links, and of the gripper's palm, where they touch, m."""
+
 
 def finger_joints(p_WG: Floats, R_WG: Floats, grip: float) -> Floats:
     """Return root, middle joint and tip of each finger, in W, shape (3, 3, 3): finger, point, coordinate; m.

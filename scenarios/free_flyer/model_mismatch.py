@@ -4,13 +4,13 @@ Both sides are taken from the values that the units got, whether by the scenario
 """
 
 from collections.abc import Mapping
-from typing import Any, cast
 
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.system import PlacedUnit
 from handover.plants.free_flyer.robot.thrusters import Propulsion
+from handover.scenarios.experiment.starts import array_of, value_of
 from handover.scenarios.free_flyer.parameters import ROBOTS, Body
 
 _BODY = {"mass": "mass", "I_B": "inertia", "p_BG": "arm"}
@@ -64,7 +64,7 @@ def _stuck(thrusters: PlacedUnit | None, whose: str) -> list[str]:
     """Return which nozzles are stuck of thrusters that use them."""
     if thrusters is None or "flapper_range" not in thrusters.description.parameters:
         return []
-    propulsion = str(_value(thrusters, "propulsion")).lower()
+    propulsion = str(value_of(thrusters, "propulsion")).lower()
     if propulsion not in (Propulsion.NOZZLES.name.lower(), str(int(Propulsion.NOZZLES))):
         return []
     shut = [str(k + 1) for k, part in enumerate(array_of(thrusters, "flapper_range").tolist()) if part == 0.0]
@@ -108,17 +108,3 @@ def _number(unit: PlacedUnit | None, name: str) -> float:
     if unit is None or name not in unit.description.parameters:
         return 0.0
     return float(array_of(unit, name).ravel()[0])
-
-
-def array_of(unit: PlacedUnit, name: str) -> Floats:
-    """Return a parameter's value in its shape, of a number in (1,): as given, or as its FMU declares it."""
-    shape = unit.description.parameters[name].shape
-    return np.array(cast(Any, _value(unit, name)), dtype=np.float64).reshape(shape or (1,))
-
-
-def _value(unit: PlacedUnit, name: str) -> object:
-    """Return a parameter's value: what the unit was given, or the start value that its FMU declares."""
-    if name in unit.start:
-        return unit.start[name]
-    entries = (unit.description.parameters[name].start or "0").split()
-    return entries if len(entries) > 1 else entries[0]

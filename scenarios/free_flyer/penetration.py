@@ -19,13 +19,11 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.plants.free_flyer.hand.box import Box
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.free_flyer.model_mismatch import array_of
+from handover.scenarios.experiment.starts import LEAST_DEPTH, array_of, penetration_fault
 from handover.scenarios.free_flyer.parameters import ROBOTS
 
 _ARM_WIDTH = 0.04
 """Sides of the arm across, as it is drawn, m."""
-_LEAST = 1e-3
-"""Metres in each other from which bodies count as that."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,7 @@ def start_faults(units: Mapping[str, PlacedUnit]) -> list[str]:
         waiting += robot_solids(robot, p_WG - p_BG, np.array([1.0, 0.0, 0.0, 0.0]), p_BG)
         grippers[robot] = p_WB + starts[robot][0].R @ p_BG
     faults = [
-        _fault(f"{b}.p_WB_0", f"{one.name} would start", other.name, *other.depth_of(one))
+        penetration_fault(f"{b}.p_WB_0", f"{one.name} would start", other.name, *other.depth_of(one))
         for a, b in combinations(starts, 2)
         for one in starts[b]
         for other in starts[a]
@@ -128,10 +126,12 @@ def _faults_of_hands(
     name = f"{person.name}.p_WH_0"
     faults: list[str] = []
     for p in hands:
-        inside = [_fault(name, "a hand would start", s.name, *s.depth_of_ball(p, radius)) for s in starts]
+        inside = [penetration_fault(name, "a hand would start", s.name, *s.depth_of_ball(p, radius)) for s in starts]
         if not any(inside):
             inside = [
-                _fault(name, "a hand would rest", f"{s.name} at its handover place", *s.depth_of_ball(p, radius))
+                penetration_fault(
+                    name, "a hand would rest", f"{s.name} at its handover place", *s.depth_of_ball(p, radius)
+                )
                 for s in waiting
             ]
         faults += inside
@@ -140,7 +140,7 @@ def _faults_of_hands(
             length = float(np.linalg.norm(apart))
             depth = radius + float(array_of(person, "palm_width")[0]) - length
             out = apart / length if length > 0.0 else np.array([-1.0, 0.0, 0.0])
-            faults.append(_fault(name, "a hand would start", f"{robot}'s gripper", depth, out))
+            faults.append(penetration_fault(name, "a hand would start", f"{robot}'s gripper", depth, out))
     return faults
 
 
@@ -152,19 +152,13 @@ def _faults_of_object(person: PlacedUnit, starts: Sequence[Solid]) -> list[str]:
     q = array_of(person, "q_WO_0")
     half = array_of(person, "object_size") / 2.0
     thing = Solid("the object", array_of(person, "p_WO_0"), rotation_of(q / np.linalg.norm(q)), half)
-    return [_fault(f"{person.name}.p_WO_0", "the object would start", s.name, *s.depth_of(thing)) for s in starts]
+    return [
+        penetration_fault(f"{person.name}.p_WO_0", "the object would start", s.name, *s.depth_of(thing)) for s in starts
+    ]
 
 
 def _is_free(person: PlacedUnit) -> bool:
     return str(person.start.get("object_with", "free")).lower() in ("free", "0")
-
-
-def _fault(name: str, what: str, where: str, depth: float, out: Floats) -> str:
-    """Return what is wrong with a body in another one, and how to move it; "" if it is not."""
-    if depth < _LEAST:
-        return ""
-    way = ", ".join(f"{x:+.3f}" for x in math.ceil(1e3 * depth) / 1e3 * out + 0.0)
-    return f"{name}: {what} {depth:.3f} m inside {where}; move it by ({way}) m, or farther"
 
 
 @dataclass
@@ -192,7 +186,7 @@ class HandInCube:
             return
         seen = inverse_rotate(rotation_matrix((q[0], q[1], q[2], q[3])), subtract((h_x, h_y, h_z), (x, y, z)))
         depth = -Box((half, half, half)).distance(seen)
-        if depth > max(self.depth, _LEAST):
+        if depth > max(self.depth, LEAST_DEPTH):
             self.depth, self.since = depth, t if self.since is None else self.since
 
     @property

@@ -18,6 +18,7 @@ from handover.plants.helix.hand.partner_parameters import Params as PartnerParam
 from handover.scenarios.experiment.experiment import Experiment, Figure, FmuOf
 from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.paper import PublishedValue, paper_values
+from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.pictures import CameraPicture
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
@@ -26,6 +27,7 @@ from handover.scenarios.helix.cameras import calibrated, camera_parameters, mark
 from handover.scenarios.helix.disturbances import Disturbances
 from handover.scenarios.helix.evaluation import HandoverEvaluator
 from handover.scenarios.helix.parameters import PUSHES, Parameters, StepRule, Tuning
+from handover.scenarios.helix.penetration import start_faults
 from handover.scenarios.helix.places import PLACES
 
 _PAPER = "helix"
@@ -174,6 +176,15 @@ class HelixHandover(Experiment[HandoverEvaluator]):
         s.connect(hand.y, arm.u)
         s.connect(arm.y, hand.u)
         return s
+
+    def check_unit_values(self, system: System, given: Sequence[str]) -> None:  # noqa: ARG002
+        """Reject a ball or a hand that starts in the arm or its gripper.
+
+        Raises:
+            InvalidParameter: with depth and the way out.
+        """
+        if faults := start_faults(system.units):
+            raise InvalidParameter(faults)
 
     def stop_time(self, parameters: Parameters) -> Fraction:
         """Return the end of the patience for the approach, plus time for closing the gripper."""

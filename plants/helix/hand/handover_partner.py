@@ -13,7 +13,7 @@ from handover.cosim.blocks.terminals import Terminal, TerminalKind, terminal
 from handover.plants.hand_motion import HandTremor, minimum_jerk
 from handover.plants.helix.hand.bowl import Bowl
 from handover.plants.helix.hand.guidance import Guidance, GuidanceGains
-from handover.plants.helix.hand.partner_parameters import Holder, Inputs, Outputs, Params
+from handover.plants.helix.hand.partner_parameters import Holder, Inputs, Outputs, Params, place_aside
 
 _NEAR = 0.12
 """Distance of the gripper from the ball beyond which it touches neither ball nor hand, m."""
@@ -78,7 +78,10 @@ class HandoverPartner:
         )
         self._holder = Holder.HAND
         self._help: Floats = np.zeros(3)  # how far the person has brought the ball to the gripper
-        self._aside, self._waits = _aside(params.p_WO_0, params.room), True  # how far the ball is held from its place
+        self._aside, self._waits = (
+            place_aside(params.p_WO_0, params.room),
+            True,
+        )  # how far the ball is held from its place
         self._place: Floats = params.p_WO_0 + self._aside  # where the ball is held out, without tremor
         self._p_WO: Floats = np.array(self._place)
         self._v_WO: Floats = np.zeros(3)
@@ -225,10 +228,3 @@ class HandoverPartner:
         away = outwards / max(float(np.linalg.norm(outwards)), 1e-9) - np.array([0.0, 0.0, 1.0])
         course = p.withdrawal * minimum_jerk((self._withdrawing - p.release_time) / p.withdrawal_time)
         return self._place + self._tremor.displacement + course * away / np.linalg.norm(away)
-
-
-def _aside(p_WO: Floats, room: float) -> Floats:
-    """Return the way outwards from the arm's axis, or away from the cameras on it, that leaves room for it, m."""
-    beside = float(np.hypot(p_WO[0], p_WO[1]))
-    outwards = np.array([p_WO[0], p_WO[1], 0.0]) / beside if beside > 0.0 else np.array([1.0, 0.0, 0.0])
-    return max(0.0, room - beside) * outwards

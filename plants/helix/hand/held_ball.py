@@ -6,15 +6,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from handover.cosim.blocks.ports import Floats
-from handover.plants.helix.gripper_fingers import KNUCKLE, finger_joints
+from handover.plants.helix.gripper_fingers import KNUCKLE, LINK_RADIUS, PALM_RADIUS, finger_joints
 from handover.plants.helix.hand.ball_contact import CAPSULES, ContactNumbers, advance
 from handover.plants.helix.hand.partner_parameters import Params
 
 _LONGEST_STEP, _STEPS = 5e-4, 8.0
 """Longest internal step, s, and how many steps the shortest time constant takes at least."""
-_LINK_RADIUS, _PALM_RADIUS = 0.0042, 0.0125
-"""Of the fingers' links, and of the gripper's palm, where they touch, m."""
-_RADII = np.append(np.full(CAPSULES - 1, _LINK_RADIUS), _PALM_RADIUS)
+_RADII = np.append(np.full(CAPSULES - 1, LINK_RADIUS), PALM_RADIUS)
 
 
 class Contact(NamedTuple):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handover.cosim.blocks.block import InvalidParameters
-from handover.cosim.blocks.ports import Vector3, Vector4, output, parameter, port
+from handover.cosim.blocks.ports import Floats, Vector3, Vector4, output, parameter, port
 from handover.cosim.blocks.start_values import parameter_faults
 from handover.cosim.blocks.units import (
     Hertz,
@@ -208,3 +208,10 @@ class Outputs:
     f_G: Vector3[Newton] = output("force on the gripper, in the world: guidance and contact, mean over the step")
     f_H: Vector3[Newton] = output("force on the hand, in the world: ball and finger tips, mean over the step")
     holder: Holder = output("who holds the ball")
+
+
+def place_aside(p_WO: Floats, room: float) -> Floats:
+    """Return the way outwards from the arm's axis, or away from the cameras on it, that leaves room for it, m."""
+    beside = float(np.hypot(p_WO[0], p_WO[1]))
+    outwards = np.array([p_WO[0], p_WO[1], 0.0]) / beside if beside > 0.0 else np.array([1.0, 0.0, 0.0])
+    return max(0.0, room - beside) * outwards
