@@ -55,8 +55,8 @@ def _taking(record: Record, p_WH: Floats, holder: str, *, closed: bool) -> HandH
         return HandHint(p_WH, None, holds=True, advice="You hold it: pull until the gripper opens.")
     R_WO, p_WO = rotation_of(record["person.q_WO"][-1]), record["person.p_WO"][-1]
     goal = p_WO + R_WO @ _HOLD
-    x, y, z = R_WO.T @ (p_WH - goal)
-    within = bool(np.hypot(x, z) <= _AROUND and abs(y) <= _ALONG)
+    p_goal_H_O: Floats = (p_WH - goal) @ R_WO
+    within = bool(np.hypot(p_goal_H_O[0], p_goal_H_O[2]) <= _AROUND and abs(p_goal_H_O[1]) <= _ALONG)
     if float(np.linalg.norm(goal - p_WH)) > _NEAR:
         return HandHint(p_WH, None, advice="The robot brings the object.")
     if closed:
@@ -73,8 +73,8 @@ def _giving(record: Record, p_WH: Floats, holder: str) -> HandHint:
     p_WO = record["person.p_WO"][-1]
     to_gripper = p_WG - p_WO
     to_gripper -= float(np.clip(axis @ to_gripper, -half, half)) * axis  # from the nearest point of its centre line
-    x, _, z = rotation_of(record["robot.q_WG"][-1]).T @ to_gripper
-    within = bool(abs(x) <= gripper.capture_axial and abs(z) <= gripper.capture_lateral)
+    to_gripper_G: Floats = to_gripper @ rotation_of(record["robot.q_WG"][-1])
+    within = bool(abs(to_gripper_G[0]) <= gripper.capture_axial and abs(to_gripper_G[2]) <= gripper.capture_lateral)
     if float(np.linalg.norm(to_gripper)) > _NEAR:
         return HandHint(p_WH, None, holds=True, advice="You hold the object: the robot comes to take it.")
     here, there = "Between the fingers: press it against the gripper.", "After the yellow flash, lead it to the ring."
