@@ -1,7 +1,7 @@
 """Checks all of a campaign's plan before any of its runs begins."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
@@ -13,8 +13,15 @@ from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.campaign.plan import MAX_REPETITIONS, MAX_RUNS, CampaignPlan, unit_key
 from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.file_experiment import settable_of
 from handover.scenarios.execution.selection import replacements, select_fmus
-from handover.scenarios.execution.unit_values import built_system, check_value, is_unit_value, split_parameters
+from handover.scenarios.execution.unit_values import (
+    built_system,
+    check_value,
+    is_unit_value,
+    set_values,
+    split_parameters,
+)
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, text_of
 from handover.scenarios.results.tolerated_faults import scenario_code
@@ -121,7 +128,7 @@ def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
     """Check that the FMUs make up the scenario's system: one that takes a unit's place may have other ports.
 
     The system is that of the first point, or of the first with such units: parameters change what units do, not how
-    they are wired. Of units' parameters, all values are checked.
+    they are wired. Of units' parameters, the values of all points are checked.
 
     Raises:
         InvalidFmu, WiringError, ScheduleError: they do not make it up. ScenarioFailed: the scenario's own code did.
@@ -145,17 +152,40 @@ def check_units(plan: CampaignPlan, fmus: Mapping[str, Path]) -> None:
 def _check_unit_values(
     experiment: Experiment[Any], system: System, plan: CampaignPlan, points: Sequence[Mapping[str, str]]
 ) -> None:
-    """Check each value of a unit's parameter that the plan has for the points with the system's units."""
+    """Check the values of units' parameters at points with the system's units: each by itself, then as a run has them.
+
+    Raises:
+        InvalidParameter: with all values that are none, or with the first point of each fault of values together.
+    """
     kind = type(experiment)
-    given = [item for values in (plan.fixed, *points) for item in values.items() if is_unit_value(kind, item[0])]
-    faults: dict[str, None] = {}
-    for name, value in dict.fromkeys(given):
-        try:
+    at = [{n: v for n, v in {**plan.fixed, **point}.items() if is_unit_value(kind, n)} for point in points]
+    wired, faults = system.units, dict[str, str]()
+    for name, value in dict.fromkeys(item for values in at for item in values.items()):
+        with _collected(faults, ""):
             check_value(experiment, system, name, value)
-        except InvalidParameter as e:
-            faults |= dict.fromkeys(e.faults)
+    if not faults and settable_of(kind) is None:
+        for values, point in zip(at, points, strict=True):
+            system.units = wired
+            set_values(system, values)
+            with _collected(faults, _place_of(point)), scenario_code(experiment):
+                experiment.check_unit_values(system, tuple(values))
+    system.units = wired
     if faults:
-        raise InvalidParameter(tuple(faults))
+        raise InvalidParameter([f"{where}{fault}" for fault, where in faults.items()])
+
+
+@contextmanager
+def _collected(faults: dict[str, str], where: str) -> Generator[None]:
+    """Add the faults of an `InvalidParameter`, with the place where each was found first."""
+    try:
+        yield
+    except InvalidParameter as e:
+        for fault in e.faults:
+            faults.setdefault(fault, where)
+
+
+def _place_of(point: Mapping[str, str]) -> str:
+    return f"at {', '.join(f'{name}={value}' for name, value in point.items())}: " if point else ""
 
 
 def _check_size(plan: CampaignPlan) -> None:
@@ -183,5 +213,4 @@ def _check_together(experiment: type[Experiment[Any]], parameters: Any, point: M
         with scenario_code(instance), suppress(_ParametersAccepted):
             instance.build(parameters, 0, stop)
     except InvalidParameter as e:
-        where = f"at {', '.join(f'{name}={value}' for name, value in point.items())}: " if point else ""
-        raise InvalidParameter([f"{where}{fault}" for fault in e.faults]) from e
+        raise InvalidParameter([f"{_place_of(point)}{fault}" for fault in e.faults]) from e

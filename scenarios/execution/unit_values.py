@@ -238,15 +238,14 @@ def _equal(name: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
 
 
 def check_value(experiment: Experiment[Any], system: System, name: str, text: str) -> None:
-    """Check one value of a unit's parameter by itself, see `unit_values`; the value is set in a scenario's system.
+    """Check one value of a unit's parameter by itself, see `unit_values`; it is set in a scenario's system.
 
     Raises:
-        InvalidParameter: its unit does not take it, or the scenario can do nothing with it.
+        InvalidParameter: its unit does not take it.
     """
     settable = settable_of(type(experiment))
     if settable is None:
         set_values(system, {name: text})
-        experiment.check_unit_values(system, [name])
     elif faults := settable.faults([f"{name}={text}"]):
         raise InvalidParameter(faults)
 

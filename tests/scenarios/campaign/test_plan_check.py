@@ -5,7 +5,7 @@ import re
 import pytest
 
 from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.campaign.plan_check import checked_plan, unit_fmus
+from handover.scenarios.campaign.plan_check import check_units, checked_plan, unit_fmus
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.experiment.parameters import InvalidParameter
 
@@ -57,3 +57,14 @@ def test_unknown_scenario_and_unit():
         checked_plan(plan(scenario="ir_gasp"))
     with pytest.raises(UsageError, match="ir_grasp has no unit 'sceen': did you mean scene"):
         unit_fmus(plan(units={"sceen": "x.fmu"}))
+
+
+def test_values_of_units_are_checked_together_as_each_point_has_them():
+    in_the_arm, beside = "0,0,-0.3", "0.3,0,-0.3"
+    points = [{"hand.room": "0.12", "hand.p_WO_0": in_the_arm}, {"hand.room": "0", "hand.p_WO_0": beside}]
+    good = plan(scenario="helix_handover", points=points)
+    check_units(good, unit_fmus(good))
+    wrong = plan(scenario="helix_handover", points=[*points, {"hand.room": "0", "hand.p_WO_0": in_the_arm}])
+    with pytest.raises(InvalidParameter) as refused:
+        check_units(wrong, unit_fmus(wrong))
+    assert all(f.startswith("at hand.room=0, hand.p_WO_0=0,0,-0.3: hand.p_WO_0: ") for f in refused.value.faults)
