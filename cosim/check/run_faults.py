@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from handover.cosim.check.description_checks import description_findings, interface_findings
-from handover.cosim.fmu.file.archive import DESCRIPTION, FmuArchive, is_of_this_project
+from handover.cosim.fmu.file.archive import FmuArchive, description_state, is_of_this_project
 from handover.cosim.fmu.file.described_variable import variables_of
 from handover.cosim.fmu.file.description import FmuDescription
 from handover.cosim.fmu.file.fmpy_edge import checked_xml, in_one_line
@@ -32,8 +32,7 @@ def run_faults(descriptions: Iterable[FmuDescription]) -> dict[Path, str]:
     for d in {d.path: d for d in descriptions}.values():
         known = f"{d.untouched_fault}; {d.experiment.step_fault}"
         places = set(_LINE.findall(known))
-        state = (d.path / DESCRIPTION if d.path.is_dir() else d.path).stat()
-        faults = _faults(d.path, d.fmi, state.st_mtime_ns, state.st_size)
+        faults = _faults(d.path, d.fmi, *description_state(d.path))
         if lines := [line for line in faults if places.isdisjoint(_LINE.findall(line))]:
             found[d.path] = in_one_line(lines)
     return found

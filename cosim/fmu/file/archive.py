@@ -232,6 +232,15 @@ def _files_in(folder: Path) -> Iterator[str]:
                 yield file.relative_to(folder).as_posix()
 
 
+def description_state(path: Path) -> tuple[int, int]:
+    """Return when the file that has an FMU's description was written, in ns, and its size.
+
+    What was made of it holds as long as these are the same.
+    """
+    status = (path / DESCRIPTION if path.is_dir() else path).stat()
+    return status.st_mtime_ns, status.st_size
+
+
 class FmuArchive:
     """An FMU's zip archive, or the folder that it was unpacked to, whose files may be read and unpacked.
 
@@ -252,8 +261,6 @@ class FmuArchive:
         self.path = path
         self._files = _Folder(path) if path.is_dir() else _Zip(path, self.kind)
         self.names = self._files.names
-        self.reduced_description: bytes | None = None
-        """Of a large description, what is left of it, see `large_description`; None before it is asked for."""
 
     @property
     def outdated_methods(self) -> tuple[str, ...]:

@@ -8,9 +8,11 @@ import importlib
 import io
 import re
 import zipfile
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
-from handover.cosim.fmu.file.archive import DESCRIPTION, FmuArchive
+from handover.cosim.fmu.file.archive import DESCRIPTION, FmuArchive, description_state
 from handover.cosim.fmu.file.xml import UnsafeXml, check_xml
 
 _etree: Any = importlib.import_module("lxml.etree")  # neither it nor its classes have types
@@ -38,9 +40,7 @@ def description_of(archive: FmuArchive) -> bytes:
     """
     if not is_large(archive):
         return archive.description()
-    if archive.reduced_description is None:
-        archive.reduced_description = _reduced(archive.description())
-    return archive.reduced_description
+    return _reduced(archive.path, *description_state(archive.path))
 
 
 def xml_source_of(archive: FmuArchive) -> str | io.BytesIO:
@@ -54,41 +54,65 @@ def xml_source_of(archive: FmuArchive) -> str | io.BytesIO:
     return source
 
 
-def _reduced(content: bytes) -> bytes:
-    check_xml(content)
-    sizes = {reference.decode() for reference in _SIZES.findall(content)}
+@lru_cache(maxsize=4)
+def _reduced(path: Path, _changed: int, _size: int) -> bytes:
+    used, numbers = _without_unused(FmuArchive(path).description())
     options = {"resolve_entities": False, "no_network": True, "load_dtd": False, "remove_comments": True}
-    events: Any = _etree.iterparse(io.BytesIO(content), events=("end",), tag=_TAGS, **options)
-    kept: dict[int, int] = {}
-    count, dropped = 0, None
     try:
-        for _, element in events:
-            variables = element.getparent()
-            if variables is None or variables.tag != "ModelVariables":
-                continue
-            count += 1
-            if dropped is not None:  # the parser still needs the last one
-                variables.remove(dropped)
-            dropped = None if _is_used(element, sizes) else element
-            if dropped is None:
-                kept[count] = len(kept) + 1
+        root = _etree.fromstring(used, _etree.XMLParser(**options))
     except SyntaxError as e:  # the base class of lxml's errors
         raise UnsafeXml(f"it is not well-formed: {' '.join(str(e).split())}") from e
-    if dropped is not None:
-        dropped.getparent().remove(dropped)
-    root = events.root
-    _keep_structure(root, kept)
+    _keep_structure(root, numbers)
     return _etree.tostring(root, encoding="utf-8", xml_declaration=True)
 
 
-def _is_used(variable: Any, sizes: set[str]) -> bool:
-    """Return whether a variable can be set or got, sizes an array, or has a value that can be set before the start."""
-    if variable.get("causality", "local") not in _UNUSED:
-        return True
-    if variable.get("valueReference") in sizes and variable.tag != "ScalarVariable":
-        return True
-    starts = (variable, *variable.iterchildren("*"))
-    return variable.get("initial") in ("exact", "approx") and any(v.get("start") is not None for v in starts)
+def _without_unused(content: bytes) -> tuple[bytes, dict[int, int]]:
+    """Return a description without unused variables, and the numbers of the others by their numbers in the whole.
+
+    Kept are those that can be set or got, that size an array, or whose value can be set before the start. Numbers begin
+    at 1. No tree is made: this runs for each of a million variables as the document is checked.
+    """
+    sizes = {reference.decode() for reference in _SIZES.findall(content)}
+    numbers, parts = dict[int, int](), [0]  # where a part begins that is kept, ends, the next one begins, ...
+    depth = count = begin = 0
+    is_list = is_unused = is_started = False
+
+    def watch(parser: Any) -> None:
+        def ends() -> None:
+            if begin and not is_unused:
+                numbers[count] = len(numbers) + 1
+            elif begin and parts[-1] == begin:
+                parts[-1] = parser.CurrentByteIndex
+            elif begin:
+                parts.extend((begin, parser.CurrentByteIndex))
+
+        def start(tag: str, attributes: dict[str, str]) -> None:
+            nonlocal depth, count, begin, is_list, is_unused, is_started
+            depth += 1
+            if depth == 2:
+                is_list = tag == "ModelVariables"
+            if depth == 3 and is_list:
+                ends()
+                begin, count = parser.CurrentByteIndex, count + 1
+                is_size = tag != "ScalarVariable" and attributes.get("valueReference") in sizes
+                is_unused = tag in _TAGS and attributes.get("causality", "local") in _UNUSED and not is_size
+                is_started = attributes.get("initial") in ("exact", "approx")
+            if is_list and is_started and "start" in attributes and depth in (3, 4):
+                is_unused = False
+
+        def end(_: str) -> None:
+            nonlocal depth, begin, is_list
+            depth -= 1
+            if depth == 1 and is_list:
+                ends()
+                begin, is_list = 0, False
+
+        parser.ordered_attributes = False
+        parser.StartElementHandler, parser.EndElementHandler = start, end
+
+    check_xml(content, watch)
+    parts.append(len(content))
+    return b"".join(content[a:b] for a, b in zip(parts[::2], parts[1::2], strict=True)), numbers
 
 
 def _keep_structure(root: Any, kept: dict[int, int]) -> None:

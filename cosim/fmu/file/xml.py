@@ -7,7 +7,7 @@ import gc
 import importlib
 import re
 import xml.parsers.expat
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 from xml.etree.ElementTree import ParseError
@@ -127,8 +127,12 @@ class _Nothing:
         """End the document."""
 
 
-def check_xml(content: bytes) -> None:
+def check_xml(content: bytes, watch: Callable[[Any], None] | None = None) -> None:
     """Check that a document is safe for other parsers too.
+
+    Args:
+        content: the document.
+        watch: is given the expat parser before it starts, to set its handlers of elements.
 
     Raises:
         UnsafeXml: as `parse_xml`.
@@ -136,6 +140,8 @@ def check_xml(content: bytes) -> None:
     try:
         parser = defusedxml.ElementTree.XMLParser(target=_Nothing(), forbid_dtd=True)
         parser.parser.DefaultHandlerExpand = None  # is called for each blank and text, and has nothing to do here
+        if watch is not None:
+            watch(parser.parser)
         parser.feed(content)
         parser.close()
     except ParseError as e:

@@ -60,3 +60,37 @@ def test_an_array_beyond_all_memory_is_refused(tmp_path: Path):
     fmu = write_archive(tmp_path / "wide.fmu", {"modelDescription.xml": text})
     with pytest.raises(InvalidFmu, match=r"wide \[18446744073709551615\]"):
         describe_fmu(fmu)
+
+
+_VARIABLES = b"""<fmiModelDescription fmiVersion="3.0"><ModelVariables>
+<Float64 name="a" valueReference="1" causality="local" initial="exact" start="2"/>
+<!-- <Float64 name="remark" valueReference="2"/> -->
+<Float64 name="b" valueReference="3" description="&lt;/Float64>"><Annotations><Annotation type="x">
+<Float64 name="noted" start="1" causality="output"/></Annotation></Annotations></Float64>
+<UInt64 name="n" valueReference="4" causality="local" variability="constant" start="3"/>
+<String name="s" valueReference="5" initial="exact"><Start value="1"/><Alias name="t" start="x"/></String>
+<Float64 name="c" valueReference="6" start="1"/>
+<Float64 name="y" valueReference="7" causality="output"><Dimension valueReference="4"/></Float64>
+</ModelVariables><ModelStructure><Output valueReference="7" dependencies="3 4"/><ContinuousStateDerivative
+valueReference="6"/></ModelStructure></fmiModelDescription>"""
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+def test_variables_are_kept_that_can_be_set_or_size_an_array(
+    encoding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(large_description, "LARGE", 10)
+    fmu = write_archive(tmp_path / "u.fmu", {"modelDescription.xml": _VARIABLES.decode().encode(encoding)})
+    root = ElementTree.fromstring(large_description.description_of(FmuArchive(fmu)))
+    assert [v.get("name") for v in root.iterfind("ModelVariables/*")] == ["a", "n", "s", "y"]
+    assert [(u.tag, u.attrib) for u in root.iterfind("ModelStructure/*")] == [
+        ("Output", {"valueReference": "7", "dependencies": "4"})
+    ]
+
+
+def test_a_large_description_that_has_changed_is_read_once_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(large_description, "LARGE", 10)
+    for name in (b"first", b"the other"):
+        text = _VARIABLES.replace(b'"y"', b'"%b"' % name)
+        fmu = write_archive(tmp_path / "u.fmu", {"modelDescription.xml": text})
+        assert name in large_description.description_of(FmuArchive(fmu))
