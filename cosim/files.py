@@ -4,7 +4,9 @@ Locks end with the process that holds them. Windows, where a mapped file cannot 
 """
 
 import contextlib
+import csv
 import errno
+import io
 import math
 import os
 import shutil
@@ -129,6 +131,7 @@ def remove_abandoned() -> None:
 _MIB = 1 << 20
 MOST = 64 * _MIB
 """Bytes of a file that is read as a whole, unless it is another number."""
+_MOST_CSV = 512 * _MIB
 
 
 def check_regular(path: Path, most: float = math.inf) -> None:
@@ -154,6 +157,20 @@ def read_regular(path: Path, most: float = MOST) -> bytes:
         raise
     with open(handle, "rb") as file:
         return file.read()
+
+
+def read_csv(path: Path) -> list[tuple[int, list[str]]]:
+    """Return the rows of a CSV file, each with the number of the line on which it ends.
+
+    Raises:
+        OSError: as by `read_regular`. ValueError: it is not CSV in UTF-8.
+    """
+    text = io.StringIO(read_regular(path, _MOST_CSV).decode("utf-8-sig"), newline="")
+    reader = csv.reader(text, strict=True, skipinitialspace=True)
+    try:
+        return [(reader.line_num, row) for row in reader]
+    except csv.Error as e:
+        raise ValueError(f"line {reader.line_num}: {e}") from e
 
 
 def _check_status(path: Path, status: os.stat_result, most: float) -> None:

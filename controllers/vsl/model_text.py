@@ -32,6 +32,7 @@ from handover.controllers.vsl.learned_model import (
 )
 from handover.controllers.vsl.network import ACTIVATIONS, LAYERS, Activation, Network
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.files import read_regular
 
 FORMAT, VERSION = "handover-vsl-model", 2
 
@@ -92,7 +93,7 @@ def read_model(path: Path) -> VslModel:
         InvalidModel: there is no such file, or it is not a model.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_regular(path).decode()
     except (OSError, UnicodeDecodeError) as e:
         raise InvalidModel(str(path), f"it cannot be read: {e}") from e
     return parse_model(text, str(path))

@@ -1,6 +1,5 @@
 """Paths through waypoints, read from a CSV file: straight between them, or on an arc by way of a third point."""
 
-import csv
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -10,6 +9,7 @@ import numpy as np
 
 from handover.controllers.vsl.paths import Arc, Line, Segment
 from handover.cosim.blocks.ports import Floats
+from handover.cosim.files import read_csv
 
 _TO, _VIA = ("x", "y", "z"), ("via_x", "via_y", "via_z")
 _MOST = 1000
@@ -62,14 +62,13 @@ def read_waypoints(file: Path) -> list[Segment]:
 def _rows(file: Path) -> list[tuple[int, dict[str, str]]]:
     """Return a file's rows, by columns that are known, with their lines."""
     try:
-        with file.open(newline="", encoding="utf-8-sig") as lines:
-            reader = csv.reader(lines, skipinitialspace=True)
-            columns = [name.strip() for name in next(reader, list[str]())]
-            rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
+        (_, header), *lines = read_csv(file) or [(1, list[str]())]
     except OSError as e:
         raise InvalidWaypoints(file, [f"it cannot be read: {e.strerror}"]) from e
-    except (UnicodeDecodeError, csv.Error) as e:
+    except ValueError as e:
         raise InvalidWaypoints(file, [f"it is no CSV file: {e}"]) from e
+    columns = [name.strip() for name in header]
+    rows = [(line, [cell.strip() for cell in row]) for line, row in lines if any(row)]
     if not set(_TO) <= set(columns) <= {*_TO, *_VIA} or len(set(columns)) < len(columns):
         found = ", ".join(columns) or "none"
         raise InvalidWaypoints(

@@ -56,7 +56,7 @@ from handover.cosim.experiments.signal_table import (
     unknown_columns,
     write_table,
 )
-from handover.cosim.files import scratch_folder
+from handover.cosim.files import read_regular, scratch_folder
 from handover.cosim.fmu.file.archive import FmuArchive
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
 from handover.cosim.fmu.start_values import entries_of
@@ -293,7 +293,7 @@ def read_stimulus(file: Path, columns: Mapping[str, Column]) -> SignalTable:
             rows or times that do not rise.
         OSError: it cannot be read.
     """
-    content, name = file.read_bytes(), str(file)
+    content, name = read_regular(file), str(file)
     if lacking := unknown_columns(read_header(content, name), columns, "input"):
         raise InvalidTable(name, lacking)
     table = read_table(content, name, columns, in_range=True)

@@ -5,9 +5,8 @@ line counts from there on. Numbers are in the units of the inputs. Continuous re
 else is held until the next one.
 """
 
-import csv
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ import numpy as np
 from handover.cosim.blocks.start_values import range_of
 from handover.cosim.blocks.variable import Kind, element_names
 from handover.cosim.exceptions import nearest
+from handover.cosim.files import read_csv
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.start_values import entries_of, parsed_number
 from handover.cosim.system.time_series import TimeSeries
@@ -46,11 +46,10 @@ def read_inputs(path: Path, inputs: Mapping[str, FmuPort], start: Mapping[str, A
         UsageError: the file cannot be read or is not of this form; the message has all faults of one kind.
     """
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [(i, row) for i, row in _numbered(csv.reader(file, strict=True, skipinitialspace=True)) if row]
+        rows = [(i, row) for i, row in read_csv(path) if row]
     except OSError as e:
         raise UsageError(f"{path}: {(e.strerror or str(e)).lower()}") from e
-    except (csv.Error, UnicodeDecodeError) as e:
+    except ValueError as e:
         raise UsageError(f"{path}: not a CSV file in UTF-8: {e}") from e
     if not rows:
         raise UsageError(f"{path}: it is empty; a line of names is wanted, {TIME} and inputs, then lines of numbers")
@@ -83,12 +82,6 @@ def value_of(port: FmuPort, text: str) -> int | float:
         ValueError: it is none, or out of range; the message says what is right.
     """
     return _value(port, text.strip())
-
-
-def _numbered(reader: Any) -> Iterator[tuple[int, Sequence[str]]]:
-    """Yield each row with the number of the line on which it ends."""
-    for row in reader:
-        yield reader.line_num, row
 
 
 def _columns(path: Path, names: Sequence[str], inputs: Mapping[str, FmuPort]) -> dict[str, Column]:

@@ -22,6 +22,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from handover.cosim.files import read_regular
 from handover.scenarios.reporting.page import asset
 
 WEBCAM_SCRIPTS = ("hand/hand_landmarks.js", "hand/hand_camera.js")
@@ -67,7 +68,7 @@ class WebcamFiles:
         contents, faults = dict[str, bytes](), list[str]()
         for name, fault_of in FILES.items():
             try:
-                content = _content(folder / name)
+                content = read_regular(folder / name, _LARGEST)
                 fault = fault_of(content) if content else "is empty"
             except FileNotFoundError:
                 content, fault = b"", "is missing"
@@ -93,13 +94,6 @@ class WebcamFiles:
         served = {Path(name).name: content for name, content in self.contents.items()}
         served["worker.js"] = asset("hand/hand_worker.js").encode()
         return [Route(f"{below}webcam/{name}", _served(name, content)) for name, content in served.items()]
-
-
-def _content(path: Path) -> bytes:
-    size = path.stat().st_size
-    if size > _LARGEST:
-        raise OSError(0, f"it has {size / 1e6:.0f} MB, and none of them has more than {_LARGEST / 1e6:.0f}")
-    return path.read_bytes()
 
 
 def _served(name: str, content: bytes) -> Callable[[Request], Response]:

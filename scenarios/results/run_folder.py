@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from handover.cosim.exceptions import RecordNotWritten
-from handover.cosim.files import FileLocked, folder_locked, holder_of, read_regular
+from handover.cosim.files import FileLocked, check_regular, folder_locked, holder_of, read_regular
 from handover.cosim.typed_data import InvalidData, read_typed
 from handover.scenarios.results.folder_data import RunData, Summary
 
@@ -276,9 +276,14 @@ def replacing(path: Path) -> Generator[Path, None, None]:
     """Give the place of an unfinished file, which takes that of `path` at the end, or goes away on any error.
 
     What is there already is removed: a link in a folder of somebody else would have another file written.
+
+    Raises:
+        RecordNotWritten: there is something else than a file, such as a device, or it cannot be replaced.
     """
     unfinished = path.with_name(path.name + ".part")
     with disk_errors_reported(path):
+        if path.exists():
+            check_regular(path)
         unfinished.unlink(missing_ok=True)
     try:
         yield unfinished

@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handover.controllers.vsl.kinematics import VslKinematics
+from handover.cosim.files import check_regular
 from handover.plants.vsl.parameters import MAX_ANGLE, MAX_PRESSURE
 from handover.plants.vsl.parameters import Params as ArmParams
 from handover.scenarios.vsl.training_data import Dataset, Measured
@@ -85,6 +86,7 @@ def read_data(path: Path, key: str, kinematics: VslKinematics, parameters: Mappi
             size, not in SI units, or is of another arm, other parameters of it, or other links.
     """
     try:
+        check_regular(path)
         table: Any = pq.read_table(path)
     except (OSError, pa.ArrowException) as e:
         reason = str(e).strip().splitlines()[0] if str(e).strip() else type(e).__name__

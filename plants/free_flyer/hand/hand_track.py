@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.plain_rotation import Quaternion, Vector, lerp, nlerp, normalize
+from handover.cosim.files import read_csv
 from handover.plants.free_flyer.hand.hand_kinematics import JOINT_MAX, JOINTS
 
 COLUMNS = (
@@ -92,16 +93,15 @@ def read_track(path: Path, max_gap: float) -> HandTrack:
             degrees.
     """
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            table = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as e:
+        table = [(n, row) for n, row in read_csv(path) if row]
+    except (OSError, ValueError) as e:
         why = e.strerror if isinstance(e, OSError) and e.strerror else str(e)
         raise InvalidTrack(path, [f"it cannot be read: {why}"]) from e
-    if fault := _fault_of_header(table):
+    header = [name.strip() for name in table[0][1]] if table else []
+    if fault := _fault_of_header(header):
         raise InvalidTrack(path, [fault])
-    header = [name.strip() for name in table[0]]
     at = [header.index(name) for name in COLUMNS]
-    rows = [(n, _numbers(row, at)) for n, row in enumerate(table[1:], start=2) if row]
+    rows = [(n, _numbers(row, at)) for n, row in table[1:]]
     if not rows:
         raise InvalidTrack(path, ["it has no rows below its header"])
     faults = _faults(rows, max_gap)
@@ -119,11 +119,10 @@ def write_track(path: Path, rows: Iterable[tuple[float, HandPose]]) -> None:
             writer.writerow([repr(float(x)) for x in (t, *pose.p, *pose.q, *pose.angles)] + [int(pose.closed)])
 
 
-def _fault_of_header(table: Sequence[Sequence[str]]) -> str:
-    """Return what is wrong with the first row of a table, "" if nothing is."""
-    if not any(table):
+def _fault_of_header(header: Sequence[str]) -> str:
+    """Return what is wrong with the names in the first row of a table, "" if nothing is."""
+    if not header:
         return "it is empty"
-    header = [name.strip() for name in table[0]]
     lacking = [name for name in COLUMNS if name not in header]
     if not lacking:
         twice = [name for name in COLUMNS if header.count(name) > 1]

@@ -95,7 +95,7 @@ def _damage(path: Path) -> None:
         (MODEL, _damage_stream, "no bundle of models, a zip file: Error -3 while decompressing data"),
         (MODEL, _zip_without_landmarks, "hand_landmarker.task has no TensorFlow Lite model hand_landmarks_detector"),
         (WASM, _write(b"<html>"), "vision_wasm_module_internal.wasm is no WebAssembly"),
-        (WASM, _put_folder, "vision_wasm_module_internal.wasm cannot be read: Is a directory"),
+        (WASM, _put_folder, "vision_wasm_module_internal.wasm cannot be read: it is a folder"),
         (LOADER, _write(b"var a;"), "vision_wasm_module_internal.js does not load"),
         (BUNDLE, _write(b"export class FaceLandmarker {}"), "no module that exports HandLandmarker"),
     ],
