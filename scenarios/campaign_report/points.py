@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign_report.point_layout import PointLayout
-from handover.scenarios.experiment.display_unit import DisplayUnit, digits_after_point, display_unit
+from handover.scenarios.experiment.display_unit import DisplayUnit, column_text, digits_after_point, display_unit
 from handover.scenarios.reporting.html import Cell, plot_html, rows_table
 from handover.scenarios.reporting.page import Section
 
@@ -84,9 +84,9 @@ def _median(results: CampaignResults, point: PointResults, metric: str, unit: Di
     median, span = results.median(point, metric), results.median_interval(point, metric)
     if math.isnan(median):
         return Cell("–", math.nan)
-    line = f"{median * unit.factor:.{digits}f}"
+    line = column_text(median * unit.factor, digits)
     if span is not None:
-        low, high = (f"{x * unit.factor:.{max(digits - 1, 0)}f}" for x in (span.low, span.high))
+        low, high = (column_text(x * unit.factor, max(digits - 1, 0)) for x in (span.low, span.high))
         line += f" ({low} to {high})"
     number = results.number_measured(point, metric)
     return Cell(line if number == len(point.done) else f"{line}, of {number}", median)

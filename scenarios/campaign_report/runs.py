@@ -12,7 +12,7 @@ import numpy as np
 from markupsafe import Markup
 
 from handover.scenarios.campaign.results import CampaignResults
-from handover.scenarios.experiment.display_unit import DisplayUnit, digits_after_point, display_unit
+from handover.scenarios.experiment.display_unit import DisplayUnit, column_text, digits_after_point, display_unit
 from handover.scenarios.reporting.html import Cell, rows_table
 from handover.scenarios.reporting.page import Section
 
@@ -108,7 +108,7 @@ def _verdict(row: dict[str, Any]) -> Markup:
 def _number(value: float | None, unit: DisplayUnit, digits: int) -> Cell:
     if value is None or not math.isfinite(value):
         return Cell("–", math.nan)
-    return Cell(f"{value * unit.factor:.{digits}f}", value)
+    return Cell(column_text(value * unit.factor, digits), value)
 
 
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")

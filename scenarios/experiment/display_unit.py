@@ -12,6 +12,10 @@ from numpy.typing import ArrayLike
 _SMALL = ("°", "mm", "mm²", "ms", "g")
 """Units of which less than a thousandth is rarely of interest."""
 
+_MOST_DIGITS = 7
+_LEAST_FIXED, _MOST_FIXED = 1e-4, 1e9
+"""Digits after the point at most, and between which magnitudes numbers are written without an exponent."""
+
 
 @dataclass(frozen=True)
 class DisplayUnit:
@@ -27,13 +31,13 @@ class DisplayUnit:
     def text(self, value: float) -> str:
         """Return a value with its unit, to four digits; small ones of small units to two digits or three decimals.
 
-        So 40.68° stands beside 0.060°, not beside 0.05991°.
+        So 40.68° stands beside 0.060°, not beside 0.05991°. Below 1e-4 of the unit there is an exponent.
         """
         if not math.isfinite(value):
             return "–"
         space = "" if self.symbol.startswith("°") else " "
         shown = value * self.factor
-        small = self.symbol in _SMALL and 0.0 < abs(shown) < 1.0
+        small = self.symbol in _SMALL and _LEAST_FIXED <= abs(shown) < 1.0
         digits = f"{shown:.{max(3, 1 - math.floor(math.log10(abs(shown))))}f}" if small else f"{shown:.4g}"
         return f"{digits}{space}{self.symbol}".rstrip()
 
@@ -41,14 +45,23 @@ class DisplayUnit:
 def digits_after_point(values: ArrayLike) -> int:
     """Return with how many digits after the point to show all numbers of a column: the largest has four digits.
 
-    It has five if the smallest that is not zero has less than two else. Whole numbers have none.
+    It has five if the smallest that is not zero has less than two else. Whole numbers have none, others at most seven.
     """
     magnitudes = np.abs(np.asarray(values, dtype=np.float64))
     shown = magnitudes[np.isfinite(magnitudes) & (magnitudes > 0.0)]
     if not shown.size or bool((shown == np.rint(shown)).all()):
         return 0
     largest, smallest = (math.floor(math.log10(float(x))) for x in (shown.max(), shown.min()))
-    return max(0, 3 - largest, min(1 - smallest, 4 - largest))
+    return min(_MOST_DIGITS, max(0, 3 - largest, min(1 - smallest, 4 - largest)))
+
+
+def column_text(value: float, digits: int) -> str:
+    """Return a number of a column with its digits after the point, or with an exponent where those do not suit it.
+
+    An exponent have numbers from 1e9 on, and those below 1e-4 in a column of at least six digits.
+    """
+    tiny = digits >= _MOST_DIGITS - 1 and 0.0 < abs(value) < _LEAST_FIXED
+    return f"{value:.3e}" if tiny or abs(value) >= _MOST_FIXED else f"{value:.{digits}f}"
 
 
 def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from handover.scenarios.experiment.display_unit import digits_after_point, display_unit
+from handover.scenarios.experiment.display_unit import column_text, digits_after_point, display_unit
 
 
 @pytest.mark.parametrize(
@@ -22,6 +22,9 @@ from handover.scenarios.experiment.display_unit import digits_after_point, displ
         (0.009961, "1", "0.009961"),
         (0.06389, "m/s", "0.06389 m/s"),
         (math.nan, "m", "–"),
+        (math.radians(0.00001234), "rad", "1.234e-05°"),
+        (-1e-300, "m", "-1e-297 mm"),
+        (1e300, "m", "1e+300 m"),
     ],
 )
 def test_a_value_is_reported_in_its_unit(value: float, unit: str, text: str):
@@ -40,9 +43,24 @@ def test_a_value_is_reported_in_its_unit(value: float, unit: str, text: str):
         ([12.345, math.nan, 0.0], 2),
         ([1e-4, 2e-4], 7),
         ([5.5, 1e-9], 4),
+        ([1e-300], 7),
         ([math.nan], 0),
         ([], 0),
     ],
 )
 def test_numbers_of_a_column_have_the_same_digits_after_the_point(values: list[float], digits: int):
     assert digits_after_point(values) == digits
+
+
+@pytest.mark.parametrize(
+    ("values", "texts"),
+    [
+        ([1e-4, 2e-4], ["0.0001000", "0.0002000"]),
+        ([1.5e-297, 0.0], ["1.500e-297", "0.0000000"]),
+        ([1e300, 2.0], ["1.000e+300", "2"]),
+        ([5.5, 1e-9], ["5.5000", "0.0000"]),
+    ],
+)
+def test_numbers_that_fixed_digits_do_not_suit_have_an_exponent(values: list[float], texts: list[str]):
+    digits = digits_after_point(values)
+    assert [column_text(value, digits) for value in values] == texts
