@@ -211,6 +211,9 @@ class _Check:
             warning("compressed in a way that the standards do not know", where=name, cure="use deflate")
             for name in self.archive.outdated_methods
         ]
+        if backslashes := self.archive.with_backslashes:
+            what = f"{len(backslashes)} names have backslashes between folders, which other tools refuse"
+            findings.append(warning(what, where=backslashes[0], cure="zip it with slashes"))
         is_folder, n = self.path.is_dir(), len(self.archive.names)
         size = sum(map(self.archive.size, self.archive.names)) if is_folder else self.path.stat().st_size
         return f"{n} file{'s' if n != 1 else ''} in {math.ceil(size / 1000)} kB", findings

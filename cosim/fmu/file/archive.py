@@ -40,9 +40,9 @@ def archive_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
     There is a line for each kind of fault.
     """
     names = [m.orig_filename for m in members]
-    plain = {_path(n) for n in names if not n.endswith("/")}
+    plain = {path for n in names if not (path := _path(n)).endswith("/")}
     kinds: tuple[tuple[str, Iterable[str]], ...] = (
-        ("paths that lead out of it; they must be relative, with slashes", filter(_escapes_root, names)),
+        ("paths that lead out of it; they must be relative", filter(_escapes_root, names)),
         ("symbolic links or devices; store the files themselves", (m.orig_filename for m in members if _special(m))),
         ("encrypted files; store them without a password", (m.orig_filename for m in members if m.flag_bits & 0x1)),
         (
@@ -71,13 +71,20 @@ def _size_faults(members: Sequence[zipfile.ZipInfo], size: int) -> list[str]:
 
 
 def _escapes_root(name: str) -> bool:
+    name = _with_slashes(name)
     is_nameless = name != _TOP and not name.strip("./")
-    windows = "\\" in name or ":" in name  # ordinary characters elsewhere; on Windows they lead to other folders
-    return windows or name.startswith("/") or "\0" in name or ".." in PurePosixPath(name).parts or is_nameless
+    drive = ":" in name  # an ordinary character elsewhere; on Windows it leads to other folders
+    return drive or name.startswith("/") or "\0" in name or ".." in PurePosixPath(name).parts or is_nameless
+
+
+def _with_slashes(name: str) -> str:
+    """Return a member's name with slashes between folders, where some tools of Windows write backslashes."""
+    return name.replace("\\", "/")
 
 
 def _path(name: str) -> str:
-    """Return a member's path from the archive's top; empty for the top itself."""
+    """Return a member's path from the archive's top, with slashes; empty for the top itself."""
+    name = _with_slashes(name)
     while name.startswith(_TOP):
         name = name[len(_TOP) :].lstrip("/")
     return name
@@ -127,6 +134,7 @@ class _Zip:
         self._by_name = {name: m for name, m in by_name.items() if name}
         self.names = tuple(self._by_name)
         self.outdated_methods = tuple(m.orig_filename for m in self._members if m.compress_type not in STANDARD_METHODS)
+        self.with_backslashes = tuple(n for m in self._members if "\\" in (n := m.orig_filename))
         self.as_named = all(name == m.orig_filename for name, m in self._by_name.items())
         self._opened: zipfile.ZipFile | None = None
 
@@ -156,8 +164,11 @@ class _Zip:
     def unpack(self, folder: Path, _names: Iterable[str]) -> None:
         """Unpack everything into a folder."""
         with zipfile.ZipFile(self.path) as z:
-            z.extractall(folder)
             for member in z.infolist():
+                member.filename = _path(member.orig_filename)
+                if not member.filename:
+                    continue
+                z.extract(member, folder)
                 if (member.external_attr >> 16) & stat.S_IXUSR and not member.is_dir():
                     _make_executable(folder / member.filename)
 
@@ -192,6 +203,7 @@ class _Folder:
     """The files of an unpacked archive. Nothing is written to it."""
 
     outdated_methods = ()
+    with_backslashes = ()
     as_named = True
 
     def __init__(self, path: Path) -> None:
@@ -266,6 +278,11 @@ class FmuArchive:
     def outdated_methods(self) -> tuple[str, ...]:
         """Members in a compression that the standards do not allow: they must be stored or deflated."""
         return self._files.outdated_methods
+
+    @property
+    def with_backslashes(self) -> tuple[str, ...]:
+        """Members whose names have backslashes between folders, which are read as slashes."""
+        return self._files.with_backslashes
 
     @property
     def what(self) -> str:

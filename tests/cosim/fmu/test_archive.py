@@ -63,12 +63,23 @@ def test_programs_may_be_executed_after_unpacking(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    "name", ["../x", "a/../../x", "/etc/x", "C:/x", "C:x", "..\\x", "a\\b", "..", "\\\\host\\share\\x", "."]
+    "name", ["../x", "a/../../x", "/etc/x", "C:/x", "C:x", "..\\x", "a\\..\\..\\b", "..", "\\\\host\\share\\x", "."]
 )
 def test_a_path_that_leads_out_is_refused(tmp_path: Path, name: str):
     value = refusal(tmp_path, packed(name))
     assert "paths that lead out of it" in value
     assert name in value
+
+
+def test_backslashes_in_names_are_read_as_slashes(tmp_path: Path):
+    file = tmp_path / "a.fmu"
+    file.write_bytes(packed("binaries\\", "binaries\\win64\\x.dll"))
+    archive = FmuArchive(file)
+    archive.unpack(tmp_path / "target")
+    assert archive.read("binaries/win64/x.dll") == (tmp_path / "target" / "binaries" / "win64" / "x.dll").read_bytes()
+    assert archive.with_backslashes == ("binaries\\", "binaries\\win64\\x.dll")
+    (tmp_path / "other").mkdir()
+    assert "the same path twice" in refusal(tmp_path / "other", packed("resources\\table.csv"))
 
 
 def test_links_are_refused(tmp_path: Path):

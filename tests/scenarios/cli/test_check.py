@@ -62,7 +62,7 @@ def test_a_fault_is_reported_with_status_1(broken: Path):
     assert lines[0] == str(broken)
     assert lines[1].split() == ["fault", "archive"]
     assert lines[2] == " " * 11 + (
-        "- the archive holds paths that lead out of it; they must be relative, with slashes: ../../escaped"
+        "- the archive holds paths that lead out of it; they must be relative: ../../escaped"
     )
     assert "  -        description  not reached: see archive" in lines
     assert lines[-1] == "not usable as it is (1 fault)"
