@@ -6,7 +6,8 @@ suggest the nearest valid name and find in a unit's log the line that gives the 
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -74,6 +75,27 @@ class CosimError(Exception):
     """Base class of the engine's own exceptions."""
 
 
+_unpacked: dict[Path, Path] = {}
+"""Folders in use, with the archives that they were unpacked from."""
+
+
+@contextmanager
+def named_by_archive(folder: Path, archive: Path) -> Generator[None, None, None]:
+    """Let messages name an FMU that is unpacked to a folder as `ARCHIVE: MEMBER`."""
+    _unpacked[folder] = archive
+    try:
+        yield
+    finally:
+        del _unpacked[folder]
+
+
+def _shown(path: Path) -> str:
+    for folder, archive in _unpacked.items():
+        if path.is_relative_to(folder):
+            return f"{archive}: {path.relative_to(folder).as_posix()}"
+    return str(path)
+
+
 class InvalidFmu(CosimError):
     """A file that should be an FMU is missing, damaged, or not one that this machine can run.
 
@@ -81,7 +103,7 @@ class InvalidFmu(CosimError):
     """
 
     def __init__(self, path: Path, fault: str, log: Sequence[str] = ()) -> None:
-        super().__init__(f"{path}: {fault}")
+        super().__init__(f"{_shown(path)}: {fault}")
         self.path, self.fault, self.log = path, fault, tuple(log)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.report import CheckReport, Section
-from handover.cosim.exceptions import InvalidSsp
+from handover.cosim.exceptions import InvalidSsp, named_by_archive
 from handover.cosim.files import scratch_folder
 from handover.cosim.fmu.file.default_experiment import NoStep
 from handover.cosim.probe.finding import Finding, fault, warning
@@ -22,7 +22,7 @@ def check_ssp(path: Path, timeout: float) -> Iterator[CheckReport]:
     Loading and running may each take `timeout` seconds of each FMU. It never raises for the file.
     """
     yield CheckReport(path, (_system(path),))
-    with scratch_folder("check") as folder:
+    with scratch_folder("check") as folder, named_by_archive(folder, path):
         try:
             archive = SspArchive(path)
             components = [component for _, component in components_of(read_structure(archive).system)]

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import Any
 
-from handover.cosim.exceptions import InvalidFmu, InvalidSsp, WiringError
+from handover.cosim.exceptions import InvalidFmu, InvalidSsp, WiringError, named_by_archive
 from handover.cosim.files import scratch_folder
 from handover.cosim.fmu.file.default_experiment import exact_seconds, proposed_step
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort, describe_fmu
@@ -189,6 +189,7 @@ class SspFile:
         self._opened = contextlib.ExitStack()
         self.folder = self._opened.enter_context(scratch_folder("ssp"))
         """Where its FMUs are unpacked until it is closed."""
+        self._opened.enter_context(named_by_archive(self.folder, path))
         try:
             members = {n: c.member for n, c in components_of(structure.system)}
             archive.unpack(self.folder, set(members.values()))

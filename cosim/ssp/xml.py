@@ -109,12 +109,12 @@ class SspPart:
             declared = with_prefixes(content)
             self.root = parse_xml(declared)
         except UnsafeXml as e:
-            raise InvalidSsp(path, [f"{member} cannot be read: {e}"]) from e
+            raise InvalidSsp(path, [f"{self._file or 'it'} cannot be read: {e}"]) from e
         self.check_root(self.root, wanted)
         if self.root.get("version") == "1.0":
             faults = _schema_faults(declared, wanted)
             if faults:
-                raise InvalidSsp(path, [f"{member}, {fault}" for fault in faults])
+                raise InvalidSsp(path, [self._located(fault) for fault in faults])
         if declared is not content:
             self.tolerated.append(f"{member}: it uses prefixes of names that it does not declare (xmlns)")
 
@@ -140,7 +140,15 @@ class SspPart:
 
     def where(self, element: XmlElement, fault: str) -> str:
         """Return a fault with the file and line of its element before it."""
-        return f"{self.member}, line {element.line}: {fault}"
+        return self._located(f"line {element.line}: {fault}")
+
+    @property
+    def _file(self) -> str:
+        """The file within the SSP; "" of an `.ssd` that was given by itself, which messages begin with already."""
+        return "" if self.path.suffix.lower() == ".ssd" and self.path.name == self.member else self.member
+
+    def _located(self, line: str) -> str:
+        return f"{self._file}, {line}" if self._file else line
 
     def children(self, parent: XmlElement, *names: str) -> Iterator[XmlElement]:
         """Yield the elements at a path of names such as `ssd:Elements`."""

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ssp_of import component, described, pack_ssp, system
 
-from handover.cosim.exceptions import InvalidSsp
+from handover.cosim.exceptions import InvalidFmu, InvalidSsp, named_by_archive
 from handover.cosim.ssp.ssp_file import SspFile
 
 SOUND = described(system(component("a")))
@@ -110,6 +110,19 @@ def test_a_malformed_description_is_refused(tmp_path: Path, edits: Mapping[str, 
 def test_a_component_s_source_is_a_file_in_the_archive(tmp_path: Path, source: str, text: str):
     description = described(system(component("a", source=source)))
     assert text in refusal(pack_ssp(tmp_path / "a.ssp", description, {"resources/unit.fmu": b"x"}))
+
+
+def test_a_structure_given_by_itself_is_named_once(tmp_path: Path):
+    for content in (SOUND.replace('name="whole"', ""), SOUND.replace('"1.0" name', '"2.0" name'), "<html>"):
+        (tmp_path / "own.ssd").write_text(content)
+        assert not refusal(tmp_path / "own.ssd").startswith("own.ssd")
+
+
+def test_what_is_wrong_with_an_unpacked_fmu_names_ssp_and_member(tmp_path: Path):
+    member = tmp_path / "scratch" / "resources" / "unit.fmu"
+    with named_by_archive(tmp_path / "scratch", tmp_path / "a.ssp"):
+        assert str(InvalidFmu(member, "no library")) == f"{tmp_path / 'a.ssp'}: resources/unit.fmu: no library"
+    assert str(InvalidFmu(member, "no library")).startswith(str(member))
 
 
 def test_what_is_wrong_with_an_fmu_is_reported_with_its_place_in_the_ssp(tmp_path: Path):
