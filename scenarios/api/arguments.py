@@ -2,6 +2,7 @@
 
 import enum
 import math
+import re
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -52,10 +53,58 @@ def errors_for_python() -> Generator[None, None, None]:
         with one_line_errors():
             yield
     except UsageError as e:
-        raise InvalidInput(e.message) from e.__cause__
+        raise InvalidInput(_with_arguments(e.message)) from e.__cause__
     except (UnitLost, RunNotWritten, WorkersLost) as e:
         cause = e.__cause__
         raise cause if isinstance(cause, (CosimError, UnitFailure, ClusterLost)) else e from None
+
+
+_ARGUMENTS = {
+    "--unit": "units",
+    "--input": "inputs",
+    "--format": "formats",
+    "--signal": "signals",
+    "--metric": "metrics",
+    "-p": "parameters",
+    "--inputs-from": "inputs_from",
+    **{
+        f"--{name}": name
+        for name in [
+            "seed",
+            "seeds",
+            "start",
+            "stop",
+            "step",
+            "record",
+            "checkpoint",
+            "algorithm",
+            "isolate",
+            "workers",
+        ]
+    },
+    **{f"--{name}": name for name in ("scheduler", "out")},
+}
+"""The arguments of Python's functions by the options of the command, where messages name these."""
+
+_OPTION = re.compile(r"(?<![\w/-])(-p|--[a-z][a-z-]*)(?![\w-])(?: (?=[\w.]+=)| (-?\d[\d.e+-]*|[A-Z]+\b))?")
+
+
+def _with_arguments(message: str) -> str:
+    """Return a message with arguments of Python in place of options: `stop=10` for `--stop 10`.
+
+    Commands between backticks, which are to be typed in a terminal, stay.
+    """
+    parts = message.split("`")
+    return "`".join(p if p.startswith("handover ") else _OPTION.sub(_argument, p) for p in parts)
+
+
+def _argument(found: re.Match[str]) -> str:
+    name = _ARGUMENTS.get(found[1])
+    if name is None:
+        return found[0]
+    if found[1] == "-p" and found[0].endswith(" "):
+        return ""  # of `-p imu=none` the setting itself is the argument
+    return f"{name}={found[2]}" if found[2] else f"{name}{' ' if found[0].endswith(' ') else ''}"
 
 
 def text_of_value(value: Any) -> str:

@@ -31,11 +31,19 @@ def is_path_of_class(text: str) -> bool:
     return _BLOCK.fullmatch(text) is not None
 
 
-NO_UNPACKED = (
-    "a folder with neither modelDescription.xml, as of an unpacked FMU, nor SystemStructure.ssd, as of an unpacked SSP,"
-    " at its top"
-)
-"""What is wrong with a folder that is to be run or checked."""
+def folder_fault(path: Path) -> str:
+    """Return why a folder, which is neither an unpacked FMU nor an unpacked SSP, cannot be run or checked."""
+    if (path / "run.json").is_file():
+        return (
+            f"the folder of a run; `handover run --config {path / 'run.json'}` repeats that, "
+            f"`handover report {path}` writes its page"
+        )
+    if (path / "campaign.json").is_file():
+        return f"the folder of a campaign; `handover report {path}` writes its page"
+    return (
+        "a folder with neither modelDescription.xml, as of an unpacked FMU, nor SystemStructure.ssd, as of an unpacked "
+        "SSP, at its top"
+    )
 
 
 def nothing_at(path: Path) -> str:
@@ -50,7 +58,7 @@ def _path_fault(name: str) -> str:
     """Return what is wrong with a name that is meant as a path of a file or folder; empty where it is not."""
     path = Path(name)
     if path.is_dir():
-        return NO_UNPACKED
+        return folder_fault(path)
     if path.exists():
         return "a file, and no scenario; what can be run ends with .fmu, .ssp or .ssd"
     is_meant = "/" in name or "\\" in name or (":" not in name and path.suffix)

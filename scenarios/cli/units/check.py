@@ -18,7 +18,7 @@ from handover.scenarios.cli.console import open_console
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.fmu_run import is_fmu
 from handover.scenarios.execution.progress import doing
-from handover.scenarios.execution.selection import NO_UNPACKED
+from handover.scenarios.execution.selection import folder_fault
 from handover.scenarios.execution.ssp_run import is_ssp
 
 _FAULTS = 1
@@ -81,7 +81,7 @@ def _check_files_exist(files: Sequence[Path]) -> None:
         try:
             if file.is_dir():
                 if not is_ssp(str(file)) and not is_fmu(str(file)):
-                    faults.append(f"{file}: {NO_UNPACKED}")
+                    faults.append(f"{file}: {folder_fault(file)}")
             elif file.exists() and not file.is_file():  # opening a pipe would wait for its writer
                 faults.append(f"{file}: {NO_FILE_FAULT}")
             else:

@@ -101,9 +101,9 @@ def test_a_system_is_run_and_its_results_outlive_the_call(tmp_path: Path, monkey
 
 
 def test_a_system_needs_a_stop_time_and_takes_no_parameters():
-    with pytest.raises(handover.InvalidInput, match="a system has no stop time of its own"):
+    with pytest.raises(handover.InvalidInput, match="a system has no stop time of its own; stop=10 lets it run"):
         handover.run(system())
-    with pytest.raises(handover.InvalidInput, match="-p, --seed: a system has its parameters"):
+    with pytest.raises(handover.InvalidInput, match="parameters, seed: a system has its parameters"):
         handover.run(system(), stop=1, seed=3, mass=3)
 
 
@@ -185,6 +185,10 @@ Unfindable.__qualname__ = "nowhere.Unfindable"
         (lambda: handover.run("ir_grasp", strategy=[["a"], ["b", "c"]]), "strategy = .*a run has one value"),
         (lambda: handover.sweep(4), "4 cannot be run"),  # pyright: ignore[reportArgumentType]
         (lambda: handover.sweep(Unfindable), "Unfindable: each run of a sweep imports its scenario"),
+        (lambda: handover.run("ir_grasp", step=0.1), "^step is for an SSP or an FMU"),
+        (lambda: handover.run("ir_grasp", inputs="u.csv"), "^inputs is for an FMU that runs by itself"),
+        (lambda: handover.run("ir_grasp", record="scene.zz"), "^record: "),
+        (lambda: handover.run("ir_grasp", units={"reflex": ""}), "^units 'reflex=' is not of the form NAME=FILE"),
         (lambda: handover.run("ir_grasp", strategy=["blind"]), r"strategy = \['blind'\]: a run has one value"),
         (lambda: handover.run(IrGrasp, forward=np.array([0.1])), "forward = .*handover.sweep varies lists"),
         (lambda: handover.environment("ir_grasp", "reflex", thing=("cup",)), "thing = .*a run has one value"),

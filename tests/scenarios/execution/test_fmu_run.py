@@ -493,6 +493,8 @@ def test_the_folder_of_an_ssp_does_what_the_file_does(tmp_path: Path):
         ("nowhere/mass", "there is no such file or folder, nor a folder nowhere"),
         ("mass.fmuu", "there is no such file or folder"),
         ("here", "a folder with neither modelDescription.xml"),
+        ("ran", "the folder of a run; `handover run --config ran/run.json` repeats that"),
+        ("swept", "the folder of a campaign; `handover report swept`"),
         ("here/notes.txt", "a file, and no scenario"),
         ("here/none.ssd", "there is no such file"),
     ],
@@ -500,7 +502,10 @@ def test_the_folder_of_an_ssp_does_what_the_file_does(tmp_path: Path):
 def test_a_path_where_nothing_is_is_told_as_that(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, wanted: str
 ):
-    (tmp_path / "here").mkdir()
+    for folder, kind in (("here", ""), ("ran", "run.json"), ("swept", "campaign.json")):
+        (tmp_path / folder).mkdir()
+        if kind:
+            (tmp_path / folder / kind).write_text("{}")
     for file in ("mass.fmu", "notes.txt"):
         (tmp_path / "here" / file).write_bytes(b"")
     monkeypatch.chdir(tmp_path)
