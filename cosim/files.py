@@ -96,23 +96,11 @@ def folder_locked(path: Path) -> Generator[bool, None, None]:
 
 
 _SCRATCH = "handover-scratch-"
-_unpacked: dict[Path, Path] = {}
-"""Scratch folders that are in use, with the archives that they were unpacked from."""
-
-
-def shown_path(path: Path) -> str:
-    """Return how messages name a file: one that was unpacked to a scratch folder as `ARCHIVE: MEMBER`."""
-    for folder, archive in _unpacked.items():
-        if path.is_relative_to(folder):
-            return f"{archive}: {path.relative_to(folder).as_posix()}"
-    return str(path)
 
 
 @contextlib.contextmanager
-def scratch_folder(purpose: str, of: Path | None = None) -> Generator[Path, None, None]:
+def scratch_folder(purpose: str) -> Generator[Path, None, None]:
     """Give a temporary folder, locked as long as it is in use; those of processes that were killed are removed first.
-
-    `of` is the archive that it is for, by which messages name what is in it (`shown_path`).
 
     Raises:
         OSError: it cannot be made.
@@ -126,9 +114,6 @@ def scratch_folder(purpose: str, of: Path | None = None) -> Generator[Path, None
                 made.enter_context(folder_locked(folder))
             except (FileLocked, FileNotFoundError):  # another process took it for abandoned before it was locked
                 continue
-            if of is not None:
-                _unpacked[folder] = of
-                made.callback(_unpacked.pop, folder)
             yield folder
             return
 

@@ -31,6 +31,7 @@ from handover.scenarios.vsl.parameters import (
     Parameters,
     Resolution,
 )
+from handover.scenarios.vsl.penetration import start_faults
 from handover.scenarios.vsl.places import PLACES, fixed_value_faults, sensor_faults
 
 _GRACE = 5
@@ -152,12 +153,14 @@ class PathExperiment(Experiment[PathEvaluator]):
         return Fraction(round(parameters.settle + length / parameters.speed)) + _GRACE
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:
-        """Reject sensors that the controller is to look at, and that are not connected.
+        """Reject sensors that the controller is to look at, and that are not connected; and an arm that starts too low.
 
         Raises:
-            InvalidParameter: `kinematics.closed_loop`, `kinematics.imu` or `arm.links` is given.
+            InvalidParameter: `kinematics.closed_loop`, `kinematics.imu` or `arm.links` is given, or tip or elbow would
+                start below the ground.
         """
-        if faults := fixed_value_faults(given) + sensor_faults(system, given, "`-p {}` of vsl_hybrid connects it"):
+        faults = fixed_value_faults(given) + start_faults(system.units)
+        if faults := faults + sensor_faults(system, given, "`-p {}` of vsl_hybrid connects it"):
             raise InvalidParameter(faults)
 
     def parameter_files(self, parameters: Parameters) -> Mapping[str, Path]:

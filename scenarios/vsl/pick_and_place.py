@@ -21,6 +21,7 @@ from handover.scenarios.experiment.parameters import InvalidParameter
 from handover.scenarios.experiment.places import Place
 from handover.scenarios.experiment.replay import Replay
 from handover.scenarios.experiment.time_plot import TimeFigure
+from handover.scenarios.vsl.penetration import start_faults
 from handover.scenarios.vsl.pick_and_place_evaluation import PickAndPlaceEvaluator, PickAndPlaceParameters
 from handover.scenarios.vsl.places import FIXED_VALUES, PLACES, fixed_value_faults, sensor_faults
 
@@ -29,6 +30,7 @@ _GRACE = 5
 _FIXED = {
     **FIXED_VALUES,
     "arm.face": "the table is as high as the top of the object, pick",
+    "gripper.p_WO_0": "the object stands where planner and arm expect it, at pick",
     "gripper.landing": "the object lands on the table, as high as pick and place",
 }
 """The units' values that are fixed, and why."""
@@ -143,12 +145,13 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
         return s
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:
-        """Reject sensors that the controller is to look at, and that are not connected.
+        """Reject sensors that the controller is to look at, and that are not connected; and an arm that starts too low.
 
         Raises:
-            InvalidParameter: `kinematics.closed_loop`, `kinematics.imu` or a value that is fixed here is given.
+            InvalidParameter: `kinematics.closed_loop`, `kinematics.imu` or a value that is fixed here is given, or
+                tip or elbow would start below the ground or the table.
         """
-        faults = fixed_value_faults(given, _FIXED)
+        faults = fixed_value_faults(given, _FIXED) + start_faults(system.units)
         if faults := faults + sensor_faults(system, given, "this scenario has no {}, vsl_hybrid has"):
             raise InvalidParameter(faults)
 

@@ -1,6 +1,8 @@
 """The scenario `vsl_pick_and_place`: an object is carried to its place, touched more softly by softer links."""
 
 import pathlib
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
@@ -13,7 +15,12 @@ from parameter_origins import assert_every_default_has_its_origin
 import handover.scenarios.vsl
 from handover.controllers.vsl.pick_and_place import Params, TaskPhase
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment.parameters import InvalidParameter
+from handover.cosim.system.system import PlacedUnit
+from handover.fmus.build import cached
+from handover.scenarios.execution.unit_values import built_system
+from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
+from handover.scenarios.vsl.path_experiments import VslModelBased
+from handover.scenarios.vsl.penetration import start_faults
 from handover.scenarios.vsl.pick_and_place import VslPickAndPlace
 from handover.scenarios.vsl.pick_and_place_evaluation import PickAndPlaceEvaluator, PickAndPlaceParameters
 
@@ -42,6 +49,47 @@ def test_defaults_have_their_origins_and_the_planner_those_of_the_scenario():
 def test_places_that_contradict_each_other_are_refused(given: dict[str, Any], fault: str):
     with pytest.raises(InvalidParameter, match=fault):
         VslPickAndPlace().build(PickAndPlaceParameters(**given), 0, lambda _unit: Path("none.fmu"))
+
+
+@cache
+def arm_in(scenario: Any) -> PlacedUnit:
+    fmus = {name: cached(unit, 3) for name, unit in scenario.units.items()}
+    return built_system(scenario(), scenario.parameters_type(), 0, fmus, {}).units["arm"]
+
+
+@pytest.mark.parametrize(
+    ("scenario", "start", "faults"),
+    [
+        (VslPickAndPlace, {}, []),
+        (VslModelBased, {}, []),
+        (VslModelBased, {"q_0": [0.0, -0.73, 1.0]}, []),  # of sin(-0.7297) = -0.150 / 0.225
+        (VslModelBased, {"q_0": [0.0, -0.8411, 1.6821]}, ["the elbow would start 0.018 m below the ground; joint 2"]),
+        (VslModelBased, {"q_0": [0.0, 0.0, -0.9]}, ["the tip would start 0.026 m below the ground; joint 3 at -0.729"]),
+        (VslModelBased, {"q_0": [0.0, 0.0, -0.9], "L_3": 0.15}, []),
+        (VslModelBased, {"L_1": 0.0, "q_0": [0.0, -1.0, -0.5]}, ["the elbow", "the tip"]),
+        (VslPickAndPlace, {"q_0": [0.0, 0.0, -0.5]}, ["the tip would start 0.018 m below the face at 0.06 m"]),
+    ],
+)
+def test_an_arm_that_starts_too_low_is_refused(scenario: Any, start: dict[str, Any], faults: list[str]):
+    arm = arm_in(scenario)
+    found = start_faults({"arm": replace(arm, start={**arm.start, **start})})
+    assert [fault.startswith(f"arm.q_0: {wanted}") for fault, wanted in zip(found, faults, strict=True)] == [
+        True for _ in faults
+    ], found
+
+
+@pytest.mark.parametrize(
+    ("scenario", "given", "values", "fault"),
+    [
+        (VslPickAndPlace, [], {"gripper.p_WO_0": "0.3,0,0.2"}, "gripper.p_WO_0: the object stands where"),
+        (VslPickAndPlace, [], {"arm.q_0": "0,0,-0.5"}, "arm.q_0: the tip would start"),
+        (VslModelBased, ["elbow=down"], {}, "arm.q_0: the elbow would start 0.018 m below the ground"),
+    ],
+)
+def test_no_run_starts_in_the_ground_or_the_object(scenario: Any, given: list[str], values: dict[str, str], fault: str):
+    fmus = {name: cached(unit, 3) for name, unit in scenario.units.items()}
+    with pytest.raises(InvalidParameter, match=fault):
+        built_system(scenario(), parse_parameters(scenario, given), 0, fmus, values)
 
 
 @pytest.mark.slow
