@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.variable import indices_of
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import CosimError, nearest, one_line
+from handover.cosim.files import check_regular
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.time_series import TimeSeries
 
@@ -21,15 +22,115 @@ SUBSCRIPT = re.compile(r"\[(\d+(?:,\d+)*)\]$")
 """The end of a column's name that is an entry of an array, counted from 1."""
 
 
+_FREE, _RATIO = 1 << 30, 1000
+"""Bytes that any file may take in memory, and how many times its own size one may take beyond that."""
+_ROWS = 64
+"""Of texts, that are read at once."""
+
+
+class InvalidRecord(CosimError, ValueError):
+    """A file is not the record of a run, or is a decompression bomb; nothing of it is used."""
+
+    def __init__(self, path: Path, fault: str) -> None:
+        super().__init__(f"{path}: {fault}")
+        self.path, self.fault = path, fault
+
+
+def read_parquet(path: Path) -> Any:
+    """Return the table of a Parquet file, which may be somebody else's: numbers, booleans, texts, lists of numbers.
+
+    A decompression bomb is refused before it is read: one whose values, of 8 bytes, take more than 1 GiB and more than
+    1000 times the file's size. No run's record is one: its times alone take some bytes a row. How long texts are, a
+    file's metadata do not say; they are counted while they are read.
+
+    Raises:
+        OSError: it cannot be read. InvalidRecord: it is damaged, has columns of other types, or is a bomb.
+    """
+    import pyarrow as pa  # slow to import, and scenarios import this module before there is any record
+    import pyarrow.parquet as pq
+
+    check_regular(path)
+    most = max(_FREE, _RATIO * path.stat().st_size)
+    try:
+        with pq.ParquetFile(path) as file:
+            schema: Any = file.schema_arrow
+            if len(set(schema.names)) < len(schema.names):
+                raise InvalidRecord(path, "two of its columns have one name")
+            for column in schema:
+                if not (_is_number(column.type) or _holds_more(column.type)):
+                    raise InvalidRecord(path, f"its column {column.name!r} is of the type {column.type}")
+            _check_size(path, 8 * _values_in(file), most)
+            if not any(_holds_more(kind) for kind in schema.types):
+                return file.read()
+            batches: list[Any] = []
+            size = 0
+            for batch in file.iter_batches(_ROWS):
+                batches.append(batch)
+                size += batch.nbytes
+                _check_size(path, size, most)
+            return pa.Table.from_batches(batches, schema)
+    except (pa.ArrowException, UnicodeError, OverflowError) as e:
+        raise InvalidRecord(path, one_line(e)) from e
+
+
+def _is_number(kind: Any) -> bool:
+    from pyarrow import types
+
+    return types.is_floating(kind) or types.is_integer(kind) or types.is_boolean(kind)
+
+
+def _holds_more(kind: Any) -> bool:
+    """Return whether values of a column's type may be longer than 8 bytes."""
+    from pyarrow import types
+
+    return types.is_string(kind) or types.is_null(kind) or (types.is_list(kind) and _is_number(kind.value_type))
+
+
+def _values_in(file: Any) -> int:
+    """Return how many values a Parquet file says it has, those in lists counted one by one."""
+    about = file.metadata
+    groups = [about.row_group(k) for k in range(about.num_row_groups)]
+    lists = [k for k in range(about.num_columns) if "." in about.schema.column(k).path]
+    rows = max(about.num_rows, sum(group.num_rows for group in groups))
+    return rows * about.num_columns + sum(group.column(k).num_values for group in groups for k in lists)
+
+
+def _check_size(path: Path, size: int, most: int) -> None:
+    if size > most:
+        fault = f"it would take {size / _FREE:.3g} GiB of memory, over {_RATIO} times its size: it is no run's"
+        raise InvalidRecord(path, fault)
+
+
 class Record:
-    """The signals of a run. `time` is in seconds, shape (rows,)."""
+    """The signals of a run. `time` is in seconds, shape (rows,).
+
+    Args:
+        path: a Parquet file with the column `time`, finite numbers, and others; all are numbers or booleans.
+
+    Raises:
+        OSError: it cannot be read. InvalidRecord: it is damaged or no record.
+    """
 
     def __init__(self, path: Path) -> None:
-        import pyarrow.parquet as pq  # slow to import, and scenarios import this class before there is any record
-
-        self._table = pq.read_table(path)
+        self._table = read_parquet(path)
+        for column in self._table.schema:
+            if not _is_number(column.type) or self._table.column(column.name).null_count:
+                raise InvalidRecord(path, f"its column {column.name!r} has other values than numbers")
         self._columns = columns_of_signals(self._table.column_names)
+        if "time" not in self._table.column_names:
+            raise InvalidRecord(path, "it has no column 'time'")
         self.time = self._values("time")
+        if self.time.dtype != np.float64 or not np.isfinite(self.time).all():
+            raise InvalidRecord(path, "its column 'time' has other values than finite numbers")
+        for signal in self.signals:
+            self._check_metadata(path, signal)
+
+    def _check_metadata(self, path: Path, signal: str) -> None:
+        try:
+            for read in (self.unit, self.description, self.items):
+                read(signal)
+        except ValueError as e:
+            raise InvalidRecord(path, f"the metadata of its column {signal!r} are damaged: {one_line(e)}") from e
 
     def __contains__(self, signal: object) -> bool:
         """Return whether a signal of this name was recorded."""

@@ -189,9 +189,10 @@ def rewind_stream(path: Path, schema: "pa.Schema", rows: int) -> int:
     left = rows
     try:
         for batch in batches:
-            if left:
-                rewound.write(batch.slice(0, left))
-                left -= min(left, batch.num_rows)
+            if not left:
+                break
+            rewound.write(batch.slice(0, left))
+            left -= min(left, batch.num_rows)
     finally:
         rewound.close()
     if left:

@@ -7,11 +7,10 @@ from typing import Any, cast
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from handover.cosim.exceptions import nearest, one_line
-from handover.cosim.files import check_regular
+from handover.cosim.record.reader import InvalidRecord, read_parquet
 from handover.cosim.typed_data import InvalidData, read_typed
 from handover.scenarios.campaign.plan import PlannedRun, safe_name
 from handover.scenarios.experiment.experiment import Metric
@@ -43,12 +42,12 @@ class CampaignTable:
         """
         file = path / "runs.parquet" if path.is_dir() else path
         try:
-            check_regular(file)
-            table = cls(pq.read_table(file))
+            table = cls(read_parquet(file))
         except FileNotFoundError as e:
             raise InvalidRunFolder(file.parent, f"it has no {file.name}; {_REMEDY}") from e
-        except (OSError, pa.ArrowException) as e:
-            raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {one_line(e)}; {_REMEDY}") from e
+        except (OSError, InvalidRecord) as e:
+            fault = e.fault if isinstance(e, InvalidRecord) else one_line(e)
+            raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {fault}; {_REMEDY}") from e
         for name in table.column("run") if "run" in table.table.column_names else ():
             if not isinstance(name, str) or name.startswith(".") or safe_name(name) != name:  # not in the folder
                 raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {name!r:.60} is no run's name")

@@ -18,6 +18,7 @@ import pyarrow.parquet as pq
 from handover.cosim.blocks.units import ONE
 from handover.cosim.blocks.variable import Causality, Kind, Variable
 from handover.cosim.exceptions import CosimError
+from handover.cosim.record.reader import InvalidRecord, read_parquet
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan, is_number
 from handover.scenarios.campaign.plan_check import checked_plan
@@ -103,8 +104,8 @@ class TableWriter:
         Raises:
             RecordNotWritten: it cannot be written.
         """
-        with contextlib.suppress(OSError, pa.ArrowException):
-            if pq.read_table(self._path).equals(table_of(self._plan, self.rows), check_metadata=True):
+        with contextlib.suppress(OSError, InvalidRecord):
+            if read_parquet(self._path).equals(table_of(self._plan, self.rows), check_metadata=True):
                 return
         self.write()
 

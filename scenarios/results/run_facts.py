@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.variable import indices_of, subscript
 from handover.cosim.exceptions import one_line
-from handover.cosim.files import check_regular
-from handover.cosim.record.reader import Record
+from handover.cosim.record.reader import InvalidRecord, Record
 from handover.scenarios.catalog import scenario_of, untrusted_code
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
@@ -90,10 +89,10 @@ def whole_record_of(folder: RunFolder) -> Record | None:
     if not folder.signals.exists():
         return None
     try:
-        check_regular(folder.signals)
         return Record(folder.signals)
-    except (OSError, ValueError, KeyError) as e:  # Arrow's exceptions are subclasses of these
-        raise InvalidRunFolder(folder.path, f"its {folder.signals.name} is damaged: {one_line(e)}") from e
+    except (OSError, InvalidRecord) as e:
+        fault = e.fault if isinstance(e, InvalidRecord) else one_line(e)
+        raise InvalidRunFolder(folder.path, f"its {folder.signals.name} is damaged: {fault}") from e
 
 
 def record_of(folder: RunFolder) -> Record | None:

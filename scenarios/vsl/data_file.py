@@ -11,7 +11,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handover.controllers.vsl.kinematics import VslKinematics
-from handover.cosim.files import check_regular
+from handover.cosim.exceptions import one_line
+from handover.cosim.record.reader import InvalidRecord, read_parquet
 from handover.plants.vsl.parameters import MAX_ANGLE, MAX_PRESSURE
 from handover.plants.vsl.parameters import Params as ArmParams
 from handover.scenarios.vsl.training_data import Dataset, Measured
@@ -86,10 +87,9 @@ def read_data(path: Path, key: str, kinematics: VslKinematics, parameters: Mappi
             size, not in SI units, or is of another arm, other parameters of it, or other links.
     """
     try:
-        check_regular(path)
-        table: Any = pq.read_table(path)
-    except (OSError, pa.ArrowException) as e:
-        reason = str(e).strip().splitlines()[0] if str(e).strip() else type(e).__name__
+        table: Any = read_parquet(path)
+    except (OSError, InvalidRecord) as e:
+        reason = e.fault if isinstance(e, InvalidRecord) else one_line(e)
         raise InvalidData(path, f"it is no Parquet file that can be read: {reason}") from e
     wanted = [*(f"{port}[{k + 1}]" for port, n in _COLUMNS.values() for k in range(n)), _ORDER]
     if missing := [name for name in wanted if name not in table.column_names]:
