@@ -14,16 +14,16 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from msgspec import Meta
-from typing_extensions import TypedDict
+from typing_extensions import NotRequired, TypedDict
 
 from handover.cosim.fmu.file.description import describe_fmu
-from handover.cosim.typed_data import ExactTime, Seed
+from handover.cosim.typed_data import ExactSeconds, ExactTime, NotNegative, Seed
 from handover.scenarios.campaign.identity import differences, identity_of
 from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun, safe_name
 from handover.scenarios.execution.file_experiment import settable_of
 from handover.scenarios.execution.unit_values import is_unit_value
 from handover.scenarios.experiment.parameters import text_of
-from handover.scenarios.results.folder_data import FileData, FmuData, SourceData
+from handover.scenarios.results.folder_data import FileData, FmuData, MasterData, SourceData
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
     check_place,
@@ -47,8 +47,21 @@ OF_NEITHER = f"is the folder of neither a run (no run.json) nor a campaign (no {
 """What is said of a folder where a run's or a campaign's is right."""
 
 
+class CampaignMasterData(MasterData):
+    """Options of the runs' master; `call_limit` is in seconds of wall time, `pace` in simulated ones a second."""
+
+    call_limit: NotRequired[NotNegative | None]
+    pace: NotRequired[NotNegative | None]
+
+
 class _OfSomeCampaigns(TypedDict, total=False):
     source: SourceData
+    master: CampaignMasterData
+    defaults: dict[str, str]
+    platform: str
+    start: ExactTime | None
+    step: ExactSeconds | None
+    recorded: list[str] | None
     parameter_units: dict[str, str]
     title: str
     headline: list[str]
@@ -66,7 +79,7 @@ class CampaignData(_OfSomeCampaigns):
     """What `campaign.json` holds: see `identity_of`, and what is needed to show the campaign."""
 
     scenario: str
-    points: list[dict[str, str]]
+    points: Annotated[list[dict[str, str]], Meta(min_length=1)]
     fixed: dict[str, str]
     repetitions: Annotated[int, Meta(ge=1, le=10**6)]
     seed: Seed

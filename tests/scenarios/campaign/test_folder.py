@@ -135,6 +135,15 @@ def test_a_damaged_campaign_json_is_refused(folder: CampaignFolder, fmus: dict[s
     assert text in refusal(folder, PLAN, fmus)
 
 
+def test_each_member_of_campaign_json_is_of_a_declared_type(folder: CampaignFolder):
+    file = folder.path / "campaign.json"
+    written: dict[str, Any] = json.loads(file.read_text())
+    for name in written:
+        file.write_text(json.dumps({**written, name: [[0]]}))
+        with pytest.raises(InvalidRunFolder, match=name):
+            folder.read()
+
+
 def test_files_in_place_of_folders_and_folders_in_place_of_files_are_refused(
     folder: CampaignFolder, fmus: dict[str, Path]
 ):
