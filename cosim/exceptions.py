@@ -66,9 +66,33 @@ def last_line(log: Iterable[str]) -> str:
     return f"{message} ({locations[-1][1]}, line {locations[-1][2]})"
 
 
+_LONGEST = 4000
+"""Characters of a line that is shown."""
+
+
+def visible(text: str) -> str:
+    """Return a text as it may be shown in a terminal: it may come from files of others.
+
+    Characters that could steer the terminal, or turn the direction of letters, are replaced, and lines cut that are
+    too long to be read.
+    """
+    shown = text if text.isprintable() else "".join(map(_visible, text))
+    return "\n".join(map(_cut, shown.split("\n")))
+
+
+def _visible(c: str) -> str:
+    return c if c.isprintable() or c == "\n" else " " if c.isspace() else "\N{REPLACEMENT CHARACTER}"
+
+
+def _cut(line: str) -> str:
+    if len(line) <= _LONGEST:
+        return line
+    return f"{line[:_LONGEST]}... ({len(line) - _LONGEST} characters more)"
+
+
 def one_line(e: BaseException) -> str:
-    """Return an exception's message in one line; the name of its type where it has none."""
-    return " ".join(str(e).split()) or type(e).__name__
+    """Return an exception's message in one line, as `visible` has it; the name of its type where it has none."""
+    return visible(" ".join(str(e).split())) or type(e).__name__
 
 
 class CosimError(Exception):

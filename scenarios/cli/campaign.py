@@ -17,7 +17,6 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import NoReturn, TextIO
 
-import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
@@ -31,6 +30,7 @@ from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import RunCounts, WorkerPool
 from handover.scenarios.execution.errors import ClusterLost, RunNotWritten, UsageError, WorkersLost, one_line_errors
 from handover.scenarios.execution.exit_status import ABORTED, INTERRUPTED, UNIT_FAILED
+from handover.scenarios.execution.progress import say
 from handover.scenarios.execution.supervisor import leave
 
 _PAUSE = 30.0
@@ -240,7 +240,7 @@ def run_campaign_command(plan: CampaignPlan, out: Path | None, workers: PoolConf
             assert progress.counts is not None
             outcome = CampaignOutcome(ready.plan, folder, table, progress.counts)
             if outcome.counts.kept == outcome.counts.total:
-                click.echo(f"{folder.path} has all of its runs; nothing was run", err=True)
+                say(f"{folder.path} has all of its runs; nothing was run")
             finish(outcome)
     except KeyboardInterrupt:
         _end_interrupted(folder, progress)
@@ -269,7 +269,7 @@ def _run(
     if not folder.has_all(plan):
         done = sum(map(folder.is_done, plan.runs()))
         text = f"{plan.size} run{'s' if plan.size > 1 else ''} of {plan.scenario} on {workers} into {folder.path}"
-        click.echo(f"{text}{f'; {done} are done' if done else ''}", err=True)
+        say(f"{text}{f'; {done} are done' if done else ''}")
     try:
         with contextlib.ExitStack() as opened, progress:
             start = partial(_started, workers, interruption)
@@ -297,9 +297,7 @@ def _started(workers: PoolConfig, interruption: CampaignInterruption) -> Generat
 def _end_interrupted(folder: CampaignFolder | None, progress: CampaignProgress) -> NoReturn:
     if folder is None or progress.counts is None:
         kept = folder is not None and folder.is_there
-        click.echo(
-            f"Aborted! Run the same command again to resume {folder.path}" if folder and kept else "Aborted!", err=True
-        )
+        say(f"Aborted! Run the same command again to resume {folder.path}" if folder and kept else "Aborted!")
         sys.exit(ABORTED)
-    click.echo(f"{format_progress(progress.counts)} in {folder.path}; run the same command again to resume", err=True)
+    say(f"{format_progress(progress.counts)} in {folder.path}; run the same command again to resume")
     sys.exit(INTERRUPTED)

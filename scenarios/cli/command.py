@@ -95,9 +95,14 @@ class DeferringGroup(click.Group):
     """
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Call the command; a package that is missing is told in one line."""
+        """Call the command; a package that is missing is told in one line, and errors as they may be shown."""
         try:
             return super().invoke(ctx)
+        except click.ClickException as e:  # such messages may quote files of others
+            from handover.cosim.exceptions import visible  # loaded for this alone
+
+            vars(e)["message"] = visible(e.message)
+            raise
         except ImportError as e:
             from handover.scenarios.execution.errors import missing_package  # loaded for this alone
 

@@ -25,6 +25,7 @@ from handover.scenarios.catalog import InvalidScenario, ScenarioSource, named_sc
 from handover.scenarios.cli.master_options import CONTROL_FIELDS
 from handover.scenarios.cli.options import HeadedCommand
 from handover.scenarios.execution.errors import UsageError
+from handover.scenarios.execution.progress import say
 from handover.scenarios.execution.selection import is_path_of_class
 from handover.scenarios.results.folder_data import RunData
 from handover.scenarios.results.run_folder import sha256_of, version_differences, versions
@@ -84,7 +85,7 @@ class ConfigFile:
     def _say(self, own_code: Iterable[str]) -> None:
         """Say which code that is not this package's is about to be run."""
         for line in own_code:
-            click.echo(f"{self.path}: this runs {line}", err=True)
+            say(f"{self.path}: this runs {line}")
 
 
 class ConfiguredCommand(HeadedCommand):
@@ -272,14 +273,14 @@ def _of_run(path: Path, run: Mapping[str, Any]) -> dict[str, Any]:
     with _damage_reported(path):
         checked(run, RunData)
         if other := version_differences(versions(), run["versions"]):
-            click.echo(f"{path}: the run was of other versions: {other}", err=True)
+            say(f"{path}: the run was of other versions: {other}")
         content: dict[str, Any] = {**_subject(run), **_of_master(run["master"])}
         content |= {"seed": run["seed"], "stop": run.get("stop", content.get("stop"))}
         content |= {"checkpoint": run["checkpoint"], "format": run["formats"], "record": run.get("recorded")}
         content["parameters"] = {**run["parameters"], **run.get("unit_values", {}), **content.get("parameters", {})}
         for file in run.get("parameter_files", {}).values():
             if Path(file["file"]).is_file() and not _is_unchanged(Path(file["file"]), file["sha256"]):
-                click.echo(f"{path}: {file['file']} is not the file that the run had", err=True)
+                say(f"{path}: {file['file']} is not the file that the run had")
     return {key: value for key, value in content.items() if value is not None}
 
 

@@ -3,14 +3,16 @@
 import json
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, TextIO
 
 import click
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
+from handover.cosim.exceptions import visible
 from handover.cosim.fmu.host_process import copied
 
 
@@ -53,6 +55,11 @@ _STDOUT, _STDERR = 1, 2
 
 
 class _Console(Console):
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Render as `visible` has it all that is shown: it may quote files of others."""
+        for text, style, control in super().render(renderable, options):
+            yield Segment(text if control else visible(text), style, control)
+
     def on_broken_pipe(self) -> None:
         """Print no more to a reader that has closed the pipe; the exit status still says how the run ended."""
         self.quiet = True

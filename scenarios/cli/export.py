@@ -15,7 +15,7 @@ from handover.fmus.contents.fmi2_description import NoFmi2Form
 from handover.scenarios.cli.options import scenario_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import doing
+from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.execution.selection import find_scenario, replacements, select_fmus
 from handover.scenarios.execution.unit_values import built_system, split_parameters
 from handover.scenarios.results.run_folder import check_place
@@ -67,7 +67,7 @@ def export_command(
         except OSError as e:
             raise UsageError(f"--ssp {file}: it cannot be written: {e.strerror}") from e
         for line in system.notes:
-            click.echo(line, err=True)
+            say(line)
     click.echo(file)
 
 
@@ -96,4 +96,4 @@ def warn_of_enumerations(system: System, units: Collection[str]) -> None:
     """Say which enumerations are left to parameter sets."""
     for name in units:
         if left := ", ".join(f"{name}.{parameter}" for parameter in bound_enumerations(system.units[name])):
-            click.echo(f"{left}: bound as an enumeration, which libcosim and Ecos do not take", err=True)
+            say(f"{left}: bound as an enumeration, which libcosim and Ecos do not take")

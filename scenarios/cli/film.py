@@ -15,7 +15,7 @@ from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.cli.options import FiniteRange, trust_option
 from handover.scenarios.execution.errors import FilmFailed, UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import doing
+from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.film import LARGEST, SMALLEST
 from handover.scenarios.results.run_folder import RunFolder, check_place
 
@@ -166,7 +166,7 @@ def _film(run: RunFolder, path: Path, plots: Sequence[str] | None, settings: "Fi
         with doing("reading the record"):
             content = film_content(run, plots, window_of(settings.size)[0][1])
         for line in content.notes:
-            click.echo(line, err=True)
+            say(line)
         with _progress(sys.stderr) as report:
             return write_film(content, path, settings, report)
     except (NotFilmed, NoBrowser) as e:

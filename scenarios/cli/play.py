@@ -15,6 +15,7 @@ import click
 from handover.scenarios.cli.options import FiniteRange, HeadedCommand, scenario_options, stop_option
 from handover.scenarios.cli.run import file_options
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.execution.progress import say
 from handover.scenarios.execution.request import RUNS, RunRequest
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import RunFolder, dated_folder
@@ -124,10 +125,10 @@ async def _serve(session: "Session") -> None:
     page = PlayPage(session)
     with socket.create_server((HOST, 0)) as listening:
         _end_by_signals(page)
-        click.echo(f"play: http://{HOST}:{listening.getsockname()[1]}/  (Ctrl-C ends the session)", err=True)
+        say(f"play: http://{HOST}:{listening.getsockname()[1]}/  (Ctrl-C ends the session)")
         await serve(page, page.work(), listening)
     runs = f"{page.runs} run{'' if page.runs == 1 else 's'}"
-    click.echo(f"{runs} in {session.folder}" if any(session.folder.iterdir()) else "no run was begun", err=True)
+    say(f"{runs} in {session.folder}" if any(session.folder.iterdir()) else "no run was begun")
 
 
 def _end_by_signals(page: "PlayPage") -> None:

@@ -13,7 +13,7 @@ from handover.scenarios.cli.options import limit_options, limits, log_option
 from handover.scenarios.cli.summaries.run import RunEnding
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import logging_to_standard_error, progress_bar
+from handover.scenarios.execution.progress import logging_to_standard_error, progress_bar, say
 from handover.scenarios.execution.resume import InterruptedRun
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.results.run_folder import RunFolder
@@ -56,7 +56,7 @@ def resume(
         opened.enter_context(run_folder.held())
         interrupted = InterruptedRun(run_folder)
         for line in interrupted.own_code():
-            click.echo(f"this runs {line}", err=True)
+            say(f"this runs {line}")
         task = interrupted.task(opened)
         options = replace(task.options, **limits(call_limit, pace), **(isolated(isolate) if isolate else {}))
         task = replace(task, options=options, presented=not no_report)

@@ -32,7 +32,7 @@ from handover.scenarios.cli.summaries.run import AS_JSON, RunEnding
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.input_sources import played_back
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import logging_to_standard_error, progress_bar
+from handover.scenarios.execution.progress import logging_to_standard_error, progress_bar, say
 from handover.scenarios.execution.request import RunRequest
 from handover.scenarios.execution.runner import run_task
 from handover.scenarios.experiment.live_inputs import inputs_of_pushes
@@ -227,7 +227,7 @@ def run(
         if live or controls:
             task, control, observer = opened.enter_context(_live(task, pace, controls, webcam))
         elif task.inputs is None and task.experiment.led_hand(task.parameters) is not None:
-            click.echo("nobody leads the hand, which stays where it is: --live lets a page lead it", err=True)
+            say("nobody leads the hand, which stays where it is: --live lets a page lead it")
         with contextlib.ExitStack() as bar:
             progress, ending = bar.enter_context(progress_bar(sys.stderr)), RunEnding(task, bar, json_to)
             result = run_task(task, progress, interruption, None, control, observer, ending.concluded)
@@ -240,10 +240,9 @@ def _tell_end_of_inputs(folder: RunFolder, until: float) -> None:
     """Say so if a run went on after the end of the inputs that it was given, at `until`, s."""
     record = whole_record_of(folder)
     if record is not None and len(record.time) and float(record.time[-1]) > until:
-        click.echo(
+        say(
             f"the recorded inputs end at {until:.6g} s, and the run went on until {float(record.time[-1]):.6g} s: "
-            "from then on they stayed as they were",
-            err=True,
+            "from then on they stayed as they were"
         )
 
 
@@ -287,7 +286,7 @@ def _live(
             address, control, inputs = opened.enter_context(
                 live_page(task.folder.path, pace or 1.0, pushes, hand, webcam, task.source.get("scenario", ""))
             )
-            click.echo(f"live: {address}  (the run begins once the page is open)", err=True)
+            say(f"live: {address}  (the run begins once the page is open)")
         if sources := inputs.sources():
             task = replace(task, inputs=InputSources(sources, {"from": "page"}))
         yield task, control, inputs.pictures

@@ -11,6 +11,13 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
+from handover.cosim.exceptions import visible
+
+
+def say(line: object) -> None:
+    """Print a line on standard error, as `visible` has it: it may quote files of others."""
+    click.echo(visible(str(line)), err=True)
+
 
 class _Pace(ProgressColumn):
     """Simulated seconds per second of wall time."""
@@ -53,10 +60,11 @@ def doing(what: str) -> Generator[None, None, None]:
     console = Console(stderr=True)
     if not console.is_terminal:
         with contextlib.suppress(OSError):  # as where a unit has closed the stream
-            click.echo(f"{what} ...", err=True)
+            say(f"{what} ...")
         yield
         return
-    with Progress(SpinnerColumn(), TextColumn(what), TimeElapsedColumn(), console=console, transient=True) as progress:
+    columns = SpinnerColumn(), TextColumn(visible(what), markup=False), TimeElapsedColumn()
+    with Progress(*columns, console=console, transient=True) as progress:
         progress.add_task(what, total=None)
         yield
 
@@ -92,6 +100,6 @@ class _ToStandardError(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Write a line."""
         try:
-            click.echo(f"{record.levelname.lower()}: {record.getMessage()}", err=True)
+            say(f"{record.levelname.lower()}: {record.getMessage()}")
         except Exception:  # as logging's own handlers do: what is logged must not end a run
             self.handleError(record)

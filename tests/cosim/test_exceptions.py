@@ -4,7 +4,7 @@ import traceback
 
 import pytest
 
-from handover.cosim.exceptions import last_line, nearest, suggestion
+from handover.cosim.exceptions import last_line, nearest, one_line, suggestion, visible
 
 
 @pytest.mark.parametrize(
@@ -34,3 +34,15 @@ def test_of_a_traceback_all_that_was_raised_is_the_last_line():
     assert last_line(log) == "ValueError: the arm is lost (see the manual)"
     assert last_line([*log, "[Error] fmi3DoStep: given up"]) == "given up"
     assert last_line(["[Error] fmi3DoStep: two\nlines"]) == "lines"
+
+
+@pytest.mark.parametrize("c", ["\x1b", "\x07", "\x9b", "\x08", "\x7f", "\u202e", "\u2066", "\udc80", "\x00"])
+def test_nothing_that_steers_a_terminal_is_shown(c: str):
+    assert visible(f"arm{c}[31m\n näher") == "arm\ufffd[31m\n näher"
+    assert one_line(ValueError(f"arm{c}]0;x")) == "arm\ufffd]0;x"
+
+
+def test_spaces_of_all_kinds_are_shown_as_one_and_long_lines_are_cut():
+    assert visible("a\tb\r\u00a0c") == "a b  c"
+    assert len(visible("A" * 300_000 + "\nlast")) < 4100
+    assert visible("A" * 300_000 + "\nlast").endswith("(296000 characters more)\nlast")

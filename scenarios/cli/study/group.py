@@ -9,6 +9,7 @@ import click
 from handover.scenarios.cli.command import DeferredCommand, DeferringGroup
 from handover.scenarios.cli.console import open_console, print_json, print_rows
 from handover.scenarios.execution.errors import UsageError, one_line_errors
+from handover.scenarios.execution.progress import say
 from handover.scenarios.results.run_folder import check_place, make_folder_of, write_whole
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def new(file: Path) -> None:
         make_folder_of(file)
         write_whole(file, default_plan())
     click.echo(file)
-    click.echo(f"try: handover study plan {file}", err=True)
+    say(f"try: handover study plan {file}")
 
 
 @study.command("plan", short_help="Check a plan, and show who plays what in which order.")

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from handover.cosim.exceptions import visible
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
-from handover.scenarios.execution.progress import doing
+from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.results.run_folder import RunFolder, check_place
 
 if TYPE_CHECKING:
@@ -85,13 +86,13 @@ def replay(folder: Path, participant: str, number: int, *, check: bool) -> None:
             click.echo("it has not been played to its end")
         else:
             outcome = "succeeded" if record.success else "failed"
-            click.echo(f"{outcome}: {record.reason}")
+            click.echo(visible(f"{outcome}: {record.reason}"))
             rule = {True: "failed", False: "did not fail", None: "cannot be judged"}[record.failed_by_rule]
             click.echo(f"by the rule of failures it {rule}")
             if record.void:
-                click.echo(f"void, it does not count: {record.void_reason}")
+                click.echo(visible(f"void, it does not count: {record.void_reason}"))
             ratings = session.answers.get(number, {})
-            click.echo(f"ratings: {', '.join(f'{k} = {v}' for k, v in ratings.items()) or 'none'}")
+            click.echo(visible(f"ratings: {', '.join(f'{k} = {v}' for k, v in ratings.items()) or 'none'}"))
             if record.latency_p95_ms is not None:
                 click.echo(f"latency: median {record.latency_median_ms:.0f} ms, 95 % {record.latency_p95_ms:.0f} ms")
         if not run.is_there:
@@ -103,7 +104,7 @@ def replay(folder: Path, participant: str, number: int, *, check: bool) -> None:
         with run.held():
             complete_signals(run)
             for line in write_run_page(run):
-                click.echo(line, err=True)
+                say(line)
     click.echo(f"page: {run.report}")
 
 
@@ -137,7 +138,7 @@ def withdraw(folder: Path, participant: str, *, delete: bool) -> None:
     click.echo(
         f"{pseudonym_of(number)} withdrew on {withdrawal.ended}: in no table and no test; what was kept is {kept}"
     )
-    click.echo("tables and pages that were copied elsewhere still have it", err=True)
+    say("tables and pages that were copied elsewhere still have it")
 
 
 def _check(folder: Path, participant: str, number: int) -> None:
@@ -151,7 +152,7 @@ def _check(folder: Path, participant: str, number: int) -> None:
         found = check_round(session, planned)
     who = f"{session.session.pseudonym}, round {number}"
     if found.other_versions:
-        click.echo(f"{who} was recorded by other versions: {found.other_versions}")
+        click.echo(visible(f"{who} was recorded by other versions: {found.other_versions}"))
     if found.difference is not None:
         click.echo(f"{who} differs when it is carried out again, first in {found.difference}")
         raise click.exceptions.Exit(1)

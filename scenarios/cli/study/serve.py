@@ -9,6 +9,7 @@ import click
 
 from handover.scenarios.cli.options import FiniteRange
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
+from handover.scenarios.execution.progress import say
 
 _HELP = """Carry out the study of PLAN.toml on this computer: a page, one participant after the other.
 
@@ -111,7 +112,7 @@ def serve(
                         pilot=pilot,
                         webcam=webcam,
                         photodiode=photodiode,
-                        tell=lambda line: click.echo(line, err=True),
+                        tell=say,
                     )
                 )
         except NotServed as e:

@@ -15,7 +15,7 @@ from handover.scenarios.cli.console import open_console, print_rows
 from handover.scenarios.execution.child_process import ChildEnd
 from handover.scenarios.execution.crash import Crash
 from handover.scenarios.execution.exit_status import UNIT_FAILED, status_of_run
-from handover.scenarios.execution.progress import doing
+from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.experiment.experiment import Outcome
 from handover.scenarios.results.run_folder import RunFolder, disk_errors_reported
 from handover.scenarios.results.summary import RunResult
@@ -98,7 +98,7 @@ class RunEnding:
         if not self._printed:
             self._print(result)
         for line in result.left_out:
-            click.echo(line, err=True)
+            say(line)
         if self._json_to is not None:
             print_summary_as_json(result, self._task.folder, self._json_to)
         else:
@@ -107,9 +107,9 @@ class RunEnding:
 
     def _print(self, result: RunResult) -> None:
         if result.failure:
-            click.echo(str(result.failure), err=True)
+            say(result.failure)
         for line in warning_lines(result.summary):
-            click.echo(line, err=True)
+            say(line)
         if self._json_to is None:
             _print_verdict(result, self._task.experiment.headline, self._task.folder)
             sys.stdout.flush()
@@ -133,9 +133,9 @@ def report_crash(heartbeat: Heartbeat, end: ChildEnd, wall: float) -> int:
         _report_concluded(crash.folder)
         return crash.concluded
     if crash.concluded is not None:
-        sys.stderr.write(f"{crash.message}; the run had ended before, and stays as it is\n")
+        say(f"{crash.message}; the run had ended before, and stays as it is")
         return crash.concluded
-    sys.stderr.write(f"{crash.message}\n")
+    say(f"{crash.message}")
     if crash.folder is None:
         return UNIT_FAILED if crash.failure is not None or crash.in_own_thread else _SIGNAL_STATUS + (end.signal or 0)
     try:
@@ -151,7 +151,7 @@ def report_crash(heartbeat: Heartbeat, end: ChildEnd, wall: float) -> int:
         else:
             _print_place(crash.folder)
     except RecordNotWritten as e:
-        sys.stderr.write(f"{e}\n")
+        say(e)
     return UNIT_FAILED
 
 
@@ -160,7 +160,7 @@ def _report_concluded(folder: RunFolder) -> None:
     summary, headline = folder.read_summary(), folder.read_run().get("headline", ())
     result = RunResult(outcome=Outcome(success=summary["success"], reason=summary["reason"]), summary=summary)
     for line in (*warning_lines(summary), *summary.get("left_out", ())):
-        click.echo(line, err=True)
+        say(line)
     if AS_JSON in sys.argv:
         print_summary_as_json(result, folder)
     else:
@@ -175,4 +175,4 @@ def _write_page(folder: RunFolder) -> None:
     with disk_errors_reported(folder.path), faults.tolerated("the report could not be written"):
         faults.lines += write_run_page(folder)
     for line in faults.lines:
-        sys.stderr.write(f"{line}\n")
+        say(line)

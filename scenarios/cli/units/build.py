@@ -32,7 +32,7 @@ from handover.fmus.standalone.freezer import CannotFreeze, check_standalone
 from handover.scenarios.catalog import search_folder
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.interruption import Interruption
-from handover.scenarios.execution.progress import doing
+from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.experiment.parameter_sets import parameter_sets
 from handover.scenarios.results.run_folder import InvalidRunFolder, check_place
 
@@ -212,7 +212,7 @@ def _compile_missing(platforms: Sequence[str]) -> None:
     if missing and not has_compiler():
         raise NotCompiled(missing)
     for target in missing:
-        click.echo(f"compiling the FMI runtime for {target}", err=True)
+        say(f"compiling the FMI runtime for {target}")
         compile_runtime([target])
 
 
@@ -248,5 +248,5 @@ def _made(entry: Entry, version: int, make: Callable[..., Path], *, named: bool)
     except NothingToCompare as e:
         if named:
             raise
-        click.echo(f"{e}; it is built without an experiment", err=True)
+        say(f"{e}; it is built without an experiment")
         return make(entry, version, parameter_sets=sets, experiment=None)

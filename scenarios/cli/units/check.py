@@ -70,7 +70,7 @@ def _reports(file: Path, timeout: float) -> Iterable[CheckReport]:
     if is_ssp(str(file)):
         yield from check_ssp(file, timeout)
         return
-    with doing(f"checking {_visible(file.name)}"):
+    with doing(f"checking {file.name}"):
         report = check_fmu(file, timeout)
     yield report
 
@@ -94,7 +94,7 @@ def _check_files_exist(files: Sequence[Path]) -> None:
 
 def _print_report(report: CheckReport) -> None:
     console = open_console()
-    console.print(Text(_visible(str(report.path)), style="bold"), soft_wrap=True)
+    console.print(Text(str(report.path), style="bold"), soft_wrap=True)
     for section in report.sections:
         _print_section(section)
     console.print(_verdict(report), soft_wrap=True)
@@ -103,7 +103,7 @@ def _print_report(report: CheckReport) -> None:
 def _print_section(section: Section) -> None:
     level = section.level.name.lower() if section.reached else "-"
     style = _STYLES[section.level] if section.reached else "dim"
-    line = Text.assemble("  ", (level.ljust(9), style), section.name.ljust(13), _visible(section.summary))
+    line = Text.assemble("  ", (level.ljust(9), style), section.name.ljust(13), section.summary)
     line.rstrip()
     open_console().print(line, soft_wrap=True)
     for wanted in sorted(Level, reverse=True):
@@ -117,9 +117,9 @@ def _print_section(section: Section) -> None:
 
 def _print_finding(finding: Finding, *, named: bool) -> None:
     level = f"{finding.level.name.lower()}: " if named else ""
-    _print_indented("- ", Text(_visible(level + finding.line)), 11)
+    _print_indented("- ", Text(level + finding.line), 11)
     for line in finding.log:
-        _print_indented("| ", Text(_visible(line), style="dim"), 13)
+        _print_indented("| ", Text(line, style="dim"), 13)
 
 
 def _print_indented(mark: str, text: Text, width: int) -> None:
@@ -131,11 +131,6 @@ def _print_indented(mark: str, text: Text, width: int) -> None:
         console.print(row)
     else:
         console.print(Text(" " * width + mark) + text, soft_wrap=True)
-
-
-def _visible(text: str) -> str:
-    """Return a text without control characters, which could steer the terminal: it comes from files of others."""
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text.replace("\t", " "))
 
 
 def _verdict(report: CheckReport) -> Text:

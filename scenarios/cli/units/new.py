@@ -13,6 +13,7 @@ from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.units.place_start import start_for
 from handover.scenarios.execution.errors import UsageError, one_line_errors
+from handover.scenarios.execution.progress import say
 from handover.scenarios.results.run_folder import check_place, disk_errors_reported
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -67,7 +68,7 @@ def new(kind: str, name: str, out: Path, place: str | None) -> None:
         scenario, _, taken = place.rpartition(":")
         what = f"handover run {scenario} --unit {taken}={path}"
     bring = "" if find_spec("pytest") else "python -m pip install pytest, then "
-    click.echo(f"try: {what}; its test: {bring}python -m pytest test_{module}.py", err=True)
+    say(f"try: {what}; its test: {bring}python -m pytest test_{module}.py")
 
 
 def _names(name: str) -> tuple[str, str]:

@@ -15,6 +15,8 @@ from handover.fmus.build import build_block, cached
 from handover.fmus.catalog import UNITS
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import main
+from handover.scenarios.cli.console import open_console, print_rows
+from handover.scenarios.execution.progress import say
 
 
 def call(*arguments: str | Path) -> Result:
@@ -36,6 +38,15 @@ def test_list_names_robots_scenarios_and_units():
         assert title in shown
     for name in (*SCENARIOS, *UNITS):
         assert name in shown.split()
+
+
+def test_what_others_have_written_does_not_steer_the_terminal(capsys: pytest.CaptureFixture[str]):
+    escapes = "\x1b[31m\x1b]0;x\x07\u202e"
+    say(escapes)
+    print_rows(open_console(), [("name", escapes)])
+    shown = call("report", f"no{escapes}").output + "".join(capsys.readouterr())
+    assert shown.count("[31m") == 3
+    assert not set(escapes) & set(shown) - set("[31m]0;x")
 
 
 def test_list_of_a_scenario_shows_ranges_and_units():
