@@ -6,9 +6,13 @@ installed, a process would take the clone's modules, and the one that started it
 which this process imports are handed over, and nothing is imported before they are set.
 """
 
+import functools
 import os
+import site
 import sys
+import sysconfig
 from collections.abc import Sequence
+from pathlib import Path
 
 _MODULE = "import runpy; runpy.run_module(sys.argv.pop(1), None, '__main__', True)"
 _CODE = "import sys; sys.path[:] = {path!r}; {code}"
@@ -45,3 +49,18 @@ def import_path() -> list[str]:
 def without_safe_path() -> dict[str, str]:
     """Return the environment of a process that runs other people's code, without `SAFE_PATH` where we have set it."""
     return {name: value for name, value in os.environ.items() if (name, value) not in SAFE_PATH.items()}
+
+
+def is_installed(path: Path) -> bool:
+    """Return whether a file or folder lies where installers of this interpreter put packages.
+
+    Another folder named `site-packages`, as in an archive of somebody else, is no such place.
+    """
+    return any(path.absolute().is_relative_to(folder) for folder in _installed_folders())
+
+
+@functools.cache
+def _installed_folders() -> frozenset[Path]:
+    folders = {sysconfig.get_path(name) for name in ("purelib", "platlib")} | {*site.getsitepackages()}
+    folders |= {site.getusersitepackages()} if site.ENABLE_USER_SITE else set()
+    return frozenset(Path(folder) for folder in folders)

@@ -17,6 +17,7 @@ from typing import Any, cast
 
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.exceptions import one_line
+from handover.cosim.python_process import is_installed
 from handover.fmus.catalog import UNITS, UnknownBlock, UnknownUnit, find_unit, import_class
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.places import Place
@@ -406,8 +407,7 @@ def import_from_source(folder: Path | str) -> None:
 
 def _is_from_source(path: str) -> bool:
     place = Path(path).absolute()
-    installed = {"site-packages", "dist-packages"} & set(place.parts)
-    return not installed and any(place.is_relative_to(folder) for folder in _FROM_SOURCE)
+    return not is_installed(place) and any(place.is_relative_to(folder) for folder in _FROM_SOURCE)
 
 
 def _finder_of_source(path: str) -> FileFinder:
@@ -429,5 +429,4 @@ def _folder_of(scenario: type[Any]) -> str:
     """Return the folder from which a class's module was imported, "" if that is where packages are installed."""
     file = Path(inspect.getfile(scenario)).absolute()
     depth = scenario.__module__.count(".") + (file.name == "__init__.py")
-    is_installed = {"site-packages", "dist-packages"} & set(file.parts)
-    return "" if is_installed else str(file.parents[depth])
+    return "" if is_installed(file) else str(file.parents[depth])

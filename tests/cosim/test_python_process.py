@@ -1,12 +1,13 @@
 import json
 import subprocess
 import sys
+import sysconfig
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
-from handover.cosim.python_process import code_command, module_command
+from handover.cosim.python_process import code_command, is_installed, module_command
 
 IMPORTED = "import json, sys; import handover.cosim; print(json.dumps([handover.cosim.__file__, *sys.argv[1:]]))"
 
@@ -88,3 +89,8 @@ def test_folders_of_own_modules_come_last_and_only_where_one_is_named(planted: P
     with pytest.raises(UsageError, match="rename that"):
         find_scenario("json:Scene")
     assert not (planted / "run.txt").exists()
+
+
+def test_installed_is_what_lies_in_folders_of_this_interpreter(tmp_path: Path):
+    assert is_installed(Path(sysconfig.get_path("purelib"), "numpy", "__init__.py"))
+    assert not is_installed(tmp_path / "lib" / "python3.11" / "site-packages" / "numpy.py")
