@@ -158,6 +158,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
     }
     unfinished = _unfinished(path)
     try:
+        unfinished.unlink(missing_ok=True)  # a link in a folder of somebody else would have another file written
         with open(unfinished, "wb") as file:
             with zipfile.ZipFile(file, "w") as archive:
                 archive.writestr("checkpoint.json", json.dumps(header))

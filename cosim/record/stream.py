@@ -163,6 +163,7 @@ def finish_record(path: Path, formats: Sequence[str], batches: Batches) -> int:
     for name in dict.fromkeys(("parquet", *formats)):
         made = path if name == "parquet" else path.with_suffix(f".{name}")
         unfinished = made.with_name(made.name + ".part")
+        unfinished.unlink(missing_ok=True)  # a link in a folder of somebody else would have another file written
         try:
             RECORD_FORMATS[name](unfinished, schema, batches())
             os.replace(unfinished, made)
@@ -185,7 +186,9 @@ def rewind_stream(path: Path, schema: "pa.Schema", rows: int) -> int:
     if not present.equals(schema, check_metadata=True):
         raise OSError(f"{source} has other columns than this run records")
     batches = stream_batches(stream) if source == stream else pq.ParquetFile(path).iter_batches()
-    rewound = RecordStream(stream.with_name(stream.name + ".part"), schema)
+    unfinished = stream.with_name(stream.name + ".part")
+    unfinished.unlink(missing_ok=True)  # it may be a link to another file
+    rewound = RecordStream(unfinished, schema)
     left = rows
     try:
         for batch in batches:

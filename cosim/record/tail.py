@@ -98,6 +98,8 @@ class RecordBlock:
         size = _aligned(_aligned(HEADER.itemsize + len(layout)) + 8 * capacity)
         for a in sources:
             size = _aligned(size + a.itemsize * len(a) * capacity)
+        if path.is_symlink():  # in a folder of somebody else it would have another file written
+            path.unlink()
         handle = open(path, "a+b")  # noqa: SIM115 (kept open: it carries the lock)
         try:
             lock_file(handle)

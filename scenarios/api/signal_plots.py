@@ -4,7 +4,6 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from handover.cosim.exceptions import nearest
 from handover.scenarios.api.signals import SignalTable
 from handover.scenarios.experiment.display_unit import unit_symbol
-from handover.scenarios.experiment.plotting import STYLE, draw_time_plot
+from handover.scenarios.experiment.plotting import draw_time_plot, own_style
 from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimePlot
 from handover.scenarios.results.run_facts import elements_of
 
@@ -48,7 +47,7 @@ def plot_signals(signals: SignalTable, names: Sequence[str], axes: Axes | None =
         raise KeyError("; ".join(f"no signal {n!r}: {nearest(n, signals)}" for n in unknown))
     if axes is not None and len(names) > 1:
         raise ValueError(f"{len(names)} signals for one pair of axes; one is right")
-    with mpl.rc_context(STYLE):
+    with own_style():
         if axes is not None:
             _draw(axes, signals, names[0])
             axes.set_xlabel("time (s)")

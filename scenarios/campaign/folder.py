@@ -6,7 +6,6 @@ to resume where the command names none.
 
 import contextlib
 import json
-import os
 import platform
 import shutil
 from collections.abc import Callable, Generator, Mapping
@@ -32,6 +31,7 @@ from handover.scenarios.results.run_folder import (
     folder_claimed,
     folder_held,
     read_object,
+    replacing,
     sha256_of,
     write_whole,
 )
@@ -211,6 +211,9 @@ class CampaignFolder:
 
     def _check_names(self, plan: CampaignPlan) -> None:
         """Check that no folder stands where a file is to be, and no file where a folder."""
+        if links := [p for p in (self.runs, self.fmus) if p.is_symlink()]:
+            fault = f"{links[0].name} is a link, which may lead anywhere; put its folder here"
+            raise InvalidRunFolder(self.path, fault)
         folders = [p for p in (self.table, self.report) if p.is_dir()]
         files = [p for p in (self.runs, *(self.runs / run.name for run in plan.runs())) if p.is_file()]
         if folders or files:
@@ -266,13 +269,8 @@ class CampaignFolder:
         ambiguous = len({sha256_of(other) for other in namesakes}) > 1
         copy = self.fmus.absolute() / (safe_name(f"{unit}_{file.name}") if ambiguous else file.name)
         if not copy.is_file() or sha256_of(copy) != sha256_of(file):
-            unfinished = copy.with_name(copy.name + ".part")
-            try:
+            with replacing(copy) as unfinished:
                 shutil.copyfile(file, unfinished)
-                os.replace(unfinished, copy)
-            except OSError:
-                unfinished.unlink(missing_ok=True)
-                raise
         return copy
 
     def _remove_unfinished(self) -> None:

@@ -32,6 +32,7 @@ from handover.scenarios.published.published_experiment import (
 )
 from handover.scenarios.reporting.page import Section, write_page
 from handover.scenarios.results.run_folder import InvalidRunFolder, disk_errors_reported
+from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
 _MAX_VALUES = 10
 
@@ -124,8 +125,10 @@ def read_claims(folder: CampaignFolder) -> Sequence[Claim]:
         raise InvalidRunFolder(folder.path, fault) from e
 
 
-def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> None:
+def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> list[str]:
     """Write a campaign's, or a paper's, page; the campaign need not be complete, and nothing else is written.
+
+    Returns what could not be drawn, a line each.
 
     Args:
         folder: the campaign's.
@@ -135,12 +138,18 @@ def write_campaign_page(folder: CampaignFolder, file: Path | None = None) -> Non
         InvalidRunFolder: it is not the folder of a campaign, or damaged; nothing is written.
         RecordNotWritten: the disk is full.
     """
+    faults = ToleratedFaults(KeyError)
     with scratch_folder("figures") as figures:
-        _write(folder, read_results(folder), read_claims(folder), None, figures, file)
+        _write(folder, read_results(folder), read_claims(folder), None, figures, file, faults)
+    return faults.lines
 
 
-def write_campaign_report(folder: CampaignFolder, file: Path | None = None, paper: PaperResults | None = None) -> None:
+def write_campaign_report(
+    folder: CampaignFolder, file: Path | None = None, paper: PaperResults | None = None
+) -> list[str]:
     """Write the page, and the figures of the campaign and of its paper into `figures/`.
+
+    Returns what could not be drawn, a line each.
 
     Args:
         folder: the campaign's.
@@ -152,9 +161,11 @@ def write_campaign_report(folder: CampaignFolder, file: Path | None = None, pape
     """
     results = read_results(folder)
     claims, tables = (read_claims(folder), None) if paper is None else (paper.claims, paper.tables)
+    faults = ToleratedFaults(KeyError)
     with disk_errors_reported(folder.figures):
-        draw_campaign(results, folder.figures)
-    _write(folder, results, claims, tables, folder.figures, file)
+        draw_campaign(results, folder.figures, faults)
+    _write(folder, results, claims, tables, folder.figures, file, faults)
+    return faults.lines
 
 
 def _write(
@@ -164,13 +175,15 @@ def _write(
     tables: Sequence[ComparisonTable] | None,
     figures: Path,
     file: Path | None,
+    faults: ToleratedFaults,
 ) -> None:
     """Write the page; a paper's figures are drawn into a folder, and its tables are made unless they are given."""
     experiment_type = EXPERIMENTS.get(str(results.metadata.get("experiment", "")))
     experiment = None if experiment_type is None else experiment_type()
     sections: list[Section | None] = [claims_section(claims)]
     if experiment is not None and results.points:
-        sections += _published(experiment, tables, results, folder.runs, figures)
+        with faults.tolerated("what the paper has published could not be shown"):
+            sections += _published(experiment, tables, results, folder.runs, figures)
     layout = layout_of(results) if results.points else None
     if layout is not None and layout.fits_a_page:
         sections += [success_section(results, layout), spread_section(results, layout)]

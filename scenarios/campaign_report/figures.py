@@ -9,12 +9,15 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from handover.cosim.blocks.ports import Floats
+from handover.scenarios.campaign.plan import safe_name
 from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.campaign.statistics import Interval
 from handover.scenarios.campaign_report.point_layout import PointLayout, layout_of
 from handover.scenarios.experiment.display_unit import DisplayUnit, display_unit
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.plotting import COLOURS, figure
+from handover.scenarios.results.run_folder import folder_within
+from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
 _LINE = 0.24
 """Height of a row where points are a list, in inches."""
@@ -35,14 +38,18 @@ _MAX_ENTRIES = 80
 _LETTERS_ALONG = 60  # that fit along a horizontal axis
 
 
-def draw_campaign(results: CampaignResults, folder: Path, layout: PointLayout | None = None) -> list[Figure]:
+def draw_campaign(
+    results: CampaignResults, folder: Path, faults: ToleratedFaults, layout: PointLayout | None = None
+) -> list[Figure]:
     """Draw success rates and the first metrics of the headline into a folder, as PNG and SVG.
 
     Draws nothing if no run is done, or if the points are more than a figure has room for.
+    What cannot be drawn is noted in `faults`; the other figures are drawn.
 
     Args:
         results: what is drawn.
         folder: where the figures go; it is made if it is not there.
+        faults: takes a line for each figure that cannot be drawn.
         layout: where the points stand; by default as `layout_of` lays them out.
     """
     if not results.done:
@@ -50,9 +57,14 @@ def draw_campaign(results: CampaignResults, folder: Path, layout: PointLayout | 
     layout = layout or layout_of(results)
     if layout.listed and len(results.points) > _MAX_ENTRIES:
         return []
-    folder.mkdir(parents=True, exist_ok=True)
-    metrics = results.shown_metrics
-    return [_success(results, layout, folder), *(_metric(results, layout, name, folder) for name in metrics)]
+    folder_within(folder)
+    drawn: list[Figure] = []
+    with faults.tolerated("figure success_by_point could not be drawn"):
+        drawn.append(_success(results, layout, folder))
+    for name in results.shown_metrics:
+        with faults.tolerated(f"figure {name}_by_point could not be drawn"):
+            drawn.append(_metric(results, layout, name, folder))
+    return drawn
 
 
 def _success(results: CampaignResults, layout: PointLayout, folder: Path) -> Figure:
@@ -77,7 +89,8 @@ def _metric(results: CampaignResults, layout: PointLayout, name: str, folder: Pa
     column, success = results.table.column(name), results.table.column("success")
     unit = display_unit(results.table.unit(name), column)
     words = name.replace("_", " ")
-    with figure(folder / f"{name}_by_point", 1, size=_size(layout)) as [axes]:
+    file = safe_name(f"{name}_by_point")
+    with figure(folder / file, 1, size=_size(layout)) as [axes]:
         for k, point in enumerate(results.points):
             values, colour = column[point.rows] * unit.factor, COLOURS[layout.groups[k]]
             succeeded = np.array([success[row] is True for row in point.rows])
@@ -94,7 +107,7 @@ def _metric(results: CampaignResults, layout: PointLayout, name: str, folder: Pa
         f"{description[0].upper()}{description[1:]}: runs that succeeded (discs) and others (crosses); medians of the "
         f"runs done{intervals}."
     )
-    return Figure(f"{name}_by_point", caption)
+    return Figure(file, caption)
 
 
 def _marks(results: CampaignResults, column: Floats) -> list[tuple[str, str, str]]:

@@ -10,7 +10,7 @@ import click
 
 from handover.scenarios.cli.options import trust_option
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
-from handover.scenarios.execution.progress import doing
+from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.results.run_folder import RunFolder, dated_folder
 
 if TYPE_CHECKING:
@@ -87,6 +87,8 @@ def compare(
         folder = folder or RunFolder(opened.enter_context(dated_folder(_PLACE, _stem(comparison))))
         with doing("drawing figures, writing the page"):
             data = write_comparison(comparison, folder.claim(opened))
+    for line in data.get("left_out", ()):
+        say(line)
     if as_json:
         click.echo(json.dumps({"folder": str(folder.shown), **data}, indent=2, allow_nan=False))
         return

@@ -17,7 +17,7 @@ from handover.scenarios.cli.campaign import CampaignOutcome, pool_config, run_ca
 from handover.scenarios.cli.console import open_console
 from handover.scenarios.cli.options import SEED, HeadedCommand, campaign_options
 from handover.scenarios.execution.errors import UsageError, require_extra
-from handover.scenarios.execution.progress import doing
+from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.results.run_folder import InvalidRunFolder
 
 if TYPE_CHECKING:
@@ -109,7 +109,8 @@ class _Finish:
         print_results(self._experiment, results, table, folder)
         if self._report and not folder.is_reported:
             with doing("drawing figures, writing the report"):
-                write_campaign_report(folder, paper=results)
+                for line in write_campaign_report(folder, paper=results):
+                    say(line)
         else:
             with doing("drawing figures"):
                 draw_figures(self._experiment, table, folder.runs, folder.figures)

@@ -7,7 +7,7 @@ import click
 from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.cli.options import trust_option
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
-from handover.scenarios.execution.progress import doing
+from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, check_place
 
 _HELP = """Write the page of the run or campaign in DIR again: one HTML file that opens offline.
@@ -60,7 +60,8 @@ def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool, runs
     rebuild_table(campaign)
     if runs:
         _write_of_runs(campaign)
-    (write_campaign_report if figures else write_campaign_page)(campaign, page)
+    for line in (write_campaign_report if figures else write_campaign_page)(campaign, page):
+        say(line)
 
 
 def _write_of_runs(campaign: CampaignFolder) -> None:
@@ -74,7 +75,7 @@ def _write_of_runs(campaign: CampaignFolder) -> None:
         try:
             _write_of_run(run, run.report, figures=False)
         except InvalidRunFolder as e:
-            click.echo(f"{name}: {e}", err=True)
+            say(f"{name}: {e}")
 
 
 def _write_of_run(run: RunFolder, page: Path, figures: bool) -> None:
@@ -88,4 +89,4 @@ def _write_of_run(run: RunFolder, page: Path, figures: bool) -> None:
         complete_signals(run)
         faults = draw_run(run) if figures else []
         for line in [*faults, *write_run_page(run, page)]:
-            click.echo(line, err=True)
+            say(line)

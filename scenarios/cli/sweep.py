@@ -27,7 +27,7 @@ from handover.scenarios.cli.options import (
 )
 from handover.scenarios.cli.run import file_options, recorded_option
 from handover.scenarios.execution.errors import one_line_errors, require_extra
-from handover.scenarios.execution.progress import doing
+from handover.scenarios.execution.progress import doing, say
 from handover.scenarios.execution.request import RunRequest, experiment_type
 
 _HELP = """Run a SCENARIO, SSP or FMU many times: all combinations of the given values, each --repeat times.
@@ -166,7 +166,8 @@ def _finish(outcome: CampaignOutcome, *, as_json: bool, report: bool) -> None:
         with doing("drawing figures, writing the report"):
             from handover.scenarios.campaign_report.campaign_page import write_campaign_report  # takes long to load
 
-            write_campaign_report(folder)
+            for line in write_campaign_report(folder):
+                say(line)
     if as_json:
         click.echo(json.dumps(campaign_data(results, outcome.counts, folder), indent=2, allow_nan=False))
     else:

@@ -37,6 +37,7 @@ from handover.scenarios.experiment.time_plot import TimeFigure
 from handover.scenarios.reporting.page import Section, write_page
 from handover.scenarios.reporting.time_plots import time_plots_section
 from handover.scenarios.results.run_folder import RunFolder, disk_errors_reported, write_whole
+from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
 
 @dataclass(frozen=True)
@@ -61,9 +62,9 @@ class CampaignComparison:
         """Its table of points."""
         return campaigns_csv(self.results)
 
-    def draw(self, folder: Path) -> Sequence[Figure]:
+    def draw(self, folder: Path, faults: ToleratedFaults) -> Sequence[Figure]:
         """Draw its figures for papers into a folder."""
-        return draw_campaign(self.results, folder, self.results.layout) if self.results.points else ()
+        return draw_campaign(self.results, folder, faults, self.results.layout) if self.results.points else ()
 
     def sections(self, page: Path, figures: Sequence[Figure]) -> Sequence[Section | None]:
         """Return the sections of its page."""
@@ -108,7 +109,7 @@ class RunComparison:
         """Its table of metrics."""
         return runs_csv(self.entries, self.metrics)
 
-    def draw(self, folder: Path) -> Sequence[Figure]:
+    def draw(self, folder: Path, faults: ToleratedFaults) -> Sequence[Figure]:
         """Draw its figures for papers into a folder."""
         plots = self.overlay.plots
         if not plots:
@@ -116,7 +117,10 @@ class RunComparison:
         names = ", ".join(e.name for e in self.entries)
         caption = f"{'; '.join(p.title for p in plots)}; of {names}."
         folder.mkdir(parents=True, exist_ok=True)
-        return draw_time_figures([TimeFigure(name="curves", caption=caption, plots=plots)], self.overlay.time, folder)
+        with faults.tolerated("figure curves could not be drawn"):
+            spec = TimeFigure(name="curves", caption=caption, plots=plots)
+            return draw_time_figures([spec], self.overlay.time, folder)
+        return ()
 
     def sections(self, page: Path, figures: Sequence[Figure]) -> Sequence[Section | None]:
         """Return the sections of its page."""
@@ -173,14 +177,18 @@ def compare(
 def write_comparison(comparison: Comparison, folder: RunFolder) -> dict[str, Any]:
     """Write page, table, data and figures into a new folder, and return what `comparison.json` holds.
 
+    Figures that cannot be drawn are named in its `left_out`, a line each.
+
     Raises:
         InvalidRunFolder: it cannot be made.
         RecordNotWritten: the disk is full.
     """
     folder.make()
+    faults = ToleratedFaults()
     with disk_errors_reported(folder.figures):
-        figures = comparison.draw(folder.figures)
-    data = {**comparison.data, "figures": [f"figures/{f.name}.{end}" for f in figures for end in ("png", "svg")]}
+        figures = comparison.draw(folder.figures, faults)
+    drawn = [f"figures/{f.name}.{end}" for f in figures for end in ("png", "svg")]
+    data = {**comparison.data, "figures": drawn, **({"left_out": faults.lines} if faults.lines else {})}
     write_whole(folder.path / "comparison.json", json.dumps(data, indent=2, allow_nan=False) + "\n")
     write_whole(folder.path / "comparison.csv", comparison.csv)
     entries: Sequence[Entry] = comparison.entries

@@ -46,6 +46,15 @@ _LETTER, _UPRIGHT = 5.2, 8.5
 
 
 @contextmanager
+def own_style() -> Generator[None, None, None]:
+    """Draw in `STYLE` alone: a `matplotlibrc` of the working directory, or a user's, has no part in it."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        yield
+
+
+@contextmanager
 def figure(
     path: Path,
     rows: int,
@@ -58,7 +67,7 @@ def figure(
     `path` is without suffix, `size` in inches; `heights` are the rows' relative heights. pyplot, which holds what a
     user's own program draws, is left alone.
     """
-    with mpl.rc_context(STYLE):
+    with own_style():
         canvas = Canvas(figsize=size)
         FigureCanvasAgg(canvas)  # draws it to memory
         axes: Any = canvas.subplots(rows, columns, squeeze=False, height_ratios=heights)
@@ -233,5 +242,6 @@ def _canvas(axes: Axes) -> Canvas:
 
 
 def _save(canvas: Canvas, path: Path) -> None:
-    canvas.savefig(path.with_suffix(".png"), metadata={"Software": None})
-    canvas.savefig(path.with_suffix(".svg"), metadata={"Date": None})
+    for file, metadata in ((path.with_suffix(".png"), {"Software": None}), (path.with_suffix(".svg"), {"Date": None})):
+        file.unlink(missing_ok=True)  # a link in a folder of somebody else would have another file written
+        canvas.savefig(file, metadata=metadata)

@@ -17,7 +17,7 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.experiment.display_unit import DisplayUnit, display_unit
 from handover.scenarios.experiment.experiment import Figure
-from handover.scenarios.results.run_folder import disk_errors_reported, write_whole
+from handover.scenarios.results.run_folder import disk_errors_reported, folder_within, write_whole
 
 
 class Verdict(str, enum.Enum):
@@ -223,5 +223,4 @@ def draw_figures(experiment: PublishedExperiment, table: CampaignTable, runs: Pa
         RecordNotWritten: the disk is full.
     """
     with disk_errors_reported(folder):
-        folder.mkdir(exist_ok=True)
-        return experiment.draw(table, runs, folder)
+        return experiment.draw(table, runs, folder_within(folder))

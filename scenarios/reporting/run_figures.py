@@ -19,7 +19,7 @@ from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimeFigure, 
 from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.pictures import read_picture_files
 from handover.scenarios.results.run_facts import RunFacts, record_of
-from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, disk_errors_reported
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, disk_errors_reported, folder_within
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
 _MAX_SIGNALS = 6
@@ -61,9 +61,9 @@ def draw_run(folder: RunFolder) -> list[str]:
     unfinished, faults = folder.path / "figures.part", ToleratedFaults(InvalidParameter, KeyError)
     with disk_errors_reported(folder.figures):
         try:
-            unfinished.mkdir(exist_ok=True)
+            folder_within(unfinished)
             _draw_record(facts, record, unfinished, faults)
-            folder.figures.mkdir(exist_ok=True)
+            folder_within(folder.figures)
             for file in unfinished.iterdir():
                 os.replace(file, folder.figures / file.name)
         finally:

@@ -152,7 +152,7 @@ class RunFolder:
         with disk_errors_reported(self.report):
             self.report.unlink(missing_ok=True)
             shutil.rmtree(self.figures, ignore_errors=True)
-            self.figures.mkdir(exist_ok=True)
+            folder_within(self.figures)
 
     @contextlib.contextmanager
     def held(self) -> Generator[None, None, None]:
@@ -292,6 +292,20 @@ def replacing(path: Path) -> Generator[Path, None, None]:
         with contextlib.suppress(OSError):
             unfinished.unlink(missing_ok=True)
         raise
+
+
+def folder_within(path: Path) -> Path:
+    """Make a folder in that of a run or a campaign, unless it is there, and return it; a link there is replaced.
+
+    A link in a folder of somebody else would have files written somewhere else.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    if path.is_symlink():
+        path.unlink()
+    path.mkdir(exist_ok=True)
+    return path
 
 
 @contextlib.contextmanager
