@@ -1,5 +1,6 @@
 """One FMU as an experiment: it runs alone until its stop time, its inputs constant at their start or from a file."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -23,7 +24,7 @@ from handover.scenarios.results.run_folder import sha256_of
 
 def is_fmu(name: str) -> bool:
     """Return whether a name is an FMU's file, or the folder of an unpacked one, and not a scenario."""
-    return Path(name).suffix.lower() == ".fmu" or (Path(name) / DESCRIPTION).is_file()
+    return Path(name).suffix.lower() == ".fmu" or os.path.isfile(Path(name) / DESCRIPTION)
 
 
 class FmuParameters(SettableParameters):

@@ -1,6 +1,7 @@
 """An SSP as an experiment: it runs until its stop time, and its outputs are drawn."""
 
 import contextlib
+import os
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -23,7 +24,7 @@ ENDLESS = Fraction(10**6)
 
 def is_ssp(name: str) -> bool:
     """Return whether a name is an SSP's file, its `.ssd` or its unpacked folder, and not a scenario."""
-    return Path(name).suffix.lower() in (".ssp", ".ssd") or (Path(name) / STRUCTURE).is_file()
+    return Path(name).suffix.lower() in (".ssp", ".ssd") or os.path.isfile(Path(name) / STRUCTURE)
 
 
 class SspParameters(SettableParameters):

@@ -26,6 +26,7 @@ from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.scenarios.cli.command import main
 from handover.scenarios.execution.file_experiment import UntilStop
+from handover.scenarios.execution.request import is_file
 from handover.scenarios.execution.ssp_run import naming_step, open_experiment
 from handover.scenarios.results.run_folder import sha256_of
 
@@ -513,3 +514,8 @@ def test_a_path_where_nothing_is_is_told_as_that(
     assert result.exit_code == 2
     assert result.output.startswith(f"Error: {name}: {wanted}")
     assert "ir_grasp" not in result.output
+
+
+def test_no_name_is_too_long_to_be_no_files():
+    assert not is_file("A" * 300_000)
+    assert not is_file("a\0b")
