@@ -1,24 +1,26 @@
 """The plan of a user study, PLAN.toml: tasks, behaviours, rounds, statements, questions, and all that people read.
 
 `handover study new` writes one that is the thesis's study, [Fernandes2020] ch. 5. A plan is checked whole before
-anything starts: every fault of it is told at once.
+anything starts: all faults of types and ranges are reported at once, then all of what does not fit together.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, cast
 
+import msgspec
 import tomli
+from msgspec import Meta, Struct
 
 from handover.cosim.exceptions import nearest, one_line
 from handover.cosim.files import read_regular
+from handover.cosim.typed_data import Name, Text, all_faults, checked, unknown_names
 from handover.scenarios.catalog import SCENARIOS, InvalidScenario, installed_scenarios, named_scenario
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.experiment.parameters import InvalidParameter, parse_parameters
-from handover.scenarios.study.plan.plan_table import PlanTable
 
 DEVICES: Mapping[str, str] = {
     "mouse": "mouse and keyboard",
@@ -36,8 +38,6 @@ SCRIPT = "script"
 """The device of a scripted pilot."""
 WEBCAM = "webcam"
 """The device that is offered only where the lab gives the files that find a hand in pictures."""
-
-_CHOICE, _TEXT = "choice", "text"
 
 
 class InvalidPlan(ValueError):
@@ -69,21 +69,21 @@ class Condition:
         return [f"{name}={text}" for name, text in self.parameters.items()]
 
 
-@dataclass(frozen=True)
-class Question:
+class Question(Struct, frozen=True, forbid_unknown_fields=True):
     """A question after the last round.
 
     Attributes:
         name: its column in `questionnaire.csv`.
+        kind: whether one of `choices` is the answer, or any text.
         choices: what can be answered, as it is kept in all languages; empty: any text.
     """
 
-    name: str
-    choices: Sequence[str]
+    name: Text
+    kind: Literal["choice", "text"]
+    choices: list[Text] = []
 
 
-@dataclass(frozen=True, kw_only=True)
-class StudyText:
+class StudyText(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """All that people read, in one language.
 
     Attributes:
@@ -97,19 +97,49 @@ class StudyText:
         choices: of each question that has them, in the order of the plan.
     """
 
-    language: str
-    welcome: str
-    consent: str
-    eligibility: Sequence[str]
-    practice: str
-    task_names: Mapping[str, str]
-    instructions: Mapping[str, str]
-    statements: Mapping[str, str]
-    lowest: str
-    highest: str
-    questions: Mapping[str, str]
-    choices: Mapping[str, Sequence[str]]
-    thanks: str
+    language: Text
+    welcome: Text
+    consent: Text
+    eligibility: list[Text]
+    practice: Text
+    task_names: dict[str, Text]
+    instructions: dict[str, Text]
+    statements: dict[str, Text]
+    lowest: Text
+    highest: Text
+    questions: dict[str, Text] = {}
+    choices: dict[str, list[Text]] = {}
+    thanks: Text
+
+
+_Value = str | int | float | bool
+_Parameters = dict[str, _Value | list[_Value]]
+_Rating = Annotated[int, Meta(ge=0, le=100)]
+
+
+class _Scale(Struct, forbid_unknown_fields=True):
+    lowest: _Rating
+    highest: _Rating
+
+
+class _Plan(Struct, kw_only=True, forbid_unknown_fields=True):
+    """The tables and keys of PLAN.toml; those of a task have the behaviours' names, too."""
+
+    title: Text
+    pilot: bool = False
+    seed: Annotated[int, Meta(ge=0, le=2**31 - 1)]
+    participants: Annotated[int, Meta(ge=1, le=999)]
+    repetitions: Annotated[int, Meta(ge=1, le=20)]
+    practice: Annotated[float, Meta(ge=0.0, le=7200.0)]
+    latency_limit: Annotated[float, Meta(ge=1.0, le=10000.0)]
+    devices: Annotated[list[Text], Meta(min_length=1)]
+    scale: _Scale
+    parameters: _Parameters = {}
+    tasks: dict[Name, dict[str, Any]]
+    behaviours: dict[Name, _Parameters]
+    statements: Annotated[list[Text], Meta(min_length=1)]
+    questions: list[Question] = []
+    text: dict[Name, StudyText]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,108 +234,128 @@ def parse_plan(text: str, path: Path | str = "plan") -> StudyPlan:
         content = tomli.loads(text)
     except (ValueError, RecursionError) as e:
         raise InvalidPlan(path, [f"it is not TOML: {one_line(e)}"]) from e
-    plan = PlanTable("", content, [])
-    found = _plan_of(plan, text)
-    plan.check_names()
-    if plan.faults:
-        raise InvalidPlan(path, plan.faults)
-    return found
-
-
-def _plan_of(plan: PlanTable, source: str) -> StudyPlan:
-    pilot = plan.flag("pilot", default=False)
-    statements = plan.texts("statements")
-    questions = [_question(table) for table in plan.list_of_tables("questions")]
-    tasks, behaviours, conditions = _conditions(plan)
-    texts_of = plan.table("text")
-    languages = texts_of.tables()
-    if not languages:
-        plan.faults.append("text: it needs a table for each language, such as [text.en]")
-    texts = {name: _text(table, tasks, statements, questions) for name, table in languages.items()}
-    for kind, names in (("statements", statements), ("questions", [q.name for q in questions])):
-        if len(set(names)) < len(names):
-            plan.faults.append(f"{kind}: a name is given twice")
+    content = _stripped(content)
+    if faults := list(all_faults(content, _Plan)):
+        raise InvalidPlan(path, faults)
+    plan = checked(content, _Plan)
+    conditions = _conditions(plan, faults)
+    faults += _faults(plan)
+    if faults:
+        raise InvalidPlan(path, faults)
+    rigid, compliant = plan.behaviours
     return StudyPlan(
-        title=plan.text("title"),
-        pilot=pilot,
-        seed=plan.whole("seed", 0, 2**31 - 1),
-        participants=plan.whole("participants", 1, 999),
-        repetitions=plan.whole("repetitions", 1, 20),
-        practice=plan.number("practice", 0.0, 7200.0),
-        latency_limit=plan.number("latency_limit", 1.0, 10000.0),
-        devices=_devices(plan, pilot),
-        scale=_scale(plan),
-        tasks=tasks,
-        behaviours=(behaviours[0], behaviours[1]) if len(behaviours) == 2 else ("", ""),
+        title=plan.title,
+        pilot=plan.pilot,
+        seed=plan.seed,
+        participants=plan.participants,
+        repetitions=plan.repetitions,
+        practice=plan.practice,
+        latency_limit=plan.latency_limit,
+        devices=plan.devices,
+        scale=(plan.scale.lowest, plan.scale.highest),
+        tasks=list(plan.tasks),
+        behaviours=(rigid, compliant),
         conditions=conditions,
-        statements=statements,
-        questions=questions,
-        texts=texts,
-        source=source,
+        statements=plan.statements,
+        questions=plan.questions,
+        texts=plan.text,
+        source=text,
     )
 
 
-def _devices(plan: PlanTable, pilot: bool) -> Sequence[str]:
-    devices = plan.texts("devices")
-    for name in devices:
+def _stripped(content: Any) -> Any:
+    """Return TOML's data with texts without blanks around them."""
+    if isinstance(content, dict):
+        return {name: _stripped(value) for name, value in cast(dict[str, Any], content).items()}
+    if isinstance(content, list):
+        return [_stripped(value) for value in cast(list[Any], content)]
+    return content.strip() if isinstance(content, str) else content
+
+
+def _faults(plan: _Plan) -> Iterator[str]:
+    """Yield what is wrong with values of a plan together."""
+    for name in plan.devices:
         if name not in DEVICES:
-            plan.faults.append(f"devices: no device {name!r}; {nearest(name, DEVICES)}")
-    if "script" in devices and not pilot:
-        plan.faults.append("devices: 'script' is no person's; pilot = true is of scripted pilots")
-    return devices
+            yield f"devices: no device {name!r}; {nearest(name, DEVICES)}"
+    if SCRIPT in plan.devices and not plan.pilot:
+        yield "devices: 'script' is no person's; pilot = true is of scripted pilots"
+    if plan.scale.highest <= plan.scale.lowest:
+        yield f"scale: its highest, {plan.scale.highest}, is not above its lowest, {plan.scale.lowest}"
+    questions = [q.name for q in plan.questions]
+    for kind, names in (("statements", plan.statements), ("questions", questions)):
+        if len(set(names)) < len(names):
+            yield f"{kind}: a name is given twice"
+    for k, question in enumerate(plan.questions, 1):
+        if (question.kind == "choice") is not bool(question.choices):
+            yield f"questions[{k}].choices: {len(question.choices)} given; kind 'choice' has some, 'text' none"
+    if not plan.text:
+        yield "text: it needs a table for each language, such as [text.en]"
+    choices = {q.name: q.choices for q in plan.questions if q.choices}
+    for language, text in plan.text.items():
+        where = f"text.{language}"
+        yield from _names_faults(text.task_names, plan.tasks, f"{where}.task_names")
+        yield from _names_faults(text.instructions, plan.tasks, f"{where}.instructions")
+        yield from _names_faults(text.statements, plan.statements, f"{where}.statements")
+        yield from _names_faults(text.questions, questions, f"{where}.questions")
+        yield from _names_faults(text.choices, choices, f"{where}.choices")
+        for name, words in text.choices.items():
+            if name in choices and len(words) != len(choices[name]):
+                yield f"{where}.choices.{name}: {len(words)} texts for {len(choices[name])} choices"
 
 
-def _scale(plan: PlanTable) -> tuple[int, int]:
-    table = plan.table("scale")
-    lowest, highest = table.whole("lowest", 0, 100), table.whole("highest", 0, 100)
-    if highest <= lowest:
-        plan.faults.append(f"scale: its highest, {highest}, is not above its lowest, {lowest}")
-    return lowest, highest
+def _names_faults(given: Mapping[str, Any], names: Iterable[str], where: str) -> Iterator[str]:
+    yield from (f"{where}.{name}: it is missing; each has a text" for name in names if name not in given)
+    yield from unknown_names(given, dict.fromkeys(names), where)
 
 
-def _question(table: PlanTable) -> Question:
-    name, kind = table.text("name"), table.choice("kind", (_CHOICE, _TEXT))
-    choices = table.texts("choices") if kind == _CHOICE else []
-    return Question(name, choices)
-
-
-def _conditions(plan: PlanTable) -> tuple[list[str], list[str], list[Condition]]:
-    """Return tasks, behaviours, and the conditions, whose parameters their scenarios take."""
-    common = plan.table("parameters", needed=False).parameters()
-    tasks, behaviours = plan.table("tasks").tables(), plan.table("behaviours").tables()
-    if not tasks:
-        plan.faults.append("tasks: it needs one at least, such as [tasks.robot_to_human]")
-    if len(behaviours) != 2:
-        plan.faults.append(
+def _conditions(plan: _Plan, faults: list[str]) -> list[Condition]:
+    """Return the conditions, whose parameters their scenarios take."""
+    if not plan.tasks:
+        faults.append("tasks: it needs one at least, such as [tasks.robot_to_human]")
+    if len(plan.behaviours) != 2:
+        faults.append(
             "behaviours: two are compared, such as [behaviours.rigid] and [behaviours.compliant]; "
-            f"it has {len(behaviours)}"
+            f"it has {len(plan.behaviours)}"
         )
-    if taken := sorted({"scenario", "parameters"} & behaviours.keys()):
-        plan.faults.append(f"behaviours.{taken[0]}: that is what a task's own settings are called; choose another")
-    of_behaviour = {name: table.parameters() for name, table in behaviours.items()}
+    if taken := sorted({"scenario", "parameters"} & plan.behaviours.keys()):
+        faults.append(f"behaviours.{taken[0]}: that is what a task's own settings are called; choose another")
+        return []
+    own = [
+        (name, _Parameters, msgspec.field(default_factory=dict[str, Any])) for name in ("parameters", *plan.behaviours)
+    ]
+    declared = msgspec.defstruct("Task", [("scenario", Text), *own], forbid_unknown_fields=True)
     conditions: list[Condition] = []
-    for task, table in tasks.items():
-        name = table.text("scenario")
-        scenario = _scenario(name, table) if name else None
-        of_task = table.table("parameters", needed=False).parameters()
-        for behaviour, given in of_behaviour.items():
-            own = table.table(behaviour, needed=False).parameters()
-            condition = Condition(task, behaviour, name, {**common, **of_task, **given, **own})
+    for task, table in plan.tasks.items():
+        if wrong := list(all_faults(table, declared, f"tasks.{task}")):
+            faults += wrong
+            continue
+        scenario = _scenario(name := table["scenario"], f"tasks.{task}", faults)
+        for behaviour, given in plan.behaviours.items():
+            tables = (plan.parameters, table.get("parameters", {}), given, table.get(behaviour, {}))
+            texts = {name: _parameter(value) for parameters in tables for name, value in parameters.items()}
+            condition = Condition(task, behaviour, name, texts)
             if scenario is not None:
-                _check_parameters(condition, scenario, plan.faults)
+                _check_parameters(condition, scenario, faults)
             conditions.append(condition)
-    return list(tasks), list(behaviours), conditions
+    return conditions
 
 
-def _scenario(name: str, table: PlanTable) -> type[Experiment[Any]] | None:
+def _parameter(value: _Value | list[_Value]) -> str:
+    """Return a parameter's value as `handover run -p` takes it."""
+    if isinstance(value, list):
+        return ",".join(map(_parameter, value))
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _scenario(name: str, where: str, faults: list[str]) -> type[Experiment[Any]] | None:
     """Return the scenario of a name; no path of a class is taken, whose code would be run as a folder is read."""
     try:
         return named_scenario(name if name in SCENARIOS else installed_scenarios()[name])
     except KeyError:
         known = [*SCENARIOS, *installed_scenarios()]
-        table.faults.append(f"{table.where}.scenario: no scenario {name!r}; {nearest(name, known)}")
+        faults.append(f"{where}.scenario: no scenario {name!r}; {nearest(name, known)}")
     except InvalidScenario as e:
-        table.faults.append(f"{table.where}.scenario: {one_line(e)}")
+        faults.append(f"{where}.scenario: {one_line(e)}")
     return None
 
 
@@ -314,33 +364,3 @@ def _check_parameters(condition: Condition, scenario: type[Experiment[Any]], fau
         parse_parameters(scenario, condition.given)
     except InvalidParameter as e:
         faults += [f"tasks.{condition.task}, {condition.behaviour}: {fault}" for fault in e.faults]
-
-
-def _text(
-    table: PlanTable, tasks: Sequence[str], statements: Sequence[str], questions: Sequence[Question]
-) -> StudyText:
-    names = [q.name for q in questions]
-    choices_of = table.table("choices", needed=any(q.choices for q in questions))
-    choices: dict[str, list[str]] = {}
-    for question in questions:
-        if question.choices:
-            words = choices[question.name] = choices_of.texts(question.name)
-            if words and len(words) != len(question.choices):
-                table.faults.append(
-                    f"{choices_of.where}.{question.name}: {len(words)} texts for {len(question.choices)} choices"
-                )
-    return StudyText(
-        language=table.text("language"),
-        welcome=table.text("welcome"),
-        consent=table.text("consent"),
-        eligibility=table.texts("eligibility", empty=True),
-        practice=table.text("practice"),
-        task_names=table.table("task_names").texts_by_name(tasks),
-        instructions=table.table("instructions").texts_by_name(tasks),
-        statements=table.table("statements").texts_by_name(statements),
-        lowest=table.text("lowest"),
-        highest=table.text("highest"),
-        questions=table.table("questions", needed=bool(names)).texts_by_name(names),
-        choices=choices,
-        thanks=table.text("thanks"),
-    )

@@ -69,13 +69,17 @@ def test_all_faults_are_told_at_once():
     faults = faults_of(
         ("seed = 2020", "sed = 2020"),
         ("practice = 600", 'practice = "long"'),
+        ('kind = "text"', 'kind = "txt"'),
+        ('language = "English"', "language = 1979-05-27"),
+    )
+    together = faults_of(
         ("highest = 9", "highest = 1"),
         ('behaviour = "rigid"', 'behaviour = "rigd"'),
         ('S2 = "I was', 'S22 = "I was'),
         ('"mouse", ', '"mose", '),
-        ('kind = "text"', 'kind = "txt"'),
     )
-    told = "\n".join(faults)
+    assert (len(faults), len(together)) == (5, 7)
+    told = "\n".join(faults + together)
     for part in (
         "sed: no such key; did you mean seed",
         "seed: it is missing; expected a whole number from 0",
@@ -85,6 +89,7 @@ def test_all_faults_are_told_at_once():
         "text.en.statements.S2: it is missing",
         "text.en.statements.S22: no such key; did you mean S2",
         "devices: no device 'mose'; did you mean mouse?",
+        "text.en.language: it is datetime.date(1979, 5, 27); expected a non-empty string",
         "questions[3].kind: it is 'txt'; expected 'choice' or 'text'",
     ):
         assert part in told
@@ -98,14 +103,23 @@ def test_all_faults_are_told_at_once():
         (('["S1", "S2", "S3"]', "[]"), "statements: it is []; expected a list of non-empty strings"),
         (('["S1", "S2", "S3"]', '["S1", "S1"]'), "statements: a name is given twice"),
         (('"gamepad", ', '"script", '), "devices: 'script' is no person's; pilot = true is of scripted pilots"),
-        (("[behaviours.compliant]", "[behaviours.rigid.compliant]"), "behaviours: two are compared"),
+        (("[behaviours.compliant]", "[behaviours.rigid.compliant]"), "behaviours.rigid.compliant: it is {"),
+        (
+            ("[behaviours.compliant]", "[behaviours.soft]\nskill = 1\n[behaviours.compliant]"),
+            "behaviours: two are compared",
+        ),
         (
             ("[behaviours.compliant]", "[behaviours.scenario]"),
             "behaviours.scenario: that is what a task's own",
         ),
-        (("[tasks.human_to_robot]", '[tasks."a b"]'), "tasks.a b: a name has letters, digits and underscores"),
+        (("[tasks.human_to_robot]", '[tasks."a b"]'), "tasks.a b: it is 'a b'; expected a name of letters, digits"),
         (('"not_said"]\n\n[[', '"not_said", "mars"]\n\n[['), "text.en.choices.age_group: 7 texts for 8 choices"),
         (("participants = 18", "participants = nan"), "participants: it is nan; expected a whole number from 1 to 999"),
+        (("practice = 600", "practice = nan"), "practice: it is nan; expected a number from 0 to 7200"),
+        (
+            ("[tasks.human_to_robot]", "[tasks.human_to_robot]\nrigd = {}"),
+            "tasks.human_to_robot.rigd: no such key; did",
+        ),
         (("practice = 600", "practice = inf"), "practice: it is inf; expected a number from 0 to 7200"),
         (('behaviour = "compliant"', 'bahaviour = "compliant"'), "has no parameter 'bahaviour'; did you mean behav"),
         (('S3"]', 'S3"'), "it is not TOML"),
