@@ -66,7 +66,7 @@ def test_all_faults_are_told_at_once_and_nothing_is_written(tmp_path: Path):
     ("subject", "given", "told"),
     [
         ("ir_grap", {}, "no scenario 'ir_grap': did you mean ir_grasp?"),
-        ("ir_grasp", {"step": 3}, "--step is for an SSP or an FMU; a scenario's units have steps of their own"),
+        ("ir_grasp", {"step": 3}, "step is for an SSP or an FMU; a scenario's units have steps of their own"),
         ("ir_grasp", {"units": {"reflexx": "a.fmu"}}, "ir_grasp has no unit 'reflexx': did you mean reflex?"),
         ("ir_grasp", {"algorithm": "jacoby"}, "no algorithm 'jacoby'; did you mean jacobi?"),
         ("ir_grasp", {"seed": -1}, "seed = -1: a whole number from 0 to 9223372036854775807 is right"),
