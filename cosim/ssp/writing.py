@@ -176,11 +176,13 @@ def write_ssp(
     Raises:
         WiringError: the system has faults.
         NotExportable: an array that is one variable is connected to one whose entries are variables, clocks are
-            connected, or an input follows values over time.
+            connected, an input follows values over time, or an FMU is unpacked.
         OSError: the file cannot be written.
     """
     system.check()
-    if faults := [f"{end} follows values over time" for end in system.followed]:
+    faults = [f"{end} follows values over time" for end in system.followed]
+    unpacked = [f"{name}: {u.description.path}" for name, u in system.units.items() if u.description.path.is_dir()]
+    if faults := faults + [f"{what} is an unpacked FMU: zip what is in it to an .fmu" for what in unpacked]:
         raise NotExportable(faults)
     files = _file_names(system)
     version = "1.0" if all(u.description.fmi == 2 for u in system.units.values()) else "2.0"

@@ -18,6 +18,7 @@ from click.core import ParameterSource
 
 from handover.cosim.exceptions import nearest, one_line
 from handover.cosim.files import read_regular
+from handover.cosim.ssp.archive import ssp_root
 from handover.cosim.typed_data import checked, decoded
 from handover.fmus.build import is_of_cache
 from handover.fmus.catalog import UNITS
@@ -26,6 +27,7 @@ from handover.scenarios.cli.master_options import CONTROL_FIELDS
 from handover.scenarios.cli.options import HeadedCommand
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.progress import say
+from handover.scenarios.execution.request import is_file
 from handover.scenarios.execution.selection import is_path_of_class
 from handover.scenarios.results.folder_data import RunData
 from handover.scenarios.results.run_folder import sha256_of, version_differences, versions
@@ -320,11 +322,7 @@ def _own_code(path: Path, run: Mapping[str, Any] | None, subject: str) -> list[s
     if "scenario" not in source:
         if not _is_own(subject):
             return []
-        if (
-            is_path_of_class(subject)
-            or not Path(subject).is_file()
-            or not _is_unchanged(Path(subject), source.get("sha256"))
-        ):
+        if is_path_of_class(subject) or not _is_unchanged(ssp_root(Path(subject)), source.get("sha256")):
             raise UsageError(f"{path}: {subject} is not the file that the run had; {cure}")
         return [f"the units in {subject}"]
     before = ScenarioSource(**source)
@@ -338,7 +336,7 @@ def _own_code(path: Path, run: Mapping[str, Any] | None, subject: str) -> list[s
 
 def _is_own(name: str) -> bool:
     """Return whether what is named runs code that is not this package's: a class by its path, or a file."""
-    return is_path_of_class(name) or (Path(name).suffix.lower() in (".fmu", ".ssp") and not is_of_cache(Path(name)))
+    return is_path_of_class(name) or (is_file(name) and not is_of_cache(Path(name)))
 
 
 def _of_master(master: Mapping[str, Any]) -> dict[str, Any]:
@@ -367,12 +365,12 @@ def _units(path: Path, run: Mapping[str, Any], given: Container[str]) -> list[st
         if name in given:
             continue
         of_cache, unit = is_of_cache(Path(file)), Path(file).name.partition(".")[0]
-        if Path(file).is_file() and _is_unchanged(Path(file), run["units"].get(name, {}).get("sha256")):
+        if _is_unchanged(Path(file), run["units"].get(name, {}).get("sha256")):
             texts.append(f"{name}={Path(file).absolute()}")
         elif of_cache and unit in UNITS:
             texts.append(f"{name}={unit}")
         elif not of_cache or unit != _own_unit(run, name):
-            fault = "is not the file that the run had" if Path(file).is_file() else "is not there"
+            fault = "is not the file that the run had" if Path(file).exists() else "is not there"
             cure = f"--unit {name}=FILE or {name}=MODULE:CLASS gives another"
             raise UsageError(f"{path}: the FMU of its unit {name}, {file}, {fault}; {cure}")
     return texts
@@ -389,4 +387,4 @@ def _own_unit(run: Mapping[str, Any], name: str) -> str:
 
 
 def _is_unchanged(file: Path, sha256: str | None) -> bool:
-    return sha256_of(file) == sha256
+    return file.exists() and sha256_of(file) == sha256

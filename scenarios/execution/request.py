@@ -16,6 +16,7 @@ from typing import Any, cast
 from handover.cosim.stepping.options import MasterOptions
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
+from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.execution.errors import UsageError
 from handover.scenarios.execution.file_experiment import system_experiment
 from handover.scenarios.execution.fmu_run import FmuRun, is_fmu
@@ -208,8 +209,8 @@ def _times_of(experiment: Experiment[Any]) -> tuple[Fraction, Fraction]:
 
 
 def is_file(subject: object) -> bool:
-    """Return whether a subject is the path of an SSP or an FMU."""
-    return isinstance(subject, str) and (is_ssp(subject) or is_fmu(subject))
+    """Return whether a subject is the path of an SSP or an FMU; the name of a scenario is none, whatever lies here."""
+    return isinstance(subject, str) and subject not in SCENARIOS and (is_ssp(subject) or is_fmu(subject))
 
 
 def experiment_type(

@@ -231,6 +231,9 @@ def test_a_run_is_not_repeated_with_other_code_than_it_had(number: int, marker: 
         ({}, "planted.fmu", {}),
         ({"ssp": "foreign_scene:Scene", "sha256": "0", "step": None, "stop": "1"}, "planted", {}),
         ({"fmu": "planted.fmu", "sha256": "0", "step": None, "stop": "1"}, "planted", {}),
+        ({}, "unpacked", {}),
+        ({"fmu": "unpacked", "sha256": "0", "step": None, "stop": "1"}, "planted", {}),
+        ({"ssp": "planted.ssd", "sha256": "0", "step": None, "stop": "1"}, "planted", {}),
         ({}, "ir_grasp", {"scene": "foreign_scene:Scene"}),
         ({}, "ir_grasp", {"scene": "planted.fmu"}),
     ],
@@ -241,9 +244,13 @@ def test_nor_with_code_that_stands_elsewhere_in_its_run_json(
 ):  # fmt: skip
     plant(tmp_path / "theirs", marker)
     monkeypatch.chdir(tmp_path / "theirs")
-    for name in ("foreign_scene:Scene", "planted.fmu"):
+    for name in ("foreign_scene:Scene", "planted.fmu", "unpacked/modelDescription.xml", "planted.ssd"):
+        Path(name).parent.mkdir(exist_ok=True)
         Path(name).write_bytes(b"of another hash")
-    repeated(source, tmp_path, scenario=scenario, files=files, units={"scene": {"sha256": "0"}})
+    refused = repeated(
+        source, tmp_path, scenario=scenario, files=files, units={"scene": {"fmu": "scene.fmu", "sha256": "0"}}
+    )
+    assert "not the file that the run had" in refused.output
     assert not marker.exists()
 
 

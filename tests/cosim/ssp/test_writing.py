@@ -162,3 +162,13 @@ def test_what_cannot_be_exported_is_reported_and_nothing_is_written(fmu: FmuOf, 
     with pytest.raises(WiringError):
         write_ssp(s, tmp_path / "a.ssp", "a")
     assert not (tmp_path / "a.ssp").exists()
+
+
+def test_an_unpacked_fmu_is_refused_by_its_unit(fmu: FmuOf, tmp_path: Path):
+    with zipfile.ZipFile(fmu("Counter")) as archive:
+        archive.extractall(tmp_path / "counter")
+    s = System()
+    s.add("one", tmp_path / "counter")
+    with pytest.raises(NotExportable) as refused:
+        write_ssp(s, tmp_path / "a.ssp", "a")
+    assert [fault.partition(":")[0] for fault in refused.value.faults] == ["one"]
