@@ -153,13 +153,13 @@ class PathExperiment(Experiment[PathEvaluator]):
         return Fraction(round(parameters.settle + length / parameters.speed)) + _GRACE
 
     def check_unit_values(self, system: System, given: Sequence[str]) -> None:
-        """Reject sensors that the controller is to look at, and that are not connected; and an arm that starts too low.
+        """Reject sensors that the controller is to look at, and that are not connected; and a tip that starts too low.
 
         Raises:
-            InvalidParameter: `kinematics.closed_loop`, `kinematics.imu` or `arm.links` is given, or tip or elbow would
-                start below the ground.
+            InvalidParameter: `kinematics.closed_loop`, `kinematics.imu` or `arm.links` is given, or the tip would start
+                below the ground. An elbow that points down may: its parameter says that it does on the paper's paths.
         """
-        faults = fixed_value_faults(given) + start_faults(system.units)
+        faults = fixed_value_faults(given) + start_faults(system.units, elbow=False)
         if faults := faults + sensor_faults(system, given, "`-p {}` of vsl_hybrid connects it"):
             raise InvalidParameter(faults)
 

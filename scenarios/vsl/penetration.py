@@ -14,11 +14,15 @@ from handover.scenarios.experiment.starts import LEAST_DEPTH, array_of
 _OF_ARM = {"q_0", "L_1", "L_2", "L_3"}
 
 
-def start_faults(units: Mapping[str, PlacedUnit]) -> list[str]:
+def start_faults(units: Mapping[str, PlacedUnit], *, elbow: bool) -> list[str]:
     """Return which of the arm's elbow and tip start too low, by how much, and the angles that raise them.
 
     By stiff links, [Gandarias2020] eq. (1): sag brings a tip lower. What a unit in the place of the arm does not have
     is not checked.
+
+    Args:
+        units: those of the system.
+        elbow: whether the elbow, too, has to be above the ground.
     """
     arm = units.get("arm")
     if arm is None or not arm.description.parameters.keys() >= _OF_ARM:
@@ -36,7 +40,7 @@ def start_faults(units: Mapping[str, PlacedUnit]) -> list[str]:
     faults: list[str] = []
     for i, (name, z) in enumerate(zip(names, heights, strict=True), 1):
         lowest, below = (face, floor) if name == "the tip" else (0.0, "the ground")
-        if z < lowest - LEAST_DEPTH:
+        if z < lowest - LEAST_DEPTH and (elbow or name == "the tip"):
             base, length = ([parts[0], *heights])[i - 1], parts[i]
             raised = _raised(q, i, float(np.arcsin(np.clip((lowest - base) / length, -1.0, 1.0))))
             faults.append(

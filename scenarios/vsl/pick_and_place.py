@@ -151,7 +151,7 @@ class VslPickAndPlace(Experiment[PickAndPlaceEvaluator]):
             InvalidParameter: `kinematics.closed_loop`, `kinematics.imu` or a value that is fixed here is given, or
                 tip or elbow would start below the ground or the table.
         """
-        faults = fixed_value_faults(given, _FIXED) + start_faults(system.units)
+        faults = fixed_value_faults(given, _FIXED) + start_faults(system.units, elbow=True)
         if faults := faults + sensor_faults(system, given, "this scenario has no {}, vsl_hybrid has"):
             raise InvalidParameter(faults)
 

@@ -72,7 +72,7 @@ def arm_in(scenario: Any) -> PlacedUnit:
 )
 def test_an_arm_that_starts_too_low_is_refused(scenario: Any, start: dict[str, Any], faults: list[str]):
     arm = arm_in(scenario)
-    found = start_faults({"arm": replace(arm, start={**arm.start, **start})})
+    found = start_faults({"arm": replace(arm, start={**arm.start, **start})}, elbow=True)
     assert [fault.startswith(f"arm.q_0: {wanted}") for fault, wanted in zip(found, faults, strict=True)] == [
         True for _ in faults
     ], found
@@ -83,13 +83,24 @@ def test_an_arm_that_starts_too_low_is_refused(scenario: Any, start: dict[str, A
     [
         (VslPickAndPlace, [], {"gripper.p_WO_0": "0.3,0,0.2"}, "gripper.p_WO_0: the object stands where"),
         (VslPickAndPlace, [], {"arm.q_0": "0,0,-0.5"}, "arm.q_0: the tip would start"),
-        (VslModelBased, ["elbow=down"], {}, "arm.q_0: the elbow would start 0.018 m below the ground"),
+        (
+            VslPickAndPlace,
+            [],
+            {"arm.q_0": "0,-0.8411,1.6821"},
+            "arm.q_0: the elbow would start 0.018 m below the ground",
+        ),
+        (VslModelBased, ["elbow=down"], {"arm.q_0": "0,0,-0.9"}, "arm.q_0: the tip would start"),
     ],
 )
 def test_no_run_starts_in_the_ground_or_the_object(scenario: Any, given: list[str], values: dict[str, str], fault: str):
     fmus = {name: cached(unit, 3) for name, unit in scenario.units.items()}
     with pytest.raises(InvalidParameter, match=fault):
         built_system(scenario(), parse_parameters(scenario, given), 0, fmus, values)
+
+
+def test_an_elbow_that_points_down_is_no_fault_on_a_path():
+    fmus = {name: cached(unit, 3) for name, unit in VslModelBased.units.items()}
+    built_system(VslModelBased(), parse_parameters(VslModelBased, ["elbow=down"]), 0, fmus, {})
 
 
 @pytest.mark.slow
