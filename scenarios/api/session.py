@@ -52,6 +52,7 @@ class SavedState:
         evaluator: what the evaluation has seen.
         free: values of the free inputs, and of the outputs of the unit that is left out.
         asked: the time until which it was stepped, s.
+        seen: the last time that the evaluation has seen, s; -inf before the first step.
         given: outputs of the unit that is left out which the evaluation sees.
     """
 
@@ -59,6 +60,7 @@ class SavedState:
     evaluator: bytes
     free: Mapping[str, NDArray[Any]]
     asked: Fraction
+    seen: float
     given: frozenset[str]
 
 
@@ -196,12 +198,12 @@ class Session:
         """
         with errors_for_python():
             check_states(self._open.system)
-            seen = self._evaluator.packed()
+            evaluator = self._evaluator.packed()
         free: dict[str, NDArray[Any]] = {name: held.entries.copy() for name, held in self._open.free.items()}
         if (place := self._open.place) is not None:
             free |= {f"{place.unit.name}.{name}": views[0].copy() for name, views in place.outputs.items()}
         checkpoint = self._master.call_units(lambda: take_checkpoint(self._master, 0))
-        return SavedState(checkpoint, seen, free, self._asked, frozenset(self._given))
+        return SavedState(checkpoint, evaluator, free, self._asked, self._seen, frozenset(self._given))
 
     def restore(self, state: SavedState) -> None:
         """Go back to a state; the steps that follow are those that followed it, bit for bit.
@@ -226,7 +228,7 @@ class Session:
                 views[0][:] = state.free[f"{self._open.place.unit.name}.{name}"]
         self._given = set(state.given)
         self._judged = self._judged_signals()
-        self._asked, self._seen = state.asked, state.checkpoint.time if state.asked else -1.0
+        self._asked, self._seen = state.asked, state.seen
 
     def close(self) -> None:
         """Terminate and free the units.

@@ -1,6 +1,7 @@
 """Stepping from Python: what is set acts, what is saved comes back, and the evaluation follows as in a run."""
 
 import shutil
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from native_units import native_fmu
 
 import handover
 from handover.cosim.ssp.writing import write_ssp
+from handover.scenarios.execution.file_experiment import UntilStop
 
 
 def gain(fmu: Path) -> handover.System:
@@ -167,6 +169,25 @@ def test_it_begins_at_the_start_that_is_given(tmp_path: Path):
         assert s.step(0.25) == s["clerk.now"] == -1.5
     with pytest.raises(handover.InvalidInput, match="a scenario begins at 0 s"):
         handover.open("ir_grasp", start=1)
+
+
+@pytest.mark.parametrize("start", [-1, 0, 1])
+@pytest.mark.parametrize("before", [(), (1,)])
+def test_a_restored_evaluation_sees_each_point_once(start: int, before: Sequence[int], monkeypatch: pytest.MonkeyPatch):
+    seen: list[float] = []
+    monkeypatch.setattr(UntilStop, "__call__", lambda _self, t, _signals: seen.append(t))  # pyright: ignore
+    with handover.open(gain(native_fmu("gain")), start=start) as s:
+        for duration in before:
+            s.step(duration)
+        saved, until_then = s.save(), len(seen)
+        s.step(1)
+        rest = seen[until_then:]
+        seen.clear()
+        s.restore(saved)
+        s.step(1)
+        assert seen == rest
+    assert rest[-1] == start + len(before) + 1
+    assert (rest[0] == start) == (not before)
 
 
 def test_an_ssp_and_an_fmu_are_stepped(tmp_path: Path):
