@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from handover.scenarios.live.commands import Push
 
@@ -12,7 +12,7 @@ _BUSY = 0.05
 """By how much a timer comes late where the server was busy, s: what pages have sent meanwhile is yet to be read."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Held:
     push: Push
     apply: Callable[[Push], None]
@@ -48,17 +48,16 @@ class BodyPushes:
         elif before is not None:
             before.timer.cancel()
             del self._held[page]
-        self._held[page] = _Held(push, apply, self._timer(page))
-        apply(push)
-
-    def _timer(self, page: object) -> asyncio.TimerHandle:
         loop = asyncio.get_running_loop()
         due = loop.time() + self._silence
-        return loop.call_at(due, self._release_silent, page, due)
+        self._held[page] = _Held(push, apply, loop.call_at(due, self._release_silent, page, due))
+        apply(push)
 
     def _release_silent(self, page: object, due: float) -> None:
-        if asyncio.get_running_loop().time() - due > _BUSY:
-            self._held[page] = replace(self._held[page], timer=self._timer(page))
+        """Release a push whose page was silent; once later where the server was busy, after it has read on."""
+        loop = asyncio.get_running_loop()
+        if loop.time() - due > _BUSY:
+            self._held[page].timer = loop.call_later(_BUSY, self.release, page)
         else:
             self.release(page)
 
