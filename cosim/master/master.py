@@ -18,7 +18,7 @@ from handover.cosim.fmu.host_process import mark_as_host
 from handover.cosim.fmu.unit_warnings import UnitWarnings
 from handover.cosim.master.pacing import Pacer
 from handover.cosim.master.stepper_factory import StepperFactory
-from handover.cosim.master.unit_options import units_of_one_fmu
+from handover.cosim.master.unit_options import unasked_isolations
 from handover.cosim.master.watchdog import Watchdog
 from handover.cosim.plan.plan_stepper import PlanStepper
 from handover.cosim.record.recorder import Recorder
@@ -103,7 +103,7 @@ class Master:
         """How model descriptions break the standard, by FMU."""
         self.execution_tools = execution_tools({name: u.description for name, u in system.units.items()})
         """Units that need other software on the machine, a line each."""
-        self.isolations = [*units_of_one_fmu(system)]
+        self.isolations = unasked_isolations(system, options.isolated)
         """Which units are isolated though nobody asked for it, and why, in lines."""
         for line in (*self.execution_tools, *self.isolations):
             _log.warning("%s", line)

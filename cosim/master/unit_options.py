@@ -1,6 +1,5 @@
 """What options say of single units by name: which live in processes of their own, and their tolerances."""
 
-import itertools
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -29,10 +28,21 @@ def isolated_units(system: System, wanted: Sequence[str]) -> frozenset[str]:
         raise InvalidOptions([f"there is no unit {name!r} to isolate; there are {valid}" for name in unknown])
     if wanted or crowded:
         _check_support("; ".join(crowded) or "no unit can be isolated")
+    return _asked(system, wanted).union(*crowded.values())
+
+
+def unasked_isolations(system: System, wanted: Sequence[str]) -> list[str]:
+    """Return why units are isolated by themselves, in lines, where not all of them are isolated as wanted."""
+    asked = _asked(system, wanted)
+    return [line for line, names in units_of_one_fmu(system).items() if not asked.issuperset(names)]
+
+
+def _asked(system: System, wanted: Sequence[str]) -> frozenset[str]:
+    units = system.units
     if ALL in wanted:
         return frozenset(units)
     ours: dict[Path, bool] = {}
-    named = {name for name in wanted if name != FOREIGN} | {*itertools.chain(*crowded.values())}
+    named = {name for name in wanted if name != FOREIGN}
     if FOREIGN in wanted:
         for name, unit in units.items():
             path = unit.description.path
