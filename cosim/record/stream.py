@@ -6,6 +6,7 @@ left of both.
 """
 
 import os
+import struct
 from collections.abc import Callable, Generator, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -97,15 +98,48 @@ def stream_schema(path: Path) -> "pa.Schema":
 
 
 def stream_batches(path: Path) -> Generator["pa.RecordBatch", None, None]:
-    """Read the whole batches of a stream that may be cut off anywhere."""
-    with pa.OSFile(str(path), "rb") as source, pa.ipc.open_stream(source) as stream:
+    """Read the whole batches of a stream that may be cut off anywhere.
+
+    Raises:
+        OSError: a batch is compressed, as a run writes none: it could take any amount of memory.
+    """
+    schema = stream_schema(path)
+    with pa.OSFile(str(path), "rb") as source:
+        messages = pa.ipc.MessageReader.open_stream(source)
+        messages.read_next_message()  # the schema
         while True:
             try:
-                yield stream.read_next_batch()
+                message = messages.read_next_message()
+                is_plain = _is_plain(message)
+                batch = pa.ipc.read_record_batch(message, schema) if is_plain else None
             except StopIteration:
                 return
             except (pa.ArrowInvalid, OSError):  # cut off within a batch
                 return
+            if batch is None:
+                raise OSError(f"{path} is not the stream of a record: a batch in it is compressed")
+            yield batch
+
+
+def _is_plain(message: Any) -> bool:
+    """Return whether a message is a record batch without the field `compression`, the fourth of its table.
+
+    pyarrow does not say so; the table is as of the format's Message.fbs, in which a table's offset to its vtable, and
+    the vtable's length and offsets of fields come first.
+    """
+    if message.type != "record batch":
+        return False
+    data = message.metadata.to_pybytes()
+
+    def field(table: int, number: int) -> int:
+        vtable = table - struct.unpack_from("<i", data, table)[0]
+        at = 4 + 2 * number
+        held = at < struct.unpack_from("<H", data, vtable)[0]
+        return struct.unpack_from("<H", data, vtable + at)[0] if held else 0
+
+    root = struct.unpack_from("<I", data)[0]
+    header = root + field(root, 2)
+    return not field(header + struct.unpack_from("<I", data, header)[0], 3)
 
 
 Batches = Callable[[], Iterable["pa.RecordBatch"]]

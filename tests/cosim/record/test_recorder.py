@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from numpy.typing import NDArray
 from signals_of import signals_of
@@ -14,7 +15,7 @@ from handover.cosim.exceptions import RecordNotWritten
 from handover.cosim.files import FileLocked
 from handover.cosim.record.reader import Record
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.record.stream import complete_record
+from handover.cosim.record.stream import complete_record, stream_batches
 
 FmuOf = Callable[..., Path]
 
@@ -71,6 +72,22 @@ def test_a_stream_that_is_cut_off_within_a_block_costs_no_row(tmp_path: Path):
     os.truncate(recorder.stream, recorder.stream.stat().st_size - 5)
     assert complete_record(file) == 17
     assert Record(file)["unit.x"].tolist() == [*range(10), *range(7)]
+
+
+@pytest.mark.parametrize("compression", ["lz4", "zstd"])
+def test_a_compressed_stream_is_refused_before_it_is_unpacked(tmp_path: Path, compression: str):
+    file = tmp_path / "signals.parquet"
+    recorder = Recorder(file)
+    _record(recorder, np.zeros(1), 10)
+    recorder.flush()
+    _abandon(recorder)
+    (batch,) = stream_batches(recorder.stream)
+    options = pa.ipc.IpcWriteOptions(compression=compression)
+    with pa.ipc.new_stream(str(recorder.stream), batch.schema, options=options) as stream:
+        stream.write_batch(batch)
+    with pytest.raises(OSError, match="compressed"):
+        complete_record(file)
+    assert not file.exists()
 
 
 def test_a_record_under_way_is_not_completed_by_another(tmp_path: Path):
