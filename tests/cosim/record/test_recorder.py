@@ -4,6 +4,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pyarrow as pa
@@ -27,6 +28,7 @@ def test_every_row_of_a_killed_process_is_recovered(fmu: FmuOf, tmp_path: Path, 
 import os, signal
 from fractions import Fraction
 from pathlib import Path
+from typing import Literal
 from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.system import System
@@ -75,7 +77,7 @@ def test_a_stream_that_is_cut_off_within_a_block_costs_no_row(tmp_path: Path):
 
 
 @pytest.mark.parametrize("compression", ["lz4", "zstd"])
-def test_a_compressed_stream_is_refused_before_it_is_unpacked(tmp_path: Path, compression: str):
+def test_a_compressed_stream_is_refused_before_it_is_unpacked(tmp_path: Path, compression: Literal["lz4", "zstd"]):
     file = tmp_path / "signals.parquet"
     recorder = Recorder(file)
     _record(recorder, np.zeros(1), 10)
