@@ -28,7 +28,6 @@ def test_every_row_of_a_killed_process_is_recovered(fmu: FmuOf, tmp_path: Path, 
 import os, signal
 from fractions import Fraction
 from pathlib import Path
-from typing import Literal
 from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
 from handover.cosim.system.system import System
