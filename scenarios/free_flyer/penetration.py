@@ -18,6 +18,7 @@ from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.plants.free_flyer.hand.box import Box
+from handover.scenarios.experiment.experiment import Metric
 from handover.scenarios.experiment.paper import paper_values
 from handover.scenarios.experiment.starts import LEAST_DEPTH, array_of, penetration_fault
 from handover.scenarios.free_flyer.parameters import ROBOTS
@@ -190,12 +191,17 @@ class HandInCube:
             self.depth, self.since = depth, t if self.since is None else self.since
 
     @property
-    def reason(self) -> str:
-        """That nothing kept the hand out of the cube, as a sentence's main part."""
-        return (
-            f"a hand's middle was up to {1e3 * self.depth:.0f} mm inside a robot's cube, from "
-            f"{self.since or 0.0:.1f} s on, which nothing simulates"
-        )
+    def note(self) -> str:
+        """What a verdict adds if a hand was in a cube, which nothing kept out of it; "" if none was."""
+        if self.since is None:
+            return ""
+        deep = f"up to {1e3 * self.depth:.0f} mm inside a robot's cube, from {self.since:.1f} s on"
+        return f"; a hand's middle was {deep}, which nothing simulates"
+
+    def metrics(self) -> dict[str, Metric]:
+        """Return the depth."""
+        text = "middle of a hand inside a robot's cube at most, which nothing simulates"
+        return {"hand_in_cube": Metric(self.depth, "m", text)}
 
 
 @cache

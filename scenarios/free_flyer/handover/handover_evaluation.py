@@ -262,14 +262,14 @@ class HandoverEvaluator(Evaluator):
         """Return whether the object changed hands as it should, why, and the metrics."""
         success = (
             self._torn is None
-            and self._in_cube.since is None
             and self._handed_over
             and self._phase == "DONE"
             and self._failed == self._empty >= self.failures
             and self._failed_deliveries == self._full
         )
         cause, reason = (Cause.NONE, self._success()) if success else self._failure()
-        return Outcome(success=success, reason=reason + self._mismatch, metrics=self._metrics() | self._causes(cause))
+        metrics = self._metrics() | self._in_cube.metrics() | self._causes(cause)
+        return Outcome(success=success, reason=reason + self._mismatch + self._in_cube.note, metrics=metrics)
 
     def _metrics(self) -> dict[str, Metric]:
         handed = "1 if each receiver got the object in turn, never out of both hands, whatever the robot did after it"
@@ -336,8 +336,6 @@ class HandoverEvaluator(Evaluator):
         if self._torn is not None:
             text = f"the object was torn out of the closed gripper at {self._torn:.1f} s"
             return Cause.TORN_OUT, f"{text}; {self._where}"
-        if self._in_cube.since is not None:
-            return Cause.HAND_IN_CUBE, f"{self._in_cube.reason}; {self._where}"
         if self._lost is not None:
             return self._loss(*self._lost)
         if self._is_forsaken and self._under_way is not None:

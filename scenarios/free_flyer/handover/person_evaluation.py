@@ -56,7 +56,6 @@ class Cause(enum.IntEnum):
     NOT_SETTLED = 15
     NOT_RETREATED = 16
     TORN_OUT = 17
-    HAND_IN_CUBE = 18
 
     @property
     def words(self) -> str:

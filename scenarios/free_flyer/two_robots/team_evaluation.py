@@ -206,14 +206,17 @@ class TeamEvaluator(Evaluator):
             and self._gap <= _ALONE
             and all(robot.torn is None for robot in self.robots)
             and self._clearance > 0.0
-            and self._in_cube.since is None
         )
         cause, reason = (TeamCause.NONE, self._success()) if success else self._failure()
         codes = ", ".join(f"{item.value} {item.words}" for item in TeamCause)
-        metrics = self._metrics() | {
-            "decided_by": Metric(int(cause), "1", f"why it failed, by number: {codes}"),
-        }
-        return Outcome(success=success, reason=reason + self._mismatch, metrics=metrics)
+        metrics = (
+            self._metrics()
+            | self._in_cube.metrics()
+            | {
+                "decided_by": Metric(int(cause), "1", f"why it failed, by number: {codes}"),
+            }
+        )
+        return Outcome(success=success, reason=reason + self._mismatch + self._in_cube.note, metrics=metrics)
 
     def _success(self) -> str:
         whom = "the person" if self.parameters.task is TeamTask.ROBOTS_TO_HUMAN else "both robots"
@@ -282,8 +285,6 @@ class TeamEvaluator(Evaluator):
             if robot.torn is not None:
                 text = f"the object was torn out of closed gripper {i} at {robot.torn:.1f} s; {self._where}"
                 return TeamCause.TORN_OUT, text
-        if self._in_cube.since is not None:
-            return TeamCause.HAND_IN_CUBE, f"{self._in_cube.reason}; {self._where}"
         if self._gap > _ALONE:
             return TeamCause.ONE_LET_GO_ALONE, self._alone()
         if self._lost is not None:

@@ -23,7 +23,6 @@ class TeamCause(enum.IntEnum):
     OUT_OF_TIME = Cause.OUT_OF_TIME
     OTHER = Cause.OTHER
     TORN_OUT = Cause.TORN_OUT
-    HAND_IN_CUBE = Cause.HAND_IN_CUBE
     ONE_HAND_HELD = 101
     ONE_LET_GO_ALONE = 102
     ONE_RECEIVED_ALONE = 103

@@ -40,7 +40,6 @@ STAGED = (
     Staged(Cause.OUT_OF_REACH, "came no nearer than", RECEIVES, {"patience": 3.0}),
     Staged(Cause.MISSED_BY_HAND, "the last of 3 times", parameters=ASIDE, seed=1),
     Staged(Cause.PUSHED_BESIDE, "the push went past the gripper", RECEIVES, ASIDE, seed=1),
-    Staged(Cause.HAND_IN_CUBE, "inside a robot's cube", RECEIVES, ASIDE, seed=3),
     Staged(Cause.NOT_FELT, "stayed below the threshold", parameters={"strength": 0.2, "patience": 20.0}),
     Staged(Cause.NOT_TRIED, "the person did not pull", parameters={**NOBODY, "patience": 20.0}),
     Staged(Cause.BUMPED, "which bumped the object", parameters={"skill": 0.0}),

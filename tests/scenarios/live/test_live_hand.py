@@ -115,7 +115,7 @@ def test_a_tracker_leads_the_hand_and_what_it_may_not_send_is_refused(tmp_path: 
             wrong = {
                 "{": "not JSON",
                 sample(0.0, p_WH=[9, 9, 9]): "p_WH: 15.8 m from where the hand rests",
-                sample(0.0, p_WH=[float("nan"), 0, 0]): "p_WH: 3 finite numbers",
+                sample(0.0, p_WH=[float("nan"), 0, 0]): "not JSON",
                 " " * 3000: "2000 characters",
             }
             for text, why in wrong.items():
