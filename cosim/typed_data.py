@@ -4,7 +4,7 @@
 |---|---|
 | `TypedDict` | an object with all required keys; keys that are not declared are kept as they are |
 | dataclass | likewise, without keys that are not declared |
-| `msgspec.Struct` with `forbid_unknown_fields` | likewise; other keys are refused |
+| `msgspec.Struct` with `forbid_unknown_fields` | the same; other keys are refused |
 | `float`, `int`, `str`, `bool`, `None`, `list`, `tuple`, `dict`, `Literal`, unions | values of these types, finite |
 | `Annotated[T, Meta(ge=0, le=9)]`, `Meta(pattern=..., max_length=...)` | those within a range, or of a form |
 """

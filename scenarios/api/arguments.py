@@ -67,22 +67,8 @@ _ARGUMENTS = {
     "--metric": "metrics",
     "-p": "parameters",
     "--inputs-from": "inputs_from",
-    **{
-        f"--{name}": name
-        for name in [
-            "seed",
-            "seeds",
-            "start",
-            "stop",
-            "step",
-            "record",
-            "checkpoint",
-            "algorithm",
-            "isolate",
-            "workers",
-        ]
-    },
-    **{f"--{name}": name for name in ("scheduler", "out")},
+    **{f"--{name}": name for name in ("algorithm", "checkpoint", "isolate", "out", "record", "scheduler")},
+    **{f"--{name}": name for name in ("seed", "seeds", "start", "step", "stop", "workers")},
 }
 """The arguments of Python's functions by the options of the command, where messages name these."""
 

@@ -95,7 +95,7 @@ class DeferringGroup(click.Group):
     """
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Call the command; a package that is missing is told in one line, and errors as they may be shown."""
+        """Call the command; a missing package is named in one line, and errors are made visible."""
         try:
             return super().invoke(ctx)
         except click.ClickException as e:  # such messages may quote files of others

@@ -79,7 +79,7 @@ def test_all_faults_are_told_at_once():
         ('"mouse", ', '"mose", '),
     )
     assert (len(faults), len(together)) == (5, 7)
-    told = "\n".join(faults + together)
+    shown = "\n".join(faults + together)
     for part in (
         "sed: no such key; did you mean seed",
         "seed: it is missing; expected a whole number from 0",
@@ -92,7 +92,7 @@ def test_all_faults_are_told_at_once():
         "text.en.language: it is datetime.date(1979, 5, 27); expected a non-empty string",
         "questions[3].kind: it is 'txt'; expected 'choice' or 'text'",
     ):
-        assert part in told
+        assert part in shown
 
 
 @pytest.mark.parametrize(
