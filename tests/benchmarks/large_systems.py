@@ -3,6 +3,7 @@
 import random
 import re
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from native_units import native_fmu
@@ -13,6 +14,7 @@ _NAMESPACES = (
 )
 _UNITS = (("late_blend", 2), ("blend", 3))
 _INPUTS = ("u1", "u2", "u3")
+CAUSALITIES = ("local", "parameter", "local", "output", "local", "input")
 
 
 def write_large_ssp(path: Path, n: int, *, seed: int = 1) -> Path:
@@ -51,15 +53,15 @@ def write_large_ssp(path: Path, n: int, *, seed: int = 1) -> Path:
     return path
 
 
-def write_large_fmu(path: Path, n: int, fmi: int) -> Path:
-    """Write a unit whose description has n variables more: half are local, the others parameters, inputs, outputs."""
+def write_large_fmu(path: Path, n: int, fmi: int, *, causalities: Sequence[str] = CAUSALITIES) -> Path:
+    """Write a unit whose description has n variables more, of these causalities in turn."""
     with zipfile.ZipFile(native_fmu("blend", fmi)) as unit:
         members = {name: unit.read(name) for name in unit.namelist()}
     description = members["modelDescription.xml"].decode()
     first = len(re.findall("<ScalarVariable ", description)) + 1 if fmi == 2 else 1000
-    variables = "\n".join(_variable(i, first + i, fmi) for i in range(n))
+    variables = "\n".join(_variable(i, first + i, fmi, causalities[i % len(causalities)]) for i in range(n))
     description = description.replace("</ModelVariables>", f"{variables}\n</ModelVariables>")
-    numbers = [first + i for i in range(n) if _causality(i) == "output"]
+    numbers = [first + i for i in range(n) if causalities[i % len(causalities)] == "output"]
     if fmi == 2:
         rows = "\n".join(f'<Unknown index="{number}" dependencies=""/>' for number in numbers)
         description = re.sub("(</Outputs>|</InitialUnknowns>)", rf"{rows}\n\1", description)
@@ -74,12 +76,7 @@ def write_large_fmu(path: Path, n: int, fmi: int) -> Path:
     return path
 
 
-def _causality(i: int) -> str:
-    return ("local", "parameter", "local", "output", "local", "input")[i % 6]
-
-
-def _variable(i: int, number: int, fmi: int) -> str:
-    causality = _causality(i)
+def _variable(i: int, number: int, fmi: int, causality: str) -> str:
     variability = "fixed" if causality == "parameter" else "continuous"
     about = f'name="part{i // 100}.x{i % 100}" valueReference="{number}" description="Variable {i} of a large unit"'
     about += f' causality="{causality}" variability="{variability}"'

@@ -1,4 +1,4 @@
-"""CPU time and memory of large systems and FMUs: an SSP read, checked, loaded and stepped 100 times, an FMU read.
+"""CPU time and memory of large systems and FMUs: an SSP read, checked, loaded and stepped 100 times, an FMU read, run.
 
 `pytest tests/benchmarks/test_size.py --benchmark-enable -s` prints them, and by what power of the size they grow.
 """
@@ -18,6 +18,9 @@ pytest.importorskip("resource", reason="memory is told on Linux and macOS only")
 SIZES = (1_000, 3_000, 10_000)
 SECONDS, BYTES = 60.0, 2 << 30
 """What 10,000 components may take."""
+
+COMMAND_SECONDS, COMMAND_BYTES = 20.0, 500 << 20
+"""What a command may take with a unit of a million variables."""
 
 _MEASURED = """
 import json, resource, sys, time
@@ -52,6 +55,14 @@ else:
     peak = peak_memory()
 print(json.dumps({"laps": [b - a for a, b in zip(times, times[1:])], "bytes": peak}))
 """
+
+_USED = """
+import json, resource, subprocess, sys
+subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(json.dumps([used.ru_utime + used.ru_stime, used.ru_maxrss << 10]))
+"""
+"""A small process between, as the peak of a forked process begins with that of its parent."""
 
 
 def measured(path: Path) -> tuple[list[float], int]:
@@ -92,13 +103,46 @@ def test_cpu_time_and_memory_of_large_systems(benchmark: BenchmarkFixture, tmp_p
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_cpu_time_and_memory_of_a_large_fmu(benchmark: BenchmarkFixture, tmp_path: Path, fmi: int) -> None:
     found: dict[int, tuple[list[float], int]] = {}
+    sizes = [(10 if benchmark.enabled else 1) * n for n in SIZES]
 
     def measure() -> None:
-        for n in (10 * size for size in SIZES):
+        for n in sizes:
             found[n] = measured(write_large_fmu(tmp_path / f"{n}.fmu", n, fmi))
 
     benchmark.pedantic(measure, rounds=1)
     print(f"\nvariables, FMI {fmi}   CPU s      MB   FMPy's reader alone, CPU s")
     for n, ((ours, of_fmpy), peak) in found.items():
         print(f"{n:16}{ours:8.2f}{peak / 2**20:8.0f}{of_fmpy:8.2f}")
-    assert growth(*(found[10 * n][0][0] for n in (SIZES[0], SIZES[-1]))) < 1.5
+    assert growth(*(found[n][0][0] for n in (sizes[0], sizes[-1]))) < 1.5
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="peak memory is in KiB on Linux only")
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_cpu_time_and_memory_of_commands_with_a_unit_of_a_million_variables(
+    benchmark: BenchmarkFixture, tmp_path: Path, fmi: int
+) -> None:
+    n = 10**6 if benchmark.enabled else 10**4
+    fmu = write_large_fmu(tmp_path / "unit.fmu", n, fmi, causalities=("local",))
+    command = str(Path(sys.executable).with_name("handover"))
+    reader = "import fmpy, sys; fmpy.read_model_description(sys.argv[1])"
+    calls = {
+        "handover check": [command, "check", str(fmu)],
+        "handover run": [command, "run", str(fmu), "--stop", "1", "--out", str(tmp_path / "out")],
+        "FMPy's reader alone": [sys.executable, "-c", reader, str(fmu)],
+    }
+    found: dict[str, tuple[float, int]] = {}
+
+    def measure() -> None:
+        for name, call in calls.items():
+            done = subprocess.run([sys.executable, "-c", _USED, *call], check=True, text=True, stdout=subprocess.PIPE)
+            found[name] = json.loads(done.stdout)
+
+    benchmark.pedantic(measure, rounds=1)
+    print(f"\n{n} local variables, FMI {fmi}; {fmu.stat().st_size / 1e6:.1f} MB   CPU s      MB")
+    for name, (seconds, peak) in found.items():
+        print(f"{name:44}{seconds:8.2f}{peak / 2**20:8.0f}")
+    for name in ("handover check", "handover run"):
+        assert found[name][1] < COMMAND_BYTES
+        if benchmark.enabled:
+            assert found[name][0] < COMMAND_SECONDS
