@@ -118,12 +118,11 @@ def test_cpu_time_and_memory_of_a_large_fmu(benchmark: BenchmarkFixture, tmp_pat
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is in KiB on Linux only")
-@pytest.mark.parametrize("fmi", [2, 3])
 def test_cpu_time_and_memory_of_commands_with_a_unit_of_a_million_variables(
-    benchmark: BenchmarkFixture, tmp_path: Path, fmi: int
+    benchmark: BenchmarkFixture, tmp_path: Path
 ) -> None:
-    n = 10**6 if benchmark.enabled else 10**4
-    fmu = write_large_fmu(tmp_path / "unit.fmu", n, fmi, causalities=("local",))
+    n = 10**6 if benchmark.enabled else 7 * 10**4  # which is read as a large one, too
+    fmu = write_large_fmu(tmp_path / "unit.fmu", n, 3, causalities=("local",))
     command = str(Path(sys.executable).with_name("handover"))
     reader = "import fmpy, sys; fmpy.read_model_description(sys.argv[1])"
     calls = {
@@ -139,7 +138,7 @@ def test_cpu_time_and_memory_of_commands_with_a_unit_of_a_million_variables(
             found[name] = json.loads(done.stdout)
 
     benchmark.pedantic(measure, rounds=1)
-    print(f"\n{n} local variables, FMI {fmi}; {fmu.stat().st_size / 1e6:.1f} MB   CPU s      MB")
+    print(f"\n{n} local variables; {fmu.stat().st_size / 1e6:.1f} MB   CPU s      MB")
     for name, (seconds, peak) in found.items():
         print(f"{name:44}{seconds:8.2f}{peak / 2**20:8.0f}")
     for name in ("handover check", "handover run"):
