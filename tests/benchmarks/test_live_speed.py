@@ -23,7 +23,7 @@ import pytest
 from playwright.sync_api import Page, sync_playwright
 from pytest_benchmark.fixture import BenchmarkFixture
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.real_time
 
 Waiter = Callable[[Page, str], None]
 
