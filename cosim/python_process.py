@@ -15,7 +15,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 _MODULE = "import runpy; runpy.run_module(sys.argv.pop(1), None, '__main__', True)"
-_CODE = "import sys; sys.path[:] = {path!r}; {code}"
+_CODE = (
+    "import sys; sys.path[:] = {path!r}; from handover.cosim.imported_elsewhere import"
+    " ImportedElsewhere; ImportedElsewhere.install(); {code}"
+)
 
 SAFE_PATH = {"PYTHONSAFEPATH": "handover"}
 """Environment of Python processes that a library starts by `python -c`, which then leave the working directory out.

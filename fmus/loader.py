@@ -70,9 +70,10 @@ def start(resources: str, token: str, memory: "Callable[[int], Any] | None" = No
     modules = _modules(unit["prefix"], os.path.join(resources, "sources"))
     module, _, name = unit["block"].partition(":")
     try:
-        block = getattr(modules.load(module), name)
-        for deferred in getattr(block, "deferred", ()):  # in the host's own thread: libcosim steps units in others
-            modules.import_from(deferred)
+        with modules.load("handover.cosim.imported_elsewhere").ImportedElsewhere.installed():
+            block = getattr(modules.load(module), name)
+            for deferred in getattr(block, "deferred", ()):  # in the host's own thread: libcosim steps units in others
+                modules.import_from(deferred)
     except Exception as error:
         failure = modules.load("handover.fmus.import_failure")
         if getattr(error, "is_refusal", False) or not failure.is_of_a_package(error):

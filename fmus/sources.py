@@ -23,6 +23,7 @@ SLAVE_SIDE = (
     "handover.fmus.slave",
     "handover.fmus.loader",
     "handover.fmus.import_failure",
+    "handover.cosim.imported_elsewhere",
     "handover.fmus.server",
     "handover.fmus.interpreter",
 )

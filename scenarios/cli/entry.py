@@ -6,6 +6,7 @@ import os
 import sys
 from typing import TYPE_CHECKING, NoReturn
 
+from handover.cosim.imported_elsewhere import ImportedElsewhere
 from handover.cosim.python_process import import_path
 from handover.scenarios.execution.exit_status import UNIT_FAILED, abort
 
@@ -35,6 +36,7 @@ def open_standard_streams() -> None:
 def main() -> None:
     """Run the command; loading it takes a second or so, during which Ctrl-C aborts it as later."""
     sys.path[:] = import_path()
+    ImportedElsewhere.install()
     open_standard_streams()
     try:
         if sys.argv[1:2] and sys.argv[1] in _SUPERVISED:

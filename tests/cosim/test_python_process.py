@@ -1,4 +1,5 @@
 import json
+import os
 import subprocess
 import sys
 import sysconfig
@@ -7,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from handover.cosim.imported_elsewhere import ImportedElsewhere
 from handover.cosim.python_process import code_command, is_installed, module_command
 
 IMPORTED = "import json, sys; import handover.cosim; print(json.dumps([handover.cosim.__file__, *sys.argv[1:]]))"
@@ -94,3 +96,20 @@ def test_folders_of_own_modules_come_last_and_only_where_one_is_named(planted: P
 def test_installed_is_what_lies_in_folders_of_this_interpreter(tmp_path: Path):
     assert is_installed(Path(sysconfig.get_path("purelib"), "numpy", "__init__.py"))
     assert not is_installed(tmp_path / "lib" / "python3.11" / "site-packages" / "numpy.py")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs pipes")
+def test_no_configuration_of_the_working_directory_is_read_by_a_library(tmp_path: Path):
+    pytest.importorskip("numba")
+    os.mkfifo(tmp_path / "matplotlibrc")  # reading it would never end
+    (tmp_path / ".numba_config.yaml").write_bytes(b"\xff: [")  # and this fails
+    code = "import json, matplotlib, numba, os; numba.core.config.reload_config(); print(json.dumps([os.getcwd()]))"
+    done = subprocess.run(code_command(code), cwd=tmp_path, capture_output=True, text=True, timeout=100)
+    assert json.loads(done.stdout or "[]") == [str(tmp_path.resolve())], done.stderr
+
+
+def test_that_ends_with_its_context():
+    before = list(sys.meta_path)
+    with ImportedElsewhere.installed():
+        assert ImportedElsewhere in sys.meta_path
+    assert sys.meta_path == before
