@@ -15,7 +15,7 @@ from typing import Any
 import fmpy
 
 from handover.cosim.exceptions import InvalidSsp
-from handover.cosim.fmu.file.xml import UnsafeXml, XmlElement, parse_xml, with_prefixes
+from handover.cosim.fmu.file.xml import UnsafeXml, XmlElement, parse_xml, tree_of, with_prefixes
 
 NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
@@ -200,7 +200,7 @@ def _schema(wanted: str) -> Any:
 
 def _schema_faults(content: bytes, wanted: str) -> list[str]:
     schema = _schema(wanted)
-    schema.validate(_etree.fromstring(content, _etree.XMLParser(resolve_entities=False, no_network=True)))
+    schema.validate(tree_of(content))
     return [f"line {entry.line}: {shortened(str(entry.message))}" for entry in schema.error_log][:_MAX_REPORTED]
 
 

@@ -5,6 +5,7 @@ FMI 2 has no arrays, and some tools do not use those of FMI 3: scalar variables 
 and both forms are interchangeable.
 """
 
+import math
 import re
 from collections import defaultdict
 from collections.abc import Mapping
@@ -339,7 +340,7 @@ def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
         members.sort(key=lambda m: m[0])
         first = members[0][1]
         shape = members[-1][0]
-        is_complete = [m[0] for m in members] == indices_of(shape)
+        is_complete = math.prod(shape) == len(members) and [m[0] for m in members] == indices_of(shape)
         is_uniform = len({(p.fmi_type, p.causality, p.unit, p.discrete, p.clocks, p.tunable) for _, p in members}) == 1
         if shape and is_complete and is_uniform:
             starts = [p.start for _, p in members]

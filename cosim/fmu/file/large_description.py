@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.fmu.file.archive import DESCRIPTION, FmuArchive, description_state
-from handover.cosim.fmu.file.xml import UnsafeXml, check_xml
+from handover.cosim.fmu.file.xml import check_xml, tree_of
 
 _etree: Any = importlib.import_module("lxml.etree")  # neither it nor its classes have types
 
@@ -57,11 +57,7 @@ def xml_source_of(archive: FmuArchive) -> str | io.BytesIO:
 @lru_cache(maxsize=4)
 def _reduced(path: Path, _changed: int, _size: int) -> bytes:
     used, numbers = _without_unused(FmuArchive(path).description())
-    options = {"resolve_entities": False, "no_network": True, "load_dtd": False, "remove_comments": True}
-    try:
-        root = _etree.fromstring(used, _etree.XMLParser(**options))
-    except SyntaxError as e:  # the base class of lxml's errors
-        raise UnsafeXml(f"it is not well-formed: {' '.join(str(e).split())}") from e
+    root = tree_of(used)
     _keep_structure(root, numbers)
     return _etree.tostring(root, encoding="utf-8", xml_declaration=True)
 

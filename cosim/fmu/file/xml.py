@@ -23,6 +23,12 @@ _PREFIX, _DECLARED = re.compile(rb"[<\s]([A-Za-z_][\w.-]*):[A-Za-z_]"), re.compi
 _ROOT_TAG = re.compile(rb"(<[A-Za-z_][\w:.-]*)([^>]*)")
 
 
+_MOST_MARKS = 10_000_000
+"""Tags of a document, and tags and values of one that becomes a tree, which take some 200 bytes of memory each."""
+_MOST_NAMESPACES = 1000
+"""Prefixes that are declared at one place: lxml looks through all of them for each element."""
+
+
 class UnsafeXml(ValueError):
     """XML that is malformed or unsafe to read; the message says what is wrong and where."""
 
@@ -88,12 +94,27 @@ def parse_xml(content: bytes) -> XmlElement:
     Raises:
         UnsafeXml: it is not well-formed, in an unknown encoding, or has a document type or entities.
     """
-    content = with_prefixes(content)
+    return XmlElement(tree_of(with_prefixes(content)))
+
+
+def tree_of(content: bytes) -> Any:
+    """Return lxml's tree of a document that `check_xml` has checked.
+
+    Raises:
+        UnsafeXml: it is not well-formed, or its tree would take gigabytes.
+    """
+    _check_extent(content, b"<", b"=")
     try:
         parser = _etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True)
-        return XmlElement(_etree.fromstring(content, parser))
+        return _etree.fromstring(content, parser)
     except SyntaxError as e:  # the base class of lxml's errors
         raise UnsafeXml(f"it is not well-formed: {' '.join(str(e).split())}") from e
+
+
+def _check_extent(content: bytes, *marks: bytes) -> None:
+    """Raise UnsafeXml where these marks are so many that they take minutes, or gigabytes: a small archive may do."""
+    if sum(map(content.count, marks)) > _MOST_MARKS:
+        raise UnsafeXml(f"it has over {_MOST_MARKS / 1e6:g} million tags and values")
 
 
 def with_prefixes(content: bytes) -> bytes:
@@ -137,13 +158,29 @@ def check_xml(content: bytes, watch: Callable[[Any], None] | None = None) -> Non
     Raises:
         UnsafeXml: as `parse_xml`.
     """
+    _check_extent(content, b"<")
+    in_scope = 0
+
+    def declare(_prefix: str | None, _uri: str | None) -> None:
+        nonlocal in_scope
+        in_scope += 1
+        if in_scope > _MOST_NAMESPACES:
+            raise UnsafeXml(f"it has over {_MOST_NAMESPACES} prefixes of names at one place")
+
+    def leave(_prefix: str | None) -> None:
+        nonlocal in_scope
+        in_scope -= 1
+
     try:
         parser = defusedxml.ElementTree.XMLParser(target=_Nothing(), forbid_dtd=True)
         parser.parser.DefaultHandlerExpand = None  # is called for each blank and text, and has nothing to do here
+        parser.parser.StartNamespaceDeclHandler, parser.parser.EndNamespaceDeclHandler = declare, leave
         if watch is not None:
             watch(parser.parser)
         parser.feed(content)
         parser.close()
+    except UnsafeXml:
+        raise
     except ParseError as e:
         raise UnsafeXml(f"it is not well-formed: {e}") from e
     except defusedxml.DTDForbidden as e:

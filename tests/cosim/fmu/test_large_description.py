@@ -94,3 +94,10 @@ def test_a_large_description_that_has_changed_is_read_once_more(tmp_path: Path, 
         text = _VARIABLES.replace(b'"y"', b'"%b"' % name)
         fmu = write_archive(tmp_path / "u.fmu", {"modelDescription.xml": text})
         assert name in large_description.description_of(FmuArchive(fmu))
+
+
+def test_scalars_whose_index_is_beyond_all_memory_are_no_array(tmp_path: Path):
+    archive = FmuArchive(native_fmu("spring", 3))
+    text = archive.description().replace(b'name="f1"', b'name="f[1,99999999999]"')
+    outputs = describe_fmu(write_archive(tmp_path / "far.fmu", {"modelDescription.xml": text})).outputs
+    assert list(outputs) == ["f[1,99999999999]", "f2"]

@@ -73,3 +73,19 @@ def test_whatever_the_encoding_it_is_read_or_refused(encoding: str):
         assert parse_xml(f'<?xml version="1.0" encoding="{encoding}"?><a/>'.encode()).tag == "a"
     except UnsafeXml:
         assert encoding not in ("utf-8", "us-ascii", "iso-8859-1")
+
+
+@pytest.mark.parametrize("declared", ["", "".join(f' xmlns:p{k}="u"' for k in range(1001))])
+def test_prefixes_that_would_take_minutes_are_refused(declared: str):
+    text = f"<a{declared}>{''.join(f'<p{k}:b/>' for k in range(1001))}</a>"
+    with pytest.raises(UnsafeXml, match="over 1000 prefixes"):
+        parse_xml(text.encode())
+    beside = "".join('<k:b xmlns:k="u"/>' for _ in range(1001))
+    assert len(parse_xml(f"<a>{beside}</a>".encode()).children) == 1001
+
+
+def test_a_tree_beyond_all_memory_is_refused(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("handover.cosim.fmu.file.xml._MOST_MARKS", 100)
+    for text in (b"<a>" + b"<b/>" * 101 + b"</a>", b"<a>" + b'<b c="1" d="2" e="3"/>' * 30 + b"</a>"):
+        with pytest.raises(UnsafeXml, match="million tags"):
+            parse_xml(text)
