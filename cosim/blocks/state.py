@@ -14,6 +14,7 @@ bits would take longer than all else.
 
 import enum
 import struct
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from fractions import Fraction
@@ -148,6 +149,10 @@ def _extension(code: int, content: bytes) -> Any:
         if len(content) - at != dtype.itemsize * prod(shape):
             raise InvalidState(f"the state holds an array of {shape} {dtype} in {len(content) - at} bytes")
         array = np.ndarray(shape, dtype, bytearray(content[at:]), order=order)
+        if dtype.kind == "U":
+            codes = np.frombuffer(content, f"{cast(str, dtype.str)[0]}u4", offset=at)
+            if codes.max(initial=0) > sys.maxunicode:
+                raise InvalidState("the state holds a text of what are no characters")
         return array if code == _ARRAY else array[()]
     if code == _FRACTION:
         top, _, bottom = content.decode("ascii").partition("/")

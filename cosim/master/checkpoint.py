@@ -108,11 +108,20 @@ class Checkpoint:
                 instance.time = self.time
                 instance.deserialise_state(self.units[name])
                 instance.refill(self.contents[name])
-                master.cpu[name][:] = array.array("d", self.cpu[name])
+                spent = array.array("d", self.cpu[name])
+                if not math.isfinite(sum(spent)):
+                    raise ValueError(f"the CPU times of {name} are no finite numbers")
+                master.cpu[name][:] = spent
             for warned in self.warnings:
                 master.ensemble.instances[warned["instance"]].warnings.add_all(warned)
             master.stepper.set_state(self.stepper)
-        except (LookupError, TypeError, ValueError, AttributeError) as e:
+            last = math.inf if master.stop is None else master.schedule.time(master.schedule.ticks(master.stop))
+            reached = Fraction(self.stepper.get("tick", self.stepper.get("now")))
+            if late := [unit for unit, due in self.stepper["due"].items() if Fraction(due) < reached]:
+                raise ValueError(f"steps of {', '.join(late)} are due before its time")
+            if not self.time == master.time <= last:
+                raise ValueError(f"its time is {self.time:g} s, its steps reach {master.time:g} s, the run {last:g} s")
+        except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as e:
             raise CosimError(f"the checkpoint does not fit its run ({type(e).__name__}: {one_line(e)})") from e
 
 
@@ -208,6 +217,8 @@ def read_checkpoint(path: Path) -> Checkpoint:
         with zipfile.ZipFile(path) as archive:
             if compressed := [e.filename for e in archive.infolist() if e.compress_type != zipfile.ZIP_STORED]:
                 raise InvalidCheckpoint(path, f"{compressed[0]} in it is compressed; checkpoints are written without")
+            if sum(e.file_size for e in archive.infolist()) > path.stat().st_size:
+                raise InvalidCheckpoint(path, "the checkpoint is damaged: its parts overlap")
             described = archive.read("checkpoint.json")
             if (written := decoded(described, _Format).format) != _FORMAT:
                 raise InvalidCheckpoint(path, f"a checkpoint of format {written}; format {_FORMAT} can be read")

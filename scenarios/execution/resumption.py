@@ -1,5 +1,6 @@
 """What a run keeps in its checkpoints besides the units' states, so that another process can resume it: plain data."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,6 +36,8 @@ class _Kept:
         parts = zip((self.parameters, self.options, self.spent), (dict, MasterOptions, ElapsedTime), strict=True)
         if not all(isinstance(part, kind) for part, kind in parts):
             raise TypeError("parameters, options or times are missing")
+        if not math.isfinite(self.spent.wall + self.spent.cpu):
+            raise ValueError("its times are no finite numbers")
 
 
 RECORDS = (_Kept, ElapsedTime, *OPTION_RECORDS)

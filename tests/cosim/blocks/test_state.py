@@ -210,3 +210,9 @@ def test_any_bytes_are_plain_data_or_refused(packed: bytes):
     except InvalidState:
         return
     kinds(state)
+
+
+def test_texts_of_what_are_no_characters_are_refused():
+    packed = pack_state(np.array(["abcd"]))
+    with pytest.raises(InvalidState, match="no characters"):
+        unpack_state(packed[:-16] + b"\xff" * 16)

@@ -1,12 +1,16 @@
 import contextlib
 import os
+import struct
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import checkpointed_runs
+import numpy as np
 import pytest
 from checkpointed_runs import checkpoint_of, record_of, resume, run
 from fmu_of import FmuOf
@@ -14,6 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from native_units import native_fmu
 
+from handover.cosim.exceptions import CosimError
 from handover.cosim.master.checkpoint import (
     Checkpoint,
     InvalidCheckpoint,
@@ -223,3 +228,33 @@ def _some(kept: bytes = b"kept") -> Checkpoint:
         cpu={"a/../b": b"\0" * 8},
         kept=kept,
     )
+
+
+@pytest.mark.parametrize(
+    ("part", "fault"),
+    [
+        ({"cpu": {name: np.array([np.nan]).tobytes() for name in ("a", "b", "between")}}, "CPU times of a"),
+        ({"stepper": {"tick": 10**17, "due": dict.fromkeys(("a", "b", "between"), 10**17)}}, "its steps reach"),
+        ({"stepper": {"due": {"a": -1, "b": 2**40, "between": 2**40}}}, "steps of a are due before its time"),
+        ({"time": 9.0}, "its time is 9 s"),
+    ],
+    ids=["cpu", "tick", "due", "time"],
+)
+def test_a_checkpoint_whose_parts_contradict_each_other_is_refused(part: dict[str, Any], fault: str):
+    with Master(checkpointed_runs.oscillator(), stop=Fraction(1)) as master:
+        master.run(Fraction(1, 5), [])
+        c = take_checkpoint(master, 5)
+    stepper = {**c.stepper, **part.get("stepper", {})}
+    with Master(checkpointed_runs.oscillator(), stop=Fraction(1)) as master, pytest.raises(CosimError, match=fault):
+        replace(c, **{**part, "stepper": stepper}).restore(master)
+
+
+def test_parts_of_a_checkpoint_that_overlap_are_refused(tmp_path: Path):
+    """Each of many parts may be as long as the file, and all of them be kept."""
+    write_checkpoint(tmp_path / "checkpoint.zip", _some(bytes(1000)))
+    content = bytearray((tmp_path / "checkpoint.zip").read_bytes())
+    at = content.rindex(b"PK\1\2")  # its size, as the list of members has it
+    content[at + 20 : at + 28] = struct.pack("<2L", *[len(content)] * 2)
+    (tmp_path / "checkpoint.zip").write_bytes(content)
+    with pytest.raises(InvalidCheckpoint, match="its parts overlap"):
+        read_checkpoint(tmp_path / "checkpoint.zip")
