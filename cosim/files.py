@@ -131,7 +131,7 @@ def remove_abandoned() -> None:
 _MIB = 1 << 20
 MOST = 64 * _MIB
 """Bytes of a file that is read as a whole, unless it is another number."""
-_MOST_CSV = 512 * _MIB
+_MOST_CSV, _MOST_CELLS = 512 * _MIB, 20_000_000
 
 
 def check_regular(path: Path, most: float = math.inf) -> None:
@@ -149,28 +149,39 @@ def read_regular(path: Path, most: float = MOST) -> bytes:
     Raises:
         OSError: it cannot be read, is no regular file, or longer than `most` bytes.
     """
+    with open_regular(path, most) as file:
+        return file.read()
+
+
+def open_regular(path: Path, most: float = math.inf) -> IO[bytes]:
+    """Open a regular file to be read; raises as `read_regular`."""
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     try:
         _check_status(path, os.fstat(handle), most)
     except OSError:
         os.close(handle)
         raise
-    with open(handle, "rb") as file:
-        return file.read()
+    return open(handle, "rb")
 
 
 def read_csv(path: Path) -> list[tuple[int, list[str]]]:
     """Return the rows of a CSV file, each with the number of the line on which it ends.
 
     Raises:
-        OSError: as by `read_regular`. ValueError: it is not CSV in UTF-8.
+        OSError: as by `read_regular`. ValueError: it is not CSV in UTF-8, or would take gigabytes.
     """
     text = io.StringIO(read_regular(path, _MOST_CSV).decode("utf-8-sig"), newline="")
     reader = csv.reader(text, strict=True, skipinitialspace=True)
+    rows, cells = list[tuple[int, list[str]]](), 0
     try:
-        return [(reader.line_num, row) for row in reader]
+        for row in reader:
+            rows.append((reader.line_num, row))
+            cells += 1 + len(row)
+            if cells > _MOST_CELLS:
+                raise ValueError(f"line {reader.line_num}: over {_MOST_CELLS / 1e6:g} million cells and lines")
     except csv.Error as e:
         raise ValueError(f"line {reader.line_num}: {e}") from e
+    return rows
 
 
 def _check_status(path: Path, status: os.stat_result, most: float) -> None:

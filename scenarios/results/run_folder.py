@@ -10,7 +10,6 @@ import hashlib
 import importlib.metadata
 import itertools
 import json
-import math
 import os
 import platform
 import shutil
@@ -20,7 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from handover.cosim.exceptions import RecordNotWritten
-from handover.cosim.files import FileLocked, check_regular, folder_locked, holder_of, read_regular
+from handover.cosim.files import FileLocked, check_regular, folder_locked, holder_of, open_regular
 from handover.cosim.typed_data import InvalidData, read_typed
 from handover.scenarios.results.folder_data import RunData, Summary
 
@@ -383,7 +382,11 @@ def _remove_empty(folders: Sequence[Path]) -> None:
 def sha256_of(file: Path) -> str:
     """Return a file's SHA-256 in hexadecimal; of a folder, that of the list of its files with theirs."""
     if not file.is_dir():
-        return hashlib.sha256(read_regular(file, math.inf)).hexdigest()
+        digest = hashlib.sha256()
+        with open_regular(file) as content:
+            while block := content.read(1 << 20):
+                digest.update(block)
+        return digest.hexdigest()
     inside = sorted(path for path in file.rglob("*") if path.is_file())
     listed = "".join(f"{sha256_of(path)}  {path.relative_to(file).as_posix()}\n" for path in inside)
     return hashlib.sha256(listed.encode()).hexdigest()

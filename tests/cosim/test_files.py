@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from handover.cosim.files import read_regular, scratch_folder
+from handover.cosim.files import read_csv, read_regular, scratch_folder
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs fork and locks")
@@ -39,3 +39,12 @@ def test_only_regular_files_of_a_sane_size_are_read(tmp_path: Path):
     for path, fault in ((pipe, "pipe"), (device, "device"), (large, "1048576 MiB; at most 64"), (tmp_path, "a folder")):
         with pytest.raises(OSError, match=fault):
             read_regular(path)
+
+
+def test_a_table_that_would_take_gigabytes_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("handover.cosim.files._MOST_CELLS", 10)
+    (tmp_path / "u.csv").write_text("time,u\n0,1\n1,2\n", encoding="utf-8")
+    assert len(read_csv(tmp_path / "u.csv")) == 3
+    (tmp_path / "u.csv").write_text("time,u\n0,1\n1,2\n2,3\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="line 4: over"):
+        read_csv(tmp_path / "u.csv")

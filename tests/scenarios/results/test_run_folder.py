@@ -4,6 +4,7 @@ import json
 import multiprocessing
 import os
 import threading
+import tracemalloc
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -11,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from handover.scenarios.results.run_facts import RunFacts
-from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, dated_folder, versions
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, dated_folder, sha256_of, versions
 
 
 def test_nothing_is_made_before_it_is_asked_for(tmp_path: Path):
@@ -143,3 +144,14 @@ def test_a_damaged_file_is_refused(tmp_path: Path, file: str, change: dict[str, 
     (tmp_path / file).write_text(json.dumps({**contents[file], **change}))
     with pytest.raises(InvalidRunFolder, match=f"its {file} is damaged"):
         RunFacts.read(RunFolder.of_run(tmp_path))
+
+
+def test_a_hash_takes_no_more_memory_for_a_large_file(tmp_path: Path):
+    (tmp_path / "large").touch()
+    os.truncate(tmp_path / "large", 32 << 20)
+    tracemalloc.start()
+    try:
+        assert sha256_of(tmp_path / "large").startswith("83ee47245398adee")
+        assert tracemalloc.get_traced_memory()[1] < 8 << 20
+    finally:
+        tracemalloc.stop()
