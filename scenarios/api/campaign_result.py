@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from handover.cosim.exceptions import visible
 from handover.scenarios.api.arguments import errors_for_python
 from handover.scenarios.api.pages import Page
 from handover.scenarios.api.run_result import Quantity, Run
@@ -126,7 +127,7 @@ class Campaign:
 
     def __repr__(self) -> str:
         """Return how many runs succeeded, and where the results are."""
-        return f"<campaign of {self.scenario}: {self._outcome}; {self.folder}>"
+        return visible(f"<campaign of {self.scenario}: {self._outcome}; {self.folder}>")
 
     @property
     def _outcome(self) -> str:

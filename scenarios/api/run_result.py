@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import nearest, visible
 from handover.cosim.record.reader import Record
 from handover.scenarios.api.arguments import InvalidInput, errors_for_python
 from handover.scenarios.api.pages import Page
@@ -51,7 +51,7 @@ class Quantity(float):
 
     def __repr__(self) -> str:
         """Return the value in a unit that is easily read, such as "12.3 mm"."""
-        return display_unit(self.unit, float(self)).text(float(self))
+        return visible(display_unit(self.unit, float(self)).text(float(self)))
 
     __str__ = __repr__
 
@@ -201,12 +201,14 @@ class Run:
 
     def __repr__(self) -> str:
         """Return the verdict and where the results are."""
-        return f"<run of {self.scenario}: {'succeeded' if self.success else 'failed'}, {self.reason}; {self.folder}>"
+        verdict = "succeeded" if self.success else "failed"
+        return visible(f"<run of {self.scenario}: {verdict}, {self.reason}; {self.folder}>")
 
     def _repr_html_(self) -> str:
         from handover.scenarios.api.notebook_forms import run_html  # draws figures
 
-        return run_html(self._facts, self.metrics, record_of(self._place))
+        with errors_for_python():
+            return run_html(self._facts, self.metrics, record_of(self._place))
 
     @functools.cached_property
     def _record(self) -> Record:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from handover.cosim.blocks.block import InvalidState
 from handover.cosim.blocks.start_values import fault_of
-from handover.cosim.exceptions import nearest
+from handover.cosim.exceptions import nearest, visible
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.master.checkpoint import Checkpoint, check_states, take_checkpoint
 from handover.cosim.master.master import Master
@@ -248,7 +248,7 @@ class Session:
 
     def __repr__(self) -> str:
         """Return the time and the units."""
-        return f"<session at {self.time:g} s of {', '.join(self._open.system.units)}>"
+        return visible(f"<session at {self.time:g} s of {', '.join(self._open.system.units)}>")
 
     def _run(self, until: Fraction) -> float:
         was_over = self._evaluator.over

@@ -1,5 +1,6 @@
 """The command `handover`: its subcommands by name, each loaded when it is called or its help is asked for."""
 
+import logging
 from importlib import import_module
 from typing import Any
 
@@ -88,6 +89,15 @@ class DeferredCommand(click.Command):
         return command
 
 
+class _VisibleLog(logging.Formatter):
+    """Warnings as they may be shown in a terminal: they may quote files of others."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        from handover.cosim.exceptions import visible  # loaded for this alone
+
+        return visible(super().format(record))
+
+
 class DeferringGroup(click.Group):
     """A group that loads the command that is called, and no other.
 
@@ -96,6 +106,8 @@ class DeferringGroup(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Call the command; a missing package is named in one line, and errors are made visible."""
+        if logging.lastResort is not None:
+            logging.lastResort.setFormatter(_VisibleLog())
         try:
             return super().invoke(ctx)
         except click.ClickException as e:  # such messages may quote files of others

@@ -55,6 +55,10 @@ _STDOUT, _STDERR = 1, 2
 
 
 class _Console(Console):
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Return a text as `visible` has it, before it is broken into lines."""
+        return super().render_str(visible(text), **options)
+
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """Render as `visible` has it all that is shown: it may quote files of others."""
         for text, style, control in super().render(renderable, options):

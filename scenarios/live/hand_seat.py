@@ -31,6 +31,8 @@ INPUTS_FILE = "inputs.json"
 """Name of the file in a run's folder that says which devices led a hand, and how old samples were at their use."""
 _MOST_MESSAGES = 2000
 """Messages of a device within a second; many more are far from any tracker, and keep the server from the page."""
+_MOST_NAMES = 20
+"""Devices that are told apart; samples of further ones are counted with those before."""
 _IS_LED = 'another page or tracker leads the hand; a page leaves it to "a tracker of one\'s own" that is chosen there'
 """Why another device has to wait."""
 
@@ -97,7 +99,8 @@ class HandSeat:
                 if timer.is_due(kind):
                     await send_json(device, {"refused": str(e)})
                 continue
-            name = sample.device or name
+            if len(self._samples) < _MOST_NAMES or sample.device in self._samples:
+                name = sample.device or name
             self._samples[name or "unnamed"] += 1
             self._inputs.set(sample.entries(self._led), stamp)
 

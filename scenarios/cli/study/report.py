@@ -154,7 +154,7 @@ def _check(folder: Path, participant: str, number: int) -> None:
     if found.other_versions:
         click.echo(visible(f"{who} was recorded by other versions: {found.other_versions}"))
     if found.difference is not None:
-        click.echo(f"{who} differs when it is carried out again, first in {found.difference}")
+        click.echo(visible(f"{who} differs when it is carried out again, first in {found.difference}"))
         raise click.exceptions.Exit(1)
     click.echo(f"{who}: the same byte for byte when carried out again, {found.signals} signals in {found.rows} rows")
 

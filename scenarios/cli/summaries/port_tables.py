@@ -22,7 +22,7 @@ def variable_data(v: Variable | FmuPort) -> dict[str, Any]:
     start: Any = None if v.causality is Causality.OUTPUT or v.kind is Kind.BINARY else v.start
     if isinstance(start, str) and v.kind in (Kind.REAL, Kind.INTEGER):  # of an FMU, as it is written there
         numbers = [float(text) if v.kind is Kind.REAL else int(text) for text in start.split()]
-        start = numbers if v.shape else numbers[0]
+        start = numbers if v.shape or not numbers else numbers[0]
     return {
         "name": v.name,
         "type": v.type_name,

@@ -155,3 +155,13 @@ def test_progress_is_a_bar():
 def test_the_folder_of_nothing_is_refused(tmp_path: Path):
     with pytest.raises(handover.InvalidInput, match="the folder of neither a run"):
         handover.load(tmp_path)
+
+
+def test_what_a_strangers_run_says_steers_no_terminal(grasp_without_reflex: Path):
+    for name in ("run.json", "summary.json"):
+        content = json.loads((grasp_without_reflex / name).read_text())
+        (grasp_without_reflex / name).write_text(json.dumps({**content, "scenario": "a\x1b]0;b\u202e"}))
+    assert "<run of a\ufffd]0;b\ufffd: " in repr(handover.load(grasp_without_reflex))
+    (grasp_without_reflex / "signals.parquet").write_bytes(b"")
+    with pytest.raises(handover.InvalidInput, match=r"signals\.parquet is damaged"):
+        handover.Run(grasp_without_reflex)._repr_html_()  # pyright: ignore

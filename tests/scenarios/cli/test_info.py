@@ -2,6 +2,7 @@
 
 import base64
 import json
+import logging
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,7 +10,9 @@ from typing import Any, ClassVar
 
 import pytest
 from click.testing import CliRunner, Result
+from native_units import native_fmu
 
+from handover.cosim.fmu.file.archive import FmuArchive, write_archive
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS, PackageFailure
 from handover.fmus.contents.icons import catalog_icon
@@ -164,3 +167,24 @@ def test_a_page_of_units_is_named_as_one(tmp_path: Path):
     result = call("list", "--html", tmp_path / "Push")
     assert result.exit_code == 2
     assert "name a file for the page that ends with .html" in result.output
+
+
+def test_a_start_value_without_a_number_and_a_name_without_end_are_shown(tmp_path: Path):
+    archive = FmuArchive(native_fmu("spring", 3))
+    text = (
+        archive.description()
+        .replace(b'start="1.0"', b'start=""')
+        .replace(b'"spring" ins', b'"' + b"s" * 10**6 + b'" ins')
+    )
+    file = write_archive(tmp_path / "odd.fmu", {"modelDescription.xml": text})
+    assert {p["name"]: p["start"] for p in data_of("info", file)["parameters"]} == {"k": [], "d": 0.0}
+    printed = call("info", file).output
+    assert "characters more" in printed
+    assert len(printed) < 20_000
+
+
+def test_warnings_that_are_logged_steer_no_terminal(capfd: pytest.CaptureFixture[str]):
+    call("info", "none.fmu")  # any command does
+    assert logging.lastResort is not None
+    logging.lastResort.emit(logging.LogRecord("handover", logging.WARNING, "", 0, "of \x1b[31m%s", ("\u202ea",), None))
+    assert capfd.readouterr().err == "of \ufffd[31m\ufffda\n"

@@ -177,3 +177,17 @@ def test_of_refusals_of_one_kind_two_a_second_are_told_and_those_of_another_besi
         told += [(round(0.1 * k, 1), kind) for kind in ("stamp", "p_WH")[: 1 + (k % 4 == 3)] if timer.is_due(kind)]
     assert [t for t, kind in told if kind == "stamp"] == [0.0, 0.5, 1.0, 1.5]
     assert [t for t, kind in told if kind == "p_WH"] == [0.3, 1.1, 1.9]
+
+
+def test_devices_of_ever_new_names_take_no_memory(tmp_path: Path):
+    async def act(page: PageWithHand, host: str) -> None:
+        async with opened(host, "hand") as tracker:
+            await answer(tracker)
+            for k in range(40):
+                sample = {"p_WH": LED.p_WH_0, "q_WH": [1, 0, 0, 0], "closed": False, "stamp": k, "device": f"d{k}"}
+                await tracker.send(json.dumps(sample))
+            while sum(page.seat.report()["samples"].values()) < 40:
+                await asyncio.sleep(0.01)
+        assert len(page.seat.report()["samples"]) == 20
+
+    with_page(tmp_path, act)
