@@ -15,7 +15,7 @@ from typing import Any
 import fmpy
 
 from handover.cosim.exceptions import InvalidSsp
-from handover.cosim.fmu.file.xml import UnsafeXml, XmlElement, parse_xml, tree_of, with_prefixes
+from handover.cosim.fmu.file.xml import UnsafeXml, XmlElement, tree_of, with_prefixes
 
 NAMESPACES = {
     "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
@@ -107,12 +107,12 @@ class SspPart:
         """What is not as it should be and does not matter."""
         try:
             declared = with_prefixes(content)
-            self.root = parse_xml(declared)
+            self.root = XmlElement(tree := tree_of(declared))
         except UnsafeXml as e:
             raise InvalidSsp(path, [f"{self._file or 'it'} cannot be read: {e}"]) from e
         self.check_root(self.root, wanted)
         if self.root.get("version") == "1.0":
-            faults = _schema_faults(declared, wanted)
+            faults = _schema_faults(tree, wanted)
             if faults:
                 raise InvalidSsp(path, [self._located(fault) for fault in faults])
         if declared is not content:
@@ -198,9 +198,9 @@ def _schema(wanted: str) -> Any:
     return _etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "ssp" / "schema" / _SCHEMAS[wanted]))
 
 
-def _schema_faults(content: bytes, wanted: str) -> list[str]:
+def _schema_faults(tree: Any, wanted: str) -> list[str]:
     schema = _schema(wanted)
-    schema.validate(tree_of(content))
+    schema.validate(tree)
     return [f"line {entry.line}: {shortened(str(entry.message))}" for entry in schema.error_log][:_MAX_REPORTED]
 
 
