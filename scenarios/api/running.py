@@ -102,7 +102,7 @@ def run(
             units=unit_texts(units),
             out=None if out is None else Path(out),
             start=exact_time("start", start),
-            stop=exact("stop", stop),
+            stop=exact_time("stop", stop),
             step=exact("step", step),
             inputs=None if inputs is None else Path(inputs),
             sources=None if inputs_from is None else played_back(Path(inputs_from)),

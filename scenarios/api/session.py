@@ -38,7 +38,7 @@ from handover.scenarios.api.arguments import (
 from handover.scenarios.api.open_inputs import OpenSystem
 from handover.scenarios.execution.fmu_run import is_fmu
 from handover.scenarios.execution.request import RunRequest, check_subject
-from handover.scenarios.execution.ssp_run import ENDLESS, is_ssp
+from handover.scenarios.execution.ssp_run import is_ssp
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, Outcome
 from handover.scenarios.results.tolerated_faults import GuardedEvaluator
 
@@ -371,7 +371,7 @@ def open(  # noqa: A001 (handover.open is named like it)
             seed=whole_number("seed", seed),
             units=unit_texts(units),
             start=exact_time("start", start),
-            stop=ENDLESS if endless else None,
+            endless=endless,
             step=exact("step", step),
             options=master_options(options or MasterOptions(), algorithm, isolate),
         )

@@ -109,7 +109,7 @@ def sweep(
             seed=whole_number("seed", seed),
             units=unit_texts(units),
             start=exact_time("start", start),
-            stop=exact("stop", stop),
+            stop=exact_time("stop", stop),
             step=exact("step", step),
             inputs=None if inputs is None else Path(inputs),
         )

@@ -167,7 +167,7 @@ stop_option = click.option(
     "--stop",
     "--stop-time",
     "stop",
-    type=Seconds(),
+    type=Instant(),
     metavar="SECONDS",
     help="When a run ends: at the first communication point at or after it, if its evaluation does not end it before."
     "  [default: the scenario's or the file's own stop time]",

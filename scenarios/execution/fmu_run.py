@@ -62,6 +62,7 @@ class FmuRun:
             stand with commas between them, or `NAME[1]=VALUE` gives one.
         inputs: a file of inputs over time, see `read_inputs`; the others stay at their start values.
         start, stop, step: in seconds; without them those of its default experiment.
+        endless: whether it has no stop time, since a program steps it.
     """
 
     path: Path
@@ -70,6 +71,7 @@ class FmuRun:
     start: Fraction | None = None
     stop: Fraction | None = None
     step: Fraction | None = None
+    endless: bool = False
 
     def open(self) -> FileExperiment:
         """Return the experiment, after checking all that it is made of.
@@ -86,7 +88,7 @@ class FmuRun:
         system.start = self._from(d.experiment)
         unit = system.add(d.identifier, d, period=self.step)
         system.units[d.identifier] = replace(unit, start=start)
-        if self.step is None and until != ENDLESS:
+        if self.step is None and not self.endless:
             system.presume_steps(until - system.start)
         if self.inputs is not None:
             for port, series in read_inputs(self.inputs, d.inputs, start).items():
@@ -110,6 +112,8 @@ class FmuRun:
         return exact_seconds(experiment.start or 0.0) if self.start is None else self.start
 
     def _until(self, experiment: DefaultExperiment) -> Fraction:
+        if self.endless:
+            return self._from(experiment) + ENDLESS
         proposed = None if experiment.stop is None else exact_seconds(experiment.stop)
         return checked_stop(self.path, self._from(experiment), self.stop, proposed)
 

@@ -22,7 +22,7 @@ from handover.scenarios.execution.file_experiment import system_experiment
 from handover.scenarios.execution.fmu_run import FmuRun, is_fmu
 from handover.scenarios.execution.runner import experiment_system
 from handover.scenarios.execution.selection import find_scenario, own_source, path_of_class, replacements, select_fmus
-from handover.scenarios.execution.ssp_run import checked_stop, is_ssp, open_experiment, source_of
+from handover.scenarios.execution.ssp_run import ENDLESS, checked_stop, is_ssp, open_experiment, source_of
 from handover.scenarios.execution.unit_values import split_parameters
 from handover.scenarios.experiment.experiment import Experiment, NoParameters
 from handover.scenarios.results.run_folder import RunFolder, dated_folder
@@ -61,6 +61,7 @@ class RunRequest:
         out: the run's folder, new or empty; None for one of its own in `runs/`.
         start: when the run starts, s, of a system, an SSP or an FMU; they may have a time of their own.
         stop: when the run ends, s; a scenario, an SSP and an FMU may have a time of their own.
+        endless: whether a system, an SSP or an FMU has no stop time, since a program steps it.
         step: of all units of an SSP or FMU, s.
         inputs: a file of inputs over time, of an FMU by itself.
         sources: who gives values to inputs from outside, see `played_back`.
@@ -74,6 +75,7 @@ class RunRequest:
     out: Path | None = None
     start: Fraction | None = None
     stop: Fraction | None = None
+    endless: bool = False
     step: Fraction | None = None
     inputs: Path | None = None
     sources: InputSources | None = None
@@ -133,13 +135,15 @@ class RunRequest:
                 raise UsageError("--input: for an FMU that runs by itself; an SSP's inputs are wired in it")
         elif self._is_file(is_fmu):
             if wrong := [name for name in ("--seed", "--unit") if name in used]:
-                raise UsageError(f"{', '.join(wrong)}: for scenarios; of an FMU, -p sets parameters")
+                raise UsageError(f"{', '.join(wrong)}: for scenarios; the values of an FMU are set by -p")
         elif "--input" in used:
             raise UsageError("--input is for an FMU that runs by itself; a scenario's inputs are wired in it")
         elif "--step" in used:
             raise UsageError("--step is for an SSP or an FMU; a scenario's units have steps of their own")
         elif "--start" in used:
             raise UsageError("--start is for an SSP or an FMU; a scenario begins at 0 s")
+        elif self.stop is not None and self.stop <= 0:
+            raise UsageError(f"--stop: {float(self.stop):g} s is not after the scenario's begin at 0 s")
 
     def open(self, opened: contextlib.ExitStack) -> OpenedSubject:
         """Return what is to be run; `opened` closes what that opens.
@@ -148,20 +152,21 @@ class RunRequest:
             UsageError, InvalidParameter, CosimError: there is no such subject, or a value is invalid.
         """
         if isinstance(self.subject, System):
-            if self.stop is None:
+            if self.stop is None and not self.endless:
                 raise UsageError("a system has no stop time of its own; --stop 10 lets it run for 10 s")
             system = copy.copy(self.subject)
             system.start = system.start if self.start is None else self.start
-            stop = checked_stop(Path("system"), system.start, self.stop, None)
+            asked = system.start + ENDLESS if self.endless else self.stop
+            stop = checked_stop(Path("system"), system.start, asked, None)
             return OpenedSubject(system_experiment("system", "a system wired in Python", system, stop))
         if isinstance(self.subject, type):
             return self._of_class(self.subject)
         path = self.path
         if is_ssp(self.subject):
-            of_ssp = open_experiment(path, self.stop, self.step, opened, self.parameters, self.start)
+            of_ssp = open_experiment(path, self.stop, self.step, opened, self.parameters, self.start, endless=self.endless)
             return OpenedSubject(of_ssp, source=source_of(path, *_times_of(of_ssp), self.step, self.parameters))
         if is_fmu(self.subject):
-            alone = FmuRun(path, self.parameters, self.inputs, self.start, self.stop, self.step)
+            alone = FmuRun(path, self.parameters, self.inputs, self.start, self.stop, self.step, self.endless)
             of_fmu = alone.open()
             return OpenedSubject(of_fmu, source=alone.as_source(*_times_of(of_fmu)))
         scenario = find_scenario(self.subject)

@@ -19,7 +19,7 @@ from handover.scenarios.execution.file_experiment import FileExperiment, Settabl
 from handover.scenarios.results.run_folder import sha256_of
 
 ENDLESS = Fraction(10**6)
-"""The stop time of what has no end of its own, s: a program steps it as far as it likes."""
+"""The duration of what a program steps as far as it likes, s: its end is never reached."""
 
 
 def is_ssp(name: str) -> bool:
@@ -54,10 +54,12 @@ def open_experiment(
     opened: contextlib.ExitStack,
     parameters: Sequence[str] = (),
     start: Fraction | None = None,
+    *,
+    endless: bool = False,
 ) -> FileExperiment:
     """Open an SSP as an experiment; `opened` closes it.
 
-    `parameters` are texts `NAME=VALUE`, see `SspFile`.
+    `parameters` are texts `NAME=VALUE`, see `SspFile`; one that is `endless` needs no stop time.
 
     Raises:
         InvalidSsp: see `SspFile`; where a unit has no step, it names `--step`.
@@ -65,11 +67,12 @@ def open_experiment(
     """
     texts = _texts_by_name(path, parameters)
     try:
-        ssp = opened.enter_context(SspFile(path, step, texts, start, None if stop == ENDLESS else stop))
+        ssp = opened.enter_context(SspFile(path, step, texts, start, stop))
     except InvalidSsp as e:
         raise InvalidSsp(e.path, naming_step(e.faults)) from e
     supervisor.heartbeat.record_scratch_folder(str(ssp.folder))
-    until = checked_stop(path, ssp.system.start, stop, ssp.stop)
+    began = ssp.system.start
+    until = began + ENDLESS if endless else checked_stop(path, began, stop, ssp.stop)
     heading = f"{ssp.name}, a system from {path.name}"
     parallel_step = None if step else ssp.parallel_step
     return system_experiment(path.name, heading, ssp.system, until, parallel_step, SspParameters(ssp))

@@ -124,7 +124,7 @@ servo.gain = [0.2, 0.4]
         ("unit.arm = 3", "run.toml: unit.arm = 3: a text in quotes is right"),
         (
             "stop = 'soon'",
-            """run.toml: stop = "soon": 'soon' is not a positive number of seconds, such as 0.01 or 1/30""",
+            """run.toml: stop = "soon": 'soon' is not a time in seconds, such as 0.01, 1/30 or -2""",
         ),
         ("stop = 1979-05-27", "run.toml: stop = "),
         ("strict = 1", "run.toml: strict = 1: true or false is right"),

@@ -318,6 +318,10 @@ def test_a_step_is_asked_for_where_there_is_no_time_to_take_it_from(tmp_path: Pa
     file = edited(tmp_path, b'stopTime="1" stepSize="0.01"', b"")
     with pytest.raises(handover.InvalidInput, match="proposes no communication step; give one"):
         handover.open(file)
+    result = run(file, "--stop", "1000000", "--strict")
+    assert "2000 s is taken" in result.output  # no stop time is so large that it stands for none
+    with handover.open(file, step=0.01, start=10**6) as s:
+        assert s.step(0.02) == 10**6 + 0.02
     with handover.open(file, step=0.01) as s:
         assert s.step(0.02) == 0.02
 

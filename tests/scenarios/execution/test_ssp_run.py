@@ -142,16 +142,26 @@ def test_what_is_for_scenarios_is_refused(spring: Path, tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("option", "value"), [("--stop", "0"), ("--stop", "soon"), ("--step", "-1"), ("--step", "1/0")]
+    ("option", "value"), [("--step", "0"), ("--step", "soon"), ("--step", "-1"), ("--step", "1/0")]
 )
-def test_a_time_is_a_positive_number(spring: Path, tmp_path: Path, option: str, value: str):
+def test_a_step_is_a_positive_number(spring: Path, tmp_path: Path, option: str, value: str):
     result = run(packed(spring, tmp_path), option, value)
     assert result.exit_code == 2, result.output
     assert f"{value!r} is not a positive number of seconds, such as 0.01 or 1/30" in " ".join(result.output.split())
 
 
+def test_a_stop_time_may_be_0_or_before_it(spring: Path, tmp_path: Path):
+    for stop in ("0", "-1"):
+        out = tmp_path / f"to{stop}"
+        result = run(packed(spring, tmp_path), "--start", "-2", "--stop", stop, "--no-report", "--out", out)
+        assert result.exit_code == 0, result.output
+        assert Record(out / "signals.parquet").time[-1] == float(stop)
+        result = CliRunner().invoke(main, ["run", "ir_grasp", "--stop", stop])
+        assert (result.exit_code, f"{stop} s is not after" in result.output) == (2, True)
+
+
 def test_a_time_is_finite(spring: Path, tmp_path: Path):
-    result = run(packed(spring, tmp_path), "--stop", "1e400")
+    result = run(packed(spring, tmp_path), "--step", "1e400")
     assert result.exit_code == 2, result.output
     assert "'1e400' is not finite as a floating-point number" in " ".join(result.output.split())
 
