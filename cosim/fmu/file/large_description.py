@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from handover.cosim.fmu.file.archive import DESCRIPTION, FmuArchive, description_state
-from handover.cosim.fmu.file.xml import check_xml, tree_of
+from handover.cosim.fmu.file.xml import UnsafeXml, check_xml, in_utf8, tree_of, with_prefixes
 
 _etree: Any = importlib.import_module("lxml.etree")  # neither it nor its classes have types
 
@@ -56,7 +56,11 @@ def xml_source_of(archive: FmuArchive) -> str | io.BytesIO:
 
 @lru_cache(maxsize=4)
 def _reduced(path: Path, _changed: int, _size: int) -> bytes:
-    used, numbers = _without_unused(FmuArchive(path).description())
+    content = in_utf8(FmuArchive(path).description())
+    try:
+        used, numbers = _without_unused(content)
+    except UnsafeXml:  # nothing else that is wrong passes the next line; this way a sound one is checked once
+        used, numbers = _without_unused(with_prefixes(content))
     root = tree_of(used)
     _keep_structure(root, numbers)
     return _etree.tostring(root, encoding="utf-8", xml_declaration=True)

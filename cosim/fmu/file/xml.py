@@ -20,6 +20,7 @@ _etree: Any = importlib.import_module("lxml.etree")  # neither it nor its classe
 
 _UNBOUND_PREFIX = xml.parsers.expat.errors.codes[xml.parsers.expat.errors.XML_ERROR_UNBOUND_PREFIX]
 _PREFIX, _DECLARED = re.compile(rb"[<\s]([A-Za-z_][\w.-]*):[A-Za-z_]"), re.compile(rb"\bxmlns:([\w.-]+)\s*=")
+_DECLARATION = re.compile(r"\A<\?xml\s[^>]*\?>")
 _ROOT_TAG = re.compile(rb"(<[A-Za-z_][\w:.-]*)([^>]*)")
 
 
@@ -117,14 +118,31 @@ def _check_extent(content: bytes, *marks: bytes) -> None:
         raise UnsafeXml(f"it has over {_MOST_MARKS / 1e6:g} million tags and values")
 
 
+def in_utf8(content: bytes) -> bytes:
+    """Return a document of UTF-16, which is known by its first bytes, in UTF-8; of another encoding as it is.
+
+    Raises:
+        UnsafeXml: it is not what these bytes say.
+    """
+    utf16 = content.startswith((b"\xff\xfe", b"\xfe\xff"))
+    if not utf16:
+        return content
+    try:
+        text = content.decode("utf-16")
+    except UnicodeDecodeError as e:
+        raise UnsafeXml(f"it is not well-formed: {e.reason}") from e
+    return _DECLARATION.sub("", text, count=1).encode()
+
+
 def with_prefixes(content: bytes) -> bytes:
     """Return a document in which prefixes of elements and attributes that it does not declare are declared at its root.
 
-    Some tools leave that out where they annotate a file. One that declares all is returned as it is.
+    Some tools leave that out where they annotate a file. One that declares all is returned as it is, see `in_utf8`.
 
     Raises:
         UnsafeXml: as `parse_xml`.
     """
+    content = in_utf8(content)
     try:
         check_xml(content)
     except UnsafeXml as e:

@@ -46,6 +46,16 @@ def test_a_large_description_says_the_same_of_what_is_set_and_got(
     assert replace(describe_fmu(fmu), path=many) == whole
 
 
+def test_prefixes_that_are_not_declared_do_not_matter_in_a_large_description(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(large_description, "LARGE", 10)
+    text = _VARIABLES.replace(b"<Annotations>", b"<Annotations><tool:mark/>")
+    fmu = write_archive(tmp_path / "u.fmu", {"modelDescription.xml": text.replace(b'type="x"', b'type="x" tool:k="1"')})
+    root = ElementTree.fromstring(large_description.description_of(FmuArchive(fmu)))
+    assert [v.get("name") for v in root.iterfind("ModelVariables/*")] == ["a", "n", "s", "y"]
+
+
 def test_a_large_description_that_is_not_well_formed_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(large_description, "LARGE", 10)
     with pytest.raises(InvalidFmu, match="not well-formed"):
@@ -75,7 +85,7 @@ _VARIABLES = b"""<fmiModelDescription fmiVersion="3.0"><ModelVariables>
 valueReference="6"/></ModelStructure></fmiModelDescription>"""
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
 def test_variables_are_kept_that_can_be_set_or_size_an_array(
     encoding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -57,6 +57,7 @@ def test_prefixes_that_are_not_declared_are_made_up():
     assert with_prefixes(text.replace(b"w:", b"").replace(b"<v:e/>", b"")) == text.replace(b"w:", b"").replace(
         b"<v:e/>", b""
     )
+    assert parse_xml(text.decode().encode("utf-16")).children[2].line == 3
     with pytest.raises(UnsafeXml, match="mismatched tag"):
         parse_xml(b"<a><v:b></a>")
 
