@@ -194,13 +194,20 @@ def unpaired_difference(first: ArrayLike, second: ArrayLike) -> DifferenceTest |
     if not len(x) or not len(y):
         return None
     orders = comb(len(x) + len(y), len(x))
+    if 1 in (len(x), len(y)):  # SciPy permutes no group of one
+        ranks = stats.rankdata(np.concatenate([x, y] if len(x) == 1 else [y, x]))
+        p = min(1.0, 2.0 * min(float(np.mean(ranks <= ranks[0])), float(np.mean(ranks >= ranks[0]))))
+    else:
+        p = _rank_sum_p(x, y, orders)
+    difference = float(np.median(y) - np.median(x))
+    return DifferenceTest(min(len(x), len(y)), difference, None, p, min(1.0, 2.0 / orders), "Mann-Whitney")
+
+
+def _rank_sum_p(x: Floats, y: Floats, orders: int) -> float:
     has_ties = len(np.unique(np.concatenate([x, y]))) < len(x) + len(y)
     method: Any = stats.PermutationMethod(n_resamples=orders) if has_ties and orders <= RESAMPLES else "auto"
     test: Any = stats.mannwhitneyu(x, y, method=method)
-    difference = float(np.median(y) - np.median(x))
-    return DifferenceTest(
-        min(len(x), len(y)), difference, None, float(test.pvalue), min(1.0, 2.0 / orders), "Mann-Whitney"
-    )
+    return float(test.pvalue)
 
 
 def holm(p: Sequence[float]) -> list[float]:

@@ -145,6 +145,22 @@ def test_tests_of_pairs_reach_their_least_p_where_all_pairs_differ_in_one_way(n:
     assert (test.p, test.least_p) == (pytest.approx(least), least)
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "p"),
+    [
+        ([1.0], [1.0], 1.0),
+        ([1.0], [2.0], 1.0),
+        ([0.0], [*range(1, 40)], 2 / 40),  # the first of 40 orders, or the last
+        ([*range(1, 40), 39.0], [40.0], 2 / 41),
+        ([9.0], [*range(9), 9.0], 4 / 11),  # two of eleven are the largest
+    ],
+)
+def test_a_group_of_one_has_the_exact_p(first: list[float], second: list[float], p: float):
+    test = unpaired_difference(first, second)
+    assert test is not None
+    assert test.p == pytest.approx(p)
+
+
 @pytest.mark.parametrize("first", [[1.0, 2.0, 3.0], [1.0, 1.0, 1.0]])  # the normal distribution would give 0.047
 def test_groups_of_equal_values_have_the_exact_p(first: list[float]):
     test = unpaired_difference(first, [4.0, 4.0, 4.0])
