@@ -16,7 +16,7 @@ from handover.scenarios.cli.console import open_console, print_json, print_rows
 from handover.scenarios.cli.summaries.port_tables import port_rows, variable_data
 from handover.scenarios.execution.errors import UsageError, one_line_errors
 from handover.scenarios.execution.fmu_run import is_fmu
-from handover.scenarios.execution.selection import nothing_at
+from handover.scenarios.execution.selection import folder_fault, nothing_at
 from handover.scenarios.execution.ssp_run import is_ssp
 
 _HELP = """Tell what is in FILE, an FMU (2.0 or 3.0, co-simulation) or an SSP: names, steps, capabilities, parameters,
@@ -44,6 +44,8 @@ def info(file: Path, *, as_json: bool) -> None:
     if not is_fmu(str(file)) and not is_ssp(str(file)):
         if not file.exists():
             raise UsageError(f"{file}: {nothing_at(file)}")
+        if file.is_dir():
+            raise UsageError(f"{file}: {folder_fault(file)}")
         right = (
             "a file that ends with .fmu, .ssp or .ssd, or its unpacked folder, is right; of units and scenarios, see"
         )

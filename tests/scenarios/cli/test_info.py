@@ -77,9 +77,14 @@ def test_an_ssps_units_and_connections(tmp_path: Path):
 
 
 def test_what_has_no_information_is_refused_in_one_line(tmp_path: Path):
+    run_folder = tmp_path / "run"
+    run_folder.mkdir()
+    (run_folder / "run.json").touch()
     for file, told in (
         (tmp_path / "none.fmu", "there is no such file"),
         (Path(__file__), "a file that ends with .fmu, .ssp or .ssd"),
+        (run_folder, "the folder of a run; "),
+        (tmp_path, "a folder with neither modelDescription.xml"),
     ):
         result = call("info", file)
         assert result.exit_code == 2
