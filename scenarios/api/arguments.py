@@ -2,8 +2,9 @@
 
 import enum
 import math
+import os
 import re
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
@@ -133,13 +134,49 @@ def is_scenario(subject: object) -> bool:
     return isinstance(subject, type) and issubclass(subject, Experiment)
 
 
+def of_type(name: str, value: Any, types: type | tuple[type, ...], right: str) -> Any:
+    """Return a value that is of one of some types.
+
+    Raises:
+        InvalidInput: it is of another one.
+    """
+    if not isinstance(value, types):
+        raise InvalidInput(f"{name} = {value!r:.60}: {right} is right")
+    return value
+
+
+def path_of(name: str, value: Any) -> Path:
+    """Return the path of a file or a folder.
+
+    Raises:
+        InvalidInput: it is neither a text nor a path.
+    """
+    return Path(of_type(name, value, (str, os.PathLike), "a path, as a text or a Path,"))
+
+
+def path_or_none(name: str, value: Any) -> Path | None:
+    """Return a path that may be left open, see `path_of`; None for None."""
+    return None if value is None else path_of(name, value)
+
+
+def several_texts(name: str, value: Any) -> tuple[str, ...]:
+    """Return one text, or several.
+
+    Raises:
+        InvalidInput: it is none, nor a list of some.
+    """
+    right = "a text, or a list of texts,"
+    given = (value,) if isinstance(value, str) else of_type(name, value, (Sequence, Set), right)
+    return tuple(of_type(name, text, str, right) for text in given)
+
+
 def merged(parameters: Mapping[str, Any] | None, named: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parameters of a call: those by keyword, and those of its mapping.
 
     Raises:
-        InvalidInput: some are given both ways.
+        InvalidInput: some are given both ways, or it is no mapping.
     """
-    given = parameters or {}
+    given = _mapping("parameters", parameters, "{'servo.gain': 0.5}")
     if "unit" in named:
         raise InvalidInput("unit: what takes the place of units is given as units={'servo': 'my_servo:MyServo'}")
     if both := [name for name in named if name in given]:
@@ -148,8 +185,17 @@ def merged(parameters: Mapping[str, Any] | None, named: Mapping[str, Any]) -> di
 
 
 def unit_texts(units: Mapping[str, Path | str | Sequence[Path | str]] | None) -> list[str]:
-    """Return replacements of units as texts `NAME=FILE`, several as `NAME=A,B`."""
-    return [f"{name}={text_of_value(files)}" for name, files in (units or {}).items()]
+    """Return replacements of units as texts `NAME=FILE`, several as `NAME=A,B`.
+
+    Raises:
+        InvalidInput: it is no mapping.
+    """
+    given = _mapping("units", units, "{'servo': 'my_servo:MyServo'}")
+    return [f"{name}={text_of_value(files)}" for name, files in given.items()]
+
+
+def _mapping(name: str, value: Any, such_as: str) -> Mapping[str, Any]:
+    return {} if value is None else of_type(name, value, Mapping, f"a mapping such as {such_as}")
 
 
 def positive_seconds(name: str, seconds: Seconds) -> Fraction:
@@ -159,7 +205,7 @@ def positive_seconds(name: str, seconds: Seconds) -> Fraction:
         InvalidInput: it is not a finite number above 0.
     """
     try:
-        fits = 0 < seconds < math.inf
+        fits = 0 < seconds < math.inf and not isinstance(seconds, bool)
     except TypeError:
         fits = False
     if not fits:
@@ -181,7 +227,7 @@ def exact_time(name: str, seconds: Seconds | None) -> Fraction | None:
     if seconds is None or isinstance(seconds, Fraction):
         return seconds
     try:
-        fits = math.isfinite(seconds)
+        fits = math.isfinite(seconds) and not isinstance(seconds, bool)
     except TypeError:
         fits = False
     if not fits:
@@ -207,7 +253,7 @@ def formats_of(formats: Sequence[str]) -> tuple[str, ...]:
     Raises:
         InvalidInput: one is unknown.
     """
-    given = (formats,) if isinstance(formats, str) else tuple(formats)
+    given = several_texts("formats", formats)
     if wrong := [f for f in given if f not in RECORD_FORMATS]:
         raise InvalidInput(f"formats: {'; '.join(f'{f!r}: {nearest(str(f), RECORD_FORMATS)}' for f in wrong)}")
     return given
@@ -219,14 +265,15 @@ def master_options(
     """Return the master's options: the given ones or the command's defaults, with algorithm and isolation set.
 
     Raises:
-        InvalidInput: there is no such algorithm. InvalidOptions: see `MasterOptions`.
+        InvalidInput: there is no such algorithm, or one is of another type. InvalidOptions: see `MasterOptions`.
     """
-    chosen = MasterOptions(call_limit=CALL_LIMIT) if options is None else options
+    default = MasterOptions(call_limit=CALL_LIMIT) if options is None else options
+    chosen: MasterOptions = of_type("options", default, MasterOptions, "handover.MasterOptions(...)")
     if isinstance(algorithm, str):
         known = {a.value: a for a in Algorithm}
         if algorithm not in known:
             raise InvalidInput(f"no algorithm {algorithm!r}; {nearest(algorithm, known)}")
         algorithm = known[algorithm]
-    names = (isolate,) if isinstance(isolate, str) else tuple(isolate)
+    names = several_texts("isolate", isolate)
     chosen = chosen if algorithm is None else replace(chosen, algorithm=algorithm)
     return replace(chosen, isolated=tuple(dict.fromkeys(names))) if names else chosen

@@ -13,6 +13,7 @@ from handover.scenarios.api.arguments import (
     InvalidInput,
     errors_for_python,
     merged,
+    path_of,
     texts_of,
     unit_texts,
     whole_number,
@@ -22,6 +23,7 @@ from handover.scenarios.api.run_result import Run
 from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.catalog import search_folder
 from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.execution.selection import nothing_at
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.results.run_folder import RunFolder
 
@@ -53,7 +55,8 @@ def describe(fmu: str | Path) -> FmuDescription:
         InvalidInput: it is no valid FMU, or no unit of that name.
     """
     with errors_for_python():
-        return describe_fmu(Path(fmu) if Path(fmu).suffix.lower() == ".fmu" else unit(str(fmu)))
+        path = path_of("fmu", fmu)
+        return describe_fmu(path if path.suffix.lower() == ".fmu" else unit(str(fmu)))
 
 
 def system(
@@ -89,9 +92,9 @@ def load(folder: Path | str) -> Run | Campaign:
     Raises:
         InvalidInput: it is the folder of neither.
     """
-    path = Path(folder)
+    path = path_of("folder", folder)
     if CampaignFolder(path).is_there:
         return Campaign(path)
     if not RunFolder.of_run(path).is_there:
-        raise InvalidInput(f"{path} {OF_NEITHER}")
+        raise InvalidInput(f"{path} {OF_NEITHER}" if path.is_dir() else f"{path}: {nothing_at(path)}")
     return Run(path)

@@ -18,6 +18,8 @@ from handover.scenarios.api.arguments import (
     exact_time,
     master_options,
     merged,
+    path_or_none,
+    several_texts,
     text_of_value,
     texts_of,
     unit_texts,
@@ -103,6 +105,7 @@ def sweep(
         require_extra("campaigns", "campaigns")
         if workers is not None and scheduler is not None:
             raise InvalidInput("workers and scheduler: a scheduler has workers of its own; one of both is right")
+        pool = PoolConfig(None if workers is None else whole_number("workers", workers, 1), scheduler)
         name = _name_of(scenario)
         common = RunRequest(
             subject=name,
@@ -111,7 +114,7 @@ def sweep(
             start=exact_time("start", start),
             stop=exact_time("stop", stop),
             step=exact("step", step),
-            inputs=None if inputs is None else Path(inputs),
+            inputs=path_or_none("inputs", inputs),
         )
         common.check_options()
         experiment = experiment_type(name, common.start, common.stop, common.step, common.inputs)
@@ -136,9 +139,9 @@ def sweep(
             stop=common.stop,
             step=common.step,
             inputs=common.inputs,
-            recorded=(record,) if isinstance(record, str) else tuple(record),
+            recorded=several_texts("record", record),
         )
-        return _carried_out(plan, None if out is None else Path(out), PoolConfig(workers, scheduler), progress)
+        return _carried_out(plan, path_or_none("out", out), pool, progress)
 
 
 def _name_of(scenario: object) -> str:

@@ -195,7 +195,7 @@ def unpaired_difference(first: ArrayLike, second: ArrayLike) -> DifferenceTest |
         return None
     orders = comb(len(x) + len(y), len(x))
     if 1 in (len(x), len(y)):  # SciPy permutes no group of one
-        ranks = stats.rankdata(np.concatenate([x, y] if len(x) == 1 else [y, x]))
+        ranks: Floats = stats.rankdata(np.concatenate([x, y] if len(x) == 1 else [y, x]))
         p = min(1.0, 2.0 * min(float(np.mean(ranks <= ranks[0])), float(np.mean(ranks >= ranks[0]))))
     else:
         p = _rank_sum_p(x, y, orders)

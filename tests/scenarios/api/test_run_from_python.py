@@ -192,6 +192,19 @@ Unfindable.__qualname__ = "nowhere.Unfindable"
         (lambda: handover.run("ir_grasp", strategy=["blind"]), r"strategy = \['blind'\]: a run has one value"),
         (lambda: handover.run(IrGrasp, forward=np.array([0.1])), "forward = .*handover.sweep varies lists"),
         (lambda: handover.environment("ir_grasp", "reflex", thing=("cup",)), "thing = .*a run has one value"),
+        (lambda: handover.run("ir_grasp", parameters=[1]), "^parameters = .*a mapping such as"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.run("ir_grasp", units=["servo"]), "^units = .*a mapping such as"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.run("ir_grasp", out=3), "^out = 3: a path"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.run("ir_grasp", inputs_from=3), "^inputs_from = 3: a path"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.run("ir_grasp", record=3), "^record = 3: a text, or a list"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.run("ir_grasp", formats=3), "^formats = 3: a text, or a list"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.run("ir_grasp", isolate=["arm", 3]), "^isolate = 3: a text, or a list"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.run("ir_grasp", options={"call_limit": 3}), "^options = .*MasterOptions"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.sweep("ir_grasp", workers=0), "^workers = 0: a whole number from 1"),
+        (lambda: handover.sweep("ir_grasp", workers="two"), "^workers = .*: a whole number from 1"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.load(3), "^folder = 3: a path"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.load("no_such_run"), "there is no such file or folder"),
+        (lambda: handover.describe(3), "^fmu = 3: a path"),  # pyright: ignore[reportArgumentType]
     ],
 )
 def test_what_is_no_subject_or_no_single_value_is_told_in_one_sentence(call: Callable[[], object], told: str):
