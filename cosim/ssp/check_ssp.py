@@ -10,7 +10,7 @@ from handover.cosim.exceptions import InvalidSsp, named_by_archive
 from handover.cosim.files import scratch_folder
 from handover.cosim.fmu.file.default_experiment import NoStep
 from handover.cosim.probe.finding import Finding, fault, warning
-from handover.cosim.ssp.archive import SspArchive
+from handover.cosim.ssp.archive import SspArchive, ssp_root
 from handover.cosim.ssp.flattening import components_of
 from handover.cosim.ssp.reading import read_structure
 from handover.cosim.ssp.ssp_file import SspFile
@@ -30,7 +30,7 @@ def check_ssp(path: Path, timeout: float) -> Iterator[CheckReport]:
         except InvalidSsp:  # which the first report tells
             return
         for member in dict.fromkeys(component.member for component in components):
-            yield replace(check_fmu(folder / member, timeout), path=path / member)
+            yield replace(check_fmu(folder / member, timeout), path=ssp_root(path) / member)
 
 
 def _system(path: Path) -> Section:

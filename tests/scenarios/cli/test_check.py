@@ -142,6 +142,15 @@ def test_of_an_ssp_the_system_is_checked_and_then_each_unit(tmp_path: Path, outp
     assert unit["passed"]
 
 
+def test_the_units_of_an_unpacked_system_are_named_in_its_folder(tmp_path: Path):
+    file = pack_ssp(tmp_path / "x.ssp", described(system(component("push", "", "Push.fmu"))), {"Push.fmu": b""})
+    with zipfile.ZipFile(file) as archive:
+        archive.extractall(tmp_path)
+    result = check(tmp_path / "SystemStructure.ssd", "--json")
+    found = [report["file"] for report in json.loads(result.stdout)]
+    assert found == [str(tmp_path / name) for name in ("SystemStructure.ssd", "Push.fmu")]
+
+
 def test_files_that_are_not_there_are_all_reported_before_anything_is_checked(broken: Path, tmp_path: Path):
     result = check(broken, tmp_path / "missing.fmu", tmp_path, Path(os.devnull))
     assert result.exit_code == 2
