@@ -119,7 +119,8 @@ def _axis_of_unit(name: str, text: str, port: FmuPort | None = None) -> tuple[li
     Of a file's parameter there is the `port`: only numbers have ranges, and values of arrays stand between `;`.
     """
     declared = Declared(name=name, kind=Kind.REAL, causality=Causality.PARAMETER) if port is None else port
-    if text.count(":") == 2 and declared.kind in (Kind.REAL, Kind.INTEGER):
+    is_range = text.count(":") == 2 if port is None else ":" in text  # without its type it may be a text
+    if is_range and declared.kind in (Kind.REAL, Kind.INTEGER):
         values, fault = _range(declared, text)
         return values, [fault] if fault else []
     values = text.split(";" if ";" in text or declared.shape else ",")

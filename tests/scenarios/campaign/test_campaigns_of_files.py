@@ -131,6 +131,7 @@ def test_a_value_is_the_same_however_it_is_written():
         (("m=1,heavy",), (), "m = 'heavy': a number is right"),
         (("m=1,inf",), (), "mass.m: inf is not finite"),
         (("m=1,1.0",), (), "m: 1 is given twice"),
+        (("m=1:2",), (), "is not of the form START:STOP:N, such as"),
         (("m=1:2:x",), (), "is not of the form START:STOP:N"),
         (("m=1,2",), ("m=3",), "m is varied and set by -p"),
         (("m=1,2",), ("k=3,4",), "-p k takes one value; to vary it, give it without -p: k=3,4"),
