@@ -86,6 +86,8 @@ def play(
             request.check_options()
             subject = request.open(opened)
             asked = subject.experiment
+            for line in request.system(subject, seed, request.fmus(asked)).tolerated:
+                click.echo(line, err=True)
             folder = RunFolder(out or made.enter_context(dated_folder(RUNS, f"{Path(asked.name).stem}_play")))
             options = _options(replaced, {"--start": start, "--stop": stop, "--step": step, "--input": inputs})
             session = _session(request, asked, subject.parameters, options, folder.claim(made).shown, pace)

@@ -163,7 +163,9 @@ class RunRequest:
             return self._of_class(self.subject)
         path = self.path
         if is_ssp(self.subject):
-            of_ssp = open_experiment(path, self.stop, self.step, opened, self.parameters, self.start, endless=self.endless)
+            of_ssp = open_experiment(
+                path, self.stop, self.step, opened, self.parameters, self.start, endless=self.endless
+            )
             return OpenedSubject(of_ssp, source=source_of(path, *_times_of(of_ssp), self.step, self.parameters))
         if is_fmu(self.subject):
             alone = FmuRun(path, self.parameters, self.inputs, self.start, self.stop, self.step, self.endless)

@@ -1,5 +1,6 @@
 """`handover play`: a change begins a run anew, verdicts stand side by side, each run is that of its command."""
 
+import importlib
 import json
 import os
 import re
@@ -18,12 +19,16 @@ import numpy as np
 import psutil
 import pyarrow.parquet as pq
 import pytest
+from click.testing import CliRunner
+from native_units import native_fmu
 from opened_page import wait_until
 from playwright.sync_api import Browser, Page
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from handover.cosim.fmu.file.archive import FmuArchive, write_archive
 from handover.cosim.record.reader import Record
+from handover.scenarios.cli.command import main
 
 HANDOVER = (sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()")
 LIVE = "document.querySelector('.live')"
@@ -314,6 +319,22 @@ def test_a_session_that_cannot_begin_is_refused_in_a_line(given: tuple[str, ...]
     assert why in done.stderr
     assert "Traceback" not in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_step_that_is_taken_is_said_before_a_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    made = FmuArchive(fmu := native_fmu("mass", 2))
+    files = {name: made.read(name) for name in made.names if not name.endswith("/")}
+    files["modelDescription.xml"] = files["modelDescription.xml"].replace(b' stepSize="0.01"', b"")
+    assert files["modelDescription.xml"] != made.description(), fmu
+
+    async def served(_: object) -> None:
+        pass
+
+    monkeypatch.setattr(importlib.import_module("handover.scenarios.cli.play"), "_serve", served)
+    file = write_archive(tmp_path / "mass.fmu", files)
+    result = CliRunner().invoke(main, ["play", str(file), "--out", str(tmp_path / "out")])
+    assert result.exit_code == 0, result.output
+    assert "0.002 s is taken, a 500th of its default experiment" in result.stderr
 
 
 @pytest.mark.slow
