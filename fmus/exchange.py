@@ -147,7 +147,7 @@ def _exact_statement(buffers: Buffers, slot: Slot, i: int, names: dict[str, Any]
     if slot.buffer is Buffer.BOOLEAN or (slot.buffer is Buffer.INT64 and v.width in (None, Width.INT64)):
         is_boolean = slot.buffer is Buffer.BOOLEAN
         names[f"to{i}"] = buffers.booleans if is_boolean else buffers.integers
-        names[f"type{i}"] = bool if is_boolean else v.enumeration or int
+        names[f"type{i}"] = bool if is_boolean else int if v.enumeration is None else v.enumeration
         return f"y{i}.__class__ is not type{i}", f"to{i}[{at}] = y{i}"
     names[f"put{i}"] = _writer(buffers, slot)
     return "False", f"put{i}(y{i})"

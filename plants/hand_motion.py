@@ -19,8 +19,8 @@ class _Step(NamedTuple):
     """An advance by dt: transition F, root L of the noise's covariance, the drift's decay and the noise added to it."""
 
     dt: float
-    F: tuple[float, float, float, float]
-    L: tuple[float, float, float]
+    F: tuple[float, ...]
+    L: tuple[float, ...]
     decay: float
     drift_noise: float
 

@@ -229,7 +229,7 @@ def _faults_of(named: type[Any]) -> list[str]:
     """Return what keeps a class from being a scenario that runs."""
     if not issubclass(named, Experiment):
         return [f"{named.__name__} is no scenario: it must be a subclass of Experiment"]
-    scenario = cast(type[Experiment[Any]], named)
+    scenario: type[Experiment[Any]] = named
     faults = [f"it has no method {name!r}" for name in sorted(getattr(scenario, "__abstractmethods__", ()))]
     try:
         scenario.parameters()
@@ -383,7 +383,7 @@ class _SourceLoader(SourceFileLoader):
     def get_code(self, fullname: str) -> CodeType:
         """Return the code of the source, whatever is in `__pycache__`."""
         path = self.get_filename(fullname)
-        return self.source_to_code(self.get_data(path), path)  # pyright: ignore[reportUnknownMemberType]
+        return self.source_to_code(self.get_data(path), path)  # type: ignore
 
 
 _FROM_SOURCE: set[Path] = set()

@@ -200,13 +200,13 @@ def terminal_faults(
     `parameters` are the names of the block's parameters.
     """
     example = 'such as (terminal("gripper", TerminalKind.POSE, "p_WG", "q_WG"),)'
-    if not isinstance(terminals, tuple | list):
+    if not isinstance(terminals, (tuple, list)):
         return [f"{terminals!r} is not a tuple of terminals, {example}"]
     sides = {p.name: p for p in inputs}, {p.name: p for p in outputs}
     faults: list[str] = []
     names: set[str] = set()
     terminal_of: dict[str, str] = {}  # by port
-    for t in terminals:  # pyright: ignore[reportUnknownVariableType]
+    for t in terminals:  # type: ignore
         if not isinstance(t, Terminal):
             faults.append(f"{t!r} is not a terminal, {example}")
             continue

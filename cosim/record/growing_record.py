@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from handover.cosim.record.columns import column_metadata
 from handover.cosim.record.reader import Record, columns_of_signals
 from handover.cosim.record.stream import stream_of, stream_schema, tail_of
-from handover.cosim.record.tail import HEADER, MAGIC, DamagedTail, block_arrays, read_layout
+from handover.cosim.record.tail import HEADER, MAGIC, block_arrays, read_layout
 
 _TRIES = 20
 """How often a row is read anew that the run overwrites meanwhile."""
@@ -45,7 +45,7 @@ class GrowingRecord(Record):
             size = int(header["layout"][0])
             layout = read_layout(self._map, size)
             self._counters, self._times, self._rows = block_arrays(self._map, layout, HEADER.itemsize + size)
-        except (OSError, ValueError, DamagedTail) as e:
+        except (OSError, ValueError) as e:
             raise NoRows from e
         self.places: dict[str, tuple[int, int]] = dict(
             zip(self._schema.names[1:], layout.get("places", []), strict=True)

@@ -122,7 +122,7 @@ def unit_of(ports: PortNames, causality: Causality) -> str:
     Raises:
         TypeError: they are something else.
     """
-    if not isinstance(ports, PortNames):  # pyright: ignore[reportUnnecessaryIsInstance]
+    if not isinstance(ports, PortNames):  # type: ignore
         raise TypeError(
             f"{ports} is one port or terminal, and the other end all of a unit: connect UNIT.y with UNIT.u, or "
             "UNIT.y.NAME with UNIT.u.NAME"

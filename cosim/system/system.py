@@ -294,7 +294,7 @@ class System:
         Raises:
             TypeError: the target is not a port.
         """
-        if not isinstance(target, PortName):  # pyright: ignore[reportUnnecessaryIsInstance]
+        if not isinstance(target, PortName):  # type: ignore
             raise TypeError(f"{target!r} is not a port: give unit.u.NAME of what add returned")
         self._forget_matches(target)
         self.followed[target] = series
@@ -313,7 +313,7 @@ class System:
         Raises:
             TypeError: the target is not a port.
         """
-        if not isinstance(target, PortName):  # pyright: ignore[reportUnnecessaryIsInstance]
+        if not isinstance(target, PortName):  # type: ignore
             raise TypeError(f"{target!r} is not a port: give unit.u.NAME of what add returned")
         self._forget_matches(target)
         self.externals[target] = NoSource() if source is None else source
@@ -331,7 +331,7 @@ class System:
             *(str(left) for x in self._unsettled if (left := x.remaining(self._feeds(x.target)))),
         ]
         faults += [ambiguity(to, [c.source for c in cs]) for to, cs in self._matches.items() if len(cs) > 1]
-        if not isinstance(self.start, Rational):  # pyright: ignore[reportUnnecessaryIsInstance]
+        if not isinstance(self.start, Rational):  # type: ignore
             faults.append(f"its start, {self.start!r}, is not exact; give Fraction('{self.start!r}')")
         for unit in self.units.values():
             faults += value_faults(unit.name, unit.description, unit.start)
@@ -423,7 +423,7 @@ class System:
         return None if transformation.is_identity else transformation
 
     def _period(self, name: str, proposed: DefaultExperiment, period: Fraction | None) -> Fraction:
-        if period is not None and not isinstance(period, Rational):  # pyright: ignore[reportUnnecessaryIsInstance]
+        if period is not None and not isinstance(period, Rational):  # type: ignore
             exact = Fraction(str(period)) if isinstance(period, float) else "1/100"
             raise TypeError(f"{name}: period = {period!r} is not exact, so time would drift; give Fraction('{exact}')")
         self._step_faults.pop(name, None)

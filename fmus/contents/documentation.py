@@ -131,7 +131,7 @@ def _start(v: Variable) -> str:
         if rows.size > 9:
             return f"{rows.flat[0]:.6g} …"
         return "; ".join(", ".join(f"{value:.6g}" for value in row) for row in rows)
-    return v.start.name if v.enumeration else f"{v.start:.6g}" if v.kind is Kind.REAL else str(v.start)
+    return v.start.name if v.enumeration is not None else f"{v.start:.6g}" if v.kind is Kind.REAL else str(v.start)
 
 
 def _range(v: Variable) -> str:

@@ -28,7 +28,7 @@ def try_unit(resources: str, token: str, step: str, result: str) -> None:
     try:
         slave = loader["start"](resources, token)
         slave.initialise()
-        slave._clock[:] = 0.0, float(step)  # pyright: ignore[reportPrivateUsage]
+        slave._clock[:] = 0.0, float(step)  # type: ignore
         slave.step()
     except BaseException as e:
         rejects_start_values = slave is not None and getattr(e, "is_refusal", False)

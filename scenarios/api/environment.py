@@ -106,7 +106,7 @@ class ScenarioEnvironment(gymnasium.Env[Values, Values]):
         session = self.session
         if session is None:
             raise RuntimeError("there is no episode: call reset first")
-        if not isinstance(action, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+        if not isinstance(action, Mapping):  # type: ignore
             raise InvalidInput(f"action = {action!r}: a mapping is right, with {', '.join(self._actions)}")
         if missing := [name for name in self._actions if name not in action]:
             raise InvalidInput(f"the action has no {', '.join(missing)}")

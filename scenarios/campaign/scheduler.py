@@ -59,7 +59,7 @@ def scheduler_address(text: str) -> str:
 
     try:
         kind = kind_at(address, _DASK_CONNECT_TIMEOUT, _ANSWER_TIMEOUT)
-    except (asyncio.TimeoutError, TimeoutError) as e:
+    except (asyncio.TimeoutError, TimeoutError) as e:  # type: ignore  # one class from Python 3.11 on
         raise PoolError(f"{address} does not answer as a Dask scheduler within {_ANSWER_TIMEOUT:g} s; {RIGHT}") from e
     except OSError as e:
         raise PoolError(f"no scheduler can be reached at {address}: {one_line(e)}; {RIGHT}") from e

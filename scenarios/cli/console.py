@@ -21,7 +21,7 @@ def open_console() -> Console:
     return _Console(highlight=False, width=None if sys.stdout.isatty() else 160)
 
 
-def print_rows(console: Console, rows: list[tuple[str, ...]]) -> None:
+def print_rows(console: Console, rows: Iterable[tuple[str, ...]]) -> None:
     """Print rows of texts in columns, indented; nothing in them is interpreted as rich's markup."""
     table = Table.grid(padding=(0, 2))
     for row in rows:

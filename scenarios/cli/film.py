@@ -32,7 +32,7 @@ _VIEWS = ("start", "front", "side", "top", "follow")
 _GIF_FPS, _FPS, _FASTEST_GIF = 15.0, 30.0, 50.0
 
 
-class Size(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (generic in newer versions only)
+class Size(click.ParamType):  # type: ignore (generic in newer versions only)
     """Width and height in pixels, such as 1280x720."""
 
     name = "size"

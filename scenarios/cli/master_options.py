@@ -16,7 +16,7 @@ _PLAIN = MasterOptions()
 _CONTROL = AdaptiveStep()
 
 
-class _Above0(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (generic in newer versions only)
+class _Above0(click.ParamType):  # type: ignore (generic in newer versions only)
     """A positive finite number; `click.FloatRange` lets infinity and not-a-number through."""
 
     name = "number"

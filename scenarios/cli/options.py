@@ -72,7 +72,7 @@ class WholeNumber(click.IntRange):
         return int(super().convert(number, param, ctx))
 
 
-class Instant(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (generic in newer versions only)
+class Instant(click.ParamType):  # type: ignore (generic in newer versions only)
     """A time in seconds, such as 0.01, 1/30 or -2, taken exactly."""
 
     name = "seconds"
@@ -96,7 +96,7 @@ _FORM = re.compile(r"[\d.]+(e[-+]?\d{1,3})?|\d+/\d+", re.IGNORECASE)
 """Exact fractions of larger exponents would take long to compute."""
 
 
-class Seconds(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (generic in newer versions only)
+class Seconds(click.ParamType):  # type: ignore (generic in newer versions only)
     """A positive number of seconds, such as 0.01 or 1/30, taken exactly."""
 
     name = "seconds"

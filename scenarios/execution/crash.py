@@ -41,7 +41,7 @@ class Crash:
         self.failure = _failure(heartbeat, self._call, end)
         self.in_own_thread = _crashed_in_own_thread(heartbeat)
         self.message = str(self.failure or "") or _crash_message(self._call, self._time, end, self.in_own_thread)
-        self.folder = None
+        self.folder: RunFolder | None = None
         if "folder" in self.facts:
             self.folder = RunFolder.of_run(Path(self.facts["folder"]), Path(self.facts["shown"]))
 

@@ -92,7 +92,7 @@ def is_number(value: object) -> bool:
 
 def is_series(values: object, shape: tuple[int | None, ...]) -> bool:
     """Return whether values are numbers in an array of a shape, of which None is any length."""
-    if not isinstance(values, np.ndarray | list | tuple):
+    if not isinstance(values, (np.ndarray, list, tuple)):
         return False
     try:
         array: NDArray[Any] = np.asarray(cast(Any, values))

@@ -3,6 +3,7 @@
 import enum
 from dataclasses import dataclass, fields
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -161,7 +162,7 @@ class HandoverParameters(RobotAndModel):
         return float(paper_values("free_flyer", "published")[f"velocity_{receiver.lower()}"][self.behaviour])
 
     @property
-    def traits(self) -> dict[str, float]:
+    def traits(self) -> dict[str, Any]:
         """Parameters of the person's unit that follow from strength and skill (assumed)."""
         worse = _UNSKILLED_ERRORS + (1.0 - _UNSKILLED_ERRORS) * self.skill
         skilled = {

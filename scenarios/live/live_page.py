@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
-import pyarrow.dataset  # pyright: ignore[reportUnusedImport] # noqa: F401  imports pandas, see `_figures`
+import pyarrow.dataset  # type: ignore # noqa: F401  imports pandas, see `_figures`
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 from starlette.routing import BaseRoute

@@ -73,7 +73,7 @@ class Viewers:
             await asyncio.wait_for(sending, self._slowest)
         except (WebSocketDisconnect, RuntimeError):
             self.remove(page)
-        except (TimeoutError, asyncio.TimeoutError):
+        except (TimeoutError, asyncio.TimeoutError):  # type: ignore  # one class from Python 3.11 on
             self.remove(page)
             reason = f"the page took more than {self._slowest:g} s to receive a message"
             closing = asyncio.create_task(close(page, TRY_AGAIN_LATER, reason, _THAWED))

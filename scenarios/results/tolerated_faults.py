@@ -93,7 +93,7 @@ class ToleratedFaults:
 
     def __init__(self, *passing: type[Exception]) -> None:
         self.lines: list[str] = []
-        self._passing = (OSError, CosimError, *passing)
+        self._passing: tuple[type[BaseException], ...] = (OSError, CosimError, *passing)
 
     @contextmanager
     def tolerated(self, what: str) -> Generator[None, None, None]:

@@ -18,8 +18,9 @@ class DrivenUnit:
         fmpy.extract(str(native_fmu(name, fmi)), str(folder))
         slave = fmpy.fmi2.FMU2Slave if fmi == 2 else fmpy.fmi3.FMU3Slave
         self.fmu: Any = slave(guid=name, modelIdentifier=name, unzipDirectory=str(folder), instanceName=name)
-        self.get: Any = self.fmu.getReal if fmi == 2 else self.fmu.getFloat64
-        self.set: Any = self.fmu.setReal if fmi == 2 else self.fmu.setFloat64
+        kind = "Real" if fmi == 2 else "Float64"
+        self.get: Any = getattr(self.fmu, f"get{kind}")
+        self.set: Any = getattr(self.fmu, f"set{kind}")
 
     def start(self, *, event_mode: bool = False, **values: float) -> None:
         """Set parameters and go through initialisation."""

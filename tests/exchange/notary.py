@@ -31,7 +31,7 @@ class Notary:
     """Writes down the numbers that hold when a step begins."""
 
     feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {"text": ("x",)}
-    period = None
+    period: float | None = None
 
     def __init__(self, params: Params) -> None:
         pass

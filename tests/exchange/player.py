@@ -35,7 +35,7 @@ def player(block: type[Any], unit: str) -> type[Any]:
         """Plays."""
 
         feedthrough: typing.ClassVar[dict[str, tuple[str, ...]]] = {}
-        period = None
+        period: float | None = None
 
         def __init__(self, params: Params) -> None:
             pass

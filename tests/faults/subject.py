@@ -73,12 +73,14 @@ class Subject:
         self.event_mode, self.early_return = event_mode, early_return
         self.refused = self.answered = 0
         self.kept: Any = None  # memory that a call's arguments point into
-        self._log2 = Log2(lambda *a: self.log.append(a[-1].decode("utf-8", "replace")))
-        self._log3 = Log3(lambda *a: self.log.append(a[-1].decode("utf-8", "replace")))
+        self._log2, self._log3 = Log2(self._keep), Log3(self._keep)
         self.callbacks = Callbacks(logger=self._log2)
         self.handle: int | None = self.instantiate()
         if not self.handle:
             raise Fault(f"the unit was not instantiated: {self.log}")
+
+    def _keep(self, *arguments: Any) -> None:
+        self.log.append(arguments[-1].decode("utf-8", "replace"))
 
     def instantiate(self, **changed: Any) -> int | None:
         """Make an instance, with other arguments by their names here if wanted; return its handle."""

@@ -37,7 +37,7 @@ def test_nothing_is_left_of_an_instance_that_has_ended(tmp_path: Path):
         with contextlib.suppress(SystemExit):
             server.run()
         answers = host.recv(1 << 20)
-        left = [weakref.ref(server), weakref.ref(server._memory)]  # pyright: ignore[reportPrivateUsage]
+        left = [weakref.ref(server), weakref.ref(server._memory)]  # type: ignore
         del server
         assert [reference() for reference in left] == [None, None]
         with pytest.raises(OSError, match="Bad file descriptor"):

@@ -34,7 +34,7 @@ def start(folder: Path, *arguments: str | Path, program: str = _MAIN, **streams:
     environment = {**os.environ, "TMPDIR": str(folder / "tmp")}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     command = [sys.executable, "-c", program, "run", *map(str, arguments)]
-    return subprocess.Popen(command, text=True, cwd=folder, env=environment, **{**pipes, **streams})  # pyright: ignore
+    return subprocess.Popen(command, text=True, cwd=folder, env=environment, **{**pipes, **streams})  # type: ignore
 
 
 def wait_until(there: Callable[[], bool], going: "subprocess.Popen[str]") -> None:

@@ -64,7 +64,7 @@ def test_verdict_figures_and_page_are_made_of_any_outputs(rows: int, kind: str, 
 
 def _plain(value: object) -> object:
     if isinstance(value, np.ndarray):
-        return value.tolist()  # pyright: ignore
+        return value.tolist()  # type: ignore
     name = getattr(value, "name", None)
     return value if name is None else str(name).lower()
 

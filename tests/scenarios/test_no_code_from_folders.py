@@ -53,14 +53,14 @@ class Scene(Experiment):
 @pytest.fixture
 def marker(tmp_path: Path) -> Generator[Path, None, None]:
     """The file that planted code writes; modules, path and what is trusted are as before after the test."""
-    modules, path, trusted = set(sys.modules), [*sys.path], set(catalog._TRUSTED)  # pyright: ignore[reportPrivateUsage]
+    modules, path, trusted = set(sys.modules), [*sys.path], set(catalog._TRUSTED)  # type: ignore
     yield tmp_path / "marker"
     for name in set(sys.modules) - modules:
         if name.startswith("foreign"):
             del sys.modules[name]
     sys.path[:] = path
-    catalog._TRUSTED.clear()  # pyright: ignore[reportPrivateUsage]
-    catalog._TRUSTED.update(trusted)  # pyright: ignore[reportPrivateUsage]
+    catalog._TRUSTED.clear()  # type: ignore
+    catalog._TRUSTED.update(trusted)  # type: ignore
 
 
 def plant(folder: Path, marker: Path) -> None:
@@ -134,10 +134,10 @@ def read_runs(folder: Path, out: Path, source: dict[str, Any]) -> None:
     film = film_content(RunFolder.of_run(first), ["mass.x"], 720)
     assert any("--trust" in line for line in film.notes)
     loaded = handover.load(first)
-    assert loaded.success  # pyright: ignore[reportAttributeAccessIssue]
+    assert loaded.success  # type: ignore
     loaded.report()
     with pytest.raises(handover.InvalidInput, match="import its module"):
-        loaded.replay()  # pyright: ignore[reportAttributeAccessIssue]
+        loaded.replay()  # type: ignore
     watched = WatchedRun(first)
     assert (watched.led_hand(), watched.has_verdict) == (None, True)
     watched.recorded_scene()
@@ -152,7 +152,7 @@ def read_campaigns(folder: Path, out: Path, source: dict[str, Any]) -> None:
     assert "fall" in compared.output  # its headline is in the folder
     loaded = handover.load(first)
     loaded.report()
-    assert loaded.points  # pyright: ignore[reportAttributeAccessIssue]
+    assert loaded.points  # type: ignore
 
 
 @pytest.mark.parametrize(("read", "number"), [(read_runs, 0), (read_runs, 1), (read_campaigns, 0)])

@@ -50,6 +50,6 @@ def test_every_shape_of_a_mark_is_drawn():
     shapes = re.findall(r'"([a-z ]+)"', (Mark.__doc__ or "").partition("shape: ")[2].partition("\n")[0])
     marks = [Mark(label="ball", shape=shape, u=20.0, v=20.0) for shape in shapes]
     pixels = np.zeros((40, 40, 3), np.uint8)
-    plots._show(axes, CameraPicture.take(t=0.0, camera="left", role="", pixels=pixels, marks=marks), (40, 0))  # pyright: ignore[reportPrivateUsage]
+    plots._show(axes, CameraPicture.take(t=0.0, camera="left", role="", pixels=pixels, marks=marks), (40, 0))  # type: ignore
     assert [patch.get_linestyle() for patch in axes.patches] == ["-", "--"]
     assert [line.get_marker() for line in axes.lines] == ["x", "+"]

@@ -165,7 +165,7 @@ def test_page_and_figure_draw_the_same_curves_in_the_same_colours(
     assert {p.name for p in tmp_path.iterdir()} == {f"{f.name}.{kind}" for f in made for kind in ("png", "svg")}
     assert set(drawn) == set(done.plots)
     for title, plot in done.plots.items():
-        traces: tuple[Any, ...] = time_figure(plot, done.record.time).data  # pyright: ignore
+        traces: tuple[Any, ...] = time_figure(plot, done.record.time).data  # type: ignore
         on_page = [(t.name, t.line.color) for t in traces]
         assert [label for label, _ in drawn[title]] == [label for label, _ in on_page]
         curves = drawn[title][: len(plot.curves)]

@@ -20,4 +20,5 @@ class ZeroArm(VslArm):
 
 def _zeros(y: Outputs) -> Outputs:
     values: dict[str, Any] = {f.name: np.zeros_like(getattr(y, f.name)) for f in dataclasses.fields(y)}
-    return dataclasses.replace(y, **{n: float(v) if v.shape == () else v for n, v in values.items()})
+    plain: dict[str, Any] = {n: float(v) if v.shape == () else v for n, v in values.items()}
+    return dataclasses.replace(y, **plain)

@@ -75,7 +75,7 @@ class BallFit:
             if gap <= self._gap:
                 return self._solve(some, start)
         alone = max(views, key=lambda view: view.disc.arc, default=None)
-        return alone and self._solve([alone], alone.by_size(self._radius))
+        return self._solve([alone], alone.by_size(self._radius)) if alone else None
 
     def _solve(self, views: Sequence["_View"], p_WO: Floats) -> BallPosition | None:
         cameras, pictures = [view.camera for view in views], [view.picture for view in views]

@@ -202,8 +202,8 @@ class _Zip:
 class _Folder:
     """The files of an unpacked archive. Nothing is written to it."""
 
-    outdated_methods = ()
-    with_backslashes = ()
+    outdated_methods: tuple[str, ...] = ()
+    with_backslashes: tuple[str, ...] = ()
     as_named = True
 
     def __init__(self, path: Path) -> None:

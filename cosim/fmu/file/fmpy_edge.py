@@ -200,7 +200,7 @@ class MissingLibrary(NamedTuple):
 
 def platform_folder(fmi: int) -> str:
     """Return the folder of `binaries/` that holds this machine's library, by the standard's name."""
-    return cast(str, fmpy.platform if fmi == 2 else fmpy.platform_tuple)
+    return fmpy.platform if fmi == 2 else fmpy.platform_tuple
 
 
 def library_path(fmi: int, identifier: str) -> str:

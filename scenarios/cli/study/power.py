@@ -31,7 +31,7 @@ _COLUMNS = (
 )
 
 
-class People(click.ParamType):  # pyright: ignore[reportMissingTypeArgument] (generic in newer versions only)
+class People(click.ParamType):  # type: ignore (generic in newer versions only)
     """Numbers of participants, such as 10,12,18."""
 
     name = "people"

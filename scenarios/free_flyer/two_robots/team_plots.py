@@ -10,12 +10,13 @@ from handover.cosim.blocks.plain_rotation import vector
 from handover.cosim.record.reader import Record
 from handover.scenarios.experiment.experiment import Figure
 from handover.scenarios.experiment.paper import paper_values
-from handover.scenarios.experiment.time_plot import Curve, Level, Phase, TimeFigure, TimePlot, phases_of
+from handover.scenarios.experiment.time_plot import Curve, Level, Phase, Stroke, TimeFigure, TimePlot, phases_of
 from handover.scenarios.free_flyer.parameters import ROBOTS, TeamParameters, TeamTask
 from handover.scenarios.free_flyer.push.push_plots import CAPTION, plot_thrust
 from handover.scenarios.free_flyer.scene import Solid, draw_scene, hand_at, jaw_gap, large_object_at, robot_at
 from handover.scenarios.free_flyer.two_robots.team_evaluation import TeamEvaluator, internal_force
 
+_STROKES: tuple[Stroke, Stroke] = ("solid", "dashed")
 _PALETTE = ("gripper 1", "gripper 2", "object", "hand 1", "hand 2")
 
 
@@ -123,7 +124,7 @@ def _forces(record: Record, hands: Sequence[str]) -> list[TimePlot]:
             curves=[
                 *(
                     Curve(label=f"on gripper {i}", values=np.linalg.norm(f, axis=1), stroke=stroke)
-                    for (i, f), stroke in zip(on_grippers.items(), ("solid", "dashed"), strict=True)
+                    for (i, f), stroke in zip(on_grippers.items(), _STROKES, strict=True)
                 ),
                 Curve(label="internal: pressing, below 0 drawing apart", values=internal, stroke="dotted"),
             ],
@@ -135,7 +136,7 @@ def _forces(record: Record, hands: Sequence[str]) -> list[TimePlot]:
             phases=phases_of(record, "person.hands_holding"),
             curves=[
                 Curve(label=f"on hand {h}", values=np.linalg.norm(record[f"person.f_H_{h}"], axis=1), stroke=stroke)
-                for h, stroke in zip(hands, ("solid", "dashed"), strict=False)
+                for h, stroke in zip(hands, _STROKES, strict=False)
             ],
         ),
     ]
@@ -150,7 +151,7 @@ def _angles(record: Record, phases: Sequence[Phase]) -> TimePlot:
         phases=phases,
         curves=[
             Curve(label=f"gripper {i}", values=np.degrees(record[f"person.gripper_angle_{i}"]), stroke=stroke)
-            for i, stroke in zip(ROBOTS, ("solid", "dashed"), strict=True)
+            for i, stroke in zip(ROBOTS, _STROKES, strict=True)
         ],
         levels=(Level(label="counts as full", value=threshold),),
         limits=(0.0, None),
@@ -167,7 +168,7 @@ def _speeds(parameters: TeamParameters, record: Record, phases: Sequence[Phase])
         curves=[
             *(
                 Curve(label=f"as robot {i} judges", values=record[f"decision.speed_{i}"], stroke=stroke)
-                for i, stroke in zip(ROBOTS, ("solid", "dashed"), strict=True)
+                for i, stroke in zip(ROBOTS, _STROKES, strict=True)
             ),
             *(
                 Curve(label=f"gripper {i}", values=np.linalg.norm(record[f"robot_{i}.v_WG"], axis=1), stroke="dotted")

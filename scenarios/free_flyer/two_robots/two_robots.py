@@ -34,7 +34,7 @@ from handover.scenarios.free_flyer.two_robots.team_evaluation import TeamEvaluat
 
 _FLIGHT = 150
 """Time for flying, fetching and retreating, without the waiting for the person, s (assumed)."""
-_TASKS: Mapping[TeamTask, tuple[str, Mapping[str, str]]] = {
+_TASKS: Mapping[TeamTask, tuple[str, Mapping[str, Any]]] = {
     TeamTask.ROBOTS_TO_HUMAN: ("robot_to_human", {"motion": "take", "object_with": "free"}),
     TeamTask.HUMAN_TO_ROBOTS: ("human_to_robot", {"motion": "give", "object_with": "hand"}),
 }

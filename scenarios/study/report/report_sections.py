@@ -273,7 +273,9 @@ def _model_rows(m: StatementModel, analysis: StudyAnalysis, words: Words) -> lis
     names = [f"{words.first} − {words.second}: {words.task(t)}" for t in tasks]
     names += [f"{words.task(t)}, not {words.task(tasks[0]).lower()}" for t in tasks[1:]]
     names += ["a period later"] if "period" in m.names else []
-    rows = [(m.statement, "participants' intercepts, standard deviation", f"{m.model.deviation:.2f}", "")]
+    rows: list[tuple[str, ...]] = [
+        (m.statement, "participants' intercepts, standard deviation", f"{m.model.deviation:.2f}", "")
+    ]
     if m.model.slope_deviation is not None:
         label = f"participants' {words.first} − {words.second}, standard deviation"
         rows.append((m.statement, label, f"{m.model.slope_deviation:.2f}", ""))

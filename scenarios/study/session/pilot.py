@@ -322,7 +322,7 @@ async def play_sessions(address: str, plan: StudyPlan, tell: Callable[[str], Non
     """
     origin = "http://" + address.split("//", 1)[1].split("/", 1)[0]
     seat = address.replace("http://", "ws://", 1) + "seat"
-    async with connect(seat, origin=origin, max_size=None) as connection:  # pyright: ignore[reportArgumentType]
+    async with connect(seat, origin=origin, max_size=None) as connection:  # type: ignore
         for number in range(1, plan.participants + 1):
             pilot = ScriptedPilot(connection, plan.seed + number)
             await pilot.take_part()

@@ -146,10 +146,10 @@ class StudySeat:
                 if fault:
                     raise InvalidAction(fault)
                 await self._take(text)
-            except (InvalidAction, ValueError) as e:
-                await self._send({"refused": str(e)})
             except (RecordNotWritten, InvalidRunFolder, OSError) as e:
                 await self._send({"refused": f"it could not be kept: {e}"})
+            except (InvalidAction, ValueError) as e:
+                await self._send({"refused": str(e)})
 
     async def _take(self, text: str) -> None:
         """Do what a message asks for.
@@ -282,7 +282,7 @@ class StudySeat:
         await self._send_frame(trial, always=True)
         try:
             await asyncio.wait_for(self._page_ready.wait(), _READY)
-        except (TimeoutError, asyncio.TimeoutError):
+        except (TimeoutError, asyncio.TimeoutError):  # type: ignore  # one class from Python 3.11 on
             return f"{VoidCause.NOT_DRAWN.value} within {_READY:.0f} s"
         if self.protocol.screen == "practising":
             await self._send({"target": self.practice.test.target})

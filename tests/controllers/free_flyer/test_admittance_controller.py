@@ -220,7 +220,7 @@ def test_an_output_depends_directly_on_the_inputs_that_are_declared_and_on_no_ot
         for given in (u, drawn(active=n % 3 > 0)):
             before = vars(controller.outputs(0.0, given))
             for name in names:
-                other = not given.active if name == "active" else getattr(drawn(), name)
+                other: Any = not given.active if name == "active" else getattr(drawn(), name)
                 if name == "q_WG_goal":
                     other = np.array([1.0, 0.0, 0.2, 0.0])
                 after = vars(controller.outputs(0.0, replace(given, **{name: other})))

@@ -205,7 +205,7 @@ def test_a_release_has_failed_if_either_gripper_closes_on_the_object_again(close
 def test_they_yield_on_until_they_no_longer_follow_the_pull():
     w = world(HandoverTask.ROBOT_TO_HUMAN, moved([-0.1, 0.0, 0.0], [-0.1, 0.0, 0.0]))
     w.until(P.RELEASE_OBJECT)
-    w.follows, w.before = [False, False], lambda _: None
+    w.follows, w.before = [False, False], lambda _: None  # type: ignore
     w.p = [p - np.array([0.05, 0.0, 0.0]) for p in w.p]
     w.v = [np.array([-0.1, 0.0, 0.0])] * 2
     y = w.run(3.0)

@@ -117,7 +117,7 @@ def test_profile_joins_its_ends_smoothly_and_keeps_its_bounds(seed: int):
     bounds = Bounds(speed=0.1, acceleration=0.02, rate=0.17, turning=0.1)
     p_0, p_1, v_0 = (tuple(s * rng.normal(size=3)) for s in (0.5, 0.5, 0.02))
     q_0, q_1 = (tuple(q) for q in Rotation.random(2, rng=rng).as_quat(scalar_first=True))
-    way = profile_between(p_0, v_0, q_0, p_1, q_1, bounds)  # pyright: ignore[reportArgumentType]
+    way = profile_between(p_0, v_0, q_0, p_1, q_1, bounds)  # type: ignore
     t = np.linspace(0.0, way.T, 4001)
     rows = [way.at(x) for x in t]
     p, v, a, w, dw = (np.array([getattr(r, k) for r in rows]) for k in ("p", "v", "a", "w", "dw"))

@@ -207,9 +207,10 @@ def test_garbage_shows_nothing(kind: str):
 
 
 def test_pictures_of_different_scenes_do_not_give_a_ball_between_them(camera: StereoCamera):
-    a, b = (camera.step(0.0, 1 / 30, replace(hanging("left"), p_WO=p)) for p in ([0, 0.3, -0.5], [0, 0.3, -0.62]))
+    places = np.array([[0.0, 0.3, -0.5], [0.0, 0.3, -0.62]])
+    a, b = (camera.step(0.0, 1 / 30, replace(hanging("left"), p_WO=p)) for p in places)
     y = HandoverVision(Params()).step(0.0, 1 / 30, Inputs(left=a.left, right=b.right))
-    near = [np.linalg.norm(y.p_WO_meas - p) for p in ([0, 0.3, -0.5], [0, 0.3, -0.62])]
+    near = [np.linalg.norm(y.p_WO_meas - p) for p in places]
     assert not y.seen_O or min(near) < 0.03
 
 

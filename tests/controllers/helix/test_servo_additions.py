@@ -86,7 +86,8 @@ def test_a_ball_that_is_taken_away_while_the_gripper_closes_is_approached_again_
 
 
 def unseen(name: str, since: float, until: float = np.inf) -> Edit:
-    return lambda t, u: replace(u, **{name: False}) if since <= t < until else u
+    change: dict[str, Any] = {name: False}
+    return lambda t, u: replace(u, **change) if since <= t < until else u
 
 
 def test_a_lost_ring_is_found_where_it_was_seen_last():

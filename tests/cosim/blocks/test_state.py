@@ -36,7 +36,7 @@ PLAIN = st.recursive(
 
 def kinds(state: Any) -> Any:
     """Return the types of all parts of a state."""
-    if isinstance(state, list | tuple):
+    if isinstance(state, (list, tuple)):
         return type(cast(object, state)), [kinds(item) for item in cast(Sequence[Any], state)]
     if isinstance(state, Mapping):
         return dict, {key: kinds(value) for key, value in cast(Mapping[Any, Any], state).items()}

@@ -46,7 +46,7 @@ class Outputs:
 
 class Plant:
     feedthrough: Any = {}
-    period = None
+    period: float | None = None
     terminals: Any = ()
 
     def __init__(self, params: Params) -> None: ...

@@ -84,9 +84,9 @@ def test_a_unit_s_process_that_somebody_killed_is_told_as_that():
     master = Master(fed_by(native_fmu("gain"), 3), MasterOptions(isolated=("bad",)))
 
     def kill(_t: float, _signals: object) -> None:
-        process = master.ensemble.instances["bad"]._process.own  # pyright: ignore
+        process = master.ensemble.instances["bad"]._process.own  # type: ignore
         assert process is not None
-        os.kill(process._process.pid, signal.SIGKILL)  # pyright: ignore
+        os.kill(process._process.pid, signal.SIGKILL)  # type: ignore
 
     how = "unit bad crashed in fmi3DoStep at t = 0 s: killed, by someone or by the system for want of memory"
     with pytest.raises(UnitCrashed, match=how), master:

@@ -244,9 +244,9 @@ def test_a_checkpoint_whose_parts_contradict_each_other_is_refused(part: dict[st
     with Master(checkpointed_runs.oscillator(), stop=Fraction(1)) as master:
         master.run(Fraction(1, 5), [])
         c = take_checkpoint(master, 5)
-    stepper = {**c.stepper, **part.get("stepper", {})}
+    changed: dict[str, Any] = {**part, "stepper": {**c.stepper, **part.get("stepper", {})}}
     with Master(checkpointed_runs.oscillator(), stop=Fraction(1)) as master, pytest.raises(CosimError, match=fault):
-        replace(c, **{**part, "stepper": stepper}).restore(master)
+        replace(c, **changed).restore(master)
 
 
 def test_parts_of_a_checkpoint_that_overlap_are_refused(tmp_path: Path):

@@ -132,7 +132,7 @@ def test_units_have_the_icons_of_their_fmus_which_come_along(fmu: FmuOf, tmp_pat
     s.add("three", fmu("Spring", 3))
     s.add("foreign", native_fmu("mass", 2))
     drawn = Drawn(write_ssp(s, tmp_path / "a.ssp", "a"))
-    named = {n: c.find("ssd:ElementGeometry", NAMESPACES).get("iconSource") for n, c in drawn.components.items()}  # pyright: ignore[reportOptionalMemberAccess]
+    named = {n: c.find("ssd:ElementGeometry", NAMESPACES).get("iconSource") for n, c in drawn.components.items()}  # type: ignore
     assert named["one"] == named["other"] != named["three"]
     assert named["foreign"] is None
     assert drawn.files[str(named["one"])] == read_icon(FmuArchive(fmu("Mass", 2))).png

@@ -219,7 +219,7 @@ def test_a_default_experiment_is_of_whole_steps(step: str, stop: float):
 
 
 def test_what_an_fmu_could_not_tell_apart_is_refused():
-    other = enum.IntEnum("Gear", {"PARK": 0})
+    other = enum.IntEnum("Gear", {"PARK": 0})  # type: ignore
     with pytest.raises(AmbiguousName, match="enumeration 'Gear'"):
         fmi3_description(model_of(gear=(other, parameter(other(0), "another Gear"))))
     with pytest.raises(AmbiguousName, match="enumeration 'Gear'"):

@@ -120,7 +120,8 @@ def test_a_zero_is_off_by_a_share_of_what_its_input_is_elsewhere(tmp_path: Path)
 def test_of_an_input_that_is_0_throughout_by_a_share_of_what_it_declares(
     chaotic: Path, declared: dict[str, Any], wanted: float
 ):
-    port = replace(describe_fmu(chaotic).inputs["x"], **{"minimum": None, "maximum": None, **declared})
+    bounds: dict[str, Any] = {"minimum": None, "maximum": None, **declared}
+    port = replace(describe_fmu(chaotic).inputs["x"], **bounds)
     table = SignalTable([Fraction(0)], {"x": [0.0]})
     assert perturbed(table, {"x": (port, 0)}, off_zero=True).columns["x"] == [pytest.approx(wanted, rel=1e-7)]
 
@@ -140,7 +141,8 @@ def test_of_an_input_that_is_0_throughout_by_a_share_of_what_it_declares(
 def test_an_input_is_off_by_what_its_range_and_width_allow(
     chaotic: Path, x: float, declared: dict[str, Any], wanted: float
 ):
-    port = replace(describe_fmu(chaotic).inputs["x"], **{"minimum": None, "maximum": None, **declared})
+    bounds: dict[str, Any] = {"minimum": None, "maximum": None, **declared}
+    port = replace(describe_fmu(chaotic).inputs["x"], **bounds)
     table = SignalTable([Fraction(0)], {"x": [x]})
     assert perturbed(table, {"x": (port, 0)}, off_zero=True).columns["x"] == [wanted]
 

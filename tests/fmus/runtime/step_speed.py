@@ -82,7 +82,7 @@ def timed(body: list[str], names: dict[str, object]) -> Callable[[], Measured]:
     """Return a function that runs the lines STEPS times and returns microseconds each."""
     lines = ["def run(k_last):", "    for k in range(k_last):", *(f"        {line}" for line in body)]
     exec("\n".join(lines), names)
-    run: Callable[[int], None] = names["run"]  # pyright: ignore[reportAssignmentType]
+    run: Callable[[int], None] = names["run"]  # type: ignore
 
     def measure() -> Measured:
         begin, wall = time.thread_time(), time.perf_counter()

@@ -86,7 +86,7 @@ class BareFolder:
         """Step an unpacked unit in the host, in this folder as the root or outside of it."""
         root = ET.parse(unit / "modelDescription.xml").getroot()
         fmi = int(float(root.attrib["fmiVersion"]))
-        name = root.find("CoSimulation").attrib["modelIdentifier"]  # pyright: ignore[reportOptionalMemberAccess]
+        name = root.find("CoSimulation").attrib["modelIdentifier"]  # type: ignore
         place = Path("/", unit.relative_to(self.path)) if inside else unit
         library = place / "binaries" / (FMI2_FOLDERS[host_platform()] if fmi == 2 else host_platform()) / f"{name}.so"
         resources = (place / "resources").as_uri() if fmi == 2 else str(place / "resources")
@@ -121,7 +121,7 @@ class BareFolder:
 
 def _outputs(root: ET.Element) -> list[str]:
     listed: list[str] = []
-    for variable in root.find("ModelVariables") or ():
+    for variable in root.iterfind("ModelVariables/*"):
         if variable.get("causality") == "output":
             kind = KINDS.get(variable.tag) or next(KINDS[child.tag] for child in variable if child.tag in KINDS)
             count = 1

@@ -17,11 +17,11 @@ from handover.fmus.standalone import freezer, program, smoke_test
 from handover.fmus.standalone.freezer import (
     PROGRAM,
     CannotFreeze,
-    _contents,  # pyright: ignore[reportPrivateUsage]
-    _freeze,  # pyright: ignore[reportPrivateUsage]
-    _imported,  # pyright: ignore[reportPrivateUsage]
-    _key,  # pyright: ignore[reportPrivateUsage]
-    _unwanted,  # pyright: ignore[reportPrivateUsage]
+    _contents,  # type: ignore
+    _freeze,  # type: ignore
+    _imported,  # type: ignore
+    _key,  # type: ignore
+    _unwanted,  # type: ignore
 )
 
 NOTHING = Carried({}, ())
@@ -88,9 +88,9 @@ def test_another_version_of_a_package_that_another_one_imports_is_frozen_anew(mo
     monkeypatch.setattr(
         freezer.importlib.metadata,
         "requires",
-        lambda name: {"direct": ["Required>=1", "not_imported; extra == 'all'"]}.get(name),  # pyright: ignore[reportUnknownLambdaType,reportUnknownArgumentType]
+        lambda name: {"direct": ["Required>=1", "not_imported; extra == 'all'"]}.get(name),  # type: ignore
     )
-    monkeypatch.setattr(freezer.importlib.metadata, "version", lambda name: versions.get(name, "6"))  # pyright: ignore[reportUnknownLambdaType,reportUnknownArgumentType]
+    monkeypatch.setattr(freezer.importlib.metadata, "version", lambda name: versions.get(name, "6"))  # type: ignore
 
     def key() -> str:
         return _key(["direct", "indirect.part"], NOTHING)
@@ -117,7 +117,7 @@ def test_how_this_machine_finds_its_installations_is_not_frozen(tmp_path: Path, 
     hack = tmp_path / "_distutils_hack"
     hack.mkdir()
     (hack / "__init__.py").touch()
-    monkeypatch.syspath_prepend(tmp_path)  # pyright: ignore[reportUnknownMemberType]
+    monkeypatch.syspath_prepend(tmp_path)  # type: ignore
     names = _imported("own:Own", NOTHING)
     assert "needed" in names
     assert not [name for name in names if name.startswith(("__editable__", "_distutils_hack"))]
@@ -135,7 +135,7 @@ def test_a_full_disk_leaves_nothing_in_the_cache(tmp_path: Path, monkeypatch: py
 
     copytree = shutil.copytree
     monkeypatch.setattr(freezer.subprocess, "run", run)
-    monkeypatch.setattr(freezer.shutil, "copytree", lambda *a, **k: copytree(*a, **k, copy_function=copy))  # pyright: ignore[reportUnknownLambdaType,reportUnknownArgumentType]
+    monkeypatch.setattr(freezer.shutil, "copytree", lambda *a, **k: copytree(*a, **k, copy_function=copy))  # type: ignore
     with pytest.raises(CannotFreeze, match=f"cannot be kept in {tmp_path}: .*No space left.*HANDOVER_CACHE"):
         _freeze([], NOTHING, tmp_path / "key")
     assert not list(tmp_path.iterdir())
@@ -152,13 +152,13 @@ def test_what_a_package_prints_as_it_is_imported_is_not_taken_for_the_modules(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     (tmp_path / "printing.py").write_text(f"{PRINTS}\nclass Own: ...\n")
-    monkeypatch.syspath_prepend(tmp_path)  # pyright: ignore[reportUnknownMemberType]
+    monkeypatch.syspath_prepend(tmp_path)  # type: ignore
     assert "atexit" in _imported("printing:Own", NOTHING)
 
 
 def test_a_module_that_ends_the_interpreter_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "ending.py").write_text("import os\nos._exit(0)\n")
-    monkeypatch.syspath_prepend(tmp_path)  # pyright: ignore[reportUnknownMemberType]
+    monkeypatch.syspath_prepend(tmp_path)  # type: ignore
     with pytest.raises(CannotFreeze, match="ending:Own cannot be imported: the interpreter ends with exit status 0"):
         _imported("ending:Own", NOTHING)
 

@@ -72,7 +72,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "own"
     folder.mkdir()
     (folder / "table.csv").write_text("2.5\n")
-    monkeypatch.syspath_prepend(folder)  # pyright: ignore[reportUnknownMemberType]
+    monkeypatch.syspath_prepend(folder)  # type: ignore
     monkeypatch.chdir(folder)
     return folder
 
@@ -147,7 +147,7 @@ def test_a_file_beside_the_module_goes_along(folder: Path, tmp_path: Path):
     block = reader(folder, "reads_beside", "Path(__file__).with_name('table.csv')")
     fmu = build(own_unit(block, None), 3, tmp_path, include=[folder / "table.csv"])
     (folder / "table.csv").write_text("no number\n")
-    result: Any = fmpy.simulate_fmu(str(fmu), stop_time=0.1, output=["y"])  # pyright: ignore[reportUnknownMemberType]
+    result: Any = fmpy.simulate_fmu(str(fmu), stop_time=0.1, output=["y"])  # type: ignore
     assert result["y"][-1] == 2.5
 
 
@@ -169,8 +169,8 @@ def test_files_that_the_fmu_lacks_or_that_only_this_machine_has(folder: Path, tm
 @pytest.mark.slow
 def test_a_package_that_is_not_frozen_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
-    unwanted = freezer._unwanted  # pyright: ignore[reportPrivateUsage]
-    monkeypatch.setattr(freezer, "_unwanted", lambda names: [*unwanted(names), "msgpack"])  # pyright: ignore[reportUnknownLambdaType,reportUnknownArgumentType]
+    unwanted = freezer._unwanted  # type: ignore
+    monkeypatch.setattr(freezer, "_unwanted", lambda names: [*unwanted(names), "msgpack"])  # type: ignore
     with pytest.raises(CannotFreeze, match="FreeFlyer: package msgpack cannot be frozen: PyInstaller"):
         build(UNITS["FreeFlyer"], 3, tmp_path, standalone=True)
     assert not list(tmp_path.glob("*.fmu"))

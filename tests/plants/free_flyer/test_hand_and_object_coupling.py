@@ -68,7 +68,7 @@ class Loop:
         """Momenta and kinetic energy of robot and object, the impulse that is on its way to the robot included."""
         y, h = self.y, self.h
         robot = body_sums(FLYER.mass, self.inertia, y.p_WB, matrix(y.q_WB), y.v_WB, y.w_WB)
-        p, q, v, spin = h.p_WO, h.q_WO, h.v_WO, np.array(self.hand._object.body.spin)  # pyright: ignore[reportPrivateUsage]
+        p, q, v, spin = h.p_WO, h.q_WO, h.v_WO, np.array(self.hand._object.body.spin)  # type: ignore
         R = matrix(q)
         held = body_sums(0.1, I_O, p, R, v, turned(np.diag(1.0 / np.diag(I_O)), R, spin))
         coming = self.dt * np.concatenate([h.f_G, h.tau_G + np.cross(y.p_WG, h.f_G), [0.0]])

@@ -115,8 +115,8 @@ class Loop:
 
     def elastic_energy(self) -> float:
         """Energy in the springs of both grips, J."""
-        energy, b = 0.0, self.unit._object.body  # pyright: ignore[reportPrivateUsage]
-        for y, gripper in zip(self.ys, self.unit._grippers, strict=True):  # pyright: ignore[reportPrivateUsage]
+        energy, b = 0.0, self.unit._object.body  # type: ignore
+        for y, gripper in zip(self.ys, self.unit._grippers, strict=True):  # type: ignore
             assert gripper.grip is not None
             G = Frame(vector(y.p_WG), quaternion(y.q_WG))
             f, tau = gripper.grip.load(G, b.p, b.q, rotation_matrix(b.q))

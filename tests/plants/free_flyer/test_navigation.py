@@ -23,7 +23,7 @@ DT = 0.016
 EXACT = Params(position_noise=0.0, attitude_noise=0.0, velocity_noise=0.0, rate_noise=0.0)
 WHATS = ("position", "attitude", "velocity", "rate")
 P_0, V, W = np.array([0.3, -0.07, 0.1]), np.array([0.2, -0.1, 0.05]), np.array([0.0, 0.6, -0.8])
-UNLIKE_EACH_OTHER = {"position": 0.001, "attitude": 0.002, "velocity": 0.003, "rate": 0.004}
+UNLIKE_EACH_OTHER: dict[str, Any] = {"position": 0.001, "attitude": 0.002, "velocity": 0.003, "rate": 0.004}
 DRIFTING = replace(EXACT, drift_time=2.0, **{f"{what}_drift": x for what, x in UNLIKE_EACH_OTHER.items()})
 
 

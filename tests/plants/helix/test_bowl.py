@@ -23,8 +23,8 @@ DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 def dropped(beside: float, v: float = 0.0, dt: float = 0.02, **changes: Any) -> list[Outputs]:
     """Return what a ball does that a gripper, moving at v, takes 0.1 m over the rim and lets go."""
     p_WG = P_WD + np.array([beside, 0.0, 0.1])
-    given = {"p_WO_0": p_WG, "p_WD": P_WD, "bowl_radius": 0.08, "tremor_rms": 0.0, "drift_rms": 0.0} | changes
-    partner = HandoverPartner(replace(Params(), **given))
+    at_rest: Any = {"p_WO_0": p_WG, "p_WD": P_WD, "bowl_radius": 0.08, "tremor_rms": 0.0, "drift_rms": 0.0}
+    partner = HandoverPartner(replace(Params(), **(at_rest | changes)))
     step = v * dt * np.array([1.0, 0.0, 0.0])
     take(partner, p_WG, dt=dt)
     carried = round(0.5 / dt)

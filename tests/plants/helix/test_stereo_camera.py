@@ -158,8 +158,9 @@ def test_a_scene_out_of_sight_leaves_the_backdrop(clean: StereoCamera):
 
 @pytest.mark.parametrize("side", ["left", "right", "third"])
 def test_a_quaternion_not_of_unit_length_is_refused(side: str):
+    long: dict[str, Any] = {f"q_WC_{side}": np.array([1.0, 1.0, 0.0, 0.0])}
     with pytest.raises(InvalidCalibration, match=f"'{side}': q_WC"):
-        StereoCamera(replace(Params(has_third=True), **{f"q_WC_{side}": np.array([1.0, 1.0, 0.0, 0.0])}))
+        StereoCamera(replace(Params(has_third=True), **long))
 
 
 def test_a_focal_length_that_is_not_positive_is_refused():

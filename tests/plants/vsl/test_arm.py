@@ -83,7 +83,7 @@ def test_error_grows_with_reach():
 
 
 def test_each_link_has_its_own_pressure_unless_it_is_rigid():
-    def height(p_2: float, p_3: float, **links: Link) -> float:
+    def height(p_2: float, p_3: float, **links: Any) -> float:
         arm = VslArm(replace(EXACT, q_0=reach(*OUT), p_0=np.array([p_2, p_3]), **links))
         return float(arm.outputs(0.0, ArmInputs()).p_WG[2])
 

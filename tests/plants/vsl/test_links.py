@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ def test_a_third_link_continues_the_second_without_a_joint():
 
 @pytest.mark.parametrize("motion", list(Motion))
 def test_a_third_link_has_a_pressure_of_its_own_unless_it_is_rigid(motion: Motion):
-    def height(p_4: float, **changes: Link) -> float:
+    def height(p_4: float, **changes: Any) -> float:
         q = np.array([0.0, 0.9, -0.9])
         params = replace(EXACT, motion=motion, links=3, p_4_0=p_4, q_0=q, **changes)
         y = walk(params, Inputs(q_cmd=q, p_cmd_4=p_4), 3)
@@ -62,7 +63,9 @@ def test_stiff_links_obey_the_kinematics(links: int):
         EI_rigid=1e9,
         L_3=0.2,
         L_4=0.17,
-        **dict.fromkeys(("link_2", "link_3", "link_4"), Link.RIGID),
+        link_2=Link.RIGID,
+        link_3=Link.RIGID,
+        link_4=Link.RIGID,
     )
     y = VslArm(replace(stiff, q_0=np.array([0.4, 0.7, -1.1]))).outputs(0.0, Inputs(load=0.1))
     forearm = (0.0, 0.2, 0.37)[links - 1]

@@ -130,7 +130,7 @@ def test_episodes_without_a_seed_differ_and_follow_from_the_first():
 )
 def test_what_makes_no_environment_is_refused(scenario: str, given: dict[str, object], told: str):
     with pytest.raises(handover.InvalidInput) as e:
-        handover.environment(scenario, **given)  # pyright: ignore
+        handover.environment(scenario, **given)  # type: ignore
     assert told in str(e.value)
 
 
@@ -140,7 +140,7 @@ def test_a_bad_action_is_refused():
         env.step({})
     env.reset(seed=0)
     with pytest.raises(handover.InvalidInput, match="action = 3: a mapping is right, with p_WH_cmd, yaw_cmd"):
-        env.step(3)  # pyright: ignore[reportArgumentType]
+        env.step(3)  # type: ignore
     with pytest.raises(handover.InvalidInput, match="the action has no p_WH_cmd"):
         env.step({"yaw_cmd": 0.0})
     with pytest.raises(handover.InvalidInput, match=r"reflex\.sigma_cmd: 2\.0 is out of range: from 0 to 1"):

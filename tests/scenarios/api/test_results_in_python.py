@@ -73,7 +73,7 @@ def test_plots_have_names_and_units_at_their_axes(run: handover.Run):
     assert [line.get_label() for line in above.get_lines()] == ["p_WH[1]", "p_WH[2]"]
     assert np.array_equal(np.asarray(above.get_lines()[1].get_ydata()), run.signals["scene.p_WH"][:, 1])
     assert "reach" in [label.get_text() for label in below.get_yticklabels()]
-    assert figure._repr_png_().startswith(b"\x89PNG")  # pyright: ignore
+    assert figure._repr_png_().startswith(b"\x89PNG")  # type: ignore
     assert not plt.get_fignums()
 
 
@@ -100,11 +100,11 @@ def test_replay_and_report_are_pages(run: handover.Run, tmp_path: Path):
     report = run.report()
     assert report.path == run.folder / "report.html"
     assert 'class="replay"' in report.html
-    assert re.match(r'<iframe srcdoc="&lt;!', report._repr_html_())  # pyright: ignore
+    assert re.match(r'<iframe srcdoc="&lt;!', report._repr_html_())  # type: ignore
 
 
 def test_a_notebook_shows_verdict_headline_and_plots(run: handover.Run):
-    html = run._repr_html_()  # pyright: ignore
+    html = run._repr_html_()  # type: ignore
     assert "succeeded</span>" in html
     assert "how far the object was pushed" in html
     assert html.count("data:image/png;base64,") == 2
@@ -114,7 +114,7 @@ def test_a_notebook_shows_verdict_headline_and_plots(run: handover.Run):
 def test_what_a_unit_did_not_give_is_left_out(grasp_without_reflex: Path):
     run = handover.Run(grasp_without_reflex)
     assert 'class="replay"' in run.replay().html
-    html = run._repr_html_()  # pyright: ignore
+    html = run._repr_html_()  # type: ignore
     assert html.count("data:image/png;base64,") == 2
     assert "Left out: what is drawn from reflex." in html
 
@@ -124,7 +124,7 @@ def test_a_run_of_another_version_is_shown_without_plots(grasp_without_reflex: P
     described["parameters"]["colour"] = "red"
     (grasp_without_reflex / "run.json").write_text(json.dumps(described))
     run = handover.Run(grasp_without_reflex)
-    html = run._repr_html_()  # pyright: ignore
+    html = run._repr_html_()  # type: ignore
     assert "succeeded</span>" in html
     assert "the plots over time could not be drawn: InvalidParameter" in html
     with pytest.raises(handover.InvalidInput, match="colour"):
@@ -132,7 +132,7 @@ def test_a_run_of_another_version_is_shown_without_plots(grasp_without_reflex: P
 
 
 def test_a_notebook_shows_a_system_as_its_graph():
-    html = handover.system("helix_handover")._repr_html_()  # pyright: ignore
+    html = handover.system("helix_handover")._repr_html_()  # type: ignore
     assert html.startswith("<svg")
     for text in ("camera", "StereoCamera", "FMI 3, 100 ms, sampled", "arm → hand", "p_WG (real [3] m)"):
         assert text in html
@@ -140,11 +140,11 @@ def test_a_notebook_shows_a_system_as_its_graph():
 
 
 def test_a_notebook_shows_a_unit_as_its_ports():
-    html = handover.describe("IrReflex")._repr_html_()  # pyright: ignore
+    html = handover.describe("IrReflex")._repr_html_()  # type: ignore
     for text in ("<b>Inputs", "<b>Outputs", "<b>Parameters", "p_WH_cmd", "real [2]", "at least 1", ">reflex<"):
         assert text in html
     placed = handover.System().add("push", handover.unit("Push"))
-    assert "<b>Parameters" in placed._repr_html_()  # pyright: ignore
+    assert "<b>Parameters" in placed._repr_html_()  # type: ignore
 
 
 def test_progress_is_a_bar():
@@ -164,4 +164,4 @@ def test_what_a_strangers_run_says_steers_no_terminal(grasp_without_reflex: Path
     assert "<run of a\ufffd]0;b\ufffd: " in repr(handover.load(grasp_without_reflex))
     (grasp_without_reflex / "signals.parquet").write_bytes(b"")
     with pytest.raises(handover.InvalidInput, match=r"signals\.parquet is damaged"):
-        handover.Run(grasp_without_reflex)._repr_html_()  # pyright: ignore
+        handover.Run(grasp_without_reflex)._repr_html_()  # type: ignore

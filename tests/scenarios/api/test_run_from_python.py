@@ -39,7 +39,7 @@ def test_it_leaves_the_same_bytes_as_the_command(blind: handover.Run, tmp_path: 
     command = ["run", "ir_grasp", "--seed", "4", "-p", "strategy=blind", "-p", "standoff=0.06", "--no-report"]
     assert CliRunner().invoke(main, [*command, "--out", str(tmp_path / "c")]).exit_code in (0, 1)
     assert (tmp_path / "c" / "signals.parquet").read_bytes() == (blind.folder / "signals.parquet").read_bytes()
-    assert handover.load(tmp_path / "c").reason == blind.reason  # pyright: ignore[reportAttributeAccessIssue]
+    assert handover.load(tmp_path / "c").reason == blind.reason  # type: ignore
 
 
 def test_its_result_is_what_the_folder_has(blind: handover.Run):
@@ -83,7 +83,7 @@ def test_what_cannot_be_run_is_refused_in_one_line(
 ):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(handover.InvalidInput) as e:
-        handover.run(subject, **given)  # pyright: ignore[reportArgumentType]
+        handover.run(subject, **given)  # type: ignore
     assert told in str(e.value)
     assert "\n" not in str(e.value)
     assert not any(tmp_path.iterdir())
@@ -118,7 +118,7 @@ def test_a_class_of_ones_own_is_run_and_drawn(tmp_path: Path):
     run = handover.run(Nearer, strategy="blind", standoff=0.05, out=tmp_path / "n")
     assert run.scenario == "nearer"
     assert 'class="replay"' in run.replay().html
-    assert "data:image/png" in run._repr_html_()  # pyright: ignore
+    assert "data:image/png" in run._repr_html_()  # type: ignore
     with handover.open(Nearer, strategy="blind") as s:
         assert "scene.p_WH" in s.outputs
     with pytest.raises(handover.InvalidInput, match="nearer has no parameter 'strategi'"):
@@ -175,15 +175,15 @@ Unfindable.__qualname__ = "nowhere.Unfindable"
 @pytest.mark.parametrize(
     ("call", "told"),
     [
-        (lambda: handover.run(3), "3 cannot be run: a scenario's name or class, a system, or the path of"),  # pyright: ignore[reportArgumentType]
-        (lambda: handover.open(None), "None cannot be run: "),  # pyright: ignore[reportArgumentType]
-        (lambda: handover.run(NoScenario), "NoScenario is no scenario: a subclass of Experiment is"),  # pyright: ignore[reportArgumentType]
-        (lambda: handover.environment(NoScenario, "reflex"), "NoScenario is no scenario"),  # pyright: ignore[reportArgumentType]
-        (lambda: handover.sweep(NoScenario), "NoScenario is no scenario"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.run(3), "3 cannot be run: a scenario's name or class, a system, or the path of"),  # type: ignore
+        (lambda: handover.open(None), "None cannot be run: "),  # type: ignore
+        (lambda: handover.run(NoScenario), "NoScenario is no scenario: a subclass of Experiment is"),  # type: ignore
+        (lambda: handover.environment(NoScenario, "reflex"), "NoScenario is no scenario"),  # type: ignore
+        (lambda: handover.sweep(NoScenario), "NoScenario is no scenario"),  # type: ignore
         (lambda: handover.run(Experiment), "Experiment is not complete: it has no build"),
         (lambda: handover.sweep(Experiment), "Experiment is not complete: it has no build"),
         (lambda: handover.run("ir_grasp", strategy=[["a"], ["b", "c"]]), "strategy = .*a run has one value"),
-        (lambda: handover.sweep(4), "4 cannot be run"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.sweep(4), "4 cannot be run"),  # type: ignore
         (lambda: handover.sweep(Unfindable), "Unfindable: each run of a sweep imports its scenario"),
         (lambda: handover.run("ir_grasp", step=0.1), "^step is for an SSP or an FMU"),
         (lambda: handover.run("ir_grasp", inputs="u.csv"), "^inputs is for an FMU that runs by itself"),
@@ -192,19 +192,19 @@ Unfindable.__qualname__ = "nowhere.Unfindable"
         (lambda: handover.run("ir_grasp", strategy=["blind"]), r"strategy = \['blind'\]: a run has one value"),
         (lambda: handover.run(IrGrasp, forward=np.array([0.1])), "forward = .*handover.sweep varies lists"),
         (lambda: handover.environment("ir_grasp", "reflex", thing=("cup",)), "thing = .*a run has one value"),
-        (lambda: handover.run("ir_grasp", parameters=[1]), "^parameters = .*a mapping such as"),  # pyright: ignore[reportArgumentType]
-        (lambda: handover.run("ir_grasp", units=["servo"]), "^units = .*a mapping such as"),  # pyright: ignore[reportArgumentType]
-        (lambda: handover.run("ir_grasp", out=3), "^out = 3: a path"),  # pyright: ignore[reportArgumentType]
-        (lambda: handover.run("ir_grasp", inputs_from=3), "^inputs_from = 3: a path"),  # pyright: ignore[reportArgumentType]
-        (lambda: handover.run("ir_grasp", record=3), "^record = 3: a text, or a list"),  # pyright: ignore[reportArgumentType]
-        (lambda: handover.run("ir_grasp", formats=3), "^formats = 3: a text, or a list"),  # pyright: ignore[reportArgumentType]
-        (lambda: handover.run("ir_grasp", isolate=["arm", 3]), "^isolate = 3: a text, or a list"),  # pyright: ignore[reportArgumentType]
-        (lambda: handover.run("ir_grasp", options={"call_limit": 3}), "^options = .*MasterOptions"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.run("ir_grasp", parameters=[1]), "^parameters = .*a mapping such as"),  # type: ignore
+        (lambda: handover.run("ir_grasp", units=["servo"]), "^units = .*a mapping such as"),  # type: ignore
+        (lambda: handover.run("ir_grasp", out=3), "^out = 3: a path"),  # type: ignore
+        (lambda: handover.run("ir_grasp", inputs_from=3), "^inputs_from = 3: a path"),  # type: ignore
+        (lambda: handover.run("ir_grasp", record=3), "^record = 3: a text, or a list"),  # type: ignore
+        (lambda: handover.run("ir_grasp", formats=3), "^formats = 3: a text, or a list"),  # type: ignore
+        (lambda: handover.run("ir_grasp", isolate=["arm", 3]), "^isolate = 3: a text, or a list"),  # type: ignore
+        (lambda: handover.run("ir_grasp", options={"call_limit": 3}), "^options = .*MasterOptions"),  # type: ignore
         (lambda: handover.sweep("ir_grasp", workers=0), "^workers = 0: a whole number from 1"),
-        (lambda: handover.sweep("ir_grasp", workers="two"), "^workers = .*: a whole number from 1"),  # pyright: ignore[reportArgumentType]
-        (lambda: handover.load(3), "^folder = 3: a path"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.sweep("ir_grasp", workers="two"), "^workers = .*: a whole number from 1"),  # type: ignore
+        (lambda: handover.load(3), "^folder = 3: a path"),  # type: ignore
         (lambda: handover.load("no_such_run"), "there is no such file or folder"),
-        (lambda: handover.describe(3), "^fmu = 3: a path"),  # pyright: ignore[reportArgumentType]
+        (lambda: handover.describe(3), "^fmu = 3: a path"),  # type: ignore
     ],
 )
 def test_what_is_no_subject_or_no_single_value_is_told_in_one_sentence(call: Callable[[], object], told: str):

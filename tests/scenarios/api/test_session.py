@@ -68,7 +68,7 @@ def test_what_cannot_be_set_or_read_is_refused():
         with pytest.raises(handover.InvalidInput, match="duration = 0: a finite number of seconds above 0"):
             s.step(0)
         with pytest.raises(handover.InvalidInput, match="duration = None: a finite number of seconds above 0"):
-            s.step(None)  # pyright: ignore
+            s.step(None)  # type: ignore
 
 
 def test_durations_add_up_exactly():
@@ -175,7 +175,7 @@ def test_it_begins_at_the_start_that_is_given(tmp_path: Path):
 @pytest.mark.parametrize("before", [(), (1,)])
 def test_a_restored_evaluation_sees_each_point_once(start: int, before: Sequence[int], monkeypatch: pytest.MonkeyPatch):
     seen: list[float] = []
-    monkeypatch.setattr(UntilStop, "__call__", lambda _self, t, _signals: seen.append(t))  # pyright: ignore
+    monkeypatch.setattr(UntilStop, "__call__", lambda _self, t, _signals: seen.append(t))  # type: ignore
     with handover.open(gain(native_fmu("gain")), start=start) as s:
         for duration in before:
             s.step(duration)

@@ -68,7 +68,7 @@ def test_the_same_call_repeats_nothing(folder: Path):
 
 
 def test_a_notebook_shows_rates_and_medians(folder: Path):
-    html = handover.load(folder)._repr_html_()  # pyright: ignore
+    html = handover.load(folder)._repr_html_()  # type: ignore
     for text in ("<b>ir_grasp</b>", "of 2", "95 % interval", "reflex", "final_distance_thumb, median"):
         assert text in html
 
@@ -101,7 +101,7 @@ def test_a_damaged_folder_is_refused(tmp_path: Path):
 )
 def test_what_cannot_be_run_is_refused(given: dict[str, object], told: str, tmp_path: Path):
     with pytest.raises(handover.InvalidInput) as e:
-        handover.sweep("ir_grasp", out=tmp_path / "c", **given)  # pyright: ignore
+        handover.sweep("ir_grasp", out=tmp_path / "c", **given)  # type: ignore
     assert told in str(e.value)
     assert not (tmp_path / "c").exists()
 

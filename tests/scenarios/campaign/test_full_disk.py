@@ -59,7 +59,7 @@ def test_a_mark_for_workers_that_cannot_be_written_is_reported(here: Path, monke
         raise OSError(errno.ENOSPC, FULL, str(file))
 
     monkeypatch.setattr(Path, "write_text", refuse)
-    monkeypatch.setattr(ClusterPool, "_ask", lambda *_question: dict[str, Any]())  # pyright: ignore
+    monkeypatch.setattr(ClusterPool, "_ask", lambda *_question: dict[str, Any]())  # type: ignore
     result = sweep(monkeypatch, ClusterPool(None, "nowhere"))  # type: ignore[arg-type]
     text = f"{BEGINNING}Error: c cannot be written: No space left on device\n"
     assert (result.exit_code, result.output) == (3, text)

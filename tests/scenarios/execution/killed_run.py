@@ -23,7 +23,8 @@ def tell_from(passed: float, waits: float) -> None:
     import handover.scenarios.cli.run
 
     @contextmanager
-    def telling(_stream: TextIO) -> Generator[Callable[[float, float], None], None, None]:
+    def telling(stream: TextIO) -> Generator[Callable[[float, float], None], None, None]:
+        del stream
         yield tell
 
     def tell(t: float, _end: float) -> None:

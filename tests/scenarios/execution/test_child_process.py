@@ -37,7 +37,7 @@ def forked(beat: Heartbeat, work: Callable[[], object]) -> ForkedChild:
 
 
 def ended(child: ForkedChild, **options: float) -> ChildEnd:
-    end = child.wait(**options)  # pyright: ignore
+    end = child.wait(**options)  # type: ignore
     assert end is not None
     return end
 

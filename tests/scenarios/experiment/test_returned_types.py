@@ -87,7 +87,7 @@ def test_an_evaluator_whose_end_is_a_method_is_refused_before_the_run():
     class Forgetful(Evaluator):
         def __call__(self, t: float, signals: Any) -> None: ...
 
-        def over(self) -> bool:  # pyright: ignore[reportIncompatibleMethodOverride]
+        def over(self) -> bool:  # type: ignore
             return False
 
         def outcome(self) -> Outcome:

@@ -128,7 +128,7 @@ def test_a_track_leads_no_pair_of_hands():
 
 
 def test_a_place_out_of_reach_is_rejected():
-    far = TeamParameters(p_WG_handover=[1.0, 0.9, 0.0])  # pyright: ignore[reportArgumentType]
+    far = TeamParameters(p_WG_handover=[1.0, 0.9, 0.0])  # type: ignore
     with pytest.raises(InvalidParameter, match="out of the person's reach"):
         TwoRobots().build(far, 0, lambda name: cached(TwoRobots.units[name], 3))
 
@@ -139,8 +139,8 @@ def judged(task: TeamTask, grippers: int, hands: int, *phases: str, hand: Hands 
     for robot, ended in zip(evaluator.robots, phases, strict=True):
         before, _, last = ended.rpartition(" ")
         robot.phases = [(phase, 1.0) for phase in (before, last) if phase]
-    evaluator._grippers, evaluator._hands = grippers, hands  # pyright: ignore[reportPrivateUsage]
-    evaluator._most_hands = hands  # pyright: ignore[reportPrivateUsage]
+    evaluator._grippers, evaluator._hands = grippers, hands  # type: ignore
+    evaluator._most_hands = hands  # type: ignore
     return evaluator
 
 

@@ -82,7 +82,7 @@ def test_a_push_is_held_once_more_where_the_server_was_busy(monkeypatch: pytest.
             return asyncio.Handle(callback, args, loop)
 
         monkeypatch.setattr(loop, "call_later", caught)
-        pushes._release_silent("A", loop.time() - 1.0)  # pyright: ignore[reportPrivateUsage]
+        pushes._release_silent("A", loop.time() - 1.0)  # type: ignore
         assert "A" in pushes  # what the page has sent meanwhile is yet to be read
         (again,) = timers
         again()  # late once more or not

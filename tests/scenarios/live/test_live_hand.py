@@ -104,8 +104,8 @@ def test_a_tracker_leads_the_hand_and_what_it_may_not_send_is_refused(tmp_path: 
     with live_run(tmp_path / "led", *given, scenario=SCENARIO) as (address, run):
         host = address.removeprefix("http://").rstrip("/")
         with pytest.raises(InvalidStatus, match="403"):
-            connect(f"ws://{host}/hand", origin="http://elsewhere.example")  # pyright: ignore[reportArgumentType]
-        page = connect(f"ws://{host}/run", origin=f"http://{host}")  # pyright: ignore[reportArgumentType]
+            connect(f"ws://{host}/hand", origin="http://elsewhere.example")  # type: ignore
+        page = connect(f"ws://{host}/run", origin=f"http://{host}")  # type: ignore
         with page, connect(f"ws://{host}/hand") as tracker:
             start = answer(tracker)["hand"]
             assert start["p_WH"] == start["centre"] == [-0.4, 0.1, -0.05]

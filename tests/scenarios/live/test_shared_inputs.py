@@ -125,8 +125,8 @@ def test_a_writer_that_was_killed_within_a_sample_stops_no_reader(tmp_path: Path
     sources = inputs.sources()
     inputs.set({"person.closed": 1.0}, time.monotonic())
     np.testing.assert_array_equal(sources["person.closed"].at(0.0), [1.0])
-    inputs._sample["begun"] = 2  # pyright: ignore[reportPrivateUsage]
-    inputs._values[3] = 0.0  # pyright: ignore[reportPrivateUsage]
+    inputs._sample["begun"] = 2  # type: ignore
+    inputs._values[3] = 0.0  # type: ignore
     np.testing.assert_array_equal(sources["person.closed"].at(0.016), [1.0])
     assert SharedInputs(tmp_path / "inputs").set({"person.closed": 0.0}, time.monotonic()) == 3
     np.testing.assert_array_equal(sources["person.closed"].at(0.032), [0.0])

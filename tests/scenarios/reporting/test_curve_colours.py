@@ -33,7 +33,7 @@ def test_the_page_has_as_many_colours_as_are_given_to_curves():
 def test_a_finger_is_as_coloured_in_space_as_its_curve(grasp: Path):
     record, parameters = Record(grasp / "signals.parquet"), Parameters()
     distances = IrGrasp().plots(parameters, record)[0]
-    traces: tuple[Any, ...] = time_figure(distances, record.time).data  # pyright: ignore
+    traces: tuple[Any, ...] = time_figure(distances, record.time).data  # type: ignore
     names = {t.name.split(",")[0]: t.line.color for t in traces}
     lines = {line.label: line.colour for line in IrGrasp().replay(parameters, record).lines}
     day = page_colours()[0]

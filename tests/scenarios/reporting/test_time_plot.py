@@ -32,7 +32,7 @@ def spans(phases: tuple[Phase, ...]) -> list[tuple[float, float, str]]:
 
 
 def layout_on_page(plot: TimePlot, time: Floats) -> Any:
-    return time_figure(plot, time).layout  # pyright: ignore
+    return time_figure(plot, time).layout  # type: ignore
 
 
 def test_phases_have_the_names_of_the_enumeration(record: Record):

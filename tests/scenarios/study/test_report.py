@@ -21,7 +21,7 @@ from handover.scenarios.study.folder.session_notes import VoidAttempt
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
 
-csv_of: Any = pd.read_csv  # pyright: ignore[reportUnknownVariableType, reportUnknownMemberType]
+csv_of: Any = pd.read_csv  # type: ignore
 
 
 def study(*arguments: str | Path) -> Result:

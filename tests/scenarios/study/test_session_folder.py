@@ -27,7 +27,7 @@ from handover.scenarios.study.session.trial import failed_by_rule
 _TYPES = {"text": "string", "whole number": "Int64", "number": "Float64", "true or false": "boolean"}
 
 
-csv_of: Any = pd.read_csv  # pyright: ignore[reportUnknownVariableType, reportUnknownMemberType]
+csv_of: Any = pd.read_csv  # type: ignore
 """Returns frames, whose types are open."""
 
 

@@ -150,7 +150,7 @@ def test_an_object_that_is_dragged_to_its_place_is_not_placed():
             seen: Any = {**arm, "planner.p_WG_goal": p_WO, "gripper.held": True, "gripper.p_WO": p_WO}
             evaluator(0.1 * k, seen)
         arm = {"arm.f_G": 0.0, "arm.p_WG": place, "planner.phase": TaskPhase.DONE, "planner.done": True}
-        seen = {**arm, "planner.p_WG_goal": place, "gripper.held": False, "gripper.p_WO": place}
+        seen: Any = {**arm, "planner.p_WG_goal": place, "gripper.held": False, "gripper.p_WO": place}
         evaluator(2.0, seen)
         return evaluator.outcome()
 

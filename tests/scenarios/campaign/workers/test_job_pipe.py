@@ -74,7 +74,7 @@ def test_a_worker_ends_a_server_that_answers_a_pickle(tmp_path: Path, monkeypatc
     start = subprocess.Popen
 
     def start_other(_command: list[str], **options: object) -> "subprocess.Popen[bytes]":
-        return start([sys.executable, "-c", answer], **options)  # pyright: ignore
+        return start([sys.executable, "-c", answer], **options)  # type: ignore
 
     monkeypatch.setattr(subprocess, "Popen", start_other)
     server = ServerProcess()

@@ -23,7 +23,7 @@ def table_of(failing: frozenset[str] = frozenset(), far: float = 0.002) -> Campa
     for point in PLAN.points:
         p = parse_parameters(HelixHandover, [f"{name}={value}" for name, value in point.items()])
         values = {name: getattr(p, name) for name in names}
-        plain = {n: v.name.lower() if defaults[n].enumeration else v for n, v in values.items()}
+        plain = {n: v.name.lower() if defaults[n].enumeration is not None else v for n, v in values.items()}
         fails = any(name in failing for name in point)
         rows.append(
             {**plain, "status": "done", "success": not fails, "final_distance": 0.05 if fails else far, "steps": 20}

@@ -22,7 +22,7 @@ def table_of(closing: dict[str, float], failing: str = "") -> CampaignTable:
     for i, point in enumerate(PLAN.points):
         p = parse_parameters(HelixHandover, [f"{name}={value}" for name, value in point.items()])
         values = {name: getattr(p, name) for name in names}
-        plain = {n: v.name.lower() if kinds[n].enumeration else v for n, v in values.items()}
+        plain = {n: v.name.lower() if kinds[n].enumeration is not None else v for n, v in values.items()}
         distance = next((closing[x] for x in point.values() if x in closing), 0.01) + 1e-6 * i
         result = {"status": "done", "success": failing not in point.values(), "steps": 20, "reason": "lost ring: far"}
         rows.append({**plain, **result, "closing_distance": distance, "final_distance": 0.001})

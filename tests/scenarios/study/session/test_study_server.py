@@ -127,7 +127,7 @@ def test_a_page_that_floods_is_refused_and_at_last_put_out(tmp_path: Path, monke
 def test_a_message_beyond_all_bounds_ends_the_connection_with_the_reason(path: str, tmp_path: Path):
     with (
         served(server_of(tmp_path / "study")) as where,
-        connect(f"ws://{where}/{path}", origin=f"http://{where}") as device,  # pyright: ignore[reportArgumentType]
+        connect(f"ws://{where}/{path}", origin=f"http://{where}") as device,  # type: ignore
     ):
         device.send("x" * 200_000)
         with pytest.raises(ConnectionClosed) as closed:
@@ -141,8 +141,8 @@ def test_a_server_that_has_gone_is_no_end_of_scripted_pilots(code: int):
     def close(connection: ServerConnection) -> None:
         connection.close(code=code)
 
-    with serve(close, HOST, 0) as server:  # pyright: ignore[reportUnknownVariableType]
-        thread = threading.Thread(target=server.serve_forever)  # pyright: ignore[reportUnknownArgumentType]
+    with serve(close, HOST, 0) as server:  # type: ignore
+        thread = threading.Thread(target=server.serve_forever)  # type: ignore
         thread.start()
         address = f"http://{HOST}:{server.socket.getsockname()[1]}/"
         try:

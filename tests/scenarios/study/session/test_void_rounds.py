@@ -124,7 +124,7 @@ class RecordedTrial:
         self._polls -= 1
         return self._polls >= 0
 
-    newest = None
+    newest: Any = None
 
     def scene_content(self) -> dict[str, Any]:
         return {}
