@@ -376,6 +376,10 @@ def _is_step(value: object) -> bool:
     return value is None or isinstance(value, Fraction)
 
 
+def _are_time_figures(value: Any) -> bool:
+    return _TIME_FIGURES.fits(value) and len({figure.name for figure in value}) == len(value)
+
+
 @dataclass(frozen=True)
 class Figure:
     """A figure of a run: file name within the figures folder, without suffix, and caption."""
@@ -384,6 +388,7 @@ class Figure:
     caption: str
 
 
+_TIME_FIGURES = sequence_of(TimeFigure, "[TimeFigure(...)]")
 _OF_SCENARIOS: Mapping[str, Expected] = {
     "build": instance_of(System, "the s = System() whose units it adds and connects"),
     "stop_time": SECONDS,
@@ -392,8 +397,10 @@ _OF_SCENARIOS: Mapping[str, Expected] = {
     "parameter_files": FILES,
     "led_hand": instance_of(LedHand, 'LedHand("person", (0.0, 0.3, 0.4), 0.5)', optional=True),
     "cycle": NAMES,
-    "time_figures": sequence_of(
-        TimeFigure, '[TimeFigure(name="distance", caption="From the tip to the goal.", plots=[TimePlot(...)])]'
+    "time_figures": Expected(
+        "a list or tuple of TimeFigure, each with a name of its own",
+        '[TimeFigure(name="distance", caption="From the tip to the goal.", plots=[TimePlot(...)])]',
+        _are_time_figures,
     ),
     "draw": sequence_of(Figure, '[Figure("scene", "The arm at its goal.")]'),
     "replay": instance_of(Replay, "Replay(lines=[Line(...)])", optional=True),

@@ -1,5 +1,6 @@
 """Declares time plots: curves with a unit, levels, phases. Pages draw them by Plotly, papers' figures by matplotlib."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -9,7 +10,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment.returned_types import Expected, is_series, sequence_of
+from handover.scenarios.experiment.returned_types import NUMBER, Expected, is_series, sequence_of
 
 COLOURS = ("#2f6db5", "#d1602b", "#3c8d53", "#8357a8", "#a37a10", "#4d5866", "#c2487f", "#1f8a94", "#7d5a3c")
 """Colours of curves, in the order of use; the same as `var(--c0)` and on of page.css in its light scheme."""
@@ -53,6 +54,14 @@ class Level:
 
     label: str
     value: float
+
+    def __post_init__(self) -> None:
+        """Refuse a value that is no number.
+
+        Raises:
+            WrongType: it is none.
+        """
+        NUMBER.check(f"the value of Level {self.label!r} is", self.value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,6 +159,11 @@ class TimePlot:
         return len(self.curves) + len(self.levels) > 1 or any(c.label != self.quantity for c in self.curves)
 
 
+_FILE_NAME = Expected(
+    "the name of a file without its folder and suffix",
+    '"distance"',
+    lambda name: isinstance(name, str) and re.fullmatch(r"[^/\\\0]+", name) is not None and name not in (".", ".."),
+)
 _PLOTS = sequence_of(TimePlot, '[TimePlot(title="Distance", quantity="distance", unit="mm", curves=[Curve(...)])]')
 
 
@@ -169,11 +183,12 @@ class TimeFigure:
     columns: int = 1
 
     def __post_init__(self) -> None:
-        """Refuse plots of another type.
+        """Refuse a name that is no file's, and plots of another type.
 
         Raises:
-            WrongType: they are.
+            WrongType: it is none, or they are.
         """
+        _FILE_NAME.check("the name of a TimeFigure is", self.name)
         _PLOTS.check(f"the plots of TimeFigure {self.name!r} are", self.plots)
 
 

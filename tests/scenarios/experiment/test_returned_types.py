@@ -16,7 +16,7 @@ from handover.scenarios.experiment import experiment, replay, time_plot
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, Metric, Outcome
 from handover.scenarios.experiment.replay import Line, Replay
 from handover.scenarios.experiment.returned_types import Expected, WrongType
-from handover.scenarios.experiment.time_plot import Curve, TimeFigure, TimePlot
+from handover.scenarios.experiment.time_plot import Curve, Level, TimeFigure, TimePlot
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
 CURVE = Curve(label="x", values=np.zeros(3))
@@ -52,6 +52,7 @@ def evaluator(**returned: Any) -> Any:
         ("time_figures", FIGURE, "list or tuple of TimeFigure", "[TimeFigure("),
         ("time_figures", [PLOT], "list or tuple of TimeFigure", "[TimeFigure("),
         ("time_figures", {"x": FIGURE}, "list or tuple of TimeFigure", "[TimeFigure("),
+        ("time_figures", [FIGURE, FIGURE], "each with a name of its own", "[TimeFigure("),
         ("replay", [Replay()], "a Replay or None", "Replay("),
         ("draw", None, "list or tuple of Figure", "[Figure("),
         ("published", None, "list or tuple of PublishedValue", "[PublishedValue("),
@@ -104,6 +105,8 @@ WRONG = cast(Any, None)
     "make",
     [
         lambda: TimeFigure(name="x", caption="", plots=cast(Any, PLOT)),
+        lambda: TimeFigure(name="x/y", caption="", plots=[PLOT]),
+        lambda: Level(label="x", value=cast(Any, "5 mm")),
         lambda: TimePlot(title="x", quantity="x", unit="", curves=[cast(Any, np.zeros(3))]),
         lambda: TimePlot(title="x", quantity="x", unit="", curves=[CURVE], levels=[cast(Any, 0.5)]),
         lambda: Curve(label="x", values=np.zeros((3, 2))),
