@@ -8,7 +8,7 @@ import functools
 import inspect
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from importlib import import_module, metadata
 from importlib.machinery import EXTENSION_SUFFIXES, SOURCE_SUFFIXES, ExtensionFileLoader, FileFinder, SourceFileLoader
 from pathlib import Path
@@ -232,6 +232,9 @@ def _faults_of(named: type[Any]) -> list[str]:
     scenario: type[Experiment[Any]] = named
     faults = [f"it has no method {name!r}" for name in sorted(getattr(scenario, "__abstractmethods__", ()))]
     try:
+        if not is_dataclass(scenario.parameters_type):
+            right = "write @dataclass(frozen=True, kw_only=True) in the line above its class"
+            raise TypeError(f"{scenario.parameters_type} is no dataclass; {right}")
         scenario.parameters()
     except (DeclarationError, TypeError) as e:
         faults.append(f"its parameters are invalid: {one_line(e)}")

@@ -190,7 +190,8 @@ def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(here: Path):
 def test_all_that_a_scenario_lacks_is_told_at_once(here: Path):
     (here / "lacking.py").write_text(
         "from reach import TwoLinkReach\nfrom handover.scenarios.experiment.experiment import Experiment\n\n\n"
-        "class Scene(Experiment):\n    name = 'ir_grasp'\n    units = {'arm': 'arm:TwoLinkArms', 'servo': 'Visual'}\n\n"
+        "class Scene(Experiment):\n    name = 'ir_grasp'\n    units = {'arm': 'arm:TwoLinkArms', 'servo': 'Visual'}\n"
+        "    parameters_type = dict\n\n"
         "    def build(self, parameters, seed, fmu):\n        raise ValueError\n\n\n"
         "class Failing(TwoLinkReach):\n    def evaluator(self, parameters):\n        return parameters.gaol\n"
     )
@@ -199,6 +200,7 @@ def test_all_that_a_scenario_lacks_is_told_at_once(here: Path):
         "it has no method 'evaluator'",
         "it has no method 'stop_time'",
         "its name 'ir_grasp' is that of a scenario of this package",
+        "its parameters are invalid: <class 'dict'> is no dataclass",
         "did you mean TwoLinkArm?",
         "there is no unit 'Visual'",
     ):
@@ -206,7 +208,7 @@ def test_all_that_a_scenario_lacks_is_told_at_once(here: Path):
     for command in ("run", "sweep"):
         line = refused(here, command, "lacking:Failing")
         assert "the scenario failing failed as it was set up: AttributeError" in line
-        assert "(lacking.py, line 15)" in line
+        assert "(lacking.py, line 16)" in line
 
 
 @pytest.mark.slow
