@@ -169,14 +169,14 @@ def read_config(path: Path, ctx: click.Context) -> ConfigFile:
 
 
 def _content(path: Path) -> dict[str, Any]:
-    form = "JSON" if path.suffix.lower() == ".json" else "TOML"
+    form, example = ("JSON", '{"seed": 3}') if path.suffix.lower() == ".json" else ("TOML", "seed = 3")
     try:
         text = read_regular(path)
         return decoded(text, dict[str, Any]) if form == "JSON" else tomli.loads(text.decode())
     except OSError as e:
         raise UsageError(f"{path}: it cannot be read: {e.strerror or e}") from e
     except (ValueError, RecursionError) as e:  # of both parsers, and of bytes that are not UTF-8
-        raise UsageError(f'{path}: it is not {form} of options, such as {{"seed": 3}}: {one_line(e)}') from e
+        raise UsageError(f"{path}: it is not {form} of options, such as {example}: {one_line(e)}") from e
 
 
 def _options(command: click.Command) -> Iterator[tuple[str, click.Parameter]]:

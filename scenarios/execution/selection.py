@@ -56,6 +56,8 @@ def nothing_at(path: Path) -> str:
 
 def _path_fault(name: str) -> str:
     """Return what is wrong with a name that is meant as a path of a file or folder; empty where it is not."""
+    if not name:  # whose path would be that of the working directory
+        return ""
     path = Path(name)
     if path.is_dir():
         return folder_fault(path)

@@ -113,7 +113,7 @@ servo.gain = [0.2, 0.4]
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("seed = ", "run.toml: it is not TOML of options, such as"),
+        ("seed = ", "run.toml: it is not TOML of options, such as seed = 3"),
         ("sed = 3", "run.toml: no option 'sed'; did you mean seed"),
         ("call_limit = 3", "run.toml: no option 'call_limit'; did you mean call-limit?"),
         ("seed = -1", "run.toml: seed = -1: -1 is not in the range 0<=x<=9223372036854775807"),
@@ -135,6 +135,7 @@ servo.gain = [0.2, 0.4]
         ("sweep.a = [1, 2]", "run.toml: no option 'sweep'; "),
         ("scenario = 'ir_grasp'\nadaptive-absolute = 1", "with run.toml: --adaptive-absolute: with --adaptive only"),
         ("seed = -1\nsed = 2", "is not in the range 0<=x<=9223372036854775807; no option 'sed'; "),
+        ("scenario = ''", "with run.toml: no scenario ''"),
         ("scenario = 'ir_grap'", "with run.toml: no scenario 'ir_grap': did you mean ir_grasp?"),
         (
             "scenario = 'ir_grasp'\n[parameters]\nstrategi = 'blind'\nforward = 9",
