@@ -99,7 +99,7 @@ def _row(
     return (
         *_labels(results, *pair),
         *(Cell(str(n), n) for n in numbers),
-        Cell(f"{test.p:.2g}", test.p),
+        Cell(f"{test.p:.3g}", test.p),
     )
 
 

@@ -86,7 +86,7 @@ def _median(results: CampaignResults, point: PointResults, metric: str, unit: Di
         return Cell("–", math.nan)
     line = column_text(median * unit.factor, digits)
     if span is not None:
-        low, high = (column_text(x * unit.factor, max(digits - 1, 0)) for x in (span.low, span.high))
+        low, high = (column_text(x * unit.factor, digits) for x in (span.low, span.high))
         line += f" ({low} to {high})"
     number = results.number_measured(point, metric)
     return Cell(line if number == len(point.done) else f"{line}, of {number}", median)

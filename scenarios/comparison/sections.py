@@ -173,7 +173,7 @@ def _split(only_first: int, only_second: int) -> tuple[Cell, Cell]:
 
 
 def _p(p: float, corrected: float) -> tuple[Cell, Cell]:
-    return Cell(f"{p:.2g}", p), Cell(f"{corrected:.2g}", corrected)
+    return Cell(f"{p:.3g}", p), Cell(f"{corrected:.3g}", corrected)
 
 
 def _signed(value: float) -> str:

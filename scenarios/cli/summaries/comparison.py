@@ -66,7 +66,7 @@ def _print_tests(console: Console, results: ComparedCampaigns) -> None:
             f"{t.first} – {t.second}",
             f"{t.counts[0]} of {t.counts[1]} – {t.counts[2]} of {t.counts[3]}",
             t.method,
-            f"{t.p:.2g}",
+            f"{t.p:.3g}",
         ]
         for t in by_success
     ]
@@ -78,7 +78,7 @@ def _print_tests(console: Console, results: ComparedCampaigns) -> None:
             f"{t.second} – {t.first}",
             _difference(results, t),
             t.test.method,
-            f"{t.test.p:.2g}",
+            f"{t.test.p:.3g}",
         ]
         for t in of_metrics
     ]

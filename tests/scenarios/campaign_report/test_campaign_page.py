@@ -118,7 +118,7 @@ def test_points_of_a_paired_campaign_are_compared(tmp_path: Path):
     table = replaced(table_of(POINTS, repetitions=6), "success", [True] * 6 + [False] * 6)
     html = page_of(tmp_path, campaign_metadata("ir_grasp", POINTS, repetitions=6, paired=True), table)
     part = html[html.index('id="pairs"') : html.index('id="failures"')]
-    assert "<td class=\"number\" data-key='0.03125'>0.031</td>" in part
+    assert "<td class=\"number\" data-key='0.03125'>0.0312</td>" in part
 
 
 def test_claims_stand_with_their_verdicts(tmp_path: Path):
@@ -176,6 +176,18 @@ def test_a_median_of_some_of_the_runs_says_of_how_many(tmp_path: Path):
     assert ">40, of 1<" in part
     assert ">60<" in part
     assert "so many of the runs done have a value" in part
+
+
+def test_the_interval_of_a_median_has_the_medians_digits(tmp_path: Path):
+    values = np.linspace(0.0627, 0.0629, 12).tolist()
+    plan = campaign_metadata("ir_grasp", POINTS, repetitions=6)
+    page = page_of(tmp_path, plan, table_of(POINTS, repetitions=6, final_distance_thumb=values))
+    part = page.partition('id="points"')[2].partition("</section>")[0]
+    shown = re.findall(r">(\d+\.\d+) \((\S+) to (\S+)\)<", part)
+    assert shown
+    for median, low, high in shown:
+        assert float(low) <= float(median) <= float(high)
+        assert len({len(text.partition(".")[2]) for text in (median, low, high)}) == 1
 
 
 def test_few_runs_are_points_and_many_have_a_box_too():

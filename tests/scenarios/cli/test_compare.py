@@ -118,7 +118,7 @@ def test_where_all_runs_succeed_the_tests_of_metrics_are_printed(here: Path):
     done = compare("a", "b", "--metric", "moved")
     assert done.exit_code == 0, done.output
     lines = [line.split() for line in done.stdout.splitlines()]
-    assert ["all", "runs", "moved", "b", "–", "a", "+30", "mm", "Wilcoxon", "0.062"] in lines
+    assert ["all", "runs", "moved", "b", "–", "a", "+30", "mm", "Wilcoxon", "0.0625"] in lines
     assert "McNemar" not in done.stdout  # whose p is 1
     assert "With 5 pairs p cannot fall below 0.0625" in done.stdout
 
