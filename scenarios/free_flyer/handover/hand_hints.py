@@ -58,7 +58,7 @@ def _taking(record: Record, p_WH: Floats, holder: str, *, closed: bool) -> HandH
     p_goal_H_O: Floats = (p_WH - goal) @ R_WO
     within = bool(np.hypot(p_goal_H_O[0], p_goal_H_O[2]) <= _AROUND and abs(p_goal_H_O[1]) <= _ALONG)
     if float(np.linalg.norm(goal - p_WH)) > _NEAR:
-        return HandHint(p_WH, None, advice="The robot brings the object.")
+        return HandHint(p_WH, None, advice="The robot brings the object: once it waits, lead your hand there.")
     if closed:
         return HandHint(p_WH, goal, advice="Your hand closed on nothing: open it.")
     advice = "Within reach: after the yellow flash, close the hand." if within else "Lead your hand to the ring."
