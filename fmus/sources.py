@@ -6,6 +6,7 @@ They are found by following the import statements in the sources, without runnin
 import ast
 import hashlib
 import importlib.util
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from importlib import metadata
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 
+from handover.cosim.exceptions import one_line
 from handover.fmus.catalog import UnknownBlock
 
 OWN_PACKAGE = "handover"
@@ -28,6 +30,9 @@ SLAVE_SIDE = (
     "handover.fmus.interpreter",
 )
 """Modules that every FMU contains, whatever its block imports."""
+
+
+_PATH_OF_CLASS = re.compile(r"[^\W\d][\w.]*:\w+")
 
 
 @dataclass(frozen=True)
@@ -139,14 +144,37 @@ def beside_block(block: str, files: Sequence[Path]) -> dict[str, Path]:
 def carried_digest(path: str) -> str:
     """Return the SHA-256 of a class's module and of those that it imports, but for this package and installed ones.
 
+    So of those of classes that one of them names by a path, such as `my_arm:MyArm`: they are imported with a scenario.
+
     Raises:
         UnknownBlock: as `closure`.
     """
+    files: dict[str, Path] = {}
+    waiting, seen = [path], set[str]()
+    while waiting:
+        seen.add(block := waiting.pop())
+        own = {n: f for n, f in closure(block).files.items() if n.partition("/")[0] != OWN_PACKAGE}
+        named = (name for n in own.keys() - files.keys() for name in _named_classes(own[n].read_bytes(), str(own[n])))
+        waiting += [name for name in named if name not in seen and _is_own(name)]
+        files |= own
     digest = hashlib.sha256()
-    for name, file in closure(path).files.items():
-        if name.partition("/")[0] != OWN_PACKAGE:
-            digest.update(f"{name}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
+    for name, file in sorted(files.items()):
+        digest.update(f"{name}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
     return digest.hexdigest()
+
+
+@cache
+def _named_classes(source: bytes, filename: str) -> list[str]:
+    """Return the texts of a source that may be paths of classes."""
+    texts = (node.value for node in ast.walk(_parsed(source, filename)) if isinstance(node, ast.Constant))
+    return [text for text in texts if isinstance(text, str) and _PATH_OF_CLASS.fullmatch(text)]
+
+
+def _is_own(path: str) -> bool:
+    """Return whether a class's module is source here, and neither this package's nor installed."""
+    module = path.partition(":")[0]
+    spec = _spec(module) if module.partition(".")[0] not in {OWN_PACKAGE, *sys.stdlib_module_names} else None
+    return spec is not None and _is_source(spec) and not _is_installed(spec)
 
 
 def _with_packages(module: str) -> Iterator[str]:
@@ -208,7 +236,7 @@ def _imports(source: bytes, package: str, filename: str) -> list[str]:
     Kept by the source's text, as units share most of their modules and the runs of a campaign all of them.
     """
     names: list[str] = []
-    for node in _running(ast.parse(source, filename=filename)):
+    for node in _running(_parsed(source, filename)):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -219,13 +247,21 @@ def _imports(source: bytes, package: str, filename: str) -> list[str]:
     return names
 
 
+def _parsed(source: bytes, filename: str) -> ast.Module:
+    try:
+        return ast.parse(source, filename=filename)
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as e:
+        fault = f"{filename} is not Python source: {type(e).__name__}: {one_line(e)}"
+        raise UnknownBlock(filename, fault) from e
+
+
 def _running(node: ast.AST) -> Iterator[ast.AST]:
     """Yield a tree's statements with what holds them, but not those that only type checkers see."""
     yield node
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.expr):
             continue  # no import stands within an expression
-        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):
+        if isinstance(child, ast.If) and "TYPE_CHECKING" in (getattr(child.test, key, "") for key in ("id", "attr")):
             for other in child.orelse:
                 yield from _running(other)
         else:
