@@ -25,6 +25,7 @@ from handover.scenarios.experiment.parameters import text_of
 from handover.scenarios.results.folder_data import FileData, FmuData, MasterData, SourceData
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
+    check_no_links,
     check_place,
     dated_folder,
     disk_errors_reported,
@@ -211,9 +212,7 @@ class CampaignFolder:
 
     def _check_names(self, plan: CampaignPlan) -> None:
         """Check that no folder stands where a file is to be, and no file where a folder."""
-        if links := [p for p in (self.runs, self.fmus) if p.is_symlink()]:
-            fault = f"{links[0].name} is a link, which may lead anywhere; put its folder here"
-            raise InvalidRunFolder(self.path, fault)
+        check_no_links(self.path, "runs", "fmus")
         folders = [p for p in (self.table, self.report) if p.is_dir()]
         files = [p for p in (self.runs, *(self.runs / run.name for run in plan.runs())) if p.is_file()]
         if folders or files:

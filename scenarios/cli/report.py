@@ -8,7 +8,7 @@ from handover.scenarios.campaign.folder import OF_NEITHER, CampaignFolder
 from handover.scenarios.cli.options import trust_option
 from handover.scenarios.execution.errors import UsageError, one_line_errors, require_extra
 from handover.scenarios.execution.progress import doing, say
-from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, check_place
+from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder, check_no_links, check_place
 
 _HELP = """Write the page of the run or campaign in DIR again: one HTML file that opens offline.
 
@@ -57,6 +57,8 @@ def _write_of_campaign(campaign: CampaignFolder, page: Path, figures: bool, runs
     from handover.scenarios.campaign.table_writer import rebuild_table  # pyarrow is slow to import
     from handover.scenarios.campaign_report.campaign_page import write_campaign_page, write_campaign_report
 
+    if runs:
+        check_no_links(campaign.path, "runs", "runs/*")
     rebuild_table(campaign)
     if runs:
         _write_of_runs(campaign)

@@ -49,6 +49,17 @@ def check_place(path: Path) -> None:
         raise InvalidRunFolder(path, f"no permission to write to {existing}")
 
 
+def check_no_links(path: Path, *patterns: str) -> None:
+    """Check that what is in a folder by these patterns is there itself.
+
+    Raises:
+        InvalidRunFolder: something is a link: what is written or deleted there may be somebody else's.
+    """
+    if links := [p for pattern in patterns for p in path.glob(pattern) if p.is_symlink()]:
+        fault = f"{links[0].relative_to(path)} is a link, which may lead anywhere; put its folder here"
+        raise InvalidRunFolder(path, fault)
+
+
 class RunFolder:
     """Paths of a run's files: `summary.json`, `signals.parquet`, `run.json`, `report.html`, `pictures/`, `figures/`.
 

@@ -188,6 +188,15 @@ def test_a_campaigns_table_names_no_folder_outside(tmp_path: Path):
     assert not (mine / "report.html").exists()
 
 
+def test_runs_that_lie_elsewhere_get_no_page_there(tmp_path: Path):
+    theirs, mine = campaign_of(tmp_path / "theirs", sources(tmp_path)[0]), run_of(tmp_path / "mine", {})
+    (theirs / "runs" / "linked").symlink_to(mine)
+    refused = call("report", theirs, "--runs")
+    assert refused.exit_code == 2, refused.output
+    assert "runs/linked is a link" in refused.output
+    assert not (mine / "report.html").exists()
+
+
 def test_a_file_that_is_named_is_run(marker: Path, tmp_path: Path):
     plant(tmp_path / "theirs", marker)
     run = run_of(tmp_path / "theirs" / "a", sources(tmp_path / "theirs")[0])
@@ -252,6 +261,33 @@ def test_nor_with_code_that_stands_elsewhere_in_its_run_json(
     )
     assert "not the file that the run had" in refused.output
     assert not marker.exists()
+
+
+@pytest.mark.parametrize("changed", ["scene", "arm", "joint", "helper"])
+def test_own_code_is_that_of_its_units_and_of_all_imports_but_those_for_type_checkers(
+    changed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    from handover.fmus.sources import carried_digest
+
+    monkeypatch.syspath_prepend(str(tmp_path))
+    name = f"foreign_{changed}"  # modules of each case are other ones
+    code = {
+        "scene": f'UNITS = {{"arm": "{name}_arm:Arm"}}\nif not TYPE_CHECKING:\n    import {name}_helper\n',
+        "arm": f"import {name}_joint\nif TYPE_CHECKING:\n    import {name}_types\n",
+        **dict.fromkeys(("joint", "helper", "types"), "x = 1\n"),
+    }
+    for module, text in code.items():
+        (tmp_path / f"{name}_{module}.py").write_text(text)
+    source = catalog.ScenarioSource(f"{name}_scene:Scene", str(tmp_path), carried_digest(f"{name}_scene:Scene"))
+    (tmp_path / f"{name}_types.py").write_text("x = 2\n")
+    assert source.unchanged_file() == tmp_path / f"{name}_scene.py"
+    file = tmp_path / f"{name}_{changed}.py"
+    file.write_text(code[changed] + "y = 2\n")
+    with pytest.raises(catalog.InvalidScenario, match="is not what the run had"):
+        source.unchanged_file()
+    file.write_text("x = = 1\n")
+    with pytest.raises(catalog.InvalidScenario, match=f"{file.name} is not Python source"):
+        source.unchanged_file()
 
 
 def test_code_that_is_what_the_run_had_is_named_before_it_is_run(marker: Path, tmp_path: Path):

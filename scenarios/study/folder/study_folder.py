@@ -15,6 +15,7 @@ from handover.cosim.files import read_regular
 from handover.scenarios.results.run_folder import (
     InvalidRunFolder,
     RunFolder,
+    check_no_links,
     disk_errors_reported,
     folder_held,
     versions,
@@ -64,11 +65,12 @@ class StudyFolder:
         """Return the folder of a study that has begun.
 
         Raises:
-            InvalidRunFolder: it is none, or its plan is damaged.
+            InvalidRunFolder: it is none, its plan is damaged, or folders of its sessions lie elsewhere, by a link.
         """
         file = path / "plan.toml"
         if not file.is_file():
             raise InvalidRunFolder(path, "it is not the folder of a study: it has no plan.toml")
+        check_no_links(path, "participants", "participants/P*", "participants/P*/*", "participants/P*/*/*")
         try:
             return cls(path, parse_plan(read_regular(file).decode(), file))
         except (OSError, UnicodeDecodeError, InvalidPlan) as e:

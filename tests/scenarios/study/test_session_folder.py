@@ -198,6 +198,15 @@ def test_a_folder_of_another_plan_or_of_something_else_is_refused(tmp_path: Path
     assert StudyFolder.read(tmp_path / "out").next_number == 2
 
 
+@pytest.mark.parametrize("linked", ["participants", "participants/P01", "participants/P01/rounds"])
+def test_sessions_that_lie_elsewhere_are_not_written_to(linked: str, tmp_path: Path):
+    StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1))
+    (tmp_path / "out" / linked).rename(tmp_path / "elsewhere")
+    (tmp_path / "out" / linked).symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(InvalidRunFolder, match=f"{linked} is a link"):
+        StudyFolder.read(tmp_path / "out")
+
+
 def test_a_damaged_file_is_told_by_its_name(tmp_path: Path):
     folder = StudyFolder.opened(tmp_path / "out", PLAN).begin(session(1))
     folder.record_round(1, record())
