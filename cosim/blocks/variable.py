@@ -4,10 +4,15 @@ import dataclasses
 import enum
 import itertools
 import math
+import re
 from typing import Any
 
 from handover.cosim.blocks.ports import Raster, Width
 from handover.cosim.blocks.units import ONE, Unit
+
+SUBSCRIPT = re.compile(r"\[(\d{1,9}(?:,\d{1,9}){0,15})\]$")
+"""The end of a name that is an entry of an array, of no more dimensions than any has, counted from 1."""
+ELEMENT = re.compile(rf"(?P<base>.+){SUBSCRIPT.pattern}")
 
 
 class Kind(enum.Enum):

@@ -4,7 +4,6 @@
 """
 
 import math
-import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,15 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from handover.cosim.blocks.variable import indices_of
+from handover.cosim.blocks.variable import SUBSCRIPT, indices_of
 from handover.cosim.exceptions import CosimError, nearest, one_line
 from handover.cosim.files import check_regular
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.time_series import TimeSeries
-
-SUBSCRIPT = re.compile(r"\[(\d+(?:,\d+)*)\]$")
-"""The end of a column's name that is an entry of an array, counted from 1."""
-
 
 _FREE, _RATIO = 1 << 30, 1000
 """Bytes that any file may take in memory, and how many times its own size one may take beyond that."""

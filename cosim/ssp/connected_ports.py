@@ -1,13 +1,10 @@
 """Finds the FMU variables that an SSP's connectors name: ports, or single entries of arrays of scalars."""
 
-import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
-from handover.cosim.blocks.variable import indices_of
+from handover.cosim.blocks.variable import ELEMENT, indices_of
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
-
-_SUBSCRIPT = re.compile(r"(?P<base>.+)\[(?P<indices>\d+(,\d+)*)\]$")
 
 Entry = tuple[FmuPort, int | None]
 """A port, or with a number one of its entries, counted from 0 in row-major order."""
@@ -22,11 +19,11 @@ def find_entry(ports: Mapping[str, FmuPort], name: str) -> Entry | None:
     """Return the port of a name, or for a name such as `p[1]` of an array of scalars the port and the entry."""
     if name in ports:
         return ports[name], None
-    match = _SUBSCRIPT.match(name)
+    match = ELEMENT.match(name)
     port = ports.get(match["base"]) if match else None
     if match is None or port is None or len(port.references) == 1:
         return None
-    indices = tuple(map(int, match["indices"].split(",")))
+    indices = tuple(map(int, match[2].split(",")))
     everywhere = indices_of(port.shape)
     return (port, everywhere.index(indices)) if indices in everywhere else None
 

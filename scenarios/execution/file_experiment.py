@@ -12,9 +12,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from handover.cosim.blocks.variable import Kind, element_names
+from handover.cosim.blocks.variable import SUBSCRIPT, Kind, element_names
 from handover.cosim.fmu.file.description import FmuPort
-from handover.cosim.record.reader import SUBSCRIPT, Record
+from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, FmuOf, Metric, Outcome

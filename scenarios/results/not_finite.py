@@ -10,7 +10,7 @@ from typing import Any, TypedDict
 
 import numpy as np
 
-from handover.cosim.record.reader import SUBSCRIPT
+from handover.cosim.blocks.variable import SUBSCRIPT
 from handover.cosim.system.system import System
 
 MAX_LINES = 5

@@ -6,7 +6,6 @@ and both forms are interchangeable.
 """
 
 import math
-import re
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from handover.cosim.blocks.ports import Width
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit
-from handover.cosim.blocks.variable import Causality, Declared, Kind, element_names, indices_of
+from handover.cosim.blocks.variable import ELEMENT, Causality, Declared, Kind, element_names, indices_of
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.file.archive import FmuArchive
 from handover.cosim.fmu.file.clocks import FmuClock, clocks_of, without_clocks
@@ -43,7 +42,6 @@ KINDS = {
 _WIDTHS = {"Real": Width.FLOAT64, "Integer": Width.INT32, **{w.value: w for w in Width}}
 _MOST_ENTRIES = 2**28
 """Of an array: 2 GiB of reals."""
-_ELEMENT = re.compile(r"(?P<base>.+)\[(?P<indices>\d+(,\d+)*)\]$")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -329,8 +327,8 @@ def _group_elements(ports: list[FmuPort]) -> list[FmuPort]:
     groups: dict[str, list[tuple[tuple[int, ...], FmuPort]]] = defaultdict(list)
     for p in ports:
         is_entry = p.name.endswith("]") and not p.shape and p.kind is not Kind.BINARY
-        match = _ELEMENT.match(p.name) if is_entry else None
-        indices = tuple(int(i) for i in match["indices"].split(",")) if match else ()
+        match = ELEMENT.match(p.name) if is_entry else None
+        indices = tuple(int(i) for i in match[2].split(",")) if match else ()
         groups[match["base"] if match else p.name].append((indices, p))
     grouped: list[FmuPort] = []
     for base, members in groups.items():

@@ -62,6 +62,16 @@ def test_a_large_description_that_is_not_well_formed_is_refused(tmp_path: Path, 
         describe_fmu(write_archive(tmp_path / "cut.fmu", {"modelDescription.xml": b"<fmiModelDescription>" * 9}))
 
 
+@pytest.mark.parametrize("subscript", ["9" * 5000, ",".join("1" * 100)])
+def test_a_name_with_a_subscript_beyond_all_arrays_is_a_scalars(subscript: str, tmp_path: Path):
+    archive, name = FmuArchive(native_fmu("gain", 3)), f"y[{subscript}]"
+    entry = f'<Float64 name="{name}" valueReference="77" causality="output"/></ModelVariables>'
+    text = archive.description().replace(b"</ModelVariables>", entry.encode())
+    text = text.replace(b"<ModelStructure>", b'<ModelStructure><Output valueReference="77"/>')
+    outputs = describe_fmu(write_archive(tmp_path / "u.fmu", {"modelDescription.xml": text})).outputs
+    assert outputs[name].shape == ()
+
+
 def test_an_array_beyond_all_memory_is_refused(tmp_path: Path):
     archive = FmuArchive(native_fmu("gain", 3))
     size = b'<Dimension start="18446744073709551615"/>'

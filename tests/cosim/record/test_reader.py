@@ -25,9 +25,10 @@ def test_an_enumerations_names_are_read_back(tmp_path: Path):
 
 def test_entries_that_are_no_whole_array_are_signals_by_themselves(tmp_path: Path):
     names = ["time", "a.p[1]", "a.p[2]", "a.q[0]", "a.q[1]", "a.r[2]", "a.s[1,1]", "a.s[1,2]", "a.t[9999999999]"]
+    names += [f"a.u[{'9' * 5000}]", f"a.v[{','.join('1' * 100)}]"]
     pq.write_table(pa.table({name: [float(k)] for k, name in enumerate(names)}), tmp_path / "r.parquet")
     record = Record(tmp_path / "r.parquet")
-    assert record.signals == ("a.p", "a.q[0]", "a.q[1]", "a.r[2]", "a.s", "a.t[9999999999]")
+    assert record.signals == ("a.p", "a.q[0]", "a.q[1]", "a.r[2]", "a.s", *names[8:])
     assert record["a.p"].tolist() == [[1.0, 2.0]]
     assert record["a.s"].tolist() == [[[6.0, 7.0]]]
     assert [record[name].tolist() for name in ("a.q[0]", "a.r[2]")] == [[3.0], [5.0]]
