@@ -36,6 +36,7 @@ from handover.scenarios.live.commands import (
 from handover.scenarios.live.connections import (
     HEADERS,
     POLICY_VIOLATION,
+    TRY_AGAIN_LATER,
     BinaryMessage,
     MessageRate,
     close,
@@ -56,6 +57,8 @@ FRAME_PERIOD, PLOT_PERIOD = 1.0 / 30.0, 1.0
 """Time between two frames, and between two states of the plots, s."""
 _PICTURE_PERIOD = 0.1
 """How often camera pictures are looked for, s."""
+MOST_PAGES = 32
+"""Pages that are shown a run at most: each costs its process time for every frame."""
 _MOST_MESSAGES = 500
 """Messages of a page within a second; it sends some thirty as it pushes."""
 _EARLY = 8.0
@@ -67,7 +70,7 @@ _POLL = 0.02
 
 
 class LivePage:
-    """A page for any number of browsers that shows one run after the other.
+    """A page for up to 32 browsers that shows one run after the other.
 
     Args:
         webcam: files by which a webcam leads a hand; None where it is not offered.
@@ -103,6 +106,9 @@ class LivePage:
             await page.close(POLICY_VIOLATION)
             return
         await page.accept()
+        if len(self._viewers.pages) >= MOST_PAGES:
+            await close(page, TRY_AGAIN_LATER, f"{MOST_PAGES} pages are open already")
+            return
         self._viewers.add(page)
         try:
             await self.greet(page)

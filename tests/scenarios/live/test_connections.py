@@ -16,6 +16,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
 from handover.scenarios.experiment.live_inputs import LedHand
+from handover.scenarios.live import live_page
 from handover.scenarios.live.commands import InvalidCommand, parse_command
 from handover.scenarios.live.connections import HEADERS, MessageRate, RefusalTimer
 from handover.scenarios.live.hand_messages import HandSample
@@ -149,6 +150,22 @@ def test_a_page_that_is_too_slow_is_closed_with_the_reason(tmp_path: Path):
                     await asyncio.wait_for(slow.recv(), 30.0)
             assert slow.close_code == 1013
             assert "more than 2 s to receive a message" in str(slow.close_reason)
+
+    with_page(tmp_path, act)
+
+
+def test_of_more_pages_than_a_run_is_shown_in_the_last_one_is_told_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(live_page, "MOST_PAGES", 1)
+
+    async def act(_page: PageWithHand, host: str) -> None:
+        async with opened(host, "run") as first:
+            await first.send("{")
+            await answer(first)
+            async with opened(host, "run") as second:
+                await second.wait_closed()
+                assert (second.close_code, second.close_reason) == (1013, "1 pages are open already")
+            await first.send("{")
+            assert "refused" in await answer(first)
 
     with_page(tmp_path, act)
 
