@@ -1,5 +1,6 @@
 """Figures for papers by matplotlib: the style that all of them share, and time plots drawn in it."""
 
+import warnings
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import cycle
@@ -244,4 +245,6 @@ def _canvas(axes: Axes) -> Canvas:
 def _save(canvas: Canvas, path: Path) -> None:
     for file, metadata in ((path.with_suffix(".png"), {"Software": None}), (path.with_suffix(".svg"), {"Date": None})):
         file.unlink(missing_ok=True)  # a link in a folder of somebody else would have another file written
-        canvas.savefig(file, metadata=metadata)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Glyph")  # it has a name's letter raw
+            canvas.savefig(file, metadata=metadata)
