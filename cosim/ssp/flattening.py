@@ -148,7 +148,7 @@ class _Flattening:
                 if not self._assign(element, path, name, value):
                     near = nearest(name, self._names(element, path))
                     what = f"{path or element.name} has nothing called {name!r} that can be set"
-                    _log.warning("%s%s; %s; its value is left out", value.where, what, near)
+                    _log.warning("%s%s; its value is left out%s", value.where, what, near and f"; {near}")
 
     def _assign(self, element: SspElement, path: str, name: str, value: SspValue) -> bool:
         """Give a value to a name as seen from an element; return False if there is none of that name."""

@@ -142,8 +142,8 @@ def mapped_values(
     for source in (name for name in mapping if name not in values):
         for m in mapping[source]:
             near = nearest(source, values)
-            text = "%s%s: no parameter is called %r; %s; its mapping to %r is left out"
-            _log.warning(text, m.where, owner, source, near, m.target)
+            text = "%s%s: no parameter is called %r; its mapping to %r is left out%s"
+            _log.warning(text, m.where, owner, source, m.target, near and f"; {near}")
     left_out = [name for name in values if name not in mapping]
     if left_out:
         names = ", ".join(repr(name) for name in left_out[:_MAX_NAMES])

@@ -45,6 +45,10 @@ def test_a_bad_value_is_reported_with_valid_values(given: Variable, value: Any, 
     assert text in fault
 
 
+def test_a_port_whose_unit_has_no_name_is_of_numbers():
+    assert fault_of(variable(Kind.REAL, unit=Unit("")), "far") == "'far' is not a number"
+
+
 @pytest.mark.parametrize(
     ("given", "value"),
     [

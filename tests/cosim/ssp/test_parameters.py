@@ -103,7 +103,7 @@ def test_what_a_mapping_and_its_set_do_not_have_of_each_other_is_reported(
     assert started(whole, files={"m.ssm": mapping, "s.ssv": values}) == {"a": {"u": 1.0}}
     left_out = "'mode', 'other0', 'other1', 'other2', 'other3' and 2 more"
     assert [record.getMessage() for record in caplog.records] == [
-        "m.ssm, line 1: a: no parameter is called 'modus'; did you mean mode?; its mapping to 'mode' is left out",
+        "m.ssm, line 1: a: no parameter is called 'modus'; its mapping to 'mode' is left out; did you mean mode?",
         f"s.ssv, line 1: a: no entry maps {left_out}, left out",
     ]
 
@@ -185,8 +185,8 @@ def test_a_value_in_a_unit_that_is_not_defined_is_taken_as_it_is(tmp_path: Path,
 def test_a_name_that_nothing_has_is_reported_with_the_nearest(started: Open, caplog: pytest.LogCaptureFixture):
     middle = system(component("a", bindings(parameters("moed|Integer|1"))), name="m")
     assert started(system(middle, before=bindings(parameters("m.a.p[3]|Real|1")))) == {"m.a": {}}
-    assert "m.a has nothing called 'moed' that can be set; did you mean mode?; its value is left out" in caplog.text
-    assert "whole has nothing called 'm.a.p[3]' that can be set; did you mean m.a.p[1] or m.a.p[2]" in caplog.text
+    assert "m.a has nothing called 'moed' that can be set; its value is left out; did you mean mode?" in caplog.text
+    assert "whole has nothing called 'm.a.p[3]' that can be set; its value is left out; did you mean m.a.p[1] or m.a.p[2]" in caplog.text
 
 
 @pytest.mark.parametrize("initial", ["exact", "approx"])
