@@ -18,11 +18,20 @@ from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.parameters import Parameters
 
 _SHAPE = (720, 1280, 3)
-_POINTS = {"p_WO": ("ball", "#ffd23f"), "p_WR": ("wrist", "#4fe3ff"), "p_WG": ("gripper", "#ff8ad8")}
-"""What each point is, and its colour; how it is known is seen by the mark's shape."""
+_POINTS = {
+    "p_WO": ("ball", "#ffd23f", "yellow"),
+    "p_WR": ("wrist", "#4fe3ff", "blue"),
+    "p_WG": ("gripper", "#ff8ad8", "pink"),
+}
+"""What each point is, its colour, and that in words; how it is known is seen by the mark's shape."""
 MEASURED, ESTIMATED = "as measured", "as the controller has it"
 _SHAPES = {MEASURED: ("circle", "cross"), ESTIMATED: ("dashed circle", "plus")}
 """Shapes of the mark of the ball, which has its size in the picture, and of the other points."""
+LEGEND = (
+    f"{', '.join(f'{what} {colour}' for what, _, colour in _POINTS.values())}; "
+    f"{', '.join(f'{ball} and {other} {source}' for source, (ball, other) in _SHAPES.items())}"
+)
+"""What the marks say, in words for a caption."""
 _SEEN_BY = {"p_WO": "vision.seen_O", "p_WR": "vision.seen_R", "p_WG": "vision.seen_R"}
 
 
@@ -77,7 +86,7 @@ def _mark(camera: Pinhole, name: str, p_WP: Floats, source: str) -> Iterator[Mar
     """Yield the mark of a point, unless it is behind the camera."""
     u, v = camera.project(p_WP).tolist()
     if np.isfinite(u) and np.isfinite(v):
-        what, colour = _POINTS[name]
+        what, colour, _ = _POINTS[name]
         ball = float(camera.f[0]) * VisionParams().ball_radius / float(camera.depth(p_WP))
         shape, radius = (_SHAPES[source][0], ball) if what == "ball" else (_SHAPES[source][1], 9.0)
         yield Mark(label=f"{what}, {source}", shape=shape, u=u, v=v, radius=radius, colour=colour)

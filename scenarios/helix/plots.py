@@ -23,6 +23,7 @@ from handover.scenarios.experiment.time_plot import (
     TimePlot,
     phases_of,
 )
+from handover.scenarios.helix.marked_pictures import LEGEND
 from handover.scenarios.helix.parameters import Parameters
 
 _FOLLOWED = (("gripper", "arm.p_WG", "servo.p_WG_est"), ("ball", "hand.p_WO", "servo.p_WO_est"))
@@ -202,10 +203,7 @@ def draw_pictures(pictures: Sequence[CameraPicture], above: Collection[str], fol
             i = moments.index(p.t)
             _show(axes[i + n * cameras.index(p.camera)], p, _ROWS_FROM_ABOVE if p.camera in above else _ROWS)
             axes[i].set_title(f"{p.t:.1f} s, {p.role}")
-    caption = (
-        f"Cameras from above: {', '.join(cameras)}. Ball (circle), wrist (cross) and gripper (plus), yellow as "
-        "measured in the pictures, blue as the controller has them."
-    )
+    caption = f"Cameras, from the upper row to the lower: {', '.join(cameras)}. Marks: {LEGEND}."
     return Figure("pictures", caption)
 
 
