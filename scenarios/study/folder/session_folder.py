@@ -101,7 +101,7 @@ class _KeptRound:
     """What a round's file holds; `answers` are the ratings by statement, None before they are given."""
 
     record: RoundRecord
-    answers: Mapping[str, int] | None = None
+    answers: Mapping[str, Count] | None = None
 
 
 class SessionFolder:

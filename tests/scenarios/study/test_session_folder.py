@@ -5,7 +5,7 @@ import os
 import signal
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -213,6 +213,9 @@ def test_a_damaged_file_is_told_by_its_name(tmp_path: Path):
     (folder.path / "rounds" / "01.json").write_text('{"record": {"success": true}}')
     with pytest.raises(InvalidRunFolder, match=r"its 01.json is damaged"):
         _ = folder.records
+    (folder.path / "rounds" / "01.json").write_text(json.dumps({"record": asdict(record()), "answers": {"S1": 2**63}}))
+    with pytest.raises(InvalidRunFolder, match=r"its 01.json is damaged"):
+        folder.write_tables()
     (folder.path / "session.json").write_text("{")
     with pytest.raises(InvalidRunFolder, match=r"its session.json is damaged"):
         SessionFolder.read(folder.path, PLAN)
