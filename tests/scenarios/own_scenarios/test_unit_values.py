@@ -107,7 +107,8 @@ def test_a_sweep_varies_the_unit_itself(here: Path):
     np.testing.assert_allclose(first[2], 0.5 * first[0], rtol=1e-12)
     assert "has all of its runs; nothing was run" in call(here, *sweep).stderr
     (here / "swept" / "runs.parquet").unlink()
-    succeeded(here / "else", "report", "../swept")
+    assert "it has no runs.parquet" in refused(here, "report", "swept")
+    assert "nothing was run" in call(here, *sweep).stderr
     assert CampaignTable.read(here / "swept" / "runs.parquet").rows == table.rows
 
 
