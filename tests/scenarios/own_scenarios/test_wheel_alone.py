@@ -155,7 +155,7 @@ def test_a_run_has_its_record_and_a_page_with_a_replay(own: Installation):
     assert own.signals("first") == own.signals("without_extras")
     page = own.here / "first" / "report.html"
     page.unlink()
-    own.succeeded("report", "first")
+    own.succeeded("report", "first", "--trust", "reach.py")
     html = page.read_text(encoding="utf-8")
     assert '<section id="replay">' in html
     for label in ("arm", "path of the tip", "goal"):
@@ -168,7 +168,7 @@ def test_units_and_parameters_are_swept_with_the_numbers_of_single_runs(own: Ins
     assert "4 of 4 runs done" in printed
     runs = sorted(folder.name for folder in (own.here / "swept" / "runs").iterdir())
     values = [
-        f"controller={name}_arm.mass={mass}" for name in ("control-SpringToGoal", "softer-Softer") for mass in (1, 2)
+        f"controller={name}_arm.mass={mass}" for name in ("goal_spring-SpringToGoal", "softer-Softer") for mass in (1, 2)
     ]
     assert runs == [f"{k:03}_{value}_r0000" for k, value in enumerate(values)]
     other = ["-p", "arm.mass=2", "--unit", "controller=softer:Softer"]
