@@ -186,7 +186,10 @@ def test_a_name_that_nothing_has_is_reported_with_the_nearest(started: Open, cap
     middle = system(component("a", bindings(parameters("moed|Integer|1"))), name="m")
     assert started(system(middle, before=bindings(parameters("m.a.p[3]|Real|1")))) == {"m.a": {}}
     assert "m.a has nothing called 'moed' that can be set; its value is left out; did you mean mode?" in caplog.text
-    assert "whole has nothing called 'm.a.p[3]' that can be set; its value is left out; did you mean m.a.p[1] or m.a.p[2]" in caplog.text
+    assert (
+        "whole has nothing called 'm.a.p[3]' that can be set; its value is left out; did you mean m.a.p[1] or m.a.p[2]"
+        in caplog.text
+    )
 
 
 @pytest.mark.parametrize("initial", ["exact", "approx"])

@@ -60,7 +60,7 @@ def with_page(folder: Path, act: Callable[[PageWithHand, str], Awaitable[None]])
 
 
 def opened(host: str, path: str, **options: Any) -> connect:
-    return connect(f"ws://{host}/{path}", origin=f"http://{host}", **options)  # type: ignore
+    return connect(f"ws://{host}/{path}", open_timeout=60.0, origin=f"http://{host}", **options)  # type: ignore
 
 
 async def answer(to: ClientConnection) -> dict[str, Any]:
@@ -80,10 +80,10 @@ def test_a_connection_of_another_sites_page_is_refused_and_a_tracker_without_a_s
     async def act(_page: PageWithHand, host: str) -> None:
         for path in ("run", "hand"):
             with pytest.raises(InvalidStatus, match="403"):
-                await connect(f"ws://{host}/{path}", origin="http://elsewhere.example")  # type: ignore
+                await connect(f"ws://{host}/{path}", open_timeout=60.0, origin="http://elsewhere.example")  # type: ignore
         with pytest.raises(InvalidStatus, match="403"):
-            await connect(f"ws://{host}/run")
-        async with connect(f"ws://{host}/hand") as tracker:
+            await connect(f"ws://{host}/run", open_timeout=60.0)
+        async with connect(f"ws://{host}/hand", open_timeout=60.0) as tracker:
             assert "hand" in await answer(tracker)
 
     with_page(tmp_path, act)

@@ -104,13 +104,13 @@ def test_a_tracker_leads_the_hand_and_what_it_may_not_send_is_refused(tmp_path: 
     with live_run(tmp_path / "led", *given, scenario=SCENARIO) as (address, run):
         host = address.removeprefix("http://").rstrip("/")
         with pytest.raises(InvalidStatus, match="403"):
-            connect(f"ws://{host}/hand", origin="http://elsewhere.example")  # type: ignore
-        page = connect(f"ws://{host}/run", origin=f"http://{host}")  # type: ignore
-        with page, connect(f"ws://{host}/hand") as tracker:
+            connect(f"ws://{host}/hand", open_timeout=60.0, origin="http://elsewhere.example")  # type: ignore
+        page = connect(f"ws://{host}/run", open_timeout=60.0, origin=f"http://{host}")  # type: ignore
+        with page, connect(f"ws://{host}/hand", open_timeout=60.0) as tracker:
             start = answer(tracker)["hand"]
             assert start["p_WH"] == start["centre"] == [-0.4, 0.1, -0.05]
             assert not start["closed"]
-            with connect(f"ws://{host}/hand") as other:
+            with connect(f"ws://{host}/hand", open_timeout=60.0) as other:
                 assert "another page or tracker leads the hand" in answer(other)["refused"]
             wrong = {
                 "{": "not JSON",

@@ -241,10 +241,10 @@ def test_the_readmes_command_refuses_who_is_not_the_page(tmp_path: Path):
         with pytest.raises(urllib.error.HTTPError, match="400"):
             urllib.request.urlopen(urllib.request.Request(address, headers={"Host": "elsewhere.example"}))
         with pytest.raises(InvalidStatus, match="403"):
-            connect(f"ws://{host}/run", origin="http://elsewhere.example")  # type: ignore
+            connect(f"ws://{host}/run", open_timeout=60.0, origin="http://elsewhere.example")  # type: ignore
         with pytest.raises(urllib.error.HTTPError, match="404"):
             urllib.request.urlopen(f"{address}etc/passwd")
-        with connect(f"ws://{host}/run", origin=f"http://{host}") as page:  # type: ignore
+        with connect(f"ws://{host}/run", open_timeout=60.0, origin=f"http://{host}") as page:  # type: ignore
             wrong = {
                 "{": "not JSON",
                 "[]": "is right: Expected",

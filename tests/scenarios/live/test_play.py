@@ -116,7 +116,7 @@ def changed(page: Page) -> list[str]:
 
 @pytest.mark.slow
 def test_a_slider_begins_a_run_anew_and_each_run_is_that_of_its_command(browser: Browser, tmp_path: Path):
-    with played("flyer_impedance", tmp_path / "runs", "--pace", "2") as (address, session):
+    with played("flyer_impedance", tmp_path / "runs", "--pace", "0.5") as (address, session):
         with shown(browser, address) as page:
             begun(page, 1)
             wait_until(page, f"{LIVE}.dataset.frames > 3")
@@ -251,10 +251,10 @@ def test_the_readmes_session_refuses_who_is_not_the_page_and_what_is_no_command(
         with pytest.raises(urllib.error.HTTPError, match="400"):
             urllib.request.urlopen(urllib.request.Request(address, headers={"Host": "elsewhere.example"}))
         with pytest.raises(InvalidStatus, match="403"):
-            connect(f"ws://{host}/run", origin="http://elsewhere.example")  # type: ignore
+            connect(f"ws://{host}/run", open_timeout=60.0, origin="http://elsewhere.example")  # type: ignore
         with pytest.raises(urllib.error.HTTPError, match="404"):
             urllib.request.urlopen(f"{address}report/../../etc/passwd")
-        with connect(f"ws://{host}/run", origin=f"http://{host}") as page:  # type: ignore
+        with connect(f"ws://{host}/run", open_timeout=60.0, origin=f"http://{host}") as page:  # type: ignore
             for value, why in (
                 ('"all"', "set takes"),
                 ('{"parameters": {"secret": "1"}}', "set takes"),
@@ -279,7 +279,7 @@ def refusal(page: ClientConnection) -> str:
 def test_a_run_ends_where_its_session_is_killed(tmp_path: Path):
     with played("flyer_impedance", tmp_path / "runs", "--pace", "0.1") as (address, session):
         host = address.removeprefix("http://").rstrip("/")
-        with connect(f"ws://{host}/run", origin=f"http://{host}") as page:  # type: ignore
+        with connect(f"ws://{host}/run", open_timeout=60.0, origin=f"http://{host}") as page:  # type: ignore
             while not isinstance(page.recv(timeout=60), bytes):  # until the first frame
                 pass
             os.kill(session.pid, signal.SIGKILL)

@@ -168,7 +168,9 @@ def test_units_and_parameters_are_swept_with_the_numbers_of_single_runs(own: Ins
     assert "4 of 4 runs done" in printed
     runs = sorted(folder.name for folder in (own.here / "swept" / "runs").iterdir())
     values = [
-        f"controller={name}_arm.mass={mass}" for name in ("goal_spring-SpringToGoal", "softer-Softer") for mass in (1, 2)
+        f"controller={name}_arm.mass={mass}"
+        for name in ("goal_spring-SpringToGoal", "softer-Softer")
+        for mass in (1, 2)
     ]
     assert runs == [f"{k:03}_{value}_r0000" for k, value in enumerate(values)]
     other = ["-p", "arm.mass=2", "--unit", "controller=softer:Softer"]

@@ -46,7 +46,7 @@ def served(server: StudyServer) -> Generator[str, None, None]:
 @contextmanager
 def page_at(where: str, path: str = "/", origin: str | None = None) -> Generator[ClientConnection, None, None]:
     own = f"http://{where}" if origin is None else origin
-    with connect(f"ws://{where}{path}seat", origin=own, max_size=None, max_queue=None) as page:  # type: ignore
+    with connect(f"ws://{where}{path}seat", open_timeout=60.0, origin=own, max_size=None, max_queue=None) as page:  # type: ignore
         yield page
 
 

@@ -127,7 +127,7 @@ def test_a_page_that_floods_is_refused_and_at_last_put_out(tmp_path: Path, monke
 def test_a_message_beyond_all_bounds_ends_the_connection_with_the_reason(path: str, tmp_path: Path):
     with (
         served(server_of(tmp_path / "study")) as where,
-        connect(f"ws://{where}/{path}", origin=f"http://{where}") as device,  # type: ignore
+        connect(f"ws://{where}/{path}", open_timeout=60.0, origin=f"http://{where}") as device,  # type: ignore
     ):
         device.send("x" * 200_000)
         with pytest.raises(ConnectionClosed) as closed:

@@ -19,7 +19,7 @@ def test_a_tracker_leads_the_hand_and_its_pictures_are_timed_by_the_pages_clock(
     with served(server_of(tmp_path / "study")) as where, page_at(where) as page:
         assert told(page, "tracker") is False
         to_instruction(page, "tracker")
-        with connect(f"ws://{where}/hand") as tracker:
+        with connect(f"ws://{where}/hand", open_timeout=60.0) as tracker:
             rest = told(tracker, "hand")
             assert told(page, "tracker") is True
             assert len(rest["angles"]) == 14
@@ -45,11 +45,14 @@ def test_a_tracker_leads_the_hand_and_its_pictures_are_timed_by_the_pages_clock(
 
 def test_a_tracker_is_told_why_it_is_refused(tmp_path: Path):
     with served(server_of(tmp_path / "study")) as where, page_at(where) as page:
-        with pytest.raises(InvalidStatus), connect(f"ws://{where}/hand", origin="http://elsewhere.example"):  # type: ignore
+        with (
+            pytest.raises(InvalidStatus),
+            connect(f"ws://{where}/hand", open_timeout=60.0, origin="http://elsewhere.example"),  # type: ignore
+        ):
             pass
-        with connect(f"ws://{where}/hand") as tracker:
+        with connect(f"ws://{where}/hand", open_timeout=60.0) as tracker:
             told(tracker, "hand")
-            with connect(f"ws://{where}/hand") as second:
+            with connect(f"ws://{where}/hand", open_timeout=60.0) as second:
                 assert "another tracker" in told(second, "refused")
             to_instruction(page, "mouse")
             tracker.send(json.dumps({**HAND, "stamp": 1.0}))
@@ -60,7 +63,7 @@ def test_what_is_no_sample_is_refused_and_a_tracker_that_floods_is_put_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr(page_messages, "FLOOD", 20)
-    with served(server_of(tmp_path / "study")) as where, connect(f"ws://{where}/hand") as tracker:
+    with served(server_of(tmp_path / "study")) as where, connect(f"ws://{where}/hand", open_timeout=60.0) as tracker:
         tracker.send(b"\x00\xff")
         assert "a text, and not bytes" in told(tracker, "refused")
         with contextlib.suppress(ConnectionClosed):
