@@ -61,7 +61,7 @@ def numbers_of(port: Declared, value: Any) -> NDArray[Any]:
 def range_of(port: Declared) -> str:
     """Return a port's range in words, with the unit; empty where it has none."""
     low, high = port.minimum, port.maximum
-    unit = "" if port.unit.symbol in ("", "1") else f" {port.unit.symbol}"
+    unit = f" {port.unit.shown}" if port.unit.shown else ""
     if low is not None and high is not None:
         return f"from {low:g} to {high:g}{unit}"
     if low is not None:
@@ -71,7 +71,7 @@ def range_of(port: Declared) -> str:
 
 def _wanted(port: Declared) -> str:
     what = "a whole number" if port.kind in (Kind.INTEGER, Kind.ENUMERATION) else "a number"
-    unit = "" if port.unit.symbol in ("", "1") else f" in {port.unit.symbol}"
+    unit = f" in {port.unit.shown}" if port.unit.shown else ""
     if port.shape:
         return f"an array of shape [{','.join(map(str, port.shape))}] of numbers{unit}"
     return what + unit

@@ -42,6 +42,11 @@ class Unit:
         """Whether values can be converted from and to it: factor and offset are of reasonable magnitude."""
         return _SMALLEST < abs(self.factor) < _LARGEST and abs(self.offset) < _LARGEST
 
+    @property
+    def shown(self) -> str:
+        """The symbol beside a value, empty for numbers without a unit."""
+        return "" if self.symbol == "1" else self.symbol
+
     def __str__(self) -> str:
         return self.symbol
 

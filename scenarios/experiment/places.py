@@ -171,7 +171,7 @@ class _Fitting:
 def signature(v: Variable) -> str:
     """Return kind, shape, unit and items of what a block declares, as in `real [3] m`."""
     shape = f" [{','.join(map(str, v.shape))}]" if v.shape else ""
-    unit = f" {v.unit.symbol}" if v.kind is Kind.REAL and v.unit.symbol != "1" else ""
+    unit = f" {v.unit.shown}" if v.kind is Kind.REAL and v.unit.shown else ""
     return f"{v.kind.value}{shape}{unit}"
 
 

@@ -32,7 +32,7 @@ INPUTS_FILE = "inputs.json"
 _MOST_MESSAGES = 2000
 """Messages of a device within a second; many more are far from any tracker, and keep the server from the page."""
 _MOST_NAMES = 20
-"""Devices that are told apart; samples of further ones are counted with those before."""
+"""Devices that are distinguished; samples of further ones are counted with those before."""
 _IS_LED = 'another page or tracker leads the hand; a page leaves it to "a tracker of one\'s own" that is chosen there'
 """Why another device has to wait."""
 

@@ -70,7 +70,7 @@ _POLL = 0.02
 
 
 class LivePage:
-    """A page for up to 32 browsers that shows one run after the other.
+    """A page for up to `MOST_PAGES` browsers that shows one run after the other.
 
     Args:
         webcam: files by which a webcam leads a hand; None where it is not offered.

@@ -79,7 +79,7 @@ def field_of(declared: Declared, default: str) -> ParameterField:
         name=declared.name,
         kind=kind,
         default=default,
-        unit="" if declared.unit.symbol == "1" else declared.unit.symbol,
+        unit=declared.unit.shown,
         description=declared.description,
         range=range_of(declared),
         items=tuple(name.lower() for name, _ in declared.items),

@@ -1,5 +1,4 @@
 import json
-import os
 import subprocess
 import sys
 import sysconfig
@@ -98,11 +97,9 @@ def test_installed_is_what_lies_in_folders_of_this_interpreter(tmp_path: Path):
     assert not is_installed(tmp_path / "lib" / "python3.11" / "site-packages" / "numpy.py")
 
 
-@pytest.mark.skipif(os.name == "nt", reason="needs pipes")
 def test_no_configuration_of_the_working_directory_is_read_by_a_library(tmp_path: Path):
-    pytest.importorskip("numba")
-    os.mkfifo(tmp_path / "matplotlibrc")  # reading it would never end
-    (tmp_path / ".numba_config.yaml").write_bytes(b"\xff: [")  # and this fails
+    for name in ("matplotlibrc", ".numba_config.yaml"):
+        (tmp_path / name).write_bytes(b"\xff: [")  # which fails where it is read
     code = "import json, matplotlib, numba, os; numba.core.config.reload_config(); print(json.dumps([os.getcwd()]))"
     done = subprocess.run(code_command(code), cwd=tmp_path, capture_output=True, text=True, timeout=100)
     assert json.loads(done.stdout or "[]") == [str(tmp_path.resolve())], done.stderr

@@ -136,7 +136,7 @@ class FmuPort(Declared):
     def signature(self) -> str:
         """Kind, unit and shape, as in `real [3] m`, for messages."""
         shape = f" [{','.join(map(str, self.shape))}]" if self.shape else ""
-        unit = self.unit.symbol if self.kind is Kind.REAL and self.unit.symbol != "1" else ""
+        unit = self.unit.shown if self.kind is Kind.REAL else ""
         extra = self.mime if self.kind is Kind.BINARY else unit
         return f"{self.kind.value}{shape}{' ' + extra if extra else ''}"
 

@@ -42,5 +42,5 @@ def _cells(port: "FmuPort") -> tuple[str, ...]:
     start = {str(value): name.lower() for name, value in port.items}.get(port.start or "", port.start or "")
     start = f"{start[:_MAX_START]}…" if len(start) > _MAX_START else start
     tunable = ", tunable" if port.tunable else ""
-    symbol = "" if port.unit.symbol == "1" else port.unit.symbol
+    symbol = port.unit.shown
     return port.name, f"{port.kind.value}{shape}{tunable}", symbol, items or range_of(port), start, port.description

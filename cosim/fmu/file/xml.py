@@ -23,7 +23,6 @@ _PREFIX, _DECLARED = re.compile(rb"[<\s]([A-Za-z_][\w.-]*):[A-Za-z_]"), re.compi
 _DECLARATION = re.compile(r"\A<\?xml\s[^>]*\?>")
 _ROOT_TAG = re.compile(rb"(<[A-Za-z_][\w:.-]*)([^>]*)")
 
-
 _MOST_MARKS = 10_000_000
 """Tags of a document, and tags and values of one that becomes a tree, which take some 200 bytes of memory each."""
 _MOST_NAMESPACES = 1000
@@ -124,8 +123,7 @@ def in_utf8(content: bytes) -> bytes:
     Raises:
         UnsafeXml: it is not what these bytes say.
     """
-    utf16 = content.startswith((b"\xff\xfe", b"\xfe\xff"))
-    if not utf16:
+    if not content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return content
     try:
         text = content.decode("utf-16")

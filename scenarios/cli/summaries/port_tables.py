@@ -44,7 +44,7 @@ def allowed(v: Declared) -> str:
 def type_of(v: Declared) -> str:
     """Return kind, shape and unit, as in `real[3] m`."""
     shape = f"[{','.join(map(str, v.shape))}]" if v.shape else ""
-    unit = v.unit.symbol if v.kind is Kind.REAL and v.unit.symbol != "1" else ""
+    unit = v.unit.shown if v.kind is Kind.REAL else ""
     return f"{v.type_name}{shape} {unit}".rstrip()
 
 

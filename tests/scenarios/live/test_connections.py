@@ -154,7 +154,7 @@ def test_a_page_that_is_too_slow_is_closed_with_the_reason(tmp_path: Path):
     with_page(tmp_path, act)
 
 
-def test_of_more_pages_than_a_run_is_shown_in_the_last_one_is_told_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_of_more_pages_than_a_run_is_shown_in_the_last_one_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(live_page, "MOST_PAGES", 1)
 
     async def act(_page: PageWithHand, host: str) -> None:
