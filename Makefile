@@ -11,7 +11,7 @@ OLDEST := --only missing-import --only missing-module-attribute --only missing-a
 
 WHEELS := x86_64-linux aarch64-linux x86_64-windows x86_64-darwin aarch64-darwin
 
-.PHONY: demo test test-slow fuzz paper real-time standalone hosts lint bench pictures notebook icons wheels install clean
+.PHONY: demo test test-slow fuzz paper real-time platforms hosts lint bench pictures notebook icons wheels install clean
 
 demo: $(VENV)/.installed
 	$(BIN)/handover run helix_handover
@@ -19,7 +19,7 @@ demo: $(VENV)/.installed
 install: $(VENV)/.installed
 
 test: lint $(VENV)/.installed-test
-	$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not fuzz and not paper and not real_time and not standalone and not hosts"
+	$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not bench and not fuzz and not hosts and not paper and not platforms and not real_time"
 
 test-slow: $(VENV)/.installed-test
 	$(BIN)/python -m pytest $(PARALLEL) -m slow
@@ -30,8 +30,8 @@ fuzz: $(VENV)/.installed-test
 real-time: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -m real_time -s
 
-standalone: $(VENV)/.installed-test
-	$(BIN)/python -m pytest $(PARALLEL) -m standalone
+platforms: $(VENV)/.installed-test
+	$(BIN)/python -m pytest $(PARALLEL) -m platforms
 
 # docs/hosts.md: every unit in every form and host; a run that was interrupted goes on.
 hosts: $(VENV)/.installed-test
@@ -48,7 +48,7 @@ lint: $(VENV)/.installed-test
 	$(TYPES) --python-version 3.10 $(OLDEST)
 
 bench: $(VENV)/.installed-test
-	$(BIN)/python -m pytest tests --benchmark-enable --benchmark-only -s
+	$(BIN)/python -m pytest tests/benchmarks -m "bench and not real_time" --benchmark-enable -s
 
 # The README's pictures; needs chromium, too.
 pictures: $(VENV)/.installed-test

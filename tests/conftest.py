@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
+from support.commands import cpu_of_commands
 
 settings.register_profile("without deadline", deadline=None)
 settings.load_profile("without deadline")
@@ -27,7 +28,7 @@ _COSTLIEST = 10
 
 def _cpu() -> float:
     used = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    return sum(u.ru_utime + u.ru_stime for u in used)
+    return sum(u.ru_utime + u.ru_stime for u in used) + cpu_of_commands()
 
 
 @pytest.hookimpl(wrapper=True)

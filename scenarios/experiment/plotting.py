@@ -248,3 +248,4 @@ def _save(canvas: Canvas, path: Path) -> None:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Glyph")  # it has a name's letter raw
             canvas.savefig(file, metadata=metadata)
+        canvas.set_layout_engine("none")  # the layout stays: computing it costs as much as drawing

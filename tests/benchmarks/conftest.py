@@ -11,6 +11,13 @@ HERE = Path(__file__).parent
 NativeFmu = Callable[..., Path]
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """All here is of one tier, `make bench`."""
+    for item in items:
+        if item.path.is_relative_to(HERE):
+            item.add_marker("bench")
+
+
 def module(folder: str, name: str) -> Any:
     """Import a module of another folder of tests."""
     sys.path.insert(0, str(HERE.parent / folder))

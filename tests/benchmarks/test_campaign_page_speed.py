@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow.parquet as pq
-import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from handover.scenarios.campaign.folder import CampaignFolder
@@ -18,8 +17,6 @@ from handover.scenarios.campaign.table import RunRow
 from handover.scenarios.campaign.table_writer import table_of
 from handover.scenarios.campaign_report.campaign_page import write_campaign_page
 from handover.scenarios.experiment.experiment import Metric
-
-pytestmark = pytest.mark.slow
 
 STRATEGIES = ("reflex", "blind", "forward")
 FEW, MANY = 300, 3000

@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import psutil
-import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from handover.cosim.stepping.options import MasterOptions
@@ -23,8 +22,6 @@ from handover.fmus.build import cached
 from handover.scenarios.campaign.local_cluster import local_cluster
 from handover.scenarios.campaign.worker_pool import RunJob, WorkerPool
 from handover.scenarios.catalog import SCENARIOS
-
-pytestmark = pytest.mark.slow
 
 RUNS, ROUNDS = 10, 3
 OVERHEAD = 0.05

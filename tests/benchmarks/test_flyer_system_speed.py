@@ -48,7 +48,8 @@ def pace(experiment: Experiment[Any]) -> tuple[float, float]:
     "name",
     [
         "flyer_impedance",
-        *(pytest.param(n, marks=pytest.mark.slow) for n in ("flyer_robot_to_human", "flyer_collaborative")),
+        "flyer_robot_to_human",
+        "flyer_collaborative",
     ],
 )
 def test_pace(benchmark: BenchmarkFixture, name: str):

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 import handover
@@ -18,7 +17,6 @@ from handover.scenarios.experiment.paper import paper_values
 RUNS = 4
 
 
-@pytest.mark.slow
 def test_handover(benchmark: BenchmarkFixture, tmp_path: Path):
     """The first run loads and imports what a process of its own has to, the others do not, as in a campaign."""
     runs: list[Any] = []

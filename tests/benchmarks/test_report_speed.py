@@ -11,13 +11,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as csv
 import pyarrow.parquet as pq
-import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from handover.scenarios.reporting.run_page import write_run_page
 from handover.scenarios.results.run_folder import RunFolder
-
-pytestmark = pytest.mark.slow
 
 ROWS, COLUMNS = 100_000, 40
 TARGET = 5.0

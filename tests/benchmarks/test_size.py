@@ -77,7 +77,6 @@ def growth(small: float, large: float) -> float:
     return math.log(large / small) / math.log(SIZES[-1] / SIZES[0])
 
 
-@pytest.mark.slow
 def test_cpu_time_and_memory_of_large_systems(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
     found: dict[int, tuple[list[float], int]] = {}
 
@@ -99,7 +98,6 @@ def test_cpu_time_and_memory_of_large_systems(benchmark: BenchmarkFixture, tmp_p
         assert most < SECONDS
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_cpu_time_and_memory_of_a_large_fmu(benchmark: BenchmarkFixture, tmp_path: Path, fmi: int) -> None:
     found: dict[int, tuple[list[float], int]] = {}
@@ -116,7 +114,6 @@ def test_cpu_time_and_memory_of_a_large_fmu(benchmark: BenchmarkFixture, tmp_pat
     assert growth(*(found[n][0][0] for n in (sizes[0], sizes[-1]))) < 1.5
 
 
-@pytest.mark.slow
 def test_cpu_time_and_memory_of_commands_with_a_unit_of_a_million_variables(
     benchmark: BenchmarkFixture, tmp_path: Path
 ) -> None:

@@ -14,7 +14,6 @@ from handover.fmus.build import build, cached
 from handover.fmus.catalog import UNITS
 
 pytestmark = [
-    pytest.mark.slow,
     pytest.mark.skipif(not can_be_entered(), reason="only the superuser may enter a folder as the root"),
 ]
 

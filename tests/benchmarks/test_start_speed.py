@@ -40,7 +40,6 @@ def cpu_of_children() -> float:
     return used.ru_utime + used.ru_stime
 
 
-@pytest.mark.slow
 def test_cpu_time_of_short_calls(benchmark: BenchmarkFixture) -> None:
     """The least of some rounds, in turn, so that what else the machine does falls on all alike."""
     calls = {name: (program(call[0]), *call[1:]) for name, call in CALLS.items()}

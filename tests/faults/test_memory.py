@@ -36,7 +36,7 @@ def test_instances_leave_nothing_behind(tmp_path: Path):
     assert growth(fmu, 3, "run", 600) < 600 / 5000 * LIMIT
 
 
-@pytest.mark.slow
+@pytest.mark.fuzz
 @pytest.mark.parametrize("kind", ["bare", "run"])
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("unit", ["EveryKind", "Push", "Thrusters"])

@@ -74,7 +74,6 @@ def test_picture_pair(benchmark: BenchmarkFixture, monkeypatch: pytest.MonkeyPat
     benchmark.extra_info.update(median_ms=float(np.median(pair)), over_unpainted=ratio)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("eyes", ["both", "left"])
 @pytest.mark.parametrize("detector", Detector, ids=lambda d: d.name.lower())
 def test_detection(benchmark: BenchmarkFixture, detector: Detector, eyes: str):
@@ -101,7 +100,6 @@ def test_detection(benchmark: BenchmarkFixture, detector: Detector, eyes: str):
     assert len(found.errors["ball"]) > 80 or (detector, eyes) == (Detector.PUBLISHED, "left")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rings", [1, 2])
 @pytest.mark.parametrize("detector", Detector, ids=lambda d: d.name.lower())
 def test_high_up(benchmark: BenchmarkFixture, detector: Detector, rings: int):

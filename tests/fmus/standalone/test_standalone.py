@@ -34,7 +34,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> BareFolder:
 def units() -> list[object]:
     """Return all units; those that stand for the systems in the slow tier, the others in a tier of their own."""
     return [
-        pytest.param(name, marks=pytest.mark.slow if name in OF_EACH_SYSTEM else pytest.mark.standalone)
+        pytest.param(name, marks=pytest.mark.slow if name in OF_EACH_SYSTEM else pytest.mark.platforms)
         for name in UNITS
     ]
 

@@ -1,0 +1,137 @@
+"""The command `handover` in processes that start in hundredths of a second, as they are forked from one that is warm.
+
+For tests of exit status, signals and what is printed. What a command prints and returns is the same in this process by
+`click.testing.CliRunner`, which is cheaper still; what depends on how Python starts needs a real start.
+"""
+
+import atexit
+import multiprocessing
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import Mapping
+from functools import cache
+from multiprocessing import forkserver
+from multiprocessing.connection import Connection
+from multiprocessing.context import ForkServerContext
+from pathlib import Path
+from typing import NamedTuple
+
+import psutil
+
+_LOADED = (
+    "handover.scenarios.cli.command",
+    "handover.scenarios.cli.run",
+    "handover.scenarios.reporting.run_page",
+    "handover.scenarios.reporting.run_figures",
+    "handover.plants.helix.arm.tendon_arm",
+    "handover.plants.ir_grasp.scene",
+    "handover.controllers.helix.vision.handover_vision",
+    "matplotlib.backends.backend_svg",
+    "plotly.graph_objects",
+    "pyarrow.parquet",
+    "scipy.optimize",
+)
+"""Modules that most commands need."""
+
+
+class Ended(NamedTuple):
+    """How a command ended: its status, negative for a signal, and what it printed."""
+
+    status: int
+    output: str
+    errors: str
+
+
+class Command:
+    """Runs `handover ARGUMENTS` in a process of its own.
+
+    Args:
+        arguments: of the command.
+        cwd: its working directory; this process's by default.
+        env: what its environment has besides this process's.
+    """
+
+    def __init__(self, *arguments: object, cwd: "Path | None" = None, env: Mapping[str, str] | None = None) -> None:
+        self._folder = tempfile.TemporaryDirectory()
+        self.output_file, self.errors_file = (Path(self._folder.name) / name for name in ("output", "errors"))
+        call = [str(argument) for argument in arguments]
+        place, environment = str(cwd or Path.cwd()), {**os.environ, **(env or {})}
+        begun, begins = _context().Pipe(duplex=False)
+        given = (call, place, environment, str(self.output_file), str(self.errors_file), begins)
+        self._process = _context().Process(target=_main, args=given)
+        self._process.start()
+        begun.recv()  # before that, signals are ignored
+
+    @property
+    def pid(self) -> int:
+        """Its process."""
+        assert self._process.pid is not None
+        return self._process.pid
+
+    def send_signal(self, number: signal.Signals) -> None:
+        """Send it a signal."""
+        os.kill(self.pid, number)
+
+    def poll(self) -> int | None:
+        """Return its status, or None as long as it runs."""
+        return self._process.exitcode
+
+    def wait(self, seconds: float = 300.0) -> Ended:
+        """Return how it ends; kill it and fail if that takes longer than some seconds."""
+        self._process.join(seconds)
+        late = self._process.exitcode is None
+        if late:
+            self._process.kill()
+            self._process.join()
+        output, errors = (file.read_text("utf-8", "replace") for file in (self.output_file, self.errors_file))
+        self._folder.cleanup()
+        assert not late, f"the command had not ended after {seconds:g} s:\n{output}{errors}"
+        assert self._process.exitcode is not None
+        return Ended(self._process.exitcode, output, errors)
+
+
+def run_command(*arguments: object, cwd: "Path | None" = None, env: Mapping[str, str] | None = None) -> Ended:
+    """Run `handover ARGUMENTS` to its end in a process of its own."""
+    return Command(*arguments, cwd=cwd, env=env).wait()
+
+
+def cpu_of_commands() -> float:
+    """Return the seconds of CPU of all commands that have ended, and of the process that they are forked from."""
+    server = getattr(forkserver, "_forkserver")._forkserver_pid  # noqa: B009
+    return sum(psutil.Process(server).cpu_times()[:4]) if server else 0.0
+
+
+@cache
+def _context() -> ForkServerContext:
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(list(_LOADED))
+    return context
+
+
+def _main(
+    call: list[str], place: str, environment: Mapping[str, str], output: str, errors: str, begins: Connection
+) -> None:
+    """Become the command, as its entry point starts it."""
+    os.environ.clear()
+    os.environ.update(environment)
+    os.chdir(place)
+    for number, name in ((0, os.devnull), (1, output), (2, errors)):
+        opened = os.open(name, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o600)
+        os.dup2(opened, number)
+        os.close(opened)
+    sys.stdin = open(0, encoding="utf-8", closefd=False)  # noqa: SIM115
+    sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+    sys.stderr = open(2, "w", encoding="utf-8", buffering=1, closefd=False)  # noqa: SIM115
+    sys.argv[:] = ["handover", *call]
+    from handover.scenarios.cli.entry import main
+
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    begins.send(None)
+    begins.close()
+    try:
+        main()
+    finally:
+        atexit._run_exitfuncs()  # type: ignore  # which a forked process leaves out
+        sys.stdout.flush()
