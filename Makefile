@@ -11,7 +11,7 @@ OLDEST := --only missing-import --only missing-module-attribute --only missing-a
 
 WHEELS := x86_64-linux aarch64-linux x86_64-windows x86_64-darwin aarch64-darwin
 
-.PHONY: demo test test-slow fuzz paper real-time platforms hosts lint bench pictures notebook icons wheels install clean
+.PHONY: demo test test-slow fuzz paper real-time platforms hosts lint bench wording pictures notebook icons wheels install clean
 
 demo: $(VENV)/.installed
 	$(BIN)/handover run helix_handover
@@ -49,6 +49,10 @@ lint: $(VENV)/.installed-test
 
 bench: $(VENV)/.installed-test
 	$(BIN)/python -m pytest tests/benchmarks -m "bench and not real_time" --benchmark-enable -s
+
+# The golden file of messages, of the tests that compare with it.
+wording: $(VENV)/.installed-test
+	HANDOVER_REWRITE_WORDING=1 $(BIN)/python -m pytest -q -m "not hosts" $$(grep -rl "wording: Wording" tests --include="test_*.py")
 
 # The README's pictures; needs chromium, too.
 pictures: $(VENV)/.installed-test

@@ -14,6 +14,8 @@ from typing import Any
 import pytest
 from hypothesis import settings
 from support.commands import cpu_of_commands
+from support.wording import wording as wording
+from support.wording import write_golden
 
 settings.register_profile("without deadline", deadline=None)
 settings.load_profile("without deadline")
@@ -42,6 +44,10 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     report = yield
     report.sections.append((_CPU, str(_cpu() - item.stash[_BEGAN])))
     return report
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    write_golden({item.nodeid.partition("::")[0] for item in session.items})
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
