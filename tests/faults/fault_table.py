@@ -4,10 +4,7 @@ The rows say what is right: exit status, what is told, rows recorded, and what t
 their end. `python fault_table.py [WORD ...]` prints what is, of the faults whose names contain a word.
 """
 
-import os
 import re
-import signal
-import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -18,13 +15,14 @@ import numpy as np
 from fault_rows import CALLS, FAULTS, LIMIT, WAYS, Fault
 from faulty_units import faulty_fmu
 from ssp_of import component, connection, connectors, described, pack_ssp, system
+from support.commands import Command
 
 from handover.cosim.record.reader import Record
 
 STOP = 1.0
 
-PATIENCE = 40.0
-"""Seconds for a whole run, after which it counts as one that does not end."""
+PATIENCE = 120.0
+"""Seconds for a whole run, after which it counts as one that does not end; much, as the machine may be busy."""
 
 
 @dataclass(frozen=True)
@@ -55,29 +53,16 @@ def run_fault(fault: Fault, fmi: int, way: str, folder: Path) -> Seen:
     out, notes = folder / "out", folder / "notes"
     notes.touch()
     options = ("--no-report", "--call-limit", str(LIMIT), *fault.options(way))
-    command = ["-c", "from handover.scenarios.cli.entry import main; main()"]
-    process = subprocess.Popen(
-        [sys.executable, *command, "run", ssp.name, "--stop", str(STOP), *options, "--out", out.name],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        stdin=subprocess.DEVNULL,
-        env={**os.environ, "FAULTS_NOTES": str(notes), "COLUMNS": "300"},
-        cwd=folder,
-    )
-    try:
-        printed, _ = process.communicate(timeout=PATIENCE)
-    except subprocess.TimeoutExpired:
-        running = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        for pid in (process.pid, *map(int, running)):  # the run that hangs has a process group of its own
-            os.kill(pid, signal.SIGKILL)
-        printed, _ = process.communicate()
+    environment = {"FAULTS_NOTES": str(notes), "COLUMNS": "300"}
+    arguments = ("run", ssp.name, "--stop", str(STOP), *options, "--out", out.name)
+    ended = Command(*arguments, cwd=folder, env=environment).wait(PATIENCE)
     record = out / "signals.parquet"
     rows, values = None, b""
     if record.is_file():
         read = Record(record)
         rows, values = len(read.time), read["a.y"].tobytes() + read["c.y"].tobytes()
     noted = tuple(notes.read_text().splitlines())
-    return Seen(process.returncode, printed.decode("utf-8", "replace"), rows, noted, values)
+    return Seen(ended.status, ended.output + ended.errors, rows, noted, values)
 
 
 @cache

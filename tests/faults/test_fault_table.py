@@ -12,14 +12,14 @@ pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="wh
 
 
 def rows() -> list[Any]:
-    """Return the rows with standard and way: of a fast one, one of the standards is in the fast tier, taking turns."""
+    """Return the rows with standard and way: of each way, the standards taking turns, one runs in CI; all as fuzz."""
     found: list[Any] = []
     for i, fault in enumerate(FAULTS):
-        first = fault.standards[i % len(fault.standards)]
-        for fmi in fault.standards:
-            for way in fault.ways:
-                marks = [] if way in fault.fast and fmi == first else [pytest.mark.slow]
-                found.append(pytest.param(fault, fmi, way, marks=marks, id=f"{fault.name}-{fmi}-{way}"))
+        for k, way in enumerate(fault.ways):
+            for fmi in fault.standards:
+                turn = fmi == fault.standards[(i + k) % len(fault.standards)]
+                tiers = () if turn and way in fault.fast else (pytest.mark.slow if turn else pytest.mark.fuzz,)
+                found.append(pytest.param(fault, fmi, way, marks=tiers, id=f"{fault.name}-{fmi}-{way}"))
     return found
 
 

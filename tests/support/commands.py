@@ -126,7 +126,9 @@ def _main(
     sys.stderr = open(2, "w", encoding="utf-8", buffering=1, closefd=False)  # noqa: SIM115
     sys.argv[:] = ["handover", *call]
     from handover.scenarios.cli.entry import main
+    from handover.scenarios.execution.supervisor import renew_heartbeat
 
+    renew_heartbeat()  # the one that was made as the module was loaded is shared with all other commands
     signal.signal(signal.SIGINT, signal.default_int_handler)
     begins.send(None)
     begins.close()
