@@ -46,6 +46,24 @@ def _array(kind: "pa.DataType", values: NDArray[Any]) -> "pa.Array[Any]":
     return pa.Array.from_buffers(kind, len(values), [None, buffer])
 
 
+def column_values(column: Any) -> NDArray[Any]:
+    """Return the values of an array or a table's column as `to_numpy` does, which would import pandas for them."""
+    kind = _WIDE.get(column.type)
+    if kind is None or column.null_count:
+        return column.to_numpy(zero_copy_only=False)
+    chunks: list[Any] = column.chunks if isinstance(column, pa.ChunkedArray) else [column]
+    parts = [_chunk_values(kind, chunk) for chunk in chunks if len(chunk)]
+    return parts[0] if len(parts) == 1 else np.concatenate([np.empty(0, kind), *parts])
+
+
+def _chunk_values(kind: Any, chunk: Any) -> NDArray[Any]:
+    begin, end, buffer = chunk.offset, chunk.offset + len(chunk), chunk.buffers()[1]
+    if kind is np.bool_:
+        bits = np.frombuffer(buffer, np.uint8)
+        return np.unpackbits(bits, count=end, bitorder="little")[begin:].astype(bool)
+    return np.frombuffer(buffer, kind, end)[begin:]
+
+
 def record_columns(columns: Sequence[Column]) -> tuple[RecordColumns, list[NDArray[Any]]]:
     """Return where these signals are in rows, and the whole arrays that the parts of a row are copied from.
 

@@ -14,7 +14,7 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from handover.cosim.record.columns import column_metadata
+from handover.cosim.record.columns import column_metadata, column_values
 
 WriteRecord = Callable[[Path, "pa.Schema", Iterable["pa.RecordBatch"]], None]
 """Writes a file with these columns, of which the first is `time`, and rows."""
@@ -118,8 +118,7 @@ def _doubles(batch: "pa.RecordBatch") -> NDArray[np.float64]:
     """Return a batch as [rows, columns]."""
     values = np.empty((batch.num_rows, batch.num_columns), dtype="<f8")
     for i in range(batch.num_columns):
-        column: NDArray[Any] = batch.column(i).to_numpy(zero_copy_only=False)
-        values[:, i] = column
+        values[:, i] = column_values(batch.column(i))
     return values
 
 

@@ -184,7 +184,9 @@ class Record:
         return self._table.schema.field(self._columns[signal][0]).metadata or {}
 
     def _values(self, name: str) -> NDArray[Any]:
-        return self._table.column(name).to_numpy()
+        from handover.cosim.record.columns import column_values  # slow to import, as what imports pyarrow
+
+        return column_values(self._table.column(name))
 
 
 def _indices(name: str) -> tuple[int, ...]:

@@ -10,6 +10,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from handover.cosim.exceptions import nearest, one_line
+from handover.cosim.record.columns import column_values
 from handover.cosim.record.reader import InvalidRecord, read_parquet
 from handover.cosim.typed_data import InvalidData, read_typed
 from handover.scenarios.campaign.plan import PlannedRun, safe_name
@@ -80,9 +81,9 @@ class CampaignTable:
         """
         column, kind = self.table.column(self._checked(name)), self._kind(name)
         if pa.types.is_floating(kind):
-            return np.asarray(column.to_numpy(), dtype=np.float64)
+            return np.asarray(column_values(column), dtype=np.float64)
         if pa.types.is_integer(kind) and column.null_count == 0:
-            return np.asarray(column.to_numpy(), dtype=np.int64)
+            return np.asarray(column_values(column), dtype=np.int64)
         values = np.empty(len(column), dtype=object)
         values[:] = column.to_pylist()
         return values

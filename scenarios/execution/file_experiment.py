@@ -168,7 +168,7 @@ def _metrics(signals: Path, prefix: str) -> dict[str, Metric]:
     import pyarrow as pa  # slow to import, as what imports it
     import pyarrow.parquet as pq
 
-    from handover.cosim.record.columns import column_metadata
+    from handover.cosim.record.columns import column_metadata, column_values
 
     if not signals.exists():
         return {}
@@ -183,7 +183,7 @@ def _metrics(signals: Path, prefix: str) -> dict[str, Metric]:
     for batch in file.iter_batches(columns=columns, use_threads=False):
         rows += batch.num_rows
         for column in columns if batch.num_rows else ():
-            values = np.asarray(batch.column(column).to_numpy(zero_copy_only=False), dtype=np.float64)
+            values = np.asarray(column_values(batch.column(column)), dtype=np.float64)
             finite = values[np.isfinite(values)]
             last[column] = float(values[-1])
             if len(finite):

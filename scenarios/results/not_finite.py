@@ -70,16 +70,18 @@ def _first_not_finite(signals: Path) -> Iterator[tuple[str, float, float]]:
     import pyarrow as pa  # slow to import
     import pyarrow.parquet as pq
 
+    from handover.cosim.record.columns import column_values
+
     file = pq.ParquetFile(signals)
     schema = file.schema_arrow
     real = [name for name, kind in zip(schema.names, schema.types, strict=True) if kind == pa.float64()]
     first: dict[str, tuple[float, float]] = {}
     for batch in file.iter_batches(columns=real, use_threads=False):
-        time = batch.column("time").to_numpy()
+        time = column_values(batch.column("time"))
         for name in real:
             if name == "time" or name in first:
                 continue
-            values = batch.column(name).to_numpy()
+            values = column_values(batch.column(name))
             finite = np.isfinite(values)
             if not finite.all():
                 row = int(np.argmin(finite))
