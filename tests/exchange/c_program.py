@@ -12,11 +12,12 @@ import numpy as np
 from drive import STEPS, inputs, parameters
 from process_cpu import cpu_seconds, family
 from reference import ARITHMETIC, Record, description, variables
+from support.c_programs import compiled
 
 from handover.cosim.blocks.variable import Kind, Variable
 from handover.fmus.binaries import FMI2_FOLDERS
 from handover.fmus.catalog import UNITS
-from handover.fmus.compile import RUNTIME, host_platform, library, zig_cc
+from handover.fmus.compile import host_platform, library
 from handover.fmus.layout import element_names
 
 TYPES = {"Real": "real", "Float64": "real", "Boolean": "boolean", "Int32": "integer32"}
@@ -26,24 +27,11 @@ LIMIT = 300.0
 """Seconds after which a run is ended."""
 
 
-def compiled(folder: Path) -> Path:
-    """Return the program, compiled in a folder."""
-    made = folder / "c_program"
-    source = Path(__file__).with_name("c_program.c")
-    flags = ["-O1", "-std=gnu11", "-Wall", "-Wextra", "-Werror", "-I", str(RUNTIME), "-ldl"]
-    done = zig_cc([str(source), "-o", str(made), *flags])
-    assert done.returncode == 0, done.stdout
-    return made
+PROGRAM = Path(__file__).with_name("c_program.c")
+FLAGS = ("-Wall", "-Wextra", "-Werror")
 
 
-def run(program: Path, unit: str, fmu: Path, folder: Path) -> Record:
-    """Let the program make a unit's run; return what it printed and wrote."""
-    return run_and_repeat(program, unit, fmu, folder, ())[0]
-
-
-def run_and_repeat(
-    program: Path, unit: str, fmu: Path, folder: Path, repeats: Sequence[int]
-) -> tuple[Record, list[float]]:
+def run_and_repeat(unit: str, fmu: Path, folder: Path, repeats: Sequence[int]) -> tuple[Record, list[float]]:
     """Let the program make a unit's run, and then its steps again, some number of times, as often as there are numbers.
 
     Returns:
@@ -61,7 +49,7 @@ def run_and_repeat(
     file = unit + library(host_platform(), fmi).suffix
     resources = folder / "unpacked" / "resources"
     command = [
-        program,
+        compiled(PROGRAM, flags=FLAGS),
         str(fmi),
         folder.joinpath("unpacked", "binaries", platform, file),
         item.guid,

@@ -21,8 +21,6 @@ from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.execution.runner import experiment_system
 from handover.scenarios.experiment.parameters import parse_parameters
 
-pytestmark = pytest.mark.slow
-
 HOST: Any = fmpy
 SEED = 3
 
@@ -131,11 +129,11 @@ def built(name: str, given: tuple[str, ...], of_units: Mapping[str, str]) -> tup
 @pytest.mark.parametrize(
     ("name", "given", "of_units", "most"),
     [
-        ("ir_grasp", (), {}, 90),
-        ("ir_grasp", ("correction=fast",), {}, 90),
-        ("ir_grasp", DISTURBED, OFF, 90),
-        ("ir_sensor", (), {}, 90),
-        ("helix_reflex_grasp", (), {}, 30),
+        pytest.param("ir_grasp", (), {}, 90, marks=pytest.mark.slow),
+        pytest.param("ir_grasp", ("correction=fast",), {}, 90, marks=pytest.mark.hosts),
+        pytest.param("ir_grasp", DISTURBED, OFF, 90, marks=pytest.mark.hosts),
+        pytest.param("ir_sensor", (), {}, 90, marks=pytest.mark.hosts),
+        pytest.param("helix_reflex_grasp", (), {}, 30, marks=pytest.mark.hosts),
     ],
 )
 def test_a_scenario_ends_in_fmpy_as_here(

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import drive
-from c_program import compiled, run_and_repeat
+from c_program import run_and_repeat
 from container import outputs_of, put_into_container
 from ecos_command import Ecos
 from fmpy_rows import FmpyInstance
@@ -184,7 +184,7 @@ def in_container(case: Case, folder: Path) -> HostRun:
 
 def in_c_program(case: Case, folder: Path) -> HostRun:
     """Run in a program in C."""
-    found, spent = run_and_repeat(compiled(folder), case.unit, case.fmu(3), folder, case.repeats)
+    found, spent = run_and_repeat(case.unit, case.fmu(3), folder, case.repeats)
     return HostRun(found, spent)
 
 

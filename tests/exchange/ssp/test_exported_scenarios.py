@@ -1,18 +1,16 @@
 """Every scenario succeeds where all units step in parallel: here, and exported in libcosim and in Ecos.
 
 The hosts take the step that the SSP says. Our own master runs the SSP likewise, with the scenario's evaluator beside
-it; in the hosts all signals must come to the same at the time of the verdict.
+it; in the hosts all signals must come to the same at the time of the verdict. `test_systems.py` has a smaller one in CI.
 """
 
 import functools
 import importlib.util
 import xml.etree.ElementTree as ET
 import zipfile
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -28,6 +26,8 @@ from handover.fmus import interpreter
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.cli.command import main
 
+pytestmark = pytest.mark.hosts
+
 in_ecos = pytest.mark.skipif(
     importlib.util.find_spec("ecospy") is None or not interpreter.library(),
     reason="ecospy has wheels for few platforms, and Ecos loads only a Python with a shared library",
@@ -37,12 +37,6 @@ SEED = 3
 WITH_PICTURES = ("helix_handover", "helix_reflex_grasp", "helix_use_case")
 """No form of their units that exchange pictures is one that libcosim or Ecos loads, see the last tests."""
 EXCHANGED = sorted(set(SCENARIOS) - set(WITH_PICTURES))
-FIRST = ("flyer_robot_to_human", "helix_handover", "ir_grasp", "vsl_hybrid")
-"""Of each robot one, which the slow tier tries; the others are tried by `make hosts`."""
-
-
-def tiered(names: Sequence[str]) -> list[Any]:
-    return [pytest.param(n, marks=pytest.mark.slow if n in FIRST else pytest.mark.hosts) for n in names]
 
 
 @dataclass(frozen=True)
@@ -90,7 +84,7 @@ def own_verdict(file: Path, name: str) -> Verdict:
     return Verdict(step, steps, values)
 
 
-@pytest.mark.parametrize("name", tiered(WITH_PICTURES))
+@pytest.mark.parametrize("name", WITH_PICTURES)
 def test_a_scenario_with_pictures_succeeds_under_jacobi(tmp_path: Path, name: str):
     out = str(tmp_path / "run")
     command = ["run", name, "--algorithm", "jacobi", "--seed", str(SEED), "--no-report", "--out", out]
@@ -109,7 +103,7 @@ def verdict_of(folder: Path, name: str) -> Verdict:
 
 
 @needs_libcosim
-@pytest.mark.parametrize("name", tiered(EXCHANGED))
+@pytest.mark.parametrize("name", EXCHANGED)
 def test_an_exported_scenario_ends_in_libcosim_as_here(folder: Path, tmp_path: Path, name: str):
     file, wanted = exported(folder, name), verdict_of(folder, name)
     assert base_step(file) == float(wanted.step)
@@ -125,7 +119,7 @@ def test_an_exported_scenario_ends_in_libcosim_as_here(folder: Path, tmp_path: P
 
 
 @in_ecos
-@pytest.mark.parametrize("name", tiered(EXCHANGED))
+@pytest.mark.parametrize("name", EXCHANGED)
 def test_an_exported_scenario_ends_in_ecos_as_here(folder: Path, tmp_path: Path, name: str):
     """To the six decimals that Ecos writes."""
     file, wanted = exported(folder, name), verdict_of(folder, name)
@@ -142,7 +136,6 @@ def test_an_exported_scenario_ends_in_ecos_as_here(folder: Path, tmp_path: Path,
     assert compared > 10
 
 
-@pytest.mark.slow
 @needs_libcosim
 def test_libcosim_knows_no_connectors_of_pictures(folder: Path, tmp_path: Path):
     job = Job({}, None, 1, ssp=exported(folder, WITH_PICTURES[0]))
@@ -150,7 +143,6 @@ def test_libcosim_knows_no_connectors_of_pictures(folder: Path, tmp_path: Path):
         job.run(tmp_path)
 
 
-@pytest.mark.slow
 @in_ecos
 def test_ecos_takes_no_ssp_of_the_version_that_fmi_3_needs(folder: Path, tmp_path: Path):
     file = exported(folder, WITH_PICTURES[0])
