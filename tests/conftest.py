@@ -4,8 +4,10 @@ Costs are CPU time of the tests' process and of the processes that it has waited
 the first that needs it.
 """
 
+import os
 import resource
 import signal
+import sys
 from collections import defaultdict
 from collections.abc import Generator
 from itertools import chain
@@ -16,6 +18,10 @@ from hypothesis import settings
 from support.commands import cpu_of_commands
 from support.wording import wording as wording
 from support.wording import write_golden
+
+# Else each process rewrites and compiles all tests and the package anew, which takes longer than most of them.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 settings.register_profile("without deadline", deadline=None)
 settings.load_profile("without deadline")
