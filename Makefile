@@ -5,13 +5,19 @@ BIN := $(VENV)/bin
 # Each process begins with a part of the files, and takes tests from the end of another's when it has none left.
 PARALLEL := --numprocesses auto --dist worksteal
 
+DEFAULT := "not slow and not bench and not fuzz and not hosts and not paper and not platforms and not real_time"
+
 TYPES := $(BIN)/pyrefly check --python-interpreter-path $(BIN)/python --output-format min-text
 # What the oldest Python lacks; NumPy's types are of a newer one, so that others are not checked by it.
 OLDEST := --only missing-import --only missing-module-attribute --only missing-attribute --only unknown-name
 
+OF_PACKAGE := pyproject.toml constraints.txt setup.py $(wildcard fmus/runtime/*.[ch] cosim/plan/*.[ch] cosim/isolation/*.[ch])
+# Python compiles the modules that it imports: a tenth of those that are installed.
+INSTALL := $(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt --editable
+
 WHEELS := x86_64-linux aarch64-linux x86_64-windows x86_64-darwin aarch64-darwin
 
-.PHONY: demo test test-slow fuzz paper real-time platforms hosts lint bench wording pictures notebook icons wheels install clean
+.PHONY: demo test test-changed test-slow fuzz paper real-time platforms hosts lint bench wording pictures notebook icons wheels install clean
 
 demo: $(VENV)/.installed
 	$(BIN)/handover run helix_handover
@@ -19,7 +25,11 @@ demo: $(VENV)/.installed
 install: $(VENV)/.installed
 
 test: lint $(VENV)/.installed-test
-	$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not bench and not fuzz and not hosts and not paper and not platforms and not real_time"
+	$(BIN)/python -m pytest $(PARALLEL) -m $(DEFAULT)
+
+# The default tests of what differs from a commit: make test-changed SINCE=main
+test-changed: $(VENV)/.installed-test
+	$(BIN)/python tests/support/changed.py $(SINCE) | xargs -r $(BIN)/python -m pytest -m $(DEFAULT)
 
 test-slow: $(VENV)/.installed-test
 	$(BIN)/python -m pytest $(PARALLEL) -m slow
@@ -74,16 +84,16 @@ wheels: $(VENV)/bin/python
 $(VENV)/bin/python:
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 10) and 'Python 3.10 or newer is needed; this is ' + sys.version)"
 	$(PYTHON) -m venv $(VENV)
-
-$(VENV)/.installed: pyproject.toml constraints.txt setup.py $(wildcard fmus/runtime/*.[ch] cosim/plan/*.[ch] cosim/isolation/*.[ch]) | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --editable ".[all]" --constraint constraints.txt
+
+$(VENV)/.installed: $(OF_PACKAGE) | $(VENV)/bin/python
+	$(INSTALL) ".[all]"
 	touch $@
 	@echo "installed; begin with: $(BIN)/handover list"
 
-$(VENV)/.installed-test: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --editable ".[test]" --constraint constraints.txt
-	touch $@
+$(VENV)/.installed-test: $(OF_PACKAGE) | $(VENV)/bin/python
+	$(INSTALL) ".[all,test]"
+	touch $(VENV)/.installed $@
 
 clean:
 	rm -rf $(VENV) build *.egg-info fmus/runtime/bin cosim/plan/bin cosim/isolation/bin
