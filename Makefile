@@ -92,7 +92,7 @@ $(VENV)/.installed: $(OF_PACKAGE) | $(VENV)/bin/python
 	@echo "installed; begin with: $(BIN)/handover list"
 
 $(VENV)/.installed-test: $(OF_PACKAGE) | $(VENV)/bin/python
-	$(INSTALL) ".[all,test]"
+	$(INSTALL) ".[test]"
 	touch $(VENV)/.installed $@
 
 clean:
