@@ -39,6 +39,7 @@ class Ecos:
         spec = importlib.util.find_spec("ecospy")
         assert spec is not None
         assert spec.origin is not None
+        libraries = Path(spec.origin).parents[4] / "lib"  # of the environment that it is installed in
         self.program = folder / "ecos"
         shutil.copy(Path(spec.origin).parent / "binaries" / "ecos", self.program)
         self.program.chmod(self.program.stat().st_mode | stat.S_IXUSR)
@@ -47,7 +48,7 @@ class Ecos:
             f"#!{sys.executable}\nimport sys, zipfile\nzipfile.ZipFile(sys.argv[2]).extractall(sys.argv[4])\n"
         )
         unzip.chmod(0o755)
-        self.environment = {"LD_LIBRARY_PATH": str(Path(sys.prefix) / "lib"), "PATH": str(folder)}
+        self.environment = {"LD_LIBRARY_PATH": str(libraries), "PATH": str(folder)}
 
     def simulate(self, folder: Path, path: Path, step: float, stop: float, *more: str) -> Table:
         """Simulate an FMU or an SSP; return the rows of the CSV file, each by the names in its header."""

@@ -30,6 +30,7 @@ def growth(fmu: Path, fmi: int, kind: str, count: int) -> int:
     return found["grown"]
 
 
+@pytest.mark.machine
 @pytest.mark.slow
 def test_instances_leave_nothing_behind(tmp_path: Path):
     fmu = build_block("sample_units.every_kind:EveryKind", 3, tmp_path)

@@ -11,7 +11,7 @@ from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.file.description import FmuDescription, FmuPort
 from handover.plants.helix.cameras.stereo_camera import Inputs, Outputs, Params, StereoCamera
 
-STEPS = 12
+STEPS = 8
 """Steps before a state is taken, and after."""
 
 HELD = 3

@@ -7,7 +7,7 @@ import zipfile
 import fmpy
 import numpy as np
 import pytest
-from fmpy.validation import validate_fmu
+from validity import problems_of
 
 from handover.cosim.fmu.file.archive import TERMINALS
 from handover.cosim.fmu.file.description import describe_fmu
@@ -33,7 +33,7 @@ def test_every_unit_is_valid_or_says_why_it_has_no_such_form(name: str, fmi: int
         assert fmi == 2
         assert name in PICTURES
         return
-    assert validate_fmu(str(file)) == []
+    assert problems_of(file) == []
     d = describe_fmu(file)
     steps = 0 if d.experiment.stop is None or d.step is None else d.experiment.stop / d.step
     assert steps == pytest.approx(round(steps), abs=1e-9)  # a host that takes both as they are ends with a whole step
@@ -64,19 +64,6 @@ def test_a_unit_lists_the_package_that_it_stands_on(name: str, package: str):
     names = {p["distribution"] for p in listed}
     assert package in names
     assert "fmpy" not in names
-
-
-@pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("name", UNITS)
-def test_every_unit_runs_in_fmpys_own_simulation(name: str, fmi: int):
-    if fmi == 2 and name in PICTURES:
-        pytest.skip("has no FMI 2 form")
-    step = float(UNITS[name].step)
-    description = fmpy.read_model_description(str(cached(name, fmi)))
-    outputs = [v.name for v in description.modelVariables if v.causality == "output" and v.type != "Binary"]
-    result = fmpy.simulate_fmu(str(cached(name, fmi)), stop_time=5 * step, output_interval=step, output=outputs)
-    assert len(result) == 6
-    assert all(np.all(np.isfinite(result[n].astype(float))) for n in outputs)
 
 
 def test_a_simulation_by_default_ends_with_a_whole_step():

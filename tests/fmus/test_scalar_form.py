@@ -11,7 +11,7 @@ import fmpy
 import numpy as np
 import pytest
 from ctypes_host import ERROR, OK, SIZE, CtypesHost
-from fmpy.validation import validate_fmu
+from validity import problems_of
 
 from handover.cosim.blocks.variable import indices_of
 from handover.cosim.fmu.file.description import describe_fmu
@@ -107,10 +107,10 @@ def test_the_cache_keeps_both_forms_apart():
     assert scalar.stat().st_ino == cached("Push", 3, scalar=True).stat().st_ino
 
 
-@pytest.mark.parametrize("name", ["TendonArm", "StereoCamera", "HandoverVision", "FreeFlyer", "TrajectoryPlanner"])
+@pytest.mark.parametrize("name", ["FreeFlyer", pytest.param("StereoCamera", marks=pytest.mark.slow)])
 def test_catalogued_units_are_valid_and_give_the_same_bits_in_both_forms(name: str):
     array, scalar = cached(name, 3), cached(name, 3, scalar=True)
-    assert validate_fmu(str(scalar)) == []
+    assert problems_of(scalar) == []
     description = describe_fmu(array)
     outputs = [p for p in description.outputs.values() if p.kind.value == "real"]
     step = description.step or 0.0
@@ -145,7 +145,7 @@ def test_our_own_master_runs_both_forms_alike():
     ]
     seen = [poses(form) for form in forms]
     assert seen[0] == seen[1] == seen[2]
-    assert len(set(seen[0])) == 51
+    assert len(set(seen[0])) == 16
 
 
 def poses(fmu: Callable[[str], Path]) -> list[bytes]:
@@ -157,7 +157,7 @@ def poses(fmu: Callable[[str], Path]) -> list[bytes]:
         told.append(np.concatenate([y["robot.p_WB"], y["robot.q_WB"]]).tobytes())
 
     with Master(system) as master:
-        master.run(Fraction(2, 125) * 50, [observe])
+        master.run(Fraction(2, 125) * 15, [observe])
     return told
 
 

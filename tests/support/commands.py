@@ -58,9 +58,9 @@ class Command:
         self.output_file, self.errors_file = (Path(self._folder.name) / name for name in ("output", "errors"))
         call = [str(argument) for argument in arguments]
         place, environment = str(cwd or Path.cwd()), {**os.environ, **(env or {})}
-        begun, begins = _context().Pipe(duplex=False)
+        begun, begins = forking().Pipe(duplex=False)
         given = (call, place, environment, str(self.output_file), str(self.errors_file), begins)
-        self._process = _context().Process(target=_main, args=given)
+        self._process = forking().Process(target=_main, args=given)
         self._process.start()
         begun.recv()  # before that, signals are ignored
 
@@ -104,7 +104,8 @@ def cpu_of_commands() -> float:
 
 
 @cache
-def _context() -> ForkServerContext:
+def forking() -> ForkServerContext:
+    """Return what forks processes from the warm one."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(list(_LOADED))
     return context

@@ -55,6 +55,7 @@ def test_the_content_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monke
     assert written == [path.stat().st_size]
 
 
+@pytest.mark.machine
 def test_an_interrupt_leaves_nothing_and_says_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     said: list[Any] = []
     monkeypatch.setattr(sys, "unraisablehook", said.append)

@@ -1,7 +1,7 @@
 """Every scenario succeeds where all units step in parallel: here, and exported in libcosim and in Ecos.
 
 The hosts take the step that the SSP says. Our own master runs the SSP likewise, with the scenario's evaluator beside
-it; in the hosts all signals must come to the same at the time of the verdict. `test_systems.py` has a smaller one in CI.
+it; in the hosts all signals must come to the same at the time of the verdict. CI has a smaller one in test_systems.py.
 """
 
 import functools

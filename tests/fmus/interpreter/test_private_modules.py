@@ -84,6 +84,7 @@ def test_a_second_instance_finds_its_modules_though_the_first_ones_folder_is_gon
     assert "return [][0]" in hosts[0].log[-1]
 
 
+@pytest.mark.machine
 def test_missing_packages_are_named_with_version_interpreter_and_cure(workshop: Workshop):
     host = workshop.host("scalars:Scalars", 3)
     host.free()

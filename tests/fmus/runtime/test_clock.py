@@ -9,9 +9,9 @@ import fmpy
 import numpy as np
 import pytest
 from ctypes_host import BOOL, DOUBLE, ERROR, OK, SIZE, CtypesHost
-from fmpy.validation import validate_fmu
 from saved_states import deserialise, save, serialised
 from state_runs import varied
+from validity import problems_of
 from workshop import Workshop
 
 from handover.cosim.blocks.description import describe
@@ -44,7 +44,7 @@ def clock(host: CtypesHost) -> "ctypes.Array[ctypes.c_uint32]":
 
 def test_the_model_description_names_the_clock(workshop: Workshop):
     file = workshop.fmu(SAMPLED, 3)
-    assert validate_fmu(str(file)) == []
+    assert problems_of(file) == []
     host = workshop.host(SAMPLED, 3)
     root = ET.parse(host.folder / "modelDescription.xml").getroot()
     (found,) = root.iter("Clock")
@@ -69,7 +69,7 @@ def test_the_model_description_names_the_clock(workshop: Workshop):
 
 def test_the_scalar_form_has_no_clock_and_ticks_by_itself(workshop: Workshop):
     file = workshop.scalar_fmu(SAMPLED)
-    assert validate_fmu(str(file)) == []
+    assert problems_of(file) == []
     host = CtypesHost(file, 3)
     workshop.open.append(host)
     assert not host.instantiate(event_mode=True)

@@ -90,15 +90,18 @@ def test_an_empty_library_is_a_library_of_its_name(machine: str, arch: lief.ELF.
     assert not stack.has(lief.ELF.Segment.FLAGS.X)
 
 
+@pytest.mark.machine
 def test_it_counts_as_loaded_by_its_name():
     done = call(sys.executable, "-c", LOAD_ONE)
     assert done.stdout.split() == ["False", "True"]
 
 
+@pytest.mark.machine
 def test_exudyn_alone_wants_a_screen(without_screen: "list[str]"):
     assert "libGL.so.1" in call(*without_screen, sys.executable, "-c", IMPORT_EXUDYN).stdout
 
 
+@pytest.mark.machine
 def test_without_a_screen_exudyn_is_loaded_and_its_windows_are_not(without_screen: "list[str]"):
     assert call(*without_screen, sys.executable, "-c", COMPARE).stdout.split() == ["True", "False"]
 
@@ -123,6 +126,7 @@ def test_without_a_screen_an_arm_runs_to_the_same_bytes(
     assert seen == blind
 
 
+@pytest.mark.machine
 @pytest.mark.parametrize("own_process", ["0", "1"])
 def test_without_a_screen_an_arm_runs_in_a_host_that_is_not_python(
     without_screen: "list[str]", own_process: str, tmp_path: Path
