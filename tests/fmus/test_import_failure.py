@@ -1,6 +1,8 @@
 """A package of a unit that cannot be imported is told in one line with its cure, by the builder and in an FMU."""
 
+import functools
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -24,6 +26,15 @@ FAILURES = {
     ),
     "missing_name": ("from math import no_such_name", "cannot import name 'no_such_name'"),
 }
+
+
+_installed = functools.cache(metadata.packages_distributions)
+"""Which takes seconds."""
+
+
+@pytest.fixture(autouse=True)
+def of_all_installed_asked_once(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(metadata, "packages_distributions", _installed)
 
 
 @pytest.fixture(params=FAILURES)

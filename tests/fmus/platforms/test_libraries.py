@@ -12,8 +12,14 @@ import handover.fmus.compile
 from handover.fmus.binaries import binaries
 from handover.fmus.compile import RUNTIME, TARGETS, compile_runtime, host_platform, library
 
-OTHERS = [target for target in TARGETS if target != host_platform()]
-EVERY = [host_platform(), *(pytest.param(target, marks=pytest.mark.slow) for target in OTHERS)]
+ANOTHER = "x86_64-windows"
+"""That of the other platforms which is compiled for in the slow tier."""
+OTHERS = [target for target in TARGETS if target not in (host_platform(), ANOTHER)]
+EVERY = [
+    host_platform(),
+    pytest.param(ANOTHER, marks=pytest.mark.slow),
+    *(pytest.param(target, marks=pytest.mark.platforms) for target in OTHERS),
+]
 
 SYSTEM_LIBRARIES = {
     "linux": r"lib(c|dl|m|pthread)\.so\.\d",
@@ -38,7 +44,13 @@ def test_exports_the_standard_alone_and_needs_the_system_alone(target: str):
         expect_fit(facts(library(target, fmi).read_bytes()), target, fmi)
 
 
-@pytest.mark.parametrize("target", EVERY)
+@pytest.mark.parametrize(
+    "target",
+    [
+        pytest.param(host_platform(), marks=pytest.mark.slow),
+        *(pytest.param(t, marks=pytest.mark.platforms) for t in TARGETS if t != host_platform()),
+    ],
+)
 def test_the_same_sources_give_the_same_bytes_anywhere_and_tell_of_no_folder(
     target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -59,7 +71,7 @@ def test_the_same_sources_give_the_same_bytes_anywhere_and_tell_of_no_folder(
     assert [content for content in first if re.search(rb"compiling-|[\w/]{3,}\.[ch]\0|\.pdb\0", content)] == []
 
 
-@pytest.mark.slow
+@pytest.mark.platforms
 def test_macs_of_both_kinds_find_a_library_that_is_signed_where_it_must_be():
     made = binaries("Unit", 2, ["x86_64-darwin", "aarch64-darwin"])
     assert sorted(made) == ["binaries/aarch64-darwin/Unit.dylib", "binaries/darwin64/Unit.dylib"]
@@ -69,20 +81,3 @@ def test_macs_of_both_kinds_find_a_library_that_is_signed_where_it_must_be():
     expect_fit(facts(arm), "aarch64-darwin", 2)
     assert is_signed(arm)
     assert not is_signed(arm.replace(b"no usable Python", b"no edible Python"))
-
-
-@pytest.mark.slow
-def test_the_folder_that_fmi_2_has_for_linux_holds_x86_64s_library_if_there_is_one():
-    both = binaries("Unit", 2, ["x86_64-linux", "aarch64-linux"])
-    alone = binaries("Unit", 2, ["aarch64-linux"])
-    arm = "binaries/aarch64-linux/Unit.so"
-    assert both.keys() == alone.keys() == {arm, "binaries/linux64/Unit.so"}
-    assert facts(both["binaries/linux64/Unit.so"]).platform == "x86_64-linux"
-    assert alone["binaries/linux64/Unit.so"] == alone[arm] == both[arm]
-    assert facts(alone[arm]).platform == "aarch64-linux"
-
-
-@pytest.mark.slow
-def test_fmi_3_has_a_folder_for_each_platform():
-    made = binaries("Unit", 3, ["all"])
-    assert {path.split("/")[1]: facts(content).platform for path, content in made.items()} == {t: t for t in TARGETS}

@@ -51,12 +51,14 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def compiled(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
-    """Let a compiler that only writes down its arguments take zig's place; return what it was given."""
+    """Let a compiler that writes only for which target take zig's place; return what it was given."""
     calls: list[list[str]] = []
 
     def compile_nothing(arguments: list[str]) -> "subprocess.CompletedProcess[str]":
         calls.append(arguments)
-        Path(arguments[arguments.index("-o") + 1]).write_bytes(b"library")
+        Path(arguments[arguments.index("-o") + 1]).write_text(
+            f"library for {arguments[arguments.index('-target') + 1]}"
+        )
         return subprocess.CompletedProcess(arguments, 0, "")
 
     monkeypatch.setattr(handover.fmus.compile, "zig_cc", compile_nothing)
@@ -124,7 +126,7 @@ def test_a_damaged_library_is_compiled_again_once_with_a_note(
     assert not is_current("aarch64-linux")
     compile_runtime(["aarch64-linux"])
     assert is_current("aarch64-linux")
-    assert damaged.read_bytes() == b"library"
+    assert damaged.read_bytes() == b"library for aarch64-linux-gnu.2.17"
     compile_runtime(["aarch64-linux"])
     assert len(compiled) == 4
     (line,) = [r.getMessage() for r in caplog.records]
@@ -140,7 +142,7 @@ def test_a_place_that_cannot_be_written_is_left_for_the_cache(
     compile_runtime(["x86_64-windows"])
     assert is_current("x86_64-windows")
     assert library("x86_64-windows", 3).is_relative_to(cache_folder() / "runtime")
-    assert binaries("Unit", 2, ["x86_64-windows"]) == {"binaries/win64/Unit.dll": b"library"}
+    assert binaries("Unit", 2, ["x86_64-windows"]).keys() == {"binaries/win64/Unit.dll"}
     first = library("x86_64-windows", 3)
     (sources / "text.h").write_text("/* other */")
     compile_runtime(["x86_64-windows"])
@@ -155,6 +157,22 @@ def test_no_place_at_all_is_reported(sources: Path, tmp_path: Path, monkeypatch:
         compile_runtime(["x86_64-windows"])
 
 
+@pytest.mark.usefixtures("sources", "compiled")
+def test_fmi_2s_folder_for_linux_holds_x86_64s_library_if_there_is_one():
+    both = binaries("Unit", 2, ["x86_64-linux", "aarch64-linux"])
+    alone = binaries("Unit", 2, ["aarch64-linux"])
+    arm, linux = "binaries/aarch64-linux/Unit.so", "binaries/linux64/Unit.so"
+    assert both.keys() == alone.keys() == {arm, linux}
+    assert both[linux] != both[arm] == alone[arm] == alone[linux] == b"library for aarch64-linux-gnu.2.17"
+
+
+@pytest.mark.usefixtures("sources", "compiled")
+def test_fmi_3_has_a_folder_for_each_platform():
+    made = {path.split("/")[1]: content.decode() for path, content in binaries("Unit", 3, ["all"]).items()}
+    assert made == {target: f"library for {TARGETS[target][0]}" for target in TARGETS}
+
+
+@pytest.mark.slow
 def test_a_compiler_that_fails_leaves_nothing(sources: Path):
     (sources / "text.c").write_text("no C")
     with pytest.raises(CompilationError, match=r"text\.c:1"):

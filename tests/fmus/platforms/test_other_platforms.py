@@ -26,8 +26,6 @@ int main(int argc, char **argv) {
 """
 """Answers as fmus/interpreter.py does, and with a library that is named like the script it was given."""
 
-pytestmark = pytest.mark.slow
-
 
 def run(command: Sequence[str | Path], environment: Mapping[str, str], folder: Path) -> str:
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "FMU_"))}
@@ -47,7 +45,7 @@ def wine(tmp_path: Path) -> Iterator[dict[str, str]]:
 
 
 @pytest.mark.skipif(not (shutil.which("wine") and shutil.which("wineserver")), reason="wine is not installed")
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.platforms)])
 def test_windows(fmi: int, tmp_path: Path, wine: dict[str, str]):
     unit = unpack(ENTRY, fmi, "x86_64-windows", tmp_path)
     host = compiled_host(fmi, "x86_64-windows", tmp_path)
@@ -60,6 +58,7 @@ def test_windows(fmi: int, tmp_path: Path, wine: dict[str, str]):
     assert "python on the PATH: cannot be read" in output
 
 
+@pytest.mark.platforms
 @pytest.mark.skipif(not (shutil.which("wine") and shutil.which("wineserver")), reason="wine is not installed")
 def test_windows_asks_the_interpreter_on_the_path(tmp_path: Path, wine: dict[str, str]):
     unit = unpack(ENTRY, 2, "x86_64-windows", tmp_path)
@@ -91,6 +90,7 @@ def on_aarch64(fmi: int, folder: Path, environment: Mapping[str, str]) -> str:
 
 
 @aarch64
+@pytest.mark.platforms
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_linux_on_aarch64(fmi: int, tmp_path: Path):
     output = on_aarch64(fmi, tmp_path, {"FMU_PYTHON_PROCESS": "0"})
@@ -100,7 +100,7 @@ def test_linux_on_aarch64(fmi: int, tmp_path: Path):
 
 
 @aarch64
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.platforms), pytest.param(3, marks=pytest.mark.slow)])
 def test_linux_on_aarch64_starts_a_process_for_python(fmi: int, tmp_path: Path):
     output = on_aarch64(fmi, tmp_path, {})
     assert output.count("instance: made") == 2

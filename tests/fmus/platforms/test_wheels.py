@@ -3,6 +3,7 @@
 import re
 import zipfile
 from email import message_from_bytes
+from email.message import Message
 from pathlib import Path
 
 import pytest
@@ -10,8 +11,6 @@ from libraries import facts
 from wheels import ROOT, build_wheel, copy_sources
 
 from handover.cosim.native_libraries import TARGETS
-
-pytestmark = pytest.mark.slow
 
 TAGS = {
     "x86_64-linux": "manylinux_2_17_x86_64",
@@ -41,9 +40,13 @@ def test_every_platform_is_tried():
     assert set(TAGS) == set(TARGETS) == set(made[1].split())
 
 
-@pytest.mark.parametrize("platform", TAGS)
-def test_a_wheel_has_the_libraries_of_its_platform_and_no_others(checkout: Path, platform: str):
-    made = build_wheel(checkout, platform)
+@pytest.mark.parametrize(
+    "platform", [pytest.param(t, marks=pytest.mark.platforms if i else pytest.mark.slow) for i, t in enumerate(TAGS)]
+)
+def test_a_wheel_has_the_libraries_of_its_platform_alone_and_shows_pictures_by_their_address(
+    checkout: Path, platform: str
+):
+    made = build_wheel(checkout, platform, HANDOVER_SITE=SITE)
     assert made.name.endswith(f"-py3-none-{TAGS[platform]}.whl")
     system, suffix = platform.partition("-")[2], TARGETS[platform][1]
     expected = [f"handover/{name.format(platform)}{suffix}" for name in LIBRARIES]
@@ -55,23 +58,27 @@ def test_a_wheel_has_the_libraries_of_its_platform_and_no_others(checkout: Path,
             found = facts(archive.read(name))
             assert found.platform == platform
             assert found.oldest <= OLDEST[system]
-
-
-def test_an_index_shows_pictures_by_their_address_or_leaves_them_out(checkout: Path):
-    host = next(iter(TAGS))
-    pages: list[str] = []
-    for site in ("", SITE):
-        made = build_wheel(checkout, host, HANDOVER_SITE=site)
-        with zipfile.ZipFile(made) as archive:
-            (name,) = [n for n in archive.namelist() if n.endswith(".dist-info/METADATA")]
-            metadata = message_from_bytes(archive.read(name))
-        assert metadata["Author"] == "The handover-cosim authors"
-        assert bool(metadata["Project-URL"]) == bool(site)
-        pages.append(str(metadata.get_payload()))
-    alone, linked = pages
-    assert "](docs/" not in alone + linked
-    assert "![" not in alone
-    assert f"]({SITE}/docs/helix_handover.jpg)" in linked
-    pictures = re.findall(rf"\({SITE}/([^)]*)\)", linked)
+        metadata, text = metadata_in(archive)
+    assert metadata["Project-URL"]
+    assert "](docs/" not in text
+    assert f"]({SITE}/docs/helix_handover.jpg)" in text
+    pictures = re.findall(rf"\({SITE}/([^)]*)\)", text)
     assert len(pictures) > 5
     assert [file for file in pictures if not (ROOT / file).exists()] == []
+
+
+@pytest.mark.platforms
+def test_an_index_shows_no_pictures_where_it_is_given_no_address(checkout: Path):
+    with zipfile.ZipFile(build_wheel(checkout, next(iter(TAGS)), HANDOVER_SITE="")) as archive:
+        metadata, text = metadata_in(archive)
+    assert not metadata["Project-URL"]
+    assert "](docs/" not in text
+    assert "![" not in text
+
+
+def metadata_in(archive: zipfile.ZipFile) -> tuple[Message, str]:
+    """Return a wheel's metadata and the page that an index shows of it."""
+    (name,) = [n for n in archive.namelist() if n.endswith(".dist-info/METADATA")]
+    metadata = message_from_bytes(archive.read(name))
+    assert metadata["Author"] == "The handover-cosim authors"
+    return metadata, str(metadata.get_payload())

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
@@ -14,8 +15,14 @@ def copy_sources(folder: Path) -> Path:
     """Copy the sources with what builds them, `build-tools`, to a folder, and return that."""
     ignored = shutil.ignore_patterns(".*", "bin", "build", "dist", "tests", "runs", "*.egg-info", "__pycache__")
     shutil.copytree(ROOT, folder, symlinks=True, ignore=ignored)
-    tools = ["setuptools>=77", *re.findall(r'"(ziglang==[\d.]+)"\]', (ROOT / "pyproject.toml").read_text())]
-    command = [sys.executable, "-m", "pip", "install", "--quiet", "--target", str(folder / "build-tools"), *tools]
+    tools = folder / "build-tools"
+    (zig,) = re.findall(r'"ziglang==([\d.]+)"\]', (ROOT / "pyproject.toml").read_text())
+    wanted = ["setuptools>=77", f"ziglang=={zig}"]
+    if metadata.version("ziglang") == zig:  # as it is large
+        tools.mkdir()
+        (tools / "ziglang").symlink_to(Path(str(metadata.distribution("ziglang").locate_file("ziglang"))))
+        del wanted[1]
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--target", str(tools), *wanted]
     subprocess.run(command, check=True)
     return folder
 

@@ -11,8 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from support.c_programs import compiled
+
 from handover.fmus.binaries import FMI2_FOLDERS
-from handover.fmus.compile import RUNTIME, host_platform, zig_cc
+from handover.fmus.compile import host_platform
 
 HOST = Path(__file__).with_name("bare_host.c")
 LIBRARIES = ("libc", "libm", "libdl", "libpthread", "librt", "libutil")
@@ -63,8 +65,7 @@ class BareFolder:
             place.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(library.resolve(), place)
         (path / "tmp").mkdir()
-        built = zig_cc(["-I", str(RUNTIME), str(HOST), "-o", str(path / "host"), "-ldl", "-lm"])
-        assert built.returncode == 0, built.stdout
+        shutil.copy(compiled(HOST), path / "host")
 
     def unpack(self, fmu: Path) -> Path:
         """Return the folder of an unpacked FMU."""

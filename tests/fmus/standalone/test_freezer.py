@@ -1,6 +1,7 @@
 """What goes into a frozen folder and into the FMU, without freezing anything."""
 
 import errno
+import functools
 import os
 import shutil
 import subprocess
@@ -48,6 +49,15 @@ def explain(error):
 """
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links and scripts")
+
+
+_installed = functools.cache(freezer.distributions_by_module)
+"""Which takes seconds."""
+
+
+@pytest.fixture(autouse=True)
+def of_all_installed_asked_once(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(freezer, "distributions_by_module", _installed)
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from handover.fmus.build import build
-from handover.fmus.catalog import UNITS, own_unit
+from handover.fmus.catalog import own_unit
 from handover.fmus.compile import TARGETS, host_platform
 from handover.fmus.sources import FileElsewhere
 from handover.fmus.standalone import freezer
@@ -167,10 +167,11 @@ def test_files_that_the_fmu_lacks_or_that_only_this_machine_has(folder: Path, tm
 
 
 @pytest.mark.slow
-def test_a_package_that_is_not_frozen_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_package_that_is_not_frozen_is_named(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
+    block = own_unit(reader(folder, "reads_nothing", "Path(__file__)"), None)
     unwanted = freezer._unwanted  # type: ignore
-    monkeypatch.setattr(freezer, "_unwanted", lambda names: [*unwanted(names), "msgpack"])  # type: ignore
-    with pytest.raises(CannotFreeze, match="FreeFlyer: package msgpack cannot be frozen: PyInstaller"):
-        build(UNITS["FreeFlyer"], 3, tmp_path, standalone=True)
-    assert not list(tmp_path.glob("*.fmu"))
+    monkeypatch.setattr(freezer, "_unwanted", lambda names: [*unwanted(names), "typing_extensions"])  # type: ignore
+    with pytest.raises(CannotFreeze, match="Reader: package typing_extensions cannot be frozen: PyInstaller"):
+        build(block, 3, tmp_path / "out", standalone=True)
+    assert not list(tmp_path.glob("out/*.fmu"))

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 from ctypes_host import CtypesHost
+from support.c_programs import compiled
 
 from handover.fmus.build import build_block
-from handover.fmus.compile import RUNTIME, host_platform, zig_cc
+from handover.fmus.compile import RUNTIME, host_platform
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="each instance has a process of its own there")
 
@@ -86,9 +87,6 @@ def test_an_instance_is_made_while_another_process_takes_its_time_to_end(host_of
     second.free()
 
 
-def test_a_fork_of_a_host_of_which_a_thread_has_the_lock_makes_instances(tmp_path: Path):
-    sources = [str(RUNTIME / name) for name in ("process_posix.c", "text.c")]
-    program = Path(__file__).with_name("lock_in_fork.c")
-    built = zig_cc(["-I", str(RUNTIME), str(program), *sources, "-o", str(tmp_path / "lock_in_fork")])
-    assert built.returncode == 0, built.stdout
-    assert subprocess.run([str(tmp_path / "lock_in_fork")], check=False, timeout=60).returncode == 0
+def test_a_fork_of_a_host_of_which_a_thread_has_the_lock_makes_instances():
+    program = compiled(Path(__file__).with_name("lock_in_fork.c"), RUNTIME / "process_posix.c", RUNTIME / "text.c")
+    assert subprocess.run([program], check=False, timeout=60).returncode == 0

@@ -13,8 +13,8 @@ pytestmark = [
     pytest.mark.skipif(not can_be_entered(), reason="only the superuser may enter a folder as the root"),
 ]
 
-OF_EACH_SYSTEM = ("TendonArm", "StereoCamera", "VslArm", "FreeFlyer", "GraspScene")
-"""Their packages differ: Exudyn and SciPy, OpenCV and numba, numpy alone, pymunk."""
+IN_CI = "GraspScene"
+"""A unit with a package of compiled code, pymunk."""
 STEPS = 5
 ELSEWHERE = {"PYTHONHOME": "/nowhere", "PYTHONPATH": "/nowhere", "LD_LIBRARY_PATH": "/nowhere", "PATH": "/nowhere"}
 """What of the host's environment must not reach the interpreter in the FMU."""
@@ -32,11 +32,8 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> BareFolder:
 
 
 def units() -> list[object]:
-    """Return all units; those that stand for the systems in the slow tier, the others in a tier of their own."""
-    return [
-        pytest.param(name, marks=pytest.mark.slow if name in OF_EACH_SYSTEM else pytest.mark.platforms)
-        for name in UNITS
-    ]
+    """Return all units; one in the slow tier, the others in a tier of their own."""
+    return [pytest.param(n, marks=pytest.mark.slow if n == IN_CI else pytest.mark.platforms) for n in UNITS]
 
 
 @pytest.mark.parametrize("name", units())
@@ -52,12 +49,12 @@ def test_a_unit_steps_without_python_as_it_does_with_it(name: str, root: BareFol
     assert len(inside.outputs) == STEPS
     assert {line.count(" ") for line in inside.outputs} == {len(description.outputs)}
     assert inside.outputs == root.step(plain, float(entry.step), STEPS, inside=False).outputs
-    if name == "TendonArm":
+    if name in (IN_CI, "TendonArm"):
         alike = root.step(standalone, float(entry.step), STEPS, 3, inside=True)
         assert alike.outputs == [line for line in inside.outputs for _ in range(3)]
 
 
-@pytest.mark.slow
+@pytest.mark.platforms
 @pytest.mark.parametrize(("fmi", "scalar"), [(2, False), (3, True)])
 def test_so_do_its_other_forms(fmi: int, scalar: bool, root: BareFolder, tmp_path: Path):
     entry = UNITS["FreeFlyer"]

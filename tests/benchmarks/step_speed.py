@@ -1,6 +1,6 @@
 """Measures what a step costs, ours and other packages' in turns, in a process of its own, and prints it as JSON.
 
-`python tests/fmus/runtime/step_speed.py LOOPS ROUNDS NAME=FMU ...`; LOOPS is the library made of step_loop.c. A NAME
+`python tests/benchmarks/step_speed.py LOOPS ROUNDS NAME=FMU ...`; LOOPS is the library made of step_loop.c. A NAME
 begins with `FMI 2`, `FMI 3`, `pythonfmu` or `pythonfmu3`; with ` apart` at its end Python
 runs in a process of its own. It prints microseconds a step: of CPU of the calling thread, and of wall time; medians.
 Other packages' libraries share no process with the tests: what they leave in the heap is not the tests' concern.

@@ -1,6 +1,6 @@
 """What a step of an FMU costs beyond that of the plain object, beside two other packages; what a picture costs.
 
-`pytest tests/fmus/runtime/test_speed.py --benchmark-enable -s` prints a table: CPU time of a host in C that sets 12
+`pytest tests/benchmarks/test_step_speed.py --benchmark-enable -s` prints a table: CPU time of a host in C that sets 12
 real inputs, steps and gets 13 outputs (step_loop.c), and of Python code that does the same to the block itself. With
 Python in a process of its own (`apart`) the host mostly waits, so that the wall time is what counts there.
 """
@@ -10,7 +10,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +30,14 @@ TARGET = 3.0
 """Most microseconds of CPU that a step should cost over the plain object."""
 
 PICTURE_BYTES = 1280 * 720 * 3
+
+
+@pytest.fixture
+def workshop(tmp_path: Path) -> Iterator[Workshop]:
+    made = Workshop(tmp_path)
+    yield made
+    for host in made.open:
+        host.close()
 
 
 @pytest.fixture(scope="module")
@@ -96,8 +104,7 @@ def test_step(benchmark: BenchmarkFixture, loops: Path, workshop: Workshop, tmp_
     fmus = {**ours, "pythonfmu": peer_fmu(2, tmp_path), "pythonfmu3": peer_fmu(3, tmp_path)}
     fmus |= {f"{name} apart": fmu for name, fmu in ours.items()}
     found: dict[str, Measured] = {}
-    rounds = ROUNDS if benchmark.enabled else 1
-    benchmark.pedantic(lambda: found.update(measured_apart(loops, rounds, fmus)), rounds=1)
+    benchmark.pedantic(lambda: found.update(measured_apart(loops, ROUNDS, fmus)), rounds=1)
     cpu = {name: row[0] for name, row in found.items()}
     over = {n: cpu[n] - cpu["plain peer" if n.startswith("pythonfmu") else "plain block"] for n in fmus}
     print(f"\nus a step        CPU of host  over plain object (target {TARGET:g})    wall")
