@@ -10,7 +10,7 @@ from collections.abc import Generator
 from pathlib import Path
 from typing import cast
 
-from processes import until
+from support.processes import until
 
 
 @contextlib.contextmanager

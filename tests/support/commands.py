@@ -5,6 +5,7 @@ For tests of exit status, signals and what is printed. What a command prints and
 """
 
 import atexit
+import ctypes
 import multiprocessing
 import os
 import signal
@@ -51,15 +52,22 @@ class Command:
         arguments: of the command.
         cwd: its working directory; this process's by default.
         env: what its environment has besides this process's.
+        privileged: false takes from it the right to raise hard limits, which root has.
     """
 
-    def __init__(self, *arguments: object, cwd: "Path | None" = None, env: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        *arguments: object,
+        cwd: "Path | None" = None,
+        env: Mapping[str, str] | None = None,
+        privileged: bool = True,
+    ) -> None:
         self._folder = tempfile.TemporaryDirectory()
         self.output_file, self.errors_file = (Path(self._folder.name) / name for name in ("output", "errors"))
         call = [str(argument) for argument in arguments]
         place, environment = str(cwd or Path.cwd()), {**os.environ, **(env or {})}
         begun, begins = forking().Pipe(duplex=False)
-        given = (call, place, environment, str(self.output_file), str(self.errors_file), begins)
+        given = (call, place, environment, str(self.output_file), str(self.errors_file), privileged, begins)
         self._process = forking().Process(target=_main, args=given)
         self._process.start()
         begun.recv()  # before that, signals are ignored
@@ -112,11 +120,20 @@ def forking() -> ForkServerContext:
 
 
 def _main(
-    call: list[str], place: str, environment: Mapping[str, str], output: str, errors: str, begins: Connection
+    call: list[str],
+    place: str,
+    environment: Mapping[str, str],
+    output: str,
+    errors: str,
+    privileged: bool,
+    begins: Connection,
 ) -> None:
     """Become the command, as its entry point starts it."""
+    if not privileged:
+        _drop_privilege_of_limits()
     os.environ.clear()
     os.environ.update(environment)
+    tempfile.tempdir = None  # this process's environment says which it is
     os.chdir(place)
     for number, name in ((0, os.devnull), (1, output), (2, errors)):
         opened = os.open(name, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o600)
@@ -138,3 +155,12 @@ def _main(
     finally:
         atexit._run_exitfuncs()  # type: ignore  # which a forked process leaves out
         sys.stdout.flush()
+
+
+def _drop_privilege_of_limits() -> None:
+    """Take CAP_SYS_RESOURCE from this process (Linux)."""
+    libc, header, sets = ctypes.CDLL(None), (ctypes.c_uint32 * 2)(0x20080522, 0), (ctypes.c_uint32 * 6)()
+    assert libc.capget(header, sets) == 0
+    for kind in range(3):  # effective, permitted, inheritable
+        sets[kind] &= ~(1 << 24)
+    assert libc.capset(header, sets) == 0

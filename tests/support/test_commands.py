@@ -4,10 +4,9 @@ import json
 import signal
 from pathlib import Path
 
-from processes import until
-
 from support.commands import Command, run_command
 from support.kept_runs import copied_run, kept_run
+from support.processes import until
 
 
 def test_a_forked_command_has_its_own_folder_environment_streams_and_status(tmp_path: Path):

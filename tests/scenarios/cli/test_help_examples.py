@@ -7,7 +7,6 @@ command's checks, up to the function that would start it.
 import re
 import shlex
 import shutil
-import signal
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
 from enum import Enum, auto
@@ -18,9 +17,9 @@ import click
 import pytest
 from campaigns import campaign_metadata, folder_of, table_of
 from click.testing import CliRunner, Result
-from killed_run import end_between
 from native_units import native_fmu
 from sample_study import same, write_study
+from support.killed_run import killed_run
 
 from handover.fmus.build import cached
 from handover.scenarios.cli.command import DeferredCommand, main
@@ -97,7 +96,7 @@ def study(path: Path) -> None:
 
 
 def interrupted(path: Path) -> None:
-    end_between(1.0, 1.5, signal.SIGINT, "run", "flyer_impedance", "--out", path, "--checkpoint", "0.5")
+    killed_run(path, 1.0, "run", "flyer_impedance", "--checkpoint", "0.5")
 
 
 HANDOVER, RIGID, COMPLIANT = (

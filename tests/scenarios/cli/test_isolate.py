@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from failing_systems import failing_ssp, native_fmu
+from support.failing_systems import failing_ssp, native_fmu
 
 from handover.cosim.master.unit_options import isolated_units
 from handover.cosim.record.reader import Record

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 import pytest
-from processes import lives, until
+from support.processes import lives, until
 
 from handover.cosim.fmu.heartbeat import Heartbeat, StallTimer
 from handover.scenarios.execution import child_process

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
-from failing_systems import failing_ssp
+from support.failing_systems import failing_ssp
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.cli.command import main

@@ -1,16 +1,25 @@
+"""`handover resume`: a run that was killed ends as if it had not been; what cannot go on is refused as it is."""
+
 import hashlib
 import json
+import os
+import re
 import shutil
 import signal
 import zipfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
 import pytest
 from click.testing import CliRunner, Result
-from killed_run import end_between
 from planted import planted_pickle
+from support.commands import Command
+from support.kept_runs import kept_run
+from support.killed_run import killed_run
+from support.processes import until
+from support.wording import Wording
 
 from handover.cosim.blocks.state import pack_state, unpack_state
 from handover.cosim.record.reader import Record
@@ -55,52 +64,69 @@ def assert_same(joined: Path, whole: Path) -> None:
     assert data | {"checkpoint": None} == wanted
 
 
-def slow(*values: Any) -> Any:
-    return pytest.param(*values, marks=pytest.mark.slow)
+FORMATS = "ir_grasp -p strategy=forward -p forward=0.055 --format csv --format mat"
 
 
 @pytest.mark.parametrize(
-    ("scenario", "every", "passed", "number"),
+    ("scenario", "every", "passed"),
     [
-        slow("ir_grasp -p strategy=forward -p forward=0.055 --format csv --format mat", 0.7, 1.6, signal.SIGKILL),
-        slow("ir_grasp", 3, 7, signal.SIGKILL),
-        slow("ir_grasp", 3, 7, signal.SIGINT),
-        slow("flyer_robot_to_human", 4, 9, signal.SIGKILL),
-        slow("vsl_hybrid", 0.5, 1.2, signal.SIGKILL),
-        slow("helix_handover -p alpha=0.4 -p tuning=thesis", 2, 5, signal.SIGKILL),
+        (FORMATS, 0.7, 1.6),
+        pytest.param("flyer_robot_to_human", 4, 9, marks=pytest.mark.slow),
+        pytest.param("vsl_hybrid", 0.5, 1.2, marks=pytest.mark.slow),
+        pytest.param("helix_handover --stop 1.5", 0.4, 0.9, marks=pytest.mark.slow),
     ],
 )
-def test_a_run_that_was_ended_goes_on_to_what_it_would_have_been(
-    tmp_path: Path, scenario: str, every: float, passed: float, number: signal.Signals
+def test_a_run_that_was_killed_goes_on_to_what_it_would_have_been(
+    tmp_path: Path, scenario: str, every: float, passed: float
 ):
-    killed, whole = tmp_path / "killed", tmp_path / "whole"
-    waits = passed + every / 3
-    arguments = ("run", *scenario.split(), "--seed", "3", "--out")
-    ended = end_between(passed, waits, number, *arguments, killed, "--checkpoint", str(every))
-    assert ended in (-signal.SIGKILL, 1)
-    assert call(*arguments, whole).exit_code == 0
+    arguments = ("run", *scenario.split(), "--no-report")
+    whole = kept_run(*arguments)
+    killed = killed_run(tmp_path / "killed", passed, *arguments, "--checkpoint", every)
     (killed / "checkpoint.zip.part").write_text("of a process that crashed while it wrote one")
     RunFolder.of_run(killed).add_to_run(failure={"kind": "killed"})  # as the supervisor does for a crashed run
-    result = call("resume", killed)
-    assert result.exit_code == 0, result.output
+    result = call("resume", killed, "--no-report")
+    assert result.exit_code == (1 if "--stop" in arguments else 0), result.output
     assert_same(killed, whole)
-    assert Record(killed / "signals.parquet").time[-1] > waits
+    assert Record(killed / "signals.parquet").time[-1] > passed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_so_it_does_where_its_process_was_killed_or_interrupted(number: signal.Signals, tmp_path: Path):
+    ended = tmp_path / "ended"
+    arguments = ("run", "ir_grasp", "--no-report")
+    going = Command(*arguments, "--out", ended, "--checkpoint", "0.1", "--pace", "1")
+    until((ended / "checkpoint.zip").exists)
+    going.send_signal(number)
+    assert going.wait().status in (-signal.SIGKILL, 1)
+    whole = Record(kept_run(*arguments) / "signals.parquet")
+    results: list[Result] = []
+
+    def resumed() -> bool:
+        results.append(call("resume", ended, "--no-report"))
+        return "the run still goes on" not in results[-1].output  # as long as its process is not wholly gone
+
+    until(resumed)
+    assert results[-1].exit_code == 0, results[-1].output
+    joined = Record(ended / "signals.parquet")
+    assert joined.signals == whole.signals
+    assert all(joined[name].tobytes() == whole[name].tobytes() for name in ("time", *whole.signals))
 
 
 @pytest.mark.slow
 def test_a_run_of_an_ssp_goes_on(tmp_path: Path):
-    killed, whole, file = tmp_path / "killed", tmp_path / "whole", tmp_path / "grasp.ssp"
+    whole, file = tmp_path / "whole", tmp_path / "grasp.ssp"
     assert call("export", "ir_grasp", "--ssp", file).exit_code == 0
-    arguments = ("run", file, "--stop", "4", "--out")
-    end_between(2.1, 2.5, signal.SIGKILL, *arguments, killed, "--checkpoint", "1")
-    assert call(*arguments, whole).exit_code == 0
+    arguments = ("run", file, "--stop", "2", "--no-report")
+    killed = killed_run(tmp_path / "killed", 1.1, *arguments, "--checkpoint", "0.5")
+    assert call(*arguments, "--out", whole).exit_code == 0
     content = file.read_bytes()
     file.write_bytes(content + b" ")
     result = call("resume", killed)
     assert result.exit_code == 2
     assert "grasp.ssp is not the file that the run began with" in result.output
     file.write_bytes(content)
-    result = call("resume", killed)
+    result = call("resume", killed, "--no-report")
     assert result.exit_code == 0, result.output
     assert_same(killed, whole)
 
@@ -116,14 +142,12 @@ def test_what_judges_a_run_can_be_kept(name: str):
 
 @pytest.fixture(scope="module")
 def left(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Leave a run that was killed early."""
+    """Leave a run that was killed at 0.3 s of 0.5, with figures to be drawn."""
     folder = tmp_path_factory.mktemp("left") / "run"
     scene = folder.with_name("scene.fmu")
     shutil.copy(cached("GraspScene", 3), scene)
-    end_between(
-        0.3, 0.35, signal.SIGKILL, "run", "ir_grasp", "--unit", f"scene={scene}", "--out", folder, "--checkpoint", "0.1"
-    )
-    return folder
+    arguments = ("run", "ir_grasp", "--unit", f"scene={scene}", "--checkpoint", "0.1", "--stop", "0.5")
+    return killed_run(folder, 0.3, *arguments)
 
 
 @pytest.fixture
@@ -136,7 +160,8 @@ def test_page_and_figures_of_the_part_do_not_outlast_going_on_without_a_report(c
     (copy / "report.html").write_text("of the part")
     (copy / "figures" / "part.png").write_text("of the part")
     result = call("resume", copy, "--no-report")
-    assert result.exit_code == 0, result.output
+    assert result.exit_code == 1, result.output  # it ends before the grasp
+    assert Record(copy / "signals.parquet").time[-1] >= 0.5
     assert not (copy / "report.html").exists()
     assert not (copy / "figures").exists()
 
@@ -163,141 +188,14 @@ def errors_of(result: Result) -> list[str]:
     return [line for line in result.output.splitlines() if not line.startswith("this runs ")]
 
 
-def assert_refused(folder: Path, data: str) -> None:
+def refusal_of(folder: Path) -> str:
+    """Check that a run is refused in a line, and left as it is but for its record; return the line."""
     before = {p: p.read_bytes() for p in folder.rglob("*") if p.is_file() and "signals" not in p.name}
     result = call("resume", folder)
     assert result.exit_code == 2, result.output
-    assert data in result.output
-    assert len(errors_of(result)) == 1
+    (line,) = errors_of(result)
     assert {p: p.read_bytes() for p in before} == before
-
-
-def assert_record_is_whole(folder: Path) -> None:
-    """Check that no row is lost which the killed process had recorded."""
-    assert Record(folder / "signals.parquet").time[-1] >= 0.3
-
-
-def test_a_folder_of_no_run_is_refused(tmp_path: Path):
-    assert_refused(tmp_path, "it is not the folder of a run: it has no run.json")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_damaged_configuration_is_refused(copy: Path):
-    (copy / "run.json").write_text("{")
-    assert_refused(copy, "its run.json is damaged")
-    (copy / "run.json").write_text("[]")
-    assert_refused(copy, "its run.json is damaged: Expected `object`")
-    (copy / "run.json").write_text('{"versions": []}')
-    assert_refused(copy, "its run.json is damaged: ")
-    (copy / "run.json").write_text('{"scenario": "ir_grasp", "parameters": {}}')
-    assert_refused(copy, "the run began with other versions: python None (here ")
-
-
-def test_a_complete_run_is_refused(copy: Path):
-    (copy / "summary.json").write_text('{"complete": true, "success": true, "reason": "", "metrics": {}}')
-    assert_refused(copy, "the run is complete")
-
-
-def test_a_run_that_goes_on_is_refused(copy: Path):
-    with open(copy / "signals.tail", "rb") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        assert_refused(copy, "the run still goes on")
-    assert not (copy / "signals.parquet").exists()
-
-
-def test_a_run_that_another_process_is_about_to_go_on_with_is_refused(copy: Path):
-    with RunFolder.of_run(copy).held():
-        assert_refused(copy, "the run still goes on")
-    assert not (copy / "signals.parquet").exists()
-    (copy / "checkpoint.zip").unlink()
-    assert_refused(copy, "there is no checkpoint")  # who held it has let go of it
-
-
-def test_a_run_without_a_checkpoint_is_refused_and_its_record_is_whole(copy: Path):
-    (copy / "checkpoint.zip").unlink()
-    assert_refused(copy, "there is no checkpoint; a run writes them with --checkpoint SECONDS")
-    assert_record_is_whole(copy)
-
-
-def test_a_damaged_checkpoint_is_refused_and_the_record_is_whole(copy: Path):
-    content = (copy / "checkpoint.zip").read_bytes()
-    (copy / "checkpoint.zip").write_bytes(content[: len(content) // 2])
-    assert_refused(copy, "the checkpoint is damaged")
-    assert_record_is_whole(copy)
-
-
-@pytest.mark.parametrize("part", ["0.state", "0.contents", "0.cpu", "kept"])
-def test_a_part_of_a_checkpoint_that_has_changed_is_refused_before_a_unit_gets_it(copy: Path, part: str):
-    """The zip's own checksums are right: whoever writes it again writes those too."""
-    with_part(copy, part, b"of another run", keep_digest=True)
-    assert_refused(copy, f"the checkpoint is damaged: {part} in it is not what was written")
-    assert_record_is_whole(copy)
-
-
-def test_a_record_that_is_shorter_than_the_checkpoint_is_refused(copy: Path):
-    (copy / "signals.arrows").unlink()
-    assert_refused(copy, "rows, the record beside it has 0")
-
-
-def test_fmus_that_changed_are_refused_by_name(copy: Path, left: Path):
-    scene = left.with_name("scene.fmu")
-    content = scene.read_bytes()
-    try:
-        with zipfile.ZipFile(scene, "a") as archive:
-            archive.writestr("documentation/more.txt", "more")
-        assert_refused(copy, f"these FMUs are not those that the run began with: scene ({scene})")
-    finally:
-        scene.write_bytes(content)
-    assert_record_is_whole(copy)
-
-
-def test_a_scenario_whose_code_changed_is_refused_before_it_is_imported(copy: Path, tmp_path: Path):
-    marker = tmp_path / "marker"
-    (tmp_path / "changed_scene.py").write_text(f"open({str(marker)!r}, 'w')\n", encoding="utf-8")
-    data = json.loads((copy / "run.json").read_text())
-    data["source"] = {"scenario": "changed_scene:Scene", "folder": str(tmp_path), "sha256": "0"}
-    (copy / "run.json").write_text(json.dumps(data))
-    assert_refused(copy, f"its code, {tmp_path / 'changed_scene.py'}, is not what the run had")
-    assert not marker.exists()
-
-
-def test_a_built_unit_that_was_damaged_is_built_again_with_a_note(
-    copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-):
-    monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
-    unit = cached("IrReflex", 3)
-    data = json.loads((copy / "run.json").read_text())
-    data["files"]["reflex"] = str(unit)
-    (copy / "run.json").write_text(json.dumps(data))
-    sound = unit.read_bytes()
-    unit.write_bytes(sound[: len(sound) // 2])
-    result = call("resume", copy, "--no-report")
-    assert result.exit_code == 0, result.output
-    assert unit.read_bytes() == sound
-    assert sum(record.getMessage().startswith(f"{unit} is built again: ") for record in caplog.records) == 1
-
-
-def test_other_versions_are_refused_by_name(copy: Path):
-    data = json.loads((copy / "run.json").read_text())
-    data["versions"]["numpy"] = "1.0"
-    (copy / "run.json").write_text(json.dumps(data))
-    assert_refused(copy, "the run began with other versions: numpy 1.0 (here 2.")
-
-
-def test_units_that_do_not_save_their_states_are_refused_at_the_start(tmp_path: Path):
-    unable = tmp_path / "unable.fmu"
-    with zipfile.ZipFile(cached("GraspScene", 3)) as source, zipfile.ZipFile(unable, "w") as target:
-        for name in source.namelist():
-            content = source.read(name)
-            if name == "modelDescription.xml":
-                assert b'canSerializeFMUState="true"' in content
-                content = content.replace(b'canSerializeFMUState="true"', b"")
-            target.writestr(name, content)
-    out = tmp_path / "out"
-    result = call("run", "ir_grasp", "--unit", f"scene={unable}", "--out", out, "--checkpoint", "1")
-    assert result.exit_code == 2, result.output
-    assert "scene: unable.fmu lacks canSerializeFMUState" in result.output
-    assert not out.exists()
+    return re.sub(r"\(here [^)]*\)", "(here ...)", line.replace(f"(process {os.getpid()})", "(process PID)"))
 
 
 def with_part(
@@ -317,41 +215,156 @@ def with_part(
             archive.writestr(name, whole)
 
 
+Damage = Callable[[Path], object]
+
+
+def text(file: str, content: str) -> Damage:
+    return lambda copy: (copy / file).write_text(content)
+
+
+def part(name: str) -> Damage:
+    """Change a part of the checkpoint; the zip's own checksums are right: whoever writes it again writes those too."""
+    return lambda copy: with_part(copy, name, b"of another run", keep_digest=True)
+
+
+def kept(edit: Callable[[Any], Any]) -> Damage:
+    """Change what the checkpoint keeps of the scenario."""
+
+    def damage(copy: Path) -> None:
+        with zipfile.ZipFile(copy / "checkpoint.zip") as archive:
+            found = unpack_state(archive.read("kept"), resumption.RECORDS)
+        with_part(copy, "kept", pack_state(edit(found), resumption.RECORDS))
+
+    return damage
+
+
+def cut(copy: Path) -> None:
+    content = (copy / "checkpoint.zip").read_bytes()
+    (copy / "checkpoint.zip").write_bytes(content[: len(content) // 2])
+
+
+def of_numpy_1(copy: Path) -> None:
+    data = json.loads((copy / "run.json").read_text())
+    data["versions"]["numpy"] = "1.0"
+    (copy / "run.json").write_text(json.dumps(data))
+
+
+COMPLETE = '{"complete": true, "success": true, "reason": "", "metrics": {}}'
+DAMAGES: dict[str, tuple[Damage, bool]] = {
+    "run.json is cut": (text("run.json", "{"), False),
+    "run.json is a list": (text("run.json", "[]"), False),
+    "versions are a list": (text("run.json", '{"versions": []}'), False),
+    "versions are unknown": (text("run.json", '{"scenario": "ir_grasp", "parameters": {}}'), False),
+    "of another version": (of_numpy_1, False),
+    "complete": (text("summary.json", COMPLETE), False),
+    "no checkpoint": (lambda copy: (copy / "checkpoint.zip").unlink(), True),
+    "the checkpoint is cut": (cut, True),
+    "no record": (lambda copy: (copy / "signals.arrows").unlink(), False),
+    **{f"another {name}": (part(name), True) for name in ("0.state", "0.contents", "0.cpu", "kept")},
+    "compressed": (lambda copy: with_part(copy, "kept", b"\0" * 10_000_000, zipfile.ZIP_DEFLATED), False),
+    "another evaluator": (kept(lambda k: replace(k, evaluator=pack_state({"a": 1}))), False),
+    "a bad parameter": (kept(lambda k: replace(k, parameters={**k.parameters, "standoff": "far"})), False),
+    "too few parameters": (kept(lambda k: replace(k, parameters={"standoff": "0.07"})), False),
+    "options for what is kept": (kept(lambda k: k.options), False),
+}
+"""What is done to a run's folder, and whether its record is whole afterwards nonetheless."""
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_run_that_cannot_go_on_is_refused_and_its_record_is_whole(damage: str, copy: Path, wording: Wording):
+    spoil, recovered = DAMAGES[damage]
+    spoil(copy)
+    wording.check(refusal_of(copy))
+    assert not recovered or Record(copy / "signals.parquet").time[-1] >= 0.3  # all that had been recorded
+
+
+def test_a_folder_of_no_run_is_refused(tmp_path: Path, wording: Wording):
+    wording.check(refusal_of(tmp_path))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_that_goes_on_is_refused(copy: Path, wording: Wording):
+    with open(copy / "signals.tail", "rb") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        wording.check(refusal_of(copy))
+    assert not (copy / "signals.parquet").exists()
+
+
+def test_a_run_that_another_process_is_about_to_go_on_with_is_refused(copy: Path, wording: Wording):
+    with RunFolder.of_run(copy).held():
+        wording.check(refusal_of(copy))
+    assert not (copy / "signals.parquet").exists()
+    (copy / "checkpoint.zip").unlink()
+    assert "there is no checkpoint" in refusal_of(copy)  # who held it has let go of it
+
+
+def test_fmus_that_changed_are_refused_by_name(copy: Path, left: Path):
+    scene = left.with_name("scene.fmu")
+    content = scene.read_bytes()
+    try:
+        with zipfile.ZipFile(scene, "a") as archive:
+            archive.writestr("documentation/more.txt", "more")
+        assert f"these FMUs are not those that the run began with: scene ({scene})" in refusal_of(copy)
+    finally:
+        scene.write_bytes(content)
+    assert Record(copy / "signals.parquet").time[-1] >= 0.3
+
+
+def test_a_scenario_whose_code_changed_is_refused_before_it_is_imported(copy: Path, tmp_path: Path, wording: Wording):
+    marker = tmp_path / "marker"
+    (tmp_path / "changed_scene.py").write_text(f"open({str(marker)!r}, 'w')\n", encoding="utf-8")
+    data = json.loads((copy / "run.json").read_text())
+    data["source"] = {"scenario": "changed_scene:Scene", "folder": str(tmp_path), "sha256": "0"}
+    (copy / "run.json").write_text(json.dumps(data))
+    wording.check(refusal_of(copy))
+    assert not marker.exists()
+
+
+def test_a_built_unit_that_was_damaged_is_built_again_with_a_note(
+    copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+):
+    monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "cache"))
+    unit = cached("IrReflex", 3)
+    data = json.loads((copy / "run.json").read_text())
+    data["files"]["reflex"] = str(unit)
+    (copy / "run.json").write_text(json.dumps(data))
+    sound = unit.read_bytes()
+    unit.write_bytes(sound[: len(sound) // 2])
+    result = call("resume", copy, "--no-report")
+    assert result.exit_code == 1, result.output  # it ends before the grasp
+    assert unit.read_bytes() == sound
+    assert sum(record.getMessage().startswith(f"{unit} is built again: ") for record in caplog.records) == 1
+
+
+def test_units_that_do_not_save_their_states_are_refused_at_the_start(tmp_path: Path, wording: Wording):
+    unable = tmp_path / "unable.fmu"
+    with zipfile.ZipFile(cached("GraspScene", 3)) as source, zipfile.ZipFile(unable, "w") as target:
+        for name in source.namelist():
+            content = source.read(name)
+            if name == "modelDescription.xml":
+                assert b'canSerializeFMUState="true"' in content
+                content = content.replace(b'canSerializeFMUState="true"', b"")
+            target.writestr(name, content)
+    out = tmp_path / "out"
+    result = call("run", "ir_grasp", "--unit", f"scene={unable}", "--out", out, "--checkpoint", "1")
+    assert result.exit_code == 2, result.output
+    wording.check(result.output)
+    assert not out.exists()
+
+
 @pytest.mark.parametrize("part", ["checkpoint.json", "0.state", "0.contents", "0.cpu", "kept"])
 def test_a_pickle_in_a_checkpoint_is_refused_and_not_executed(part: str, copy: Path, tmp_path: Path):
     planted, mark = planted_pickle(tmp_path)
     with_part(copy, part, planted + b"\0" * (-len(planted) % 8 + 1))
-    result = call("resume", copy)
+    result = call("resume", copy, "--no-report")
     assert result.exit_code in (2, 3), result.output
     assert len(errors_of(result)) <= 2, result.output
     assert not mark.exists()
     assert not (copy / "report.html").exists()
 
 
-def kept_in(copy: Path) -> Any:
-    with zipfile.ZipFile(copy / "checkpoint.zip") as archive:
-        return unpack_state(archive.read("kept"), resumption.RECORDS)
-
-
 def test_a_pickle_in_the_evaluators_state_is_refused_and_not_executed(copy: Path, tmp_path: Path):
     planted, mark = planted_pickle(tmp_path)
-    kept = kept_in(copy)
-    with_part(copy, "kept", pack_state(replace(kept, evaluator=planted), resumption.RECORDS))
-    assert_refused(copy, "what it keeps of the scenario cannot be read: ")
-    with_part(copy, "kept", pack_state(replace(kept, evaluator=pack_state({"a": 1})), resumption.RECORDS))
-    assert_refused(copy, "it is not the state of a GraspEvaluator")
-    with_part(
-        copy, "kept", pack_state(replace(kept, parameters={**kept.parameters, "standoff": "far"}), resumption.RECORDS)
-    )
-    assert_refused(copy, "standoff: 'far' is not a number")
-    with_part(copy, "kept", pack_state(replace(kept, parameters={}), resumption.RECORDS))
-    assert_refused(copy, "the parameters of ir_grasp are others")
-    with_part(copy, "kept", pack_state(kept.options, resumption.RECORDS))
-    assert_refused(copy, "what it keeps")
+    kept(lambda k: replace(k, evaluator=planted))(copy)
+    assert "what it keeps of the scenario cannot be read: " in refusal_of(copy)
     assert not mark.exists()
-
-
-def test_a_compressed_checkpoint_is_refused(copy: Path):
-    """It could be of any size once it is read."""
-    with_part(copy, "kept", b"\0" * 10_000_000, zipfile.ZIP_DEFLATED)
-    assert_refused(copy, "is compressed; checkpoints are written without")

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from failing_systems import failing_ssp
 from native_units import native_fmu
+from support.failing_systems import failing_ssp
 
 import handover
 from handover.cosim.record.reader import Record

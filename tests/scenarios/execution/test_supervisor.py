@@ -9,36 +9,47 @@ import sys
 from pathlib import Path
 
 import pytest
-from failing_systems import IN_TERMINAL, failing_ssp, start, wait_until
-from processes import lives, until
+from support.commands import Command
+from support.failing_systems import failing_ssp, start, wait_until
+from support.processes import children, lives, stopped, until
 
 from handover.cosim.record.reader import Record
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc"),
-]
+pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
+
+IN_TERMINAL = """
+import fcntl, termios
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+from handover.scenarios.cli.entry import main
+main()
+"""
+"""The command where standard input is a terminal, which it makes the one that controls it."""
 
 
 @pytest.fixture
 def arguments(tmp_path: Path) -> tuple[str | Path, ...]:
     """Of a run that takes as long as one lets it."""
-    return (failing_ssp(tmp_path, "gain"), "--out", tmp_path / "r", "--stop", "1000", "--pace", "1")
+    endless = ("--stop", "1000", "--pace", "1", "--no-report")
+    return (failing_ssp(tmp_path, "gain"), "--out", tmp_path / "r", *endless)
 
 
-def begun(going: "subprocess.Popen[str]", folder: Path) -> int:
-    """Wait until a run has recorded a row, and return the process that does it."""
+def has_row(folder: Path) -> bool:
     tail = folder / "r" / "signals.tail"
-    wait_until(lambda: tail.exists() and any(tail.read_bytes()[16:24]), going)
-    (child,) = Path(f"/proc/{going.pid}/task/{going.pid}/children").read_text().split()
-    return int(child)
+    return tail.exists() and any(tail.read_bytes()[16:24])
+
+
+def begun(going: Command, folder: Path) -> int:
+    """Wait until a run has recorded a row, and return the process that does it."""
+    wait_until(lambda: has_row(folder), going)
+    (child,) = children(going.pid)
+    return child
 
 
 def test_a_child_that_is_killed_leaves_a_whole_record(arguments: tuple[str | Path, ...], tmp_path: Path):
     going = start(tmp_path, *arguments)
     os.kill(begun(going, tmp_path), signal.SIGKILL)
-    shown, errors = going.communicate(timeout=60)
-    assert going.returncode == 3
+    status, shown, errors = going.wait()
+    assert status == 3
     assert errors.startswith("the run was killed at t = ")
     assert "gain.ssp failed: the run was killed" in shown
     assert json.loads((tmp_path / "r" / "summary.json").read_text())["failure"]["kind"] == "killed"
@@ -49,32 +60,36 @@ def test_a_child_that_is_killed_leaves_a_whole_record(arguments: tuple[str | Pat
 def test_a_parent_that_is_killed_takes_its_child_with_it(arguments: tuple[str | Path, ...], tmp_path: Path):
     going = start(tmp_path, *arguments)
     child = begun(going, tmp_path)
-    going.kill()
-    going.communicate(timeout=60)
-    until(lambda: not lives(child))  # it lets go of the pipes before it is gone
+    going.send_signal(signal.SIGKILL)
+    going.wait()
+    until(lambda: not lives(child))
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_to_the_parent_ends_the_run_after_its_step(
     number: signal.Signals, arguments: tuple[str | Path, ...], tmp_path: Path
 ):
-    if signal.getsignal(number) is signal.SIG_IGN:
+    if number != signal.SIGINT and signal.getsignal(number) is signal.SIG_IGN:
         pytest.skip("under nohup the tests' processes ignore it, too")
     going = start(tmp_path, *arguments)
     begun(going, tmp_path)
     going.send_signal(number)
-    shown, errors = going.communicate(timeout=60)
-    assert going.returncode == 1, errors
+    status, shown, errors = going.wait()
+    assert status == 1, errors
     assert "interrupted" in shown
     assert (tmp_path / "r" / "signals.parquet").exists()
 
 
+@pytest.mark.slow
 def test_ctrl_c_in_a_terminal_is_heard_once(arguments: tuple[str | Path, ...], tmp_path: Path):
     here, terminal = os.openpty()
-    streams = {"stdin": terminal, "stdout": terminal, "stderr": terminal}
-    going = start(tmp_path, *arguments, program=IN_TERMINAL, start_new_session=True, **streams)
+    call = [sys.executable, "-c", IN_TERMINAL, "run", *map(str, arguments)]
+    going = subprocess.Popen(
+        call, cwd=tmp_path, stdin=terminal, stdout=terminal, stderr=terminal, start_new_session=True
+    )
     os.close(terminal)
-    child = begun(going, tmp_path)
+    until(lambda: has_row(tmp_path) or going.poll() is not None)
+    (child,) = children(going.pid)
     assert os.tcgetpgrp(here) == os.getpgid(going.pid) != os.getpgid(child)  # else the child might hear of it twice
     os.write(here, b"\x03")
     shown = b""
@@ -90,22 +105,10 @@ def test_ctrl_c_in_a_terminal_is_heard_once(arguments: tuple[str | Path, ...], t
 
 def test_ctrl_z_stops_both_and_going_on_lets_both_go_on(arguments: tuple[str | Path, ...], tmp_path: Path):
     going = start(tmp_path, *arguments)
-    child = begun(going, tmp_path)
-
-    def state(process: int) -> str:
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
-
+    both = (going.pid, begun(going, tmp_path))
     going.send_signal(signal.SIGTSTP)
-    wait_until(lambda: (state(going.pid), state(child)) == ("T", "T"), going)
+    wait_until(lambda: all(map(stopped, both)), going)
     going.send_signal(signal.SIGCONT)
-    wait_until(lambda: "T" not in (state(going.pid), state(child)), going)
+    wait_until(lambda: not any(map(stopped, both)), going)
     going.send_signal(signal.SIGTERM)
-    going.communicate(timeout=60)
-    assert going.returncode == 1
-
-
-def test_a_usage_error_is_answered_as_ever(tmp_path: Path):
-    going = start(tmp_path, "nonsense")
-    _, errors = going.communicate(timeout=60)
-    assert going.returncode == 2
-    assert "no scenario 'nonsense'" in errors
+    assert going.wait().status == 1

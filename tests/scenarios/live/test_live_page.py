@@ -17,8 +17,8 @@ import pytest
 from live_runs import HANDOVER, LIVE, TOLD, live_run, shown
 from opened_page import wait_until
 from playwright.sync_api import Browser
-from processes import with_argument
 from scipy.spatial.transform import Rotation
+from support.processes import with_argument
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 from clusters import scheduler, worker
-from processes import lives, parent, servers, until
 from sample_jobs import bad_job, job
+from support.processes import lives, parent, servers, until
 
 from handover.scenarios.campaign.local_cluster import connect_cluster
 from handover.scenarios.campaign.scheduler import scheduler_address

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import psutil
 import pytest
-from processes import family, lives, parent, servers, until
 from sample_jobs import bad_job, job
+from support.processes import family, lives, parent, servers, until
 
 from handover.scenarios.campaign.local_cluster import local_cluster
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, WorkerPool, cores

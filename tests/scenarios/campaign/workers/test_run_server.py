@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 from native_units import native_fmu
-from processes import children, lives, until
 from sample_jobs import bad_job, job
+from support.processes import children, lives, until
 
 from handover.cosim.python_process import code_command
 from handover.cosim.record.reader import Record

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from processes import with_argument
 from sample_study import record
 from study_server import (
     HAND,
@@ -24,6 +23,7 @@ from study_server import (
     to_round,
     told,
 )
+from support.processes import with_argument
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 

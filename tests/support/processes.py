@@ -55,9 +55,16 @@ def parent(process: int) -> int:
     return int(Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[1])
 
 
+def stopped(process: int) -> bool:
+    """Return whether a process is stopped, as by SIGSTOP."""
+    with contextlib.suppress(ProcessLookupError, FileNotFoundError):
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] == "T"
+    return False
+
+
 def until(condition: Callable[[], bool], seconds: float = 60.0) -> None:
     """Wait until a condition is true, for at most some seconds."""
     end = time.monotonic() + seconds
     while not condition():
-        assert time.monotonic() < end, "the condition did not become true"
-        time.sleep(0.05)
+        assert time.monotonic() < end, f"the condition did not become true: {condition}"
+        time.sleep(0.02)
