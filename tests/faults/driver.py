@@ -12,6 +12,7 @@ import random
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 from call_ring import CallRing
 from foreign_unit import ForeignUnit
@@ -108,25 +109,17 @@ class Driver:
             self._remove(subject)
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("fmu", type=Path)
-    parser.add_argument("fmi", type=int)
-    parser.add_argument("kind", choices=["legal", "illegal"])
-    parser.add_argument("count", type=int)
-    parser.add_argument("seed", type=int)
-    parser.add_argument("ring", type=Path)
-    parser.add_argument("first", type=int, nargs="?", default=0)
-    a = parser.parse_args()
+def play(fmu: Path, fmi: int, kind: str, count: int, seed: int, ring_file: Path, first: int = 0) -> dict[str, Any]:
+    """Make sequences; return the faults, how many calls were made and how many of them refused, and seconds of CPU."""
     faulthandler.enable()
-    ring = CallRing(a.ring)
-    unit = ForeignUnit(a.fmu, a.fmi)
-    driver = Driver(unit, ring, a.seed)
-    sequence = driver.legal if a.kind == "legal" else driver.illegal
+    ring = CallRing(ring_file)
+    unit = ForeignUnit(fmu, fmi)
+    driver = Driver(unit, ring, seed)
+    sequence = driver.legal if kind == "legal" else driver.illegal
     faults: list[dict[str, object]] = []
     begin = time.process_time()
-    for k in range(a.first, a.first + a.count):
-        ring.note(f"--- {a.kind} sequence {k} of seed {a.seed}")
+    for k in range(first, first + count):
+        ring.note(f"--- {kind} sequence {k} of seed {seed}")
         try:
             sequence(k)
         except Fault as fault:
@@ -137,8 +130,22 @@ def main() -> int:
     driver.close()
     unit.close()
     spent = time.process_time() - begin
-    print(json.dumps({"faults": faults, "calls": driver.calls, "refused": driver.refused, "cpu": spent}))
-    return bool(faults)
+    return {"faults": faults, "calls": driver.calls, "refused": driver.refused, "cpu": spent}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("fmu", type=Path)
+    parser.add_argument("fmi", type=int)
+    parser.add_argument("kind", choices=["legal", "illegal"])
+    parser.add_argument("count", type=int)
+    parser.add_argument("seed", type=int)
+    parser.add_argument("ring", type=Path)
+    parser.add_argument("first", type=int, nargs="?", default=0)
+    a = parser.parse_args()
+    found = play(a.fmu, a.fmi, a.kind, a.count, a.seed, a.ring, a.first)
+    print(json.dumps(found))
+    return bool(found["faults"])
 
 
 if __name__ == "__main__":

@@ -6,21 +6,21 @@ A failure names the sequence by its seed and number, and the last calls; `python
 import json
 import os
 import re
-import subprocess
-import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
+import driver
 import pytest
 from call_ring import count_of, lines_of
+from support.commands import forking
 
 from handover.fmus.build import build_block, cached
 from handover.fmus.catalog import UNITS
 
-DRIVER = Path(__file__).with_name("driver.py")
 SEED = 20
 FEW, FEW_APART = 25, 10
 MANY = 2000
@@ -47,38 +47,39 @@ class Job:
     ring: Path
     hung: float = HUNG
     environment: Mapping[str, str] = field(default_factory=dict[str, str])
-    process: "subprocess.Popen[str] | None" = field(default=None, init=False)
+    process: "BaseProcess | None" = field(default=None, init=False)
 
     def run(self) -> dict[str, Any]:
         """Return what the driver found; a crash or a hang is a fault, too."""
-        given = [self.fmu, self.fmi, self.kind, self.count, SEED, self.ring]
-        self.process = subprocess.Popen(
-            [sys.executable, str(DRIVER), *map(str, given)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **self.environment},
-        )
+        given = (self.fmu, self.fmi, self.kind, self.count, SEED, self.ring)
+        result, errors = (self.ring.with_suffix(suffix) for suffix in (".json", ".txt"))
+        self.process = forking().Process(target=_drive, args=(given, self.environment, result, errors))
+        self.process.start()
         seen, idle = 0, 0.0
-        while True:
-            try:
-                out, errors = self.process.communicate(timeout=self.hung)
-                break
-            except subprocess.TimeoutExpired:
-                count = count_of(self.ring) if self.ring.is_file() else 0
-                seen, idle = count, idle + self.hung if count == seen else 0.0
-                if idle >= (self.hung if count else HUNG):  # before the first call Python has much to load
-                    self.process.kill()
-                    self.process.communicate()
-                    return self._lost(f"no call ended for {idle:g} s")
-        if self.process.returncode not in (0, 1) or not out:
-            return self._lost(f"the process ended with {self.process.returncode}: {errors[-3000:]}")
-        return json.loads(out)
+        while self.process.exitcode is None:
+            self.process.join(self.hung)
+            count = count_of(self.ring) if self.ring.is_file() else 0
+            seen, idle = count, idle + self.hung if count == seen else 0.0
+            if self.process.exitcode is None and idle >= (self.hung if count else HUNG):
+                self.process.kill()  # before the first call Python has much to load
+                self.process.join()
+                return self._lost(f"no call ended for {idle:g} s")
+        if self.process.exitcode or not result.is_file():
+            return self._lost(f"the process ended with {self.process.exitcode}: {errors.read_text()[:3000]}")
+        return json.loads(result.read_text())
 
     def _lost(self, fault: str) -> dict[str, Any]:
         calls = lines_of(self.ring) if self.ring.is_file() else []
         sequence = next((c for c in reversed(calls) if c.startswith("---")), "before the first sequence")
         return {"faults": [{"sequence": sequence, "fault": fault, "calls": calls}], "calls": len(calls)}
+
+
+def _drive(given: "tuple[Any, ...]", environment: Mapping[str, str], result: Path, errors: Path) -> None:
+    os.environ.update(environment)
+    opened = os.open(errors, os.O_WRONLY | os.O_CREAT, 0o600)
+    os.dup2(opened, 2)
+    os.close(opened)
+    result.write_text(json.dumps(driver.play(*given)))
 
 
 class WorkerPool:
@@ -88,10 +89,12 @@ class WorkerPool:
         self.folder = folder
         self.jobs: list[Job] = []
 
-    def add(self, fmus: Iterable[tuple[Path, int]], count: int, *, apart: bool = False) -> None:
-        """Add jobs for both kinds of sequences on every FMU, perhaps with Python in a process of its own."""
+    def add(
+        self, fmus: Iterable[tuple[Path, int]], count: int, *, kinds: Sequence[str] = KINDS, apart: bool = False
+    ) -> None:
+        """Add jobs for kinds of sequences on every FMU, perhaps with Python in a process of its own."""
         for fmu, fmi in fmus:
-            for kind in KINDS:
+            for kind in kinds:
                 ring = self.folder / f"{len(self.jobs)}.ring"
                 self.jobs.append(Job(fmu, fmi, kind, count, ring, environment=APART if apart else {}))
 
@@ -115,9 +118,8 @@ class WorkerPool:
     def end(self) -> None:
         """Kill what still runs."""
         for process in (job.process for job in self.jobs if job.process):
-            if process.poll() is None:
-                process.kill()
-                process.wait()
+            process.kill()
+            process.join()
 
 
 @pytest.fixture
@@ -136,9 +138,15 @@ def catalog_fmus(names: "tuple[str, ...]") -> list[tuple[Path, int]]:
 
 
 def test_a_few_sequences_on_light_units(pool: WorkerPool, tmp_path: Path):
-    fmus = [*sample_fmus(tmp_path), *catalog_fmus(LIGHT)]
-    pool.add([fmu for k, fmu in enumerate(fmus) if k % 4 in (0, 3)], FEW)  # each in one of the standards
-    pool.add(catalog_fmus(LIGHT[:1]), FEW_APART, apart=True)
+    samples = [(build_block(f"sample_units.{b}", 2 + k % 2, tmp_path), 2 + k % 2) for k, b in enumerate(SAMPLES)]
+    pool.add([*samples, (cached(LIGHT[0], 2), 2), (cached(LIGHT[1], 3), 3)], FEW)  # each in one of the standards
+    pool.add(catalog_fmus(LIGHT[:1])[1:], FEW_APART, kinds=KINDS[1:], apart=True)
+    pool.run()
+
+
+@pytest.mark.slow
+def test_a_few_with_python_apart(pool: WorkerPool):
+    pool.add(catalog_fmus(LIGHT[:1]), 2 * FEW_APART, apart=True)
     pool.run()
 
 
@@ -157,7 +165,7 @@ def test_a_unit_that_crashes_or_hangs_is_reported_with_its_last_calls(pool: Work
         assert re.fullmatch(r"x\d \[stepping\] DoStep\(.+", re.findall(r"^ +(x\d .+)$", entries, re.MULTILINE)[-1]), (
             entries
         )
-    assert [job.process.poll() is None for job in pool.jobs if job.process] == [False, False]
+    assert [job.process.is_alive() for job in pool.jobs if job.process] == [False, False]
 
 
 @pytest.mark.fuzz
