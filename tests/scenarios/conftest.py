@@ -1,14 +1,11 @@
-import shutil
 from collections.abc import Generator
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from click.testing import CliRunner
 from opened_page import launched
 from playwright.sync_api import Browser
-
-from handover.scenarios.cli.command import main
+from support.kept_runs import copied_run, kept_run
 
 
 @pytest.fixture(scope="module")
@@ -19,18 +16,15 @@ def browser() -> Generator[Browser, None, None]:
 
 
 @pytest.fixture(scope="session")
-def grasp(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of a run of `ir_grasp`; not to be changed."""
-    out = tmp_path_factory.mktemp("runs") / "grasp"
-    done = CliRunner().invoke(main, ["run", "ir_grasp", "--out", str(out)])
-    assert done.exit_code == 0, done.output
-    return out
+def grasp() -> Path:
+    """Return the folder of a run of `ir_grasp`, with page and figures; not to be changed."""
+    return kept_run("run", "ir_grasp")
 
 
 @pytest.fixture
-def grasp_without_reflex(grasp: Path, tmp_path: Path) -> Path:
-    """Return a copy of that run whose controller has recorded nothing, as one without the optional outputs."""
-    copy = shutil.copytree(grasp, tmp_path / "without_reflex")
+def grasp_without_reflex(tmp_path: Path) -> Path:
+    """Return such a run, without page, whose controller has recorded nothing, as one without the optional outputs."""
+    copy = copied_run(tmp_path / "without_reflex", "run", "ir_grasp", "--no-report")
     table = pq.read_table(copy / "signals.parquet")
     kept = [name for name in table.column_names if not name.startswith("reflex.")]
     pq.write_table(table.select(kept), copy / "signals.parquet")

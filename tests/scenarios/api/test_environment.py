@@ -4,11 +4,14 @@ import subprocess
 import sys
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from gymnasium import spaces
 from gymnasium.utils.env_checker import check_env
+from support.kept_runs import kept_run
+from support.wording import Wording
 
 import handover
 from handover.cosim.fmu.file.description import describe_fmu
@@ -48,8 +51,10 @@ def test_its_spaces_are_what_the_unit_declares():
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> handover.Run:
-    return handover.run("ir_grasp", seed=3, strategy="blind", out=tmp_path_factory.mktemp("runs") / "r")
+def run() -> handover.Run:
+    found = handover.load(kept_run("run", "ir_grasp", "--seed", "3", "-p", "strategy=blind", "--no-report"))
+    assert isinstance(found, handover.Run)
+    return found
 
 
 def driven(env: ScenarioEnvironment, run: handover.Run) -> tuple[list[float], dict[str, object]]:
@@ -119,32 +124,31 @@ def test_episodes_without_a_seed_differ_and_follow_from_the_first():
 
 
 @pytest.mark.parametrize(
-    ("scenario", "given", "told"),
+    ("scenario", "given"),
     [
-        ("ir_grasp", {"place": "reflexx"}, "no unit 'reflexx' whose place could be taken; did you mean reflex?"),
-        ("ir_grasp", {"place": "reflex", "actions": ["yaw"]}, "actions: 'yaw', did you mean yaw_cmd?"),
-        ("helix_handover", {"place": "camera"}, "camera.left is a binary"),
-        ("flyer_impedance", {"place": "push"}, "observations: there are none"),
-        ("ir_grasp", {"place": "reflex", "strategi": 1}, "did you mean strategy?"),
+        ("ir_grasp", {"place": "reflexx"}),
+        ("ir_grasp", {"place": "reflex", "actions": ["yaw"]}),
+        ("helix_handover", {"place": "camera"}),
+        ("flyer_impedance", {"place": "push"}),
+        ("ir_grasp", {"place": "reflex", "strategi": 1}),
     ],
 )
-def test_what_makes_no_environment_is_refused(scenario: str, given: dict[str, object], told: str):
+def test_what_makes_no_environment_is_refused(scenario: str, given: dict[str, object], wording: Wording):
     with pytest.raises(handover.InvalidInput) as e:
         handover.environment(scenario, **given)  # type: ignore
-    assert told in str(e.value)
+    wording.check(e.value)
 
 
-def test_a_bad_action_is_refused():
+def test_a_bad_action_is_refused(wording: Wording):
     env = handover.environment("ir_grasp", place="reflex")
     with pytest.raises(RuntimeError, match="call reset first"):
         env.step({})
     env.reset(seed=0)
-    with pytest.raises(handover.InvalidInput, match="action = 3: a mapping is right, with p_WH_cmd, yaw_cmd"):
-        env.step(3)  # type: ignore
-    with pytest.raises(handover.InvalidInput, match="the action has no p_WH_cmd"):
-        env.step({"yaw_cmd": 0.0})
-    with pytest.raises(handover.InvalidInput, match=r"reflex\.sigma_cmd: 2\.0 is out of range: from 0 to 1"):
-        env.step({"p_WH_cmd": np.zeros(2), "yaw_cmd": 0.0, "sigma_cmd": 2.0})
+    actions: list[Any] = [3, {"yaw_cmd": 0.0}, {"p_WH_cmd": np.zeros(2), "yaw_cmd": 0.0, "sigma_cmd": 2.0}]
+    for action in actions:
+        with pytest.raises(handover.InvalidInput) as e:
+            env.step(action)
+        wording.check(e.value)
     env.close()
 
 

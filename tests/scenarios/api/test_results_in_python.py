@@ -9,14 +9,15 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from support.kept_runs import copied_run, kept_run
 
 import handover
 from handover.scenarios.api.progress import bar_html
 
 
 @pytest.fixture
-def run(grasp: Path) -> handover.Run:
-    found = handover.load(grasp)
+def run() -> handover.Run:
+    found = handover.load(kept_run("run", "ir_grasp", "--no-report"))
     assert isinstance(found, handover.Run)
     return found
 
@@ -91,7 +92,8 @@ def test_a_plot_of_nothing_is_refused(run: handover.Run):
         run.plot()
 
 
-def test_replay_and_report_are_pages(run: handover.Run, tmp_path: Path):
+def test_replay_and_report_are_pages(tmp_path: Path):
+    run = handover.Run(copied_run(tmp_path / "run", "run", "ir_grasp", "--no-report"))
     replay = run.replay()
     assert 'class="replay"' in replay.html
     saved = replay.save(tmp_path / "replay.html")
@@ -103,20 +105,15 @@ def test_replay_and_report_are_pages(run: handover.Run, tmp_path: Path):
     assert re.match(r'<iframe srcdoc="&lt;!', report._repr_html_())  # type: ignore
 
 
-def test_a_notebook_shows_verdict_headline_and_plots(run: handover.Run):
+def test_a_notebook_shows_verdict_headline_and_plots_without_what_a_unit_did_not_give(grasp_without_reflex: Path):
+    run = handover.Run(grasp_without_reflex)
+    assert 'class="replay"' in run.replay().html
     html = run._repr_html_()  # type: ignore
     assert "succeeded</span>" in html
     assert "how far the object was pushed" in html
     assert html.count("data:image/png;base64,") == 2
-    assert "object at 0x" not in repr(run)
-
-
-def test_what_a_unit_did_not_give_is_left_out(grasp_without_reflex: Path):
-    run = handover.Run(grasp_without_reflex)
-    assert 'class="replay"' in run.replay().html
-    html = run._repr_html_()  # type: ignore
-    assert html.count("data:image/png;base64,") == 2
     assert "Left out: what is drawn from reflex." in html
+    assert "object at 0x" not in repr(run)
 
 
 def test_a_run_of_another_version_is_shown_without_plots(grasp_without_reflex: Path):

@@ -4,16 +4,16 @@ import threading
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from support.kept_runs import kept_run
+from support.wording import Wording
 
 import handover
 from handover.controllers.ir_grasp.parameters import Strategy
 from handover.scenarios.catalog import SCENARIOS
-from handover.scenarios.cli.command import main
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
 
@@ -29,23 +29,24 @@ def system() -> handover.System:
     return s
 
 
+BLIND = ("run", "ir_grasp", "--seed", "3", "-p", "strategy=blind", "--no-report")
+
+
 @pytest.fixture(scope="module")
 def blind(tmp_path_factory: pytest.TempPathFactory) -> handover.Run:
     out = tmp_path_factory.mktemp("runs") / "blind"
-    return handover.run("ir_grasp", seed=4, strategy=Strategy.BLIND, standoff=0.06, out=out)
+    return handover.run("ir_grasp", seed=3, strategy=Strategy.BLIND, out=out)
 
 
-def test_it_leaves_the_same_bytes_as_the_command(blind: handover.Run, tmp_path: Path):
-    command = ["run", "ir_grasp", "--seed", "4", "-p", "strategy=blind", "-p", "standoff=0.06", "--no-report"]
-    assert CliRunner().invoke(main, [*command, "--out", str(tmp_path / "c")]).exit_code in (0, 1)
-    assert (tmp_path / "c" / "signals.parquet").read_bytes() == (blind.folder / "signals.parquet").read_bytes()
-    assert handover.load(tmp_path / "c").reason == blind.reason  # type: ignore
+def test_it_leaves_the_same_bytes_as_the_command(blind: handover.Run):
+    of_command = kept_run(*BLIND)
+    assert (of_command / "signals.parquet").read_bytes() == (blind.folder / "signals.parquet").read_bytes()
+    assert handover.load(of_command).reason == blind.reason  # type: ignore
 
 
 def test_its_result_is_what_the_folder_has(blind: handover.Run):
-    assert blind.seed == 4
+    assert blind.seed == 3
     assert blind.parameters["strategy"] == "blind"
-    assert blind.parameters["standoff"] == 0.06
     again = handover.load(blind.folder)
     assert isinstance(again, handover.Run)
     assert (again.success, again.reason) == (blind.success, blind.reason)
@@ -63,28 +64,28 @@ def test_all_faults_are_told_at_once_and_nothing_is_written(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("subject", "given", "told"),
+    ("subject", "given"),
     [
-        ("ir_grap", {}, "no scenario 'ir_grap': did you mean ir_grasp?"),
-        ("ir_grasp", {"step": 3}, "step is for an SSP or an FMU; a scenario's units have steps of their own"),
-        ("ir_grasp", {"units": {"reflexx": "a.fmu"}}, "ir_grasp has no unit 'reflexx': did you mean reflex?"),
-        ("ir_grasp", {"algorithm": "jacoby"}, "no algorithm 'jacoby'; did you mean jacobi?"),
-        ("ir_grasp", {"seed": -1}, "seed = -1: a whole number from 0 to 9223372036854775807 is right"),
-        ("ir_grasp", {"seed": 10**310}, "seed = 1000000000"),
-        ("ir_grasp", {"seed": 0.5}, "seed = 0.5: a whole number from 0 to"),
-        ("ir_grasp", {"formats": ["cvs"]}, "formats: 'cvs': did you mean csv?"),
-        ("ir_grasp", {"checkpoint": 0}, "checkpoint = 0: a finite number of seconds above 0 is right"),
-        ("ir_grasp", {"thing": 1, "parameters": {"thing": 2}}, "thing: given by keyword and in parameters={...}"),
-        ("nowhere.fmu", {"stop": 1}, "nowhere.fmu"),
+        ("ir_grap", {}),
+        ("ir_grasp", {"step": 3}),
+        ("ir_grasp", {"units": {"reflexx": "a.fmu"}}),
+        ("ir_grasp", {"algorithm": "jacoby"}),
+        ("ir_grasp", {"seed": -1}),
+        ("ir_grasp", {"seed": 10**310}),
+        ("ir_grasp", {"seed": 0.5}),
+        ("ir_grasp", {"formats": ["cvs"]}),
+        ("ir_grasp", {"checkpoint": 0}),
+        ("ir_grasp", {"thing": 1, "parameters": {"thing": 2}}),
+        ("nowhere.fmu", {"stop": 1}),
     ],
 )
 def test_what_cannot_be_run_is_refused_in_one_line(
-    subject: str, given: dict[str, object], told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    subject: str, given: dict[str, object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
 ):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(handover.InvalidInput) as e:
         handover.run(subject, **given)  # type: ignore
-    assert told in str(e.value)
+    wording.check(e.value)
     assert "\n" not in str(e.value)
     assert not any(tmp_path.iterdir())
 
@@ -115,10 +116,9 @@ class Nearer(IrGrasp):
 
 
 def test_a_class_of_ones_own_is_run_and_drawn(tmp_path: Path):
-    run = handover.run(Nearer, strategy="blind", standoff=0.05, out=tmp_path / "n")
+    run = handover.run(Nearer, strategy="blind", standoff=0.05, stop=0.5, out=tmp_path / "n")
     assert run.scenario == "nearer"
     assert 'class="replay"' in run.replay().html
-    assert "data:image/png" in run._repr_html_()  # type: ignore
     with handover.open(Nearer, strategy="blind") as s:
         assert "scene.p_WH" in s.outputs
     with pytest.raises(handover.InvalidInput, match="nearer has no parameter 'strategi'"):
@@ -127,7 +127,7 @@ def test_a_class_of_ones_own_is_run_and_drawn(tmp_path: Path):
 
 def test_parameters_of_units_are_set(blind: handover.Run, tmp_path: Path):
     own = {"reflex.shake_cycles": 1}  # of 3, at 1.5 Hz
-    run = handover.run("ir_grasp", seed=4, strategy="blind", standoff=0.06, parameters=own, out=tmp_path / "u")
+    run = handover.run("ir_grasp", seed=3, strategy="blind", parameters=own, out=tmp_path / "u")
     assert run.signals.time[-1] == pytest.approx(blind.signals.time[-1] - 2 / 1.5, abs=0.05)
     with pytest.raises(handover.InvalidInput, match="no parameter 'closing_tim'; did you mean closing_time"):
         handover.run("ir_grasp", parameters={"reflex.closing_tim": 3.0}, out=tmp_path / "v")
@@ -172,42 +172,43 @@ class Unfindable(IrGrasp):
 Unfindable.__qualname__ = "nowhere.Unfindable"
 
 
-@pytest.mark.parametrize(
-    ("call", "told"),
-    [
-        (lambda: handover.run(3), "3 cannot be run: a scenario's name or class, a system, or the path of"),  # type: ignore
-        (lambda: handover.open(None), "None cannot be run: "),  # type: ignore
-        (lambda: handover.run(NoScenario), "NoScenario is no scenario: a subclass of Experiment is"),  # type: ignore
-        (lambda: handover.environment(NoScenario, "reflex"), "NoScenario is no scenario"),  # type: ignore
-        (lambda: handover.sweep(NoScenario), "NoScenario is no scenario"),  # type: ignore
-        (lambda: handover.run(Experiment), "Experiment is not complete: it has no build"),
-        (lambda: handover.sweep(Experiment), "Experiment is not complete: it has no build"),
-        (lambda: handover.run("ir_grasp", strategy=[["a"], ["b", "c"]]), "strategy = .*a run has one value"),
-        (lambda: handover.sweep(4), "4 cannot be run"),  # type: ignore
-        (lambda: handover.sweep(Unfindable), "Unfindable: each run of a sweep imports its scenario"),
-        (lambda: handover.run("ir_grasp", step=0.1), "^step is for an SSP or an FMU"),
-        (lambda: handover.run("ir_grasp", inputs="u.csv"), "^inputs is for an FMU that runs by itself"),
-        (lambda: handover.run("ir_grasp", record="scene.zz"), "^record: "),
-        (lambda: handover.run("ir_grasp", units={"reflex": ""}), "^units 'reflex=' is not of the form NAME=FILE"),
-        (lambda: handover.run("ir_grasp", strategy=["blind"]), r"strategy = \['blind'\]: a run has one value"),
-        (lambda: handover.run(IrGrasp, forward=np.array([0.1])), "forward = .*handover.sweep varies lists"),
-        (lambda: handover.environment("ir_grasp", "reflex", thing=("cup",)), "thing = .*a run has one value"),
-        (lambda: handover.run("ir_grasp", parameters=[1]), "^parameters = .*a mapping such as"),  # type: ignore
-        (lambda: handover.run("ir_grasp", units=["servo"]), "^units = .*a mapping such as"),  # type: ignore
-        (lambda: handover.run("ir_grasp", out=3), "^out = 3: a path"),  # type: ignore
-        (lambda: handover.run("ir_grasp", inputs_from=3), "^inputs_from = 3: a path"),  # type: ignore
-        (lambda: handover.run("ir_grasp", record=3), "^record = 3: a text, or a list"),  # type: ignore
-        (lambda: handover.run("ir_grasp", formats=3), "^formats = 3: a text, or a list"),  # type: ignore
-        (lambda: handover.run("ir_grasp", isolate=["arm", 3]), "^isolate = 3: a text, or a list"),  # type: ignore
-        (lambda: handover.run("ir_grasp", options={"call_limit": 3}), "^options = .*MasterOptions"),  # type: ignore
-        (lambda: handover.sweep("ir_grasp", workers=0), "^workers = 0: a whole number from 1"),
-        (lambda: handover.sweep("ir_grasp", workers="two"), "^workers = .*: a whole number from 1"),  # type: ignore
-        (lambda: handover.load(3), "^folder = 3: a path"),  # type: ignore
-        (lambda: handover.load("no_such_run"), "there is no such file or folder"),
-        (lambda: handover.describe(3), "^fmu = 3: a path"),  # type: ignore
-    ],
-)
-def test_what_is_no_subject_or_no_single_value_is_told_in_one_sentence(call: Callable[[], object], told: str):
-    with pytest.raises(handover.InvalidInput, match=told) as raised:
-        call()
+CALLS: dict[str, Callable[[Any], object]] = {
+    "run of a number": lambda h: h.run(3),
+    "open of nothing": lambda h: h.open(None),
+    "run of another class": lambda h: h.run(NoScenario),
+    "environment of another class": lambda h: h.environment(NoScenario, "reflex"),
+    "sweep of another class": lambda h: h.sweep(NoScenario),
+    "run of the base class": lambda h: h.run(Experiment),
+    "sweep of the base class": lambda h: h.sweep(Experiment),
+    "lists of lists": lambda h: h.run("ir_grasp", strategy=[["a"], ["b", "c"]]),
+    "sweep of a number": lambda h: h.sweep(4),
+    "sweep of a class without a module": lambda h: h.sweep(Unfindable),
+    "step of a scenario": lambda h: h.run("ir_grasp", step=0.1),
+    "inputs of a scenario": lambda h: h.run("ir_grasp", inputs="u.csv"),
+    "record of no variable": lambda h: h.run("ir_grasp", record="scene.zz"),
+    "unit without a file": lambda h: h.run("ir_grasp", units={"reflex": ""}),
+    "list for a value": lambda h: h.run("ir_grasp", strategy=["blind"]),
+    "array for a value": lambda h: h.run(IrGrasp, forward=np.array([0.1])),
+    "environment with a tuple": lambda h: h.environment("ir_grasp", "reflex", thing=("cup",)),
+    "parameters of a list": lambda h: h.run("ir_grasp", parameters=[1]),
+    "units of a list": lambda h: h.run("ir_grasp", units=["servo"]),
+    "out of a number": lambda h: h.run("ir_grasp", out=3),
+    "inputs_from of a number": lambda h: h.run("ir_grasp", inputs_from=3),
+    "record of a number": lambda h: h.run("ir_grasp", record=3),
+    "formats of a number": lambda h: h.run("ir_grasp", formats=3),
+    "isolate with a number": lambda h: h.run("ir_grasp", isolate=["arm", 3]),
+    "options of a dict": lambda h: h.run("ir_grasp", options={"call_limit": 3}),
+    "no workers": lambda h: h.sweep("ir_grasp", workers=0),
+    "workers in words": lambda h: h.sweep("ir_grasp", workers="two"),
+    "load of a number": lambda h: h.load(3),
+    "load of nothing there": lambda h: h.load("no_such_run"),
+    "describe of a number": lambda h: h.describe(3),
+}
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_what_is_no_subject_or_no_single_value_is_told_in_one_sentence(call: str, wording: Wording):
+    with pytest.raises(handover.InvalidInput) as raised:
+        CALLS[call](handover)
+    wording.check(raised.value)
     assert "\n" not in str(raised.value)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from native_units import native_fmu
+from support.kept_runs import kept_run
 
 import handover
 from handover.cosim.ssp.writing import write_ssp
@@ -78,8 +79,8 @@ def test_durations_add_up_exactly():
         assert s.step(0.05) == 1.1
 
 
-def test_a_scenario_that_is_stepped_ends_as_its_run(tmp_path: Path):
-    run = handover.run("ir_grasp", seed=3, strategy="blind", out=tmp_path / "r")
+def test_a_scenario_that_is_stepped_ends_as_its_run():
+    run = handover.Run(kept_run("run", "ir_grasp", "--seed", "3", "-p", "strategy=blind", "--no-report"))
     with handover.open("ir_grasp", seed=3, strategy="blind") as s:
         seen: list[np.ndarray[tuple[int], np.dtype[np.float64]]] = []
         while not s.over and s.time < s.stop:
@@ -95,8 +96,7 @@ def test_a_scenario_that_is_stepped_ends_as_its_run(tmp_path: Path):
         assert s.outcome == outcome
 
 
-@pytest.mark.parametrize("other", [False, True])
-def test_the_whole_state_is_saved_and_restored(other: bool):
+def test_the_whole_state_is_saved_and_restored():
     with handover.open("flyer_impedance", seed=2) as s:
         s["thrusters.f_pose"] = [0.5, 0.0, 0.0]
         s.step(0.7)
@@ -109,16 +109,17 @@ def test_the_whole_state_is_saved_and_restored(other: bool):
         s.step(1)
         p_pushed, outcome = s["navigation.p_WB_meas"], s.outcome
         assert not np.array_equal(p_free, p_pushed)
-        with handover.open("flyer_impedance", seed=5) if other else s as again:
-            again.restore(state)
-            assert again.time == pytest.approx(0.704)
-            again["thrusters.f_pose"] = [0.0, 0.0, 0.0]
-            assert [again.step(0.25) for _ in range(4)] == rest
-            assert np.array_equal(again["navigation.p_WB_meas"], p_free)
-            again.restore(state)
-            again.step(1)
-            assert np.array_equal(again["navigation.p_WB_meas"], p_pushed)
-            assert again.outcome == outcome
+        with handover.open("flyer_impedance", seed=5) as other:
+            for again in (s, other):
+                again.restore(state)
+                assert again.time == pytest.approx(0.704)
+                again["thrusters.f_pose"] = [0.0, 0.0, 0.0]
+                assert [again.step(0.25) for _ in range(4)] == rest
+                assert np.array_equal(again["navigation.p_WB_meas"], p_free)
+                again.restore(state)
+                again.step(1)
+                assert np.array_equal(again["navigation.p_WB_meas"], p_pushed)
+                assert again.outcome == outcome
 
 
 def test_what_the_evaluation_sees_of_a_vacant_place_is_restored_too():

@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from support.kept_runs import kept_run
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.comparison.entries import NotComparable, RunEntry, differences_of, read_entries
@@ -116,7 +117,8 @@ def test_axes_have_room_for_all_runs_and_lines_for_long_labels(tmp_path: Path):
     assert [p.axis_label for p in plots] == ["x, tip by the\nservos, links taken\nas rigid (m)", "x, tip (m)"]
 
 
-def test_a_curve_that_a_unit_does_not_give_is_left_out_of_that_run_alone(grasp: Path, grasp_without_reflex: Path):
+def test_a_curve_that_a_unit_does_not_give_is_left_out_of_that_run_alone(grasp_without_reflex: Path):
+    grasp = kept_run("run", "ir_grasp", "--no-report")
     overlay = overlaid(runs(grasp, grasp_without_reflex))
     drawn = {p.title: [c.label for c in p.curves] for p in overlay.plots}
     assert drawn["Distances of the fingers from the object: thumb, as seen"] == [grasp.name]
