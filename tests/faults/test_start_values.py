@@ -53,13 +53,14 @@ def test_all_values_that_do_not_hold_are_told_at_once(fmi: int):
 
 @STANDARDS
 def test_rounding_is_no_loss(fmi: int):
-    numbers = [0.1 * i for i in range(1, 200)]
+    degree = 3.141592653589793 / 180
+    numbers = [k for k in (0.1 * i for i in range(1, 200)) if k * degree / degree != k][:12]
     s = System()
     for i, k in enumerate(numbers):
         s.add(f"u{i}", native_fmu("keeps_radians", fmi), k=k)
     with Master(s):
         pass
-    assert any(k * (3.141592653589793 / 180) / (3.141592653589793 / 180) != k for k in numbers)
+    assert len(numbers) == 12
 
 
 @STANDARDS

@@ -4,6 +4,7 @@ import copy
 import ctypes
 import shutil
 import tempfile
+import weakref
 import xml.etree.ElementTree as ET
 import zipfile
 from collections.abc import Sequence
@@ -58,6 +59,8 @@ class CtypesHost:
         suffix = library(host_platform(), fmi).suffix
         self.library = ctypes.CDLL(str(self.folder / "binaries" / folder / (root.attrib["modelName"] + suffix)))
         self.instance: int | None = None
+        self._owner: CtypesHost | None = None
+        self._remove = weakref.finalize(self, shutil.rmtree, self.folder, ignore_errors=True)
         self.categories: list[str] = []
         self.names: list[str] = []
         self.logging = False
@@ -158,12 +161,17 @@ class CtypesHost:
         references = (ctypes.c_uint32 * n)(*range(first, first + n))
         return self.call(f"{verb}Real", references, SIZE(n), values)
 
-    def another(self) -> "CtypesHost":
-        """Return a host of one more instance in the same folder, which is initialised."""
+    def beside(self) -> "CtypesHost":
+        """Return a host without an instance in the same folder, which stays when it is closed."""
         other = copy.copy(self)
         other.instance, other.log, other.categories, other.names = None, [], [], []
         other._log2, other.logger3 = Log2(other._take_2), Log3(other._take_3)
-        other.callbacks = Callbacks(logger=other._log2)
+        other.callbacks, other._owner = Callbacks(logger=other._log2), self
+        return other
+
+    def another(self) -> "CtypesHost":
+        """Return a host of one more instance in the same folder, which is initialised."""
+        other = self.beside()
         assert other.instantiate(), other.log
         assert other.initialise() == OK, other.log
         return other
@@ -175,6 +183,7 @@ class CtypesHost:
         self.instance = None
 
     def close(self) -> None:
-        """Free the instance and remove the unpacked files; the library stays loaded."""
+        """Free the instance and remove the unpacked files if they are its own; the library stays loaded."""
         self.free()
-        shutil.rmtree(self.folder, ignore_errors=True)
+        if self._owner is None:
+            self._remove()

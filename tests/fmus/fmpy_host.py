@@ -63,7 +63,9 @@ class FmpyHost:
         ports = {**self.description.parameters, **self.description.inputs}
         for name, value in values.items():
             port = ports[name]
-            entries = [value] if port.kind in (Kind.STRING, Kind.BINARY) else np.ravel(value).tolist()
+            entries = [value] if isinstance(value, str) else np.ravel(value).tolist()
+            if port.kind is Kind.BINARY:
+                entries = [value.tobytes()]
             getattr(self.fmu, f"set{self._type(port)}")(port.references, entries)
 
     def outputs(self) -> Digests:

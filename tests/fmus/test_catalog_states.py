@@ -38,9 +38,9 @@ def test_a_unit_goes_on_from_a_restored_state_bit_for_bit(name: str, fmi: int, t
     fmu = cached(name, fmi)
     initialising, at_start, later = (tmp_path / n for n in ("initialising", "at start", "later"))
     with FmpyHost(fmu) as host:
-        host.set(other_parameters(host.description))
+        host.set(other_parameters(name))
         host.enter()
-        host.set(inputs_at(host.description, 1))
+        host.set(inputs_at(name, 1))
         initialising.write_bytes(host.saved())
         host.leave()
         at_start.write_bytes(host.saved())

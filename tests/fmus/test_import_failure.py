@@ -66,9 +66,7 @@ def test_the_builder_tells_it(package: "tuple[str, str]"):
 @pytest.fixture
 def host(workshop: Workshop) -> CtypesHost:
     """Return an instance's host, whose FMU is made before `package` changes the folders that it notes."""
-    made = workshop.host("scalars:Scalars", 3)
-    made.free()
-    return made
+    return workshop.own("scalars:Scalars", 3)
 
 
 def test_an_fmu_tells_it(host: CtypesHost, package: "tuple[str, str]"):

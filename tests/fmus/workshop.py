@@ -1,5 +1,6 @@
 """Sample units for tests."""
 
+import functools
 from pathlib import Path
 
 from ctypes_host import CtypesHost
@@ -23,8 +24,18 @@ class Workshop:
         return made if made.is_file() else build_block(f"sample_units.{block}", 3, self.folder, scalar=True)
 
     def host(self, block: str, fmi: int, *, event_mode: bool = False, early_return: bool = False) -> CtypesHost:
-        """Return a host with an instance of a block's FMU."""
-        host = CtypesHost(self.fmu(block, fmi), fmi)
+        """Return a host with an instance of a block's FMU, in a folder that must not be changed."""
+        host = _unpacked(self.fmu(block, fmi), fmi).beside()
         self.open.append(host)
         host.instantiate(event_mode=event_mode, early_return=early_return)
         return host
+
+    def own(self, block: str, fmi: int) -> CtypesHost:
+        """Return a host without an instance, with a folder of its own."""
+        self.open.append(CtypesHost(self.fmu(block, fmi), fmi))
+        return self.open[-1]
+
+
+@functools.cache
+def _unpacked(fmu: Path, fmi: int) -> CtypesHost:
+    return CtypesHost(fmu, fmi)

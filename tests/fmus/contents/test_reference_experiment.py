@@ -147,6 +147,7 @@ def test_an_input_is_off_by_what_its_range_and_width_allow(
     assert perturbed(table, {"x": (port, 0)}, off_zero=True).columns["x"] == [wanted]
 
 
+@pytest.mark.slow
 def test_a_chaotic_unit_of_a_single_precision_input_is_measured(tmp_path: Path):
     """1e-7 of 0.5 m, which is the least, becomes 2^8 times that in 8 steps; 1e-13 of it, the input would round away."""
     fmu = build(CHAOTIC_SINGLE, 3, tmp_path, platforms=["host"])
@@ -160,11 +161,10 @@ def test_a_chaotic_unit_of_a_single_precision_input_is_measured(tmp_path: Path):
         recorded(fmu, tmp_path, "0.0,0.5\n2.0,0.5\n")
 
 
-@pytest.mark.parametrize("x", ["0.0", "0.3"])
-def test_a_unit_that_is_random_whatever_its_inputs_is_not_said_to_round(tmp_path: Path, x: str):
+def test_a_unit_that_is_random_whatever_its_inputs_is_not_said_to_round(tmp_path: Path):
     fmu = build(RANDOM, 3, tmp_path, platforms=["host"])
     with pytest.raises(CannotRecordExperiment, match=r"output 'y' changes from one run to the next .* a seed alone"):
-        recorded(fmu, tmp_path, f"0.0,{x}\n0.5,{x}\n")
+        recorded(fmu, tmp_path, "0.0,0.3\n0.5,0.3\n")
 
 
 def test_that_no_input_could_be_off_is_said():

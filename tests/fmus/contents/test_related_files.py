@@ -13,6 +13,7 @@ from typing import Any
 import fmpy
 import pytest
 import xmlschema
+from support.wording import Wording
 
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.experiments.manifest import FOLDER, MANIFEST, related_files
@@ -92,7 +93,7 @@ def test_an_experiment_is_stored_with_its_result(tmp_path: Path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("fmi", "scalar"), FORMS)
+@pytest.mark.parametrize(("fmi", "scalar"), [(2, False), (3, True)])
 def test_an_experiment_is_repeated_in_each_form(tmp_path: Path, fmi: int, scalar: bool):
     fmu = build(
         EVERY_KIND,
@@ -129,47 +130,42 @@ def test_a_stimulus_of_ones_own_is_played(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("content", "wanted"),
+    ("block", "content"),
     [
-        ("time,w\n0,1\n1,1\n", "column 'w' is no input of the FMU: valid: x"),
-        ("time,x\n0,nan\n1,1\n", "line 2, column 'x': 'nan': a finite number is right"),
-        ("time,x\n0,0.1\n0,0.1\n", "line 3: the time 0 s is not after 0 s"),
-        ("time,x\n0,2.0\n1,0.1\n", "line 2, column 'x': '2.0': it is out of range: from 0 to 1 m"),
-        ("time,x\n0,0.1\n", "it has one row; the last row's time is the end, so at least two are right"),
+        pytest.param(CHAOTIC, "time,w\n0,1\n1,1\n", id="no input"),
+        pytest.param(CHAOTIC, "time,x\n0,nan\n1,1\n", id="NaN"),
+        pytest.param(CHAOTIC, "time,x\n0,0.1\n0,0.1\n", id="no time between"),
+        pytest.param(CHAOTIC, "time,x\n0,2.0\n1,0.1\n", id="out of range"),
+        pytest.param(CHAOTIC, "time,x\n0,0.1\n", id="one row"),
+        pytest.param(SAMPLED, "time,u\n0.0,1.0\n0.25,1.0\n", id="within a step"),
     ],
 )
-def test_a_stimulus_at_fault_is_refused_before_anything_is_written(tmp_path: Path, content: str, wanted: str):
+def test_a_stimulus_at_fault_is_refused_before_anything_is_written(
+    tmp_path: Path, block: Entry, content: str, wording: Wording
+):
     given = tmp_path / "given.csv"
     given.write_text(content)
     with pytest.raises(InvalidTable) as caught:
-        build(CHAOTIC, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest(given))
-    assert wanted in str(caught.value)
+        build(block, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest(given))
+    wording.check(caught.value)
     assert not (tmp_path / "out").exists()
 
 
-def test_a_step_that_the_unit_does_not_take_is_refused(tmp_path: Path):
-    given = tmp_path / "given.csv"
-    given.write_text("time,u\n0.0,1.0\n0.25,1.0\n")
-    with pytest.raises(InvalidTable, match=r"0\.25 s lies within a step: the unit takes only steps of 0\.0333333 s"):
-        build(SAMPLED, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest(given))
-
-
-def test_a_unit_of_pictures_has_nothing_to_compare(tmp_path: Path):
-    with pytest.raises(NothingToCompare, match="all are binary"):
+def test_a_unit_of_pictures_has_nothing_to_compare(tmp_path: Path, wording: Wording):
+    with pytest.raises(NothingToCompare) as caught:
         build(EYE, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest())
+    wording.check(caught.value)
 
 
 def test_a_unit_that_fails_is_not_proven(tmp_path: Path):
     given = tmp_path / "given.csv"
     given.write_text("time,a\n0.0,1.0\n0.1,666\n0.3,1\n")
-    with pytest.raises(
-        CannotRecordExperiment, match=r"fmi3DoStep at t = 0\.1 s answered Error .*the number of the beast"
-    ):
+    with pytest.raises(CannotRecordExperiment, match=r"fmi3DoStep at t = 0\.1 s .*the number of the beast"):
         build(EVERY_KIND, 3, tmp_path / "out", platforms=["host"], experiment=ExperimentRequest(given))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("places", "passes"), [(0, True), (1, True), (2, False)])
+@pytest.mark.parametrize(("places", "passes"), [(1, True), (2, False)])
 def test_the_last_place_of_a_single_precision_output_may_be_another(tmp_path: Path, places: int, passes: bool):
     given = tmp_path / "given.csv"
     given.write_text("time,x\n0.0,0.5\n0.1,0.5\n")
@@ -212,26 +208,21 @@ def test_a_parameter_set_has_the_variables_of_its_form(tmp_path: Path, fmi: int,
 
 
 @pytest.mark.parametrize(
-    ("names", "wanted"),
+    ("names", "values"),
     [
-        (["../a"], "a set's name is that of a file; ASCII letters"),
-        (["a b"], "a set's name is that of a file"),
-        ([""], "a set's name is that of a file"),
-        (["a", "A"], "two sets have this name"),
+        pytest.param(["../a"], {"gain": 3.0}, id="a path"),
+        pytest.param(["a b"], {"gain": 3.0}, id="a space"),
+        pytest.param([""], {"gain": 3.0}, id="no name"),
+        pytest.param(["a", "A"], {"gain": 3.0}, id="one name twice"),
+        pytest.param(["a"], {"gains": 1.0}, id="no parameter"),
+        pytest.param(["a"], {"gain": 11.0}, id="out of range"),
     ],
 )
-def test_a_parameter_set_whose_name_is_no_files_is_refused(tmp_path: Path, names: list[str], wanted: str):
-    sets = [ParameterSet(name=name, description="b", values={"gain": 3.0}) for name in names]
-    with pytest.raises(InvalidParameterSet, match=wanted):
+def test_a_parameter_set_that_is_no_files_or_does_not_fit_is_refused(
+    tmp_path: Path, names: list[str], values: dict[str, Any], wording: Wording
+):
+    sets = [ParameterSet(name=name, description="b", values=values) for name in names]
+    with pytest.raises(InvalidParameterSet) as caught:
         build(EVERY_KIND, 3, tmp_path / "out", parameter_sets=sets)
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("values", "wanted"),
-    [({"gains": 1.0}, "gains: no parameter of it"), ({"gain": 11.0}, "gain: 11.0 is out of range: from 0 to 10")],
-)
-def test_a_parameter_set_that_does_not_fit_is_refused(tmp_path: Path, values: dict[str, Any], wanted: str):
-    with pytest.raises(InvalidParameterSet, match=f"EveryKind, parameter set 'a': {wanted}"):
-        build(EVERY_KIND, 3, tmp_path / "out", parameter_sets=[ParameterSet(name="a", description="b", values=values)])
+    wording.check(caught.value)
     assert not (tmp_path / "out").exists()

@@ -34,7 +34,7 @@ WITHOUT_LIBRARY = f"executable = {sys.executable}\nlibrary = \n"
 @pytest.fixture
 def unpacked(workshop: Workshop) -> CtypesHost:
     """Return an FMU, unpacked; only its folder is used."""
-    return workshop.host("every_kind:EveryKind", 2)
+    return workshop.own("every_kind:EveryKind", 2)
 
 
 def note_of(unit: CtypesHost) -> Path:
@@ -231,7 +231,7 @@ def test_calls_after_the_hosts_python_has_ended_are_errors(unpacked: CtypesHost)
 
 
 def test_units_may_be_instantiated_from_several_threads_at_once(workshop: Workshop, tmp_path: Path):
-    units = [workshop.host(block, 2) for block in ("every_kind:EveryKind", "scalars:Scalars")]
+    units = [workshop.own(block, 2) for block in ("every_kind:EveryKind", "scalars:Scalars")]
     command: list[str | Path] = [compiled(HERE / "threaded_host.c", flags=("-pthread",))]
     for unit in units:
         command += [unit.library._name, unit.token, (unit.folder / "resources").as_uri()]

@@ -86,8 +86,7 @@ def test_a_second_instance_finds_its_modules_though_the_first_ones_folder_is_gon
 
 @pytest.mark.machine
 def test_missing_packages_are_named_with_version_interpreter_and_cure(workshop: Workshop):
-    host = workshop.host("scalars:Scalars", 3)
-    host.free()
+    host = workshop.own("scalars:Scalars", 3)
     file = host.folder / "resources" / "unit.json"
     unit = json.loads(file.read_text())
     unit["packages"].append({"module": "no_such_module", "distribution": "no-such-package", "version": "4.5.6"})
@@ -99,8 +98,7 @@ def test_missing_packages_are_named_with_version_interpreter_and_cure(workshop: 
 
 @pytest.mark.parametrize(("change", "warned"), [(1, True), (0, False), (-1, False)])
 def test_a_package_older_than_that_of_the_build_is_a_warning(workshop: Workshop, change: int, warned: bool):
-    host = workshop.host("scalars:Scalars", 3)
-    host.free()
+    host = workshop.own("scalars:Scalars", 3)
     host.log.clear()
     here = metadata.version("numpy")
     major, minor = (int(n) for n in here.split(".")[:2])
@@ -116,16 +114,14 @@ def test_a_package_older_than_that_of_the_build_is_a_warning(workshop: Workshop,
 
 
 def test_a_missing_source_is_a_logged_error(workshop: Workshop):
-    host = workshop.host("scalars:Scalars", 3)
-    host.free()
+    host = workshop.own("scalars:Scalars", 3)
     (host.folder / "resources" / "sources" / "handover" / "fmus" / "loader.py").unlink()
     assert not host.instantiate()
     assert "loader.py cannot be read" in host.log[-1]
 
 
 def test_a_unit_whose_import_fails_is_a_logged_error(workshop: Workshop):
-    host = workshop.host("scalars:Scalars", 3)
-    host.free()
+    host = workshop.own("scalars:Scalars", 3)
     unit = host.folder / "resources" / "unit.json"
     unit.write_text(unit.read_text().replace("_fmu_", "_fmu_broken_"))
     (host.folder / "resources" / "sources" / "sample_units" / "scalars.py").write_text(
@@ -154,8 +150,7 @@ def test_a_path_keeps_all_its_parts():
 
 
 def test_two_builds_in_one_folder_are_reported_with_a_cure(workshop: Workshop):
-    host = workshop.host("scalars:Scalars", 3)
-    host.free()
+    host = workshop.own("scalars:Scalars", 3)
     assert not host.instantiate(token="{0}")
     for part in ("token {0} is not that of the resources", "of two different builds. Cure: unpack the FMU again"):
         assert part in host.log[-1]

@@ -228,8 +228,7 @@ def test_a_process_that_ends_while_the_block_is_made_is_an_error(workshop: Works
 def test_a_setting_that_makes_no_sense_is_refused(
     workshop: Workshop, monkeypatch: pytest.MonkeyPatch, name: str, value: str
 ):
-    host = CtypesHost(workshop.fmu(TROUBLE, 3), 3)
-    workshop.open.append(host)
+    host = workshop.own(TROUBLE, 3)
     monkeypatch.setenv(name, value)
     assert not host.instantiate()
     assert f"{name} is '{value}'; it is " in host.log[-1]

@@ -1,13 +1,12 @@
 """The compiled libraries against the standards' own headers, which FMPy brings along."""
 
-import ctypes
 import re
 from pathlib import Path
 
 import fmpy
 import pytest
 
-from handover.fmus.compile import RUNTIME, compile_runtime, host_platform, library, zig_cc
+from handover.fmus.compile import RUNTIME, zig_cc
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 
@@ -25,31 +24,11 @@ ENUMERATORS = {
 }
 
 
-def functions(fmi: int) -> list[str]:
-    text = (HEADERS / f"fmi{fmi}Functions.h").read_text()
-    return re.findall(rf"FMI{fmi}_Export\s+\w+TYPE\s+(\w+);", text)
-
-
 def compiles(source: str, folder: Path) -> None:
     file = folder / "check.c"
     file.write_text(source)
     done = zig_cc(["-c", "-std=c11", "-I", str(RUNTIME), "-I", str(HEADERS), str(file), "-o", str(folder / "check.o")])
     assert done.returncode == 0, done.stdout
-
-
-@pytest.mark.parametrize(("fmi", "count"), [(2, 44), (3, 75)])
-def test_every_function_of_the_standard_is_exported(fmi: int, count: int):
-    compile_runtime((host_platform(),))
-    exported = ctypes.CDLL(str(library(host_platform(), fmi)))
-    names = functions(fmi)
-    assert len(names) == count
-    assert [name for name in names if not hasattr(exported, name)] == []
-
-
-def test_nothing_else_is_exported():
-    exported = ctypes.CDLL(str(library(host_platform(), 3)))
-    assert not hasattr(exported, "instance_new")
-    assert not hasattr(exported, "fmi2DoStep")
 
 
 def test_declarations_agree_with_the_official_headers(tmp_path: Path):

@@ -121,8 +121,7 @@ def test_an_unknown_category_is_refused_with_the_known_ones_and_changes_nothing(
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("on", [True, False])
 def test_a_warning_is_reported_while_logging_is_on(workshop: Workshop, fmi: int, on: bool):
-    host = workshop.host(BLOCK, fmi)
-    host.free()
+    host = workshop.own(BLOCK, fmi)
     file = host.folder / "resources" / "unit.json"
     unit = json.loads(file.read_text())
     unit["packages"] = [{"module": "numpy", "distribution": "numpy", "version": "99999.0"}]

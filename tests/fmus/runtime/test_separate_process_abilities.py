@@ -76,7 +76,9 @@ def scalar(workshop: Workshop) -> list[object]:
     return list(values)
 
 
-@pytest.mark.parametrize("seen", [clocked, eventful, derived, wide, scalar])
+@pytest.mark.parametrize(
+    "seen", [clocked, derived, *(pytest.param(f, marks=pytest.mark.slow) for f in (eventful, wide, scalar))]
+)
 def test_a_unit_does_the_same_wherever_its_python_runs(
     workshop: Workshop, monkeypatch: pytest.MonkeyPatch, seen: Callable[[Workshop], list[object]]
 ):

@@ -4,6 +4,7 @@ import struct
 import pytest
 from ctypes_host import ERROR, OK, CtypesHost
 from saved_states import called, deserialise, save, serialised
+from support.wording import Wording
 from workshop import Workshop
 
 DT = 1 / 64
@@ -94,10 +95,10 @@ def test_saving_again_uses_the_same_state(workshop: Workshop):
 
 
 @pytest.mark.parametrize("damage", [b"", b"x" * 10, b"x" * 500])
-def test_bytes_that_are_no_state_are_refused(workshop: Workshop, damage: bytes):
+def test_bytes_that_are_no_state_are_refused(workshop: Workshop, damage: bytes, wording: Wording):
     host = ready(workshop, 3)
     assert deserialise(host, damage)[0] == ERROR
-    assert "not a state that this unit serialised" in host.log[-1]
+    wording.check(host.log[-1])
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -114,44 +115,44 @@ def test_a_serialised_state_with_flipped_bits_is_refused(workshop: Workshop, fmi
     assert deserialise(host, good)[0] == OK
 
 
-def test_a_foreign_state_is_refused_when_set(workshop: Workshop):
+def test_a_foreign_state_is_refused_when_set(workshop: Workshop, wording: Wording):
     host, other = ready(workshop, 3), workshop.host("scalars:Scalars", 3)
     other.initialise()
     data = serialised(host, save(host))
     status, state = deserialise(other, data)
     assert status == OK
     assert other.call("SetFMUState", state) == ERROR
-    assert "saved by another unit" in other.log[-1]
+    wording.check(other.log[-1])
     assert other.step(0.0, DT) == OK
 
 
-def test_a_state_with_a_parameter_out_of_range_changes_nothing(workshop: Workshop):
+def test_a_state_with_a_parameter_out_of_range_changes_nothing(workshop: Workshop, wording: Wording):
     host, other = ready(workshop, 3), ready(workshop, 3)
     expected = ten_steps(ready(workshop, 3))
     data = serialised(host, save(host)).replace(struct.pack("d", 2.0), struct.pack("d", 12.0), 1)
     state = deserialise(other, resealed(data))[1]
     assert other.call("SetFMUState", state) == ERROR
-    assert "parameter 'gain'" in other.log[-1]
+    wording.check(other.log[-1])
     assert ten_steps(other) == expected
 
 
-def test_an_instance_whose_block_fails_to_take_a_state_has_failed(workshop: Workshop):
+def test_an_instance_whose_block_fails_to_take_a_state_has_failed(workshop: Workshop, wording: Wording):
     host, other = ready(workshop, 3), ready(workshop, 3)
     data = serialised(host, save(host))
     state = deserialise(other, resealed(data[:-40] + bytes(40)))[1]
     assert other.call("SetFMUState", state) == ERROR
     assert other.step(3 * DT, DT) == ERROR
-    assert "failed: only reset" in other.log[-1]
+    wording.check(other.log[-1])
     assert other.call("SetFMUState", deserialise(other, data)[1]) == OK
     assert ten_steps(other) == ten_steps(host)
 
 
-def test_a_freed_state_and_one_of_another_instance_are_refused(workshop: Workshop):
+def test_a_freed_state_and_one_of_another_instance_are_refused(workshop: Workshop, wording: Wording):
     host, other = ready(workshop, 3), ready(workshop, 3)
     state = save(host)
     assert other.call("SetFMUState", state) == ERROR
     gone = ctypes.c_void_p(state.value)
     host.call("FreeFMUState", ctypes.byref(state))
     assert host.call("SetFMUState", gone) == ERROR
-    assert "it was freed" in host.log[-1]
+    wording.check(host.log[-1])
     assert host.call("FreeFMUState", ctypes.byref(ctypes.c_void_p())) == OK

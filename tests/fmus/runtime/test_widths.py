@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ctypes_host import ERROR, OK, SIZE, CtypesHost
+from support.wording import Wording
 from workshop import Workshop
 
 from handover.fmus.contents.fmi2_description import NoFmi2Form
@@ -69,58 +70,43 @@ def set_real(host: CtypesHost, name: str, *values: float) -> int:
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize(
-    ("name", "values", "told"),
-    [
-        ("x", (1e38,), "DoStep: output 'x_out' is 5e+75; it is declared as Float32, up to 3.40282e+38"),
-        ("x", (-1e38,), "DoStep: output 'x_out' is -5e+75; it is declared as Float32"),
-        ("v", (0.0, 0.0, 3e38), "is 6e+38"),
-    ],
-)
+@pytest.mark.parametrize(("name", "values"), [("x", (1e38,)), ("x", (-1e38,)), ("v", (0.0, 0.0, 3e38))])
 def test_a_step_whose_output_no_single_holds_is_an_error(
-    workshop: Workshop, fmi: int, name: str, values: tuple[float, ...], told: str
+    workshop: Workshop, fmi: int, name: str, values: tuple[float, ...], wording: Wording
 ):
     host = workshop.host(BLOCK, fmi)
     assert set_real(host, "stretch", 5e37) == OK
     assert host.initialise() == OK
     assert host.step(0.0, 0.5) == OK
     assert set_real(host, name, *values) == OK
-    assert host.step(0.5, 0.5) == ERROR
-    assert told in host.log[-1]
-    assert host.step(0.5, 0.5) == ERROR
-    assert "failed: only reset" in host.log[-1]
+    for _ in range(2):  # the second time since it has failed
+        assert host.step(0.5, 0.5) == ERROR
+        wording.check(host.log[-1])
 
 
 @pytest.mark.parametrize(
-    ("width", "name", "message"),
-    [
-        ("Float64", "x", "'x' (value reference 3) is of type Float32"),
-        ("Float32", "time", "'time' (value reference 0) is of type Float64"),
-        ("Int64", "i16", "is of type Int16"),
-        ("UInt16", "i16", "is of type Int16"),
-        ("Int32", "x", "is of type Float32"),
-        ("Float32", "told", "is of type String"),
-        ("Boolean", "u8", "is of type UInt8"),
-    ],
-)
-def test_a_call_of_another_type_is_reported_the_variables_own(workshop: Workshop, width: str, name: str, message: str):
+    ("width", "name"),
+    [("Float64", "x"), ("Float32", "time"), ("Int64", "i16"), ("UInt16", "i16"), ("Int32", "x"), ("Float32", "told"),
+     ("Boolean", "u8")],
+)  # fmt: skip
+def test_a_call_of_another_type_is_reported_the_variables_own(
+    workshop: Workshop, width: str, name: str, wording: Wording
+):
     host = workshop.host(BLOCK, 3)
     host.initialise()
-    assert transfer(host, "Get", width, name, (ctypes.c_double * 1)()) == ERROR
-    assert message in host.log[-1]
-    assert transfer(host, "Set", width, name, (ctypes.c_double * 1)()) == ERROR
-    assert message in host.log[-1]
+    for verb in ("Get", "Set"):
+        assert transfer(host, verb, width, name, (ctypes.c_double * 1)()) == ERROR
+        wording.check(host.log[-1])
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_an_output_outside_its_width_is_an_error_that_says_the_range(workshop: Workshop, fmi: int):
+def test_an_output_outside_its_width_is_an_error_that_says_the_range(workshop: Workshop, fmi: int, wording: Wording):
     host = workshop.host(BLOCK, fmi)
     width = "Integer" if fmi == 2 else "Int16"
     shift = (ctypes.c_int * 1)(-1) if fmi == 2 else (ctypes.c_int16 * 1)(-1)
     assert set_integer(host, width, "shift", shift) == OK
     assert host.initialise() == ERROR
-    told = "output 'i8_out' is declared as Int8 (from -128 to 127); the block gave int: -129"
-    assert told in host.log[-1]
+    wording.check(host.log[-1].splitlines()[-1])
 
 
 def get_integer(host: CtypesHost, name: str) -> int:
@@ -136,22 +122,14 @@ def set_integer(host: CtypesHost, function: str, name: str, values: Any) -> int:
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "told"),
-    [
-        ("i8", 128, "'i8' (value reference 6) takes Int8, from -128 to 127, not 128"),
-        ("u8", -1, "takes UInt8, from 0 to 255, not -1"),
-        ("i16", -40000, "takes Int16, from -32768 to 32767"),
-        ("u16", 65536, "takes UInt16, from 0 to 65535"),
-        ("u32", -1, "takes UInt32, from 0 to 4294967295, not -1"),
-        ("u64", -1, "takes UInt64, from 0 to"),
-    ],
+    ("name", "value"), [("i8", 128), ("u8", -1), ("i16", -40000), ("u16", 65536), ("u32", -1), ("u64", -1)]
 )
-def test_fmi_2_refuses_what_is_outside_an_inputs_width(workshop: Workshop, name: str, value: int, told: str):
+def test_fmi_2_refuses_what_is_outside_an_inputs_width(workshop: Workshop, name: str, value: int, wording: Wording):
     host = workshop.host(BLOCK, 2)
     assert host.initialise() == OK
     before = get_integer(host, name)
     assert set_integer(host, "Integer", name, (ctypes.c_int * 1)(value)) == ERROR
-    assert told in host.log[-1]
+    wording.check(host.log[-1])
     assert get_integer(host, name) == before
 
 
