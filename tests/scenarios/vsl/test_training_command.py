@@ -6,7 +6,7 @@ import re
 import signal
 import sys
 import types
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
@@ -15,7 +15,8 @@ from typing import Any, TextIO
 
 import numpy as np
 import pytest
-from vsl_training_points import TRAINING, call, key_of_made_up, made_up, nobody, shipped
+from support.wording import Wording
+from vsl_training_points import TRAINING, Trained, call, key_of_made_up, made_up, nobody, shipped
 
 from handover.controllers.vsl.default_model import DEFAULT_MODEL
 from handover.controllers.vsl.hybrid_kinematics import HybridKinematics, InvalidModel, Params
@@ -32,17 +33,16 @@ from handover.scenarios.vsl.training import Progress, VslTraining
 from handover.scenarios.vsl.training_data import Measured
 
 
-def test_the_same_seed_gives_the_same_model_in_both_forms(tmp_path: Path):
-    for name in ("m.json", "m.py"):
-        result = call("--points", "400", "--seed", "1", "--out", tmp_path / name)
-        assert result.exit_code == 0, result.output
-        assert "400 points measured" in result.output
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["m.json", "m.py"]
+def test_the_same_seed_gives_the_same_model_in_both_forms(trained: Trained, tmp_path: Path):
+    result = call("--points", "400", "--seed", "1", "--out", tmp_path / "m.py")
+    assert result.exit_code == 0, result.output
+    assert "400 points measured" in result.output
+    assert [p.name for p in tmp_path.iterdir()] == ["m.py"]
     module = types.ModuleType("m")
     exec((tmp_path / "m.py").read_text(), vars(module))
-    assert vars(module)["DEFAULT_MODEL"] == (tmp_path / "m.json").read_text()
+    assert vars(module)["DEFAULT_MODEL"] == trained.model.read_text()
     assert "--points 400 --seed 1" in (module.__doc__ or "")
-    text = read_model(tmp_path / "m.json").provenance
+    text = read_model(trained.model).provenance
     assert text["arm"]["fmu"] == "VslArm"
     assert text["arm"]["parameters"]["motion"] == "QUASI_STATIC"
     assert text["seed"] == 1
@@ -50,13 +50,16 @@ def test_the_same_seed_gives_the_same_model_in_both_forms(tmp_path: Path):
     assert text["mean_test_errors_m"]["forward_hybrid"] < 0.1 * text["mean_test_errors_m"]["forward_model_based"]
 
 
-def test_the_command_that_a_refusal_advises_makes_the_model_that_is_lacking(tmp_path: Path):
+def test_the_command_that_a_refusal_advises_makes_the_model_that_is_lacking(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(vsl_train_command, "MIN_POINTS", 200)
     links: dict[str, Any] = {"L_1": 0.2, "L_2": 0.3, "L_3": 0.26, "elbow": Elbow.DOWN}
     with pytest.raises(InvalidModel) as refused:
         HybridKinematics(Params(**links))
     advice = re.search(r"`handover vsl-train(.*)`", str(refused.value))
     assert advice is not None
-    result = call(*advice[1].split(), "--points", "400", "--out", tmp_path / "m.json")
+    result = call(*advice[1].split(), "--points", "200", "--out", tmp_path / "m.json")
     assert result.exit_code == 0, result.output
     HybridKinematics(Params(**links, model=str(tmp_path / "m.json")))
     arm = read_model(tmp_path / "m.json").provenance
@@ -83,8 +86,8 @@ def test_errors_fall_along_the_learning_curve():
     assert seen == [1, 2, 3]
 
 
-def test_the_curve_is_drawn(tmp_path: Path):
-    result = call("--points", "400", "--curve", tmp_path / "a.b.png", "--out", tmp_path / "m.json")
+def test_the_curve_is_drawn(trained: Trained, tmp_path: Path):
+    result = call("--data", trained.data, "--curve", tmp_path / "a.b.png", "--out", tmp_path / "m.json")
     assert result.exit_code == 0, result.output
     assert {p.name for p in tmp_path.iterdir()} == {"a.b.png", "a.b.svg", "m.json"}
     assert re.search(r"^ +250 +\d+\.\d\d", result.output, re.MULTILINE)
@@ -96,6 +99,7 @@ def test_model_and_data_are_written_before_the_curve(tmp_path: Path, monkeypatch
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(curve_module, "_draw", full)
+    monkeypatch.setattr(VslTraining, "measure", lambda _self, _progress: made_up(400))
     out, curve = tmp_path / "m.json", tmp_path / "c.png"
     result = call("--points", "400", "--save-data", tmp_path / "d.parquet", "--curve", curve, "--out", out)
     assert result.exit_code == 2
@@ -134,45 +138,48 @@ def test_without_pytorch_the_published_network_is_refused(tmp_path: Path, monkey
 
 
 @pytest.mark.parametrize(
-    ("arguments", "text"),
+    "arguments",
     [
-        (["--points", "10"], "10 is not in the range"),
-        (["--points", "50"], "--points 50: without --adapt at least 400"),
-        (["--arm", "EI_factor=1.2,1.2"], "is not an array of shape [3]"),
-        (["--arm", "EI_factor=1.2,x,1"], "is not 3 numbers with commas between"),
-        (["--arm", "EI_0"], "is not of the form NAME=VALUE"),
-        (["--arm", "EI=1"], "the arm has no parameter 'EI'"),
-        (["--arm", "links=3"], "--arm links=3: kinematics are learned of an arm of two links"),
-        (["--arm", "load_steps=8:0.1"], "--arm load_steps=8:0.1: loads are those of the points"),
-        (["--arm", "EI_0=x"], "'x' is not a number"),
-        (["--arm", "EI_0=-1"], "--arm EI_0=-1"),
-        (["--save-data", "d.csv"], "ends in .parquet"),
-        (["--curve", "c.pdf"], "ends in .png"),
-        (["--epochs", "3"], "of the published network alone"),
-        (["--learned", "physics", "--forward-input", "X"], "begins with the joints' angles"),
-        (["--data", "d.parquet", "--seed", "1", "--walk"], "--seed, --walk: with --data it is the file's"),
-        (["--adapt", "m.json", "--learned", "small"], "--learned: with --adapt it is the model's"),
-        (["--adapt", "none.json"], "none.json: it cannot be read"),
-        (["--data", "none.parquet"], "it is no Parquet file that can be read"),
-        (["--seed", "-1"], "-1 is not in the range"),
-        (["--out", "text.fmu/m.json"], "is a file, so no folder can be made in it"),
-        (["--out", "m.txt"], "ends in .json"),
-        (["--out", "m" * 250 + ".json"], "the name is longer than"),
-        (["--elbow", "left"], "'left' is not one of"),
-        (["--out", "folder.json"], "there is a folder of that name"),
-        (["--plant", "none.fmu"], "none.fmu"),
-        (["--plant", "text.fmu"], "not an FMU"),
+        ["--points", "10"],
+        ["--points", "50"],
+        ["--arm", "EI_factor=1.2,1.2"],
+        ["--arm", "EI_factor=1.2,x,1"],
+        ["--arm", "EI_0"],
+        ["--arm", "EI=1"],
+        ["--arm", "links=3"],
+        ["--arm", "load_steps=8:0.1"],
+        ["--arm", "EI_0=x"],
+        ["--arm", "EI_0=-1"],
+        ["--save-data", "d.csv"],
+        ["--curve", "c.pdf"],
+        ["--epochs", "3"],
+        ["--learned", "physics", "--forward-input", "X"],
+        ["--data", "d.parquet", "--seed", "1", "--walk"],
+        ["--adapt", "m.json", "--learned", "small"],
+        ["--adapt", "none.json"],
+        ["--data", "none.parquet"],
+        ["--seed", "-1"],
+        ["--out", "text.fmu/m.json"],
+        ["--out", "m.txt"],
+        pytest.param(["--out", "m" * 250 + ".json"], id="--out of a long name"),
+        ["--elbow", "left"],
+        ["--out", "folder.json"],
+        ["--plant", "none.fmu"],
+        ["--plant", "text.fmu"],
     ],
+    ids=" ".join,
 )
-def test_usage_errors_take_a_line(arguments: list[str], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_usage_errors_take_a_line(
+    arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder.json").mkdir()
     (tmp_path / "text.fmu").write_text("text")
     before = sorted(tmp_path.iterdir())
     result = call(*arguments)
     assert result.exit_code == 2
-    assert text in result.output
-    assert "Traceback" not in result.output
+    if not result.output.startswith("Usage:"):  # which are click's words
+        wording.check(result.output)
     assert sorted(tmp_path.iterdir()) == before
 
 
@@ -184,19 +191,15 @@ def test_an_arm_that_fails_leaves_no_file(tmp_path: Path):
     assert not (tmp_path / "m.json").exists()
 
 
-@pytest.mark.parametrize(
-    ("arm", "text"),
-    [
-        ("DistantArm", "0 of 400 measured tips are where links of 0.225 and 0.225 m"),
-        ("ArmWithoutGauges", r"the same at all points, whatever is commanded: p_meas\[1\], p_meas\[2\]"),
-    ],
-)
-def test_an_arm_that_teaches_nothing_is_refused(arm: str, text: str, tmp_path: Path):
+@pytest.mark.parametrize("arm", ["DistantArm", "ArmWithoutGauges"])
+def test_an_arm_that_teaches_nothing_is_refused(
+    arm: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
+):
+    monkeypatch.setattr(vsl_train_command, "MIN_POINTS", 20)
     fmu = build_block(f"vsl_training_arms:{arm}", 3, tmp_path, step=Fraction(1, 50))
-    result = call("--points", "400", "--plant", fmu, "--out", tmp_path / "m.json")
+    result = call("--points", "20", "--plant", fmu, "--out", tmp_path / "m.json")
     assert result.exit_code == 2
-    assert re.search(text, result.output)
-    assert "Traceback" not in result.output
+    wording.check(result.output)
     assert not (tmp_path / "m.json").exists()
 
 
@@ -227,7 +230,14 @@ def test_ctrl_c_leaves_the_file_of_before(tmp_path: Path, monkeypatch: pytest.Mo
     assert [p.read_text() for p in tmp_path.iterdir()] == ["former"]
 
 
-def test_arrays_of_the_arm_are_given_with_commas(tmp_path: Path):
+def test_arrays_of_the_arm_are_given_with_commas(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    arms: list[Mapping[str, Any]] = []
+
+    def measure(training: VslTraining, _progress: Progress) -> Measured:
+        arms.append(training.arm)
+        return made_up(400)
+
+    monkeypatch.setattr(VslTraining, "measure", measure)
     result = call("--points", "400", "--arm", "EI_factor=1.2,1.1,1", "--out", tmp_path / "m.json")
     assert result.exit_code == 0, result.output
-    assert read_model(tmp_path / "m.json").provenance["arm"]["parameters"]["EI_factor"] == [1.2, 1.1, 1.0]
+    assert [arm["EI_factor"].tolist() for arm in arms] == [[1.2, 1.1, 1.0]]

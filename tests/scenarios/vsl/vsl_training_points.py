@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from click.testing import CliRunner, Result
@@ -15,6 +16,15 @@ from handover.fmus.build import cached
 from handover.scenarios.cli.robots.vsl_train import vsl_train
 from handover.scenarios.vsl.training import VslTraining
 from handover.scenarios.vsl.training_data import Dataset, Measured
+
+
+class Trained(NamedTuple):
+    """A model of 400 points of seed 1, the points' file, and what the command printed."""
+
+    model: Path
+    data: Path
+    output: str
+
 
 ARM = VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
 
