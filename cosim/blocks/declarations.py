@@ -10,6 +10,7 @@ import enum
 import math
 import numbers
 import typing
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ class DeclarationError(TypeError):
         self.owner, self.field, self.fault = owner, field, fault
 
 
+@cache
 def declared_variables(owner: type[Any], causality: Causality, block: str = "") -> tuple[Variable, ...]:
     """Read the fields of one dataclass of declarations; `block` names the block that it belongs to, if to one.
 
