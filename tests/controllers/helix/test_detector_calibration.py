@@ -49,11 +49,10 @@ def true_edge_shift(u: Scene, pictures: Pair) -> Floats:
 
 @pytest.mark.parametrize("blur", [0.7, 1.0])
 def test_finds_the_shifts_without_knowing_the_poses(blur: float):
-    pictures = taken(blur, 14)
+    pictures = taken(blur, 10)
     found = calibrate_detector([pair for _, pair in pictures], CAMERAS, RING, P.ball_radius)
     corner = np.median(np.concatenate([true_corner_shift(u, pair) for u, pair in pictures]))
     edge = np.median(np.concatenate([true_edge_shift(u, pair) for u, pair in pictures]))
-    print(f"\nblur {blur} px; by the true poses {corner:+.3f} and {edge:+.3f} px\n{found}")
     assert found.corner_shift.value == pytest.approx(corner, abs=0.05)
     assert found.edge_shift.value == pytest.approx(edge, abs=0.02)
     assert 0.0 < found.corner_shift.error < 0.03

@@ -25,39 +25,35 @@ def two_rings() -> StereoCamera:
     return StereoCamera(CameraParams(rings=2))
 
 
-def test_the_published_detector_averages_what_the_joint_one_fits(camera: StereoCamera):
+def test_the_published_detector_averages_what_the_joint_one_fits_and_its_covariances_tell_the_errors(
+    camera: StereoCamera,
+):
     rng = np.random.default_rng(3)
     errors: list[tuple[Floats, Floats]] = []
+    squares: list[list[float]] = []
     for _ in range(12):
         u = anywhere(rng)
         joint, published = (look(camera, HandoverVision(p), u) for p in (Params(), PUBLISHED))
         if all(y.seen_O and y.seen_R for y in (joint, published)):
             errors.append((distances(joint, u), distances(published, u)))
+        if published.seen_O and published.seen_R:
+            y = published
+            pairs = [(y.p_WO_meas - u.p_WO, y.cov_O), (y.p_WR_meas - u.p_WR, y.cov_R), (y.p_WG_meas - u.p_WG, y.cov_G)]
+            squares.append([float(e @ np.linalg.solve(cov, e)) for e, cov in pairs])
     assert len(errors) >= 9
     joint, published = 1e3 * np.sqrt(np.mean(np.square(errors), axis=0))
     assert np.all(joint < [1.0, 1.0, 2.0])  # mm RMS of ball, wrist and gripper
     assert np.all(published < [15.0, 80.0, 90.0])
     assert np.all(published > 5.0 * joint)
+    ball, wrist, gripper = np.transpose(squares)
+    assert np.median(ball) < 3.0  # few are far off, by half-hidden discs
+    for square in (wrist, gripper):
+        assert 0.3 < np.mean(square) < 9.0  # 3 where they were exact
 
 
 def test_the_published_gripper_is_at_its_distance_from_the_wrist(camera: StereoCamera):
     y = look(camera, HandoverVision(PUBLISHED), hanging("left"))
     assert np.linalg.norm(y.p_WG_meas - y.p_WR_meas) == pytest.approx(0.1)  # eq. (13)
-
-
-def test_the_published_covariances_tell_the_errors(camera: StereoCamera):
-    rng = np.random.default_rng(17)
-    squares: list[list[float]] = []
-    for _ in range(12):
-        u = anywhere(rng)
-        y = look(camera, HandoverVision(PUBLISHED), u)
-        if y.seen_O and y.seen_R:
-            pairs = [(y.p_WO_meas - u.p_WO, y.cov_O), (y.p_WR_meas - u.p_WR, y.cov_R), (y.p_WG_meas - u.p_WG, y.cov_G)]
-            squares.append([float(e @ np.linalg.solve(cov, e)) for e, cov in pairs])
-    ball, wrist, gripper = np.transpose(squares)
-    assert np.median(ball) < 3.0  # few are far off, by half-hidden discs
-    for square in (wrist, gripper):
-        assert 0.3 < np.mean(square) < 9.0  # 3 where they were exact
 
 
 def test_with_one_camera_the_thesis_finds_the_ring_but_no_ball(camera: StereoCamera):
@@ -135,13 +131,13 @@ def test_an_arm_as_fast_as_the_bounds_is_followed(camera: StereoCamera):
 def test_what_is_seen_high_up_is_where_it_is(camera: StereoCamera):
     rng = np.random.default_rng(3)
     errors: list[float] = []
-    for _ in range(12):
+    for _ in range(5):
         vision = HandoverVision(Params())
         for i, u in enumerate(rising(rng, 25)):
             y = look(camera, vision, u, t=0.1 * i)
             if y.seen_R and u.p_WR[2] > -0.5:
                 errors.append(float(distances(y, u)[1]))
-    assert len(errors) > 80
+    assert len(errors) > 30
     assert max(errors) < 0.02
     assert np.sqrt(np.mean(np.square(errors))) < 0.004
 

@@ -36,11 +36,12 @@ def test_every_output_feeds_through_from_all_pictures():
     assert d.feedthrough == {v.name: ("left", "right", "third") for v in d.outputs}
 
 
-def test_accuracy_over_many_poses(camera: StereoCamera):
+def test_accuracy_over_many_poses_and_covariances_that_tell_the_errors(camera: StereoCamera):
     rng = np.random.default_rng(7)
     errors: list[Floats] = []
+    squares: list[list[float]] = []
     both: list[bool] = []
-    for _ in range(30):
+    for _ in range(16):
         u, vision = anywhere(rng), HandoverVision(Params())
         look(camera, vision, u)
         y = look(camera, vision, u)
@@ -48,24 +49,27 @@ def test_accuracy_over_many_poses(camera: StereoCamera):
         if y.seen_R:  # a hand may hide the ring
             errors.append(distances(y, u))
             both.append(bool(np.trace(y.cov_O) < 0.002**2))  # the arm may hide the ball from one camera
+            pairs = [(y.p_WO_meas - u.p_WO, y.cov_O), (y.p_WR_meas - u.p_WR, y.cov_R), (y.p_WG_meas - u.p_WG, y.cov_G)]
+            squares.append([float(e @ np.linalg.solve(cov, e)) for e, cov in pairs])
     _, wrist, gripper = 1e3 * np.sqrt(np.mean(np.square(errors), axis=0))
     balls = np.array(errors)[:, 0]
     ball = 1e3 * np.sqrt(np.mean(balls[both] ** 2))
-    print(f"\nRMS error over {len(errors)} poses: ball {ball:.2f} mm ({sum(both)} seen by both cameras), "
-          f"wrist {wrist:.2f} mm, gripper {gripper:.2f} mm")  # fmt: skip
-    assert len(errors) >= 28
-    assert sum(both) >= 24
+    assert len(errors) >= 15
+    assert sum(both) >= 13
     assert ball < 0.15
     assert balls.max() < 0.01
     assert wrist < 0.6
     assert gripper < 1.25
+    mean = np.mean(squares, axis=0)  # 3 where the covariances were exact
+    assert np.all(mean > 0.2)
+    assert np.all(mean < 9.0)
 
 
 def seen_with(covered: tuple[str, ...], has_third: bool, detector: Detector = Detector.JOINT) -> Floats:
-    """Return errors of ball and wrist in 12 scenes, shape (12, 2), m; NaN where one is not seen."""
+    """Return errors of ball and wrist in 6 scenes, shape (6, 2), m; NaN where one is not seen."""
     until = [1e9 if side in covered else 0.0 for side in ("left", "right")]
     camera = StereoCamera(CameraParams(has_third=has_third, cover_left_until=until[0], cover_right_until=until[1]))
-    rng, errors = np.random.default_rng(5), np.full((12, 2), np.nan)
+    rng, errors = np.random.default_rng(5), np.full((6, 2), np.nan)
     for e in errors:
         u = anywhere(rng)
         y = look(camera, HandoverVision(Params(has_third=has_third, detector=detector)), u)
@@ -77,7 +81,7 @@ def seen_with(covered: tuple[str, ...], has_third: bool, detector: Detector = De
 @pytest.mark.parametrize("covered", ["left", "right"])
 def test_a_third_camera_makes_up_for_a_covered_one(covered: str):
     alone, beside = seen_with((covered,), has_third=False), seen_with((covered,), has_third=True)
-    assert np.count_nonzero(np.isfinite(beside).all(axis=1)) >= 10
+    assert np.count_nonzero(np.isfinite(beside).all(axis=1)) >= 5
     ball, wrist = np.nanmedian(beside, axis=0)
     ball_alone, wrist_alone = np.nanmedian(alone, axis=0)
     assert ball < min(0.3 * ball_alone, 0.0002)
@@ -87,14 +91,14 @@ def test_a_third_camera_makes_up_for_a_covered_one(covered: str):
 def test_a_third_camera_alone_sees_ball_and_ring_where_the_arm_does_not_hide_them():
     errors = seen_with(("left", "right"), has_third=True)
     seen = np.isfinite(errors)
-    assert np.all(np.count_nonzero(seen, axis=0) >= [8, 4])
+    assert np.all(np.count_nonzero(seen, axis=0) >= [4, 2])
     assert np.nanmax(errors) < 0.015
 
 
 def test_the_published_detector_takes_the_ball_by_the_two_cameras_that_see_it():
     assert np.isnan(seen_with(("left",), has_third=False, detector=Detector.PUBLISHED)[:, 0]).all()
     balls = seen_with(("left",), has_third=True, detector=Detector.PUBLISHED)[:, 0]
-    assert np.count_nonzero(np.isfinite(balls)) >= 10
+    assert np.count_nonzero(np.isfinite(balls)) >= 5
     assert np.nanmedian(balls) < 0.005
 
 
@@ -106,25 +110,12 @@ def test_without_a_third_camera_its_picture_does_not_count():
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_ball_and_ring_are_seen_at_every_place(camera: StereoCamera, place: str):
+def test_ball_and_ring_are_seen_at_every_place(place: str):
+    camera = StereoCamera(CameraParams(seed=1))
     for u in (hanging(place), reaching(place, 0.0), reaching(place, 1.0)):
         y = look(camera, HandoverVision(Params()), u)
         assert (y.seen_O, y.seen_R) == (True, True)
         assert np.all(distances(y, u) < [0.0005, 0.0015, 0.0025])
-
-
-def test_covariances_tell_the_errors(camera: StereoCamera):
-    rng = np.random.default_rng(11)
-    squares: list[list[float]] = []
-    for _ in range(20):
-        u = anywhere(rng)
-        y = look(camera, HandoverVision(Params()), u)
-        if y.seen_O and y.seen_R:
-            pairs = [(y.p_WO_meas - u.p_WO, y.cov_O), (y.p_WR_meas - u.p_WR, y.cov_R), (y.p_WG_meas - u.p_WG, y.cov_G)]
-            squares.append([float(e @ np.linalg.solve(cov, e)) for e, cov in pairs])
-    mean = np.mean(squares, axis=0)  # 3 where the covariances were exact
-    assert np.all(mean > 0.2)
-    assert np.all(mean < 9.0)
 
 
 def test_one_camera_is_enough_but_says_that_it_knows_depth_less(camera: StereoCamera, one_eyed: StereoCamera):
@@ -164,7 +155,7 @@ def test_fingers_before_the_ball_hardly_shift_it():
     camera, rng = StereoCamera(CameraParams(seed=1)), np.random.default_rng(1)
     errors: list[float] = []
     squares: list[float] = []
-    for _ in range(120):
+    for _ in range(40):
         u = over_ball(rng)
         y = look(camera, HandoverVision(Params()), u)
         assert y.seen_O
@@ -172,8 +163,6 @@ def test_fingers_before_the_ball_hardly_shift_it():
         errors.append(1e3 * float(np.linalg.norm(e)))
         squares.append(float(e @ np.linalg.solve(y.cov_O, e)))
     rms, most, share = np.sqrt(np.mean(np.square(errors))), max(errors), np.percentile(errors, 95)
-    print(f"\nball behind fingers: RMS {rms:.3f} mm, 95 % {share:.3f} mm, most {most:.2f} mm, e^T C^-1 e "
-          f"{np.mean(squares):.1f}")  # fmt: skip
     assert rms < 0.15
     assert share < 0.3
     assert most < 1.0
@@ -184,7 +173,7 @@ def test_fingers_before_the_ball_hardly_shift_it():
 def test_finds_again_what_jumped_out_of_its_region(start: str):
     """The region around where the ball was may show a part of it, or one camera's may."""
     camera, u = StereoCamera(CameraParams(seed=2)), reaching("back-left", 0.0)
-    for _ in range(8):
+    for _ in range(3):
         vision = HandoverVision(Params())
         look(camera, vision, hanging(start))
         y = look(camera, vision, u, t=1.0)

@@ -59,7 +59,7 @@ def own(**values: Any) -> Loop:
     return Loop(VisualServo(Params(**values)))
 
 
-@pytest.mark.parametrize("degrees", [0.0, 45.0, 90.0, 135.0, -100.0])
+@pytest.mark.parametrize("degrees", [0.0, 135.0, -100.0])
 def test_the_gripper_comes_to_the_ball_within_what_the_cameras_know(degrees: float):
     p_WO, run = ball_at(degrees), Loop()
     assert run.run(Phase.GRASP, p_WO).phase is Phase.GRASP
@@ -163,8 +163,12 @@ def everything(y: Outputs) -> list[Any]:
     return [np.asarray(getattr(y, v.name)).tolist() for v in describe(VisualServo).outputs]
 
 
-@pytest.mark.parametrize("after", [0, 7, 43, 120, 180])
-def test_another_servo_goes_on_from_the_state_bit_for_bit(after: int):
+Course = tuple[list[Inputs], list[Outputs]]
+
+
+@pytest.fixture(scope="module")
+def course() -> Course:
+    """What a servo reads and commands that loses the ring on its way, and closes its gripper."""
     run, inputs = own(closing_time=4.0), list[Inputs]()
 
     def keep(t: float, u: Inputs) -> Inputs:
@@ -174,13 +178,19 @@ def test_another_servo_goes_on_from_the_state_bit_for_bit(after: int):
     for _ in range(320):
         run.step(ball_at(45.0), keep)
     assert {y.phase for y in run.history} >= {Phase.APPROACH, Phase.RECOVER, Phase.DESCEND, Phase.GRASP}
+    return inputs, run.history
+
+
+@pytest.mark.parametrize("after", [0, 7, 43, 120, 180])
+def test_another_servo_goes_on_from_the_state_bit_for_bit(after: int, course: Course):
+    inputs, history = course
     begun, other = (VisualServo(Params(closing_time=4.0)) for _ in range(2))
     for n, u in enumerate(inputs[:after]):
         begun.step(n * PICTURE, PICTURE, u)
     other.step(0.0, PICTURE, inputs[20])
     other.set_state(begun.get_state())
-    for n, u in enumerate(inputs[after:], after):
-        assert everything(other.step(n * PICTURE, PICTURE, u)) == everything(run.history[n])
+    for n, u in enumerate(inputs[after : after + 150], after):
+        assert everything(other.step(n * PICTURE, PICTURE, u)) == everything(history[n])
 
 
 def update_times(loop: Loop, seconds: float) -> Floats:

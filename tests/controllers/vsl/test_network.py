@@ -118,9 +118,9 @@ def test_a_small_network_learns():
     assert fit.network.neurons == (32, 32)
     assert fit.validation_rms < 0.3 * float(np.std(values(X)))
     assert set(fit.facts) == {"decay", "steps", "scipy"}
-    again = fit_small(points(), seed=1, steps=150)
-    np.testing.assert_array_equal(again.network.predict(X), fit.network.predict(X))
-    assert np.any(fit_small(points(), seed=2, steps=150).network.predict(X) != fit.network.predict(X))
+    first, again, other = (fit_small(points(), seed=seed, steps=10).network.predict(X) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(again, first)
+    assert np.any(other != first)
 
 
 @pytest.mark.slow

@@ -159,7 +159,8 @@ def test_fingers_are_where_they_are_painted_and_mirror_nothing():
     np.testing.assert_allclose(np.degrees(np.arctan2(seen[:, 2, 1], seen[:, 2, 0])) % 360.0, [60.0, 180.0, 300.0])
 
 
-@pytest.mark.parametrize("compiled", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("compiled", [True, False])
 def test_plain_python_gives_the_same_grasp(*, compiled: bool):
     script = (
         "from partner_runs import *\n"

@@ -92,12 +92,12 @@ def test_reflectivity_and_gain_scale_a_reading():
 def test_a_sensor_of_more_range_reads_from_farther_what_the_characteristic_says():
     window, rays = beams(np.zeros(3), np.eye(3), 0.0, (P.across, P.ahead), 0.0)
     ranges: list[float] = []
-    for seed in range(100):
+    for seed in range(40):
         for sensor in range(6):
             ball = window[sensor, 0] + (0.02 + P.ball_radius) * rays[sensor, 0]
             ticks = read(ball, beam=0.0, range_tolerance=0.1, seed=seed)[sensor]
             ranges.append(0.02 / P.sensor().distance(ticks))
-    assert np.std(ranges) == pytest.approx(0.1, abs=0.01)
+    assert np.std(ranges) == pytest.approx(0.1, abs=0.015)
     assert np.mean(ranges) == pytest.approx(1.0, abs=0.02)
 
 

@@ -58,7 +58,9 @@ def test_declares_pictures_that_feed_through_at_30_hz():
     assert float(d.period) == pytest.approx(1 / 30)
 
 
-@pytest.mark.parametrize("kernels", ["compiled", "not compiled", "not loaded"])
+@pytest.mark.parametrize(
+    "kernels", ["not loaded", *(pytest.param(k, marks=pytest.mark.slow) for k in ("compiled", "not compiled"))]
+)
 def test_pictures_are_the_same_in_another_process_with_compiled_kernels_and_without(kernels: str):
     code = f"import sys; sys.path[:0] = [{str(HOUSE)!r}, {str(Path(__file__).parent)!r}]\n"
     if kernels != "not loaded":
@@ -202,14 +204,13 @@ def test_a_lost_picture_is_black_and_the_other_camera_s_is_not():
 def test_tape_hides_the_markers_that_face_the_cameras_first():
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50))
     seen: list[set[int]] = []
-    for covered in (0, 1, 3, 8):
+    for covered in (0, 3, 8):
         y = StereoCamera(Params(covered_markers=covered)).outputs(0.0, Inputs())
         ids: list[Any] = [detector.detectMarkers(cv2.cvtColor(p, cv2.COLOR_BGR2GRAY))[1] for p in (y.left, y.right)]
         seen.append({int(i) for found in ids if found is not None for i in found.ravel()})
     assert {3, 4, 5} <= seen[0]
-    assert seen[1] == seen[0] - {4}
-    assert seen[2] == seen[0] - {3, 4, 5}
-    assert seen[3] == set()
+    assert seen[1] == seen[0] - {3, 4, 5}
+    assert seen[2] == set()
 
 
 def test_a_card_hides_the_ball_from_both_cameras_while_it_is_held():
@@ -236,7 +237,7 @@ def test_three_pictures_continue_bit_identically_from_a_state():
     camera, other = (StereoCamera(Params(has_third=True, lost_pictures=0.3, seed=1)) for _ in range(2))
     camera.step(0.0, 1 / 30, Inputs())
     other.set_state(camera.get_state())
-    for k in range(1, 6):
+    for k in range(1, 4):
         a, b = (c.step(k / 30, 1 / 30, Inputs(grip=0.1 * k)) for c in (camera, other))
         for side in ("left", "right", "third"):
             np.testing.assert_array_equal(getattr(a, side), getattr(b, side))
@@ -255,7 +256,7 @@ def test_a_repeated_picture_is_the_same_after_its_state_was_restored():
     camera.step(0.0, 1 / 30, Inputs(grip=0.5))
     state = camera.get_state()
     other.set_state(state)
-    for k in range(1, 8):
+    for k in range(1, 5):
         a, b = (c.step(k / 30, 1 / 30, Inputs()) for c in (camera, other))
         np.testing.assert_array_equal(a.left, b.left)
         np.testing.assert_array_equal(a.right, b.right)

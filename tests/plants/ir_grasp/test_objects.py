@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.ir_grasp.objects import SOLIDS, Solid, Thing, outlines
@@ -109,11 +110,12 @@ def test_a_slender_bar_and_a_dented_polygon_have_the_friction_arm_of_their_area(
     corners = dented.corners
     edges = list(zip(corners, (*corners[1:], corners[0]), strict=True))
     p = np.random.default_rng(0).uniform(-0.05, 0.05, (100000, 2))
-    inside = np.array([sum(_crosses(x, y, a, b) for a, b in edges) % 2 for x, y in p.tolist()], dtype=bool)
+    inside = np.sum([_crosses(p, a, b) for a, b in edges], axis=0) % 2 == 1
     distance: Floats = np.linalg.norm(p - np.array(dented.centroid), axis=1)
     assert dented.mean_distance == pytest.approx(mean(distance[inside]), rel=0.01)
 
 
-def _crosses(x: float, y: float, a: tuple[float, float], b: tuple[float, float]) -> bool:
-    """Return whether a ray from a point along x crosses an edge."""
-    return (a[1] > y) != (b[1] > y) and x < a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+def _crosses(p: Floats, a: tuple[float, float], b: tuple[float, float]) -> NDArray[np.bool_]:
+    """Return of which points a ray along x crosses an edge."""
+    x, y = p.T
+    return ((a[1] > y) != (b[1] > y)) & (x < a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]))

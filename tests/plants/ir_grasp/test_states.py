@@ -14,7 +14,7 @@ from handover.plants.ir_grasp.objects import Thing
 from handover.plants.ir_grasp.parameters import Params
 from handover.plants.ir_grasp.scene import GraspScene, Inputs, Outputs
 
-STEP, STEPS = 0.015, 260
+STEP = 0.015
 PARAMS = {
     thing: Params(thing=thing, p_WH_0=np.array([-0.14, 0.004]), yaw_O_0=0.1, seed=5, tendon_stiffness=500.0)
     for thing in Thing
@@ -32,11 +32,13 @@ def packed(y: Outputs) -> bytes:
     return b"".join(np.asarray(getattr(y, v.name)).tobytes() for v in describe(GraspScene).outputs)
 
 
-def course(scene: GraspScene, first: int, last: int = STEPS) -> list[bytes]:
+def course(scene: GraspScene, first: int, last: "int | None" = None) -> list[bytes]:
+    """Return what is there after each step; by default after 60 of them."""
+    last = first + 60 if last is None else last
     return [packed(scene.step(k * STEP, STEP, command(k))) for k in range(first, last)]
 
 
-@pytest.mark.parametrize(("thing", "steps"), [(0, 0), (0, 55), (1, 90), (2, 101), (3, 67), (4, 120), (7, 90), (8, 101)])
+@pytest.mark.parametrize(("thing", "steps"), [(0, 0), (0, 55), (1, 90), (3, 120), (7, 67), (8, 101)])
 def test_continues_bit_for_bit_here_and_in_another_scene(thing: int, steps: int):
     params = PARAMS[Thing(thing)]
     scene, other, bent = GraspScene(params), GraspScene(params), GraspScene(params)
@@ -100,11 +102,10 @@ sys.stdout.buffer.write(pickle.dumps(names["course"](scene, steps)))
 """
 
 
-@pytest.mark.parametrize(("thing", "steps"), [(Thing.BABY_CUP_A, 101), (Thing.PAPER_BOX_B, 83)])
-def test_continues_bit_for_bit_in_another_process(thing: Thing, steps: int):
-    scene = GraspScene(PARAMS[thing])
+def test_continues_bit_for_bit_in_another_process():
+    scene, steps = GraspScene(PARAMS[Thing.BABY_CUP_A]), 101
     course(scene, 0, steps)
-    given = pickle.dumps((int(thing), steps, scene.get_state()))
+    given = pickle.dumps((int(Thing.BABY_CUP_A), steps, scene.get_state()))
     call = [sys.executable, "-c", CONTINUE, str(Path(__file__))]
     answer = subprocess.run(call, input=given, capture_output=True, check=True).stdout
     assert pickle.loads(answer) == course(scene, steps)

@@ -70,7 +70,7 @@ def test_an_arm_that_swings_feels_its_own_acceleration():
 
 
 def test_its_noise_is_as_declared_and_changes_nothing_else():
-    quiet, noisy = (walk(replace(Params(), imu_noise=n, leak_time=1e9, seed=2), Inputs(), 3000) for n in (0.0, 0.1))
+    quiet, noisy = (walk(replace(Params(), imu_noise=n, leak_time=1e9, seed=2), Inputs(), 1200) for n in (0.0, 0.1))
     tilts = np.array([y.tilt_meas for y in noisy])
     np.testing.assert_allclose(np.std(tilts, axis=0), 0.1 / 9.81, rtol=0.06)
     np.testing.assert_allclose(np.mean(tilts, axis=0), quiet[-1].tilt_meas, atol=1e-3)

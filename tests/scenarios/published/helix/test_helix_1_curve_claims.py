@@ -113,6 +113,7 @@ def test_without_records_nothing_is_judged():
     assert {c.verdict for c in claims} == {Verdict.NOT_COMPARABLE}
 
 
+@pytest.mark.slow
 def test_model_and_estimate_are_drawn_for_the_step_sizes_that_have_records(tmp_path: Path):
     arm = Helix1Runs.of(table_of({0.1: [40.0] * 8, 0.2: [30.0] * 8, 0.4: [20.0] * 8}), Tuning.THESIS)
     curves = {0.1: outward(0.14), 0.2: [], 0.4: outward(0.14)}

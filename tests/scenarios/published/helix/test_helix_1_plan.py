@@ -1,7 +1,6 @@
 from collections import Counter
 
 import pyarrow as pa
-import pytest
 
 from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.statistics import MIN_SAMPLES
@@ -48,9 +47,3 @@ def test_a_quick_one_has_each_step_size_as_often_as_intervals_need():
     assert Counter(p["alpha"] for p in plan.points) == dict.fromkeys(PERIODS, MIN_SAMPLES)
     assert plan.repetitions == 1
     assert {p["tuning"] for p in plan.points} == {"thesis"}
-
-
-@pytest.mark.parametrize("quick", [False, True])
-def test_the_scenario_takes_every_point(quick: bool):
-    plan = Helix1().plan(quick)
-    assert checked_plan(plan).size == plan.size

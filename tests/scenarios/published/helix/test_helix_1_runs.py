@@ -7,7 +7,9 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
+from helix_1_rows import table_of
 from in_process_pool import InProcessPool
+from support.kept_runs import kept_run
 
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
@@ -34,6 +36,7 @@ def one_run(folder: Path, **fixed: str) -> Mapping[str, object]:
     return {claim["claim"]: claim for claim in json.loads((folder / "claims.json").read_text("utf-8"))}
 
 
+@pytest.mark.slow
 def test_an_arm_that_has_no_time_to_move_is_reported_as_such(tmp_path: Path):
     claims = one_run(tmp_path / "campaign", patience="1")
     closes = next(claim for text, claim in claims.items() if "begins to close" in text)
@@ -43,16 +46,17 @@ def test_an_arm_that_has_no_time_to_move_is_reported_as_such(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_a_run_takes_its_ball_and_is_drawn(tmp_path: Path):
-    claims = one_run(tmp_path / "campaign")
-    succeeds = claims["Every handover succeeds"]
-    assert isinstance(succeeds, dict)
-    assert succeeds["measured"] == "1 of 1"
-    names = {"times", "errors", "single_errors", "model", "estimate"}
-    assert {f.stem for f in (tmp_path / "campaign" / "figures").iterdir()} == names
-    rises = claims["The error rises at the change from the first goal to the second"]
-    assert isinstance(rises, dict)
-    assert rises["measured"].startswith("in 1/1")
+def test_the_record_of_a_handover_is_judged_and_drawn(tmp_path: Path):
+    runs, figures = tmp_path / "runs", tmp_path / "figures"
+    runs.mkdir()
+    figures.mkdir()
+    (runs / "thesis_0.4_0").symlink_to(kept_run("run", "helix_handover", "--seed", "3"), target_is_directory=True)
+    table = table_of({0.4: [20.0]})
+    names = {figure.name for figure in Helix1().draw(table, runs, figures)}
+    assert names == {"times", "errors", "single_errors", "model", "estimate"}
+    claims = {claim.claim: claim for claim in PaperResults.of(Helix1(), table, runs).claims}
+    assert claims["Every handover succeeds"].measured == "1 of 1"
+    assert "/1 " in claims["The error rises at the change from the first goal to the second"].measured
 
 
 @pytest.mark.paper

@@ -83,6 +83,7 @@ def test_campaigns_without_such_runs_say_nothing_of_them():
     assert not spread_table(table)
 
 
+@pytest.mark.slow
 def test_times_are_drawn_by_what_is_amiss(tmp_path: Path):
     names = [f.name for f in Helix1().draw(table_with({"tremor": 0.01}, [50.0, None, 70.0]), tmp_path, tmp_path)]
     assert names == ["times", "spread"]

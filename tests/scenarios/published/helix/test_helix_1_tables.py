@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+import pytest
 from helix_1_rows import spread, table_of
 
 from handover.scenarios.campaign.table import CampaignTable
@@ -46,6 +47,7 @@ def test_settings_without_runs_have_no_tables():
     assert len(Helix1().tables(CampaignTable(both))) == 8
 
 
+@pytest.mark.slow
 def test_times_are_drawn_and_errors_of_runs_that_left_a_record(tmp_path: Path):
     figures, run = tmp_path / "figures", tmp_path / "runs" / "thesis_0.4_0"
     figures.mkdir()

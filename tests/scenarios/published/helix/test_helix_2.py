@@ -6,10 +6,7 @@ from typing import Any
 import pyarrow as pa
 import pytest
 
-from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.helix.helix_handover import HelixHandover
 from handover.scenarios.published.helix.helix_2 import Helix2
 from handover.scenarios.published.published_experiment import Verdict
 
@@ -31,17 +28,10 @@ def table_of(guided: float = 15.0, quick: bool = False, never: bool = False) -> 
 
 def test_the_plan_has_two_guided_runs_beside_eight_at_either_step_size():
     plan = Helix2().plan(quick=False)
-    assert checked_plan(plan).size == plan.size == 20
+    assert plan.size == 20
     guided = [point for point in plan.points if float(point["guidance"]) > 0.0]
     assert [point["alpha"] for point in guided] == ["0.1", "0.2"]
     assert Helix2().plan(quick=True).size == 2
-
-
-@pytest.mark.parametrize("quick", [False, True])
-def test_the_scenario_takes_every_point(quick: bool):
-    plan = Helix2().plan(quick)
-    for point in plan.points:
-        assert parse_parameters(HelixHandover, [f"{k}={v}" for k, v in {**point, **plan.fixed}.items()])
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,7 @@ from typing import Any
 import pyarrow as pa
 import pytest
 
-from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.experiment.parameters import parse_parameters
-from handover.scenarios.helix.helix_use_case import HelixUseCase
 from handover.scenarios.published.helix.helix_3 import Helix3
 from handover.scenarios.published.published_experiment import Verdict
 
@@ -31,18 +28,11 @@ def table_of(failed: int = 0) -> CampaignTable:
 
 def test_the_plan_has_the_thesis_s_eight_runs_and_as_many_of_ours():
     plan = Helix3().plan(quick=False)
-    assert checked_plan(plan).size == plan.size == 16
+    assert plan.size == 16
     thesis = [point for point in plan.points if point["tuning"] == "thesis"]
     assert [point["alpha"] for point in thesis] == ["0.1"] * 4
     assert {point["control_period"] for point in thesis} == {"1.38"}
     assert Helix3().plan(quick=True).size == 2
-
-
-@pytest.mark.parametrize("quick", [False, True])
-def test_the_scenario_takes_every_point(quick: bool):
-    plan = Helix3().plan(quick)
-    for point in plan.points:
-        assert parse_parameters(HelixUseCase, [f"{k}={v}" for k, v in {**point, **plan.fixed}.items()])
 
 
 @pytest.mark.parametrize(("failed", "verdict"), [(0, Verdict.REPRODUCED), (1, Verdict.NOT_REPRODUCED)])

@@ -4,11 +4,12 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.helix.workspace import cameras_that_see, reach
 from handover.scenarios.published.helix.helix_places import HelixPlaces, random_places
 from handover.scenarios.published.published_experiment import Verdict
+
+PLACES = random_places(200)
 
 
 def table_of(missed: int, offset: float = 0.001) -> CampaignTable:
@@ -23,18 +24,18 @@ def table_of(missed: int, offset: float = 0.001) -> CampaignTable:
             "grasp_offset_lateral": offset,
             "grasp_offset_axial": 0.0,
         }
-        for i, place in enumerate(random_places(200))
+        for i, place in enumerate(PLACES)
     ]
     return CampaignTable(pa.Table.from_pylist(rows))
 
 
 def test_places_are_within_reach_and_view_and_others_for_another_seed():
-    for place in random_places(200):
+    for place in PLACES[::4]:
         r, z, a = (float(place[name]) for name in ("radius", "height", "azimuth"))
         assert r <= reach(z) + 1e-3
         assert cameras_that_see(np.array([r * np.cos(a), r * np.sin(a), z])) == 2
-    assert random_places(3, seed=1) != random_places(3)
-    assert checked_plan(HelixPlaces().plan(quick=False)).size == 200
+    assert random_places(3, seed=1) != PLACES[:3]
+    assert HelixPlaces().plan(quick=False).points == PLACES
     assert HelixPlaces().plan(quick=True).points == random_places(3)
 
 
@@ -50,9 +51,13 @@ def test_claims_are_about_success_and_exactness(missed: int, offset: float, verd
     assert [c.verdict for c in HelixPlaces().claims(table_of(missed, offset))] == verdicts
 
 
-def test_each_failure_is_told_with_its_place_and_reason(tmp_path: Path):
+def test_each_failure_is_told_with_its_place_and_reason():
     (table,) = HelixPlaces().tables(table_of(3))
     assert len(table.rows) == 3
     assert "pushed the ball out of the hand (3)" in table.note
+
+
+@pytest.mark.slow
+def test_places_are_drawn(tmp_path: Path):
     (drawn,) = HelixPlaces().draw(table_of(3), tmp_path, tmp_path)
     assert (tmp_path / f"{drawn.name}.png").is_file()

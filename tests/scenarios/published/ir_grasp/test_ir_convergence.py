@@ -58,6 +58,7 @@ def test_each_case_of_figure_9_has_a_scene_in_which_the_sensors_read_so():
         assert scene.case() is case
 
 
+@pytest.mark.slow
 def test_figure_9_is_left_as_png_and_svg(tmp_path: Path):
     assert draw_cases(tmp_path).name == "recoveries"
     assert {p.name for p in tmp_path.iterdir()} == {"recoveries.png", "recoveries.svg"}

@@ -211,6 +211,7 @@ def test_that_looking_is_worth_it_takes_four_axes(claims: Sequence[Claim]):
     assert worth_claims(alike) == [Verdict.NOT_REPRODUCED, Verdict.NOT_REPRODUCED]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("push", "verdict"), [(0.014, Verdict.NOT_REPRODUCED), (0.016, Verdict.REPRODUCED)])
 def test_a_hand_that_pushes_what_it_takes_is_outdone_where_that_counts(push: float, verdict: Verdict):
     pushing = limits_table(
@@ -228,10 +229,10 @@ def test_one_curve_for_all_materials_is_refuted_by_grasps_that_fail_in_the_dark(
     assert one(claims, "One curve is enough for all sensors").verdict is Verdict.REPRODUCED
 
 
-@pytest.mark.parametrize(("pushed", "holds"), [(0.004, True), (0.016, False)])
-def test_pushing_is_judged_by_median_and_most(pushed: float, holds: bool):
-    claim = one(IrLimits().claims(limits_table(succeeds, displacement=pushed)), "Before it closes")
-    assert (claim.verdict is Verdict.REPRODUCED) is holds
+def test_pushing_is_judged_by_median_and_most(claims: Sequence[Claim]):
+    assert one(claims, "Before it closes").verdict is Verdict.REPRODUCED
+    pushed = IrLimits().claims(limits_table(succeeds, displacement=0.016))
+    assert one(pushed, "Before it closes").verdict is Verdict.NOT_REPRODUCED
 
 
 @pytest.mark.slow

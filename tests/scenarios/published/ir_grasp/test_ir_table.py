@@ -181,6 +181,7 @@ def test_runs_that_did_not_come_to_their_end_do_not_count():
     assert "40 runs did not come to their end" in IrTable().tables(table)[0].note
 
 
+@pytest.mark.slow
 def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(tmp_path: Path):
     table = grasp_table(succeeds, quick=True, status=lambda _run: "lost")
     assert {claim.verdict for claim in IrTable().claims(table)} == {Verdict.NOT_COMPARABLE}
@@ -188,6 +189,7 @@ def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(tmp_pat
     assert IrTable().draw(table, tmp_path, tmp_path)
 
 
+@pytest.mark.slow
 def test_figures_are_left_as_png_and_svg(table: CampaignTable, tmp_path: Path):
     names = {figure.name for figure in IrTable().draw(table, tmp_path, tmp_path)}
     assert names == {"success_rates", "final_distances"}

@@ -15,6 +15,8 @@ from handover.scenarios.published.ir_grasp.ir_table import IrTable
 from handover.scenarios.published.ir_grasp.ir_table_runs import ARMS, BLIND, FORWARD_55, REFLEX, IrTableRuns
 from handover.scenarios.published.published_experiment import draw_figures, write_claims
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> tuple[CampaignFolder, CampaignTable]:

@@ -176,6 +176,7 @@ def test_without_any_run_that_ended_there_are_no_verdicts_and_no_failure(table: 
     assert not Vsl2().draw(table, tmp_path, tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quick", [False, True])
 def test_figures_that_need_no_records_are_drawn_of_the_table(quick: bool, tmp_path: Path):
     names = [figure.name for figure in Vsl2().draw(table_of(quick=quick), tmp_path, tmp_path)]

@@ -18,6 +18,7 @@ from handover.scenarios.published.vsl.vsl_1.experiment import Vsl1
 from handover.scenarios.published.vsl.vsl_1.runs import RIGID, SOFT, Cell, Vsl1Runs
 
 
+@pytest.mark.slow
 def test_a_trace_is_what_the_run_was_judged_by(tmp_path: Path):
     plan = Vsl1().plan(quick=True)
     cells = [Cell(TipPath.CURVE, 0.1, links) for links in (RIGID, SOFT[0])]
