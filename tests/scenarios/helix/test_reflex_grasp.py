@@ -119,10 +119,3 @@ def test_with_covered_cameras_the_fingers_centre_the_gripper(tmp_path: Path):
     assert apart[is_covered] == pytest.approx(P.near, abs=0.015)
     figures = HelixReflexGrasp().time_figures(P, record)
     assert figures[0].name == "reflex"
-
-
-@pytest.mark.slow
-def test_with_free_cameras_the_reflex_does_no_harm(tmp_path: Path):
-    done = run(HelixReflexGrasp, tmp_path / "r", "offer=given", "radius=0.14", seed=4)
-    assert done.summary["success"], done.summary["reason"]
-    assert metric(done, "grasp_offset_lateral") < 0.003

@@ -1,14 +1,15 @@
 """The use case: what its evaluation tells of a ball's way, what is refused before it starts, and a whole run."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import tomli
-from flyer_runs import metric, run
 from helix_signals import PICTURE, port, views_and_ports
 from parameter_origins import assert_every_default_has_its_origin
+from support.kept_runs import kept_run
 
 import handover.scenarios.helix
 from handover.controllers.helix.servo.visual_servo import Phase, Verdict
@@ -165,11 +166,12 @@ def test_what_it_adds_has_an_origin():
 
 
 @pytest.mark.slow
-def test_the_ball_gets_from_the_hand_into_the_bowl(tmp_path: Path):
-    done = run(HelixUseCase, tmp_path / "r", seed=3)
-    assert done.summary["success"], done.summary["reason"]
-    assert metric(done, "drop_offset") < P.bowl_radius - HandParams().ball_radius
-    record = Record(tmp_path / "r" / "signals.parquet")
+def test_the_ball_gets_from_the_hand_into_the_bowl():
+    folder = kept_run("run", "helix_use_case", "--no-report")
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["success"], summary["reason"]
+    assert summary["metrics"]["drop_offset"]["value"] < P.bowl_radius - HandParams().ball_radius
+    record = Record(folder / "signals.parquet")
     np.testing.assert_allclose(record["hand.p_WO"][-1], LYING, atol=0.005)
     phases = record["servo.phase"].tolist()
     first = [phases.index(int(p)) for p in (Phase.GRASP, Phase.HOLD, Phase.CARRY, Phase.DROP)]

@@ -76,14 +76,14 @@ def test_the_tracker_is_wired_only_where_it_closes_the_loop():
 
 
 def test_imus_make_up_for_an_arm_that_differs_and_tell_that_it_does(cubic: float):
-    stiffer = ("settle=2", "EI_factor=1.2")
+    stiffer = (*QUICK, "EI_factor=1.2")
     assert metrics_of(*stiffer, "imu=feedback")["mean_error_true"] < 1.5 * cubic
     monitored, open_loop = metrics_of(*stiffer, "imu=monitor"), metrics_of(*stiffer)
     assert monitored["mean_error_true"] == open_loop["mean_error_true"] > 2.0 * cubic
     assert monitored["model_mismatch"] > 0.8
     assert monitored["outside"] < 0.1
     assert "model_mismatch" not in open_loop
-    assert metrics_of("settle=2", "imu=monitor")["model_mismatch"] == 0.0
+    assert metrics_of(*QUICK, "imu=monitor")["model_mismatch"] == 0.0
 
 
 def test_imus_beside_a_tracker_are_refused():
