@@ -93,13 +93,17 @@ def test_the_curve_is_drawn(trained: Trained, tmp_path: Path):
     assert re.search(r"^ +250 +\d+\.\d\d", result.output, re.MULTILINE)
 
 
+def measured_at_once(_training: VslTraining, _progress: Progress) -> Measured:
+    return made_up(400)
+
+
 def test_model_and_data_are_written_before_the_curve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     def full(_points: object, path: Path) -> None:
         path.with_suffix(".svg").write_text("<svg>")
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(curve_module, "_draw", full)
-    monkeypatch.setattr(VslTraining, "measure", lambda _self, _progress: made_up(400))
+    monkeypatch.setattr(VslTraining, "measure", measured_at_once)
     out, curve = tmp_path / "m.json", tmp_path / "c.png"
     result = call("--points", "400", "--save-data", tmp_path / "d.parquet", "--curve", curve, "--out", out)
     assert result.exit_code == 2
