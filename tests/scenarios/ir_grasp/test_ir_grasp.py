@@ -94,7 +94,7 @@ def test_the_same_seed_gives_the_same_course_and_another_seed_another():
     quick: dict[str, Any] = {"strategy": Strategy.FORWARD}
     first = grasp(3, **quick)
     assert grasp(4, **quick).metrics["vision_yaw_error"] != first.metrics["vision_yaw_error"]
-    assert grasp(3, **quick) == first
+    assert repr(grasp(3, **quick)) == repr(first)  # as what is not seen is no number
 
 
 def test_a_blind_hand_misses_the_moved_cylinder_and_says_so():
