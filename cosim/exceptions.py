@@ -15,6 +15,10 @@ _STATUS = re.compile(r"^\[\w+\] ")
 _STATUS_AND_CALL = re.compile(r"^\[\w+\] fmi[23]\w+: ")
 _SYNTAX = re.compile(r"(?:SyntaxError|IndentationError|TabError): ")
 _LOCATION = re.compile(r'File "(?:.*?/resources/sources/)?([^"]+)", line (\d+)')
+_OF_AUTHOR = re.compile(r'File "[^"]*?/resources/(?:sources/)?(?!sources/|handover/)([^"]+)", line (\d+)')
+"""A line of code that an FMU contains and that is not this package's."""
+_OWN_NAME = re.compile(r"^handover(?:\.\w+)+: ")
+"""What was raised, where that is this package's: its message says it better."""
 
 _LIKE, _AS_LIKELY = 0.5, 0.3
 """How like a name, of 1, one that is suggested is at least, and how much less than the one most like it."""
@@ -53,17 +57,19 @@ def log_lines(log: Iterable[str]) -> list[str]:
 def last_line(log: Iterable[str]) -> str:
     """Return the last line of a log that says anything, without status and call.
 
-    Of a traceback that is what was raised, with all of its message. A syntax error gets its file and line appended,
-    which a traceback gives in an earlier line.
+    Of a traceback that is what was raised, with all of its message, and the last line of the unit's author's that led
+    to it; of a syntax error its own.
     """
     log = list(log)
-    lines = [line.strip() for line in log_lines(log)]
-    raised = _RAISED.search(next((entry for entry in reversed(log) if entry.strip()), ""))
-    message = " ".join(raised[1].split()) if raised else _STATUS_AND_CALL.sub("", lines[-1]) if lines else ""
-    locations = [location for line in lines if (location := _LOCATION.search(line))]
-    if not locations or not _SYNTAX.match(message):
-        return message
-    return f"{message} ({locations[-1][1]}, line {locations[-1][2]})"
+    entry = next((entry for entry in reversed(log) if entry.strip()), "")
+    raised = _RAISED.search(entry)
+    message = (
+        " ".join(raised[1].split()) if raised else _STATUS_AND_CALL.sub("", (log_lines([entry]) or [""])[-1].strip())
+    )
+    is_syntax = _SYNTAX.match(message)
+    places = _LOCATION.findall("\n".join(log)) if is_syntax else _OF_AUTHOR.findall(entry) if raised else []
+    place = f" ({places[-1][0]}, line {places[-1][1]})" if places else ""
+    return _OWN_NAME.sub("", message) + place
 
 
 _LONGEST = 4000

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from handover.cosim.blocks.description import place_of
 from handover.cosim.blocks.ports import Raster, Width
 from handover.cosim.blocks.variable import Causality, Variable
 from handover.fmus.buffers import Buffers, to_signed
@@ -22,7 +23,15 @@ from handover.fmus.parameters import read_value
 NOT_REAL = (Buffer.INT64, Buffer.BOOLEAN, Buffer.STRING, Buffer.BINARY)
 
 
-class InvalidOutput(TypeError):
+class InvalidReturn(TypeError):
+    """A method of a block returned something else than it must."""
+
+    def by(self, method: object) -> "InvalidReturn":
+        """Return the same, said of a method: its name, and where it is defined."""
+        return InvalidReturn(f"{getattr(method, '__qualname__', 'a method')}{place_of(method)}: {self}")
+
+
+class InvalidOutput(InvalidReturn):
     """A block gave an output that is not of the declared type or shape."""
 
     def __init__(self, variable: Variable, value: object) -> None:
@@ -40,13 +49,13 @@ class InvalidOutput(TypeError):
         self.variable, self.value = variable, value
 
 
-class InvalidReturn(TypeError):
-    """A method of a block returned something else than it must; `example` is what would be right."""
+class OtherReturn(InvalidReturn):
+    """A method of a block returned an object of another kind; `example` is what would be right."""
 
-    def __init__(self, method: str, value: object, example: str) -> None:
+    def __init__(self, value: object, example: str) -> None:
         shown = "" if value is None else f": {' '.join(repr(value).split()):.80}"
         kind = "None" if value is None else type(value).__name__
-        super().__init__(f"{method} returned {kind}{shown}; expected {example}")
+        super().__init__(f"returned {kind}{shown}; expected {example}")
 
 
 def input_reader(buffers: Buffers) -> Callable[[], Any]:
@@ -73,7 +82,7 @@ def input_reader(buffers: Buffers) -> Callable[[], Any]:
 def output_writer(buffers: Buffers) -> Callable[[Any], None]:
     """Return a function that writes a block's outputs into the buffers.
 
-    It raises InvalidOutput if an output is not of its declared type or shape, InvalidReturn if it gets no outputs. It
+    It raises InvalidOutput if an output is not of its declared type or shape, OtherReturn if it gets no outputs. It
     tries the exact types first, which is fast; only if that fails it goes through the outputs one after another,
     converts what may be converted and finds the output at fault.
     """
@@ -96,8 +105,7 @@ def output_writer(buffers: Buffers) -> Callable[[Any], None]:
             if isinstance(y, outputs):
                 raise
             names = ", ".join(f"{v.name}=..." for v in layout.description.outputs)
-            method = f"outputs or step of {layout.description.name}"
-            raise InvalidReturn(method, y, f"its outputs, such as {outputs.__name__}({names})") from error
+            raise OtherReturn(y, f"its outputs, such as {outputs.__name__}({names})") from error
 
     def write_checked(y: Any) -> None:
         try:
@@ -253,11 +261,11 @@ def _write_bytes(buffers: Buffers, slot: Slot, value: Any) -> None:
 Derivative = float | NDArray[np.float64]
 
 
-class InvalidDerivative(TypeError):
+class InvalidDerivative(InvalidReturn):
     """A block returned a derivative of something that is no real output, or not of that output's shape."""
 
     def __init__(self, name: str, fault: str) -> None:
-        super().__init__(f"directional_derivative gave {name!r}: {fault}")
+        super().__init__(f"gave {name!r}: {fault}")
         self.name, self.fault = name, fault
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from handover.cosim.blocks.block import InvalidAdvance, InvalidState
 from handover.cosim.blocks.description import describe, with_start_values
 from handover.fmus.buffers import Buffers, join, split
-from handover.fmus.exchange import InvalidReturn, derivative_reader, input_reader, output_writer
+from handover.fmus.exchange import InvalidReturn, OtherReturn, derivative_reader, input_reader, output_writer
 from handover.fmus.layout import Form, Layout
 from handover.fmus.parameters import read_parameters
 from handover.fmus.table import table
@@ -64,12 +64,21 @@ class Slave:
             self._block.set_state(self._fresh)
         else:
             self._make()
-        self._write(self._block.outputs(float(self._clock[0]), self._read()))
+        try:
+            self._write(self._block.outputs(float(self._clock[0]), self._read()))
+        except InvalidReturn as e:
+            raise e.by(self._block.outputs) from e.__cause__
 
     def step(self) -> None:
         """Step from t by dt, which are in the buffers, and write the outputs; a sampled block's dt is its period."""
         t, dt = self._clock.tolist()
-        self._write(self._block.step(t, dt, self._read()))
+        self._step(t, dt, self._read())
+
+    def _step(self, t: float, dt: float, u: Any) -> None:
+        try:
+            self._write(self._block.step(t, dt, u))
+        except InvalidReturn as e:
+            raise e.by(self._block.step) from e.__cause__
 
     def evaluate(self) -> None:
         """Step as `step` does, but tentatively: called again, it steps from the same state as the first time."""
@@ -79,7 +88,7 @@ class Slave:
             self._before_tick = self._block.get_state()
         else:
             self._block.set_state(self._before_tick)
-        self._write(self._block.step(t, dt, u))
+        self._step(t, dt, u)
 
     def settle(self) -> None:
         """Make the last tentative step the actual one."""
@@ -92,25 +101,40 @@ class Slave:
             InvalidAdvance: by the block's return value it went backwards, or farther than dt.
         """
         t, dt = self._clock.tolist()
-        reached, y = self._block.advance(t, dt, self._read())
-        if not 0.0 <= reached <= dt:
-            raise InvalidAdvance(self._type.__name__, reached, dt)
-        self._write(y)
+        returned: Any = self._block.advance(t, dt, self._read())
+        try:
+            if not isinstance(returned, tuple) or len(returned) != 2:
+                raise OtherReturn(returned, "the time by which it advanced and its outputs, such as (dt, Outputs(...))")
+            reached, y = returned
+            if not 0.0 <= reached <= dt:
+                raise InvalidAdvance(self._type.__name__, reached, dt)
+            self._write(y)
+        except InvalidReturn as e:
+            raise e.by(self._block.advance) from e.__cause__
         self._clock[1] = reached
 
     def handle_event(self) -> None:
         """Let the block handle an event at t, and write the outputs."""
-        self._write(self._block.handle_event(float(self._clock[0]), self._read()))
+        try:
+            self._write(self._block.handle_event(float(self._clock[0]), self._read()))
+        except InvalidReturn as e:
+            raise e.by(self._block.handle_event) from e.__cause__
 
     def next_event(self) -> None:
         """Write the time of the next time event, or infinity, in the place of dt."""
         event_time = self._block.next_event(float(self._clock[0]))
-        self._clock[1] = math.inf if event_time is None else event_time
+        try:
+            self._clock[1] = math.inf if event_time is None else event_time
+        except (TypeError, ValueError) as e:
+            raise OtherReturn(event_time, "a time, such as t + 0.5, or None").by(self._block.next_event) from e
 
     def derivative(self, seed: bytes) -> bytes:
         """Return the directional derivative of the real outputs by the real inputs; float64, in the buffers' order."""
         du, to_vector = self._derive(seed)
-        return to_vector(self._block.directional_derivative(float(self._clock[0]), self._read(), du))
+        try:
+            return to_vector(self._block.directional_derivative(float(self._clock[0]), self._read(), du))
+        except InvalidReturn as e:
+            raise e.by(self._block.directional_derivative) from e.__cause__
 
     def reset(self) -> None:
         """Restore the state of a new instance."""
@@ -174,6 +198,6 @@ class Slave:
         fresh: object = block.get_state()
         if not isinstance(fresh, bytes):
             expected = 'bytes, such as pack_state((self.q, self.v)), or b"" without a state'
-            raise InvalidReturn(f"get_state of {self._type.__name__}", fresh, expected)
+            raise OtherReturn(fresh, expected).by(block.get_state)
         self._fresh = fresh
         self._block, self._made_from = block, self._buffers.parameters()

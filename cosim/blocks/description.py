@@ -10,12 +10,15 @@ import functools
 import inspect
 import sys
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
+from pathlib import Path
+from types import FunctionType
 from typing import Any, cast
 
 import numpy as np
 
+from handover.cosim.blocks.block import Block, DifferentiableBlock, EventfulBlock
 from handover.cosim.blocks.declarations import DeclarationError, declared_variables
 from handover.cosim.blocks.start_values import fault_of, numbers_of
 from handover.cosim.blocks.terminals import Terminal, terminal_faults
@@ -139,16 +142,46 @@ def check_form(block: type[Any]) -> None:
     """Check a block class's attributes and methods.
 
     Raises:
-        DeclarationError: some are missing (the message lists all of them), or an attribute's value is invalid.
+        DeclarationError: some are missing (the message lists all of them), an attribute's value is invalid, or a method
+            takes other arguments.
     """
     missing = [name for name in _ATTRIBUTES if not hasattr(block, name)]
     missing += [name for name in _METHODS if not callable(getattr(block, name, None))]
     if missing:
         what = "a block has these" if len(missing) > 1 else "a block has this"
         raise DeclarationError(block.__name__, ", ".join(missing), f"{what}; see handover.cosim.blocks.block.Block")
-    for name, fault in (("period", _period_fault(block.period)), ("feedthrough", _feedthrough_fault(block))):
+    faults = [("period", _period_fault(block.period)), ("feedthrough", _feedthrough_fault(block))]
+    for like in (Block, EventfulBlock, DifferentiableBlock):
+        for name, method in ((n, m) for n, m in vars(like).items() if isinstance(m, FunctionType) and n[0] != "_"):
+            own = inspect.getattr_static(block, name, None)
+            if isinstance(own, FunctionType):
+                faults.append((name + place_of(own), signature_fault(own, method)))
+    for name, fault in faults:
         if fault:
             raise DeclarationError(block.__name__, name, fault)
+
+
+def signature_fault(method: Callable[..., Any], like: Callable[..., Any]) -> str:
+    """Return that a method cannot be called with another's arguments, given in their order; "" if it can."""
+    wanted = inspect.signature(like).parameters
+    try:
+        taken = inspect.signature(method)
+        taken.bind(*wanted)
+    except TypeError:
+        return f"takes ({_listed(inspect.signature(method).parameters)}); expected ({_listed(wanted)})"
+    except ValueError:  # of a compiled function
+        return ""
+    return ""
+
+
+def _listed(parameters: Iterable[str]) -> str:
+    return ", ".join(name for name in parameters if name != "self")
+
+
+def place_of(method: object) -> str:
+    """Return where a method is defined, as " (arm.py, line 3)"; "" where that is not known, as of a compiled one."""
+    code = getattr(inspect.unwrap(method) if callable(method) else None, "__code__", None)
+    return "" if code is None else f" ({Path(code.co_filename).name}, line {code.co_firstlineno})"
 
 
 def _period_fault(period: object) -> str:

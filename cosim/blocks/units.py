@@ -1,5 +1,6 @@
 """Physical units as part of a port's type: `Metre` is a float that is known to be in metres."""
 
+import re
 from dataclasses import dataclass, fields
 from typing import Annotated
 
@@ -88,5 +89,21 @@ Tick = Annotated[float, Unit("tick")]
 """Steps of an analogue-to-digital converter."""
 PerTick = Annotated[float, Unit("1/tick")]
 Pixel = Annotated[float, Unit("px")]
+_SYMBOLS = (
+    *("m", "g", "s", "A", "K", "mol", "cd", "rad", "sr", "Hz", "N", "Pa", "J", "W", "C", "V", "F", "Ohm", "ohm", "S"),
+    *("Wb", "T", "H", "degC", "lm", "lx", "Bq", "Gy", "Sv", "kat", "deg", "min", "h", "d", "l", "L", "t", "eV", "bar"),
+    *("B", "bit", "px", "tick", "levels", "rev", "rpm", "dB"),
+)
+_SYMBOL = rf"(?:da|[afpnuµmcdhkMGTPE])?(?:{'|'.join(_SYMBOLS)})-?\d*"
+_WRITTEN_UNIT = re.compile(
+    rf"(?:1|%|°C?|{_SYMBOL}(?:[.*·]{_SYMBOL})*)(?:/{_SYMBOL}|/\({_SYMBOL}(?:[.*·]{_SYMBOL})*\))*"
+)
+
+
+def is_written_unit(symbol: str) -> bool:
+    """Return whether a text is a unit as FMI writes it, of SI's or another known symbol: `m/s2`, `N.m`, `1`."""
+    return _WRITTEN_UNIT.fullmatch(symbol) is not None
+
+
 Levels = Annotated[float, Unit("levels")]
 """Brightness steps of an 8-bit picture."""

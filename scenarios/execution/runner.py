@@ -258,9 +258,10 @@ def _conclude(
         if task.presented:
             with disk_errors_reported(task.folder.path):
                 _present(task, evaluator, summary, faults)
-    if faults.lines:
-        task.folder.write_summary({**summary, "left_out": faults.lines})
-    return replace(result, left_out=tuple(faults.lines))
+    lines = list(dict.fromkeys(faults.lines))  # figures and page draw the same
+    if lines:
+        task.folder.write_summary({**summary, "left_out": lines})
+    return replace(result, left_out=tuple(lines))
 
 
 def _outcome(

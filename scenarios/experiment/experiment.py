@@ -19,6 +19,7 @@ from typing import Any, ClassVar, Generic, TypeVar, cast
 from handover.cosim.blocks.block import InvalidState
 from handover.cosim.blocks.declarations import declared_variables
 from handover.cosim.blocks.state import pack_state, unpack_state
+from handover.cosim.blocks.units import is_written_unit
 from handover.cosim.blocks.variable import Causality, Variable
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
@@ -32,12 +33,12 @@ from handover.scenarios.experiment.returned_types import (
     FILES,
     FLAG,
     NAMES,
-    NUMBER,
     SECONDS,
-    TEXT,
+    Checked,
     Expected,
     WrongType,
     check_methods,
+    described,
     instance_of,
     mapping_to,
     sequence_of,
@@ -49,39 +50,26 @@ FmuOf = Callable[[str], Path]
 
 
 @dataclass(frozen=True)
-class Metric:
+class Metric(Checked):
     """A figure of merit in a run's summary."""
 
     value: float
     unit: str = "1"
     description: str = ""
 
-    def __post_init__(self) -> None:
-        """Refuse a value that is no number.
-
-        Raises:
-            WrongType: it is none.
-        """
-        NUMBER.check("a Metric's value is", self.value)
-
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class Outcome(Checked):
     """How a task ended: whether it succeeded, why (in a sentence), and its metrics."""
 
     success: bool
     reason: str
     metrics: Mapping[str, Metric] = field(default_factory=dict[str, Metric])
 
-    def __post_init__(self) -> None:
-        """Refuse fields of other types.
-
-        Raises:
-            WrongType: one is.
-        """
-        FLAG.check("an Outcome's success is", self.success)
-        TEXT.check("an Outcome's reason is", self.reason)
-        mapping_to(Metric, '{"distance": Metric(0.004, "m")}').check("an Outcome's metrics are", self.metrics)
+    expected = {
+        "reason": instance_of(str, '"the tip is 3 mm from the goal"'),
+        "metrics": mapping_to(Metric, '{"distance": Metric(0.004, "m")}'),
+    }
 
 
 class Evaluator(abc.ABC):
@@ -97,7 +85,7 @@ class Evaluator(abc.ABC):
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
-        check_methods(cls, _OF_EVALUATORS)
+        check_methods(cls, Evaluator, _OF_EVALUATORS)
 
     def note_units(self, units: Mapping[str, PlacedUnit]) -> None:  # noqa: B027 (most tasks are judged by the signals alone)
         """Take in, before a run begins or is resumed, which units are there and what they are set to, by name.
@@ -186,10 +174,20 @@ class Evaluator(abc.ABC):
 
 _OF_EVALUATORS: Mapping[str, Expected] = {
     "over": FLAG,
-    "outcome": instance_of(Outcome, 'Outcome(success=True, reason="the tip is at the goal")'),
+    "outcome": Expected(
+        "an Outcome whose metrics have units as FMI writes them",
+        'Outcome(success=True, reason="the tip is at the goal", metrics={"speed": Metric(0.2, "m/s")})',
+        lambda v: isinstance(v, Outcome) and not _strange_units(v),
+        lambda v: f"an Outcome with {_strange_units(v)}" if isinstance(v, Outcome) else described(v),
+    ),
     "pictures": sequence_of(CameraPicture, "[CameraPicture(...)]"),
 }
 """What its methods must return."""
+
+
+def _strange_units(outcome: Outcome) -> str:
+    return ", ".join(f"{n} in {m.unit!r}" for n, m in outcome.metrics.items() if not is_written_unit(m.unit))
+
 
 _BOUND, _PUSHES, _PUSHED = "_bound", "_pushes", "_pushed_bodies"
 _NOT_KEPT = ("parameters", _BOUND, _PUSHES)
@@ -238,7 +236,7 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
-        check_methods(cls, _OF_SCENARIOS)
+        check_methods(cls, Experiment, _OF_SCENARIOS)
         if "name" not in vars(cls):
             cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", cls.__name__).lower()
         if "title" not in vars(cls) and vars(cls).get("__doc__"):
@@ -293,7 +291,7 @@ class Experiment(abc.ABC, Generic[AnyEvaluator]):
         evaluator = self.evaluator(parameters)
         if isinstance(over := getattr_static(evaluator, "over"), FunctionType):
             example = "@property in the line above def over(self) -> bool"
-            raise WrongType(f"{type(evaluator).__name__}.over is", over, "a property", example)
+            raise WrongType(f"{type(evaluator).__name__}.over is", described(over), "a property", example)
         evaluator.bind(parameters, self.pushes(parameters))
         return evaluator
 
@@ -381,7 +379,7 @@ def _are_time_figures(value: Any) -> bool:
 
 
 @dataclass(frozen=True)
-class Figure:
+class Figure(Checked):
     """A figure of a run: file name within the figures folder, without suffix, and caption."""
 
     name: str

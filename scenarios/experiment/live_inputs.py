@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.system import PortName, System
 from handover.cosim.system.time_series import NoSource
+from handover.scenarios.experiment.returned_types import VECTOR, Checked
 
 _HAND_SIZES = {"p_WH_track": 3, "q_WH_track": 4, "finger_track": 14, "closed_track": 1}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pushable:
+class Pushable(Checked):
     """A body that can be pushed at any of its points, by two inputs of a unit, or at one of them, by a single input.
 
     Attributes:
@@ -50,7 +51,7 @@ def let_push(system: System, pushes: Sequence[Pushable]) -> None:
 
 
 @dataclass(frozen=True)
-class LedHand:
+class LedHand(Checked):
     """A hand that inputs from outside lead.
 
     Attributes:
@@ -65,6 +66,8 @@ class LedHand:
     reach: float
     task: str = ""
 
+    expected = {"p_WH_0": VECTOR}
+
     @property
     def inputs(self) -> Mapping[str, int]:
         """The inputs that a sample of a hand sets, as `unit.input`, and how many entries each has."""
@@ -77,7 +80,7 @@ class LedHand:
 
 
 @dataclass(frozen=True)
-class HandHint:
+class HandHint(Checked):
     """What helps who leads a hand, at an instant of a run.
 
     Attributes:

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import tomli
 
+from handover.scenarios.experiment.returned_types import Checked
+
 
 def paper_values(scenario: str, group: str) -> dict[str, Any]:
     """Return the values of one group of a scenario's `paper.toml` by name."""
@@ -35,7 +37,7 @@ def _read(scenario: str) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PublishedValue:
+class PublishedValue(Checked):
     """A published value beside a metric, both in the metric's unit.
 
     Attributes:

@@ -2,36 +2,40 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from handover.scenarios.experiment.returned_types import COLOUR, Checked
 
 QUALITY = 88
 """Quality of the JPEG that is kept, of 100."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mark:
+class Mark(Checked):
     """Something that was detected, at a place in the picture.
 
     Attributes:
         label: what it is, such as "ball, as measured".
-        shape: "circle", "dashed circle", "cross" or "plus".
         u, v: pixels from the left and from the top.
         radius: of a circle, in pixels.
         colour: as "#rrggbb".
     """
 
     label: str
-    shape: str
+    shape: Literal["circle", "dashed circle", "cross", "plus"]
     u: float
     v: float
     radius: float = 8.0
     colour: str = "#ffd23f"
 
+    expected = {"colour": COLOUR}
+
 
 @dataclass(frozen=True, kw_only=True)
-class CameraPicture:
+class CameraPicture(Checked):
     """A picture of one camera at a time of the run, compressed as it is kept.
 
     Attributes:

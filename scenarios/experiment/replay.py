@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.experiment.returned_types import Expected, is_series, sequence_of
+from handover.scenarios.experiment.returned_types import COLOUR, VECTOR, Checked, Expected, is_series, sequence_of
 from handover.scenarios.experiment.time_plot import Phase
 
 
@@ -124,8 +124,20 @@ def faceted(mesh: Mesh) -> Mesh:
     return Mesh(mesh.vertices[kept[:, 1]], indices.reshape(-1, 3).astype(np.int64))
 
 
+_POINTS = Expected(
+    "an array of shape (rows, n, 3), or (1, n, 3)",
+    'record["arm.p_WE"][:, None, :]',
+    lambda points: is_series(points, (None, None, 3)),
+)
+_RADII = Expected("an array of shape (n,), or None", "np.full(3, 0.01)", lambda r: r is None or is_series(r, (None,)))
+_PLACES = Expected("an array of shape (rows, 3), or (1, 3)", 'record["robot.p_WB"]', lambda p: is_series(p, (None, 3)))
+_TURNS = Expected(
+    "an array of shape (rows, 4), or (1, 4)", 'record["robot.q_WB"]', lambda q: q is None or is_series(q, (None, 4))
+)
+
+
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class Line(Checked):
     """A line or a tube through points that move, such as a backbone.
 
     Attributes:
@@ -148,17 +160,11 @@ class Line:
     trail: bool = False
     opacity: float = 1.0
 
-    def __post_init__(self) -> None:
-        """Refuse points of another shape.
-
-        Raises:
-            WrongType: they have one.
-        """
-        _POINTS.check(f"the points of Line {self.label!r} are", self.points)
+    expected = {"colour": COLOUR, "points": _POINTS, "radii": _RADII}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Body:
+class Body(Checked):
     """A rigid body.
 
     Attributes:
@@ -176,25 +182,20 @@ class Body:
     q_WB: Floats | None = None
     opacity: float = 1.0
 
-    def __post_init__(self) -> None:
-        """Refuse positions and orientations of other shapes.
-
-        Raises:
-            WrongType: one has.
-        """
-        _PLACES.check(f"p_WB of Body {self.label!r} is", self.p_WB)
-        if self.q_WB is not None:
-            _TURNS.check(f"q_WB of Body {self.label!r} is", self.q_WB)
+    expected = {"colour": COLOUR, "p_WB": _PLACES, "q_WB": _TURNS}
 
 
-_POINTS = Expected(
-    "an array of shape (rows, n, 3), or (1, n, 3)",
-    'record["arm.p_WE"][:, None, :]',
-    lambda points: is_series(points, (None, None, 3)),
-)
-_PLACES = Expected("an array of shape (rows, 3), or (1, 3)", 'record["robot.p_WB"]', lambda p: is_series(p, (None, 3)))
-_TURNS = Expected("an array of shape (rows, 4), or (1, 4)", 'record["robot.q_WB"]', lambda q: is_series(q, (None, 4)))
 _LINES = sequence_of(Line, '[Line(label="arm", colour="#2f6db5", points=points)]')
+_PHASES = Expected(
+    "a list or tuple of Phase, or the name of a signal",
+    'phases_of(record, "servo.phase")',
+    lambda v: isinstance(v, str) or sequence_of(Phase, "").fits(v),
+)
+_WINDOW = Expected(
+    "an array of shape (2, 3) or (n, 3), or None",
+    "np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 2.0]])",
+    lambda v: v is None or is_series(v, (None, 3)),
+)
 _BODIES = sequence_of(Body, '[Body(label="robot", colour="#2f6db5", mesh=ball(0.1), p_WB=record["robot.p_WB"])]')
 
 
@@ -206,7 +207,7 @@ class PersonView(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Replay:
+class Replay(Checked):
     """A scene over a record's time.
 
     What is drawn, and in which order, does not depend on what was recorded, and where it is at a time depends on that
@@ -239,12 +240,11 @@ class Replay:
     follow: str = ""
     person_view: PersonView | None = None
 
-    def __post_init__(self) -> None:
-        """Refuse lines and bodies of other types.
-
-        Raises:
-            WrongType: one is.
-        """
-        _LINES.check("the lines of a Replay are", self.lines)
-        _LINES.check("the fixed lines of a Replay are", self.fixed)
-        _BODIES.check("the bodies of a Replay are", self.bodies)
+    expected = {
+        "lines": _LINES,
+        "fixed": _LINES,
+        "bodies": _BODIES,
+        "eye": VECTOR,
+        "phases": _PHASES,
+        "window": _WINDOW,
+    }

@@ -10,7 +10,7 @@ import numpy as np
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
-from handover.scenarios.experiment.returned_types import NUMBER, Expected, is_series, sequence_of
+from handover.scenarios.experiment.returned_types import Checked, Expected, is_number, is_series, sequence_of
 
 COLOURS = ("#2f6db5", "#d1602b", "#3c8d53", "#8357a8", "#a37a10", "#4d5866", "#c2487f", "#1f8a94", "#7d5a3c")
 """Colours of curves, in the order of use; the same as `var(--c0)` and on of page.css in its light scheme."""
@@ -21,8 +21,15 @@ _MARGIN = 0.06
 Stroke = Literal["solid", "dashed", "dotted"]
 
 
+SERIES = Expected(
+    "an array of numbers of shape (rows,), one a row of the record",
+    'record["arm.p_WE"][:, 0]',
+    lambda values: is_series(values, (None,)),
+)
+
+
 @dataclass(frozen=True, kw_only=True)
-class Curve:
+class Curve(Checked):
     """Values over the record's time, shape (rows,); NaN where there is nothing to be drawn.
 
     Attributes:
@@ -39,33 +46,19 @@ class Curve:
     stroke: Stroke = "solid"
     group: str = ""
 
-    def __post_init__(self) -> None:
-        """Refuse values that are no series of numbers.
-
-        Raises:
-            WrongType: they are none.
-        """
-        SERIES.check(f"the values of Curve {self.label!r} are", self.values)
+    expected = {"values": SERIES}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Level:
+class Level(Checked):
     """A horizontal line, such as a threshold."""
 
     label: str
     value: float
 
-    def __post_init__(self) -> None:
-        """Refuse a value that is no number.
-
-        Raises:
-            WrongType: it is none.
-        """
-        NUMBER.check(f"the value of Level {self.label!r} is", self.value)
-
 
 @dataclass(frozen=True, kw_only=True)
-class Phase:
+class Phase(Checked):
     """A span of time, s, and the name over it, "" for none."""
 
     begin: float
@@ -73,18 +66,18 @@ class Phase:
     name: str
 
 
-SERIES = Expected(
-    "an array of numbers of shape (rows,), one a row of the record",
-    'record["arm.p_WE"][:, 0]',
-    lambda values: is_series(values, (None,)),
-)
 _CURVES = sequence_of(Curve, '[Curve(label="x", values=record["arm.p_WE"][:, 0])]')
 _LEVELS = sequence_of(Level, '[Level(label="threshold", value=0.005)]')
+_LIMITS = Expected(
+    "a lower and an upper limit, each a number or None",
+    "(0.0, None)",
+    lambda v: isinstance(v, Sequence) and len(v) == 2 and all(x is None or is_number(x) for x in v),
+)
 _PHASES = sequence_of(Phase, 'phases_of(record, "servo.phase")')
 
 
 @dataclass(frozen=True, kw_only=True)
-class TimePlot:
+class TimePlot(Checked):
     """Curves over time that share an axis.
 
     Attributes:
@@ -108,15 +101,7 @@ class TimePlot:
     limits: tuple[float | None, float | None] = (None, None)
     palette: Sequence[str] = ()
 
-    def __post_init__(self) -> None:
-        """Refuse curves, levels and phases of other types.
-
-        Raises:
-            WrongType: one is.
-        """
-        _CURVES.check(f"the curves of TimePlot {self.title!r} are", self.curves)
-        _LEVELS.check(f"the levels of TimePlot {self.title!r} are", self.levels)
-        _PHASES.check(f"the phases of TimePlot {self.title!r} are", self.phases)
+    expected = {"curves": _CURVES, "levels": _LEVELS, "phases": _PHASES, "limits": _LIMITS}
 
     @property
     def axis_label(self) -> str:
@@ -168,7 +153,7 @@ _PLOTS = sequence_of(TimePlot, '[TimePlot(title="Distance", quantity="distance",
 
 
 @dataclass(frozen=True, kw_only=True)
-class TimeFigure:
+class TimeFigure(Checked):
     """Plots that a figure for papers draws below each other, sharing time.
 
     Attributes:
@@ -182,14 +167,7 @@ class TimeFigure:
     plots: Sequence[TimePlot]
     columns: int = 1
 
-    def __post_init__(self) -> None:
-        """Refuse a name that is no file's, and plots of another type.
-
-        Raises:
-            WrongType: it is none, or they are.
-        """
-        _FILE_NAME.check("the name of a TimeFigure is", self.name)
-        _PLOTS.check(f"the plots of TimeFigure {self.name!r} are", self.plots)
+    expected = {"name": _FILE_NAME, "plots": _PLOTS}
 
 
 def phases_of(record: Record, signal: str, names: Mapping[int, str] | None = None) -> tuple[Phase, ...]:

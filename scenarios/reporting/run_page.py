@@ -76,7 +76,7 @@ def _sections_of_scenario(
     guarded = ToleratedFaults(InvalidParameter, KeyError)
     try:
         replay, plots, shown = replay_and_plots(facts, record, guarded)
-        with guarded.tolerated("the plots over time could not be drawn"):
+        with guarded.tolerated("the figures over time could not be drawn"):
             plots_shown = time_plots_section(plots, shown.time)
         with guarded.tolerated("the replay could not be drawn"):
             replay_shown = None if replay is None else replay_section(replay, shown)
@@ -106,7 +106,7 @@ def replay_and_plots(
     parameters: Any = parameters_of(type(experiment), facts.run["parameters"])
     plots: list[TimePlot] = []
     shown: Replay | None = None
-    with guarded.tolerated("the plots over time could not be drawn"):
+    with guarded.tolerated("the figures over time could not be drawn"):
         plots += known.drawable_plots(experiment.plots(parameters, known))
     with guarded.tolerated("the replay could not be drawn"):
         replay = experiment.replay(parameters, known)

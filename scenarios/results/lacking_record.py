@@ -17,7 +17,7 @@ from handover.cosim.blocks.variable import Kind, Variable
 from handover.cosim.record.reader import Record
 from handover.fmus.catalog import UnknownBlock, UnknownUnit, find_unit, import_class
 from handover.scenarios.experiment.replay import Body, Replay
-from handover.scenarios.experiment.returned_types import WrongType
+from handover.scenarios.experiment.returned_types import WrongType, described
 from handover.scenarios.experiment.time_plot import SERIES, TimeFigure, TimePlot
 
 
@@ -100,7 +100,7 @@ class LackingRecord(Record):
         for curve in plot.curves:
             if len(curve.values) != len(self.time):
                 what = f"the values of Curve {curve.label!r} in TimePlot {plot.title!r} are"
-                raise WrongType(what, curve.values, f"{SERIES.right}, here {len(self.time)}", SERIES.example)
+                raise WrongType(what, described(curve.values), f"{SERIES.right}, here {len(self.time)}", SERIES.example)
 
     def drawable_replay(self, replay: Replay) -> Replay | None:
         """Return a replay without what has no place at any time; None if nothing has one."""

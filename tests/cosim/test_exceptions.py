@@ -36,6 +36,16 @@ def test_of_a_traceback_all_that_was_raised_is_the_last_line():
     assert last_line(["[Error] fmi3DoStep: two\nlines"]) == "lines"
 
 
+@pytest.mark.parametrize(("file", "place"), [("arm.py", " (arm.py, line 1)"), ("handover/arm.py", "")])
+def test_with_the_line_of_the_units_author_that_led_to_it(file: str, place: str):
+    with pytest.raises(ZeroDivisionError) as raised:
+        exec(compile("1 / 0", f"/tmp/x/resources/sources/{file}", "exec"))
+    log = ["[Error] fmi3DoStep: " + "".join(traceback.format_exception(raised.value))]
+    assert last_line(log) == f"ZeroDivisionError: division by zero{place}"
+    ours = log[0].replace("ZeroDivisionError", "handover.fmus.exchange.OtherReturn")
+    assert last_line([ours]) == f"division by zero{place}"
+
+
 @pytest.mark.parametrize("c", ["\x1b", "\x07", "\x9b", "\x08", "\x7f", "\u202e", "\u2066", "\udc80", "\x00"])
 def test_nothing_that_steers_a_terminal_is_shown(c: str):
     assert visible(f"arm{c}[31m\n näher") == "arm\ufffd[31m\n näher"

@@ -70,7 +70,7 @@ def _plain(value: object) -> object:
 
 
 @pytest.mark.parametrize("fails", [False, True])
-def test_an_arm_whose_outputs_are_all_zero_and_a_replay_that_fails_cost_neither_verdict_nor_page(
+def test_an_arm_whose_outputs_are_all_zero_and_figures_that_fail_cost_neither_verdict_nor_page(
     fails: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     def replay(_scenario: object, _parameters: object, _record: object) -> None:
@@ -78,20 +78,21 @@ def test_an_arm_whose_outputs_are_all_zero_and_a_replay_that_fails_cost_neither_
 
     if fails:
         monkeypatch.setattr(SCENARIOS["vsl_model_based"], "replay", replay)
+        monkeypatch.setattr(SCENARIOS["vsl_model_based"], "time_figures", replay)
     arm = build_block("zero_arm:ZeroArm", 3, tmp_path)
     out = tmp_path / "r"
     given = ["--unit", f"arm={arm}", "-p", "points=3", "-p", "settle=0.2", "--out", str(out)]
     done = CliRunner().invoke(main, ["run", "vsl_model_based", *given])
     assert done.exit_code == 1, done.output
-    lines = [line for line in done.output.splitlines() if line.startswith("the replay could not be drawn: ")]
-    assert len(lines) == fails
+    lines = [line for line in done.output.splitlines() if " could not be drawn: " in line]
+    assert [line.partition(" could")[0] for line in lines] == ["the figures over time", "the replay"] * fails
     summary = json.loads((out / "summary.json").read_text())
     assert summary.get("left_out", []) == lines
     assert summary["complete"]
     page = (out / "report.html").read_text(encoding="utf-8")
     assert ("Left out: the replay could not be drawn" in page) == fails
     assert ("no two points of the arm differ" in page) == fails
-    assert 'id="time"' in page
+    assert ('id="time"' in page) != fails
     assert 'id="signals"' in page
 
 

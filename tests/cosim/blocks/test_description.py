@@ -151,6 +151,14 @@ def test_an_attribute_that_is_not_what_it_is_to_be_is_refused(attribute: str, va
         describe(type("Wrong", (Gripper,), {attribute: value}))
 
 
+def test_a_method_that_takes_other_arguments_is_refused_where_it_is():
+    class Wrong(Gripper):
+        def outputs(self, t: float) -> Outputs: ...  # type: ignore
+
+    with pytest.raises(DeclarationError, match=r"outputs \(test_description.py, line \d+\): takes \(t\); .* \(t, u\)"):
+        describe(Wrong)
+
+
 def test_a_fault_of_a_field_names_the_block_too():
     made = dataclasses.make_dataclass("Made", [("x", Vector3[Metre], port(np.zeros(2), "x"))])
 

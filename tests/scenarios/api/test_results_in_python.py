@@ -123,7 +123,7 @@ def test_a_run_of_another_version_is_shown_without_plots(grasp_without_reflex: P
     run = handover.Run(grasp_without_reflex)
     html = run._repr_html_()  # type: ignore
     assert "succeeded</span>" in html
-    assert "the plots over time could not be drawn: InvalidParameter" in html
+    assert "the figures over time could not be drawn: InvalidParameter" in html
     with pytest.raises(handover.InvalidInput, match="colour"):
         run.replay()
 

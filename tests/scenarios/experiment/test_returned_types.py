@@ -14,8 +14,9 @@ from handover.scenarios.catalog import InvalidScenario, named_scenario
 from handover.scenarios.cli.command import main
 from handover.scenarios.experiment import experiment, replay, time_plot
 from handover.scenarios.experiment.experiment import Evaluator, Experiment, Metric, Outcome
+from handover.scenarios.experiment.live_inputs import Pushable
 from handover.scenarios.experiment.replay import Line, Replay
-from handover.scenarios.experiment.returned_types import Expected, WrongType
+from handover.scenarios.experiment.returned_types import Expected, WrongArguments, WrongType
 from handover.scenarios.experiment.time_plot import Curve, Level, TimeFigure, TimePlot
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
@@ -77,7 +78,21 @@ def test_a_scenarios_method_names_the_type_that_is_right(method: str, value: Any
     assert example in told.partition(", such as ")[2]
 
 
-@pytest.mark.parametrize(("method", "value"), [("outcome", True), ("over", None), ("pictures", None)])
+METRES = Outcome(success=True, reason="", metrics={"far": Metric(0.5, "metres")})
+
+
+@pytest.mark.parametrize("method", ["build", "replay"])
+def test_a_method_that_takes_other_arguments_is_refused_as_its_class_is_made(method: str):
+    def take(self: Any) -> None: ...
+
+    with pytest.raises(WrongArguments) as raised:
+        type("Wrong", (Experiment,), {method: take})
+    assert f"({Path(__file__).name}, line " in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("method", "value"), [("outcome", True), ("outcome", METRES), ("over", None), ("pictures", None)]
+)
 def test_so_does_an_evaluators(method: str, value: Any):
     judge = evaluator(**{method: value})
     with pytest.raises(WrongType, match=r"^Wrong\..*; expected .*, such as "):
@@ -116,6 +131,13 @@ WRONG = cast(Any, None)
         lambda: Metric(cast(Any, "0.5")),
         lambda: Metric(cast(Any, np.zeros(2))),
         lambda: Outcome(success=WRONG, reason=""),
+        lambda: Line(label="x", colour="bleu", points=np.zeros((1, 3, 3))),
+        lambda: Line(label="x", colour="#000000", points=np.zeros((1, 3, 3)), opacity=cast(Any, "half")),
+        lambda: TimePlot(title=cast(Any, 3), quantity="x", unit="", curves=[CURVE]),
+        lambda: TimePlot(title="x", quantity="x", unit="", curves=[CURVE], limits=cast(Any, 3)),
+        lambda: Curve(label="x", values=np.zeros(3), stroke=cast(Any, "thick")),
+        lambda: Replay(eye=cast(Any, (1.0, 1.0))),
+        lambda: Pushable(labels=cast(Any, "arm"), unit="arm", force="f", point=None, greatest=5.0),
         lambda: Outcome(success=True, reason="", metrics=cast(Any, {"x": 0.5})),
     ],
 )
