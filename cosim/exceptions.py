@@ -32,14 +32,14 @@ def did_you_mean(names: Sequence[str]) -> str:
     return f"did you mean {' or '.join(names[:3])}?" if names else ""
 
 
-def suggestion(name: str, valid: Iterable[str]) -> str:
+def suggestion(name: object, valid: Iterable[str]) -> str:
     """Return "did you mean ...?" with the valid names that are nearest, "" where none is near."""
-    likeness = {n: difflib.SequenceMatcher(None, n, name).ratio() for n in sorted(set(valid))}
+    likeness = {n: difflib.SequenceMatcher(None, n, str(name)).ratio() for n in sorted(set(valid))}
     least = max(_LIKE, max(likeness.values(), default=0.0) - _AS_LIKELY)
     return did_you_mean(sorted((n for n, x in likeness.items() if x >= least), key=lambda n: (-likeness[n], n)))
 
 
-def nearest(name: str, valid: Iterable[str]) -> str:
+def nearest(name: object, valid: Iterable[str]) -> str:
     """Return the suggestion of valid names; where none is near, all of them."""
     names = sorted(set(valid))
     if near := suggestion(name, names):

@@ -137,9 +137,7 @@ class Record:
         Raises:
             KeyError: no such signal was recorded.
         """
-        if signal not in self._columns:
-            raise KeyError(f"no signal {signal!r}; {nearest(signal, self._columns)}")
-        names = self._columns[signal]
+        names = self._columns_of(signal)
         if names == [signal]:
             return self._values(signal)
         return np.column_stack([self._values(n) for n in names]).reshape(-1, *_indices(names[-1]))
@@ -181,7 +179,12 @@ class Record:
         return {int(value): name for value, _, name in pairs}
 
     def _metadata(self, signal: str) -> dict[bytes, bytes]:
-        return self._table.schema.field(self._columns[signal][0]).metadata or {}
+        return self._table.schema.field(self._columns_of(signal)[0]).metadata or {}
+
+    def _columns_of(self, signal: str) -> list[str]:
+        if signal not in self._columns:
+            raise KeyError(f"no signal {signal!r}; {nearest(signal, self._columns)}")
+        return self._columns[signal]
 
     def _values(self, name: str) -> NDArray[Any]:
         from handover.cosim.record.columns import column_values  # slow to import, as what imports pyarrow

@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from fractions import Fraction
+from numbers import Rational, Real
 from typing import Any, cast
 
 from handover.cosim.exceptions import InvalidOptions
@@ -39,6 +40,15 @@ class AdaptiveStep:
     uncontrolled: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        given: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
+        exact = "a number of seconds is right that is exact, such as Fraction(1, 1000)"
+        faults = [f"{n} = {given[n]!r}: a number is right" for n in ("relative", "absolute") if not _is_real(given[n])]
+        steps = {n: given[n] for n in ("smallest", "largest", "initial") if n == "smallest" or given[n] is not None}
+        faults += [f"{name} = {step!r}: {exact}" for name, step in steps.items() if not isinstance(step, Rational)]
+        if not _are_names(self.uncontrolled):
+            faults.append(f"uncontrolled = {self.uncontrolled!r}: a tuple of outputs, such as ('arm.p_WG',), is right")
+        if faults:
+            raise InvalidOptions(faults)
         faults = [
             f"the {name} tolerance is {value!r}; a number from 0 on is right"
             for name, value in (("relative", self.relative), ("absolute", self.absolute))
@@ -170,6 +180,8 @@ class MasterOptions:
             ),
             "pace": (_is_above_0(given["pace"], int | float, None), "None, or a finite number above 0"),
         }
+        flags = ("cpu_times", "compiled", "repeat_discarded", "strict")
+        checks |= {name: (isinstance(given[name], bool), "True or False") for name in flags}
         faults = [f"{name} = {given[name]!r}: {valid} is right" for name, (fits, valid) in checks.items() if not fits]
         if faults:
             raise InvalidOptions(faults)
@@ -206,6 +218,10 @@ def _names(kind: type[enum.Enum]) -> str:
 
 def _is_above_0(value: Any, kind: Any, *others: None) -> bool:
     return value in others or (isinstance(value, kind) and 0 < value < math.inf)
+
+
+def _is_real(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def _are_names(value: Any) -> bool:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from fractions import Fraction
 from numbers import Rational
+from os import PathLike
 from pathlib import Path
 from typing import Any, overload
 
@@ -83,8 +84,12 @@ class System:
 
         Raises:
             InvalidFmu: the file is not a valid co-simulation FMU.
-            TypeError: the period is not exact.
+            TypeError: the period is not exact, or another argument is of another type.
         """
+        if not isinstance(name, str):  # type: ignore
+            raise TypeError(f"name = {name!r:.60}: a text is right, such as 'arm'")
+        if not isinstance(fmu, (str, PathLike, FmuDescription)):  # type: ignore
+            raise TypeError(f"unit {name}: fmu = {fmu!r:.60}: the path of an FMU is right, such as 'arm.fmu'")
         description = fmu if isinstance(fmu, FmuDescription) else self._described(Path(fmu))
         if name in self.units:
             self._faults.append(f"two units are called {name!r}")
@@ -225,8 +230,9 @@ class System:
         """Remove the connections of a port, or of all ports of a terminal, and what they are set to or follow.
 
         Raises:
-            ValueError: the terminal has a fault, so that its ports are not known.
+            ValueError: the terminal has a fault, so that its ports are not known. TypeError: it is not a port.
         """
+        _check_port(end, "unit.y.NAME or unit.u.NAME")
         if (found := self._terminal(end)) is None:
             self.disconnect_port(end)
             return
@@ -237,7 +243,12 @@ class System:
             self.disconnect_port(PortName(end.unit, member.port))
 
     def disconnect_port(self, end: PortName) -> None:
-        """Remove the connections of a port alone, whether the unit has a port of this name or not."""
+        """Remove the connections of a port alone, whether the unit has a port of this name or not.
+
+        Raises:
+            TypeError: it is not a port.
+        """
+        _check_port(end, "unit.y.NAME or unit.u.NAME")
         self._matches.pop(end, None)
         for matches in self._matches.values():
             matches[:] = [m for m in matches if m.source != end]
@@ -292,10 +303,11 @@ class System:
         """Let an input that no output feeds follow values over time, which are in its unit.
 
         Raises:
-            TypeError: the target is not a port.
+            TypeError: the target is not a port, or these are no values over time.
         """
-        if not isinstance(target, PortName):  # type: ignore
-            raise TypeError(f"{target!r} is not a port: give unit.u.NAME of what add returned")
+        _check_port(target)
+        if not isinstance(series, TimeSeries):  # type: ignore
+            raise TypeError(f"{target} cannot follow {series!r:.60}: a TimeSeries is right, as of Record.series")
         self._forget_matches(target)
         self.followed[target] = series
 
@@ -311,10 +323,11 @@ class System:
             source: gives its values, in its unit; None gives none, and the input keeps its start value.
 
         Raises:
-            TypeError: the target is not a port.
+            TypeError: the target is not a port, or the source gives no values.
         """
-        if not isinstance(target, PortName):  # type: ignore
-            raise TypeError(f"{target!r} is not a port: give unit.u.NAME of what add returned")
+        _check_port(target)
+        if source is not None and not callable(getattr(source, "at", None)):
+            raise TypeError(f"{target} cannot come from {source!r:.60}: an object with a method at(t) is right")
         self._forget_matches(target)
         self.externals[target] = NoSource() if source is None else source
 
@@ -446,6 +459,11 @@ class System:
         if path not in self._descriptions:
             self._descriptions[path] = describe_fmu(path)
         return self._descriptions[path]
+
+
+def _check_port(end: object, right: str = "unit.u.NAME") -> None:
+    if not isinstance(end, PortName):
+        raise TypeError(f"{end!r:.60} is not a port: give {right} of what add returned")
 
 
 def _ports_of(unit: str, ends: Iterable[PortName]) -> list[str]:

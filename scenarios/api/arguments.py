@@ -145,13 +145,24 @@ def of_type(name: str, value: Any, types: type | tuple[type, ...], right: str) -
     return value
 
 
+def _number_of(seconds: Any) -> float:
+    """Return a number of seconds; NaN for what is none, or is beyond all numbers."""
+    try:
+        return math.nan if isinstance(seconds, (bool, str)) else float(seconds)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
 def path_of(name: str, value: Any) -> Path:
     """Return the path of a file or a folder.
 
     Raises:
-        InvalidInput: it is neither a text nor a path.
+        InvalidInput: it is neither a text nor a path, or it is empty.
     """
-    return Path(of_type(name, value, (str, os.PathLike), "a path, as a text or a Path,"))
+    right = "a path, as a text or a Path,"
+    if value == "":
+        raise InvalidInput(f"{name} = '': {right} is right")
+    return Path(of_type(name, value, (str, os.PathLike), right))
 
 
 def path_or_none(name: str, value: Any) -> Path | None:
@@ -204,12 +215,8 @@ def positive_seconds(name: str, seconds: Seconds) -> Fraction:
     Raises:
         InvalidInput: it is not a finite number above 0.
     """
-    try:
-        fits = 0 < seconds < math.inf and not isinstance(seconds, bool)
-    except TypeError:
-        fits = False
-    if not fits:
-        raise InvalidInput(f"{name} = {seconds!r}: a finite number of seconds above 0 is right")
+    if not 0 < _number_of(seconds) < math.inf:
+        raise InvalidInput(f"{name} = {seconds!r:.60}: a finite number of seconds above 0 is right")
     return seconds if isinstance(seconds, Fraction) else exact_seconds(float(seconds))
 
 
@@ -226,12 +233,8 @@ def exact_time(name: str, seconds: Seconds | None) -> Fraction | None:
     """
     if seconds is None or isinstance(seconds, Fraction):
         return seconds
-    try:
-        fits = math.isfinite(seconds) and not isinstance(seconds, bool)
-    except TypeError:
-        fits = False
-    if not fits:
-        raise InvalidInput(f"{name} = {seconds!r}: a finite number of seconds is right")
+    if not math.isfinite(_number_of(seconds)):
+        raise InvalidInput(f"{name} = {seconds!r:.60}: a finite number of seconds is right")
     return exact_seconds(float(seconds))
 
 

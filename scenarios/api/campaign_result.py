@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from handover.cosim.exceptions import visible
-from handover.scenarios.api.arguments import errors_for_python
+from handover.scenarios.api.arguments import errors_for_python, path_of
 from handover.scenarios.api.pages import Page
 from handover.scenarios.api.run_result import Quantity, Run
 from handover.scenarios.api.signals import data_frame
@@ -61,7 +61,7 @@ class Campaign:
         """
         from handover.scenarios.campaign.table_writer import rebuild_table
 
-        self.folder = Path(folder)
+        self.folder = path_of("folder", folder)
         self._place = CampaignFolder(self.folder)
         with errors_for_python():
             try:

@@ -13,6 +13,7 @@ from handover.scenarios.api.arguments import (
     InvalidInput,
     errors_for_python,
     merged,
+    of_type,
     path_of,
     texts_of,
     unit_texts,
@@ -39,6 +40,9 @@ def unit(name: str, fmi: Literal[2, 3] = 3) -> Path:
     Raises:
         InvalidInput: there is no such unit, or it cannot be built in this standard.
     """
+    of_type("name", name, str, "the name of a unit, or the path of a block such as 'my_arm:MyArm',")
+    if fmi not in (2, 3):
+        raise InvalidInput(f"fmi = {fmi!r:.60}: 2 or 3 is right")
     if ":" in name:
         search_folder(Path.cwd())
     try:

@@ -27,6 +27,7 @@ from handover.scenarios.api.arguments import (
     errors_for_python,
     exact,
     positive_seconds,
+    several_texts,
     whole_number,
 )
 from handover.scenarios.api.open_inputs import HELD_KINDS, OpenSystem
@@ -186,7 +187,7 @@ def _chosen(
     Raises:
         InvalidInput: there are none, or some are unknown.
     """
-    chosen = default if names is None else names
+    chosen = default if names is None else several_texts(what, names)
     if unknown := [name for name in chosen if name not in ports]:
         raise InvalidInput(f"{what}: {'; '.join(f'{n!r}, {nearest(n, ports)}' for n in unknown)}")
     if not chosen:

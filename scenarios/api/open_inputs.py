@@ -114,9 +114,11 @@ class OpenSystem:
             KeyError: there is no such unit.
         """
         units = [*self.system.units, *(() if self.place is None else (self.place.unit.name,))]
-        owner = max((u for u in units if name.startswith(f"{u}.")), key=len, default=None)
+        owner = max((u for u in units if str(name).startswith(f"{u}.")), key=len, default=None)
+        if owner is None and name in units:
+            raise KeyError(f"{name!r} is a unit; one of its ports is right, such as '{name}.port'")
         if owner is None:
-            raise KeyError(f"no unit in {name!r}, such as 'unit.port'; {nearest(name.partition('.')[0], units)}")
+            raise KeyError(f"no unit in {name!r}, such as 'unit.port'; {nearest(str(name).partition('.')[0], units)}")
         return owner, name[len(owner) + 1 :]
 
     def _hold(self, target: PortName, port: FmuPort, start: Mapping[str, Any]) -> None:

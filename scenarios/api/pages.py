@@ -5,6 +5,7 @@ import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
 
+from handover.scenarios.api.arguments import path_of
 from handover.scenarios.results.run_folder import make_folder_of, write_whole
 
 
@@ -26,11 +27,12 @@ class Page:
         """Write the page to a file, whose folder is made, and return it with that as its path.
 
         Raises:
-            RecordNotWritten: it cannot be written.
+            InvalidInput: it is no path. RecordNotWritten: it cannot be written.
         """
-        make_folder_of(Path(path))
-        write_whole(Path(path), self.html)
-        return Page(self.html, Path(path), self.height)
+        file = path_of("path", path)
+        make_folder_of(file)
+        write_whole(file, self.html)
+        return Page(self.html, file, self.height)
 
     def show(self) -> None:
         """Open the page in a browser.

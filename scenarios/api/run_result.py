@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from handover.cosim.exceptions import nearest, visible
 from handover.cosim.record.reader import Record
-from handover.scenarios.api.arguments import InvalidInput, errors_for_python
+from handover.scenarios.api.arguments import InvalidInput, errors_for_python, path_of
 from handover.scenarios.api.pages import Page
 from handover.scenarios.api.signals import SignalTable
 from handover.scenarios.execution.errors import require_extra
@@ -81,7 +81,7 @@ class Run:
         Raises:
             InvalidInput: it is not the folder of a run, or a file in it is damaged.
         """
-        self.folder = Path(folder)
+        self.folder = path_of("folder", folder)
         self._place = RunFolder.of_run(self.folder)
         with errors_for_python():
             facts = RunFacts.read(self._place)

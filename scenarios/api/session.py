@@ -30,6 +30,7 @@ from handover.scenarios.api.arguments import (
     exact_time,
     master_options,
     merged,
+    of_type,
     positive_seconds,
     single_texts,
     unit_texts,
@@ -214,6 +215,7 @@ class Session:
         """
         if self._master.ended is not None:
             raise RuntimeError(f"{self._master.ended.summary}: open another session")
+        of_type("state", state, SavedState, "what Session.save returned")
         with errors_for_python():
             self._master.call_units(lambda: state.checkpoint.restore(self._master))
         self._evaluator = GuardedEvaluator(self._evaluator.evaluator)

@@ -65,7 +65,7 @@ def plot_signals(signals: SignalTable, names: Sequence[str], axes: Axes | None =
 
 
 def _draw(axes: Axes, signals: SignalTable, name: str) -> None:
-    element, whole = _element(signals, name), name if name in signals else name.rpartition("[")[0]
+    element, whole = _element(signals, name), name if name in signals else str(name).rpartition("[")[0]
     values, items = signals[whole], signals.item_names(whole)
     label = name.rpartition(".")[2]
     elements = list(elements_of(label, values).items())[: len(COLOURS)] if element is None else [(label, element)]
@@ -81,7 +81,7 @@ def _draw(axes: Axes, signals: SignalTable, name: str) -> None:
 
 def _element(signals: SignalTable, name: str) -> NDArray[Any] | None:
     """Return an element of a signal over time, by its name in the record, `arm.p_WG[3]`; None if there is none."""
-    whole = name.rpartition("[")[0]
+    whole = str(name).rpartition("[")[0]
     if name in signals or whole not in signals:
         return None
     return elements_of(whole, signals[whole]).get(name)

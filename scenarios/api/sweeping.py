@@ -18,6 +18,7 @@ from handover.scenarios.api.arguments import (
     exact_time,
     master_options,
     merged,
+    of_type,
     path_or_none,
     several_texts,
     text_of_value,
@@ -105,6 +106,8 @@ def sweep(
         require_extra("campaigns", "campaigns")
         if workers is not None and scheduler is not None:
             raise InvalidInput("workers and scheduler: a scheduler has workers of its own; one of both is right")
+        if scheduler is not None:
+            of_type("scheduler", scheduler, str, "an address such as 'tcp://10.0.0.5:8786'")
         pool = PoolConfig(None if workers is None else whole_number("workers", workers, 1), scheduler)
         name = _name_of(scenario)
         common = RunRequest(

@@ -13,6 +13,7 @@ from support.wording import Wording
 
 import handover
 from handover.controllers.ir_grasp.parameters import Strategy
+from handover.cosim.exceptions import InvalidOptions
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.experiment import Experiment
 from handover.scenarios.ir_grasp.ir_grasp import IrGrasp
@@ -203,12 +204,26 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "load of a number": lambda h: h.load(3),
     "load of nothing there": lambda h: h.load("no_such_run"),
     "describe of a number": lambda h: h.describe(3),
+    "describe of nothing": lambda h: h.describe(""),
+    "unit of a number": lambda h: h.unit(3),
+    "unit of FMI 4": lambda h: h.unit("Push", fmi=4),
+    "unit of no names": lambda h: h.unit(":"),
+    "stop beyond all numbers": lambda h: h.run("ir_grasp", stop=10**400),
+    "scheduler of a number": lambda h: h.sweep("ir_grasp", scheduler=3),
+    "place of a number": lambda h: h.open("ir_grasp", place=3),
+    "actions of a number": lambda h: h.environment("ir_grasp", "reflex", actions=3),
+    "Run of a number": lambda h: h.Run(3),
+    "Campaign of a number": lambda h: h.Campaign(3),
+    "page to a number": lambda h: h.Page("").save(3),
+    "tolerance of a text": lambda h: h.AdaptiveStep(relative="x"),
+    "step that is not exact": lambda h: h.AdaptiveStep(smallest=0.1),
+    "flag of a text": lambda h: h.MasterOptions(strict="no"),
 }
 
 
 @pytest.mark.parametrize("call", CALLS)
 def test_what_is_no_subject_or_no_single_value_is_told_in_one_sentence(call: str, wording: Wording):
-    with pytest.raises(handover.InvalidInput) as raised:
+    with pytest.raises((handover.InvalidInput, InvalidOptions)) as raised:
         CALLS[call](handover)
     wording.check(raised.value)
     assert "\n" not in str(raised.value)

@@ -28,6 +28,10 @@ def test_a_free_input_acts_in_the_steps_that_follow(fmi: int, isolate: tuple[str
         assert s.inputs == ("gain.u",)
         s["gain.u"] = 3.0
         assert s["gain.u"] == 3.0
+        with pytest.raises(KeyError, match="no unit in 3"):
+            _ = s[3]  # type: ignore
+        with pytest.raises(handover.InvalidInput, match=r"^state = 3: what Session\.save returned"):
+            s.restore(3)  # type: ignore
         s.step(0.1)
         assert s["gain.y"] == 6.0
         s["gain.u"] = -1.0
