@@ -143,6 +143,13 @@ def check_regular(path: Path, most: float = math.inf) -> None:
     _check_status(path, path.stat(), most)
 
 
+def reading_fault(error: OSError) -> str:
+    """Return why a file could not be read, in words that follow its name: `there is no such file`."""
+    if isinstance(error, FileNotFoundError):
+        return "there is no such file"
+    return f"it cannot be read: {(error.strerror or str(error)).lower()}"
+
+
 def read_regular(path: Path, most: float = MOST) -> bytes:
     """Return the content of a regular file.
 

@@ -32,7 +32,7 @@ from handover.controllers.vsl.learned_model import (
 )
 from handover.controllers.vsl.network import ACTIVATIONS, LAYERS, Activation, Network
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.files import read_regular
+from handover.cosim.files import read_regular, reading_fault
 
 FORMAT, VERSION = "handover-vsl-model", 2
 
@@ -94,7 +94,9 @@ def read_model(path: Path) -> VslModel:
     """
     try:
         text = read_regular(path).decode()
-    except (OSError, UnicodeDecodeError) as e:
+    except OSError as e:
+        raise InvalidModel(str(path), reading_fault(e)) from e
+    except UnicodeDecodeError as e:
         raise InvalidModel(str(path), f"it cannot be read: {e}") from e
     return parse_model(text, str(path))
 

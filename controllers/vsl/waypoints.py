@@ -9,7 +9,7 @@ import numpy as np
 
 from handover.controllers.vsl.paths import Arc, Line, Segment
 from handover.cosim.blocks.ports import Floats
-from handover.cosim.files import read_csv
+from handover.cosim.files import read_csv, reading_fault
 
 _TO, _VIA = ("x", "y", "z"), ("via_x", "via_y", "via_z")
 _MOST = 1000
@@ -64,7 +64,7 @@ def _rows(file: Path) -> list[tuple[int, dict[str, str]]]:
     try:
         (_, header), *lines = read_csv(file) or [(1, list[str]())]
     except OSError as e:
-        raise InvalidWaypoints(file, [f"it cannot be read: {e.strerror}"]) from e
+        raise InvalidWaypoints(file, [reading_fault(e)]) from e
     except ValueError as e:
         raise InvalidWaypoints(file, [f"it is no CSV file: {e}"]) from e
     columns = [name.strip() for name in header]

@@ -17,7 +17,7 @@ import tomli
 from click.core import ParameterSource
 
 from handover.cosim.exceptions import nearest, one_line
-from handover.cosim.files import read_regular
+from handover.cosim.files import read_regular, reading_fault
 from handover.cosim.ssp.archive import ssp_root
 from handover.cosim.typed_data import checked, decoded
 from handover.fmus.build import is_of_cache
@@ -174,7 +174,7 @@ def _content(path: Path) -> dict[str, Any]:
         text = read_regular(path)
         return decoded(text, dict[str, Any]) if form == "JSON" else tomli.loads(text.decode())
     except OSError as e:
-        raise UsageError(f"{path}: it cannot be read: {e.strerror or e}") from e
+        raise UsageError(f"{path}: {reading_fault(e)}") from e
     except (ValueError, RecursionError) as e:  # of both parsers, and of bytes that are not UTF-8
         raise UsageError(f"{path}: it is not {form} of options, such as {example}: {one_line(e)}") from e
 

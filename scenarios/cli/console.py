@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, TextIO
@@ -27,6 +28,25 @@ def print_rows(console: Console, rows: Iterable[tuple[str, ...]]) -> None:
     for row in rows:
         table.add_row("", *map(Text, row))
     console.print(table)
+
+
+def heading(name: str) -> Text:
+    """Return a column's heading, whose long names are broken at underscores and dots, and not within words."""
+    return Text("\n".join(line for text in name.split("\n") for line in _broken(text)))
+
+
+def _broken(name: str) -> list[str]:
+    lines = [""]
+    for part in _PARTS.findall(name):
+        if lines[-1] and len(lines[-1]) + len(part) > _LONGEST_HEADING:
+            lines.append("")
+        lines[-1] += part
+    return lines
+
+
+_PARTS = re.compile(r"[^_.]*[_.]|[^_.]+")
+_LONGEST_HEADING = 16
+"""Characters in a line of a heading, unless a word is longer."""
 
 
 def print_json(data: Mapping[str, Any]) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from handover.cosim.blocks.start_values import range_of
 from handover.cosim.blocks.variable import Kind, element_names
 from handover.cosim.exceptions import nearest
-from handover.cosim.files import read_csv
+from handover.cosim.files import read_csv, reading_fault
 from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.fmu.start_values import entries_of, parsed_number
 from handover.cosim.system.time_series import TimeSeries
@@ -48,7 +48,7 @@ def read_inputs(path: Path, inputs: Mapping[str, FmuPort], start: Mapping[str, A
     try:
         rows = [(i, row) for i, row in read_csv(path) if row]
     except OSError as e:
-        raise UsageError(f"{path}: {(e.strerror or str(e)).lower()}") from e
+        raise UsageError(f"{path}: {reading_fault(e)}") from e
     except ValueError as e:
         raise UsageError(f"{path}: not a CSV file in UTF-8: {e}") from e
     if not rows:

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handover.controllers.vsl.kinematics import VslKinematics
-from handover.cosim.exceptions import one_line
+from handover.cosim.files import reading_fault
 from handover.cosim.record.reader import InvalidRecord, read_parquet
 from handover.plants.vsl.parameters import MAX_ANGLE, MAX_PRESSURE
 from handover.plants.vsl.parameters import Params as ArmParams
@@ -88,9 +88,10 @@ def read_data(path: Path, key: str, kinematics: VslKinematics, parameters: Mappi
     """
     try:
         table: Any = read_parquet(path)
-    except (OSError, InvalidRecord) as e:
-        reason = e.fault if isinstance(e, InvalidRecord) else one_line(e)
-        raise InvalidData(path, f"it is no Parquet file that can be read: {reason}") from e
+    except OSError as e:
+        raise InvalidData(path, reading_fault(e)) from e
+    except InvalidRecord as e:
+        raise InvalidData(path, f"it is no Parquet file that can be read: {e.fault}") from e
     wanted = [*(f"{port}[{k + 1}]" for port, n in _COLUMNS.values() for k in range(n)), _ORDER]
     if missing := [name for name in wanted if name not in table.column_names]:
         raise InvalidData(path, f"it lacks the columns {', '.join(missing)}")

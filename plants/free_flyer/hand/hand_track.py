@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from handover.cosim.blocks.block import InvalidParameters
 from handover.cosim.blocks.plain_rotation import Quaternion, Vector, lerp, nlerp, normalize
-from handover.cosim.files import read_csv
+from handover.cosim.files import read_csv, reading_fault
 from handover.plants.free_flyer.hand.hand_kinematics import JOINT_MAX, JOINTS
 
 COLUMNS = (
@@ -94,9 +94,10 @@ def read_track(path: Path, max_gap: float) -> HandTrack:
     """
     try:
         table = [(n, row) for n, row in read_csv(path) if row]
-    except (OSError, ValueError) as e:
-        why = e.strerror if isinstance(e, OSError) and e.strerror else str(e)
-        raise InvalidTrack(path, [f"it cannot be read: {why}"]) from e
+    except OSError as e:
+        raise InvalidTrack(path, [reading_fault(e)]) from e
+    except ValueError as e:
+        raise InvalidTrack(path, [f"it cannot be read: {e}"]) from e
     header = [name.strip() for name in table[0][1]] if table else []
     if fault := _fault_of_header(header):
         raise InvalidTrack(path, [fault])

@@ -14,7 +14,7 @@ from handover.scenarios.campaign.results import CampaignResults, PointResults
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import RunCounts
 from handover.scenarios.cli.campaign import format_progress
-from handover.scenarios.cli.console import open_console
+from handover.scenarios.cli.console import heading, open_console
 from handover.scenarios.experiment.display_unit import display_unit
 
 _MAX_POINTS = 12
@@ -66,8 +66,8 @@ def _points(results: CampaignResults, console: Console) -> Table:
     varied = list(dict.fromkeys(name for point in results.points for name in point.values))
     metrics = results.headline[: max(1, (console.width - 40 - 12 * len(varied)) // _COLUMN_WIDTH)]
     rows = Table(box=None, padding=(0, 2), pad_edge=True)
-    for heading in (*varied, "runs", "succeeded", "95 % interval", *(f"median\n{name}" for name in metrics)):
-        rows.add_column(Text(heading), justify="right", overflow="fold")
+    for name in (*varied, "runs", "succeeded", "95 % interval", *(f"median\n{name}" for name in metrics)):
+        rows.add_column(heading(name), justify="right", overflow="fold")
     for point in results.points[:_MAX_POINTS]:
         cells = [point.values.get(name, "") for name in varied]
         medians = (_median(results, point, name) for name in metrics)

@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from handover.scenarios.cli.console import open_console
+from handover.scenarios.cli.console import heading, open_console
 from handover.scenarios.comparison.campaigns import (
     ComparedCampaigns,
     MetricTest,
@@ -107,8 +107,8 @@ def _print_table(console: Console, header: Sequence[str], rows: Sequence[Sequenc
     if not rows:
         return
     table = Table(box=None, padding=(0, 2), pad_edge=True)
-    for k, heading in enumerate(header):
-        table.add_column(Text(heading), justify="left" if k == 0 else "right", overflow="fold")
+    for k, name in enumerate(header):
+        table.add_column(heading(name), justify="left" if k == 0 else "right", overflow="fold")
     for row in rows[:_MAX_ROWS]:
         table.add_row(*map(Text, row))
     console.print(table)

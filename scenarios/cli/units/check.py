@@ -11,6 +11,7 @@ from rich.text import Text
 
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.report import EXPERIMENTS, CheckReport, Section
+from handover.cosim.files import reading_fault
 from handover.cosim.fmu.file.archive import NO_FILE_FAULT
 from handover.cosim.probe.finding import Finding, Level
 from handover.cosim.ssp.check_ssp import check_ssp
@@ -87,7 +88,7 @@ def _check_files_exist(files: Sequence[Path]) -> None:
             else:
                 file.open("rb").close()
         except OSError as e:
-            faults.append(f"{file}: {(e.strerror or str(e)).lower()}")
+            faults.append(f"{file}: {reading_fault(e)}")
     if faults:
         raise UsageError("; ".join(faults))
 

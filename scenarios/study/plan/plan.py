@@ -16,7 +16,7 @@ import tomli
 from msgspec import Meta, Struct
 
 from handover.cosim.exceptions import nearest, one_line
-from handover.cosim.files import read_regular
+from handover.cosim.files import read_regular, reading_fault
 from handover.cosim.typed_data import Name, Text, all_faults, checked, unknown_names
 from handover.scenarios.catalog import SCENARIOS, InvalidScenario, installed_scenarios, named_scenario
 from handover.scenarios.experiment.experiment import Experiment
@@ -218,7 +218,7 @@ def read_plan(path: Path) -> StudyPlan:
     try:
         text = read_regular(path).decode()
     except OSError as e:
-        raise InvalidPlan(path, [f"it cannot be read: {e.strerror or e}"]) from e
+        raise InvalidPlan(path, [reading_fault(e)]) from e
     except ValueError as e:
         raise InvalidPlan(path, [f"it is not text in UTF-8: {one_line(e)}"]) from e
     return parse_plan(text, path)

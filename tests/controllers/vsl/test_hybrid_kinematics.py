@@ -223,7 +223,7 @@ def test_a_file_that_is_no_model_is_refused(tmp_path: Path):
     file.write_text("{}")
     with pytest.raises(InvalidModel, match=r"m\.json: its format is None"):
         HybridKinematics(Params(model=str(file)))
-    with pytest.raises(InvalidModel, match="cannot be read"):
+    with pytest.raises(InvalidModel, match="there is no such file"):
         HybridKinematics(Params(model=str(tmp_path / "none.json")))
 
 

@@ -151,7 +151,7 @@ def test_files_that_cannot_be_read_are_told(tmp_path: Path):
     assert "run.json: it is not JSON of options, such as" in refused(tmp_path, "seed = 3", name="run.json")
     assert "Expected `object`, got `array`" in refused(tmp_path, "[3]", name="run.json")
     result = call("sweep", "ir_grasp", "--config", tmp_path / "none.toml")
-    assert (result.exit_code, "none.toml: it cannot be read: No such file" in result.output) == (2, True)
+    assert (result.exit_code, "none.toml: there is no such file" in result.output) == (2, True)
 
 
 @pytest.fixture(scope="module")

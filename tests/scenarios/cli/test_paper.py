@@ -39,7 +39,7 @@ def test_without_a_name_it_lists_the_experiments():
         (["ir-table", "--workers", "0"], "0 is not in the range x>=1"),
         (["ir-table", "--seed", "-1"], "-1 is not in the range 0<=x<="),
         (["ir-table", "--model", "m.json"], "ir-table has no use for a trained model"),
-        (["vsl-2", "--model", "none.json"], "none.json: it cannot be read"),
+        (["vsl-2", "--model", "none.json"], "none.json: there is no such file"),
     ],
 )
 def test_a_call_that_cannot_be_executed_is_refused_and_leaves_nothing(

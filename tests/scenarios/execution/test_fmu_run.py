@@ -227,7 +227,7 @@ def test_a_local_variable_starts_from_what_is_given(tmp_path: Path, initial: str
         (("-p", "m=1", "-p", "m=2"), "m is given twice"),
         (("-p", "m=1,2"), "m = '1,2': 2 values where 1 is right"),
         (("-p", "m=inf"), "mass.m: inf is not finite"),
-        (("--input", "missing.csv"), "missing.csv: no such file or directory"),
+        (("--input", "missing.csv"), "missing.csv: there is no such file"),
         (("--seed", "1"), "--seed: for scenarios"),
         (("--unit", "a=b.fmu"), "--unit: for scenarios"),
     ],

@@ -136,7 +136,7 @@ def test_a_pilot_study_may_be_driven_by_scripts():
 
 
 def test_a_file_that_is_no_plan_is_told(tmp_path: Path):
-    with pytest.raises(InvalidPlan, match="it cannot be read"):
+    with pytest.raises(InvalidPlan, match="there is no such file"):
         read_plan(tmp_path / "plan.toml")
     (tmp_path / "plan.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(InvalidPlan, match="it is not text in UTF-8"):

@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
@@ -38,6 +39,15 @@ def test_each_point_has_its_rate_with_an_interval_and_its_medians(capsys: pytest
     (row,) = [line.split() for line in output.splitlines() if " of 10 " in line and "runs" not in line]
     # Clopper and Pearson of 9 of 10, as in tables: 0.555 to 0.997
     assert " ".join(row) == "0.03 10 9 of 10 55 % to 100 % 4.5 mm"
+
+
+def test_long_names_are_broken_between_their_words(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("handover.scenarios.cli.summaries.campaign.open_console", lambda: Console(width=80))
+    plan = CampaignPlan(scenario="ir_grasp", points=[{"approach_disturbance_scale": "0.03"}])
+    metrics = {"final_distance_thumb": Metric(0.001, "m"), "true_distance_thumb": Metric(0.002, "m")}
+    rows = [RunRow(run=run, status="done", success=True, reason="closed", metrics=metrics) for run in plan.runs()]
+    words = printed(plan, rows, capsys).split()
+    assert {"approach_", "disturbance_", "scale", "final_distance_", "thumb"} <= {*words}
 
 
 def test_of_many_points_and_reasons_the_first_are_reported(capsys: pytest.CaptureFixture[str]):
