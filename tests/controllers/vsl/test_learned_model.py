@@ -382,5 +382,5 @@ def test_other_text_is_refused(text: str):
 def test_files_that_cannot_be_read_are_refused(tmp_path: Path):
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
     for name in ("none.json", "binary", "."):
-        with pytest.raises(InvalidModel, match="cannot be read|there is no such file"):
+        with pytest.raises(InvalidModel, match=r"cannot be read|there is no such file"):
             read_model(tmp_path / name)
