@@ -29,3 +29,14 @@ def serialised(host: CtypesHost, state: ctypes.c_void_p) -> bytes:
 def deserialise(host: CtypesHost, data: bytes) -> tuple[int, ctypes.c_void_p]:
     state = ctypes.c_void_p()
     return host.call(called(host, "DeserializeFMUstate"), data, SIZE(len(data)), ctypes.byref(state)), state
+
+
+def digest(*parts: bytes) -> int:
+    """Return the digest that the runtime has of a state: FNV-1a by words of each part, the upper half folded in."""
+    value = 0xCBF29CE484222325
+    for part in parts:
+        for at in range(0, len(part), 8):
+            word = int.from_bytes(part[at : at + 8].ljust(8, b"\0"), "little")
+            value = (value ^ word) * 0x100000001B3 % 2**64
+            value ^= value >> 32
+    return value

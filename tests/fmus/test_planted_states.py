@@ -7,22 +7,13 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy_host import FmpyHost
 from planted import planted_pickle
+from saved_states import digest
 
 from handover.fmus.buffers import join, split
 from handover.fmus.build import cached
 
 IN_OTHER_PARTS = "HandAndObject"
 """A unit whose state holds states of its parts."""
-
-
-def digest(content: bytes) -> int:
-    """Return the digest that the runtime has of a state: FNV-1a by words, the upper half folded in."""
-    value = 0xCBF29CE484222325
-    for at in range(0, len(content), 8):
-        word = int.from_bytes(content[at : at + 8].ljust(8, b"\0"), "little")
-        value = (value ^ word) * 0x100000001B3 % 2**64
-        value ^= value >> 32
-    return value
 
 
 def header_of(saved: bytes) -> bytes:

@@ -7,7 +7,6 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import pytest
 from ctypes_host import CtypesHost
@@ -42,11 +41,16 @@ def note_of(unit: CtypesHost) -> Path:
     return unit.folder / "resources" / "python.txt"
 
 
-def run(unit: CtypesHost, *, resources: Path | None = None, program: str = "host.c", **environment: str) -> Any:
-    place = (resources or unit.folder / "resources").as_uri()
+def run(unit: CtypesHost, **environment: str) -> "subprocess.CompletedProcess[str]":
+    return run_in("host.c", unit, unit.folder / "resources", environment)
+
+
+def run_in(
+    program: str, unit: CtypesHost, resources: Path, environment: Mapping[str, str]
+) -> "subprocess.CompletedProcess[str]":
     references = [str(unit.references[name]) for name in ("a", "b")]
-    made = compiled(HERE / program)
-    return call([made, unit.library._name, unit.token, place, *references], NOWHERE | environment)
+    command = [compiled(HERE / program), unit.library._name, unit.token, resources.as_uri(), *references]
+    return call(command, {**NOWHERE, **environment})
 
 
 def call(command: "list[str | Path]", environment: Mapping[str, str]) -> "subprocess.CompletedProcess[str]":
@@ -109,8 +113,8 @@ def test_a_folder_and_a_module_in_any_script_serve_in_any_locale(unpacked: Ctype
     resources = shutil.copytree(unpacked.folder / "resources", tmp_path / "größe 100% #a" / "resources")
     with (resources / "sources" / "sample_units" / "every_kind.py").open("a", encoding="utf-8") as file:
         file.write("\nω = 3\n\nclass Ünit:\n    größe = ω\n")
-    bare = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-    expect_values(run(unpacked, resources=resources, FMU_PYTHON_PROCESS=place, **bare))
+    bare = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "FMU_PYTHON_PROCESS": place}
+    expect_values(run_in("host.c", unpacked, resources, bare))
 
 
 LISTED = {
@@ -180,7 +184,7 @@ def test_all_that_was_tried_is_told_with_a_cure(unpacked: CtypesHost, tmp_path: 
     assert ("python.txt" in done.stdout) is (note is not None and "FMU_LIBPYTHON" not in environment)
 
 
-def alike(folder: Path, version: str) -> Path:
+def alike(folder: Path, version: str) -> str:
     """Return a library that has Python's functions, or only the first ones; none of them does anything."""
     names = set(re.findall(r"F\(.*?, (\w+), \(", (RUNTIME / "python_api.h").read_text())) - {"Py_GetVersion"}
     code = "".join(f"void *{name}(void) {{ return 0; }}\n" for name in sorted(names))
@@ -190,7 +194,7 @@ def alike(folder: Path, version: str) -> Path:
     (folder / "alike.c").write_text(code)
     (folder / "lib" / "python3.11").mkdir(parents=True)
     (folder / "lib" / "python3.11" / "os.py").touch()
-    return shutil.copy(compiled(folder / "alike.c", flags=("-shared", "-fPIC")), folder / version)
+    return str(shutil.copy(compiled(folder / "alike.c", flags=("-shared", "-fPIC")), folder / version))
 
 
 @pytest.mark.parametrize("place", EITHER_PLACE)
@@ -203,7 +207,7 @@ def test_a_unit_without_its_sources_says_what_may_be_wrong(unpacked: CtypesHost,
 
 
 def test_no_second_python_is_loaded_beside_an_unfit_one(unpacked: CtypesHost, tmp_path: Path):
-    done = run(unpacked, HOST_LOADS_BEFORE=str(alike(tmp_path, "fragment")), HOST_LOGS="1")
+    done = run(unpacked, HOST_LOADS_BEFORE=alike(tmp_path, "fragment"), HOST_LOGS="1")
     assert "the Python in this process: has no function Py_GetVersion" in done.stdout
     assert "Cure: there cannot be a second Python beside it" in done.stdout
     assert "FMU_LIBPYTHON" not in done.stdout
@@ -223,7 +227,7 @@ def test_a_library_without_its_standard_library_is_refused(unpacked: CtypesHost,
 
 @NEEDS_LIBRARY
 def test_calls_after_the_hosts_python_has_ended_are_errors(unpacked: CtypesHost):
-    done = run(unpacked, program="finalising_host.c")
+    done = run_in("finalising_host.c", unpacked, unpacked.folder / "resources", {})
     assert done.returncode == 0, done.stdout
     statuses = [line for line in done.stdout.splitlines() if " = " in line]
     assert statuses == ["step = 0", "step = 3", "state = 3", "string = 3", "reset = 3", "freed = 1"]

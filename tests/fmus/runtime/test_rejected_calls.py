@@ -4,6 +4,7 @@ import ctypes
 
 import pytest
 from ctypes_host import BOOL, ERROR, OK, SIZE, CtypesHost
+from saved_states import save, serialised
 from support.wording import Wording
 from workshop import Workshop
 
@@ -11,15 +12,7 @@ DT = 1 / 64
 
 
 def state_of(host: CtypesHost) -> bytes:
-    get, size_of, write = ("GetFMUState", "SerializedFMUStateSize", "SerializeFMUState")
-    if host.fmi == 2:
-        get, size_of, write = (name.replace("State", "state") for name in (get, size_of, write))
-    state, size = ctypes.c_void_p(), ctypes.c_size_t()
-    assert host.call(get, ctypes.byref(state)) == OK
-    assert host.call(size_of, state, ctypes.byref(size)) == OK
-    data = ctypes.create_string_buffer(size.value)
-    assert host.call(write, state, data, size) == OK
-    return data.raw
+    return serialised(host, save(host))
 
 
 def set_strings(host: CtypesHost, names: tuple[str, ...], values: tuple[bytes | None, ...]) -> int:

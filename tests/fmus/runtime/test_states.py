@@ -3,7 +3,7 @@ import struct
 
 import pytest
 from ctypes_host import ERROR, OK, CtypesHost
-from saved_states import called, deserialise, save, serialised
+from saved_states import called, deserialise, digest, save, serialised
 from support.wording import Wording
 from workshop import Workshop
 
@@ -28,14 +28,8 @@ def ten_steps(host: CtypesHost) -> list[list[float]]:
 
 def resealed(data: bytes) -> bytes:
     """Return a serialised state that was changed with the digest that fits, as another writer would give it."""
-    head, mask = 64, (1 << 64) - 1
-    blank = data[: head - 8] + bytes(8)
-    digest = 0xCBF29CE484222325
-    for part in (blank, data[head:]):
-        for at in range(0, len(part), 8):
-            digest = ((digest ^ int.from_bytes(part[at : at + 8], "little")) * 0x100000001B3) & mask
-            digest ^= digest >> 32
-    return data[: head - 8] + struct.pack("=Q", digest) + data[head:]
+    head = 64
+    return data[: head - 8] + struct.pack("=Q", digest(data[: head - 8] + bytes(8), data[head:])) + data[head:]
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
