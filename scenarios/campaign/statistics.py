@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from math import comb
 from typing import Any, Literal
 
@@ -161,13 +162,18 @@ def two_proportions(successes: int, n: int, others: int, n_others: int) -> float
     return float(fisher_exact(table).pvalue)
 
 
+@cache
 def compatible_counts(successes: int, n: int, n_others: int) -> tuple[int, int]:
     """Return the smallest and the largest count of `n_others` that Fisher's test cannot tell from `successes` of `n`.
 
     They say what the test could have found: where they span all counts, nothing.
     """
-    kept = [k for k in range(n_others + 1) if two_proportions(k, n_others, successes, n) >= LEVEL]
-    return kept[0], kept[-1]
+    counts = range(n_others + 1)
+    low, high = (
+        next(k for k in from_end if two_proportions(k, n_others, successes, n) >= LEVEL)
+        for from_end in (counts, reversed(counts))
+    )
+    return low, high
 
 
 def paired_difference(first: ArrayLike, second: ArrayLike) -> DifferenceTest | None:

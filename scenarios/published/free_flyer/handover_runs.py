@@ -123,6 +123,7 @@ class HandoverRuns:
 
     def __init__(self, table: CampaignTable) -> None:
         self._rows: Sequence[Row] = known_rows(table)
+        self._found: dict[tuple[tuple[str, str], ...], list[Row]] = {}
 
     def of(
         self,
@@ -133,7 +134,10 @@ class HandoverRuns:
     ) -> list[Row]:
         """Return the runs of a task, in the order of their repetitions."""
         wanted = point_of(task, behaviour, propulsion, variation)
-        return [row for row in self._rows if has(row, wanted, _VARIED, _DEFAULT)]
+        key = tuple(wanted.items())
+        if key not in self._found:  # claims, tables and figures ask for the same ones some hundred times
+            self._found[key] = [row for row in self._rows if has(row, wanted, _VARIED, _DEFAULT)]
+        return [*self._found[key]]
 
     def usual(self, task: Task | None = None) -> list[Row]:
         """Return the runs of a task, or of all, with the scenario's own values, whatever behaviour and propulsion."""

@@ -70,8 +70,10 @@ def has(row: Row, wanted: Mapping[str, str], names: Sequence[str], default: obje
         names: parameters that count besides those that are wanted.
         default: the scenario's parameters; those of units have the default where a run does not set them.
     """
-    asked = {**wanted, **{name: None for name in names if name not in wanted}}
-    return all(_is(row.get(name), text, getattr(default, name, None)) for name, text in asked.items())
+    if not all(_is(row.get(name), text, getattr(default, name, None)) for name, text in wanted.items()):
+        return False
+    others = (name for name in names if name not in wanted)
+    return all(_is(row.get(name), None, getattr(default, name, None)) for name in others)
 
 
 def _is(value: Any, text: str | None, default: Any) -> bool:
