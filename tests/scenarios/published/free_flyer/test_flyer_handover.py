@@ -1,12 +1,15 @@
 """Handovers of the free-flyer: the plan, and how claims and tables are judged, on tables that a test makes up."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pytest
 from flyer_runs import metric, task_of
+from support.sketched_figures import Sketches
+from support.sketched_figures import sketches as sketches
 
 from handover.scenarios.campaign.plan_check import checked_plan
 from handover.scenarios.campaign.table import CampaignTable
@@ -55,6 +58,7 @@ def row_of(run: Any, **measured: Any) -> dict[str, Any]:
     return row | measured
 
 
+@cache
 def table_of(
     quick: bool = False,
     *,
@@ -97,6 +101,7 @@ def table_of(
     return CampaignTable(pa.Table.from_pylist([{name: row.get(name) for name in names} for row in rows]))
 
 
+@cache
 def verdicts(table: CampaignTable) -> dict[str, Claim]:
     return {claim.claim: claim for claim in HAND_OVER.claims(table)}
 
@@ -217,11 +222,12 @@ def test_the_figures_are_numbered_as_in_the_thesis():
     assert len(numbers) == 5
 
 
-def test_without_records_there_are_no_curves(tmp_path: Path):
-    figures = HAND_OVER.draw(table_of(), tmp_path, tmp_path)
-    assert [figure.name for figure in figures] == ["margins", "strength"]
+def test_without_records_there_are_no_curves(tmp_path: Path, sketches: Sketches):
+    HAND_OVER.draw(table_of(), tmp_path, tmp_path)
+    sketches.check("margins", "strength")
 
 
+@cache
 def approaches(alone: int = 0, alone_if_other: int = 0, silent: bool = False, quick: bool = False) -> CampaignTable:
     """Return the approaches' runs, of which the first and, of robots that are otherwise, as many act alone."""
     rows: list[dict[str, Any]] = []
@@ -262,9 +268,9 @@ def test_the_robot_reaches_all_random_places():
     assert {point["p_WG_handover"] for point in plan.points} == set(places(125))
 
 
-def test_approaches_are_drawn_with_each_kind_of_robot(tmp_path: Path):
+def test_approaches_are_drawn_with_each_kind_of_robot(tmp_path: Path, sketches: Sketches):
     (figure,) = FlyerApproaches().draw(approaches(), tmp_path, tmp_path)
-    assert (tmp_path / f"{figure.name}.png").exists()
+    sketches.check(figure.name)
     (table,) = FlyerApproaches().tables(approaches())
     assert len(table.rows) == 4 * (1 + len(CASES))
 

@@ -1,12 +1,15 @@
 """Errors of the free-flyer's navigation: the plan, and how it is judged, on tables that a test makes up."""
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pytest
+from support.sketched_figures import Sketches
+from support.sketched_figures import sketches as sketches
 
 from handover.plants.free_flyer.robot.navigation import Params
 from handover.scenarios.campaign.plan_check import checked_plan
@@ -47,6 +50,7 @@ def by_position(given: Run) -> bool:
     return fetches or late > (0.02 if given["behaviour"] == "rigid" else 0.11)
 
 
+@cache
 def table_of(
     fails: Callable[[Run], bool] = by_position,
     signals: Callable[[Run, int], bool] = as_models_say,
@@ -70,6 +74,7 @@ def table_of(
     return CampaignTable(pa.Table.from_pylist(rows))
 
 
+@cache
 def verdicts(table: CampaignTable) -> dict[str, Claim]:
     return {claim.claim: claim for claim in FlyerNavigation().claims(table)}
 
@@ -83,9 +88,8 @@ def test_the_plans_are_sound_and_have_one_error_at_a_time():
         assert len(names) <= 1
 
 
-@pytest.mark.parametrize("error", ESTIMATE_ERRORS, ids=lambda error: error.label)
-def test_the_navigation_takes_every_level(error: Any):
-    for level in error.levels:
+def test_the_navigation_takes_every_level():
+    for error, level in ((each, level) for each in ESTIMATE_ERRORS for level in each.levels):
         given: dict[str, Any] = {
             n.removeprefix("navigation."): float(x) for n, x in error.variation(level).parameters.items()
         }
@@ -172,11 +176,10 @@ def test_the_counts_test_is_the_binomial_one_for_equal_chances():
     assert count_probability(3, [1.0, 1.0, 1.0]) == pytest.approx(1.0)
 
 
-def test_table_and_figures_are_made_of_what_there_is(tmp_path: Path):
+def test_table_and_figures_are_made_of_what_there_is(tmp_path: Path, sketches: Sketches):
     (table,) = FlyerNavigation().tables(table_of())
     assert len(table.rows) == 1 + len(VARIATIONS)
     assert table.rows[0][1].startswith("6 of 6")
-    drawn = FlyerNavigation().draw(table_of(), tmp_path, tmp_path)
-    assert [f.name for f in drawn] == ["navigation_success", "navigation_displacement", "navigation_time"]
-    assert all((tmp_path / f"{f.name}.png").stat().st_size > 20_000 for f in drawn)
+    FlyerNavigation().draw(table_of(), tmp_path, tmp_path)
+    sketches.check("navigation_success", "navigation_displacement", "navigation_time")
     assert FlyerNavigation().draw(table_of(quick=True), tmp_path, tmp_path) == []
