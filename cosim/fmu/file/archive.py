@@ -100,7 +100,8 @@ def _parents(name: str) -> set[str]:
     parts = name.split("/")
     if "" in parts or "." in parts:
         return {str(p) for p in PurePosixPath(name).parents}
-    return {".", *accumulate(parts[:-1], "{}/{}".format)}  # an FMU has hundreds of members, and paths cost ten times as much
+    # of the hundreds of members of an FMU; paths cost ten times as much
+    return {".", *accumulate(parts[:-1], "{}/{}".format)}
 
 
 def listed(names: Iterable[str]) -> str:
