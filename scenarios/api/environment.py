@@ -191,5 +191,5 @@ def _chosen(
     if unknown := [name for name in chosen if name not in ports]:
         raise InvalidInput(f"{what}: {'; '.join(f'{n!r}, {nearest(n, ports)}' for n in unknown)}")
     if not chosen:
-        raise InvalidInput(f"{what}: there are none; {nearest('', ports)}")
+        raise InvalidInput(f"{what}: there are none" + (f"; {nearest('', ports)}" if ports else ""))
     return {name: ports[name] for name in chosen}

@@ -64,7 +64,7 @@ def _print_place(folder: RunFolder) -> None:
 def _conversion_rows(folder: RunFolder) -> list[tuple[str, str]]:
     conversions = [format_conversion(c) for c in folder.read_run().get("conversions", [])]
     left = len(conversions) - _MAX_CONVERSIONS
-    more = [(f"{left} conversions more", "in the report")] if left > 0 else []
+    more = [(f"{left} conversion{'s' if left > 1 else ''} more", "in the report")] if left > 0 else []
     return [(f"converted: {ends}", change) for ends, change in conversions[:_MAX_CONVERSIONS]] + more
 
 

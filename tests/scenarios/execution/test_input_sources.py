@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from flyer_runs import run, task_of
+from flyer_runs import task_of
 from native_units import native_fmu
 from numpy.typing import NDArray
+from support.kept_runs import kept_run
 
 import handover
 from handover.cosim.record.reader import Record
@@ -81,8 +82,8 @@ def led_by_script(wanted: Path, out: Path, *given: str) -> bool:
 
 @pytest.mark.slow
 def test_a_run_led_by_shared_inputs_is_played_back_byte_for_byte(tmp_path: Path):
-    run(RobotToHuman, tmp_path / "person", "skill=1")
-    assert led_by_script(tmp_path / "person", tmp_path / "led")
+    person = kept_run("run", "flyer_robot_to_human", "-p", "skill=1", "--no-report")
+    assert led_by_script(person, tmp_path / "led")
     led = Record(tmp_path / "led" / "signals.parquet")
     assert led["person.age"].max() < 0.2
     assert led["person.closed_track"].any()
@@ -97,7 +98,16 @@ def test_a_run_led_by_shared_inputs_is_played_back_byte_for_byte(tmp_path: Path)
     assert told[1]["inputs"]["from"] == "run"
     assert told[1]["inputs"]["folder"] == str(tmp_path / "led")
     assert told[0]["external_inputs"] == told[1]["external_inputs"] == [*GOALS, "person.age"]
-    compliant = ["flyer_robot_to_human", "-p", "hand=outside", "-p", "behaviour=compliant", "--no-report"]
+    compliant = [
+        "flyer_robot_to_human",
+        "-p",
+        "hand=outside",
+        "-p",
+        "behaviour=compliant",
+        "--stop",
+        "6",
+        "--no-report",
+    ]
     other = [*compliant, "--inputs-from", str(tmp_path / "led"), "--out", str(tmp_path / "other")]
     assert "Traceback" not in CliRunner().invoke(run_command, other).output
     meets_the_same_hand = Record(tmp_path / "other" / "signals.parquet")
@@ -147,11 +157,11 @@ def test_a_run_that_lacks_inputs_is_refused_before_anything_is_written(tmp_path:
 
 def test_a_run_that_goes_on_after_its_recorded_inputs_says_when_they_end(tmp_path: Path):
     given = ["flyer_robot_to_human", "-p", "hand=outside", "--no-report", "--stop"]
-    assert CliRunner().invoke(run_command, [*given, "0.4", "--out", str(tmp_path / "led")]).exit_code == 1
-    for stop, goes_on in (("0.4", False), ("0.8", True)):
+    assert CliRunner().invoke(run_command, [*given, "0.1", "--out", str(tmp_path / "led")]).exit_code == 1
+    for stop, goes_on in (("0.1", False), ("0.2", True)):
         again = [*given, stop, "--inputs-from", str(tmp_path / "led"), "--out", str(tmp_path / f"until {stop}")]
         output = CliRunner().invoke(run_command, again).output
-        assert ("the recorded inputs end at 0.4 s, and the run went on until 0.8 s" in output) is goes_on
+        assert ("the recorded inputs end at 0.1 s, and the run went on until 0.2 s" in output) is goes_on
 
 
 def test_a_folder_without_inputs_from_outside_is_refused(tmp_path: Path):
@@ -198,8 +208,8 @@ def held_until(released: float, force: float) -> dict[str, ExternalSource]:
 def test_a_run_that_could_be_pushed_is_resumed_as_it_was_recorded_and_is_then_let_go(tmp_path: Path, is_page: bool):
     task = task_of(FlyerImpedance, tmp_path / "whole", "begin=30")
     inputs = InputSources(held_until(0.6, 4.0), {"from": "page"}) if is_page else None
-    task = replace(task, every=Fraction(1, 5), stop=Fraction(1), pushed=True, inputs=inputs)
-    at = {"held": 0.45, "released": 0.75}  # when the run is killed: as it is, its folder is copied
+    task = replace(task, every=Fraction(1, 5), stop=Fraction(4, 5), pushed=True, inputs=inputs)
+    at = {"held": 0.45, "released": 0.65}  # when the run is killed: as it is, its folder is copied
 
     def snapshot(t: float, _stop: float) -> None:
         for name, when in at.items():
@@ -227,7 +237,7 @@ def test_a_run_that_could_be_pushed_is_resumed_as_it_was_recorded_and_is_then_le
 
 
 def test_a_hand_whose_page_is_gone_stays_and_its_sample_grows_old(tmp_path: Path):
-    short = Fraction(1, 2)
+    short = Fraction(1, 10)
     run_task(replace(task_of(RobotToHuman, tmp_path / "person"), stop=short), tell_nobody, Interruption())
     wanted = Record(tmp_path / "person" / "signals.parquet")
     sources: dict[str, ExternalSource] = {name: wanted.series(goal) for name, goal in GOALS.items()}

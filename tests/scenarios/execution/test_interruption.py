@@ -1,39 +1,20 @@
+"""Ctrl-C and other signals: the first ends a run after its step, or what has not begun at once; the second aborts."""
+
 import contextlib
 import os
 import signal
-import subprocess
 import sys
-import time
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from support.commands import Command
+from support.failing_systems import wait_until
 
 from handover.fmus.build import build_block
 from handover.scenarios.execution.interruption import Interruption
 
-BLOCKS = ["HangingArm", "NativelyHangingArm"][: 2 if sys.platform.startswith("linux") else 1]
-
-
-def start(*arguments: str | Path) -> "subprocess.Popen[str]":
-    call = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()", "run", "helix_handover"]
-    return subprocess.Popen([*call, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-def wait_for(going: "subprocess.Popen[str]", file: Path) -> None:
-    deadline = time.monotonic() + 120
-    while not file.exists():
-        assert going.poll() is None, going.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-
-
-def read_line(going: "subprocess.Popen[str]", wanted: str) -> None:
-    assert going.stderr is not None
-    for line in going.stderr:
-        if wanted in line:
-            return
-    raise AssertionError(f"ended without telling {wanted!r}")
+BLOCKS = ["HangsInPython", "HangsInNativeCode"][: 2 if sys.platform.startswith("linux") else 1]
 
 
 def interrupt(times: int, *, begun: bool = False) -> list[bool]:
@@ -103,30 +84,30 @@ def test_without_an_interrupt_nothing_changes():
     assert signal.getsignal(signal.SIGINT) is before
 
 
-def test_ctrl_c_while_units_are_built_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_ctrl_c_while_units_are_built_leaves_nothing(tmp_path: Path):
     cache, out = tmp_path / "cache", tmp_path / "r"
-    monkeypatch.setenv("HANDOVER_CACHE", str(cache))
-    going = start("--out", out)
-    wait_for(going, cache)
-    os.kill(going.pid, signal.SIGINT)
-    _, errors = going.communicate(timeout=60)
-    assert going.returncode == 130
+    going = Command("run", "helix_handover", "--out", out, env={"HANDOVER_CACHE": str(cache)})
+    wait_until(cache.exists, going)
+    going.send_signal(signal.SIGINT)
+    status, _, errors = going.wait()
+    assert status == 130
     assert "Traceback" not in errors
     assert not out.exists()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block", BLOCKS)
-def test_a_second_ctrl_c_ends_a_run_whose_unit_hangs(block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("HANGING_ARM_TELLS", str(tmp_path / "hangs"))
-    arm = build_block(f"hanging_arm:{block}", 3, tmp_path, step=Fraction(1, 50))
-    out = tmp_path / "r"
-    going = start("--unit", f"arm={arm}", "--out", out)
-    wait_for(going, tmp_path / "hangs")
-    os.kill(going.pid, signal.SIGINT)
-    read_line(going, "Ctrl-C again to abort")
-    os.kill(going.pid, signal.SIGINT)
-    _, errors = going.communicate(timeout=60)
-    assert going.returncode == 130
+@pytest.mark.parametrize(
+    "block", ["HangsInPython", "HangsInNativeCode"][: 2 if sys.platform.startswith("linux") else 1]
+)
+def test_a_second_ctrl_c_ends_a_run_whose_unit_hangs(block: str, tmp_path: Path):
+    unit = build_block(f"hanging_blocks:{block}", 3, tmp_path, step=Fraction(1, 10))
+    hangs = tmp_path / "hangs"
+    going = Command("run", unit, "--stop", "1", "--out", tmp_path / "r", env={"HANGING_BLOCK_TELLS": str(hangs)})
+    wait_until(hangs.exists, going)
+    going.send_signal(signal.SIGINT)
+    wait_until(lambda: "Ctrl-C again to abort" in going.errors_file.read_text(), going)
+    going.send_signal(signal.SIGINT)
+    status, _, errors = going.wait()
+    assert status == 130
     assert "Aborted!" in errors
     assert "Traceback" not in errors

@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 from native_units import native_fmu
 from support.failing_systems import failing_ssp
+from support.wording import Wording
 
 import handover
 from handover.cosim.record.reader import Record
@@ -65,7 +66,7 @@ def test_a_run_ends_at_the_file_s_stop_time_and_leaves_a_folder(spring: Path, tm
 
 def test_stop_and_step_of_the_call_come_first(spring: Path, tmp_path: Path):
     out = tmp_path / "out"
-    result = run(packed(spring, tmp_path, Fraction(2)), "--stop", "1/2", "--step", "1/4", "--out", out)
+    result = run(packed(spring, tmp_path, Fraction(2)), "--stop", "1/2", "--step", "1/4", "--no-report", "--out", out)
     assert result.exit_code == 0, result.output
     assert Record(out / "signals.parquet").time.tolist() == [0.0, 0.25, 0.5]
 
@@ -86,7 +87,7 @@ def test_a_run_starts_where_the_file_or_the_call_says(tmp_path: Path):
 
 def test_a_unit_that_fails_ends_the_run_with_status_3_and_keeps_the_record(spring: Path, tmp_path: Path):
     out = tmp_path / "out"
-    result = run(packed(spring, tmp_path, Fraction(2), tears=0.45), "--out", out)
+    result = run(packed(spring, tmp_path, Fraction(2), tears=0.45), "--no-report", "--out", out)
     assert result.exit_code == 3, result.output
     assert "the spring tore" in result.output
     summary = json.loads((out / "summary.json").read_text())
@@ -94,13 +95,18 @@ def test_a_unit_that_fails_ends_the_run_with_status_3_and_keeps_the_record(sprin
     assert Record(out / "signals.parquet").time[-1] == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_a_unit_that_ends_the_simulation_ends_the_run_well(fmi: int, tmp_path: Path):
+@pytest.mark.parametrize(("fmi", "more"), [(2, ("--no-report",)), (3, ())])
+def test_a_unit_that_ends_the_simulation_ends_the_run_well(fmi: int, more: tuple[str, ...], tmp_path: Path):
     out = tmp_path / "out"
-    result = run(failing_ssp(tmp_path, "ends", fmi), "--out", out, "--checkpoint", "0.1")
+    result = run(failing_ssp(tmp_path, "ends", fmi), "--out", out, "--checkpoint", "0.1", *more)
     assert result.exit_code == 0, result.output
     told = "ran to 0.3 s of 1 s; unit bad ended the simulation at t = 0.3 s"
-    said = [f"ends.ssp succeeded: {told}", "drawing figures, writing the report ...", f"report: {out}"]
+    if more:
+        said = [f"ends.ssp succeeded: {told}"]
+    else:
+        said = [f"ends.ssp succeeded: {told}", "drawing figures, writing the report ...", f"report: {out}"]
+        page = " ".join((out / "report.html").read_text().split())  # numbers and units do not break
+        assert f"Succeeded</b>: {told}" in page
     assert sorted(said, key=result.output.index) == said  # the verdict comes before what takes seconds
     assert "to resume" not in result.output
     assert Record(out / "signals.parquet").time.tolist() == [0.0, 0.1, 0.2, 0.3]
@@ -109,8 +115,6 @@ def test_a_unit_that_ends_the_simulation_ends_the_run_well(fmi: int, tmp_path: P
     assert (summary["reason"], summary["simulated_seconds"]) == (told, 0.3)
     ended = summary["ended"]
     assert (ended["instance"], ended["call"], ended["time"], ended["reached"]) == ("bad", f"fmi{fmi}DoStep", 0.2, 0.3)
-    page = " ".join((out / "report.html").read_text().split())  # numbers and units do not break
-    assert f"Succeeded</b>: {told}" in page
     assert CliRunner().invoke(main, ["resume", str(out)]).exit_code == 2  # complete
 
 
@@ -124,30 +128,31 @@ def test_of_a_run_that_ended_where_it_began_nothing_is_drawn(spring: Path, tmp_p
     assert 'id="signals"' not in page
 
 
-def test_without_a_stop_time_one_is_asked_for(spring: Path, tmp_path: Path):
-    result = run(packed(spring, tmp_path), "--out", tmp_path / "out")
-    assert result.exit_code == 2, result.output
-    assert "proposes no stop time; --stop 10 lets it run from 0 to 10 s" in result.output
-    assert not (tmp_path / "out").exists()
-
-
-def test_what_is_for_scenarios_is_refused(spring: Path, tmp_path: Path):
-    result = run(packed(spring, tmp_path, Fraction(2)), "--unit", "a=1", "--seed", "3", "--out", tmp_path / "out")
-    assert result.exit_code == 2, result.output
-    assert "--seed, --unit: for scenarios" in result.output
-    result = CliRunner().invoke(main, ["run", "ir_grasp", "--step", "1", "--out", str(tmp_path / "out")])
-    assert result.exit_code == 2, result.output
-    assert "--step is for an SSP or an FMU" in result.output
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.parametrize(
-    ("option", "value"), [("--step", "0"), ("--step", "soon"), ("--step", "-1"), ("--step", "1/0")]
+    ("stop", "given"),
+    [
+        pytest.param(None, (), id="no stop time"),
+        pytest.param(2, ("--unit", "a=1", "--seed", "3"), id="what is for scenarios"),
+        *(pytest.param(None, ("--step", step), id=f"step {step}") for step in ("0", "soon", "-1", "1/0", "1e400")),
+        pytest.param(2, ("-p", "left.tear=1", "-p", "tears=1"), id="unknown parameters"),
+        pytest.param(2, ("-p", "left.tears=soon"), id="no number"),
+        pytest.param(2, ("-p", "left.tears"), id="no value"),
+    ],
 )
-def test_a_step_is_a_positive_number(spring: Path, tmp_path: Path, option: str, value: str):
-    result = run(packed(spring, tmp_path), option, value)
+def test_what_cannot_be_run_is_refused_and_leaves_nothing(
+    spring: Path, tmp_path: Path, stop: int | None, given: tuple[str, ...], wording: Wording
+):
+    file = packed(spring, tmp_path, None if stop is None else Fraction(stop))
+    result = run(file, *given, "--out", tmp_path / "out")
     assert result.exit_code == 2, result.output
-    assert f"{value!r} is not a positive number of seconds, such as 0.01 or 1/30" in " ".join(result.output.split())
+    wording.check(result.output)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_scenario_has_steps_of_its_own(tmp_path: Path, wording: Wording):
+    result = run(Path("ir_grasp"), "--step", "1", "--out", tmp_path / "out")
+    assert result.exit_code == 2, result.output
+    wording.check(result.output)
 
 
 def test_a_stop_time_may_be_0_or_before_it(spring: Path, tmp_path: Path):
@@ -160,23 +165,18 @@ def test_a_stop_time_may_be_0_or_before_it(spring: Path, tmp_path: Path):
         assert (result.exit_code, f"{stop} s is not after" in result.output) == (2, True)
 
 
-def test_a_time_is_finite(spring: Path, tmp_path: Path):
-    result = run(packed(spring, tmp_path), "--step", "1e400")
-    assert result.exit_code == 2, result.output
-    assert "'1e400' is not finite as a floating-point number" in " ".join(result.output.split())
-
-
 @pytest.mark.parametrize(
-    ("old", "new", "data"),
+    ("old", "new"),
     [
-        (b'name="left"', b'name="right"', "two elements are called 'right'"),
-        (b"TearingSpring", b"Spring", "there is no 'resources/Spring.fmi2.fmu' in the SSP; did you mean "),
-        (b'<ssd:Connector name="x"', b'<ssd:Connector name="y"', "has no variable 'y'"),
-        (b"</ssd:System>", b"", "SystemStructure.ssd cannot be read"),
+        (b'name="left"', b'name="right"'),
+        (b"TearingSpring", b"Spring"),
+        (b'<ssd:Connector name="x"', b'<ssd:Connector name="y"'),
+        (b"</ssd:System>", b""),
     ],
+    ids=["two of a name", "no such FMU", "no such variable", "no XML"],
 )
 def test_a_malformed_file_is_refused_in_one_line_and_nothing_is_written(
-    spring: Path, tmp_path: Path, old: bytes, new: bytes, data: str
+    spring: Path, tmp_path: Path, old: bytes, new: bytes, wording: Wording
 ):
     file, out = tmp_path / "bad.ssp", tmp_path / "out"
     with zipfile.ZipFile(packed(spring, tmp_path, Fraction(2))) as good, zipfile.ZipFile(file, "w") as bad:
@@ -186,8 +186,7 @@ def test_a_malformed_file_is_refused_in_one_line_and_nothing_is_written(
     result = run(file, "--out", out)
     assert result.exit_code == 2, result.output
     (line,) = result.output.splitlines()
-    assert line.startswith(f"Error: {file}: ")
-    assert data in line
+    wording.check(line)
     assert not out.exists()
 
 
@@ -199,7 +198,9 @@ def test_a_file_that_is_not_there_is_reported(tmp_path: Path):
 
 def test_p_sets_a_components_parameter_which_a_resumed_run_sets_again(spring: Path, tmp_path: Path):
     file, out = packed(spring, tmp_path, Fraction(2), tears=5.0), tmp_path / "out"
-    result = run(file, "-p", "left.tears=0.45", "-p", "right.tears=1.05", "--checkpoint", "0.2", "--out", out)
+    result = run(
+        file, "-p", "left.tears=0.45", "-p", "right.tears=1.05", "--checkpoint", "0.2", "--no-report", "--out", out
+    )
     assert result.exit_code == 3, result.output
     assert "left: fmi2DoStep at t = 0.5 s: RuntimeError: the spring tore" in result.output
     data = json.loads((out / "run.json").read_text())
@@ -209,19 +210,6 @@ def test_p_sets_a_components_parameter_which_a_resumed_run_sets_again(spring: Pa
         task = InterruptedRun(RunFolder.of_run(out)).task(opened)
         system = task.experiment.build(task.parameters, 0, lambda _unit: file)
         assert {name: unit.start["tears"] for name, unit in system.units.items()} == {"left": 0.45, "right": 1.05}
-
-
-def test_what_is_wrong_with_parameters_is_told_in_one_line(spring: Path, tmp_path: Path):
-    file = packed(spring, tmp_path, Fraction(2))
-    given = ("-p", "left.tear=1", "-p", "tears=1")
-    result = run(file, *given, "--out", tmp_path / "out")
-    assert result.exit_code == 2, result.output
-    assert "no parameter 'left.tear'; did you mean left.tears?; no parameter 'tears'; " in result.output
-    result = run(file, "-p", "left.tears=soon", "--out", tmp_path / "out")
-    assert (result.exit_code, "left.tears: 'soon' is not a number" in result.output) == (2, True), result.output
-    result = run(file, "-p", "left.tears", "--out", tmp_path / "out")
-    assert (result.exit_code, "'left.tears' is not of the form NAME=VALUE" in result.output) == (2, True)
-    assert not (tmp_path / "out").exists()
 
 
 def test_python_gives_them_too(spring: Path, tmp_path: Path):

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from campaigns import carried_out
 from click.testing import CliRunner, Result
+from support.kept_runs import kept_run
 
 import handover
 from handover.cosim.record.reader import Record
@@ -45,9 +46,12 @@ def test_a_run_ends_at_the_first_point_at_or_after_it_and_has_not_succeeded(tmp_
     assert ["stop", "1 s", "given stop time of the run"] in read(out, "run.json")["told_parameters"]
 
 
+BLIND = ("run", "ir_grasp", "--seed", "3", "-p", "strategy=blind", "--no-report")
+
+
 def test_what_is_over_before_is_judged_as_ever(tmp_path: Path):
-    whole = handover.run("ir_grasp", strategy="blind", out=tmp_path / "whole", progress=False)
-    later = handover.run("ir_grasp", strategy="blind", stop=1000, out=tmp_path / "later", progress=False)
+    whole = handover.Run(kept_run(*BLIND))
+    later = handover.run("ir_grasp", seed=3, strategy="blind", stop=1000, out=tmp_path / "later", progress=False)
     assert (later.success, later.reason) == (whole.success, whole.reason)
     records = [(run.folder / "signals.parquet").read_bytes() for run in (whole, later)]
     assert records[0] == records[1]
@@ -58,9 +62,9 @@ def test_what_ended_by_itself_was_not_asked_to(tmp_path: Path, monkeypatch: pyte
     def fail(_self: GraspEvaluator) -> Outcome:
         raise KeyError("of the evaluation")
 
-    own_end = handover.run("ir_grasp", strategy="blind", out=tmp_path / "whole", progress=False).signals.time[-1]
+    own_end = handover.Run(kept_run(*BLIND)).signals.time[-1]
     monkeypatch.setattr(GraspEvaluator, "outcome", fail)
-    done = call("run", "ir_grasp", "-p", "strategy=blind", "--stop", f"{own_end + 1:.1f}", "--out", tmp_path / "r")
+    done = call(*BLIND, "--stop", f"{own_end + 1:.1f}", "--out", tmp_path / "r")
     assert "not judged: the verdict failed: KeyError" in done.output
     assert "as asked" not in done.output
     assert Record(tmp_path / "r" / "signals.parquet").time[-1] == own_end

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from flyer_runs import run, task_of
+from flyer_runs import task_of
+from support.kept_runs import kept_run
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.typed_data import decoded
@@ -34,7 +35,8 @@ def assert_of(declared: type[Any], content: Any) -> None:
 
 def test_however_a_run_ends_its_files_are_of_one_declaration(tmp_path: Path):
     task, spent = task_of(IrGrasp, tmp_path / "refused"), ElapsedTime(wall=2.0, cpu=1.0)
-    finished = run(IrGrasp, tmp_path / "run").summary
+    whole = kept_run("run", "ir_grasp", "--no-report")
+    finished = json.loads((whole / "summary.json").read_text())
     refusal = WiringError(["nothing feeds scene.goal"])
     refused = unstarted_summary(task, refusal, spent)
     units = [("scene", "GraspScene (FMI 3)", "15 ms")]
@@ -42,7 +44,7 @@ def test_however_a_run_ends_its_files_are_of_one_declaration(tmp_path: Path):
     assert set(finished) == set(crashed) == set(refused)
     for summary in (finished, crashed, refused):
         assert_of(Summary, summary)
-    assert_of(RunData, json.loads((tmp_path / "run" / "run.json").read_text()))
+    assert_of(RunData, json.loads((whole / "run.json").read_text()))
     assert_of(RunData, unstarted_run(task, refusal))
 
 

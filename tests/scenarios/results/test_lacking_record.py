@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from flyer_runs import run
+from support.kept_runs import copied_run, kept_run
 
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals
@@ -25,34 +26,33 @@ from handover.scenarios.results.lacking_record import LackingRecord
 from handover.scenarios.results.run_folder import RunFolder
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
-FAST = {
-    "ir_grasp": ((), "reflex", "Wrist along x of W", "measured", "palm"),
-    "helix_handover": (("patience=1",), "servo", "Tendon forces", "segment 1, 0°", "arm"),
-    "vsl_hybrid": (("points=3", "settle=1", "speed=0.5"), "planner", "Servos' currents", "J1", "arm"),
-    "flyer_robot_to_human": (("patience=1",), "decision", "Roll of gripper, hand and object in W", "hand", "robot"),
-    "flyer_impedance": ((), "impedance", "Force of the thrusters along x of B", "given", "robot"),
+LACKING = {
+    "ir_grasp": ("reflex", "Wrist along x of W", "measured", "palm"),
+    "helix_handover": ("servo", "Tendon forces", "segment 1, 0°", "arm"),
+    "vsl_hybrid": ("planner", "Servos' currents", "J1", "arm"),
+    "flyer_robot_to_human": ("decision", "Roll of gripper, hand and object in W", "hand", "robot"),
+    "flyer_impedance": ("impedance", "Force of the thrusters along x of B", "given", "robot"),
 }
-"""Parameters, the unit whose outputs are taken away, a plot and its curve that stay, and a body that stays."""
+"""The unit whose outputs are taken away, a plot and its curve that stay, and a body that stays."""
 
 
-@pytest.fixture(scope="module", params=FAST)
-def lacking(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
-    """Return a run whose controller has recorded nothing."""
-    name: str = request.param
-    given, unit, *_ = FAST[name]
-    folder = tmp_path_factory.mktemp("runs") / name
-    run(SCENARIOS[name], folder, *given)
-    table = pq.read_table(folder / "signals.parquet")
-    pq.write_table(
-        table.select([c for c in table.column_names if not c.startswith(f"{unit}.")]), folder / "signals.parquet"
-    )
-    return name, folder
+def lacking(name: str, folder: Path) -> Path:
+    """Return a copy of a short run whose controller has recorded nothing."""
+    copied_run(folder, "run", name, "--no-report", "--stop", "0.5")
+    select_columns(folder / "signals.parquet", folder / "signals.parquet", without=f"{LACKING[name][0]}.")
+    return folder
 
 
-def test_what_needs_no_output_of_the_controller_is_drawn_in_its_colours(lacking: tuple[str, Path]):
-    name, folder = lacking
-    given, unit, title, label, body = FAST[name]
-    experiment, parameters = SCENARIOS[name](), parse_parameters(SCENARIOS[name], given)
+def select_columns(source: Path, target: Path, without: str) -> None:
+    table = pq.read_table(source)
+    pq.write_table(table.select([c for c in table.column_names if not c.startswith(without)]), target)
+
+
+@pytest.mark.parametrize("name", LACKING)
+def test_what_needs_no_output_of_the_controller_is_drawn_in_its_colours(name: str, tmp_path: Path):
+    unit, title, label, body = LACKING[name]
+    folder, experiment = lacking(name, tmp_path / "r"), SCENARIOS[name]()
+    parameters = parse_parameters(SCENARIOS[name], [])
     record = LackingRecord(Record(folder / "signals.parquet"), experiment.units)
     plots = {p.title: p for p in record.drawable_plots(experiment.plots(parameters, record))}
     assert label in [c.label for c in plots[title].curves]
@@ -66,18 +66,24 @@ def test_what_needs_no_output_of_the_controller_is_drawn_in_its_colours(lacking:
     assert f"{unit}." in line
 
 
-def test_page_and_figures_say_in_a_line_what_is_left_out(lacking: tuple[str, Path]):
-    name, folder = lacking
-    given, unit, title, *_ = FAST[name]
-    run_folder, experiment = RunFolder.of_run(folder), SCENARIOS[name]()
+def test_the_page_says_in_a_line_what_is_left_out(tmp_path: Path):
+    unit, title, *_ = LACKING["flyer_impedance"]
+    run_folder = RunFolder.of_run(lacking("flyer_impedance", tmp_path / "r"))
     (line,) = write_run_page(run_folder)
     assert line.startswith(f"what is drawn from {unit}.")
     page = run_folder.report.read_text(encoding="utf-8")
     assert page.count("Left out: ") == 1
     assert title.replace("'", "&#39;") in page
     assert all(f'id="{anchor}"' in page for anchor in ("time", "replay", "signals"))
+
+
+@pytest.mark.parametrize(
+    "name", [name if name == "flyer_impedance" else pytest.param(name, marks=pytest.mark.slow) for name in LACKING]
+)
+def test_so_do_figures(name: str, tmp_path: Path):
+    folder, experiment = lacking(name, tmp_path / "r"), SCENARIOS[name]()
     (folder / "figures").mkdir()
-    faults, parameters = ToleratedFaults(), parse_parameters(SCENARIOS[name], given)
+    faults, parameters = ToleratedFaults(), parse_parameters(SCENARIOS[name], [])
     evaluator = experiment.evaluator(parameters)
     draw_figures(experiment, parameters, evaluator, Record(folder / "signals.parquet"), folder / "figures", faults)
     assert [said for said in faults.lines if "what is drawn from" in said]
@@ -85,11 +91,9 @@ def test_page_and_figures_say_in_a_line_what_is_left_out(lacking: tuple[str, Pat
 
 
 def test_curves_keep_their_colours_where_others_are_left_out(tmp_path: Path):
-    run(FlyerImpedance, tmp_path / "r")
-    whole = Record(tmp_path / "r" / "signals.parquet")
-    table = pq.read_table(tmp_path / "r" / "signals.parquet")
-    kept = [c for c in table.column_names if not c.startswith("thrusters.")]
-    pq.write_table(table.select(kept), tmp_path / "less.parquet")
+    signals = kept_run("run", "flyer_impedance", "--no-report", "--stop", "0.5") / "signals.parquet"
+    whole = Record(signals)
+    select_columns(signals, tmp_path / "less.parquet", without="thrusters.")
     record = LackingRecord(Record(tmp_path / "less.parquet"), FlyerImpedance.units)
     parameters = ImpedanceParameters()
     before = {p.title: p for p in FlyerImpedance().plots(parameters, whole)}

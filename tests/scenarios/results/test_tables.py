@@ -50,13 +50,20 @@ class Page(HTMLParser):
             self.pre += data
 
 
+def page_of(out: Path) -> Page:
+    """Write the page of a run that has none yet."""
+    folder = RunFolder.of_run(out)
+    write_run_page(folder)
+    return Page(folder.report)
+
+
 def run(file: Path, out: Path, *arguments: str) -> str:
     done = CliRunner().invoke(main, ["run", str(file), "--out", str(out), *arguments])
     assert done.exit_code == 0, done.output
     return done.output
 
 
-@pytest.mark.parametrize("pairs", [1, 4])
+@pytest.mark.parametrize("pairs", [1, 3])
 def test_conversions_are_reported_in_run_json_terminal_and_report(pairs: int, tmp_path: Path):
     s = System()
     for i in range(pairs):
@@ -64,7 +71,7 @@ def test_conversions_are_reported_in_run_json_terminal_and_report(pairs: int, tm
         for name in ("angle", "length", "temperature"):
             s.connect(getattr(a.y, name), getattr(b.u, f"{name}_in"))
     file = write_ssp(s, tmp_path / "x.ssp", "x", Fraction(1))
-    shown = run(file, tmp_path / "out")
+    shown = run(file, tmp_path / "out", "--no-report")
     content = json.loads((tmp_path / "out" / "run.json").read_text())["conversions"]
     assert len(content) == 3 * pairs
     assert content[0] == {
@@ -78,16 +85,17 @@ def test_conversions_are_reported_in_run_json_terminal_and_report(pairs: int, tm
     lines = [" ".join(line.split()) for line in shown.splitlines()]
     assert "converted: a0.angle (deg) -> b0.angle_in (rad) times 0.0174533" in lines
     assert sum(line.startswith("converted: ") for line in lines) == min(3 * pairs, 8)
-    assert ("4 conversions more in the report" in lines) == (pairs == 4)
-    rows = Page(tmp_path / "out" / "report.html").rows
-    assert ["a0.temperature (degC) -> b0.temperature_in (K)", "plus 273.15"] in rows
-    assert sum(" -> " in row[0] for row in rows if row) == 3 * pairs
+    assert ("1 conversion more in the report" in lines) == (pairs == 3)
+    if pairs == 3:
+        rows = page_of(tmp_path / "out").rows
+        assert ["a0.temperature (degC) -> b0.temperature_in (K)", "plus 273.15"] in rows
+        assert sum(" -> " in row[0] for row in rows if row) == 3 * pairs
 
 
 def test_the_report_says_how_units_were_coupled(tmp_path: Path):
     file, out = failing_ssp(tmp_path, "gain"), tmp_path / "out"
-    run(file, out, "--adaptive", "1e-3", "--pace", "1000", "--extrapolation", "linear")
-    page, summary = Page(out / "report.html"), json.loads((out / "summary.json").read_text())
+    run(file, out, "--adaptive", "1e-3", "--pace", "1000", "--extrapolation", "linear", "--no-report")
+    page, summary = page_of(out), json.loads((out / "summary.json").read_text())
     absent = {"ended", "inputs", "left_out", "not_finite", "recorded", "stop", "unit_values", "warnings"}
     assert set(summary) == set(Summary.__annotations__) - absent
     rows = dict(row for row in page.rows if len(row) == 2)
@@ -118,7 +126,8 @@ def test_warnings_of_units_are_reported_in_summary_json_terminal_report_and_pyth
     s, out = System(), tmp_path / "out"
     s.add("b", faulty_fmu("warning_in_step", 2, tmp_path))
     s.add("c", faulty_fmu("warning_in_all", 3, tmp_path))
-    shown = run(write_ssp(s, tmp_path / "x.ssp", "x", Fraction(1)), out)
+    shown = run(write_ssp(s, tmp_path / "x.ssp", "x", Fraction(1)), out, "--no-report")
+    write_run_page(RunFolder.of_run(out))
     lines = [
         "unit b returned Warning from fmi2DoStep 7 times, first at t = 0.3 s; last message: step: the step size was "
         "halved",
