@@ -98,16 +98,7 @@ def test_a_run_led_by_shared_inputs_is_played_back_byte_for_byte(tmp_path: Path)
     assert told[1]["inputs"]["from"] == "run"
     assert told[1]["inputs"]["folder"] == str(tmp_path / "led")
     assert told[0]["external_inputs"] == told[1]["external_inputs"] == [*GOALS, "person.age"]
-    compliant = [
-        "flyer_robot_to_human",
-        "-p",
-        "hand=outside",
-        "-p",
-        "behaviour=compliant",
-        "--stop",
-        "6",
-        "--no-report",
-    ]
+    compliant = ["flyer_robot_to_human", "-p", "hand=outside", "-p", "behaviour=compliant", "--no-report"]
     other = [*compliant, "--inputs-from", str(tmp_path / "led"), "--out", str(tmp_path / "other")]
     assert "Traceback" not in CliRunner().invoke(run_command, other).output
     meets_the_same_hand = Record(tmp_path / "other" / "signals.parquet")
@@ -157,11 +148,11 @@ def test_a_run_that_lacks_inputs_is_refused_before_anything_is_written(tmp_path:
 
 def test_a_run_that_goes_on_after_its_recorded_inputs_says_when_they_end(tmp_path: Path):
     given = ["flyer_robot_to_human", "-p", "hand=outside", "--no-report", "--stop"]
-    assert CliRunner().invoke(run_command, [*given, "0.1", "--out", str(tmp_path / "led")]).exit_code == 1
-    for stop, goes_on in (("0.1", False), ("0.2", True)):
+    assert CliRunner().invoke(run_command, [*given, "0.08", "--out", str(tmp_path / "led")]).exit_code == 1
+    for stop, goes_on in (("0.08", False), ("0.16", True)):
         again = [*given, stop, "--inputs-from", str(tmp_path / "led"), "--out", str(tmp_path / f"until {stop}")]
         output = CliRunner().invoke(run_command, again).output
-        assert ("the recorded inputs end at 0.1 s, and the run went on until 0.2 s" in output) is goes_on
+        assert ("the recorded inputs end at 0.08 s, and the run went on until 0.16 s" in output) is goes_on
 
 
 def test_a_folder_without_inputs_from_outside_is_refused(tmp_path: Path):
@@ -204,7 +195,10 @@ def held_until(released: float, force: float) -> dict[str, ExternalSource]:
     }
 
 
-@pytest.mark.parametrize("is_page", [True, False], ids=["pushed by a page", "with nobody"])
+@pytest.mark.parametrize(
+    "is_page",
+    [pytest.param(True, id="pushed by a page"), pytest.param(False, id="with nobody", marks=pytest.mark.slow)],
+)
 def test_a_run_that_could_be_pushed_is_resumed_as_it_was_recorded_and_is_then_let_go(tmp_path: Path, is_page: bool):
     task = task_of(FlyerImpedance, tmp_path / "whole", "begin=30")
     inputs = InputSources(held_until(0.6, 4.0), {"from": "page"}) if is_page else None
@@ -237,13 +231,12 @@ def test_a_run_that_could_be_pushed_is_resumed_as_it_was_recorded_and_is_then_le
 
 
 def test_a_hand_whose_page_is_gone_stays_and_its_sample_grows_old(tmp_path: Path):
-    short = Fraction(1, 10)
-    run_task(replace(task_of(RobotToHuman, tmp_path / "person"), stop=short), tell_nobody, Interruption())
-    wanted = Record(tmp_path / "person" / "signals.parquet")
+    person = kept_run("run", "flyer_robot_to_human", "--no-report", "--stop", "0.5")
+    wanted = Record(person / "signals.parquet")
     sources: dict[str, ExternalSource] = {name: wanted.series(goal) for name, goal in GOALS.items()}
     sources["person.age"] = TimeSeries([0.0], [[0.02]], linear=False)
     inputs = InputSources(sources, {"from": "page"})
-    task = replace(task_of(RobotToHuman, tmp_path / "led", "hand=outside"), inputs=inputs, stop=short)
+    task = replace(task_of(RobotToHuman, tmp_path / "led", "hand=outside"), inputs=inputs, stop=Fraction(1, 2))
     run_task(task, tell_nobody, Interruption())
     led = RobotToHuman().led_hand(task.parameters)
     resumed = resumed_inputs(task.folder, {"from": "page"}, (), led)
