@@ -78,7 +78,7 @@ def seen_with(covered: tuple[str, ...], has_third: bool, detector: Detector = De
     return errors
 
 
-@pytest.mark.parametrize("covered", ["left", "right"])
+@pytest.mark.parametrize("covered", ["left", pytest.param("right", marks=pytest.mark.slow)])
 def test_a_third_camera_makes_up_for_a_covered_one(covered: str):
     alone, beside = seen_with((covered,), has_third=False), seen_with((covered,), has_third=True)
     assert np.count_nonzero(np.isfinite(beside).all(axis=1)) >= 5
@@ -95,6 +95,7 @@ def test_a_third_camera_alone_sees_ball_and_ring_where_the_arm_does_not_hide_the
     assert np.nanmax(errors) < 0.015
 
 
+@pytest.mark.slow
 def test_the_published_detector_takes_the_ball_by_the_two_cameras_that_see_it():
     assert np.isnan(seen_with(("left",), has_third=False, detector=Detector.PUBLISHED)[:, 0]).all()
     balls = seen_with(("left",), has_third=True, detector=Detector.PUBLISHED)[:, 0]

@@ -151,6 +151,7 @@ def test_what_one_side_sees_as_far_off_on_the_way_ahead_is_gone_around(seer: Vis
     assert side * (left[-1] - left[turned]) > 0.9 * p.along_across
 
 
+@pytest.mark.slow
 def test_an_object_before_a_fingertip_is_pushed_less_than_half_as_far():
     """A small heavy disc, met by a search so fast that it stands before the index's tip."""
     p_WO = (0.0, 0.006)
@@ -307,6 +308,7 @@ def test_it_goes_on_from_any_state_bit_for_bit(
     assert met <= seen
 
 
+@pytest.mark.slow
 def test_a_search_that_is_wider_than_the_reach_ends():
     reach = 0.05
     seen = grasp(
@@ -350,6 +352,7 @@ def test_a_grasp_begins_with_the_jacobian_of_the_last_one():
     assert np.linalg.norm(in_hand(seen[-1][1])) < 0.2
 
 
+@pytest.mark.slow
 def test_ambient_light_is_not_taken_for_an_object():
     in_the_dark, *in_light = (grasp(reflex(), scene((0.02, 0.03), ambient=light)) for light in (0.0, 100.0, 1500.0))
     for seen in in_light:

@@ -34,6 +34,7 @@ def test_tremor_and_drift_are_as_large_as_declared_whatever_the_step(dt: float, 
     assert rms(drift_rms=0.003, drift_time=0.5) == pytest.approx(0.003, rel=0.15)
 
 
+@pytest.mark.slow
 def test_tremor_lies_in_its_band():
     partner = HandoverPartner(Params(drift_rms=0.0, tremor_frequency=8.0, tremor_bandwidth=2.0))
     x = np.array([y.p_WO[0] for y in walk(partner, Inputs(), 8192, 0.01)]) - 0.18
@@ -44,6 +45,7 @@ def test_tremor_lies_in_its_band():
     assert f[np.searchsorted(below, 0.9)] < 10.5
 
 
+@pytest.mark.slow
 def test_correlation_over_a_time_is_the_same_in_one_step_or_many():
     def correlation(dt: float) -> float:
         partner = HandoverPartner(Params(drift_rms=0.0, seed=1))

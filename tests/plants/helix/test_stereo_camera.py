@@ -58,9 +58,8 @@ def test_declares_pictures_that_feed_through_at_30_hz():
     assert float(d.period) == pytest.approx(1 / 30)
 
 
-@pytest.mark.parametrize(
-    "kernels", ["not loaded", *(pytest.param(k, marks=pytest.mark.slow) for k in ("compiled", "not compiled"))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kernels", ["compiled", "not compiled", "not loaded"])
 def test_pictures_are_the_same_in_another_process_with_compiled_kernels_and_without(kernels: str):
     code = f"import sys; sys.path[:0] = [{str(HOUSE)!r}, {str(Path(__file__).parent)!r}]\n"
     if kernels != "not loaded":
@@ -194,6 +193,7 @@ def test_light_scales_what_is_seen_until_the_sensor_is_full(clean: StereoCamera)
     np.testing.assert_array_equal(usual, clean.outputs(0.0, Inputs()).left)
 
 
+@pytest.mark.slow
 def test_a_lost_picture_is_black_and_the_other_camera_s_is_not():
     camera = StereoCamera(Params(lost_pictures=0.5, seed=2))
     lost = [(not y.left.any(), not y.right.any()) for y in (camera.step(k / 30, 1 / 30, Inputs()) for k in range(40))]
@@ -251,6 +251,7 @@ def test_of_three_pictures_one_is_taken_and_repeated():
     assert same == [True, True, False, True, True, False]
 
 
+@pytest.mark.slow
 def test_a_repeated_picture_is_the_same_after_its_state_was_restored():
     camera, other = (StereoCamera(Params(decimation=3, lost_pictures=0.2, seed=4)) for _ in range(2))
     camera.step(0.0, 1 / 30, Inputs(grip=0.5))

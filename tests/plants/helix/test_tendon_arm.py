@@ -117,6 +117,7 @@ def test_a_persons_push_adds_to_what_else_pulls_at_the_gripper():
     np.testing.assert_allclose(settled(both, seconds=0.2).p_WG, settled(one, seconds=0.2).p_WG, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_swinging_dies_out_and_faster_with_more_damping():
     def swing(damping: float) -> tuple[float, float]:
         arm = TendonArm(Params(damping=damping))

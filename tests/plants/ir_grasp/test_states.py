@@ -102,6 +102,7 @@ sys.stdout.buffer.write(pickle.dumps(names["course"](scene, steps)))
 """
 
 
+@pytest.mark.slow
 def test_continues_bit_for_bit_in_another_process():
     scene, steps = GraspScene(PARAMS[Thing.BABY_CUP_A]), 101
     course(scene, 0, steps)
@@ -111,6 +112,7 @@ def test_continues_bit_for_bit_in_another_process():
     assert pickle.loads(answer) == course(scene, steps)
 
 
+@pytest.mark.slow
 def test_a_world_made_anew_goes_on_nearly_as_before(monkeypatch: pytest.MonkeyPatch):
     def end(checkpoint: int) -> Outputs:
         monkeypatch.setattr("handover.plants.ir_grasp.scene._CHECKPOINT", checkpoint)

@@ -44,6 +44,7 @@ def test_the_end_lies_between_the_last_two_steps(loaded: Approach):
     assert np.all(loaded.end <= high)
 
 
+@pytest.mark.slow
 def test_an_arm_that_sags_more_is_farther_from_its_model_at_every_place():
     ones = np.ones(len(FACTORS))
     places = places_at(0.16, -0.6)[2:3]

@@ -56,6 +56,7 @@ def test_the_offset_at_the_grasp_is_that_of_the_pads_middle(tmp_path: Path, shif
     assert metric(ended, "offset_at_grasp") == pytest.approx(offset, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_controller_hears_the_encoders_with_their_noise_and_the_verdict_the_truth(tmp_path: Path):
     _, record = grasp(tmp_path, *BLIND, "scene.wrist_noise=0.001")
     off = record["scene.p_WH_meas"] - record["scene.p_WH"]

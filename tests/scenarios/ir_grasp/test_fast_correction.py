@@ -75,7 +75,7 @@ def grasp(seed: int, **parameters: Any) -> tuple[Outcome, Shadow]:
     "given",
     [
         {"correction": Correction.FAST, "shift": np.array([0.05, 0.04])},
-        {"strategy": Strategy.CONTACT, "perturbed": False},
+        pytest.param({"strategy": Strategy.CONTACT, "perturbed": False}, marks=pytest.mark.slow),
     ],
 )
 def test_the_fmu_does_what_the_block_does_bit_for_bit(given: dict[str, Any]):
@@ -86,6 +86,7 @@ def test_the_fmu_does_what_the_block_does_bit_for_bit(given: dict[str, Any]):
         assert {"SEARCH", "RECOVER", "TRACK", "CLOSE"} <= shadow.phases
 
 
+@pytest.mark.slow
 def test_an_object_carried_at_15_mm_a_second_is_held():
     outcome, shadow = grasp(8, correction=Correction.FAST, carried_speed=0.015)
     assert outcome.success
@@ -95,6 +96,7 @@ def test_an_object_carried_at_15_mm_a_second_is_held():
     assert "TRACK" in shadow.phases
 
 
+@pytest.mark.slow
 def test_a_run_begins_with_what_the_last_one_learnt_of_the_jacobian(tmp_path: Path):
     given = ("-p", "correction=fast", "-p", "perturbed=false", "--no-report")
     last = kept_run("run", "ir_grasp", *given)

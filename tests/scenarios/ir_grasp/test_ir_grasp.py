@@ -97,6 +97,7 @@ def test_the_same_seed_gives_the_same_course_and_another_seed_another():
     assert repr(grasp(3, **quick)) == repr(first)  # as what is not seen is no number
 
 
+@pytest.mark.slow
 def test_a_blind_hand_misses_the_moved_cylinder_and_says_so():
     outcome = grasp(0, strategy=Strategy.BLIND)
     assert not outcome.success

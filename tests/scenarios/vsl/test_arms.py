@@ -67,6 +67,7 @@ def test_a_stiffer_arm_than_the_trained_one_errs_more_and_is_in_the_metrics():
     assert not any("factor" in n for n in usual.metrics)
 
 
+@pytest.mark.slow
 def test_stiffer_joints_make_the_rigid_arm_more_accurate():
     errors = [
         outcome_of("links=rigid", f"joint_factor={f}", experiment=VslModelBased).metrics["mean_error"].value
@@ -75,6 +76,7 @@ def test_stiffer_joints_make_the_rigid_arm_more_accurate():
     assert errors[1] < 0.7 * errors[0]
 
 
+@pytest.mark.slow
 def test_a_scattered_arm_runs_and_says_what_it_is_made_of():
     given = ("arm_scatter=0.1", "length_scatter=0.001", "arm_seed=3")
     metrics = outcome_of(*given).metrics

@@ -53,6 +53,7 @@ def test_link_3_has_another_pressure_than_link_2(tmp_path: Path):
     np.testing.assert_allclose(record["arm.p_meas"][-1], [1.5e5, 0.5e5], atol=3000.0)
 
 
+@pytest.mark.slow
 def test_one_link_of_two_may_be_rigid(tmp_path: Path):
     fast = [text.replace("speed=0.01", "speed=0.05") for text in LINE]
     errors = {
@@ -99,6 +100,7 @@ def test_masses_are_those_of_the_whole_run():
     assert Parameters(load=0.0).masses == []
 
 
+@pytest.mark.slow
 def test_a_path_goes_by_a_file_of_waypoints(tmp_path: Path):
     way = tmp_path / "way.csv"
     way.write_text("x,y,z,via_x,via_y,via_z\n0.3,0,0.1,,,\n0.35,0,0.1,,,\n0.35,0,0.15,0.375,0,0.125\n")

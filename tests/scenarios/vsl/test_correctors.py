@@ -54,12 +54,17 @@ def cubic() -> float:
 
 @pytest.mark.parametrize(
     ("given", "share"),
-    [("learned=small", 1.3), ("learned=physics", 1.8), ("friction_compensation=true", 0.6)],
+    [
+        pytest.param("learned=small", 1.3, marks=pytest.mark.slow),
+        ("learned=physics", 1.8),
+        pytest.param("friction_compensation=true", 0.6, marks=pytest.mark.slow),
+    ],
 )
 def test_each_corrector_against_the_polynomials(cubic: float, given: str, share: float):
     assert error_of(*QUICK, given) < share * cubic
 
 
+@pytest.mark.slow
 def test_the_closed_loop_makes_up_for_an_arm_that_differs(cubic: float):
     stiffer = {"EI_0": 0.55 * 1.2, "EI_p": 1.05e-5 * 1.2}
     open_loop = error_of(*QUICK, **stiffer)
@@ -75,6 +80,7 @@ def test_the_tracker_is_wired_only_where_it_closes_the_loop():
     assert targets(wired("imu=monitor")) - targets(wired()) == {"kinematics.tilt_meas"}
 
 
+@pytest.mark.slow
 def test_imus_make_up_for_an_arm_that_differs_and_tell_that_it_does(cubic: float):
     stiffer = (*QUICK, "EI_factor=1.2")
     assert metrics_of(*stiffer, "imu=feedback")["mean_error_true"] < 1.5 * cubic

@@ -139,12 +139,14 @@ def test_the_error_grows_with_the_load_and_falls_with_the_pressure():
     assert all(b < a - 0.001 for a, b in itertools.pairwise(pressures)), pressures
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["curve", "square"])
 def test_the_error_grows_with_the_reach(path: str):
     metrics = judge(VslModelBased, "settle=2", "speed=0.1", f"path={path}").metrics
     assert metrics["error_far"].value > metrics["error_near"].value + 0.002
 
 
+@pytest.mark.slow
 def test_the_hybrid_errs_less_than_rigid_links_and_they_less_than_the_model_based(finished: Finished):
     rigid = error_of("links=rigid")
     hybrid, model_based = (metric(finished(e), "mean_error") for e in (VslHybrid, VslModelBased))

@@ -183,6 +183,7 @@ def test_a_load_beyond_the_training_is_extrapolation_while_it_is_held(mass: floa
     assert ("extrapolate" in outcome.reason) == (share > 0.0)
 
 
+@pytest.mark.slow
 def test_on_a_table_higher_than_the_shoulder_the_arm_starts_above_it(tmp_path: Path):
     run(VslPickAndPlace, tmp_path / "r", "pick=0.3,0,0.2", "place=0.36,0,0.2", "settle=0.1", "wait=0.1")
     record = Record(tmp_path / "r" / "signals.parquet")
@@ -190,6 +191,7 @@ def test_on_a_table_higher_than_the_shoulder_the_arm_starts_above_it(tmp_path: P
     assert np.all(record["arm.f_G"][record["planner.phase"] == TaskPhase.SETTLE] == 0.0)
 
 
+@pytest.mark.slow
 def test_an_object_that_is_too_heavy_for_the_cup_is_never_picked_up(tmp_path: Path):
     ended = run(VslPickAndPlace, tmp_path / "r", "mass=0.3", "gripper.suction=1.0", "settle=1", "wait=0.3")
     assert not ended.outcome.success

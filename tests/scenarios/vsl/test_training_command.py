@@ -50,6 +50,7 @@ def test_the_same_seed_gives_the_same_model_in_both_forms(trained: Trained, tmp_
     assert text["mean_test_errors_m"]["forward_hybrid"] < 0.1 * text["mean_test_errors_m"]["forward_model_based"]
 
 
+@pytest.mark.slow
 def test_the_command_that_a_refusal_advises_makes_the_model_that_is_lacking(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -86,6 +87,7 @@ def test_errors_fall_along_the_learning_curve():
     assert seen == [1, 2, 3]
 
 
+@pytest.mark.slow
 def test_the_curve_is_drawn(trained: Trained, tmp_path: Path):
     result = call("--data", trained.data, "--curve", tmp_path / "a.b.png", "--out", tmp_path / "m.json")
     assert result.exit_code == 0, result.output

@@ -90,6 +90,7 @@ def test_times_are_drawn_by_what_is_amiss(tmp_path: Path):
     assert (tmp_path / "spread.png").exists()
 
 
+@pytest.mark.slow
 def test_runs_on_the_fitted_arm_have_tables_claims_and_figures_of_their_own(tmp_path: Path):
     of_arm: dict[str, Any] = {
         "arm.EA": 47.0,

@@ -114,6 +114,7 @@ def test_more_successes_than_published_are_told_as_an_easier_task(claims: Sequen
     assert "easier task" not in one(rate_claims(IrTableRuns(fewer)), "The IR-guided hand holds 11 of 15").reason
 
 
+@pytest.mark.slow
 def test_a_distance_beyond_the_range_is_told_as_not_seen():
     index = grasp_table(succeeds, final_distance_index=lambda run: nan if run.repetition < 5 else 0.04)
     table = next(t for t in IrTable().tables(index) if t.title.startswith("Table II, nominal"))
