@@ -16,10 +16,13 @@ from pathlib import Path
 import handover
 from handover.cosim.files import FileLocked, lock_file
 from handover.cosim.native_libraries import cache_folder
-from support.commands import run_command
+from support.commands import Command
 
 _ROOT = Path(handover.__file__).resolve().parent.parent
 _PRODUCT = ("controllers", "cosim", "fmus", "plants", "scenarios")
+_MOST = 1800.0
+"""Seconds that a run may take on a machine with much else to do; a handover takes half a minute alone."""
+
 _KEPT_FOR = 86_400.0
 """Seconds for which runs of other code are kept, as of another clone."""
 
@@ -38,7 +41,7 @@ def kept_run(*arguments: str) -> Path:
         if not (folder / "whole").exists():
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir()
-            done = run_command(*arguments, "--out", wanted, cwd=folder)
+            done = Command(*arguments, "--out", wanted, cwd=folder).wait(_MOST)
             assert done.status in (0, 1), done.output + done.errors  # 1: the robot failed
             (folder / "whole").touch()
     return wanted

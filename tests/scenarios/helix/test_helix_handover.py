@@ -176,12 +176,11 @@ def test_the_same_seed_gives_the_same_signals_bit_for_bit(handover: Path, tmp_pa
 
 
 @pytest.mark.slow
-def test_three_cameras_take_the_ball_though_one_is_covered_for_a_while(tmp_path: Path):
+def test_three_cameras_take_the_ball_though_one_is_covered_for_a_while():
     options = ("cameras=three", "cover=left", "cover_from=3", "cover_for=2")
     given = [text for option in options for text in ("-p", option)]
-    out = tmp_path / "r"
-    done = run_command("run", "helix_handover", *given, "--unit", "arm=TendonArmFast", "--seed", "3", "--out", out)
-    assert done.status == 0, done.output
+    out = kept_run("run", "helix_handover", *given, "--unit", "arm=TendonArmFast", "--seed", "3")
+    assert summary_of(out)["success"]
     assert summary_of(out)["metrics"]["closing_distance"]["value"] < 0.005
     assert {p.stem.rsplit("_", 1)[-1] for p in (out / "pictures").glob("*.jpg")} == {"left", "right", "third"}
     record = Record(out / "signals.parquet")
