@@ -3,12 +3,10 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from made_signals import made_signals
 
 from handover.controllers.ir_grasp.ir_reflex import Phase, Stop
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
-from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import PlacedUnit
 from handover.plants.ir_grasp.hand import sensor_rays
@@ -33,30 +31,11 @@ def signals(
 
     The index's distances are as seen, and true; the thumb's is as seen.
     """
-    units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {"scene": {}, "reflex": {}}
-    ports: dict[str, dict[str, FmuPort]] = {"scene": {}, "reflex": {}}
-
-    def show(unit: str, name: str, kind: Kind, value: Any, **more: Any) -> None:
-        array = np.array(value).reshape(-1)
-        units[unit][name] = (array,)
-        shape = array.shape if array.size > 1 else ()
-        ports[unit][name] = FmuPort(
-            name=name, kind=kind, causality=Causality.OUTPUT, fmi_type="", references=(), shape=shape, **more
-        )
-
-    for name, value in (("p_WH", [p_WH, 0.0]), ("p_WO", [p_WH + p_HO[0], p_HO[1]]), ("yaw", 0.0), ("yaw_O", 0.0)):
-        show("scene", name, Kind.REAL, value)
-    show("scene", "range", Kind.REAL, [0.01, index[1], 0.01])
-    show("scene", "q", Kind.REAL, np.zeros(8))
-    show("scene", "p_ground", Kind.REAL, p_ground)
-    show("scene", "touching", Kind.INTEGER, touching)
-    for name, value in (("distance", [thumb, index[0], 0.01]), ("cost", 1e-5), ("yaw_cmd", 0.0), ("sigma_cmd", 0.0)):
-        show("reflex", name, Kind.REAL, value)
-    show("reflex", "p_WH_cmd", Kind.REAL, [p_WH, 0.0])
-    show("reflex", "steps", Kind.INTEGER, 4)
-    for name, item in (("phase", phase), ("stop", stop)):
-        show("reflex", name, Kind.ENUMERATION, int(item), items=tuple((i.name, int(i)) for i in type(item)))
-    return Signals(units, ports, None)
+    scene: dict[str, Any] = {"p_WH": [p_WH, 0.0], "p_WO": [p_WH + p_HO[0], p_HO[1]], "yaw": 0.0, "yaw_O": 0.0}
+    scene |= {"range": [0.01, index[1], 0.01], "q": np.zeros(8), "p_ground": p_ground, "touching": touching}
+    reflex: dict[str, Any] = {"distance": [thumb, index[0], 0.01], "cost": 1e-5, "yaw_cmd": 0.0, "sigma_cmd": 0.0}
+    reflex |= {"p_WH_cmd": [p_WH, 0.0], "steps": 4, "phase": phase, "stop": stop}
+    return made_signals({"scene": scene, "reflex": reflex})
 
 
 def follow(*moments: tuple[float, Signals]) -> GraspEvaluator:

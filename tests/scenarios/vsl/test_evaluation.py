@@ -3,10 +3,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_signals import made_signals
 from numpy.typing import NDArray
 
-from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.fmus.build import cached
@@ -31,20 +30,10 @@ def signals(
     """Return a goal at x = goal and a tip `below` the point at x = at; servos are 1 mm off, the tracker 0.5 mm."""
     entries, reached = (np.array([x, 0.0, 0.1]) for x in (goal, goal if at is None else at))
     tip = reached - below * UP
-    values: dict[str, dict[str, Any]] = {
-        "planner": {"p_WG_goal": entries, "moving": segment > 0 and not done, "done": done, "segment": segment},
-        "arm": {"p_WG": tip + 0.0005 * UP, "p_WG_meas": tip, "shape": np.array([0.0 * UP, 0.15 * UP, lowest * UP])},
-        "kinematics": {"p_WG_model": reached - 0.001 * UP, "p_WG_est": tip + 0.003 * UP, "outside": outside},
-    }
-    views: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
-        unit: {name: (np.atleast_1d(np.array(value)),) for name, value in ys.items()} for unit, ys in values.items()
-    }
-    ports = {unit: {name: port(name, np.shape(value)) for name, value in ys.items()} for unit, ys in values.items()}
-    return Signals(views, ports, values)
-
-
-def port(name: str, shape: tuple[int, ...]) -> FmuPort:
-    return FmuPort(name=name, kind=Kind.REAL, causality=Causality.OUTPUT, fmi_type="", references=(), shape=shape)
+    planner = {"p_WG_goal": entries, "moving": segment > 0 and not done, "done": done, "segment": segment}
+    arm = {"p_WG": tip + 0.0005 * UP, "p_WG_meas": tip, "shape": np.array([0.0 * UP, 0.15 * UP, lowest * UP])}
+    kinematics = {"p_WG_model": reached - 0.001 * UP, "p_WG_est": tip + 0.003 * UP, "outside": outside}
+    return made_signals({"planner": planner, "arm": arm, "kinematics": kinematics})
 
 
 def follow(evaluator: PathEvaluator, *moments: Signals) -> PathEvaluator:
