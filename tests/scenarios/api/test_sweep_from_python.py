@@ -121,6 +121,7 @@ def test_what_cannot_be_run_is_refused(given: dict[str, object], tmp_path: Path,
     assert not (tmp_path / "c").exists()
 
 
+@pytest.mark.slow
 def test_units_are_varied(in_process: None, tmp_path: Path):  # noqa: ARG001
     fmus = [handover.unit("IrReflex", fmi=2), handover.unit("IrReflex", fmi=3)]
     campaign = handover.sweep("ir_grasp", units={"reflex": fmus}, strategy="blind", stop=0.5, out=tmp_path / "c")

@@ -55,7 +55,7 @@ def without_harm(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], li
     return read
 
 
-@pytest.mark.parametrize("coupling", [(), GENERAL], ids=["plan", "general"])
+@pytest.mark.parametrize("coupling", [pytest.param((), id="plan"), pytest.param(GENERAL, id="general", marks=slow)])
 def test_a_run_ends_as_if_its_units_had_done_no_harm_in_a_step(
     coupling: tuple[str, ...], without_harm: Callable[[int], list[float]], tmp_path: Path
 ):
@@ -72,6 +72,7 @@ def test_so_it_does_where_they_do_it_before_it_begins(
     assert x == without_harm(len(TOGETHER))
 
 
+@slow
 def test_figures_and_page_are_made_after_harm(without_harm: Callable[[int], list[float]], tmp_path: Path):
     harms = ("change_directory", "trap_division", "limit_files", "limit_descriptors")
     assert end_of_chain(tmp_path, [f"{harm}_in_step" for harm in harms]) == without_harm(len(harms))

@@ -59,6 +59,7 @@ def test_files_that_units_values_name_are_known_too_and_there_may_be_none(way: P
     assert files_of("without") == {}
 
 
+@pytest.mark.slow
 def test_a_campaign_is_another_with_another_file(way: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(local_cluster, "local_cluster", InProcessPool.opened)
     sweep = (

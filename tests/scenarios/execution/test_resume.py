@@ -64,7 +64,7 @@ def assert_same(joined: Path, whole: Path) -> None:
     assert data | {"checkpoint": None} == wanted
 
 
-FORMATS = "ir_grasp -p strategy=forward -p forward=0.055 --format csv --format mat"
+FORMATS = "ir_grasp -p strategy=forward -p forward=0.055 --stop 2 --format csv --format mat"
 
 
 @pytest.mark.parametrize(

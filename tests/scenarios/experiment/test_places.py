@@ -25,7 +25,11 @@ class Systems(NamedTuple):
     fitted: System
 
 
-@pytest.fixture(scope="module", params=SCENARIOS)
+A_ROBOT = ("ir_grasp", "helix_handover", "vsl_hybrid", "flyer_robot_to_human")
+EACH = [name if name in A_ROBOT else pytest.param(name, marks=pytest.mark.slow) for name in SCENARIOS]
+
+
+@pytest.fixture(scope="module", params=EACH)
 def scenario(request: pytest.FixtureRequest) -> type[Experiment[Any]]:
     return SCENARIOS[request.param]
 

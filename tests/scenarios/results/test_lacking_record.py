@@ -48,7 +48,9 @@ def select_columns(source: Path, target: Path, without: str) -> None:
     pq.write_table(table.select([c for c in table.column_names if not c.startswith(without)]), target)
 
 
-@pytest.mark.parametrize("name", LACKING)
+@pytest.mark.parametrize(
+    "name", [n if n in ("ir_grasp", "flyer_impedance") else pytest.param(n, marks=pytest.mark.slow) for n in LACKING]
+)
 def test_what_needs_no_output_of_the_controller_is_drawn_in_its_colours(name: str, tmp_path: Path):
     unit, title, label, body = LACKING[name]
     folder, experiment = lacking(name, tmp_path / "r"), SCENARIOS[name]()

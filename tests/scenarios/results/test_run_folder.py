@@ -63,7 +63,7 @@ def begun_in_dated_folder(place: Path, together: Callable[[], object]) -> str:
 def test_threads_that_begin_at_once_get_a_folder_each(tmp_path: Path):
     at_once = threading.Barrier(8)
     with ThreadPoolExecutor(8) as threads:
-        for turn in range(20):
+        for turn in range(5):
             place = tmp_path / str(turn)
             found = [threads.submit(begun_in_dated_folder, place, at_once.wait) for _ in range(8)]
             assert {f.result() for f in found} == {str(p) for p in place.iterdir()}
