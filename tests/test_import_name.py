@@ -34,8 +34,11 @@ def repository(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("added", ["", "."], ids=["plainly", "with PYTHONPATH=."])
-@pytest.mark.parametrize("call", [["script.py"], ["-m", "script"], ["-c", "import script"]], ids=" ".join)
+@pytest.mark.parametrize(
+    ("call", "added"),
+    [(["script.py"], ""), (["-m", "script"], "."), (["-c", "import script"], "")],
+    ids=["script", "module with PYTHONPATH=.", "code"],
+)
 def test_a_repository_with_folders_of_the_same_names_keeps_them(repository: Path, added: str, call: list[str]):
     inherited = os.environ.get("PYTHONPATH", "")
     path = os.pathsep.join(part for part in (added, inherited) if part)

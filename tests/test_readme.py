@@ -1,6 +1,8 @@
 """The README's commands and programs do what it says."""
 
+import contextlib
 import importlib.util
+import io
 import json
 import re
 import shlex
@@ -8,10 +10,17 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from collections import Counter
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import pytest
+from click.testing import CliRunner
+from in_process_pool import use_in_process_pool
+from support.commands import Ended, run_command
+from support.kept_runs import copied_run, kept_run
 
 from handover.cosim.stepping.options import Algorithm
 from handover.fmus import interpreter
@@ -20,45 +29,44 @@ from handover.fmus.catalog import UNITS
 from handover.fmus.compile import TARGETS
 from handover.fmus.contents.fmi2_description import NoFmi2Form
 from handover.scenarios.catalog import SYSTEMS
+from handover.scenarios.cli.command import main
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", README, flags=re.DOTALL | re.MULTILINE)
 COMMANDS = [line for kind, text in BLOCKS if not kind for line in text.splitlines() if line.startswith(".venv/")]
 RUNS = [c for c in COMMANDS if " run " in c and "--live" not in c]
-LIVE_RUNS = [c for c in COMMANDS if "--live" in c]
-"""Begins once its page is open: tests/scenarios/live runs it."""
+OF_FILES = ("model=", "units/", ".ssp")
+"""In runs that read what another command has written."""
 PROGRAMS = [text for kind, text in BLOCKS if kind == "python"]
 IN_PYTHON, STEPS, AGENT, OWN_SYSTEM, TERMINALS, IN_FMPY, OWN_BLOCK, OWN_BUILD = PROGRAMS
 
 
-def handover(command: str, folder: Path) -> "subprocess.CompletedProcess[str]":
-    arguments = shlex.split(command)[1:]
-    call = [sys.executable, "-c", "from handover.scenarios.cli.command import main; main()", *arguments]
-    return subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
+def handover(command: str, folder: Path, *more: str) -> Ended:
+    """Run a command, with more arguments, in a folder; a campaign's runs are executed by its own process."""
+    return run_command(*shlex.split(command)[1:], *more, cwd=folder, before=use_in_process_pool)
 
 
-def program(text: str, folder: Path) -> str:
-    done = subprocess.run([sys.executable, "-c", text], cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+def succeeded(command: str, folder: Path, *more: str) -> str:
+    done = handover(command, folder, *more)
+    assert done.status == 0, (command, done.output, done.errors)
+    return done.output
 
 
-def test_the_readme_has_what_is_tested_here():
-    assert len(RUNS) == 13
-    assert len(LIVE_RUNS) == 1
-    assert len([c for c in COMMANDS if " export " in c]) == 1
-    assert len([c for c in COMMANDS if " build " in c]) == 4
-    assert len([c for c in COMMANDS if " check " in c]) == 2
-    assert len([c for c in COMMANDS if " info " in c]) == 1
-    assert len([c for c in COMMANDS if " vsl-train " in c]) == 2
-    assert len([c for c in COMMANDS if " sweep " in c]) == 4
-    assert len([c for c in COMMANDS if " compare " in c]) == 1
-    assert len([c for c in COMMANDS if " paper " in c]) == 1
-    assert len([c for c in COMMANDS if " report " in c]) == 1
-    assert len([c for c in COMMANDS if " film " in c]) == 1
-    assert len([c for c in COMMANDS if " play " in c]) == 1
-    assert len([c for c in COMMANDS if " study " in c]) == 2
+def program(text: str, folder: Path, patch: pytest.MonkeyPatch) -> str:
+    """Run a program in a folder, and return what it prints."""
+    patch.chdir(folder)
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        exec(compile(text, "README.md", "exec"), {"__name__": "__main__"})
+    return printed.getvalue()
+
+
+def test_every_command_is_run_by_a_test():
+    """Here; what begins once its page is open, `play` and one of `run`, in tests/scenarios/live."""
+    counted = Counter(c.split()[1] for c in COMMANDS if c.startswith(".venv/bin/handover "))
+    here = {"run": 13, "sweep": 4, "build": 4, "check": 2, "study": 2, "vsl-train": 2, "list": 1}
+    once = ("export", "info", "compare", "paper", "report", "film")
+    assert counted == {**here, **dict.fromkeys(once, 1)} | {"run": here["run"] + 1, "play": 1}
 
 
 def test_the_citation_is_of_this_version():
@@ -103,6 +111,7 @@ def test_the_table_of_options_names_every_algorithm():
     assert {a.value for a in Algorithm} <= {*re.findall(r"`([^`]+)`", row)}
 
 
+@pytest.mark.slow
 def test_the_table_of_units_has_their_steps_and_standards():
     cells = [row.split("|")[1:4] for row in README.splitlines() if re.match(r"\| `[A-Z][a-z]\w+`", row)]
     sentence = {
@@ -126,31 +135,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("repository")
     for name, target in ((".venv", Path(sys.prefix)), ("docs", ROOT / "docs"), ("fmus", ROOT / "fmus")):
         (made / name).symlink_to(target)
-    done = handover(command_with(" build TendonArm "), made)
-    assert done.returncode == 0, done.stderr
+    succeeded(command_with(" build TendonArm "), made)
     return made
 
 
-def test_a_unit_runs_in_fmpy(folder: Path):
-    printed = program(IN_FMPY, folder)
-    x, y, z = (float(n) for n in printed.strip().strip("[]").split())
-    assert (x, y, z) == pytest.approx((0.0, 0.0, -0.7), abs=1e-6)
+@pytest.mark.slow
+def test_a_unit_runs_in_fmpy(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    printed = program(IN_FMPY, folder, monkeypatch)
+    assert [float(n) for n in printed.strip().strip("[]").split()] == pytest.approx([0.0, 0.0, -0.7], abs=1e-6)
 
 
 def test_a_unit_tells_its_terminals(folder: Path):
-    done = handover(command_with(" info "), folder)
-    assert done.returncode == 0, done.stderr
-    listed = [line.split()[:3] for line in done.stdout.partition("\nTerminals")[2].splitlines() if line]
-    assert listed == [
-        ["wrist", "_handover_pose", "plug"],
-        ["gripper", "_handover_pose", "plug"],
-        ["actuators", "_handover_command", "plug"],
-    ]
-
-
-def test_whole_units_and_terminals_are_connected(tmp_path: Path):
-    lines = program(TERMINALS, tmp_path).splitlines()
-    assert lines == [f"robot.{x}_WB -> navigation.{x}_WB (terminal base)" for x in "pqvw"]
+    told = succeeded(command_with(" info "), folder)
+    listed = [line.split()[0] for line in told.partition("\nTerminals")[2].splitlines() if line]
+    assert listed == ["wrist", "gripper", "actuators"]
 
 
 @pytest.mark.skipif(sys.platform != "linux" or not interpreter.library(), reason="the program looks for linux64")
@@ -163,6 +161,7 @@ def test_a_unit_runs_in_a_c_program(folder: Path):
     assert f"prints `{printed.strip()}`" in README
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("ecospy") is None, reason="ecospy has wheels for few platforms")
 @pytest.mark.skipif(shutil.which("unzip") is None, reason="Ecos calls unzip")
 @pytest.mark.skipif(not interpreter.library(), reason="this Python has no shared library that Ecos can load")
@@ -175,28 +174,20 @@ def test_a_unit_runs_in_ecos(folder: Path):
     assert len(rows) >= 50
     assert {row.split(", ")[column] for row in rows} == {"-0.700000"}
     (scalar,) = re.findall(r"`\.venv/bin/(handover build [^`]*--scalar[^`]*)`", README)
-    assert handover(scalar, folder).returncode == 0
+    succeeded(scalar, folder)
     assert (folder / "units" / "TendonArm.fmi3-scalar.fmu").is_file()
 
 
-def test_the_unit_passes_its_check(folder: Path):
-    done = handover(command_with(" check units/TendonArm"), folder)
-    assert done.returncode == 0, done.stdout + done.stderr
-
-
 @pytest.mark.slow
-def test_a_unit_brings_an_experiment_along_that_its_check_repeats(folder: Path):
-    done = handover(command_with(" --prove "), folder)
-    assert done.returncode == 0, done.stderr
-    done = handover(command_with(" check units/FreeFlyer"), folder)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "outputs compared, all equal" in done.stdout
+def test_units_pass_their_checks_and_one_brings_an_experiment_along_that_its_check_repeats(folder: Path):
+    succeeded(command_with(" check units/TendonArm"), folder)
+    succeeded(command_with(" --prove "), folder)
+    assert "outputs compared, all equal" in succeeded(command_with(" check units/FreeFlyer"), folder)
 
 
 @pytest.mark.slow
 def test_a_unit_is_built_for_all_platforms(folder: Path):
-    done = handover(command_with(" --platform all "), folder)
-    assert done.returncode == 0, done.stderr
+    succeeded(command_with(" --platform all "), folder)
     with zipfile.ZipFile(folder / "units" / "Push.fmi3.fmu") as archive:
         libraries = [name for name in archive.namelist() if name.startswith("binaries/")]
     assert len(libraries) == len(TARGETS)
@@ -204,8 +195,7 @@ def test_a_unit_is_built_for_all_platforms(folder: Path):
 
 @pytest.mark.slow
 def test_a_unit_brings_its_interpreter(folder: Path):
-    done = handover(command_with(" --standalone "), folder)
-    assert done.returncode == 0, done.stderr
+    succeeded(command_with(" --standalone "), folder)
     (size,) = re.findall(r"`units/Push.fmi3-standalone.fmu`, (\d+) MB", README)
     file = folder / "units" / "Push.fmi3-standalone.fmu"
     assert file.stat().st_size < 40e6
@@ -222,12 +212,11 @@ def test_data_beside_a_unit_goes_along_with_it(tmp_path: Path):
     (tmp_path / "tabled.py").write_text(f"from pathlib import Path\n\n{block}")
     (tmp_path / file).write_text("2.0")
     for out, given in (("with", option), ("without", "")):
-        done = handover(f"handover build tabled:Spring --fmi 3 --platform host {given} --out {out}", tmp_path)
-        assert done.returncode == 0, done.stderr
+        succeeded(f"handover build tabled:Spring --fmi 3 --platform host {given} --out {out}", tmp_path)
     (tmp_path / file).unlink()
     checks = [handover(f"handover check {out}/Spring.fmi3.fmu", tmp_path) for out in ("with", "without")]
-    assert [done.returncode for done in checks] == [0, 1]
-    assert file in checks[1].stdout
+    assert [done.status for done in checks] == [0, 1]
+    assert file in checks[1].output
 
 
 def test_what_a_unit_in_another_tool_needs_is_run_here_or_an_extra():
@@ -259,73 +248,125 @@ def shell(script: str, folder: Path) -> str:
     return done.stdout
 
 
-def test_a_scenario_is_run_from_python(tmp_path: Path):
-    assert len(IN_PYTHON.split("\n\n")[1].splitlines()) + 1 <= 5  # lines of program
-    assert program(IN_PYTHON, tmp_path).startswith("True closed at ")
-    assert (tmp_path / "hand.png").is_file()
-    assert len([*tmp_path.glob("runs/*/signals.parquet")]) == 1
+@pytest.mark.parametrize(
+    ("text", "printed", "made"),
+    [
+        pytest.param(IN_PYTHON, "True closed at ", ["hand.png", "runs/*/signals.parquet"], id="run"),
+        pytest.param(STEPS, "3.008 [", [], id="steps", marks=pytest.mark.slow),
+        pytest.param(AGENT, "Box(-inf, inf, (3,), float64)", [], id="agent"),
+        pytest.param(OWN_SYSTEM, "[0.25 0.   0.  ]\n", ["push/signals.parquet"], id="system"),
+        pytest.param(TERMINALS, "robot.p_WB -> navigation.p_WB (terminal base)", [], id="terminals"),
+    ],
+)
+def test_programs_print_and_make_what_they_say(
+    text: str, printed: str, made: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    assert printed in program(text, tmp_path, monkeypatch)
+    assert [len([*tmp_path.glob(file)]) for file in made] == [1] * len(made)
 
 
-def test_a_scenario_is_stepped_from_python(tmp_path: Path):
-    assert program(STEPS, tmp_path).startswith("3.008 [")
+def test_a_run_is_five_lines():
+    assert len(IN_PYTHON.split("\n\n")[1].splitlines()) + 1 <= 5
 
 
-def test_an_agent_takes_a_units_place(tmp_path: Path):
-    assert "Box(-inf, inf, (3,), float64)" in program(AGENT, tmp_path)
-
-
-def test_a_system_of_ones_own_is_co_simulated(tmp_path: Path):
-    printed = program(OWN_SYSTEM, tmp_path)
-    assert printed.strip() == "[0.25 0.   0.  ]"
-    assert (tmp_path / "push" / "signals.parquet").is_file()
-
-
-def test_a_block_of_ones_own_is_built(tmp_path: Path):
+def test_a_block_of_ones_own_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "spring.py").write_text(OWN_BLOCK)
-    printed = program(OWN_BUILD, tmp_path)
-    assert (tmp_path / printed.strip()).is_file()
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "spring", raising=False)
+    printed = program(OWN_BUILD, tmp_path, monkeypatch).strip()
+    assert (tmp_path / printed).is_file()
     (command,) = re.findall(r"`\.venv/bin/(handover build spring:Spring [^`]*)`", README)
-    done = handover(command, tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert printed.strip() in done.stdout
+    assert printed in succeeded(command, tmp_path)
+
+
+def arguments_of(command: str) -> Sequence[str]:
+    """Return what a run is called with, without a page or a folder of its own."""
+    given = shlex.split(command)[1:]
+    if "--out" in given:
+        del given[given.index("--out") :][:2]
+    return (*given, "--no-report")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", RUNS)
-def test_the_runs_succeed(command: str, tmp_path: Path):
-    needed = [" build TendonArm ", " vsl-train "] if "units/" in command or "vsl_model.json" in command else []
-    needed += [" export "] if ".ssp" in command else []
-    for before in (c for c in COMMANDS if any(word in c for word in needed)):
-        assert handover(before, tmp_path).returncode == 0
-    if "--input" in command:
-        shell("".join(line + "\n" for line in block_with(command).splitlines() if line.startswith("printf ")), tmp_path)
-    done = handover(command, tmp_path)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "succeeded" in done.stdout
-    again, filmed = command_with(" report "), command_with(" film ")
-    if command.endswith(f" --out {again.split()[-1]}"):
-        assert handover(again, tmp_path).returncode == 0
-        done = handover(filmed, tmp_path) if shutil.which("chromium") else done
-        assert done.returncode == 0, done.stderr
+@pytest.mark.parametrize("command", [c for c in RUNS if not any(text in c for text in (*OF_FILES, " --out "))])
+def test_the_runs_succeed(command: str):
+    """Those of the Helix up to their second second: whole ones are in tests/scenarios/helix."""
+    begins = ("--stop", "2") if " helix_" in command else ()
+    summary = json.loads((kept_run(*arguments_of(command), *begins) / "summary.json").read_text())
+    assert summary["complete"]
+    assert summary["success"] is not bool(begins), summary["reason"]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", [c for c in COMMANDS if " sweep " in c or " paper " in c])
-def test_the_campaigns_end(command: str, tmp_path: Path):
-    done = handover(command, tmp_path)
-    assert done.returncode == 0, done.stdout + done.stderr
-    tables = [*tmp_path.glob("*/runs.parquet"), *tmp_path.glob("campaigns/*/runs.parquet")]
-    assert len(tables) == 1
-    assert (tables[0].parent / "report.html").is_file()
+def test_a_run_is_reported_again_and_filmed(tmp_path: Path):
+    (command,) = (c for c in RUNS if c.endswith(" --out r"))
+    copied_run(tmp_path / "r", *arguments_of(command)[:-1])
+    assert json.loads((tmp_path / "r" / "summary.json").read_text())["success"]
+    (tmp_path / "r" / "report.html").unlink()
+    succeeded(command_with(" report "), tmp_path)
+    assert (tmp_path / "r" / "report.html").is_file()
+    if shutil.which("chromium"):
+        succeeded(command_with(" film "), tmp_path, "--size", "320x180", "--pace", "40")
+        assert (tmp_path / "grasp.gif").is_file()
+
+
+@pytest.mark.slow
+def test_a_model_is_trained_run_and_adapted(tmp_path: Path):
+    train, adapt = (c for c in COMMANDS if " vsl-train " in c)
+    succeeded(train, tmp_path, "--points", "200")
+    succeeded(command_with(" run vsl_hybrid -p model="), tmp_path, "--no-report")
+    succeeded(adapt, tmp_path)
+    assert (tmp_path / "stiffer_arm.json").is_file()
+
+
+@pytest.mark.slow
+def test_files_are_run(folder: Path):
+    succeeded(command_with(" export "), folder)
+    assert "succeeded" in succeeded(command_with(" run grasp.ssp "), folder, "--no-report")
+    of_input = command_with(" --input ")
+    shell("".join(line + "\n" for line in block_with(of_input).splitlines() if line.startswith("printf ")), folder)
+    assert "succeeded" in succeeded(of_input, folder, "--no-report")
+    done = handover(command_with(" --unit arm=units/"), folder, "--stop", "2", "--no-report", "--out", "other_arm")
+    assert done.status == 1, done.errors  # it ends before the grasp
+    run = json.loads((folder / "other_arm" / "run.json").read_text())
+    assert run["units"]["arm"]["fmu"] == "TendonArm.fmi2.fmu"
+
+
+def test_what_a_place_needs_is_listed(tmp_path: Path):
+    assert "dl_t" in succeeded(command_with(" list "), tmp_path)
+
+
+@pytest.mark.slow
+def test_campaigns_end_with_a_page(tmp_path: Path):
+    grasps, loads = (c for c in COMMANDS if " sweep " in c and c not in block_with(" compare "))
+    succeeded(grasps, tmp_path, "--repeat", "1")
+    assert (tmp_path / "c" / "report.html").is_file()
+    succeeded(loads, tmp_path, "--stop", "0.5", "--no-report")
+    (campaign,) = (tmp_path / "campaigns").iterdir()
+    assert len([*(campaign / "runs").iterdir()]) == 10
+
+
+def test_a_published_experiment_is_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Its runs, of which there are many, in tests/scenarios/cli/test_paper.py."""
+    begun: list[Sequence[Any]] = []
+
+    def run(*given: Any) -> None:
+        begun.append(given)
+        sys.exit(0)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("handover.scenarios.cli.campaign._run", run)
+    assert CliRunner().invoke(main, shlex.split(command_with(" paper "))[1:]).exit_code == 0
+    assert len(begun) == 1
 
 
 @pytest.mark.slow
 def test_campaigns_are_compared(tmp_path: Path):
-    block = block_with(" compare ")
-    for command in block.splitlines():
-        done = handover(command, tmp_path)
-        assert done.returncode == 0, done.stdout + done.stderr
-    comparison = tmp_path / command_with(" compare ").split()[-1]
+    ours, theirs, compare = block_with(" compare ").splitlines()
+    for command in (ours, theirs):
+        succeeded(command, tmp_path, "--repeat", "2", "--no-report")
+    succeeded(compare, tmp_path)
+    comparison = tmp_path / compare.split()[-1]
     assert {"report.html", "comparison.csv", "comparison.json", "figures"} == {p.name for p in comparison.iterdir()}
     found = json.loads((comparison / "comparison.json").read_bytes())
     assert all(test["paired"] for test in found["tests"])  # "run by run where they share seeds, as these do"
@@ -334,7 +375,5 @@ def test_campaigns_are_compared(tmp_path: Path):
 
 def test_the_plan_of_a_study_is_written_and_checked(tmp_path: Path):
     new, check = (c for c in COMMANDS if " study " in c)
-    assert handover(new, tmp_path).returncode == 0
-    done = handover(check, tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "12" in done.stdout
+    succeeded(new, tmp_path)
+    assert "12" in succeeded(check, tmp_path)

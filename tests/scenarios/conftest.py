@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+from matplotlib.figure import Figure
 from opened_page import launched
 from playwright.sync_api import Browser
 from support.kept_runs import copied_run, kept_run
@@ -13,6 +14,16 @@ def browser() -> Generator[Browser, None, None]:
     """Return a browser for a file's tests: as long as it is there, an event loop runs in the tests' thread."""
     with launched() as made:
         yield made
+
+
+@pytest.fixture
+def empty_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let files of figures be empty: drawing them takes most of the time where a test asks only which there are."""
+
+    def save(_figure: Figure, file: Path, **_: object) -> None:
+        Path(file).touch()
+
+    monkeypatch.setattr(Figure, "savefig", save)
 
 
 @pytest.fixture(scope="session")

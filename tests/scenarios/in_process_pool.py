@@ -3,11 +3,15 @@
 import contextlib
 import os
 import shutil
+import sys
+import types
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
 from handover.scenarios.campaign.run_job import run_job
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob
+
+LOCAL_CLUSTER = "handover.scenarios.campaign.local_cluster"
 
 
 class InProcessPool:
@@ -43,3 +47,20 @@ def _run(job: RunJob) -> None:
         shutil.rmtree(unfinished, ignore_errors=True)
         raise
     os.replace(unfinished, Path(job.runs) / job.name)
+
+
+def local_cluster_of(pool: InProcessPool) -> types.ModuleType:
+    """Return what takes the place of the module `local_cluster`, so that campaigns of this process have a pool."""
+
+    @contextlib.contextmanager
+    def local_cluster(_workers: int | None) -> Generator[InProcessPool, None, None]:
+        yield pool
+
+    module = types.ModuleType(LOCAL_CLUSTER)
+    vars(module).update(local_cluster=local_cluster, connect_cluster=None)
+    return module
+
+
+def use_in_process_pool() -> None:
+    """Let this process execute campaigns' runs itself, without Dask; `before` of a `Command`."""
+    sys.modules[LOCAL_CLUSTER] = local_cluster_of(InProcessPool())

@@ -1,5 +1,6 @@
 """What scenarios give to be drawn over time, from real runs: what it is, in its unit, however short the record is."""
 
+import json
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -7,8 +8,8 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from flyer_runs import metric, run
 from matplotlib.axes import Axes
+from support.kept_runs import kept_run
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
@@ -18,36 +19,48 @@ from handover.scenarios.experiment.parameters import parse_parameters
 from handover.scenarios.experiment.plotting import draw_time_figures, draw_time_plot
 from handover.scenarios.experiment.time_plot import COLOURS, Curve, TimePlot
 from handover.scenarios.reporting.time_plots import time_figure
-from handover.scenarios.results.summary import RunResult
 
-FAST = {
+SHORT = {
     "ir_grasp": (),
     "flyer_impedance": (),
     "vsl_hybrid": ("points=5", "settle=1", "speed=0.2"),
     "helix_handover": ("patience=1",),
     "flyer_robot_to_human": ("patience=1",),
 }
+SLOW = ("helix_handover", "flyer_robot_to_human")
+NAMES = [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in SHORT]
 
 
 class Run:
     """A run, with what it was asked for and what it left."""
 
-    def __init__(self, name: str, given: tuple[str, ...], out: Path) -> None:
+    def __init__(self, name: str, given: tuple[str, ...]) -> None:
         scenario: type[Experiment[Any]] = SCENARIOS[name]
-        self.ended: RunResult = run(scenario, out, *given)
+        folder = kept_run("run", name, *(text for value in given for text in ("-p", value)), "--no-report")
+        self.metrics = json.loads((folder / "summary.json").read_text())["metrics"]
         self.experiment, self.parameters = scenario(), parse_parameters(scenario, given)
-        self.file = out / "signals.parquet"
+        self.file = folder / "signals.parquet"
         self.record = Record(self.file)
         self.plots = {p.title: p for p in self.experiment.plots(self.parameters, self.record)}
 
     def curve(self, title: str, label: str) -> Curve:
         return next(c for c in self.plots[title].curves if c.label == label)
 
+    def metric(self, name: str) -> float:
+        return float(self.metrics[name]["value"])
+
+
+class Runs(dict[str, Run]):
+    """Runs by scenario, made when they are asked for."""
+
+    def __missing__(self, name: str) -> Run:
+        self[name] = Run(name, SHORT[name])
+        return self[name]
+
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Run]:
-    folder = tmp_path_factory.mktemp("runs")
-    return {name: Run(name, given, folder / name) for name, given in FAST.items()}
+def runs() -> Runs:
+    return Runs()
 
 
 def check(plots: list[TimePlot], record: Record) -> None:
@@ -59,8 +72,8 @@ def check(plots: list[TimePlot], record: Record) -> None:
         assert all(a.end == b.begin and a.name != b.name for a, b in pairwise(plot.phases)), plot.title
 
 
-@pytest.mark.parametrize("name", FAST)
-def test_curves_are_as_long_as_the_record_and_phases_are_named(name: str, runs: dict[str, Run]):
+@pytest.mark.parametrize("name", NAMES)
+def test_curves_are_as_long_as_the_record_and_phases_are_named(name: str, runs: Runs):
     done = runs[name]
     assert 3 <= len(done.plots) <= 15
     check(list(done.plots.values()), done.record)
@@ -68,8 +81,8 @@ def test_curves_are_as_long_as_the_record_and_phases_are_named(name: str, runs: 
 
 
 @pytest.mark.parametrize("rows", [1, 2])
-@pytest.mark.parametrize("name", FAST)
-def test_a_record_of_a_row_or_two_is_no_fault(name: str, rows: int, runs: dict[str, Run], tmp_path: Path):
+@pytest.mark.parametrize("name", NAMES)
+def test_a_record_of_a_row_or_two_is_no_fault(name: str, rows: int, runs: Runs, tmp_path: Path):
     done = runs[name]
     pq.write_table(pq.read_table(done.file).slice(0, rows), tmp_path / "signals.parquet")
     short = Record(tmp_path / "signals.parquet")
@@ -80,33 +93,34 @@ def test_every_scenario_has_plots_of_its_own():
     assert all(s.time_figures is not Experiment.time_figures for s in SCENARIOS.values())
 
 
-def test_the_helix_true_distance_ends_where_the_summary_says(runs: dict[str, Run]):
+@pytest.mark.slow
+def test_the_helix_true_distance_ends_where_the_summary_says(runs: Runs):
     done = runs["helix_handover"]
     curve = done.curve("Distance to the goal", "gripper to ball, true")
-    assert curve.values[-1] == pytest.approx(1000 * metric(done.ended, "final_distance"))
+    assert curve.values[-1] == pytest.approx(1000 * done.metric("final_distance"))
     descends, grasps = done.plots["Distance to the goal"].levels
     assert (descends.value, grasps.value) == pytest.approx((50.0, 3.0))
 
 
-def test_a_push_disagrees_with_the_model_as_much_as_the_summary_says(runs: dict[str, Run]):
+def test_a_push_disagrees_with_the_model_as_much_as_the_summary_says(runs: Runs):
     done = runs["flyer_impedance"]
     titles = [f"Error of the gripper's position, rest minus actual, {axis} of W" for axis in "xyz"]
     apart = [
         np.nanmax(np.abs(done.curve(title, "actual").values - done.curve(title, "calculated").values))
         for title in titles
     ]
-    assert max(apart) == pytest.approx(1000 * metric(done.ended, "disagreement_position"))
+    assert max(apart) == pytest.approx(1000 * done.metric("disagreement_position"))
 
 
-def test_joints_are_in_degrees_and_the_error_is_drawn_on_the_path_only(runs: dict[str, Run]):
+def test_joints_are_in_degrees_and_the_error_is_drawn_on_the_path_only(runs: Runs):
     done = runs["vsl_hybrid"]
     assert done.curve("Joints", "J2, measured").values == pytest.approx(np.degrees(done.record["arm.q_meas"][:, 1]))
     error = done.curve("Error of the tip, on the path", "tip by the tracker").values
     assert (np.isfinite(error) == done.record["planner.moving"]).all()
-    assert np.nanmax(error) >= 1000 * metric(done.ended, "max_error") - 1e-9
+    assert np.nanmax(error) >= 1000 * done.metric("max_error") - 1e-9
 
 
-def test_fingers_that_see_nothing_are_not_drawn(runs: dict[str, Run]):
+def test_fingers_that_see_nothing_are_not_drawn(runs: Runs):
     done = runs["ir_grasp"]
     title = "Distances of the fingers from the object"
     for i, finger in enumerate(("thumb", "index", "ring")):
@@ -115,7 +129,7 @@ def test_fingers_that_see_nothing_are_not_drawn(runs: dict[str, Run]):
     assert done.plots["Cost of thumb and ring, [Luberto] eq. (4)"].logarithmic
 
 
-def test_a_cost_is_drawn_as_measured_only_while_thumb_and_ring_see(runs: dict[str, Run]):
+def test_a_cost_is_drawn_as_measured_only_while_thumb_and_ring_see(runs: Runs):
     done = runs["ir_grasp"]
     title = "Cost of thumb and ring, [Luberto] eq. (4)"
     measured, partly = done.plots[title].curves
@@ -129,7 +143,8 @@ def test_a_cost_is_drawn_as_measured_only_while_thumb_and_ring_see(runs: dict[st
     assert np.nanmax(partly.values) < 3025.0
 
 
-def test_commands_far_beyond_the_thrusters_run_out_of_the_axes(runs: dict[str, Run]):
+@pytest.mark.slow
+def test_commands_far_beyond_the_thrusters_run_out_of_the_axes(runs: Runs):
     done = runs["flyer_robot_to_human"]
     plots = [done.plots[f"Force of the thrusters along {axis} of B"] for axis in "xyz"]
     commanded = done.curve(plots[0].title, "commanded").values
@@ -140,16 +155,17 @@ def test_commands_far_beyond_the_thrusters_run_out_of_the_axes(runs: dict[str, R
     assert all(plot.limits == pytest.approx((-limit, limit)) for plot in plots)
 
 
-def test_no_plot_of_a_push_has_more_than_three_curves(runs: dict[str, Run]):
+def test_no_plot_of_a_push_has_more_than_three_curves(runs: Runs):
     plots = runs["flyer_impedance"].plots.values()
     assert max(len(plot.curves) for plot in plots) == 3
     noisy = [plot for plot in plots if plot.title.startswith(("Force of", "Torque of"))]
     assert [[c.label for c in plot.curves] for plot in noisy] == [["given", "commanded"]] * 6
 
 
-@pytest.mark.parametrize("name", FAST)
+@pytest.mark.usefixtures("empty_figures")
+@pytest.mark.parametrize("name", NAMES)
 def test_page_and_figure_draw_the_same_curves_in_the_same_colours(
-    name: str, runs: dict[str, Run], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    name: str, runs: Runs, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ):
     done = runs[name]
     drawn: dict[str, list[tuple[str, str]]] = {}

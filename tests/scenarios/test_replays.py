@@ -1,12 +1,10 @@
 """Every scenario can be seen in space: its replay is complete, finite and small."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from flyer_runs import run
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+from support.kept_runs import kept_run
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.catalog import SCENARIOS
@@ -30,17 +28,16 @@ MUST_SHOW: dict[str, set[str]] = {
     "ir_grasp": {"palm", "thumb", "index", "ring", "object", "beams"},
     "ir_sensor": {"palm", "thumb", "index", "ring", "object", "beams"},
 }
-FIRST = ("helix_handover", "vsl_hybrid", "flyer_human_to_robot")
-SHORT = {"helix_handover": ("patience=1",)}
+FIRST = ("vsl_hybrid", "flyer_impedance")
 LARGEST = 400_000
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in FIRST else (pytest.mark.slow,)) for n in SCENARIOS])
-def test_a_scenario_is_shown_in_space(name: str, tmp_path: Path):
-    given = SHORT.get(name, ())
-    run(SCENARIOS[name], tmp_path / "run", *given)
-    record = Record(tmp_path / "run" / "signals.parquet")
-    replay = SCENARIOS[name]().replay(parse_parameters(SCENARIOS[name], given), record)
+def test_a_scenario_is_shown_in_space(name: str):
+    begins = ("--stop", "1") if name.startswith("helix_") and name != "helix_use_case" else ()
+    record = Record(kept_run("run", name, *begins, "--no-report") / "signals.parquet")
+    scenario, parameters = SCENARIOS[name](), parse_parameters(SCENARIOS[name], ())
+    replay = scenario.replay(parameters, record)
     assert replay is not None
     drawn = [*replay.bodies, *replay.lines, *replay.fixed]
     assert {d.label for d in drawn} >= MUST_SHOW.get(name, set())
@@ -49,7 +46,7 @@ def test_a_scenario_is_shown_in_space(name: str, tmp_path: Path):
     for d in drawn:
         check(d, len(record.time))
     for k in (0, len(record.time) // 2, -1):
-        one = SCENARIOS[name]().replay(parse_parameters(SCENARIOS[name], given), record.row(k))
+        one = scenario.replay(parameters, record.row(k))
         assert one is not None
         alone = [*one.bodies, *one.lines, *one.fixed]
         assert [d.label for d in alone] == [d.label for d in drawn]

@@ -11,7 +11,7 @@ import os
 import signal
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection
@@ -53,6 +53,7 @@ class Command:
         cwd: its working directory; this process's by default.
         env: what its environment has besides this process's.
         privileged: false takes from it the right to raise hard limits, which root has.
+        before: is called in the process first; a module's function.
     """
 
     def __init__(
@@ -61,13 +62,14 @@ class Command:
         cwd: "Path | None" = None,
         env: Mapping[str, str] | None = None,
         privileged: bool = True,
+        before: Callable[[], object] | None = None,
     ) -> None:
         self._folder = tempfile.TemporaryDirectory()
         self.output_file, self.errors_file = (Path(self._folder.name) / name for name in ("output", "errors"))
         call = [str(argument) for argument in arguments]
         place, environment = str(cwd or Path.cwd()), {**os.environ, **(env or {})}
         begun, begins = forking().Pipe(duplex=False)
-        given = (call, place, environment, str(self.output_file), str(self.errors_file), privileged, begins)
+        given = (call, place, environment, str(self.output_file), str(self.errors_file), privileged, begins, before)
         self._process = forking().Process(target=_main, args=given)
         self._process.start()
         begun.recv()  # before that, signals are ignored
@@ -100,9 +102,14 @@ class Command:
         return Ended(self._process.exitcode, output, errors)
 
 
-def run_command(*arguments: object, cwd: "Path | None" = None, env: Mapping[str, str] | None = None) -> Ended:
+def run_command(
+    *arguments: object,
+    cwd: "Path | None" = None,
+    env: Mapping[str, str] | None = None,
+    before: Callable[[], object] | None = None,
+) -> Ended:
     """Run `handover ARGUMENTS` to its end in a process of its own."""
-    return Command(*arguments, cwd=cwd, env=env).wait()
+    return Command(*arguments, cwd=cwd, env=env, before=before).wait()
 
 
 def cpu_of_commands() -> float:
@@ -127,6 +134,7 @@ def _main(
     errors: str,
     privileged: bool,
     begins: Connection,
+    before: Callable[[], object] | None,
 ) -> None:
     """Become the command, as its entry point starts it."""
     if not privileged:
@@ -147,6 +155,8 @@ def _main(
     from handover.scenarios.execution.supervisor import renew_heartbeat
 
     renew_heartbeat()  # the one that was made as the module was loaded is shared with all other commands
+    if before is not None:
+        before()
     signal.signal(signal.SIGINT, signal.default_int_handler)
     begins.send(None)
     begins.close()

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from support.wording import Wording
 
 from handover.cosim.record.reader import Record
 from handover.fmus.build import build_block, cached
@@ -23,9 +24,10 @@ def call(*arguments: str | Path) -> Result:
     return CliRunner().invoke(main, [str(a) for a in arguments])
 
 
-def assert_refused(result: Result, sentence: str, *untouched: Path) -> None:
+def assert_refused(result: Result, wording: Wording, *untouched: Path) -> None:
     assert result.exit_code == 2, result.output
-    assert sentence in result.output
+    assert len(result.output.splitlines()) == 1 or result.output.startswith("Usage: ")
+    wording.check(result.output)
     assert "Traceback" not in result.output
     assert not re.search(r"_fmu_[0-9a-f]{16}", result.output)  # the private name of a unit's modules
     for path in untouched:
@@ -70,17 +72,6 @@ def test_every_unit_can_be_listed(name: str):
     assert "Outputs" in result.output
 
 
-def test_a_reader_who_leaves_does_not_change_the_status(tmp_path: Path):
-    command = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()", "list"]
-    reading, writing = os.pipe()
-    os.close(reading)
-    try:
-        done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, check=False, cwd=tmp_path)
-    finally:
-        os.close(writing)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
 def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
     (tmp_path / "click.py").write_text("raise KeyboardInterrupt\n")
     command = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()", "list"]
@@ -90,108 +81,90 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "sentence"),
+    "arguments",
     [
-        (("run", "helix_hand"), "did you mean helix_handover or helix_reach"),
-        (("list", "nothing_like_it"), "valid: AdmittanceController, "),
-        (("run", "helix_handover", "-p", "alfa=0.2"), "did you mean alpha"),
-        (("run", "helix_handover", "-p", "alpha=7"), "from 0.01 to 1"),
-        (("run", "helix_handover", "-p", "alpha=quick"), "not a number"),
-        (("run", "helix_handover", "--seed", "-1"), "0<=x<=9223372036854775807"),
-        (("run", "flyer_impedance", "-p", "delay=0.032"), "stable with a delay of at most about 0.026 s"),
-        (("run", "vsl_hybrid", "-p", "path=custom", "-p", "x_g=0.6,0,0.15"), "point 49 of 100"),
+        ("run", "helix_hand"),
+        ("list", "nothing_like_it"),
+        ("run", "helix_handover", "-p", "alfa=0.2"),
+        ("run", "helix_handover", "-p", "alpha=7"),
+        ("run", "helix_handover", "-p", "alpha=quick"),
+        ("run", "helix_handover", "--seed", "-1"),
+        ("run", "flyer_impedance", "-p", "delay=0.032"),
+        ("run", "vsl_hybrid", "-p", "path=custom", "-p", "x_g=0.6,0,0.15"),
         (
-            (
-                "run",
-                "ir_grasp",
-                "-p",
-                "run_up=0",
-                "-p",
-                "standoff=0",
-                "-p",
-                "perturbed=false",
-                "-p",
-                "thing=paper_box_a",
-            ),
-            "the hand would start in the object: palm by",
+            "run",
+            "ir_grasp",
+            "-p",
+            "run_up=0",
+            "-p",
+            "standoff=0",
+            "-p",
+            "perturbed=false",
+            "-p",
+            "thing=paper_box_a",
         ),
-        (("run", "helix_handover", "--unit", "arms=x.fmu"), "did you mean arm?"),
-        (("run", "helix_handover", "--unit", "arm"), "NAME=FILE"),
-        (("run", "helix_handover", "--unit", "arm=a.fmu", "--unit", "arm=b.fmu"), "arm is given twice"),
-        (("run", "helix_handover", "--unit", "arm=missing.fmu"), "there is no such file"),
-        (("run", "helix_handover", "--unit", "arm=TendonArmFst"), "no unit 'TendonArmFst': did you mean TendonArmFast"),
-        (
-            ("run", "helix_handover", "-p", "ball_mass=1"),
-            "hand_force_max = 5 N: it must exceed the ball's weight, 9.81 N",
-        ),
-        (("build", "TendonArms"), "did you mean TendonArm or TendonArmFast?"),
-        (("build", "spring"), "a unit of your own is named MODULE:CLASS"),
-        (("build", "nowhere:Spring"), "module 'nowhere' cannot be found"),
-        (("build", "failing_arm:Nothing"), "has no class 'Nothing'"),
-        (("build", "failing_arm:RunTime", "--step", "soon"), "--step 'soon' is not a positive number of seconds"),
-        (("build", "failing_arm:RunTime", "--step", "1e400"), "--step '1e400' is not a positive number of seconds"),
-        (("build", "failing_arm:RunTime", "--step", "1e-400"), "--step '1e-400' is not a positive number of seconds"),
-        (("build", "failing_arm:Inputs"), "failing_arm:Inputs: Inputs.feedthrough, period, outputs, step, get_state"),
-        (("build", "Push", "--step", "0.1"), "--step is for units of your own"),
-        (("build", "StereoCamera", "--fmi", "2"), "FMI 2"),
-        (("build", "Push", "--stimulus", "given.csv"), "--stimulus is that of --prove; give both"),
-        (("build", "--prove", "--stimulus", "given.csv"), "--stimulus is for one UNIT, whose inputs it has; no units"),
-        (
-            ("build", "Push", "Thrusters", "--prove", "--stimulus", "a.csv"),
-            "for one UNIT, whose inputs it has; 2",
-        ),
-        (("build", "Push", "--prove", "--stimulus", "given.csv"), "--stimulus given.csv: there is no such file"),
+        ("run", "helix_handover", "--unit", "arms=x.fmu"),
+        ("run", "helix_handover", "--unit", "arm"),
+        ("run", "helix_handover", "--unit", "arm=a.fmu", "--unit", "arm=b.fmu"),
+        ("run", "helix_handover", "--unit", "arm=missing.fmu"),
+        ("run", "helix_handover", "--unit", "arm=TendonArmFst"),
+        ("run", "helix_handover", "-p", "ball_mass=1"),
+        ("build", "TendonArms"),
+        ("build", "spring"),
+        ("build", "nowhere:Spring"),
+        ("build", "failing_arm:Nothing"),
+        ("build", "failing_arm:RunTime", "--step", "soon"),
+        ("build", "failing_arm:RunTime", "--step", "1e400"),
+        ("build", "failing_arm:RunTime", "--step", "1e-400"),
+        ("build", "failing_arm:Inputs"),
+        ("build", "Push", "--step", "0.1"),
+        ("build", "StereoCamera", "--fmi", "2"),
+        ("build", "Push", "--stimulus", "given.csv"),
+        ("build", "--prove", "--stimulus", "given.csv"),
+        ("build", "Push", "Thrusters", "--prove", "--stimulus", "a.csv"),
+        ("build", "Push", "--prove", "--stimulus", "given.csv"),
     ],
+    ids=" ".join,
 )
-def test_a_usage_error_is_refused_with_valid_values(tmp_path: Path, arguments: tuple[str, ...], sentence: str):
+def test_a_usage_error_is_refused_with_valid_values(tmp_path: Path, arguments: tuple[str, ...], wording: Wording):
     out = tmp_path / "out"
-    assert_refused(call(*arguments, "--out", out) if arguments[0] != "list" else call(*arguments), sentence, out)
+    assert_refused(call(*arguments, "--out", out) if arguments[0] != "list" else call(*arguments), wording, out)
 
 
-def test_a_folder_in_use_is_refused_before_anything_runs(tmp_path: Path):
+def test_folders_that_cannot_be_used_are_refused_before_anything_runs(tmp_path: Path, wording: Wording):
     (tmp_path / "mine").write_text("precious")
-    assert_refused(call("run", "helix_handover", "--out", tmp_path), "not empty")
+    for arguments in (
+        ("run", "helix_handover", "--out", tmp_path),
+        ("build", "TendonArm", "--out", tmp_path / "mine"),
+        ("build", "TendonArm", "--out", tmp_path / "mine" / "x"),
+        ("run", "helix_handover", "--unit", f"arm={tmp_path}", "--out", tmp_path / "out"),
+    ):
+        assert_refused(call(*arguments), wording)
     assert [p.name for p in tmp_path.iterdir()] == ["mine"]
 
 
-def test_a_broken_fmu_is_refused(tmp_path: Path):
+def test_a_broken_fmu_and_one_that_does_not_fit_are_refused_with_every_fault(tmp_path: Path, wording: Wording):
     out, broken = tmp_path / "out", tmp_path / "broken.fmu"
     broken.write_bytes(cached("TendonArm", 3).read_bytes()[:5000])
-    assert_refused(call("run", "helix_handover", "--unit", f"arm={broken}", "--out", out), "its end is missing", out)
+    assert_refused(call("run", "helix_handover", "--unit", f"arm={broken}", "--out", out), wording, out)
     with zipfile.ZipFile(broken, "w") as archive:
         archive.writestr("modelDescription.xml", "<fmiModelDescription")
-    assert_refused(call("run", "helix_handover", "--unit", f"arm={broken}", "--out", out), "not well-formed", out)
+    assert_refused(call("run", "helix_handover", "--unit", f"arm={broken}", "--out", out), wording, out)
+    hand = cached("HandoverPartner", 3)
+    assert_refused(call("run", "helix_handover", "--unit", f"arm={hand}", "--out", out), wording, out)
 
 
-def test_an_fmu_that_does_not_fit_is_refused_with_every_fault(tmp_path: Path):
-    out = tmp_path / "out"
-    result = call("run", "helix_handover", "--unit", f"arm={cached('HandoverPartner', 3)}", "--out", out)
-    assert_refused(result, "unit arm (HandoverPartner) needs the output backbone (real [25,3] m)", out)
-    assert "unit arm (HandoverPartner) needs the input dl_t (real [9] m)" in result.output
-
-
-@pytest.mark.parametrize("below", ["", "x"])
-def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_built(tmp_path: Path, below: str):
+def test_settings_of_the_environment_that_cannot_be_used_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
+):
     (tmp_path / "file").write_text("precious")
-    result = call("build", "TendonArm", "--out", tmp_path / "file" / below)
-    assert_refused(result, "is a file, so no folder can be made in it")
-    assert len(result.output.splitlines()) == 1
-
-
-def test_a_platform_that_is_not_known_is_reported_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    with monkeypatch.context() as patched:
+        patched.setenv("HANDOVER_CACHE", str(tmp_path / "file"))
+        result = call("run", "helix_handover", "--out", tmp_path / "r")
+        assert (result.exit_code, result.output.count("\n"), "HANDOVER_CACHE" in result.output) == (2, 1, True)
     monkeypatch.setenv("HANDOVER_FMI_PLATFORMS", "foo")
-    for arguments in (("build", "TendonArm", "--out", tmp_path / "u"), ("run", "helix_handover", "--out", tmp_path)):
-        result = call(*arguments)
-        assert_refused(result, "no platform 'foo'; there are x86_64-linux", tmp_path / "u")
-        assert len(result.output.splitlines()) == 1
-
-
-def test_a_cache_that_cannot_be_used_is_reported_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    (tmp_path / "file").write_text("precious")
-    monkeypatch.setenv("HANDOVER_CACHE", str(tmp_path / "file"))
-    result = call("run", "helix_handover", "--out", tmp_path / "r")
-    assert_refused(result, "HANDOVER_CACHE", tmp_path / "r")
-    assert len(result.output.splitlines()) == 1
+    for arguments in (("run", "helix_handover", "--out", tmp_path / "r"), ("build", "Push", "--out", tmp_path / "u")):
+        assert_refused(call(*arguments), wording, tmp_path / "r", tmp_path / "u")
 
 
 def test_build_writes_the_files_it_names(tmp_path: Path):
@@ -242,17 +215,13 @@ def test_build_makes_a_unit_of_ones_own_from_the_working_directory(tmp_path: Pat
     assert call("check", "made/Spring.fmi3.fmu").exit_code == 0
 
 
-def test_a_users_module_that_does_not_load_is_reported_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_users_module_that_does_not_load_is_reported_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
+):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path])
     (tmp_path / "own_broken.py").write_text("x = 1\ny = 1 / 0\n")
-    result = call("build", "own_broken:Spring", "--out", "made")
-    assert_refused(
-        result,
-        "own_broken:Spring: its module cannot be loaded (own_broken.py, line 2): ZeroDivisionError",
-        tmp_path / "made",
-    )
-    assert len(result.output.splitlines()) == 1
+    assert_refused(call("build", "own_broken:Spring", "--out", "made"), wording, tmp_path / "made")
 
 
 def test_a_unit_that_is_named_twice_is_built_once(tmp_path: Path):
@@ -260,18 +229,14 @@ def test_a_unit_that_is_named_twice_is_built_once(tmp_path: Path):
     assert [Path(line).name for line in result.output.split()] == ["Push.fmi3.fmu"]
 
 
-def test_a_folder_that_cannot_be_made_is_reported_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_folder_that_cannot_be_made_is_reported_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
+):
     def refuse(path: Path, **_: object) -> None:
         raise FileNotFoundError(2, "No such file or directory", str(path))
 
     monkeypatch.setattr(Path, "mkdir", refuse)  # as /proc does, though it says that it can be written to
-    result = call("build", "Push", "--fmi", "3", "--out", tmp_path / "out")
-    assert_refused(result, f"folder {tmp_path / 'out'}: it cannot be written to: No such file or directory")
-
-
-def test_a_folder_in_the_place_of_an_fmu_is_reported_with_what_to_do(tmp_path: Path):
-    result = call("run", "helix_handover", "--unit", f"arm={tmp_path}", "--out", tmp_path / "out")
-    assert_refused(result, "no modelDescription.xml at the top of the folder", tmp_path / "out")
+    assert_refused(call("build", "Push", "--fmi", "3", "--out", tmp_path / "out"), wording)
 
 
 def test_build_scalar_writes_fmi_3_without_arrays(tmp_path: Path):
@@ -283,17 +248,17 @@ def test_build_scalar_writes_fmi_3_without_arrays(tmp_path: Path):
     assert [p.name for p in (tmp_path / "two").iterdir()] == ["VisualServo.fmi2.fmu"]
 
 
+@pytest.mark.slow
 def test_a_unit_that_fails_ends_the_run_with_status_3_and_keeps_the_record(tmp_path: Path):
     failing = build_block("failing_arm:FailingArm", 3, tmp_path, step=Fraction(1, 50))
     out = tmp_path / "out"
-    result = call("run", "helix_handover", "--unit", f"arm={failing}", "--out", out)
+    result = call("run", "helix_handover", "--unit", f"arm={failing}", "--no-report", "--out", out)
     assert result.exit_code == 3, result.output
     assert "a tendon tore" in result.output
     summary = json.loads((out / "summary.json").read_text())
     assert summary["success"] is False
     assert summary["reason"].startswith("a unit failed: arm: fmi3DoStep at t = 0.3 s: RuntimeError: a tendon tore")
     assert Record(out / "signals.parquet").time[-1] == pytest.approx(0.3)
-    assert (out / "report.html").is_file()
 
 
 @pytest.mark.parametrize(("words", "completed"), [("com", "compare"), ("run --alg", "--algorithm")])

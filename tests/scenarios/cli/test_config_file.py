@@ -9,6 +9,7 @@ import click
 import pytest
 from click.testing import CliRunner, Result
 from native_units import native_fmu
+from support.wording import Wording
 
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions
@@ -111,47 +112,44 @@ servo.gain = [0.2, 0.4]
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    "text",
     [
-        ("seed = ", "run.toml: it is not TOML of options, such as seed = 3"),
-        ("sed = 3", "run.toml: no option 'sed'; did you mean seed"),
-        ("call_limit = 3", "run.toml: no option 'call_limit'; did you mean call-limit?"),
-        ("seed = -1", "run.toml: seed = -1: -1 is not in the range 0<=x<=9223372036854775807"),
-        ("seed = true", "run.toml: seed = true: a number, or a text that is one, is right"),
-        ("scenario = 3", "run.toml: scenario = 3: a text in quotes is right"),
-        ("out = 3", "run.toml: out = 3: a text in quotes is right"),
-        ("isolate = [3]", "run.toml: isolate = [3]: a text in quotes is right, or several in [...]"),
-        ("unit.arm = 3", "run.toml: unit.arm = 3: a text in quotes is right"),
-        (
-            "stop = 'soon'",
-            """run.toml: stop = "soon": 'soon' is not a time in seconds, such as 0.01, 1/30 or -2""",
-        ),
-        ("stop = 1979-05-27", "run.toml: stop = "),
-        ("strict = 1", "run.toml: strict = 1: true or false is right"),
-        ("algorithm = 'jacoby'", "is not one of 'jacobi', 'gauss-seidel'"),
-        ("format = [['csv']]", 'run.toml: format = [["csv"]]: a text in quotes is right, or several in [...]'),
-        ("parameters = 3", "run.toml: parameters = 3: a table by name is right, such as [parameters]"),
-        ("parameters.a.b = 1979-05-27", "run.toml: parameters.a.b = "),
-        ("sweep.a = [1, 2]", "run.toml: no option 'sweep'; "),
-        ("scenario = 'ir_grasp'\nadaptive-absolute = 1", "with run.toml: --adaptive-absolute: with --adaptive only"),
-        ("seed = -1\nsed = 2", "is not in the range 0<=x<=9223372036854775807; no option 'sed'; "),
-        ("scenario = ''", "with run.toml: no scenario ''"),
-        ("scenario = 'ir_grap'", "with run.toml: no scenario 'ir_grap': did you mean ir_grasp?"),
-        (
-            "scenario = 'ir_grasp'\n[parameters]\nstrategi = 'blind'\nforward = 9",
-            "with run.toml: ir_grasp has no parameter 'strategi'; did you mean strategy?; forward: 9.0 is out of range",
-        ),
+        "seed = ",
+        "sed = 3",
+        "call_limit = 3",
+        "seed = -1",
+        "seed = true",
+        "scenario = 3",
+        "out = 3",
+        "isolate = [3]",
+        "unit.arm = 3",
+        "stop = 'soon'",
+        "stop = 1979-05-27",
+        "strict = 1",
+        "algorithm = 'jacoby'",
+        "format = [['csv']]",
+        "parameters = 3",
+        "parameters.a.b = 1979-05-27",
+        "sweep.a = [1, 2]",
+        "scenario = 'ir_grasp'\nadaptive-absolute = 1",
+        "seed = -1\nsed = 2",
+        "scenario = ''",
+        "scenario = 'ir_grap'",
+        "scenario = 'ir_grasp'\n[parameters]\nstrategi = 'blind'\nforward = 9",
     ],
+    ids=str.strip,
 )
-def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(text: str, told: str, tmp_path: Path):
-    assert told in refused(tmp_path, text)
+def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(text: str, tmp_path: Path, wording: Wording):
+    wording.check(refused(tmp_path, text))
 
 
-def test_files_that_cannot_be_read_are_told(tmp_path: Path):
-    assert "run.json: it is not JSON of options, such as" in refused(tmp_path, "seed = 3", name="run.json")
-    assert "Expected `object`, got `array`" in refused(tmp_path, "[3]", name="run.json")
-    result = call("sweep", "ir_grasp", "--config", tmp_path / "none.toml")
-    assert (result.exit_code, "none.toml: there is no such file" in result.output) == (2, True)
+def test_files_that_cannot_be_read_and_options_of_another_command_are_told(tmp_path: Path, wording: Wording):
+    wording.check(refused(tmp_path, "seed = 3", name="run.json"))
+    wording.check(refused(tmp_path, "[3]", name="run.json"))
+    for given in (("sweep", "ir_grasp", "--config", tmp_path / "none.toml"), ("run", "ir_grasp", "--seed", "3.5")):
+        result = call(*given)
+        assert result.exit_code == 2
+        wording.check(result.output)
 
 
 @pytest.fixture(scope="module")
@@ -213,7 +211,7 @@ def test_all_options_of_the_master_are_repeated(options: MasterOptions, first: P
     assert MasterOptions(**coupling_of(got)) == options
 
 
-def test_other_versions_and_files_that_are_gone_are_told(first: Path, tmp_path: Path):
+def test_other_versions_and_files_that_are_gone_are_told(first: Path, tmp_path: Path, wording: Wording):
     data = json.loads((first / "run.json").read_text())
     data["versions"]["numpy"] = "0.1"
     data["files"]["reflex"] = str(tmp_path / "gone.fmu")
@@ -221,7 +219,7 @@ def test_other_versions_and_files_that_are_gone_are_told(first: Path, tmp_path: 
     assert "the run was of other versions: numpy 0.1" in told
     assert f"the FMU of its unit reflex, {tmp_path / 'gone.fmu'}, is not there; --unit reflex=FILE" in told
     del data["master"]["tolerance"]
-    assert "run.json: it is damaged: InvalidData Object missing required field `tolerance`" in call_with(data, tmp_path)
+    wording.check(call_with(data, tmp_path))
 
 
 def call_with(data: Any, folder: Path) -> str:
@@ -246,17 +244,3 @@ def test_a_run_of_an_fmu_or_an_ssp_is_repeated(tmp_path: Path):
         assert done.exit_code == 0, done.output
         for name in ("run.json", "signals.parquet"):
             assert (out / "1" / name).read_bytes() == (out / "2" / name).read_bytes()
-
-
-@pytest.mark.parametrize("seed", ["3.5", "many", "1e3"])
-def test_a_seed_that_is_no_whole_number_is_told_as_that(seed: str):
-    done = CliRunner().invoke(main, ["run", "ir_grasp", "--seed", seed])
-    assert done.exit_code == 2
-    assert f"Invalid value for '--seed': '{seed}' is no whole number." in done.stderr
-
-
-def test_a_table_of_another_command_is_told_as_that(tmp_path: Path):
-    (tmp_path / "c.toml").write_text('[sweep]\nstrategy = ["reflex", "blind"]\n')
-    done = CliRunner().invoke(main, ["run", "ir_grasp", "--config", str(tmp_path / "c.toml")])
-    assert done.exit_code == 2
-    assert "no option 'sweep'; the table [sweep] is for `handover sweep`" in done.stderr

@@ -19,6 +19,7 @@ from campaigns import campaign_metadata, folder_of, table_of
 from click.testing import CliRunner, Result
 from native_units import native_fmu
 from sample_study import same, write_study
+from support.kept_runs import copied_run
 from support.killed_run import killed_run
 
 from handover.fmus.build import cached
@@ -64,8 +65,7 @@ def run_of(scenario: str, *given: str) -> Callable[[Path], None]:
     """Return what makes a short run, whose task need not succeed."""
 
     def make(path: Path) -> None:
-        done = call("run", scenario, "--stop", "0.1", "--no-report", "--out", str(path), *given)
-        assert done.exit_code == 1, (done.output, done.exception)
+        copied_run(path, "run", scenario, "--stop", "0.1", "--no-report", *given)
 
     return make
 
@@ -125,7 +125,7 @@ EXAMPLES: Mapping[str, tuple[How, Needs]] = {
     "handover flyer-track runs/x": (RUN, {"runs/x": HANDOVER}),
     "handover study new plan.toml": (RUN, {}),
     "handover new scenario Reach": (RUN, {}),
-    "handover run reach:Reach": (RUN, {}),
+    "handover run reach:Reach": (CHECKED, {}),
     "handover build TendonArm --fmi both": (RUN, {}),
     "handover export ir_grasp --ssp grasp.ssp": (RUN, {}),
     "handover info Their.fmu": (RUN, {"Their.fmu": fmu}),
@@ -136,7 +136,7 @@ EXAMPLES: Mapping[str, tuple[How, Needs]] = {
     "handover run flyer_impedance -p behaviour=compliant --out b": (CHECKED, {}),
     "handover compare a b --name rigid --name compliant --signal robot.p_WB": (RUN, {"a": RIGID, "b": COMPLIANT}),
     "handover new controller Gentle": (RUN, {}),
-    "handover run reach:Reach --unit controller=gentle:Gentle": (RUN, {}),
+    "handover run reach:Reach --unit controller=gentle:Gentle": (CHECKED, {}),
     "handover new controller Mine --for helix_handover:servo": (RUN, {}),
     "handover sweep ir_grasp strategy=reflex,blind,forward --repeat 20 --paired": (CHECKED, {}),
     "handover sweep helix_handover alpha=0.1:0.4:4 -p patience=30 --out alphas": (CHECKED, {}),
@@ -212,7 +212,10 @@ def put(here: Path, needs: Needs, made: Callable[[Callable[[Path], None]], Path]
             (shutil.copytree if source.is_dir() else shutil.copyfile)(source, here / name)
 
 
-@pytest.mark.parametrize("name", [*dict.fromkeys(OWNERS.values())])
+@pytest.mark.usefixtures("empty_figures")
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=() if n else pytest.mark.slow) for n in dict.fromkeys(OWNERS.values())]
+)
 def test_the_examples_of_a_help_run(
     name: str, here: Path, made: Callable[[Callable[[Path], None]], Path], monkeypatch: pytest.MonkeyPatch
 ):
@@ -229,10 +232,14 @@ def test_the_examples_of_a_help_run(
         function = CLUSTER if "--scheduler" in arguments else STARTS[command]
         with monkeypatch.context() as patched:
             patched.setattr(function, starter_of(function))
-            before = {*here.rglob("*")}
+            before = files_in(here)
             done = call(*arguments)
         assert isinstance(done.exception, Started), (example, done.output, done.exception)
-        assert {*here.rglob("*")} == before
+        assert files_in(here) == before
+
+
+def files_in(folder: Path) -> set[Path]:
+    return {path for path in folder.rglob("*") if "__pycache__" not in path.parts}
 
 
 def starter_of(function: str) -> Callable[..., NoReturn]:

@@ -25,7 +25,7 @@ def run(file: Path, out: Path, *arguments: str) -> Result:
 
 
 def test_the_summary_says_how_much_was_iterated(masses: Path, tmp_path: Path):
-    result = run(masses, tmp_path / "out", "--algorithm", "newton")
+    result = run(masses, tmp_path / "out", "--algorithm", "newton", "--no-report")
     assert result.exit_code == 0, result.output
     metrics = json.loads((tmp_path / "out" / "summary.json").read_text())["metrics"]
     assert 1.0 < metrics["iterations"]["value"] < 4.0
@@ -39,6 +39,7 @@ def test_units_that_do_not_agree_end_the_run_with_status_3(masses: Path, tmp_pat
     assert "found no solution in 2 iterations" in result.output
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert "b.f -> a.f still moves by" in summary["reason"]
+    assert (tmp_path / "out" / "report.html").is_file()
 
 
 def test_an_algebraic_loop_without_a_solution_is_bad_input(tmp_path: Path):

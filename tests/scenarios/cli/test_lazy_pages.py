@@ -1,5 +1,6 @@
 """Modules that only some commands need are not loaded by the others: help does not wait for plots."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -13,23 +14,31 @@ from handover.scenarios.cli.command import COMMANDS, DeferredCommand, main
 PAGES = {"scipy.stats", "plotly", "networkx", "tsdownsample", "distributed", "handover.scenarios.reporting.page"}
 HEAVY = {"matplotlib", "scipy", "cv2", "plotly", "distributed", "dask", "pyarrow", "fmpy", "control", "exudyn"}
 HELP = HEAVY | {"numpy", "rich", "pymunk", "handover.cosim.blocks", "handover.cosim.fmu", "handover.fmus"}
-_CALL = """
-import sys
+OTHER_ROBOTS = {"handover.scenarios.vsl", "handover.scenarios.free_flyer"}
+CALLS = (
+    (["--version"], HELP),
+    (["--help"], HELP),
+    (["list", "ir_grasp"], HEAVY | OTHER_ROBOTS),
+    (["list"], HEAVY),
+    (["list", "helix_handover"], HEAVY),
+    (["list", "flyer_impedance"], HEAVY),
+    (["list", "TendonArm"], HEAVY),
+    (["list", "PoseController"], HEAVY),
+    (["list", "StereoCamera"], HEAVY - {"cv2"}),  # which draws its pictures by it
+)
+"""Calls, one after another in a process, and what is not loaded then."""
+_PROGRAM = """
+import json, sys
 from handover.scenarios.cli.entry import main
 
-sys.argv[0] = "handover"
-try:
-    main()
-except SystemExit as e:
-    assert not e.code, e.code
-print(*sys.modules, file=sys.stderr)
+for call in json.loads(sys.argv[1]):
+    sys.argv[:] = ["handover", *call]
+    try:
+        main()
+    except SystemExit as e:
+        assert not e.code, e.code
+    print(json.dumps([*sys.modules]), file=sys.stderr)
 """
-
-
-def loaded_by(*arguments: str) -> set[str]:
-    done = subprocess.run([sys.executable, "-c", _CALL, *arguments], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return set(done.stderr.split())
 
 
 def test_what_executes_runs_loads_neither_pages_nor_statistics():
@@ -38,21 +47,12 @@ def test_what_executes_runs_loads_neither_pages_nor_statistics():
     assert not (PAGES | {"matplotlib"}) & set(done.stdout.split())
 
 
-@pytest.mark.parametrize("option", ["--version", "--help"])
-def test_help_and_version_load_the_command_line_alone(option: str):
-    assert not HELP & loaded_by(option)
-
-
-@pytest.mark.parametrize(
-    "given", [(), ("helix_handover",), ("flyer_impedance",), ("TendonArm",), ("PoseController",), ("StereoCamera",)]
-)
-def test_a_list_loads_no_physics_plots_or_records(given: tuple[str, ...]):
-    seen = HEAVY - {"cv2"} if given == ("StereoCamera",) else HEAVY  # which draws its pictures by it
-    assert not seen & loaded_by("list", *given)
-
-
-def test_a_list_of_a_scenario_loads_no_other_robots():
-    assert not {"handover.scenarios.vsl", "handover.scenarios.free_flyer"} & loaded_by("list", "ir_grasp")
+def test_help_and_lists_load_no_physics_plots_or_records():
+    given = json.dumps([call for call, _ in CALLS])
+    done = subprocess.run([sys.executable, "-c", _PROGRAM, given], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for (call, lazy), line in zip(CALLS, done.stderr.splitlines(), strict=True):
+        assert not lazy & {*json.loads(line)}, call
 
 
 @pytest.mark.parametrize("name", [c.name for c in COMMANDS])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from oscillator import PLAIN, STATES
+from support.wording import Wording
 
 from handover.cosim.record.reader import Record
 from handover.cosim.ssp.writing import write_ssp
@@ -21,7 +22,7 @@ def ssp(tmp_path: Path) -> Path:
 
 
 def run(file: Path, out: Path, *options: str) -> Result:
-    return CliRunner().invoke(main, ["run", str(file), "--step", "1/100", "--out", str(out), *options])
+    return CliRunner().invoke(main, ["run", str(file), "--step", "1/100", "--no-report", "--out", str(out), *options])
 
 
 def read(out: Path, name: str) -> Any:
@@ -81,21 +82,22 @@ def test_a_step_that_cannot_be_small_enough_fails_the_run(ssp: Path, tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("options", "text"),
+    "options",
     [
-        (("--largest-step", "1", "--first-step", "1"), "--first-step, --largest-step: with --adaptive only"),
-        (("--adaptive", "0"), "'0' is not a finite number above 0"),
-        (("--tolerance", "inf"), "'inf' is not a finite number above 0"),
-        (("--adaptive", "1e-3", "--largest-step", "1e-9"), "the largest step, 1e-09 s, is below the smallest, 1e-06 s"),
-        (("--repeat-discarded", "--extrapolation", "linear"), "steps may end off it when one is discarded"),
-        (("--algorithm", "gauss"), "'gauss' is not one of 'jacobi'"),
-        (("--iterations", "0"), "0 is not in the range x>=1"),
+        ("--largest-step", "1", "--first-step", "1"),
+        ("--adaptive", "0"),
+        ("--tolerance", "inf"),
+        ("--adaptive", "1e-3", "--largest-step", "1e-9"),
+        ("--repeat-discarded", "--extrapolation", "linear"),
+        ("--algorithm", "gauss"),
+        ("--iterations", "0"),
     ],
+    ids=" ".join,
 )
 def test_contradictions_are_refused_before_anything_is_made(
-    ssp: Path, tmp_path: Path, options: tuple[str, ...], text: str
+    ssp: Path, tmp_path: Path, options: tuple[str, ...], wording: Wording
 ):
     result = run(ssp, tmp_path / "out", *options)
     assert result.exit_code == 2, result.output
-    assert text in result.output
+    wording.check(result.output)
     assert not (tmp_path / "out").exists()

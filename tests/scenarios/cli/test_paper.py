@@ -2,11 +2,14 @@
 
 import json
 import shutil
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from in_process_pool import LOCAL_CLUSTER, InProcessPool, local_cluster_of
+from support.wording import Wording
 
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
@@ -32,22 +35,24 @@ def test_without_a_name_it_lists_the_experiments():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "content"),
+    "arguments",
     [
-        (["ir-tabel"], "no experiment 'ir-tabel': did you mean ir-table?"),
-        (["ir-table", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "one of both is right"),
-        (["ir-table", "--workers", "0"], "0 is not in the range x>=1"),
-        (["ir-table", "--seed", "-1"], "-1 is not in the range 0<=x<="),
-        (["ir-table", "--model", "m.json"], "ir-table has no use for a trained model"),
-        (["vsl-2", "--model", "none.json"], "none.json: there is no such file"),
+        ["ir-tabel"],
+        ["ir-table", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"],
+        ["ir-table", "--workers", "0"],
+        ["ir-table", "--seed", "-1"],
+        ["ir-table", "--model", "m.json"],
+        ["vsl-2", "--model", "none.json"],
     ],
+    ids=" ".join,
 )
 def test_a_call_that_cannot_be_executed_is_refused_and_leaves_nothing(
-    arguments: list[str], content: str, tmp_path: Path
+    arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
 ):
+    monkeypatch.chdir(tmp_path)
     result = paper(*arguments, "--out", tmp_path / "c")
     assert result.exit_code == 2
-    assert content in result.output
+    wording.check(result.output)
     assert not (tmp_path / "c").exists()
 
 
@@ -59,29 +64,44 @@ def test_a_folder_of_something_else_is_refused(tmp_path: Path):
     assert [p.name for p in tmp_path.iterdir()] == ["letter.txt"]
 
 
+def plan_of(name: str, few: CampaignPlan, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let an experiment have a plan, whose runs are executed by this process."""
+
+    def plan(_experiment: object, _quick: bool) -> CampaignPlan:
+        return few
+
+    monkeypatch.setattr(EXPERIMENTS[name], "plan", plan)
+    monkeypatch.setitem(sys.modules, LOCAL_CLUSTER, local_cluster_of(InProcessPool()))
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("experiment", ["vsl-1", "vsl-2"])
-def test_the_quick_plan_of_the_vsl_arm_ends_with_tables_figures_and_too_few_runs(experiment: str, tmp_path: Path):
-    ended = paper(experiment, "--quick", "--out", tmp_path / "c")
+@pytest.mark.usefixtures("empty_figures")
+def test_the_quick_plan_of_the_vsl_arm_ends_with_tables_figures_and_too_few_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    whole = EXPERIMENTS["vsl-2"]().plan(quick=True)
+    short = {"points": "3", "settle": "0.2"}
+    plan_of("vsl-2", replace(whole, fixed={**whole.fixed, **short}), monkeypatch)
+    assert_few_runs("vsl-2", tmp_path / "c")
+
+
+def assert_few_runs(experiment: str, folder: Path) -> None:
+    ended = paper(experiment, "--quick", "--out", folder)
     assert ended.exit_code == 0, ended.output
-    claims = json.loads((tmp_path / "c" / "claims.json").read_text(encoding="utf-8"))
+    claims = json.loads((folder / "claims.json").read_text(encoding="utf-8"))
     assert {claim["verdict"] for claim in claims} == {"not comparable", "too few runs"}
-    assert len(list((tmp_path / "c" / "figures").glob("*.png"))) >= 3
-    assert (tmp_path / "c" / "report.html").exists()
+    assert len(list((folder / "figures").glob("*.png"))) >= 3
+    assert (folder / "report.html").exists()
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("empty_figures")
 def test_it_leaves_claims_figures_and_a_page_and_a_second_call_repeats_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     whole = IrTable().plan(quick=True)
     cylinder = [point for point in whole.points if point["thing"] == "cylinder"]
-    few = replace(whole, points=cylinder, repetitions=1)
-
-    def plan(_experiment: IrTable, _quick: bool) -> CampaignPlan:
-        return few
-
-    monkeypatch.setattr(IrTable, "plan", plan)
+    plan_of("ir-table", replace(whole, points=cylinder, repetitions=1), monkeypatch)
     folder = tmp_path / "c"
     first = paper("ir-table", "--quick", "--out", folder)
     assert first.exit_code == 0, first.output
@@ -104,6 +124,12 @@ def test_it_leaves_claims_figures_and_a_page_and_a_second_call_repeats_nothing(
     write_campaign_page(CampaignFolder(folder))
     assert (folder / "report.html").read_bytes() == page, "it is made of the claims and the table that were left"
     assert not (folder / "figures").exists()
+
+
+@pytest.mark.paper
+@pytest.mark.parametrize("experiment", ["vsl-1", "vsl-2"])
+def test_quick_plans_of_the_vsl_arm_at_full_length(experiment: str, tmp_path: Path):
+    assert_few_runs(experiment, tmp_path / "c")
 
 
 @pytest.mark.paper

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from faulty_units import faulty_fmu
+from support.commands import Ended, run_command
 
 PROGRAM = """
 import sys
@@ -30,34 +31,32 @@ def test_closed_streams_lead_nowhere(closed: str, tmp_path: Path):
     assert made.read_text() == "only what is meant for it"
 
 
-def ran(fmu: Path, folder: Path, *options: str) -> "subprocess.CompletedProcess[str]":
-    call = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()", "run", str(fmu)]
-    given = ("--stop", "1", "--no-report", "--out", "r", *options)
-    return subprocess.run([*call, *given], cwd=folder, capture_output=True, text=True, check=False)
+def ran(fmu: Path, folder: Path, *options: str) -> Ended:
+    return run_command("run", fmu, "--stop", "1", "--no-report", "--out", "r", *options, cwd=folder)
 
 
-@pytest.mark.parametrize("isolated", [(), ("--isolate", "all")], ids=["", "isolated"])
-@pytest.mark.parametrize("when", ["step", "unload"])
-def test_what_units_print_is_not_in_the_json(when: str, isolated: tuple[str, ...], tmp_path: Path):
+@pytest.mark.parametrize(("when", "isolated"), [("step", False), ("unload", False), ("step", True)])
+def test_what_units_print_is_not_in_the_json(when: str, isolated: bool, tmp_path: Path):
     fmu = faulty_fmu(f"print_in_{when}", 2, tmp_path)
-    done = ran(fmu, tmp_path, "--json", *isolated)
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout) == json.loads((tmp_path / "r" / "summary.json").read_text()) | {"folder": "r"}
+    done = ran(fmu, tmp_path, "--json", *(("--isolate", "all") if isolated else ()))
+    assert done.status == 0, done.errors
+    assert json.loads(done.output) == json.loads((tmp_path / "r" / "summary.json").read_text()) | {"folder": "r"}
     if not isolated:  # its process ends without writing what its C library has kept
-        assert "a unit's own words\n" in done.stderr
+        assert "a unit's own words\n" in done.errors
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the run has no process of its own")
-@pytest.mark.parametrize("options", [(), ("--json",)], ids=["", "json"])
-@pytest.mark.parametrize("closed", ["close_low", "close_any"])
+@pytest.mark.parametrize(
+    ("closed", "options"), [("close_low", ("--json",)), ("close_any", ()), ("close_any", ("--json",))]
+)
 def test_status_and_summary_agree_where_a_unit_closes_the_streams(
     closed: str, options: tuple[str, ...], tmp_path: Path
 ):
     done = ran(faulty_fmu(f"{closed}_in_step", 2, tmp_path), tmp_path, *options)
     summary = json.loads((tmp_path / "r" / "summary.json").read_text())
-    assert (done.returncode, summary["success"], summary["failure"]) == (0, True, None), done.stderr
+    assert (done.status, summary["success"], summary["failure"]) == (0, True, None), done.errors
     if options:
-        assert json.loads(done.stdout) == summary | {"folder": "r"}
+        assert json.loads(done.output) == summary | {"folder": "r"}
     else:
-        assert f"{closed}_in_step.fmu succeeded: ran to 1 s" in done.stdout
-    assert ("its process could not print its summary" in done.stderr) == (closed == "close_any")
+        assert f"{closed}_in_step.fmu succeeded: ran to 1 s" in done.output
+    assert ("its process could not print its summary" in done.errors) == (closed == "close_any")

@@ -1,17 +1,19 @@
 """`handover sweep`: its output, its exit status, and the usage errors."""
 
 import contextlib
+import sys
 from collections.abc import Callable, Generator
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
 from clusters import closed_port
-from in_process_pool import InProcessPool
+from in_process_pool import LOCAL_CLUSTER, InProcessPool, local_cluster_of
+from support.wording import Wording
 
 from handover.cosim.files import folder_locked
 from handover.fmus.build import cached
-from handover.scenarios.campaign import local_cluster, plan_check
+from handover.scenarios.campaign import plan_check
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import RunJob
@@ -47,12 +49,7 @@ def sweep(
 ) -> tuple[Result, list[str]]:
     """Return how a command ended, and which runs it began."""
     pool = InProcessPool(before)
-
-    @contextlib.contextmanager
-    def in_process_pool(_workers: int | None) -> Generator[InProcessPool, None, None]:
-        yield pool
-
-    monkeypatch.setattr(local_cluster, "local_cluster", in_process_pool)
+    monkeypatch.setitem(sys.modules, LOCAL_CLUSTER, local_cluster_of(pool))
     return CliRunner().invoke(main, call), pool.begun
 
 
@@ -64,7 +61,9 @@ def refuse_workers(monkeypatch: pytest.MonkeyPatch) -> None:
         raise PoolError("there are none")
         yield InProcessPool()
 
-    monkeypatch.setattr(local_cluster, "local_cluster", refuse)
+    module = local_cluster_of(InProcessPool())
+    monkeypatch.setattr(module, "local_cluster", refuse)
+    monkeypatch.setitem(sys.modules, LOCAL_CLUSTER, module)
 
 
 def raising(error: BaseException, at: int) -> Callable[[RunJob], str]:
@@ -128,6 +127,7 @@ def test_a_run_that_cannot_be_read_is_repeated(here: Path, monkeypatch: pytest.M
     assert (result.exit_code, begun) == (0, [ALL[1]])
 
 
+@pytest.mark.slow
 def test_without_out_an_interrupted_call_goes_on_too(monkeypatch: pytest.MonkeyPatch):
     call = [text for text in CALL if text not in ("--out", "c")]
     result, _ = sweep(monkeypatch, *call, before=raising(KeyboardInterrupt(), at=1))
@@ -167,35 +167,33 @@ def test_workers_that_cannot_be_had_leave_nothing(here: Path, monkeypatch: pytes
 
 
 @pytest.mark.parametrize(
-    ("call", "sentence"),
+    "call",
     [
-        (["ir_gasp"], "no scenario 'ir_gasp': did you mean ir_grasp?"),
-        (
-            ["my_plan.toml"],
-            "a study's plan is opened by handover study serve my_plan.toml, values of options by --config",
-        ),
-        (["x.ssp"], "x.ssp: "),
-        (["x.fmu", "a=1,2"], "x.fmu: there is no such file"),
-        (["x.fmu", "--seed", "3", "--unit", "a=b"], "--seed, --unit: for scenarios"),
-        (["ir_grasp", "--step", "0.1"], "--step is for an SSP or an FMU"),
-        (["ir_grasp", "thing=cylindr"], "thing: 'cylindr' is none of cylinder, baby_cup_a"),
-        (["ir_grasp", "forward=0.1", "-p", "forward=0.2"], "forward is varied and set by -p; one of both is right"),
-        (["ir_grasp", "shift_least=0.01,0.06"], "at shift_least=0.06: shift_least 0.06 m must be at most"),
-        (["ir_grasp", "--unit", "sceen=x.fmu"], "ir_grasp has no unit 'sceen': did you mean scene?"),
-        (["ir_grasp", "--unit", "scene=absent.fmu"], "absent.fmu"),
-        (["ir_grasp", "-p", "strategy=reflex,blind"], "give it without -p: strategy=reflex,blind"),
-        (["ir_grasp", "forward=0:0.3:20000", "--repeat", "9"], "are 180,000 runs; at most 100,000 can be planned"),
-        (["ir_grasp", "--workers", "2", "--scheduler", "tcp://h:1"], "a scheduler has workers of its own"),
-        (["ir_grasp", "--first-step", "0.1"], "with --adaptive only"),
+        ["ir_gasp"],
+        ["my_plan.toml"],
+        ["x.ssp"],
+        ["x.fmu", "a=1,2"],
+        ["x.fmu", "--seed", "3", "--unit", "a=b"],
+        ["ir_grasp", "--step", "0.1"],
+        ["ir_grasp", "thing=cylindr"],
+        ["ir_grasp", "forward=0.1", "-p", "forward=0.2"],
+        ["ir_grasp", "shift_least=0.01,0.06"],
+        ["ir_grasp", "--unit", "sceen=x.fmu"],
+        ["ir_grasp", "--unit", "scene=absent.fmu"],
+        ["ir_grasp", "-p", "strategy=reflex,blind"],
+        ["ir_grasp", "forward=0:0.3:20000", "--repeat", "9"],
+        ["ir_grasp", "--workers", "2", "--scheduler", "tcp://h:1"],
+        ["ir_grasp", "--first-step", "0.1"],
     ],
+    ids=" ".join,
 )
 def test_usage_errors_are_reported_in_a_line_and_leave_nothing(
-    here: Path, call: list[str], sentence: str, monkeypatch: pytest.MonkeyPatch
+    here: Path, call: list[str], monkeypatch: pytest.MonkeyPatch, wording: Wording
 ):
     result, begun = sweep(monkeypatch, "sweep", *call)
     assert result.exit_code == 2
-    assert sentence in result.output
     assert len(result.output.splitlines()) == 1
+    wording.check(result.output)
     assert begun == []
     assert list(here.iterdir()) == []
 

@@ -26,13 +26,12 @@ def wait_for_end_of(processes: list[psutil.Process]) -> None:
     assert alive == []
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_the_first_signal_ends_it_in_order(number: signal.Signals, tmp_path: Path):
+def test_a_sigterm_ends_it_in_order(tmp_path: Path):
     out = tmp_path / "c"
     with sweeping(*CALL, "--out", out) as going:
         wait_for(lambda: len(runs_in(out)) >= 3, going)
         family = family_of(going)
-        going.send_signal(number)
+        going.send_signal(signal.SIGTERM)
         status, value, errors = ended(going)
         wait_for_end_of(family)
     done = len(runs_in(out))
@@ -55,12 +54,11 @@ def test_ctrl_c_before_the_first_run_leaves_nothing(tmp_path: Path, monkeypatch:
     assert not out.exists()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_as_workers_start_leaves_nothing_of_a_campaign_that_begins(number: signal.Signals, tmp_path: Path):
+def test_ctrl_c_as_workers_start_leaves_nothing_of_a_campaign_that_begins(tmp_path: Path):
     out = tmp_path / "c"
     with sweeping(*CALL, "--out", out) as going:
         wait_for(lambda: (out / "campaign.json").exists(), going)
-        going.send_signal(number)
+        going.send_signal(signal.SIGINT)
         status, value, errors = ended(going)
     assert (status, value) == (130, "")
     assert errors == f"200 runs of ir_grasp on 2 workers into {out}\nAborted!\n"

@@ -1,4 +1,4 @@
-"""Controllers of a test's own for places of scenarios, as their authors would write them."""
+"""Controllers of a test's own for places of scenarios, as their authors would write them; a scenario with a place."""
 
 from pathlib import Path
 
@@ -129,7 +129,59 @@ class Proportional(Stateless):
 """
 """The shortest controller of the Helix: it takes two inputs and gives one output."""
 
+PLACED = '''
+from goal_spring import Inputs, Outputs, Params, SpringToGoal
+from dataclasses import dataclass
+from handover.cosim.blocks.ports import output
+from handover.cosim.blocks.units import Number
+from handover.scenarios.experiment.places import Place
+from reach import TwoLinkReach
+
+
+@dataclass(kw_only=True)
+class MoreOutputs(Outputs):
+    energy: Number = output("energy of the springs, in units of its own")
+
+
+class Telling(SpringToGoal):
+    """A controller that also gives an energy."""
+
+    feedthrough = {"tau": ("q", "v"), "energy": ()}
+
+    def __init__(self, params: Params) -> None:
+        super().__init__(params)
+
+    def outputs(self, t: float, u: Inputs) -> MoreOutputs:
+        return MoreOutputs(tau=super().outputs(t, u).tau, energy=1.0)
+
+    def step(self, t: float, dt: float, u: Inputs) -> MoreOutputs:
+        return self.outputs(t, u)
+
+
+class Placed(TwoLinkReach):
+    """An arm of two links, with a place for controllers."""
+
+    units = {"arm": "arm:TwoLinkArm", "controller": "placed:Telling"}
+    places = {
+        "controller": Place(
+            required={"tau": "positive turns left, as seen from above"},
+            optional={"q": "", "v": "", "p_WG": "the scenario's goal, in W", "energy": "shown"},
+            remarks=("W has its origin at the shoulder.",),
+        )
+    }
+'''
+"""A scenario with a place for controllers, whose own gives more than it must."""
+
 
 def write_controller(folder: Path, module: str, code: str) -> None:
     """Write a controller's module into a folder."""
     (folder / f"{module}.py").write_text(_HEAD + code, encoding="utf-8")
+
+
+def write_placed(folder: Path) -> None:
+    """Write the scenario with a place, and controllers that fit there and that do not, beside the tutorial's files."""
+    (folder / "placed.py").write_text(PLACED, encoding="utf-8")
+    nearly = MISSPELLED.replace("taw", "tau").replace("    energy: int", "    work: int").replace("energy", "work")
+    codes = {"joints": JOINTS, "wrong": MISSPELLED, "other": MISSPELLED.replace("taw", "moment"), "nearly": nearly}
+    for module, code in codes.items():
+        write_controller(folder, module, code)

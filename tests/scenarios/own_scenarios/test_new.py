@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from tutorial import refused, succeeded
+from tutorial import succeeded
 
 from handover.scenarios.cli.command import main
 
@@ -16,14 +16,15 @@ def files_in(folder: Path) -> set[str]:
 
 
 @pytest.mark.slow
-def test_a_scenario_comes_with_plant_and_controller_that_pass_their_tests(tmp_path: Path):
-    succeeded(tmp_path, "new", "scenario", "CartReach", "--out", "mine")
+def test_a_scenario_and_a_controller_for_a_place_pass_their_tests(tmp_path: Path):
     here = tmp_path / "mine"
+    succeeded(tmp_path, "new", "scenario", "CartReach", "--out", "mine")
     modules = {"cart_reach.py", "cart_reach_plant.py", "cart_reach_controller.py"}
     assert files_in(here) == modules | {f"test_{name}" for name in modules}
+    assert "gentle.py" in succeeded(here, "new", "controller", "Gentle", "--for", "helix_handover:servo")
     tests = subprocess.run([sys.executable, "-m", "pytest", "-q", "."], cwd=here, capture_output=True, text=True)
     assert tests.returncode == 0, tests.stdout
-    assert "7 passed" in tests.stdout
+    assert "8 passed" in tests.stdout
 
 
 def test_a_unit_and_a_controller_are_written_and_listed(tmp_path: Path):
@@ -34,17 +35,20 @@ def test_a_unit_and_a_controller_are_written_and_listed(tmp_path: Path):
     assert "sampled every 10 ms" in succeeded(tmp_path, "list", "gentle:Gentle")
 
 
-def test_nothing_is_overwritten_and_names_are_checked(tmp_path: Path):
-    (tmp_path / "test_reach.py").write_text("mine")
-    assert "test_reach.py is there already" in refused(tmp_path, "new", "unit", "Reach")
-    assert "is in the catalog already" in refused(tmp_path, "new", "unit", "TendonArm")
-    assert "letters, digits and underscores are right" in refused(tmp_path, "new", "unit", "my-arm")
-    assert "is a keyword of Python" in refused(tmp_path, "new", "controller", "class")
-
-
 @pytest.mark.parametrize("name", ["Random", "Handover", "numpy"])
 def test_a_module_that_python_has_is_not_hidden(name: str, tmp_path: Path):
     done = CliRunner().invoke(main, ["new", "unit", name, "--out", str(tmp_path)])
     assert done.exit_code == 2
     assert f"{name.lower()}.py would hide a module that Python or a package has; give another name" in done.output
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_how_to_run_its_test_is_told_also_without_pytest(there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def find_spec(name: str) -> bool | None:
+        return there if name == "pytest" else None
+
+    monkeypatch.setattr("handover.scenarios.cli.units.new.find_spec", find_spec)
+    told = CliRunner().invoke(main, ["new", "controller", "Quick", "--out", str(tmp_path)]).stderr
+    assert ("its test: python -m pytest test_quick.py" in told) is there
+    assert ("its test: python -m pip install pytest, then python -m pytest test_quick.py" in told) is not there

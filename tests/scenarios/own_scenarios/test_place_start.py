@@ -1,20 +1,15 @@
 """`handover new unit --for SCENARIO:PLACE`: a start with the ports of a place."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from tutorial import refused, succeeded
 
 import handover
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.fmus.catalog import find_unit, import_class
 from handover.scenarios.catalog import SCENARIOS, named_scenario
-from handover.scenarios.cli.command import main
 from handover.scenarios.cli.units.place_start import start_for
 from handover.scenarios.experiment.places import ports_of_place
 
@@ -29,7 +24,16 @@ def has_start(scenario: str, place: str) -> bool:
 PLACES = [(name, place) for name in SCENARIOS for place in named_scenario(name).places if has_start(name, place)]
 
 
-@pytest.mark.parametrize(("scenario", "place"), PLACES, ids=[":".join(p) for p in PLACES])
+_FAST = ("ir_grasp:reflex", "vsl_hybrid:arm", "flyer_impedance:robot", "flyer_robot_to_human:decision")
+_OF_ROBOT_TO_HUMAN = [f"flyer_robot_to_human:{place}" for place in ("person", "impedance", "navigation", "robot")]
+_SLOW = ("helix_handover:vision", "helix_handover:arm", "ir_grasp:scene", "vsl_hybrid:planner", *_OF_ROBOT_TO_HUMAN)
+
+
+def tier(taken: str) -> tuple[pytest.MarkDecorator, ...]:
+    return () if taken in _FAST else (pytest.mark.slow,)
+
+
+@pytest.mark.parametrize(("scenario", "place"), [pytest.param(*p, marks=tier(":".join(p))) for p in PLACES])
 def test_each_place_has_a_start_that_declares_its_ports_as_the_shipped_unit_does(
     scenario: str, place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -47,12 +51,7 @@ def test_each_place_has_a_start_that_declares_its_ports_as_the_shipped_unit_does
             assert v.name not in found
 
 
-_FAST = ("ir_grasp:reflex", "vsl_hybrid:arm", "flyer_impedance:robot", "flyer_robot_to_human:decision")
-_RUN = [f"{name}:{place}" for name, place in PLACES if name in ("helix_handover", "vsl_hybrid", "flyer_robot_to_human")]
-_SLOW = [pytest.param(p, marks=pytest.mark.slow) for p in (*_RUN, "ir_grasp:scene") if p not in _FAST]
-
-
-@pytest.mark.parametrize("taken", [*_FAST, *_SLOW])
+@pytest.mark.parametrize("taken", [pytest.param(p, marks=tier(p)) for p in (*_FAST, *_SLOW)])
 def test_the_start_of_each_place_runs(taken: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     scenario, _, place = taken.partition(":")
     module = f"running_{scenario}_{place}"
@@ -60,40 +59,7 @@ def test_the_start_of_each_place_runs(taken: str, tmp_path: Path, monkeypatch: p
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.chdir(tmp_path)
     with handover.open(scenario, units={place: f"{module}:Mine"}) as running:
-        running.step(0.2)
+        running.step(0.1)
         assert not running.outcome.reason.startswith("not judged")
         for output in (o for o in running.outputs if o.startswith(f"{place}.q_W")):
             np.testing.assert_allclose(np.linalg.norm(running[output]), 1.0, atol=1e-5)
-
-
-@pytest.mark.parametrize("there", [True, False])
-def test_how_to_run_its_test_is_told_also_without_pytest(there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    def find_spec(name: str) -> bool | None:
-        return there if name == "pytest" else None
-
-    monkeypatch.setattr("handover.scenarios.cli.units.new.find_spec", find_spec)
-    told = CliRunner().invoke(main, ["new", "controller", "Quick", "--out", str(tmp_path)]).stderr
-    assert ("its test: python -m pytest test_quick.py" in told) is there
-    assert ("its test: python -m pip install pytest, then python -m pytest test_quick.py" in told) is not there
-
-
-@pytest.mark.slow
-def test_the_start_passes_its_test_and_runs(tmp_path: Path):
-    printed = succeeded(tmp_path, "new", "controller", "Gentle", "--for", "helix_handover:servo")
-    assert "gentle.py" in printed
-    done = subprocess.run([sys.executable, "-m", "pytest", "-q", "test_gentle.py"], cwd=tmp_path, check=False)
-    assert done.returncode == 0
-
-
-def test_a_place_that_is_not_there_is_told_and_nothing_written(tmp_path: Path):
-    for place, told in (
-        ("helix_handover", "not of the form SCENARIO:PLACE"),
-        ("helix_handover:servos", "did you mean servo?"),
-        ("helix_handovers:servo", "did you mean helix_handover or"),
-        ("helix_handover:camera", "left, right: no start can be written"),
-    ):
-        assert told in refused(tmp_path, "new", "controller", "Gentle", "--for", place)
-    assert "--for is for a unit or a controller" in refused(
-        tmp_path, "new", "scenario", "Gentle", "--for", "helix_handover:servo"
-    )
-    assert not list(tmp_path.iterdir())

@@ -1,11 +1,14 @@
 """The tutorial's files, as its text has them, and the command run beside them in a process of its own."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
+from in_process_pool import use_in_process_pool
+from support.commands import Ended, run_command
+
 TUTORIAL = Path(__file__).parents[3] / "docs" / "tutorial.md"
+SCENE = "reach:TwoLinkReach"
+QUIET = ("--no-report", "-p", "patience=0.2")
 _FILE = re.compile(r"^##+ [^\n]*`(?P<name>\w+\.py)`\n.*?^```python\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL)
 SOFTER = """
 from goal_spring import Inputs, Outputs, Params, SpringToGoal
@@ -21,41 +24,45 @@ class Softer(SpringToGoal):
         return y
 """
 """A controller of which an FMU can be made, after the tutorial's."""
-COMMAND = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()"]
 
 
 def write_files(folder: Path) -> None:
-    """Write arm.py, goal_spring.py, encoders.py and reach.py into a folder."""
+    """Write arm.py, goal_spring.py, encoders.py and reach.py into a folder, and softer.py beside them."""
     files = {m["name"]: m["code"] for m in _FILE.finditer(TUTORIAL.read_text(encoding="utf-8"))}
     assert set(files) == {"arm.py", "goal_spring.py", "encoders.py", "reach.py"}
-    for name, code in files.items():
+    for name, code in {**files, "softer.py": SOFTER}.items():
         (folder / name).write_text(code, encoding="utf-8")
 
 
-def call(folder: Path, *arguments: str, limit: float = 300.0) -> subprocess.CompletedProcess[str]:
-    """Call the command in a folder, for so many seconds at most."""
-    return subprocess.run([*COMMAND, *arguments], cwd=folder, capture_output=True, text=True, timeout=limit)
+def call(folder: Path, *arguments: str) -> Ended:
+    """Call the command in a folder; a campaign's runs are executed by its own process."""
+    return run_command(*arguments, cwd=folder, before=use_in_process_pool)
 
 
-def succeeded(folder: Path, *arguments: str, limit: float = 300.0) -> str:
+def succeeded(folder: Path, *arguments: str) -> str:
     """Call the command in a folder, assert that it succeeds, and return what it prints."""
-    done = call(folder, *arguments, limit=limit)
-    assert done.returncode == 0, done.stderr + done.stdout
-    return done.stdout
+    done = call(folder, *arguments)
+    assert done.status == 0, done.errors + done.output
+    return done.output
 
 
 def ran(folder: Path, *arguments: str) -> None:
     """Call the command in a folder, and assert that a run ended, whether or not its task succeeded."""
     done = call(folder, *arguments)
-    assert done.returncode in (0, 1), done.stderr + done.stdout
+    assert done.status in (0, 1), done.errors + done.output
 
 
 def refused(folder: Path, *arguments: str) -> str:
     """Call the command in a folder, assert that it refuses in one line and writes nothing, and return the line."""
     before = {p.name for p in folder.iterdir()} | {"__pycache__"}
     done = call(folder, *arguments)
-    assert done.returncode == 2, done.stderr + done.stdout
+    assert done.status == 2, done.errors + done.output
     assert {p.name for p in folder.iterdir()} <= before
-    (line,) = [line for line in done.stderr.strip().splitlines() if not line.endswith(" ...")]
+    (line,) = [line for line in done.errors.strip().splitlines() if not line.endswith(" ...")]
     assert "Traceback" not in line
     return line
+
+
+def signals(run: Path) -> bytes:
+    """Return the record of a run, which is the same of the same run."""
+    return (run / "signals.parquet").read_bytes()
