@@ -1,4 +1,4 @@
-"""Processes that are alive, by /proc, and waiting for a condition."""
+"""Processes that are alive, by /proc, how far a run has come, and waiting for a condition."""
 
 import contextlib
 import time
@@ -60,6 +60,12 @@ def stopped(process: int) -> bool:
     with contextlib.suppress(ProcessLookupError, FileNotFoundError):
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] == "T"
     return False
+
+
+def recorded_rows(folder: Path) -> int:
+    """Return how many rows a run that goes on has recorded so far, but for those in whole blocks."""
+    tail = folder / "signals.tail"
+    return int.from_bytes(tail.read_bytes()[16:24], "little") if tail.exists() else 0
 
 
 def until(condition: Callable[[], bool], seconds: float = 60.0) -> None:

@@ -3,10 +3,10 @@
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from support.processes import recorded_rows, until
 
 import handover
 
@@ -26,11 +26,7 @@ assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == be
 def test_ctrl_c_ends_the_run_and_keeps_its_record(tmp_path: Path):
     call = [sys.executable, "-c", PROGRAM]
     with subprocess.Popen(call, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        for _ in range(600):
-            if (tmp_path / "r" / "run.json").is_file():
-                break
-            time.sleep(0.1)
-        time.sleep(1.0)
+        until(lambda: recorded_rows(tmp_path / "r") > 1 or process.poll() is not None)
         process.send_signal(signal.SIGINT)
         printed, errors = process.communicate(timeout=60)
     assert printed == "the run was interrupted; what was recorded is in r\n", errors

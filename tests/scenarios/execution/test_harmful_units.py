@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from support.failing_systems import failing_chain, failing_ssp, start, wait_until
-from support.processes import children, family, lives, stopped, until
+from support.processes import children, family, lives, recorded_rows, stopped, until
 
 from handover.cosim.record.reader import Record
 
@@ -197,8 +197,7 @@ def test_a_run_that_a_unit_has_stopped_can_be_aborted(number: signal.Signals, tm
 @pytest.mark.parametrize("bad", ["ignore_signals_and_hang", pytest.param("fork_and_hang", marks=slow)])
 def test_a_run_dies_with_its_parent_whatever_the_unit_does(bad: str, tmp_path: Path):
     going = start(tmp_path, failing_ssp(tmp_path, f"{bad}_in_step"), "--out", "r", "--call-limit", "0")
-    tail = tmp_path / "r" / "signals.tail"
-    wait_until(lambda: tail.exists() and tail.read_bytes()[16:17] >= b"\x03", going)
+    wait_until(lambda: recorded_rows(tmp_path / "r") > 2, going)
     processes = children(going.pid)
     assert len(processes) == 1
     going.send_signal(signal.SIGKILL)

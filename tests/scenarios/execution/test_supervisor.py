@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from support.commands import Command
 from support.failing_systems import failing_ssp, start, wait_until
-from support.processes import children, lives, stopped, until
+from support.processes import children, lives, recorded_rows, stopped, until
 
 from handover.cosim.record.reader import Record
 
@@ -33,14 +33,9 @@ def arguments(tmp_path: Path) -> tuple[str | Path, ...]:
     return (failing_ssp(tmp_path, "gain"), "--out", tmp_path / "r", *endless)
 
 
-def has_row(folder: Path) -> bool:
-    tail = folder / "r" / "signals.tail"
-    return tail.exists() and any(tail.read_bytes()[16:24])
-
-
 def begun(going: Command, folder: Path) -> int:
     """Wait until a run has recorded a row, and return the process that does it."""
-    wait_until(lambda: has_row(folder), going)
+    wait_until(lambda: recorded_rows(folder / "r") > 0, going)
     (child,) = children(going.pid)
     return child
 
@@ -88,7 +83,7 @@ def test_ctrl_c_in_a_terminal_is_heard_once(arguments: tuple[str | Path, ...], t
         call, cwd=tmp_path, stdin=terminal, stdout=terminal, stderr=terminal, start_new_session=True
     )
     os.close(terminal)
-    until(lambda: has_row(tmp_path) or going.poll() is not None)
+    until(lambda: recorded_rows(tmp_path / "r") > 0 or going.poll() is not None)
     (child,) = children(going.pid)
     assert os.tcgetpgrp(here) == os.getpgid(going.pid) != os.getpgid(child)  # else the child might hear of it twice
     os.write(here, b"\x03")
