@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from handover.controllers.helix.servo.arm_paths import next_place
@@ -25,6 +25,7 @@ def course(start: Floats, goal: Floats, excess: float = 0.0, steps: int = 400) -
     return np.array(places)
 
 
+@settings(max_examples=30)
 @given(st.floats(-np.pi, np.pi), st.floats(FINGERS + BALL, 0.3), st.floats(-0.3, 0.2), st.booleans())
 def test_the_gripper_comes_from_above_wherever_it_starts(angle: float, beside: float, height: float, down: bool):
     goal = P_WO if down else P_WO + ABOVE

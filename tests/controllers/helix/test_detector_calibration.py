@@ -47,7 +47,7 @@ def true_edge_shift(u: Scene, pictures: Pair) -> Floats:
     return found.offset[found.weight > 0.5]
 
 
-@pytest.mark.parametrize("blur", [0.7, pytest.param(1.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("blur", [pytest.param(0.7, marks=pytest.mark.slow), 1.0])
 def test_finds_the_shifts_without_knowing_the_poses(blur: float):
     pictures = taken(blur, 10)
     found = calibrate_detector([pair for _, pair in pictures], CAMERAS, RING, P.ball_radius)

@@ -170,7 +170,7 @@ def test_fingers_before_the_ball_hardly_shift_it():
     assert 1.0 < np.mean(squares) < 4.5  # 3 where the covariances were exact
 
 
-@pytest.mark.parametrize("start", ["front-left", "left", "front"])
+@pytest.mark.parametrize("start", ["front", *(pytest.param(s, marks=pytest.mark.slow) for s in ("front-left", "left"))])
 def test_finds_again_what_jumped_out_of_its_region(start: str):
     """The region around where the ball was may show a part of it, or one camera's may."""
     camera, u = StereoCamera(CameraParams(seed=2)), reaching("back-left", 0.0)

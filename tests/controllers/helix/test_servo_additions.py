@@ -59,7 +59,7 @@ def own(**values: Any) -> Loop:
     return Loop(VisualServo(Params(**values)))
 
 
-@pytest.mark.parametrize("degrees", [0.0, 135.0, -100.0])
+@pytest.mark.parametrize("degrees", [135.0, *(pytest.param(d, marks=pytest.mark.slow) for d in (0.0, -100.0))])
 def test_the_gripper_comes_to_the_ball_within_what_the_cameras_know(degrees: float):
     p_WO, run = ball_at(degrees), Loop()
     assert run.run(Phase.GRASP, p_WO).phase is Phase.GRASP
@@ -181,7 +181,7 @@ def course() -> Course:
     return inputs, run.history
 
 
-@pytest.mark.parametrize("after", [0, 7, 43, 120, 180])
+@pytest.mark.parametrize("after", [7, 43, 120, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 180))])
 def test_another_servo_goes_on_from_the_state_bit_for_bit(after: int, course: Course):
     inputs, history = course
     begun, other = (VisualServo(Params(closing_time=4.0)) for _ in range(2))

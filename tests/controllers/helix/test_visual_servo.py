@@ -75,7 +75,7 @@ def loop(seed: int = 0, dt: float = 0.5, **values: Any) -> Loop:
 
 
 @pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("noise", [0.001, 0.003])
+@pytest.mark.parametrize("noise", [pytest.param(0.001, marks=pytest.mark.slow), 0.003])
 def test_the_arm_comes_to_the_ball_and_closes(place: str, noise: float):
     p_WO = ball_at(PLACES[place])
     for seed in range(2):

@@ -62,7 +62,7 @@ def in_hand(y: Sensed) -> Floats:
     return np.array([[c, s], [-s, c]]) @ (y.p_WO - y.p_WH)
 
 
-@pytest.mark.parametrize("p_WO", [(0.0, 0.0), (0.03, -0.03)])
+@pytest.mark.parametrize("p_WO", [pytest.param((0.0, 0.0), marks=pytest.mark.slow), (0.03, -0.03)])
 def test_it_comes_to_the_object_in_less_than_two_thirds_of_the_papers_time(p_WO: tuple[float, float]):
     fast, paper = grasp(reflex(), scene(p_WO)), grasp(reflex(correction=Correction.PAPER), scene(p_WO))
     assert len(fast) < 0.67 * len(paper)
@@ -91,7 +91,7 @@ def test_a_hand_at_rest_follows_nothing():
     assert np.linalg.norm(closing[-1] - closing[0]) < 5e-3
 
 
-@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("side", [-1.0, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_an_object_off_to_the_side_is_found_by_the_search_across(side: float):
     p_WO = (0.04, side * 0.06)
     seen = grasp(reflex(), scene(p_WO))
@@ -165,7 +165,10 @@ def test_an_object_before_a_fingertip_is_pushed_less_than_half_as_far():
     assert around < straight / 2.0
 
 
-@pytest.mark.parametrize(("thing", "p_WO"), [(Thing.CYLINDER, (0.0, 0.09)), (Thing.BABY_CUP_B, (-0.02, 0.09))])
+@pytest.mark.parametrize(
+    ("thing", "p_WO"),
+    [(Thing.CYLINDER, (0.0, 0.09)), pytest.param(Thing.BABY_CUP_B, (-0.02, 0.09), marks=pytest.mark.slow)],
+)
 def test_an_object_that_a_fingertip_is_felt_to_meet_is_gone_around(thing: Thing, p_WO: tuple[float, float]):
     """It stands before the tip of the index, which does not see it."""
 

@@ -87,6 +87,7 @@ def test_a_bowl_that_cannot_be_is_refused_with_all_that_is_wrong():
     assert "into the floor" in faults
 
 
+@pytest.mark.slow
 def test_the_cameras_see_the_bowl_and_what_lies_in_it_behind_its_wall():
     def picture(bowl_radius: float, p_WO: Floats) -> Any:
         camera = StereoCamera(CameraParams(p_WD=P_WD, bowl_radius=bowl_radius, noise=0.0))

@@ -23,7 +23,7 @@ def test_starts_at_its_place_in_the_hand():
     assert y.holder is Holder.HAND
 
 
-@pytest.mark.parametrize(("dt", "steps"), [(0.005, 8000), (0.05, 3000)])
+@pytest.mark.parametrize(("dt", "steps"), [pytest.param(0.005, 8000, marks=pytest.mark.slow), (0.05, 3000)])
 def test_tremor_and_drift_are_as_large_as_declared_whatever_the_step(dt: float, steps: int):
     def rms(**changes: Any) -> float:
         partner = HandoverPartner(replace(STILL, seed=4, **changes))
@@ -232,7 +232,7 @@ def test_guidance_leads_over_the_ball_before_it_leads_down():
     np.testing.assert_allclose(low, [-0.5, 0.0, 10.0 * (0.02 + 0.02)], atol=1e-6)
 
 
-@pytest.mark.parametrize("stiffness", [10.0, 50.0])
+@pytest.mark.parametrize("stiffness", [10.0, pytest.param(50.0, marks=pytest.mark.slow)])
 def test_a_guided_arm_comes_nearer_and_to_rest(stiffness: float):
     low = np.array([0.12, 0.0, -0.85])
     above = replace(STILL, p_WO_0=low, guide_stiffness=stiffness, guide_height=0.15)  # clear of the ball
@@ -248,7 +248,7 @@ def test_a_guided_arm_comes_nearer_and_to_rest(stiffness: float):
     assert np.ptp(distance[-100:]) < 0.01
 
 
-@pytest.mark.parametrize("dt", [0.005, 0.01])
+@pytest.mark.parametrize("dt", [pytest.param(0.005, marks=pytest.mark.slow), 0.01])
 def test_an_arm_that_leans_on_the_held_ball_stays_calm(dt: float):
     under_palm = replace(STILL, p_WO_0=np.array([0.01, 0.0, -0.68]), room=0.0)
     arm, partner, pull = TendonArmFast(ArmParams()), HandoverPartner(under_palm), np.array([0.2, 0.0, 0.0])

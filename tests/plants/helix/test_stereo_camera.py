@@ -201,6 +201,7 @@ def test_a_lost_picture_is_black_and_the_other_camera_s_is_not():
     assert any(left != right for left, right in lost)
 
 
+@pytest.mark.slow
 def test_tape_hides_the_markers_that_face_the_cameras_first():
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50))
     seen: list[set[int]] = []
@@ -233,6 +234,7 @@ def test_a_third_camera_leaves_the_others_pictures_as_they_are_and_sees_the_ball
     assert green_level > max(blue, red) + 30
 
 
+@pytest.mark.slow
 def test_three_pictures_continue_bit_identically_from_a_state():
     camera, other = (StereoCamera(Params(has_third=True, lost_pictures=0.3, seed=1)) for _ in range(2))
     camera.step(0.0, 1 / 30, Inputs())

@@ -68,7 +68,7 @@ def test_motors_do_not_yield_and_tendons_hold_the_length_against_a_downward_pull
     assert -0.7 - sunk == pytest.approx(np.sum(1.0 / stiffness), rel=0.06)
 
 
-@pytest.mark.parametrize("tendon", [0, 4, 8])
+@pytest.mark.parametrize("tendon", [4, *(pytest.param(t, marks=pytest.mark.slow) for t in (0, 8))])
 def test_a_shortened_tendon_bends_the_arm_towards_its_own_angle_in_the_base_frame(tendon: int):
     dl_t = np.zeros(9)
     dl_t[tendon] = -0.004

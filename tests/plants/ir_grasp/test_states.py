@@ -38,7 +38,15 @@ def course(scene: GraspScene, first: int, last: "int | None" = None) -> list[byt
     return [packed(scene.step(k * STEP, STEP, command(k))) for k in range(first, last)]
 
 
-@pytest.mark.parametrize(("thing", "steps"), [(0, 0), (0, 55), (1, 90), (3, 120), (7, 67), (8, 101)])
+@pytest.mark.parametrize(
+    ("thing", "steps"),
+    [
+        (0, 55),
+        (3, 120),
+        (8, 101),
+        *(pytest.param(*given, marks=pytest.mark.slow) for given in ((0, 0), (1, 90), (7, 67))),
+    ],
+)
 def test_continues_bit_for_bit_here_and_in_another_scene(thing: int, steps: int):
     params = PARAMS[Thing(thing)]
     scene, other, bent = GraspScene(params), GraspScene(params), GraspScene(params)

@@ -273,7 +273,10 @@ def test_swinging_arm_comes_to_the_quasi_static_rest():
     assert np.linalg.norm(coarse.p_WG - still.p_WG) < 3e-4
 
 
-@pytest.mark.parametrize(("dt", "motions"), [(0.001, [Motion.QUASI_STATIC]), (0.0137, Motion), (0.1, Motion)])
+@pytest.mark.parametrize(
+    ("dt", "motions"),
+    [pytest.param(0.001, [Motion.QUASI_STATIC], marks=pytest.mark.slow), (0.0137, Motion), (0.1, Motion)],
+)
 def test_any_step_will_do(dt: float, motions: Iterable[Motion]):
     u = ArmInputs(q_cmd=reach(*OUT), qd_cmd=np.array([0.0, 0.5, 1.0]), load=0.05)
     seconds = 3.0 if dt > 0.01 else 1.0

@@ -87,6 +87,7 @@ def test_an_arm_of_one_link_reads_nothing_of_the_joint_that_it_has_not():
     np.testing.assert_array_equal(y.shape[0], 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("links", [1, 3])
 def test_a_swinging_arm_comes_to_the_quasi_static_rest(links: int):
     params = replace(EXACT, links=links, hinges_dynamic=6, leak_time=1e9, damping_time=0.1)

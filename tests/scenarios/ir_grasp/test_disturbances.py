@@ -46,7 +46,7 @@ def pad(f: Finger, points: Floats) -> Floats:
     return 0.5 * (points[-1] + points[-2]) + f.radii[-1] * f.flexion * np.array([-along[1], along[0]])
 
 
-@pytest.mark.parametrize("shift", ["0,0", "0,0.02"])
+@pytest.mark.parametrize("shift", [pytest.param("0,0", marks=pytest.mark.slow), "0,0.02"])
 def test_the_offset_at_the_grasp_is_that_of_the_pads_middle(tmp_path: Path, shift: str):
     ended, record = grasp(tmp_path, *BLIND, "standoff=0.03", f"shift={shift}")
     k = closing(record)

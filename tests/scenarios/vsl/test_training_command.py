@@ -75,6 +75,7 @@ def test_links_that_do_not_reach_over_the_workspace_are_refused(tmp_path: Path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_errors_fall_along_the_learning_curve():
     training, measured = replace(TRAINING, forward_input=ForwardInput.X), made_up(800)
     seen: list[float] = []
@@ -113,6 +114,7 @@ def test_model_and_data_are_written_before_the_curve(tmp_path: Path, monkeypatch
     assert {p.name for p in tmp_path.iterdir()} == {"d.parquet", "m.json"}
 
 
+@pytest.mark.slow
 def test_a_model_is_adapted_to_stiffer_links_by_few_points(tmp_path: Path):
     (tmp_path / "m.json").write_text(DEFAULT_MODEL)
     stiffer = ("--arm", "EI_0=0.605", "--arm", "EI_p=1.155e-5")
