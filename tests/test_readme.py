@@ -18,8 +18,8 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
-from in_process_pool import use_in_process_pool
 from support.commands import Ended, run_command
+from support.in_process_pool import use_in_process_pool
 from support.kept_runs import copied_run, kept_run
 
 from handover.cosim.stepping.options import Algorithm

@@ -1,13 +1,11 @@
-import zipfile
-from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 
 import decay
 import pytest
-from driven_unit import DrivenUnit, Started
 from fmu_of import FmuOf
 from native_units import Edited, native_fmu
+from support.rewritten_archive import rewritten
 
 from handover.fmus.build import build_block
 
@@ -33,34 +31,18 @@ def decay_library(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.fixture
-def started(tmp_path: Path) -> Iterator[Started]:
-    """Start native units without the master; free them at the end."""
-    made: list[DrivenUnit] = []
-
-    def start(name: str, fmi: int, *, event_mode: bool = False, **values: float) -> DrivenUnit:
-        unit = DrivenUnit(name, fmi, tmp_path / f"unit_{len(made)}")
-        made.append(unit)
-        unit.start(event_mode=event_mode, **values)
-        return unit
-
-    yield start
-    for unit in made:
-        unit.fmu.freeInstance()
-
-
-@pytest.fixture
 def edited(tmp_path: Path) -> Edited:
     """Return a native unit's FMU with texts of its description replaced, each of which must be there."""
 
     def edit(unit: str, fmi: int, *edits: tuple[str, str]) -> Path:
         file = tmp_path / f"{unit}-{fmi}.fmu"
-        with zipfile.ZipFile(native_fmu(unit, fmi)) as sound, zipfile.ZipFile(file, "w") as faulty:
-            for name in sound.namelist():
-                content = sound.read(name)
-                for old, new in edits if name.endswith(".xml") else ():
-                    assert old.encode() in content, old
-                    content = content.replace(old.encode(), new.encode())
-                faulty.writestr(name, content)
-        return file
+
+        def rewrite(name: str, content: bytes) -> bytes:
+            for old, new in edits if name.endswith(".xml") else ():
+                assert old.encode() in content, old
+                content = content.replace(old.encode(), new.encode())
+            return content
+
+        return rewritten(native_fmu(unit, fmi), file, rewrite)
 
     return edit

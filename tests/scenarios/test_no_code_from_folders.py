@@ -15,8 +15,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from campaigns import campaign_metadata, folder_of, table_of
 from click.testing import CliRunner, Result
+from support.campaigns import campaign_metadata, folder_of, table_of
 
 import handover
 from handover.scenarios import catalog

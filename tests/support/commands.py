@@ -22,6 +22,8 @@ from typing import NamedTuple
 import psutil
 
 _LOADED = (
+    "handover.cosim.check.load_probe",
+    "handover.cosim.check.smoke_run",
     "handover.scenarios.cli.command",
     "handover.scenarios.cli.run",
     "handover.scenarios.reporting.run_page",
@@ -31,6 +33,7 @@ _LOADED = (
     "handover.controllers.helix.vision.handover_vision",
     "matplotlib.backends.backend_svg",
     "plotly.graph_objects",
+    "psutil",
     "pyarrow.parquet",
     "scipy.optimize",
 )

@@ -9,6 +9,8 @@ import pytest
 from fmu_of import FmuOf
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.rewritten_archive import DESCRIPTION, rewritten
+from support.wording import Wording
 
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.report import CheckReport
@@ -32,50 +34,37 @@ def test_a_sound_description_has_no_findings(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "wanted"),
+    ("old", "new"),
     [
-        ('causality="input"', 'causality="imput"', r"line 12: .*'imput' is not an element of the set"),
-        ('<Integer start="0"', '<Integer start="zero"', r"start value 'zero' is not a whole number"),
-        ('<Integer start="0"', '<Integer start="12"', r"'mode' \(line 1\d\): start value 12 is out of .*from 0 to 11"),
-        ('<Integer start="0"', '<Integer start="3000000000"', r"does not fit Integer: from -2147483648 to 2147483647"),
-        ('<Integer start="0" min="0"', '<Integer start="0" min="20"', r"its min 20 is above its max 11"),
-        ('<Integer start="0"', "<Integer", r'"mode" \(line 1\d\) has no start value'),
-        ('<Real start="0"', "<Real", r'"u" \(line 12\) has no start value'),
-        ('<Real unit="m"/>', '<Real unit="parsec"/>', r'unit "parsec" of variable "x"'),
-        ('<Real unit="m"/>', '<Real displayUnit="mm"/>', r"'x' \(line 10\): has the display unit 'mm', but no unit"),
-        ('<Real unit="m"/>', '<Real unit="m" derivative="9"/>', r"derivative of 9, which leads to no variable"),
-        ('<Real unit="m"/>', '<Real unit="m" declaredType="T"/>', r'declaredType="T" which has not been defined'),
-        ('name="x"', 'name="u"', r'variable name "u" \(line 12\) is not unique'),
-        ('name="x"', 'name="1 x"', r'"1 x" .* is not a legal variable name'),
-        ('<Outputs><Unknown index="3"', '<Outputs><Unknown index="7"', r"index 7 leads to no .*variables 1 to 4"),
-        (
-            '<Outputs><Unknown index="3" dependencies=""/></Outputs>',
-            "",
-            r"'y' \(line 14\): an output that ModelStructure does not list",
-        ),
-        ('dependencies=""/></Outputs>', 'dependencies="0"/></Outputs>', r"dependencies 0 leads to no variable"),
-        ('modelIdentifier="Decay"', 'modelIdentifier="3-decay"', r"'3-decay' is not an identifier of C"),
-        ('stepSize="0.1"', 'stepSize="-1"', r"stepSize='-1' of its DefaultExperiment \(line 8\) is no"),
-        ('startTime="0" stopTime="1"', 'startTime="2" stopTime="1"', r"stopTime is before startTime"),
-        (' guid="decay"', "", r"attribute 'guid' is required but missing"),
-        ('fmiVersion="2.0"', 'fmiVersion="1.0"', r"an FMU of FMI 1\.0; supported versions: 2\.0 and 3\.0"),
-        ('fmiVersion="2.0"', "", "has no fmiVersion"),
-        ("fmiModelDescription", "modelDescription", r"begins with <modelDescription>; it must be <fmiModel"),
-        (
-            '<InitialUnknowns><Unknown index="3"',
-            '<InitialUnknowns><Unknown index="2"',
-            r"ModelStructure/InitialUnknowns lacks y and should not have u",
-        ),
-        (
-            'name="x" valueReference="0" causality="local"',
-            'name="x" valueReference="1" causality="input"',
-            r"can be set and shares the value reference 1 with 'x'",
-        ),
+        ('causality="input"', 'causality="imput"'),
+        ('<Integer start="0"', '<Integer start="zero"'),
+        ('<Integer start="0"', '<Integer start="12"'),
+        ('<Integer start="0"', '<Integer start="3000000000"'),
+        ('<Integer start="0" min="0"', '<Integer start="0" min="20"'),
+        ('<Integer start="0"', "<Integer"),
+        ('<Real start="0"', "<Real"),
+        ('<Real unit="m"/>', '<Real unit="parsec"/>'),
+        ('<Real unit="m"/>', '<Real displayUnit="mm"/>'),
+        ('<Real unit="m"/>', '<Real unit="m" derivative="9"/>'),
+        ('<Real unit="m"/>', '<Real unit="m" declaredType="T"/>'),
+        ('name="x"', 'name="u"'),
+        ('name="x"', 'name="1 x"'),
+        ('<Outputs><Unknown index="3"', '<Outputs><Unknown index="7"'),
+        ('<Outputs><Unknown index="3" dependencies=""/></Outputs>', ""),
+        ('dependencies=""/></Outputs>', 'dependencies="0"/></Outputs>'),
+        ('modelIdentifier="Decay"', 'modelIdentifier="3-decay"'),
+        ('stepSize="0.1"', 'stepSize="-1"'),
+        ('startTime="0" stopTime="1"', 'startTime="2" stopTime="1"'),
+        (' guid="decay"', ""),
+        ('fmiVersion="2.0"', 'fmiVersion="1.0"'),
+        ('fmiVersion="2.0"', ""),
+        ("fmiModelDescription", "modelDescription"),
+        ('<InitialUnknowns><Unknown index="3"', '<InitialUnknowns><Unknown index="2"'),
+        ('name="x" valueReference="0" causality="local"', 'name="x" valueReference="1" causality="input"'),
     ],
-)  # fmt: skip
-def test_a_fault_is_reported_with_its_place(tmp_path: Path, old: str, new: str, wanted: str):
-    report = checked(tmp_path / "a.fmu", decay.edited((old, new)))
-    assert re.search(wanted, findings_text(report)), findings_text(report)
+)
+def test_a_fault_is_reported_with_its_place(tmp_path: Path, old: str, new: str, wording: Wording):
+    wording.check(findings_text(checked(tmp_path / "a.fmu", decay.edited((old, new)))))
 
 
 def test_all_faults_are_reported_together(tmp_path: Path):
@@ -106,15 +95,13 @@ def test_an_fmu_for_model_exchange_alone_is_reported(tmp_path: Path):
 
 
 def edited_copy(fmu: Path, file: Path, old: str, new: str) -> Path:
-    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(file, "w") as target:
-        for item in source.infolist():
-            content = source.read(item)
-            if item.filename == "modelDescription.xml":
-                assert old in content.decode()
-                content = content.decode().replace(old, new).encode()
-            if not item.filename.startswith("binaries/"):
-                target.writestr(item, content)
-    return file
+    def rewrite(name: str, content: bytes) -> bytes | None:
+        if name == DESCRIPTION:
+            assert old.encode() in content
+            return content.replace(old.encode(), new.encode())
+        return None if name.startswith("binaries/") else content
+
+    return rewritten(fmu, file, rewrite)
 
 
 @pytest.mark.parametrize(
@@ -151,7 +138,7 @@ ODD = st.sampled_from(
 )
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
 @given(
     edits=st.lists(st.tuples(st.integers(0, len(VALUES) - 1), ODD | st.text("abc<>&'{}\t 01.", max_size=5)), max_size=4)
 )

@@ -1,25 +1,28 @@
 """Loading and running a foreign unit with one fault: the fault is reported, and the check survives."""
 
 import os
+import subprocess
 from pathlib import Path
 
 import decay
 import fmpy
 import pytest
+from support.forked_probes import ForkedProbes
 
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.check.load_probe import load_fault
 from handover.cosim.check.report import CheckReport
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.file.fmpy_edge import unpack
+from handover.cosim.probe import isolated_process
 from handover.cosim.probe.finding import Level
 from handover.fmus.compile import host_platform
 
 pytestmark = pytest.mark.skipif(not host_platform().endswith("linux"), reason="signals and messages of Linux")
 
 
-def checked(folder: Path, library: bytes, description: str = decay.DESCRIPTION, timeout: float = 60.0) -> CheckReport:
-    return check_fmu(decay.pack(folder / "Decay.fmu", library, description), timeout)
+def checked(folder: Path, library: bytes, description: str = decay.DESCRIPTION) -> CheckReport:
+    return check_fmu(decay.pack(folder / "Decay.fmu", library, description), 60.0)
 
 
 def told(report: CheckReport, section: str) -> tuple[Level, str]:
@@ -28,7 +31,9 @@ def told(report: CheckReport, section: str) -> tuple[Level, str]:
     return found.level, "\n".join(line for f in found.findings for line in (f.line, *f.log))
 
 
-def test_a_sound_unit_passes(decay_library: bytes, tmp_path: Path):
+def test_a_sound_unit_passes(decay_library: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """In processes that Python starts, as users have them."""
+    monkeypatch.setattr(isolated_process, "subprocess", subprocess)
     report = checked(tmp_path, decay_library)
     assert report.passed
     assert all(s.reached and s.level is Level.OK for s in report.sections)
@@ -56,10 +61,11 @@ def test_a_spoilt_run_is_reported(decay_library: bytes, tmp_path: Path, mode: st
     assert wanted in lines
 
 
-def test_a_run_that_hangs_is_ended(decay_library: bytes, tmp_path: Path):
-    found, lines = told(checked(tmp_path, decay_library, decay.spoilt("hangs"), timeout=2.0), "run")
+def test_a_run_that_hangs_is_ended(decay_library: bytes, tmp_path: Path, probes: ForkedProbes):
+    probes.hangs_after = '"call": "fmi2DoStep", "t": 0.2'
+    found, lines = told(checked(tmp_path, decay_library, decay.spoilt("hangs")), "run")
     assert found is Level.FAULT
-    assert "fmi2DoStep at t = 0.2 s was not done after 2 s; if it only needs longer: --timeout" in lines
+    assert "fmi2DoStep at t = 0.2 s was not done after 60 s; if it only needs longer: --timeout" in lines
 
 
 def test_a_refused_instantiation_is_reported_with_the_log(decay_library: bytes, tmp_path: Path):
@@ -96,14 +102,15 @@ def test_one_instance_is_enough_where_there_may_be_only_one(decay_library: bytes
         ("abort", "crashed with SIGABRT in loading the library: it gave up: abort(), a failed assertion or a C++ "
          "exception that nothing caught\nno licence for Decay"),
         ("crash", "crashed with SIGSEGV in loading the library"),
-        pytest.param("hang", "loading the library was not done after 3 s", marks=pytest.mark.slow),
+        ("hang", "loading the library was not done after 60 s"),
     ],
 )  # fmt: skip
 def test_a_crash_on_loading_is_reported(
-    decay_library: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wish: str, wanted: str
+    decay_library: bytes, tmp_path: Path, probes: ForkedProbes, monkeypatch: pytest.MonkeyPatch, wish: str, wanted: str
 ):
     monkeypatch.setenv("DECAY_ON_LOAD", wish)
-    report = checked(tmp_path, decay_library, timeout=3.0 if wish == "hang" else 60.0)
+    probes.hangs_after = '"call": "loading the library"' if wish == "hang" else ""
+    report = checked(tmp_path, decay_library)
     found, lines = told(report, "loading")
     assert found is Level.FAULT
     assert wanted in lines

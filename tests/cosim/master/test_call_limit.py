@@ -19,7 +19,7 @@ from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 from handover.fmus.build import build_block
 
-LIMIT = 1.0  # s: a unit in Python may take a while to be loaded beside other tests
+LIMIT = 3.0  # s: a unit in Python may take a while to be loaded beside other tests
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_a_unit_that_hangs_in_a_step_is_left_and_the_others_are_ended(
     options = MasterOptions(call_limit=LIMIT, compiled=compiled)
     with pytest.raises(UnitHung) as caught, Master(s, options, call_log) as master, Recorder(record) as recorder:
         master.run(Fraction(1), [recorder])
-    assert str(caught.value) == "endless: fmi3DoStep at t = 0.3 s did not return within 1 s"
+    assert str(caught.value) == "endless: fmi3DoStep at t = 0.3 s did not return within 3 s"
     assert caught.value.as_data()["kind"] == "hang"
     assert Record(record).time.tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3])
     ends = [call for call in call_log.calls if call[1].endswith(("Terminate", "FreeInstance"))]
@@ -132,3 +132,67 @@ def test_without_a_limit_there_is_no_other_thread():
 def test_a_limit_that_is_none_is_refused(limit: float):
     with pytest.raises(ValueError, match="above 0 is right"):
         MasterOptions(call_limit=limit)
+
+
+class Stuck(CallLog):
+    """Holds one call of the unit `bad` until it is let go."""
+
+    def __init__(self, call: str) -> None:
+        super().__init__()
+        self._stuck = ("bad", call)
+        self.let_go = threading.Event()
+
+    def begin(self, code: int, t: float) -> None:
+        super().begin(code, t)
+        if self.calls[-1] == self._stuck:
+            self.let_go.wait(60)
+
+
+@pytest.fixture
+def threads() -> Iterator[list[Stuck]]:
+    """Lets go of what is in the list, and waits until no thread is left."""
+    before, stuck = set(threading.enumerate()), list[Stuck]()
+    yield stuck
+    for each in stuck:
+        each.let_go.set()
+    for thread in set(threading.enumerate()) - before:
+        thread.join(60)
+        assert not thread.is_alive()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        MasterOptions(call_limit=0.5),
+        MasterOptions(call_limit=0.5, compiled=False),
+        MasterOptions(call_limit=0.5, repeat_discarded=True),
+    ],
+    ids=["plan", "grid", "events"],
+)
+@pytest.mark.parametrize("call", ["Terminate", "FreeInstance"])
+def test_others_are_ended(call: str, options: MasterOptions, threads: list[Stuck]):
+    call_log = Stuck(f"fmi3{call}")
+    threads.append(call_log)
+    master = Master(fed_by(native_fmu("gain"), 3), options, call_log)
+    with pytest.raises(UnitHung, match=f"bad: fmi3{call} at t = "), master:
+        master.run(Fraction(1))
+    for unit in ("source", "reader"):
+        assert [c for u, c in call_log.calls if u == unit][-1] == "fmi3FreeInstance"
+        assert (unit, "fmi3Terminate") in call_log.calls
+    assert call_log.after("bad", f"fmi3{call}", "bad") == []
+
+
+def test_a_failure_counts_more_than_a_hang_that_follows(threads: list[Stuck]):
+    call_log = Stuck("fmi3Terminate")
+    threads.append(call_log)
+
+    def fail(t: float, _y: object) -> None:
+        if t > 0.3:
+            raise ZeroDivisionError
+
+    with (
+        pytest.raises(ZeroDivisionError),
+        Master(fed_by(native_fmu("gain"), 3), MasterOptions(call_limit=0.5), call_log) as master,
+    ):
+        master.run(Fraction(1), [fail])
+    assert call_log.after("source", "fmi3Terminate", "bad") != []

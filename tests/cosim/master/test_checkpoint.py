@@ -1,9 +1,11 @@
 import contextlib
+import json
 import os
 import struct
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -13,6 +15,7 @@ import checkpointed_runs
 import numpy as np
 import pytest
 from checkpointed_runs import checkpoint_of, record_of, resume, run
+from event_systems import BOUNCING, COUNTING, bouncing, counting
 from fmu_of import FmuOf
 from hypothesis import given
 from hypothesis import strategies as st
@@ -258,3 +261,29 @@ def test_parts_of_a_checkpoint_that_overlap_are_refused(tmp_path: Path):
     (tmp_path / "checkpoint.zip").write_bytes(content)
     with pytest.raises(InvalidCheckpoint, match="its parts overlap"):
         read_checkpoint(tmp_path / "checkpoint.zip")
+
+
+@pytest.mark.parametrize("algorithm", [Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL])
+@pytest.mark.parametrize(("build", "names"), [(bouncing, BOUNCING), (counting, COUNTING)])
+def test_a_run_with_events_goes_on_from_a_checkpoint(
+    build: Callable[[], System], names: tuple[str, ...], algorithm: Algorithm
+):
+    """Taken at the start, between events, at the impact at 0.45 s, and behind it."""
+    options, taken = MasterOptions(algorithm=algorithm), list[Checkpoint]()
+    whole: dict[float, tuple[float, ...]] = {}
+    with Master(build(), options) as master:
+
+        def observe(t: float, y: Signals) -> None:
+            whole[t] = tuple(float(y[n]) for n in names)
+            if len(taken) < 4 and t >= (0.0, 0.3, 0.45, 0.62)[len(taken)]:
+                taken.append(take_checkpoint(master, len(whole)))
+                json.dumps(taken[-1].stepper)
+
+        master.run(Fraction(2), [observe])
+    assert len(taken) == 4
+    for checkpoint in taken:
+        rows: dict[float, tuple[float, ...]] = {}
+        with Master(build(), options) as master:
+            checkpoint.restore(master)
+            master.run(Fraction(2), [lambda t, y, rows=rows: rows.update({t: tuple(float(y[n]) for n in names)})])
+        assert rows == {t: values for t, values in whole.items() if t >= checkpoint.time}

@@ -1,5 +1,4 @@
 import re
-import zipfile
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
@@ -8,6 +7,8 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
+from observed_rows import observed_rows
+from support.rewritten_archive import described_otherwise, rewritten
 
 from handover.cosim.exceptions import InitializationError, InvalidFmu, InvalidOptions, UnitFailure, WiringError
 from handover.cosim.master.master import Master
@@ -30,14 +31,8 @@ def oscillator(fmu: FmuOf, fmi: int = 3, period: Fraction = Fraction(1, 100)) ->
 
 
 def positions(system: System, stop: Fraction, algorithm: Algorithm = Algorithm.GAUSS_SEIDEL) -> dict[float, float]:
-    seen: dict[float, float] = {}
-
-    def observe(t: float, signals: Signals) -> None:
-        seen[t] = float(signals["mass.x"])
-
-    with Master(system, MasterOptions(algorithm=algorithm)) as master:
-        master.run(stop, [observe])
-    return seen
+    rows = observed_rows(system, stop, "mass.x", options=MasterOptions(algorithm=algorithm))
+    return {t: x for t, (x,) in rows.items()}
 
 
 def held_force(n: int, dt: float, delay: int) -> list[float]:
@@ -173,13 +168,11 @@ def test_a_wrong_system_does_not_start(fmu: FmuOf):
 
 
 def test_an_fmu_with_a_damaged_binary_is_refused(fmu: FmuOf, tmp_path: Path):
-    broken = tmp_path / "Mass.fmu"
-    with zipfile.ZipFile(fmu("Mass")) as source, zipfile.ZipFile(broken, "w") as target:
-        for item in source.infolist():
-            content = source.read(item)
-            target.writestr(item, b"not a library" if item.filename.startswith("binaries/") else content)
+    def broken(name: str, content: bytes) -> bytes:
+        return b"not a library" if name.startswith("binaries/") else content
+
     s = System()
-    s.add("mass", broken)
+    s.add("mass", rewritten(fmu("Mass"), tmp_path / "Mass.fmu", broken))
     here = Path.cwd()
     with pytest.raises(InvalidFmu, match=r"Mass.fmu: mass: could not be instantiated"), Master(s):
         pass
@@ -202,15 +195,12 @@ def test_a_plant_with_feedthrough_is_recorded_as_fmpy_records_it(fmu: FmuOf, alg
 
 def without_dependencies(file: Path, folder: Path, *, states: bool) -> Path:
     """Copy an FMU but for what it declares of its outputs' dependencies and, as asked for, of its states."""
-    made = folder / file.name
-    with zipfile.ZipFile(file) as source, zipfile.ZipFile(made, "w") as target:
-        for item in source.infolist():
-            content = source.read(item)
-            if item.filename == "modelDescription.xml":
-                content = re.sub(rb' dependencies(Kind)?="[^"]*"', b"", content)
-                content = content if states else re.sub(rb' can(GetAndSet|Serialize)FMUState="true"', b"", content)
-            target.writestr(item, content)
-    return made
+
+    def change(text: str) -> str:
+        bare = re.sub(r' dependencies(Kind)?="[^"]*"', "", text)
+        return bare if states else re.sub(r' can(GetAndSet|Serialize)FMUState="true"', "", bare)
+
+    return described_otherwise(file, folder / file.name, change)
 
 
 @pytest.mark.parametrize("states", [True, False])

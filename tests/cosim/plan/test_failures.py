@@ -9,8 +9,12 @@ from both_paths import PLAIN, expect_alike, recorded
 from fmu_of import FmuOf
 from native_units import native_fmu
 
-from handover.cosim.exceptions import UnitFailure
+from handover.cosim.exceptions import RecordNotWritten, UnitFailure
 from handover.cosim.fmu.failures import NotFinite, UnitDiscarded, UnitError, UnitFatal
+from handover.cosim.master.master import Master
+from handover.cosim.record.reader import Record
+from handover.cosim.record.recorder import Recorder
+from handover.cosim.record.stream import RecordStream
 from handover.cosim.stepping.options import Algorithm
 from handover.cosim.system.system import System
 
@@ -96,3 +100,21 @@ def test_a_negative_number_has_no_place_where_signs_have_none(fmu: FmuOf, tmp_pa
     failure = expect_alike(build, Fraction(3), tmp_path, Algorithm.JACOBI).failure
     assert failure is not None
     assert "a.power is -1, which does not fit UInt64" in str(failure)
+
+
+def test_a_run_goes_on_where_the_disk_was_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    s = System()
+    s.add("ramp", native_fmu("ramp"), period=Fraction(1, 1000))
+    file = tmp_path / "r.parquet"
+    with Master(s) as master, Recorder(file) as recorder:
+        with monkeypatch.context() as patch:
+            patch.setattr(RecordStream, "write", full)
+            for _ in range(3):
+                with pytest.raises(RecordNotWritten, match="No space left"):
+                    master.run(Fraction(10), [recorder])
+                assert recorder.rows == recorder.block.capacity
+        master.run(Fraction(10), [recorder])
+    assert Record(file).time[-1] == 10.0

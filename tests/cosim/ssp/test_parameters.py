@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable, Mapping
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,10 @@ from ssp_of import (
 )
 
 from handover.cosim.exceptions import InvalidSsp
+from handover.cosim.master.master import Master
 from handover.cosim.ssp.ssp_file import SspFile
+from handover.cosim.system.signals import Signals
+from handover.fmus.build import build_block
 
 SET_MM = MM.replace("ssd:", "ssv:")
 
@@ -252,3 +256,107 @@ def test_a_mapping_of_two_to_one_name_is_refused(started: Open):
     whole = bound(inside, 'source="s.ssv"')
     files = {"m.ssm": mapping, "s.ssv": parameters("x|Real|1")}
     assert "m.ssm, line 1: two parameters are mapped to 'u'" in refusal(lambda: started(whole, files=files))
+
+
+@pytest.fixture
+def fmu(tmp_path: Path) -> Path:
+    return decay.pack(tmp_path / "unit.fmu", b"", decay.edited(*MORE_PARAMETERS))
+
+
+def packed(fmu: Path, inside: str, more: str = "") -> Path:
+    return pack_ssp(fmu.with_name("a.ssp"), described(inside, more), {"resources/unit.fmu": fmu})
+
+
+def starts(file: Path, given: Mapping[str, str]) -> dict[str, Any]:
+    """Return the units' start values."""
+    with SspFile(file, parameters=given) as ssp:
+        return {name: dict(unit.start) for name, unit in ssp.system.units.items()}
+
+
+def test_given_values_come_before_the_file_s_and_are_of_all_types(fmu: Path):
+    file = packed(fmu, system(component("a", bindings(parameters("on|Boolean|false", "called|String|old")))))
+    start = starts(file, {"a.on": "True", "a.called": "a, b", "a.light": "green", "a.p": "3,-4.5"})["a"]
+    np.testing.assert_array_equal(start.pop("p"), [3.0, -4.5])
+    assert start == {"on": True, "called": "a, b", "light": "green"}
+    assert starts(file, {"a.light": "2"})["a"] == {"on": False, "called": "old", "light": 2}
+
+
+def test_an_entry_of_an_array_leaves_the_others_as_the_file_has_them(fmu: Path):
+    whole = packed(fmu, system(component("a", bindings(parameters("p[1]|Real|10", "p[2]|Real|20")))))
+    np.testing.assert_array_equal(starts(whole, {"a.p[2]": "7"})["a"]["p"], [10.0, 7.0])
+    np.testing.assert_array_equal(starts(whole, {"a.p": "8,9"})["a"]["p"], [8.0, 9.0])
+    partly = packed(fmu, system(component("a")))
+    assert starts(partly, {"a.p[2]": "7"}) == {"a": {"p[2]": 7.0}}
+
+
+def test_parameters_are_listed_with_their_values(fmu: Path):
+    file = packed(fmu, system(component("a", bindings(parameters("on|Boolean|true", "p[2]|Real|20")))))
+    with SspFile(file) as ssp:
+        listed = ssp.parameters
+    starts = {name: port.start for name, port in listed.items()}
+    assert starts == {"a.mode": "0", "a.p": "1 20.0", "a.on": "true", "a.called": "", "a.light": "1"}
+    assert [port.name for port in listed.values()] == list(listed)
+
+
+def of_connector(fmu: Path) -> Path:
+    """Return an SSP in which `s.width`, 1000 mm, feeds the parameter p[1] of `s.a`, in m."""
+    unit = component("a", connectors(**{"p[1]": "parameter"}))
+    before = connectors(width="parameter mm") + bindings(parameters("width|Real|1000"))
+    inner = system(unit, connection("width", "a.p[1]"), name="s", before=before)
+    return packed(fmu, system(inner), MM)
+
+
+def test_a_system_s_parameter_is_in_the_unit_of_its_connector(fmu: Path):
+    file = of_connector(fmu)
+    assert starts(file, {}) == {"s.a": {"p[1]": 1.0}}
+    assert starts(file, {"s.width": "250"}) == {"s.a": {"p[1]": 0.25}}
+    with SspFile(file, parameters={"s.width": "250"}) as ssp:
+        width = ssp.parameters["s.width"]
+        assert (width.unit.symbol, width.start) == ("mm", "250")
+        assert {"s.a.p", "s.a.on"} < ssp.parameters.keys()
+
+
+def test_what_a_system_s_parameter_feeds_can_be_given_itself(fmu: Path):
+    assert starts(of_connector(fmu), {"s.a.p[1]": "0.5"}) == {"s.a": {"p[1]": 0.5}}
+
+
+@pytest.mark.parametrize(
+    ("given", "fault"),
+    [
+        ({"a.onn": "true"}, "no parameter 'a.onn'; did you mean a.on"),
+        ({"a.u": "1"}, "no parameter 'a.u'; "),  # an input
+        ({"a.on": "maybe"}, "a.on: 'maybe' is neither true nor false"),
+        ({"a.p": "1"}, "a.p: 1 values where 2 are right"),
+        ({"a.p[3]": "1"}, "no parameter 'a.p[3]'; "),
+        ({"a.light": "blue"}, "'blue' is none of red, green"),
+    ],
+)
+def test_what_is_wrong_is_told(fmu: Path, given: Mapping[str, str], fault: str):
+    with pytest.raises(InvalidSsp) as e:
+        SspFile(packed(fmu, system(component("a"))), parameters=given)
+    assert fault in "; ".join(e.value.faults)
+
+
+STEP = Fraction(1, 10)
+
+
+def test_entries_that_are_swapped_arrive_swapped(tmp_path: Path):
+    fmus = {
+        f"resources/{name}.fmu": build_block(f"master_blocks:{name}", 3, tmp_path, step=STEP, scalar=True)
+        for name in ("Counter", "Echo")
+    }
+    gives, takes = ({f"pair[{k}]": kind for k in (1, 2)} for kind in ("output", "input"))
+    elements = component("counter", connectors(**gives), "resources/Counter.fmu")
+    elements += component("echo", connectors(**takes), "resources/Echo.fmu")
+    transformed = '<ssc:LinearTransformation factor="-2" offset="0.5"/>'
+    crossed = connection("counter.pair[1]", "echo.pair[2]") + connection("counter.pair[2]", "echo.pair[1]", transformed)
+    seen: list[tuple[float, ...]] = []
+
+    def observe(t: float, signals: Signals) -> None:  # noqa: ARG001
+        seen.append(tuple(float(signals[n]) for n in ("counter.pair[1]", "counter.pair[2]")))
+        seen[-1] += tuple(signals["echo.pair_back"].tolist())
+
+    description = described(system(elements, crossed), version="2.0")
+    with SspFile(pack_ssp(tmp_path / "a.ssp", description, fmus)) as ssp, Master(ssp.system) as master:
+        master.run(Fraction(1, 2), [observe])
+    assert seen == [(float(k), float(k * k), 0.5 - 2.0 * k * k, float(k)) for k in range(6)]

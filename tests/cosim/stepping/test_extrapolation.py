@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 from native_units import native_fmu
+from observed_rows import observed_rows
 from oscillator import PLAIN, STATES
 
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.extrapolation import SampleHistory
 from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions
 from handover.cosim.system.conversion import LinearTransformation
-from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System
 
 LINEAR = MasterOptions(extrapolation=Extrapolation.LINEAR)
@@ -30,14 +30,7 @@ def integrated_ramp(slow: Fraction, fast: Fraction, **placing: Any) -> System:
 
 
 def course(system: System, signal: str, stop: Fraction, options: MasterOptions = LINEAR) -> dict[float, float]:
-    seen: dict[float, float] = {}
-
-    def observe(t: float, signals: Signals) -> None:
-        seen[t] = float(signals[signal])
-
-    with Master(system, options) as master:
-        master.run(stop, [observe])
-    return seen
+    return {t: y for t, (y,) in observed_rows(system, stop, signal, options=options).items()}
 
 
 @pytest.mark.parametrize("fast", [Fraction(1, 10), Fraction(1, 7), Fraction(1, 3000)])

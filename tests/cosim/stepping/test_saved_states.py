@@ -3,6 +3,7 @@
 import ctypes
 from collections import Counter
 from fractions import Fraction
+from typing import cast
 
 import pytest
 from call_log import CallLog
@@ -11,7 +12,10 @@ from native_units import native_fmu
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.instance import Instance
 from handover.cosim.master.master import Master
+from handover.cosim.stepping.ensemble import Ensemble
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, MasterOptions
+from handover.cosim.stepping.pending_steps import PendingSteps
+from handover.cosim.system.schedule import Slot
 from handover.cosim.system.system import System
 
 OPTIONS = {
@@ -92,3 +96,36 @@ def test_states_are_freed_where_a_unit_does_not_save_its_own(options: MasterOpti
     ):
         master.run(Fraction(1))
     assert kept(call_log, 3) == {"bad": 0, "beside": 0, "steady": 0}
+
+
+class Isolated:
+    """All units are isolated, and begin."""
+
+    def begin(self, unit: str, t: float, dt: float) -> bool:  # noqa: ARG002
+        return True
+
+
+def begun(finished: list[str]) -> PendingSteps:
+    """Return the step of a, which fails as it is finished."""
+
+    def finish(slot: Slot) -> None:
+        finished.append(slot.unit)
+        raise UnitFailure(slot.unit, "fmi3DoStep", 0.0, "Error")
+
+    pending = PendingSteps(cast("Ensemble", Isolated()), finish)
+    assert pending.begin(Slot("a", 1, 0.1), 0.0)
+    return pending
+
+
+def test_a_unit_that_comes_before_fails_first():
+    finished: list[str] = []
+    with pytest.raises(UnitFailure, match=r"^a: "), begun(finished).failing_first():
+        raise UnitFailure("b", "fmi3DoStep", 0.0, "Error")
+    assert finished == ["a"]
+
+
+def test_what_is_no_failure_of_a_unit_is_not_replaced_by_one():
+    finished: list[str] = []
+    with pytest.raises(ZeroDivisionError), begun(finished).failing_first():
+        raise ZeroDivisionError
+    assert finished == []

@@ -5,9 +5,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from campaigns import campaign_metadata, folder_of, table_of
-from in_process_pool import InProcessPool
 from native_units import native_fmu
+from support.campaigns import campaign_metadata, folder_of, table_of
+from support.in_process_pool import InProcessPool
 from support.wording import Wording
 
 import handover

@@ -1,37 +1,35 @@
-"""A campaign resumes where it stopped: runs that are done are kept, runs that are lost or damaged are repeated."""
+"""A campaign resumes where it stopped, with the runs that are done; its table is rebuilt from their folders."""
 
 import json
 import shutil
 from collections.abc import Generator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
-from in_process_pool import InProcessPool
+from click.testing import CliRunner
+from support.campaigns import carried_out, short_plan
+from support.in_process_pool import InProcessPool
+from support.sweep_process import without_times
 
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.table import CampaignTable
+from handover.scenarios.campaign.table_writer import rebuild_table
 from handover.scenarios.campaign.worker_pool import JobResult, RunCounts, RunJob
+from handover.scenarios.cli.command import main
 
-PLAN = CampaignPlan(
-    scenario="ir_grasp",
-    points=[{"forward": "0.03"}, {"forward": "0.1"}],
-    fixed={"strategy": "forward", "run_up": "0"},
-    repetitions=2,
-    seed=3,
-)
+PLAN = short_plan(repetitions=2)
 NAMES = [run.name for run in PLAN.runs()]
+FIRST = NAMES[0]
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("campaign") / "done"
-    run_campaign(prepared(PLAN), CampaignFolder(path), InProcessPool(), lambda _tally: None)
-    return path
+    return carried_out(PLAN, tmp_path_factory.mktemp("campaign") / "done").path
 
 
 @pytest.fixture
@@ -47,11 +45,6 @@ def resume(
     pool, counts = pool or InProcessPool(), list[RunCounts]()
     run_campaign(prepared(plan), folder, pool, counts.append)
     return pool.begun, counts
-
-
-def without_times(table: Path) -> list[dict[str, Any]]:
-    times = ("wall_", "cpu_", "pace_", "peak_memory")
-    return [{k: v for k, v in row.items() if not k.startswith(times)} for row in CampaignTable.read(table).rows]
 
 
 def test_each_run_has_a_row_in_the_plans_order(finished: Path):
@@ -82,7 +75,7 @@ def test_an_interrupted_campaign_goes_on_and_is_as_if_undisturbed(finished: Path
     begun, counts = resume(folder)
     assert begun == [NAMES[1], NAMES[3]]
     assert counts[0] == RunCounts(total=4, kept=2, ended=2)
-    assert without_times(folder.table) == without_times(finished)
+    assert without_times(folder.path) == without_times(finished)
 
 
 def test_a_run_whose_result_did_not_come_is_in_the_table_nevertheless(tmp_path: Path):
@@ -105,7 +98,7 @@ def test_a_lost_run_is_a_row_with_its_reason_and_tried_again(tmp_path: Path):
     assert counts[-1] == RunCounts(total=4, ended=3, lost=1)
     row = CampaignTable.read(folder.table).rows[0]
     assert (row["status"], row["success"], row["reason"]) == ("lost", None, "its machine burnt")
-    assert (row["forward"], row["simulated_seconds"], row["steps"]) == (0.03, None, None)
+    assert (row["m"], row["simulated_seconds"], row["last_x"]) == (1.0, None, None)
     begun, _ = resume(folder)
     assert begun == [NAMES[0]]
     assert CampaignTable.read(folder.table).column("status").tolist() == ["done"] * 4
@@ -165,3 +158,68 @@ def test_more_repetitions_add_runs(folder: CampaignFolder):
     table = CampaignTable.read(folder.table)
     assert table.column("run").tolist() == [run.name for run in more.runs()]
     assert folder.read()["repetitions"] == 3
+
+
+def cut(folder: CampaignFolder, rows: int) -> bytes:
+    """Leave the first rows of the table only."""
+    pq.write_table(CampaignTable.read(folder.table).table.slice(0, rows), folder.table)
+    return folder.table.read_bytes()
+
+
+@pytest.mark.parametrize("left", ["nothing", "no row", "a row", "damaged"])
+def test_a_rebuilt_table_is_as_the_campaign_itself_writes_it(left: str, finished: Path, folder: CampaignFolder):
+    if left == "nothing":
+        folder.table.unlink()
+    elif left == "damaged":
+        folder.table.write_bytes(b"PAR1")
+    else:
+        cut(folder, rows=int(left == "a row"))
+    rebuild_table(folder)
+    expected = CampaignTable.read(finished).table
+    assert CampaignTable.read(folder.table).table.equals(expected, check_metadata=True)
+
+
+def test_a_whole_table_is_not_written_again(folder: CampaignFolder):
+    before = folder.table.stat()
+    rebuild_table(folder)
+    assert folder.table.stat().st_mtime_ns == before.st_mtime_ns
+    assert folder.table.stat().st_ino == before.st_ino
+
+
+def test_a_lost_run_stays_lost(tmp_path: Path):
+    lost = carried_out(short_plan(), tmp_path / "lost", [FIRST])
+    cut(lost, rows=1)
+    rebuild_table(lost)
+    table = CampaignTable.read(lost.table)
+    assert table.column("status").tolist() == ["lost", "done"]
+    assert table.column("reason")[0] == "its worker went away"
+
+
+def test_a_table_is_left_alone_while_a_command_works_on_the_campaign(folder: CampaignFolder):
+    before = cut(folder, rows=1)
+    with folder.held():
+        rebuild_table(folder)
+    assert folder.table.read_bytes() == before
+
+
+@pytest.mark.parametrize("change", [{"versions": {"handover-cosim": "9.9"}}, {"scenario": "juggle"}])
+def test_the_table_of_a_campaign_of_another_version_is_left(change: dict[str, object], folder: CampaignFolder):
+    before = cut(folder, rows=1)
+    file = folder.path / "campaign.json"
+    file.write_text(json.dumps({**json.loads(file.read_text(encoding="utf-8")), **change}), encoding="utf-8")
+    rebuild_table(folder)
+    assert folder.table.read_bytes() == before
+
+
+def test_the_page_shows_all_runs_that_are_done(folder: CampaignFolder):
+    cut(folder, rows=1)
+    with folder.held():  # as a running command does
+        assert "1 of 4 runs so far" in page_of(folder)
+    assert "so far" not in page_of(folder)
+
+
+def page_of(folder: CampaignFolder) -> str:
+    """Return what `handover report` writes."""
+    done = CliRunner().invoke(main, ["report", str(folder.path)])
+    assert done.exit_code == 0, done.output
+    return folder.report.read_text(encoding="utf-8").replace("\u00a0", " ")

@@ -10,9 +10,10 @@ from typing import Any
 import decay
 import numpy as np
 import pytest
-from campaigns import carried_out
-from in_process_pool import InProcessPool
 from native_units import native_fmu
+from support.campaigns import carried_out
+from support.in_process_pool import InProcessPool
+from support.wording import Wording
 
 from handover.cosim.exceptions import InvalidFmu, WiringError
 from handover.cosim.ssp.writing import write_ssp
@@ -125,22 +126,16 @@ def test_a_value_is_the_same_however_it_is_written():
 
 
 @pytest.mark.parametrize(
-    ("grid", "fixed", "fault"),
+    "given",
     [
-        (("mas=1,2",), (), "no parameter or input 'mas'; did you mean m"),
-        (("m=1,heavy",), (), "m = 'heavy': a number is right"),
-        (("m=1,inf",), (), "mass.m: inf is not finite"),
-        (("m=1,1.0",), (), "m: 1 is given twice"),
-        (("m=1:2",), (), "is not of the form START:STOP:N, such as"),
-        (("m=1:2:x",), (), "is not of the form START:STOP:N"),
-        (("m=1,2",), ("m=3",), "m is varied and set by -p"),
-        (("m=1,2",), ("k=3,4",), "-p k takes one value; to vary it, give it without -p: k=3,4"),
+        "mas=1,2", "m=1,heavy", "m=1,inf", "m=1,1.0", "m=1:2", "m=1:2:x", "m=1,2 -p m=3", "m=1,2 -p k=3,4",
     ],
-)
-def test_wrong_values_are_refused_before_anything_is_written(grid: tuple[str, ...], fixed: tuple[str, ...], fault: str):
+)  # fmt: skip
+def test_wrong_values_are_refused_before_anything_is_written(given: str, wording: Wording):
+    grid, _, fixed = given.partition(" -p ")
     with pytest.raises(InvalidParameter) as e:
-        prepared(plan_of(native_fmu("mass", 2), *grid, fixed=fixed))
-    assert fault in str(e.value)
+        prepared(plan_of(native_fmu("mass", 2), grid, fixed=tuple(fixed.split())))
+    wording.check(e.value)
 
 
 def test_wrong_values_of_an_ssp_are_refused(tmp_path: Path):

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from in_process_pool import InProcessPool
+from support.in_process_pool import InProcessPool
 
 from handover.cosim.stepping.options import MasterOptions
 from handover.scenarios.campaign import local_cluster

@@ -1,6 +1,7 @@
 """`name=values` texts of a sweep: what they mean, and the errors for invalid ones."""
 
 import pytest
+from support.wording import Wording
 
 from handover.scenarios.campaign.grid import parse_grid, set_parameters
 from handover.scenarios.experiment.parameters import InvalidParameter
@@ -59,42 +60,33 @@ def test_arrays_stand_between_semicolons():
 
 
 @pytest.mark.parametrize(
-    ("text", "fault"),
+    "text",
     [
-        ("alpha", "'alpha' is not of the form name=v1,v2,... or name=START:STOP:N"),
-        ("alpah=1", "helix_handover has no parameter 'alpah'; did you mean alpha?"),
-        ("alpha=", "alpha: the list of values is empty"),
-        ("alpha=0.1,,0.2", "alpha: '0.1,,0.2' has an empty item"),
-        ("alpha=0.1,", "alpha: '0.1,' has an empty item"),
-        ("alpha=1:2", "alpha: '1:2' is not of the form START:STOP:N, such as 0.1:0.5:5"),
-        ("alpha=a:b:3", "alpha: 'a:b:3' is not of the form START:STOP:N: START and STOP are finite numbers"),
-        ("alpha=0:inf:3", "alpha: '0:inf:3' is not of the form START:STOP:N: START and STOP are finite numbers"),
-        ("alpha=nan:1:3", "alpha: 'nan:1:3' is not of the form START:STOP:N: START and STOP are finite numbers"),
-        (
-            "alpha=0:1:0",
-            "alpha: '0:1:0' is not of the form START:STOP:N: N is a whole number of values from 2 to 100,000",
-        ),
-        (
-            "alpha=0:1:x",
-            "alpha: '0:1:x' is not of the form START:STOP:N: N is a whole number of values from 2 to 100,000",
-        ),
-        (
-            "alpha=0:1:2.5",
-            "alpha: '0:1:2.5' is not of the form START:STOP:N: N is a whole number of values from 2 to 100,000",
-        ),
-        ("alpha=0.1:1:200000", "alpha: '0.1:1:200000' has too many values: at most 100,000 runs can be planned"),
-        ("alpha=0:1:1000000000", "alpha: '0:1:1000000000' has too many values: at most 100,000 runs can be planned"),
-        ("alpha=1:1:3", "alpha: '1:1:3' begins where it ends; for one value write '1'"),
-        ("alpha=0.1,2", "alpha: 2.0 is out of range: from 0.01 to 1"),
-        ("alpha=0.1,nan", "alpha: nan is not finite, from 0.01 to 1"),
-        ("alpha=0.1,0.10", "alpha: 0.10 is given twice"),
-        ("place=front,rihgt", "place: 'rihgt' is none of front, front_left, left, back_left"),
-        ("place=lfet", "place: 'lfet' is none of front, front_left, left, back_left; did you mean left"),
+        "alpha",
+        "alpah=1",
+        "alpha=",
+        "alpha=0.1,,0.2",
+        "alpha=0.1,",
+        "alpha=1:2",
+        "alpha=a:b:3",
+        "alpha=0:inf:3",
+        "alpha=nan:1:3",
+        "alpha=0:1:0",
+        "alpha=0:1:x",
+        "alpha=0:1:2.5",
+        "alpha=0.1:1:200000",
+        "alpha=0:1:1000000000",
+        "alpha=1:1:3",
+        "alpha=0.1,2",
+        "alpha=0.1,nan",
+        "alpha=0.1,0.10",
+        "place=front,rihgt",
+        "place=lfet",
     ],
 )
-def test_what_means_nothing_is_reported_in_a_line(text: str, fault: str):
+def test_what_means_nothing_is_reported_in_a_line(text: str, wording: Wording):
     (value,) = faults(text)
-    assert value.startswith(fault)
+    wording.check(value)
 
 
 def test_all_faults_are_reported_together():

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 
 import pytest
-from campaigns import results_of, table_of
+from support.campaigns import results_of, table_of
 
 from handover.fmus.build import cached
 from handover.scenarios.campaign.folder import CampaignFolder

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pytest
-from campaigns import campaign_metadata, folder_of, results_of, table_of
+from support.campaigns import campaign_metadata, folder_of, results_of, table_of
 
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign_report.campaign_page import write_campaign_page

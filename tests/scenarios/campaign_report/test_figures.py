@@ -6,9 +6,9 @@ from typing import Any
 
 import matplotlib as mpl
 import pytest
-from campaigns import results_of
 from matplotlib.figure import Figure as Canvas
 from matplotlib.transforms import Bbox
+from support.campaigns import results_of
 
 from handover.scenarios.campaign_report.figures import draw_campaign
 from handover.scenarios.experiment.plotting import figure

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from campaigns import results_of
+from support.campaigns import results_of
 
 from handover.scenarios.campaign_report.point_layout import PointLayout, layout_of
 

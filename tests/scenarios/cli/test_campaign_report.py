@@ -5,8 +5,8 @@ from pathlib import Path
 from urllib.parse import quote
 
 import pytest
-from campaigns import campaign_metadata, carried_out, folder_of, table_of
 from click.testing import CliRunner
+from support.campaigns import campaign_metadata, carried_out, folder_of, table_of
 
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from campaigns import campaign_metadata, carried_out, folder_of, table_of
 from click.testing import CliRunner, Result
 from opened_page import opened, overflow
 from playwright.sync_api import Browser
+from support.campaigns import campaign_metadata, carried_out, folder_of, table_of
 from support.wording import Wording
 
 from handover.scenarios.campaign.plan import CampaignPlan

@@ -15,10 +15,10 @@ from typing import Any, NoReturn
 
 import click
 import pytest
-from campaigns import campaign_metadata, folder_of, table_of
 from click.testing import CliRunner, Result
 from native_units import native_fmu
 from sample_study import same, write_study
+from support.campaigns import campaign_metadata, folder_of, table_of
 from support.kept_runs import copied_run
 from support.killed_run import killed_run
 

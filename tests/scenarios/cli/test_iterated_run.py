@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 from native_units import native_fmu
-from two_masses import TwoMasses
+from oscillator import equal_masses
 
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
@@ -17,7 +17,7 @@ from handover.scenarios.cli.command import main
 @pytest.fixture(scope="module")
 def masses(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("masses") / "masses.ssp"
-    return write_ssp(TwoMasses(k_c=4000.0).system(Fraction(1, 10)), file, "two masses", Fraction(1))
+    return write_ssp(equal_masses(k_c=4000.0).two_units(Fraction(1, 10)), file, "two masses", Fraction(1))
 
 
 def run(file: Path, out: Path, *arguments: str) -> Result:

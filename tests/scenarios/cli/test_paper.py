@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from in_process_pool import LOCAL_CLUSTER, InProcessPool, local_cluster_of
+from support.in_process_pool import LOCAL_CLUSTER, InProcessPool, local_cluster_of
 from support.wording import Wording
 
 from handover.scenarios.campaign.folder import CampaignFolder

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from clusters import closed_port
-from in_process_pool import LOCAL_CLUSTER, InProcessPool, local_cluster_of
+from support.clusters import closed_port
+from support.in_process_pool import LOCAL_CLUSTER, InProcessPool, local_cluster_of
 from support.wording import Wording
 
 from handover.cosim.files import folder_locked

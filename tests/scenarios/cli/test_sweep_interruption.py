@@ -7,7 +7,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from sweep_process import SweepProcess, ended, runs_in, sweeping, wait_for
+from support.sweep_process import SweepProcess, ended, runs_in, sweeping, wait_for
 
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.cli.campaign import CampaignInterruption

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from campaigns import campaign_metadata, folder_of, table_of
+from support.campaigns import campaign_metadata, folder_of, table_of
 
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.comparison import sections

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from in_process_pool import InProcessPool
+from support.in_process_pool import InProcessPool
 from support.killed_run import killed_run
 
 from handover.scenarios.campaign import local_cluster

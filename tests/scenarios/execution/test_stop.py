@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from campaigns import carried_out
 from click.testing import CliRunner, Result
+from support.campaigns import carried_out
 from support.kept_runs import kept_run
 
 import handover

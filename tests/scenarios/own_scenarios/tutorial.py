@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
-from in_process_pool import use_in_process_pool
 from support.commands import Ended, run_command
+from support.in_process_pool import use_in_process_pool
 
 TUTORIAL = Path(__file__).parents[3] / "docs" / "tutorial.md"
 SCENE = "reach:TwoLinkReach"

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 from native_units import native_fmu
-from two_masses import TwoMasses
+from oscillator import equal_masses
 
 from handover.cosim.exceptions import ScheduleError
 from handover.cosim.fmu.instance import Instance
@@ -61,7 +61,7 @@ def test_units_off_the_cycle_step_once(steps: Counter[str]):
 @both
 def test_units_that_save_no_state_are_refused_where_they_lie_in_a_circle(algorithm: Algorithm):
     with pytest.raises(ScheduleError) as caught:
-        Master(TwoMasses(k_c=1.0).system(PERIOD, canGetAndSetFMUState=False), MasterOptions(algorithm=algorithm))
+        Master(equal_masses(k_c=1.0).two_units(PERIOD, canGetAndSetFMUState=False), MasterOptions(algorithm=algorithm))
     assert "a, b (connected in a cycle: a, b)" in str(caught.value)
     s = System()
     first, second = (s.add(n, native_fmu("gain", canGetAndSetFMUState=False)) for n in ("first", "second"))
@@ -74,7 +74,7 @@ def test_units_that_save_no_state_are_refused_where_they_lie_in_a_circle(algorit
 
 @both
 def test_what_does_not_converge_is_reported_with_signals_time_and_iterations(algorithm: Algorithm):
-    system = TwoMasses(k_c=4000.0).system(PERIOD)
+    system = equal_masses(k_c=4000.0).two_units(PERIOD)
     options = MasterOptions(algorithm=algorithm, tolerance=1e-15, max_iterations=2)
     with pytest.raises(NotConverged) as caught, Master(system, options) as master:
         master.run(Fraction(1))
@@ -89,7 +89,7 @@ def test_what_does_not_converge_is_reported_with_signals_time_and_iterations(alg
 
 @both
 def test_units_of_several_rates_iterate_with_those_of_their_own(algorithm: Algorithm):
-    s = TwoMasses(k_c=100.0).system(PERIOD)
+    s = equal_masses(k_c=100.0).two_units(PERIOD)
     slow = s.add("slow", native_fmu("integrator"), period=Fraction(1, 5))
     back = s.add("back", native_fmu("gain"), a=-0.5, b=1.0, period=Fraction(1, 5))
     s.connect(slow.y.x, back.u.u)
@@ -120,7 +120,7 @@ def test_a_run_goes_on_from_saved_states_to_the_same_bits(algorithm: Algorithm):
     whole: list[float] = []
     rest: list[float] = []
     options = MasterOptions(algorithm=algorithm)
-    with Master(TwoMasses(k_c=100.0).system(PERIOD), options) as master:
+    with Master(equal_masses(k_c=100.0).two_units(PERIOD), options) as master:
         master.run(Fraction(1), [record(whole)])
         state = json.loads(json.dumps(master.stepper.get_state()))
         saved = master.ensemble.save(["a", "b"])

@@ -2,7 +2,6 @@
 
 import logging
 import re
-import zipfile
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from native_units import native_fmu
+from support.rewritten_archive import described_otherwise
 
 from handover.cosim.exceptions import ScheduleError
 from handover.cosim.fmu.file.description import describe_fmu
@@ -132,16 +132,13 @@ def test_values_that_are_not_real_stay_out_of_presumed_loops():
 
 def edited(fmu: Path, folder: Path, pattern: str, replacement: str) -> Path:
     """Return a copy of an FMU whose description is changed."""
-    changed = folder / fmu.name
-    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(changed, "w") as target:
-        for item in source.infolist():
-            data = source.read(item)
-            if item.filename == "modelDescription.xml":
-                text, n = re.subn(pattern, replacement, data.decode(), flags=re.DOTALL)
-                assert n
-                data = text.encode()
-            target.writestr(item, data)
-    return changed
+
+    def change(text: str) -> str:
+        changed, n = re.subn(pattern, replacement, text, flags=re.DOTALL)
+        assert n
+        return changed
+
+    return described_otherwise(fmu, folder / fmu.name, change)
 
 
 @STANDARDS

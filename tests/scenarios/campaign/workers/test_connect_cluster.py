@@ -9,8 +9,8 @@ from collections.abc import Generator
 from pathlib import Path
 
 import pytest
-from clusters import scheduler, worker
 from sample_jobs import bad_job, job
+from support.clusters import scheduler, worker
 from support.processes import lives, parent, servers, until
 
 from handover.scenarios.campaign.local_cluster import connect_cluster
@@ -29,43 +29,48 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Generator[str, None, No
         yield address
 
 
-def test_threads_of_a_worker_execute_runs_in_parallel(address: str, tmp_path: Path):
-    runs = tmp_path / "runs"
-    jobs = [job(runs, f"run_{i}", seed=i) for i in range(4)]
-    jobs.append(bad_job(runs, "Crashes", tmp_path))
-    with worker(tmp_path, address, threads=2) as process:
-        with connect_cluster(scheduler_address(address.removeprefix("tcp://"))) as pool:
-            assert pool.workers == 2
-            pool.check(runs)
-            results = [(result.name, result.lost) for result in pool.run_jobs(jobs)]
-            assert len(servers(process)) == 2
-        assert sorted(results) == [("bad", ""), *((f"run_{i}", "") for i in range(4))]
-        assert servers(process) == []  # though the cluster lives on
-
-
-def test_a_command_that_is_killed_leaves_no_run_on_the_cluster(address: str, tmp_path: Path):
-    runs = tmp_path / "runs"
-    jobs = [bad_job(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(3)]
-    (tmp_path / "jobs").write_bytes(pickle.dumps(jobs))
-    program = [sys.executable, str(Path(__file__).with_name("pool_program.py")), str(tmp_path / "jobs"), address]
-    with worker(tmp_path, address, threads=2) as process:
-        with subprocess.Popen(program) as command:
-            try:
-                until(lambda: len(list(runs.glob(".*/signals.tail"))) == 2)
-                below = servers(process)
-                assert len(below) == 2
-            finally:
-                command.kill()
-        until(lambda: not any(map(lives, below)))
-        until(lambda: list(runs.iterdir()) == [])
-
-
 def test_a_cluster_without_workers_is_refused(address: str):
     with (
         pytest.raises(PoolError, match=f"{address} has no workers; `dask worker {address}` starts some"),
         connect_cluster(address),
     ):
         pass
+
+
+@pytest.fixture(scope="module")
+def nanny(address: str, tmp_path_factory: pytest.TempPathFactory) -> Generator[int, None, None]:
+    """The process that has started a worker of two threads."""
+    with worker(tmp_path_factory.mktemp("worker"), address, threads=2) as process:
+        yield process
+
+
+def test_threads_of_a_worker_execute_runs_in_parallel(address: str, nanny: int, tmp_path: Path):
+    runs = tmp_path / "runs"
+    jobs = [job(runs, f"run_{i}", seed=i) for i in range(4)]
+    jobs.append(bad_job(runs, "Crashes", tmp_path))
+    with connect_cluster(scheduler_address(address.removeprefix("tcp://"))) as pool:
+        assert pool.workers == 2
+        pool.check(runs)
+        results = [(result.name, result.lost) for result in pool.run_jobs(jobs)]
+        assert len(servers(nanny)) == 2
+    assert sorted(results) == [("bad", ""), *((f"run_{i}", "") for i in range(4))]
+    assert servers(nanny) == []  # though the cluster lives on
+
+
+def test_a_command_that_is_killed_leaves_no_run_on_the_cluster(address: str, nanny: int, tmp_path: Path):
+    runs = tmp_path / "runs"
+    jobs = [bad_job(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(3)]
+    (tmp_path / "jobs").write_bytes(pickle.dumps(jobs))
+    program = [sys.executable, str(Path(__file__).with_name("pool_program.py")), str(tmp_path / "jobs"), address]
+    with subprocess.Popen(program) as command:
+        try:
+            until(lambda: len(list(runs.glob(".*/signals.tail"))) == 2)
+            below = servers(nanny)
+            assert len(below) == 2
+        finally:
+            command.kill()
+    until(lambda: not any(map(lives, below)))
+    until(lambda: list(runs.iterdir()) == [])
 
 
 def test_a_worker_of_another_version_is_refused(address: str, tmp_path: Path):
@@ -92,10 +97,11 @@ def test_a_worker_without_this_package_is_refused(address: str, tmp_path: Path):
         pool.check(tmp_path)
 
 
+@pytest.mark.usefixtures("nanny")
 def test_a_worker_that_does_not_see_the_folder_is_refused(
     address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    with worker(tmp_path, address), connect_cluster(address) as pool:
+    with connect_cluster(address) as pool:
         (tmp_path / "here").mkdir()
         monkeypatch.chdir(tmp_path / "here")
         with pytest.raises(
@@ -105,14 +111,13 @@ def test_a_worker_that_does_not_see_the_folder_is_refused(
         assert list((tmp_path / "here").iterdir()) == []
 
 
-def test_workers_that_are_killed_are_replaced(address: str, tmp_path: Path):
+def test_workers_that_are_killed_are_replaced(address: str, nanny: int, tmp_path: Path):
     runs = tmp_path / "runs"
-    with worker(tmp_path, address) as process, connect_cluster(address) as pool:
+    with connect_cluster(address) as pool:
         names: list[str] = []
         for result in pool.run_jobs([job(runs, f"run_{i}", seed=i) for i in range(4)]):
             if not names:
-                (server,) = servers(process)
-                os.kill(parent(server), signal.SIGKILL)
+                os.kill(parent(servers(nanny)[0]), signal.SIGKILL)
             assert result.lost == ""
             names.append(result.name)
     assert sorted(names) == [f"run_{i}" for i in range(4)]

@@ -1,68 +1,78 @@
-"""A campaign of 60 runs loses and repeats no run when a worker or its command is killed."""
+"""A campaign loses and repeats no run when a worker or its command is killed."""
 
 import signal
 from pathlib import Path
 
 import pytest
-from clusters import scheduler, worker
-from sweep_process import ended, runs_in, sweeping, wait_for, without_times, workers_of
+from native_units import native_fmu
+from support.campaigns import carried_out, short_plan
+from support.clusters import scheduler, worker
+from support.sweep_process import ended, runs_in, sweeping, wait_for, without_times, workers_of
 
+from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.table import CampaignTable
 
 pytestmark = pytest.mark.slow
 
-OF_EACH = ["helix_handover", "alpha=0.1:0.4:6", "--seed", "7", "-p", "patience=1", "--no-report", "--repeat"]
-CALL = [*OF_EACH, "10"]
+POINTS, REPETITIONS = 4, 4
+RUNS = POINTS * REPETITIONS
 
 
 @pytest.fixture(scope="module")
-def worker_killed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A campaign by workers that a user has started, one of which was killed; its runs until then were not repeated."""
-    folder = tmp_path_factory.mktemp("cluster")
-    out = folder / "c"
+def call() -> list[str]:
+    """What is given to `handover sweep`: runs of half a second in which a unit computes nothing for long."""
+    fmu = str(native_fmu("mass"))
+    return [fmu, f"m=1:4:{POINTS}", "-p", "f=1", "--repeat", str(REPETITIONS), "--pace", "2", "--no-report"]
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    plan = short_plan(points=[{"m": str(m)} for m in range(1, POINTS + 1)], repetitions=REPETITIONS)
+    return carried_out(plan, tmp_path_factory.mktemp("undisturbed") / "c").path
+
+
+def expect_whole(out: Path, undisturbed: Path) -> None:
+    """Expect each run once, as without disturbance, and nothing besides."""
+    table = CampaignTable.read(out)
+    assert len(table) == len(set(table.column("run"))) == len(set(table.column("seed"))) == RUNS
+    assert set(table.column("status")) == {"done"}
+    assert {p.name for p in (out / "runs").iterdir()} == set(table.column("run"))
+    assert without_times(out) == without_times(undisturbed)
+
+
+def test_a_worker_that_is_killed_costs_no_run(call: list[str], undisturbed: Path, tmp_path: Path):
+    """Of a cluster that the user runs."""
+    out = tmp_path / "c"
     with (
-        scheduler(folder) as address,
-        worker(folder, address) as nanny,
-        worker(folder, address),
-        sweeping(*CALL, "--scheduler", address, "--out", out) as going,
+        scheduler(tmp_path) as address,
+        worker(tmp_path, address) as nanny,
+        worker(tmp_path, address),
+        sweeping(*call, "--scheduler", address, "--out", out) as going,
     ):
-        wait_for(lambda: len(runs_in(out)) >= 15, going)
+        wait_for(lambda: len(runs_in(out)) >= RUNS // 4, going)
         before = runs_in(out)
         workers_of(nanny)[0].kill()
         status, _, errors = ended(going)
     assert status == 0, errors
     assert before.items() <= runs_in(out).items()
-    return out
+    expect_whole(out, undisturbed)
 
 
-def test_a_worker_that_is_killed_costs_no_run(worker_killed: Path, tmp_path: Path):
-    table = CampaignTable.read(worker_killed)
-    assert len(table) == len(set(table.column("run"))) == len(set(table.column("seed"))) == 60
-    assert set(table.column("status")) == {"done"}
-    assert set(runs_in(worker_killed)) == set(table.column("run"))
-    assert list((worker_killed / "runs").glob(".*")) == []
-    with sweeping(*OF_EACH, "2", "--workers", "2", "--out", tmp_path / "undisturbed") as going:
-        status, _, errors = ended(going)
-    assert status == 0, errors
-    first = [row for row in without_times(worker_killed) if row["repetition"] < 2]
-    assert without_times(tmp_path / "undisturbed") == first
-
-
-def test_a_command_that_is_killed_goes_on_with_the_same_call(worker_killed: Path, tmp_path: Path):
+def test_a_command_that_is_killed_goes_on_with_the_same_call(call: list[str], undisturbed: Path, tmp_path: Path):
+    """And as it goes on, one of its workers is killed."""
     out = tmp_path / "c"
-    with sweeping(*CALL, "--workers", "2", "--out", out) as going:
-        wait_for(lambda: len(runs_in(out)) >= 25, going)
+    with sweeping(*call, "--workers", "2", "--out", out) as going:
+        wait_for(lambda: len(runs_in(out)) >= RUNS // 4 and CampaignFolder(out).table.exists(), going)
         going.send_signal(signal.SIGKILL)
         going.wait()
     before = runs_in(out)
-    assert 25 <= len(before) < 60
+    assert RUNS // 4 <= len(before) < RUNS
     assert len(CampaignTable.read(out)) <= len(before)
-    with sweeping(*CALL, "--workers", "2", "--out", out) as going:
-        wait_for(lambda: len(runs_in(out)) >= 40, going)
+    with sweeping(*call, "--workers", "2", "--out", out) as going:
+        wait_for(lambda: len(runs_in(out)) >= RUNS // 2, going)
         workers_of(going.pid)[0].kill()
         status, value, errors = ended(going)
     assert status == 0, errors
-    assert "60 of 60 runs done" in value
+    assert f"{RUNS} of {RUNS} runs done" in value
     assert before.items() <= runs_in(out).items()
-    assert without_times(out) == without_times(worker_killed)
-    assert list((out / "runs").glob(".*")) == []
+    expect_whole(out, undisturbed)

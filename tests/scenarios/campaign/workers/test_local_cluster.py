@@ -55,7 +55,7 @@ def test_all_are_answered_and_one_that_fails_ends_no_other(pool: WorkerPool, run
 
 
 def test_a_killed_worker_is_replaced_and_its_run_begun_anew(pool: WorkerPool, runs: Path):
-    jobs = [job(runs, f"run_{i}", seed=i) for i in range(8)]
+    jobs = [job(runs, f"run_{i}", seed=i) for i in range(4)]
     names: list[str] = []
     for result in pool.run_jobs(jobs):
         if not names:
@@ -64,7 +64,7 @@ def test_a_killed_worker_is_replaced_and_its_run_begun_anew(pool: WorkerPool, ru
             until(lambda: not lives(server))  # noqa: B023 (awaited here)
         names.append(result.name)
         assert result.lost == ""
-    assert sorted(names) == sorted(p.name for p in runs.iterdir()) == [f"run_{i}" for i in range(8)]
+    assert sorted(names) == sorted(p.name for p in runs.iterdir()) == [f"run_{i}" for i in range(4)]
 
 
 def test_a_run_that_always_takes_its_worker_with_it_is_given_up(pool: WorkerPool, runs: Path, tmp_path: Path):

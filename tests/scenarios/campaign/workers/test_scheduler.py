@@ -1,14 +1,20 @@
 """Schedulers that cannot be used are reported in one line, before anything is sent to them."""
 
 import asyncio
+import contextlib
 import socket
 import threading
 from collections.abc import Generator
 from pathlib import Path
 
 import pytest
-from clusters import closed_port, scheduler
+from support.clusters import closed_port, scheduler
+from support.in_process_pool import InProcessPool
 
+from handover.scenarios.campaign import local_cluster
+from handover.scenarios.campaign import scheduler as of_scheduler
+from handover.scenarios.campaign.cluster import call_with_timeout
+from handover.scenarios.campaign.pool_config import PoolConfig
 from handover.scenarios.campaign.scheduler import scheduler_address
 from handover.scenarios.execution.errors import PoolError
 
@@ -81,3 +87,51 @@ def test_a_scheduler_is_found_from_where_an_event_loop_runs(tmp_path: Path):
 
     with scheduler(tmp_path) as address:
         assert asyncio.run(ask(address.removeprefix("tcp://"))) == address
+
+
+@pytest.mark.parametrize("checked", [True, False], ids=["checked", "unchecked"])
+def test_workers_are_those_of_the_scheduler_that_has_answered(checked: bool, monkeypatch: pytest.MonkeyPatch):
+    asked: list[str] = []
+
+    def result(text: str) -> str:
+        asked.append(text)
+        return f"tcp://{text}"
+
+    @contextlib.contextmanager
+    def connect_cluster(address: str) -> Generator[InProcessPool, None, None]:
+        asked.append(address)
+        yield InProcessPool()
+
+    monkeypatch.setattr(of_scheduler, "scheduler_address", result)
+    monkeypatch.setattr(local_cluster, "connect_cluster", connect_cluster)
+    config = PoolConfig(scheduler="h:1")
+    if checked:
+        config.check()
+    with config.start():
+        assert asked == ["h:1", "tcp://h:1"]
+    assert str(config) == "the workers of h:1"
+
+
+@pytest.fixture
+def never() -> Generator[threading.Event, None, None]:
+    """An event that is not set until the end of the test."""
+    event = threading.Event()
+    yield event
+    event.set()
+
+
+def test_it_is_called_in_another_thread():
+    assert call_with_timeout(threading.get_ident, 60.0) != threading.get_ident()
+
+
+def test_what_it_raises_is_raised_in_the_caller():
+    def ask() -> None:
+        raise ValueError("no such worker")
+
+    with pytest.raises(ValueError, match="no such worker"):
+        call_with_timeout(ask, 60.0)
+
+
+def test_a_call_without_an_answer_times_out(never: threading.Event):
+    with pytest.raises(TimeoutError, match=r"^no answer within 0\.1 s$"):
+        call_with_timeout(lambda: never.wait(60.0), 0.1)

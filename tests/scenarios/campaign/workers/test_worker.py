@@ -1,5 +1,7 @@
 """A worker of a cluster executes only jobs whose results are still wanted."""
 
+import logging
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +10,7 @@ from distributed import Client
 from sample_jobs import job
 
 from handover.scenarios.campaign import worker
+from handover.scenarios.campaign.run_job import run_job
 from handover.scenarios.campaign.worker import ServerProcess
 from handover.scenarios.results.run_folder import versions
 
@@ -35,3 +38,18 @@ def test_a_job_of_a_batch_that_has_been_ended_starts_no_server(tmp_path: Path, m
         assert lost(client, "wanted") == "it was ended, as nobody waited for it"
         assert len(started) == 1
     assert [p.name for p in (tmp_path / "runs").iterdir()] == ["run"]
+
+
+def test_units_of_ours_tell_of_their_calls(tmp_path: Path, caplog: pytest.LogCaptureFixture):
+    """What Python's logging takes is for every program that uses the library."""
+    with caplog.at_level(logging.DEBUG, logger="handover"):
+        run_job(job(tmp_path / "runs", "r", "strategy=blind"), tmp_path / "runs" / "r")
+    lines = [record.getMessage() for record in caplog.records if record.name == "handover.units"]
+    assert "scene: [OK] fmi3EnterInitializationMode: initialising at t = 0 s" in lines
+    assert any("fmi3Terminate: ends at t" in line for line in lines), lines
+
+
+def test_a_campaign_s_runs_tell_in_their_logs(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    of_campaign = job(tmp_path / "runs", "r", "strategy=blind")
+    run_job(replace(of_campaign, log_level="info"), tmp_path / "runs" / "r")
+    assert "info: units are stepped to t = " in capsys.readouterr().err

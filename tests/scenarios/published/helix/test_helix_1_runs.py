@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from helix_1_rows import table_of
-from in_process_pool import InProcessPool
+from support.in_process_pool import InProcessPool
 from support.kept_runs import kept_run
 
 from handover.scenarios.campaign.campaign import run_campaign

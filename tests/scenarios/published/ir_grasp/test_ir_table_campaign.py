@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from in_process_pool import InProcessPool
+from support.in_process_pool import InProcessPool
 
 from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.campaign import run_campaign

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from in_process_pool import InProcessPool
+from support.in_process_pool import InProcessPool
 
 from handover.controllers.vsl.paths import Path as TipPath
 from handover.cosim.record.reader import Record

@@ -1,46 +1,34 @@
-"""Campaigns for tests of their pages: real ones, and made-up tables."""
+"""Campaigns without processes of their own: real ones, and made-up tables for tests of pages."""
 
 import json
-from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
+from native_units import native_fmu
 
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.results import CampaignResults
-from handover.scenarios.campaign.run_job import run_job
 from handover.scenarios.campaign.table import CampaignTable
-from handover.scenarios.campaign.worker_pool import JobResult, RunJob
+from support.in_process_pool import InProcessPool
 
 
-@dataclass
-class PlainPool:
-    """Executes runs one after another in this process, and loses those that are named."""
-
-    lost: Sequence[str] = ()
-
-    def check(self, folder: Path) -> None:
-        assert folder.is_dir()
-
-    def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
-        for job in jobs:
-            if job.name in self.lost:
-                yield JobResult(name=job.name, lost="its worker went away")
-                continue
-            run_job(job, Path(job.runs, job.name))
-            yield JobResult(name=job.name)
+def short_plan(**given: Any) -> CampaignPlan:
+    """Return the plan of runs that take hundredths of a second: a mass of 1 kg, and one of 2 kg, is pushed for 1 s."""
+    whole: dict[str, Any] = {"points": [{"m": "1"}, {"m": "2"}], "fixed": {"f": "1"}, **given}
+    return CampaignPlan(scenario=str(native_fmu("mass")), **whole)
 
 
 def carried_out(plan: CampaignPlan, path: Path, lost: Sequence[str] = ()) -> CampaignFolder:
     """Run a campaign and return its folder."""
     folder = CampaignFolder(path)
-    run_campaign(prepared(plan), folder, PlainPool(lost), lambda _tally: None)
+    pool = InProcessPool(lambda job: "its worker went away" if job.name in lost else "")
+    run_campaign(prepared(plan), folder, pool, lambda _tally: None)
     return folder
 
 

@@ -1,8 +1,6 @@
 """Campaigns by the command `handover sweep` in processes of their own, for tests that interrupt or kill them."""
 
 import contextlib
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Generator
 from pathlib import Path
@@ -11,36 +9,27 @@ from typing import Any
 import psutil
 
 from handover.scenarios.campaign.table import CampaignTable
+from support.commands import Command, Ended
 
-_ENTRY = [sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()"]
-SweepProcess = subprocess.Popen[str]
+SweepProcess = Command
 
 
 @contextlib.contextmanager
-def sweeping(*arguments: str | Path) -> Generator[SweepProcess, None, None]:
+def sweeping(*arguments: str | Path) -> Generator[Command, None, None]:
     """Start `handover sweep`; at the end it and what it started are ended."""
-    call = [*_ENTRY, "sweep", *map(str, arguments)]
-    sweep = subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    sweep = Command("sweep", *arguments)
     try:
         yield sweep
     finally:
-        end(sweep)
+        if sweep.poll() is None:
+            for process in (psutil.Process(sweep.pid), *psutil.Process(sweep.pid).children(recursive=True)):
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    process.kill()
 
 
-def ended(sweep: SweepProcess) -> tuple[int, str, str]:
+def ended(sweep: SweepProcess) -> Ended:
     """Wait for the end of a command; return its status and what it printed."""
-    out, errors = sweep.communicate(timeout=600)
-    return sweep.returncode, out, errors
-
-
-def end(sweep: "subprocess.Popen[Any]") -> None:
-    """End a process and its descendants."""
-    if sweep.poll() is None:
-        family = [psutil.Process(sweep.pid), *psutil.Process(sweep.pid).children(recursive=True)]
-        for process in family:
-            with contextlib.suppress(psutil.NoSuchProcess):
-                process.kill()
-    sweep.wait()
+    return sweep.wait(600.0)
 
 
 def workers_of(process: int) -> list[psutil.Process]:
@@ -56,12 +45,12 @@ def runs_in(folder: Path) -> dict[str, tuple[int, int]]:
     return {name: (stat.st_ino, stat.st_mtime_ns) for name, stat in stats.items()}
 
 
-def wait_for(condition: Callable[[], Any], sweep: SweepProcess) -> None:
+def wait_for(condition: Callable[[], Any], sweep: Command) -> None:
     """Wait until a condition is true, while a command runs."""
     deadline = time.monotonic() + 300
     while not condition():
-        assert sweep.poll() is None, sweep.communicate()
-        assert time.monotonic() < deadline
+        assert sweep.poll() is None, sweep.wait()
+        assert time.monotonic() < deadline, sweep.errors_file.read_text()
         time.sleep(0.05)
 
 

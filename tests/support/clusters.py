@@ -35,7 +35,7 @@ def scheduler(folder: Path) -> Generator[str, None, None]:
     text = folder / "scheduler.json"
     command = ["scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(text)]
     with running(folder, *command) as process:
-        until(lambda: (text.exists() and text.read_text().endswith("}")) or process.poll() is not None)
+        until(lambda: (text.exists() and text.read_text().endswith("}")) or process.poll() is not None, 300.0)
         yield json.loads(text.read_text())["address"]
 
 
@@ -49,7 +49,7 @@ def worker(folder: Path, address: str, threads: int = 1, **environment: str) -> 
     with Client(address, set_as_default=False) as client:
         there = len(cast("dict[str, int]", client.nthreads()))
         with running(folder, *command, **environment) as process:
-            client.wait_for_workers(there + 1, timeout=60)
+            client.wait_for_workers(there + 1, timeout=300)
             yield process.pid
 
 

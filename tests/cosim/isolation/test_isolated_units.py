@@ -1,0 +1,273 @@
+"""Isolated units step at the same time, log, take CPU time and share pictures; those in Python find one."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+
+import pytest
+from both_paths import PLAIN
+from fmu_of import FmuOf
+from native_units import native_fmu
+
+from handover.cosim.exceptions import InvalidFmu, UnitFailure
+from handover.cosim.fmu.failures import UnitError
+from handover.cosim.fmu.heartbeat import Heartbeat
+from handover.cosim.isolation import unit_process
+from handover.cosim.master.master import Master
+from handover.cosim.stepping.options import Algorithm, MasterOptions
+from handover.cosim.system.signals import Signals
+from handover.cosim.system.system import System
+from handover.fmus import interpreter
+
+COMPILED = pytest.mark.parametrize("compiled", [False, True], ids=["general", "plan"])
+algorithms = pytest.mark.parametrize("algorithm", PLAIN)
+
+
+@COMPILED
+@algorithms
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("isolated", [("all",), ("first",)])
+def test_two_units_meet_in_their_steps(
+    isolated: tuple[str, ...], fmi: int, algorithm: Algorithm, compiled: bool, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+):  # fmt: skip
+    """In one process neither would ever return; one of them may be in this process, while the other one steps."""
+    monkeypatch.setenv("MEETING_FOLDER", str(tmp_path))
+    s = System()
+    first, second = s.add("first", native_fmu("meets", fmi), who=0), s.add("second", native_fmu("meets", fmi), who=1)
+    third = s.add("third", native_fmu("hub", fmi))
+    s.connect(first.y.y, third.u.u1)
+    s.connect(second.y.y, third.u.u2)
+    with Master(s, MasterOptions(algorithm=algorithm, compiled=compiled, isolated=isolated)) as master:
+        master.run(Fraction(1, 2))
+        assert [int(master.signals[f"{name}.n"]) for name in ("first", "second")] == [5, 5]
+
+
+def test_with_events_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("MEETING_FOLDER", str(tmp_path))
+    s = System()
+    for who, name in enumerate(("first", "second")):
+        s.add(name, native_fmu("meets"), who=who)
+    with Master(s, MasterOptions(isolated=("all",), repeat_discarded=True)) as master:
+        master.run(Fraction(1, 2))
+        assert [int(master.signals[f"{name}.n"]) for name in ("first", "second")] == [5, 5]
+
+
+@COMPILED
+@algorithms
+@pytest.mark.parametrize("isolated", [("all",), ("first",), ("second",), ("first", "third")])
+def test_of_two_failures_that_of_one_process_is_raised(
+    isolated: tuple[str, ...], algorithm: Algorithm, compiled: bool
+):  # fmt: skip
+    """Three units, of which the last two fail in the same step."""
+    failures: list[UnitFailure] = []
+    for which in ((), isolated):
+        s = System()
+        s.add("first", native_fmu("gain"))
+        s.add("second", native_fmu("errs"))
+        s.add("third", native_fmu("errs"))
+        with (
+            pytest.raises(UnitError) as caught,
+            Master(s, MasterOptions(algorithm=algorithm, compiled=compiled, isolated=which)) as master,
+        ):
+            master.run(Fraction(1))
+        failures.append(caught.value)
+    assert failures[0].as_data() == failures[1].as_data()
+    assert failures[0].unit == "second"
+
+
+STEPS = 10
+WAYS = [(algorithm, compiled) for algorithm in (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL) for compiled in (False, True)]
+
+
+def cpu_seconds(fmi: int, isolated: tuple[str, ...], algorithm: Algorithm, compiled: bool) -> dict[str, float]:
+    """Return the CPU time of a heavy unit's steps and of a light one's that it feeds."""
+    system = System()
+    heavy = system.add("heavy", native_fmu("heavy", fmi), work=500)
+    light = system.add("light", native_fmu("heavy", fmi), work=0)
+    system.connect(heavy.y.y, light.u.u)
+    options = MasterOptions(algorithm=algorithm, compiled=compiled, isolated=isolated, cpu_times=True)
+    with Master(system, options) as master:
+        master.run(Fraction(STEPS, 10))
+        cpu = master.cpu
+        assert {name: len(spent) for name, spent in cpu.items()} == dict.fromkeys(("heavy", "light"), STEPS)
+        return {name: sum(spent) for name, spent in cpu.items()}
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(("algorithm", "compiled"), WAYS)
+def test_cpu_time_of_an_isolated_unit_counts(fmi: int, algorithm: Algorithm, compiled: bool):
+    here = cpu_seconds(fmi, (), algorithm, compiled)
+    alone = cpu_seconds(fmi, ("all",), algorithm, compiled)
+    assert here["heavy"] > 0.01
+    assert 0.4 * here["heavy"] < alone["heavy"] < 2.5 * here["heavy"]
+    assert alone["light"] < 0.2 * alone["heavy"]
+
+
+def test_the_same_where_steps_may_end_anywhere():
+    options = MasterOptions(isolated=("heavy",), cpu_times=True, repeat_discarded=True)
+    system = System()
+    system.add("heavy", native_fmu("heavy"), work=500)
+    with Master(system, options) as master:
+        master.run(Fraction(STEPS, 10))
+        assert sum(master.cpu["heavy"]) > 0.01
+
+
+class Listener(Heartbeat):
+    """Keeps all lines."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.lines: list[str] = []
+
+    def log(self, unit: str, message: str) -> None:
+        self.lines.append(f"{unit}: {message}")
+
+
+def heard(fmi: int, lines: int, *isolated: str) -> list[str]:
+    s, listener = System(), Listener()
+    s.add("talks", native_fmu("talks", fmi), lines=lines)
+    with Master(s, MasterOptions(isolated=isolated), listener) as master:
+        master.run(Fraction(1, 5))
+    return listener.lines
+
+
+@pytest.mark.parametrize(("lines", "fmi"), [(1, 2), (2000, 3)])
+def test_every_line_is_heard(lines: int, fmi: int):
+    """2,000 lines are more than the memory for the log holds."""
+    all_lines = heard(fmi, lines, "talks")
+    assert all_lines == heard(fmi, lines)
+    assert len(all_lines) == 2 * lines
+    assert all_lines[-1] == f"talks: [Warning] line {lines} of {lines} of the step from t = 0.1 s"
+
+
+in_proc = pytest.mark.skipif(sys.platform != "linux", reason="looks for files in memory in /proc")
+
+PHOTO = 640 * 480 * 3
+
+
+def seen(fmu: FmuOf, options: MasterOptions) -> tuple[list[object], list[int]]:
+    """Run a camera and a viewer; return what was seen, and the bytes of memory that units share with this process."""
+    s = System()
+    camera, viewer = s.add("camera", fmu("Camera"), period=Fraction(1, 10)), s.add("viewer", fmu("Viewer"))
+    s.connect(camera.y.photo, viewer.u.photo)
+    rows: list[object] = []
+    before = set(shared_memory())
+    with Master(s, options) as master:
+        names = ("camera.photo", "viewer.weight")
+        master.run(Fraction(1), [lambda t, y: rows.append((t, *(y[name].tobytes() for name in names)))])
+        shared = [size for file, size in shared_memory().items() if file not in before]
+    return rows, shared
+
+
+def shared_memory() -> dict[tuple[int, int], int]:
+    """Return how many bytes are used of each file in memory that this process has open."""
+    found: dict[tuple[int, int], int] = {}
+    for entry in Path("/proc/self/fd").iterdir():
+        try:
+            if os.readlink(entry).startswith("/memfd:unit"):
+                about = entry.stat()
+                found[about.st_dev, about.st_ino] = about.st_blocks * 512
+        except FileNotFoundError:  # the list's own
+            continue
+    return found
+
+
+@pytest.fixture(scope="module")
+def together(fmu: FmuOf) -> Callable[[Algorithm], list[object]]:
+    """Return what is seen in one process."""
+
+    @cache
+    def rows(algorithm: Algorithm) -> list[object]:
+        return seen(fmu, MasterOptions(algorithm=algorithm))[0]
+
+    return rows
+
+
+@in_proc
+@pytest.mark.parametrize(
+    ("algorithm", "compiled"),
+    [
+        (Algorithm.GAUSS_SEIDEL, True),
+        (Algorithm.JACOBI, False),
+        pytest.param(Algorithm.GAUSS_SEIDEL, False, marks=pytest.mark.slow),
+        pytest.param(Algorithm.JACOBI, True, marks=pytest.mark.slow),
+    ],
+)
+def test_a_picture_lies_in_the_camera_s_memory_alone(
+    fmu: FmuOf, together: Callable[[Algorithm], list[object]], algorithm: Algorithm, compiled: bool
+):
+    options = MasterOptions(algorithm=algorithm, compiled=compiled, isolated=("all",))
+    rows, (of_camera, of_viewer) = seen(fmu, options)
+    assert rows == together(algorithm)
+    assert 2 * PHOTO <= of_camera < 4 * PHOTO  # the one that the master holds, the next, and room for larger ones
+    assert of_viewer < PHOTO / 2
+
+
+@pytest.mark.parametrize("isolated", ["camera", "viewer"])
+def test_one_of_them_may_be_in_this_process(fmu: FmuOf, together: Callable[[Algorithm], list[object]], isolated: str):
+    options = MasterOptions(isolated=(isolated,))
+    assert seen(fmu, options)[0] == together(options.algorithm)
+
+
+_SOURCE = """
+import numpy
+from {package} import Fmi{fmi}Causality, Fmi{fmi}Slave, {real}
+
+class Doubling(Fmi{fmi}Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.y = 0.0
+        self.register_variable({real}("y", causality=Fmi{fmi}Causality.output))
+
+    def do_step(self, current_time, step_size):
+        self.y = float(numpy.float64(2.0) * (current_time + step_size))
+        return True
+"""
+
+
+@pytest.fixture(scope="module", params=[2, 3])
+def doubling(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The FMU of a class in Python, by pythonfmu or pythonfmu3."""
+    fmi: int = request.param
+    package, real = ("pythonfmu", "Real") if fmi == 2 else ("pythonfmu3", "Float64")
+    pytest.importorskip(package)
+    folder = tmp_path_factory.mktemp(package)
+    source = folder / "doubling.py"
+    source.write_text(_SOURCE.format(package=package, fmi=fmi, real=real))
+    command = [sys.executable, "-m", package, "build", "-f", str(source), "-d", str(folder)]
+    done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    return folder / "Doubling.fmu"
+
+
+def isolated(fmu: Path) -> Master:
+    system = System()
+    system.add("unit", fmu, period=Fraction(1, 10))
+    return Master(system, MasterOptions(isolated=("unit",)))
+
+
+@pytest.mark.skipif(not interpreter.library(), reason="this Python has no shared library")
+@pytest.mark.parametrize("path", ["as it is", "of another Python"])
+def test_it_runs_with_this_python(doubling: Path, path: str, monkeypatch: pytest.MonkeyPatch):
+    if path == "of another Python":  # as where the virtual environment is not activated
+        monkeypatch.setenv("PATH", "/usr/bin:/bin")
+    rows: list[tuple[float, float]] = []
+
+    def observe(t: float, signals: Signals) -> None:
+        rows.append((t, float(signals["unit.y"])))
+
+    with isolated(doubling) as master:
+        master.run(Fraction(1, 2), [observe])
+    assert rows == [(t, pytest.approx(2.0 * t)) for t in (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)]
+
+
+def test_where_this_python_has_no_library_cause_and_cure_are_told(doubling: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(unit_process, "_libpython", lambda: "")
+    with pytest.raises(InvalidFmu, match=r"it uses Python \(_?Py\w+\), but names no library of Python") as told:
+        isolated(doubling).__enter__()
+    assert "Cure: run it without isolation, or install Debian's libpython3" in str(told.value)
