@@ -108,11 +108,10 @@ class CampaignResults:
 
     def is_number(self, parameter: str) -> bool:
         """Whether a parameter is a number, neither an array nor a name."""
-        variable = self.declared.get(parameter)
-        if variable is None:  # of a unit: by what its values look like
-            given = (*self._values, self.metadata["fixed"])
-            return all(is_number(values[parameter]) for values in given if parameter in values)
-        return variable.kind in (Kind.REAL, Kind.INTEGER) and not variable.shape
+        variable = self.declared.get(parameter)  # of a unit there is none: its values tell
+        may_be = variable is None or (variable.kind in (Kind.REAL, Kind.INTEGER) and not variable.shape)
+        given = (*self._values, self.metadata["fixed"])
+        return may_be and all(is_number(values[parameter]) for values in given if parameter in values)
 
     def is_boolean(self, parameter: str) -> bool:
         """Whether a parameter is true or false; of a scenario that is not to be had here, by what its values are."""
@@ -248,7 +247,14 @@ def _is_array(text: str) -> bool:
 DEFAULTS = "nothing changed"
 """Label of a point at which no varied parameter is set."""
 
-_COLUMNS = ("run", "point", "repetition", "seed", "status", "success", "reason", "cpu_seconds", "wall_seconds")
+_TEXT, _WHOLE, _NUMBER, _TRUTH = "texts", "whole numbers", "numbers", "true and false"
+_COLUMNS = {
+    **dict.fromkeys(("run", "status", "reason"), _TEXT),
+    **dict.fromkeys(("point", "repetition", "seed"), _WHOLE),
+    **dict.fromkeys(("cpu_seconds", "wall_seconds"), _NUMBER),
+    "success": _TRUTH,
+}
+"""What the columns of all tables hold."""
 
 
 def read_results(folder: CampaignFolder) -> CampaignResults:
@@ -260,8 +266,14 @@ def read_results(folder: CampaignFolder) -> CampaignResults:
     content = folder.read()
     table = CampaignTable.read(folder.table)
     missing = [name for name in _COLUMNS if name not in table.table.column_names]
-    if missing:
-        raise InvalidRunFolder(
-            folder.path, f"its {folder.table.name} is damaged: it has no column {', '.join(missing)}"
-        )
+    faults = [f"it has no column {', '.join(missing)}"] if missing else []
+    wanted = {**_COLUMNS, **dict.fromkeys(table.metrics, _NUMBER)}
+    wrong = [name for name, kind in wanted.items() if name not in missing and not table.holds(name, kind)]
+    faults += [f"its column {name!r:.60} does not hold {wanted[name]}" for name in wrong[:_MAX_NAMED]]
+    if faults:
+        raise InvalidRunFolder(folder.path, f"its {folder.table.name} is damaged: {'; '.join(faults)}")
     return CampaignResults(content, table)
+
+
+_MAX_NAMED = 5
+"""Columns that a fault names."""

@@ -19,6 +19,8 @@ from handover.scenarios.results.folder_data import Summary
 from handover.scenarios.results.run_folder import InvalidRunFolder
 from handover.scenarios.results.summary import metric_of
 
+_LONGEST_NAME = 255
+"""Characters of a folder's name."""
 _REMEDY = "run the campaign's command again to rewrite it"
 
 
@@ -50,7 +52,8 @@ class CampaignTable:
             fault = e.fault if isinstance(e, InvalidRecord) else one_line(e)
             raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {fault}; {_REMEDY}") from e
         for name in table.column("run") if "run" in table.table.column_names else ():
-            if not isinstance(name, str) or name.startswith(".") or safe_name(name) != name:  # not in the folder
+            is_name = isinstance(name, str) and not name.startswith(".") and safe_name(name) == name
+            if not is_name or len(name) > _LONGEST_NAME:  # not in the folder
                 raise InvalidRunFolder(file.parent, f"its {file.name} is damaged: {name!r:.60} is no run's name")
         return table
 
@@ -87,6 +90,17 @@ class CampaignTable:
         values = np.empty(len(column), dtype=object)
         values[:] = column.to_pylist()
         return values
+
+    def holds(self, name: str, kind: str) -> bool:
+        """Return whether a column holds `texts`, `numbers`, `whole numbers`, all of them given, or `true and false`."""
+        is_whole = pa.types.is_integer(self._kind(name))
+        fits = {
+            "texts": pa.types.is_string(self._kind(name)),
+            "numbers": is_whole or pa.types.is_floating(self._kind(name)),
+            "whole numbers": is_whole and self.table.column(name).null_count == 0,
+            "true and false": pa.types.is_boolean(self._kind(name)),
+        }
+        return fits[kind] or (pa.types.is_null(self._kind(name)) and kind != "whole numbers") or not len(self)
 
     def unit(self, name: str) -> str:
         """Return the unit of a column, "1" where it has none.

@@ -1,5 +1,6 @@
 """Errors that end a command: shown in one line, without a traceback, each with its exit status."""
 
+import errno
 from collections.abc import Generator
 from contextlib import contextmanager
 
@@ -83,6 +84,10 @@ def one_line_errors() -> Generator[None, None, None]:
         raise UsageError(str(e).replace("\n", " ", 1)) from e
     except ImportError as e:
         raise missing_package(e) from e
+    except OSError as e:
+        if e.errno != errno.ENAMETOOLONG:
+            raise
+        raise UsageError(f"{e.filename!s:.60}...: the name is longer than this system takes") from e
 
 
 def require_extra(extra: str, what: str, way_out: str = "") -> None:

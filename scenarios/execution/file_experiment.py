@@ -4,6 +4,7 @@ The metrics of such a run are the last value of each signal in its record, of nu
 """
 
 import abc
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -193,8 +194,14 @@ def _metrics(signals: Path, prefix: str) -> dict[str, Metric]:
     ranges: dict[str, Metric] = {}
     for column in columns if rows else ():
         name, unit = column.removeprefix(prefix), about[column]["unit"]
-        found[f"last_{name}"] = Metric(last[column], unit, f"last value of {name}")
+        found[f"last_{name}"] = Metric(last[column], unit, f"last value of {name}{_not_finite(last[column])}")
         if not about[column]["items"] and not pa.types.is_boolean(schema.field(column).type):
-            ranges[f"min_{name}"] = Metric(low[column], unit, f"smallest value of {name}")
-            ranges[f"max_{name}"] = Metric(high[column], unit, f"largest value of {name}")
+            none = "" if np.isfinite(low[column]) else ", none of which is finite"
+            ranges[f"min_{name}"] = Metric(low[column], unit, f"smallest value of {name}{none}")
+            ranges[f"max_{name}"] = Metric(high[column], unit, f"largest value of {name}{none}")
     return {**found, **ranges}
+
+
+def _not_finite(value: float) -> str:
+    """Return that a value, for which a summary has a dash, is no number."""
+    return "" if math.isfinite(value) else ", which is not a number" if math.isnan(value) else ", which is infinite"

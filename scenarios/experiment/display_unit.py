@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike
 _SMALL = ("°", "mm", "mm²", "ms", "g")
 """Units of which less than a thousandth is rarely of interest."""
 
+_NOTHING = 1e-40
+"""Magnitudes in SI units below which a value is shown as 0: no quantity is as small."""
 _MOST_DIGITS = 7
 _LEAST_FIXED, _MOST_FIXED = 1e-4, 1e9
 """Digits after the point at most, and between which magnitudes numbers are written without an exponent."""
@@ -31,12 +33,13 @@ class DisplayUnit:
     def text(self, value: float) -> str:
         """Return a value with its unit, to four digits; small ones of small units to two digits or three decimals.
 
-        So 40.68° stands beside 0.060°, not beside 0.05991°. Below 1e-4 of the unit there is an exponent.
+        So 40.68° stands beside 0.060°, not beside 0.05991°. Below 1e-4 of the unit there is an exponent; what is
+        smaller than any quantity is 0.
         """
         if not math.isfinite(value):
             return "–"
         space = "" if self.symbol.startswith("°") else " "
-        shown = value * self.factor
+        shown = 0.0 if abs(value) < _NOTHING else value * self.factor
         small = self.symbol in _SMALL and _LEAST_FIXED <= abs(shown) < 1.0
         digits = f"{shown:.{max(3, 1 - math.floor(math.log10(abs(shown))))}f}" if small else f"{shown:.4g}"
         return f"{digits}{space}{self.symbol}".rstrip()
@@ -48,7 +51,7 @@ def digits_after_point(values: ArrayLike) -> int:
     It has five if the smallest that is not zero has less than two else. Whole numbers have none, others at most seven.
     """
     magnitudes = np.abs(np.asarray(values, dtype=np.float64))
-    shown = magnitudes[np.isfinite(magnitudes) & (magnitudes > 0.0)]
+    shown = magnitudes[np.isfinite(magnitudes) & (magnitudes >= _NOTHING)]
     if not shown.size or bool((shown == np.rint(shown)).all()):
         return 0
     largest, smallest = (math.floor(math.log10(float(x))) for x in (shown.max(), shown.min()))
@@ -60,7 +63,7 @@ def column_text(value: float, digits: int) -> str:
 
     An exponent have numbers from 1e9 on, and those below 1e-4 in a column of at least six digits.
     """
-    tiny = digits >= _MOST_DIGITS - 1 and 0.0 < abs(value) < _LEAST_FIXED
+    tiny = digits >= _MOST_DIGITS - 1 and _NOTHING <= abs(value) < _LEAST_FIXED
     return f"{value:.3e}" if tiny or abs(value) >= _MOST_FIXED else f"{value:.{digits}f}"
 
 

@@ -13,6 +13,9 @@ from handover.scenarios.film.encoder import film_to
 from handover.scenarios.film.film_page import FilmContent, NotFilmed, film_html, most_plots
 from handover.scenarios.results.run_folder import make_folder_of
 
+_MOST_FRAMES = 200_000
+"""Nearly two hours at 30 frames a second."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class FilmSettings:
@@ -34,8 +37,17 @@ class FilmSettings:
 
 
 def frame_times(begin: float, end: float, settings: FilmSettings) -> Floats:
-    """Return the simulated times of a film's frames, s: evenly spaced from the record's begin, and its end."""
+    """Return the simulated times of a film's frames, s: evenly spaced from the record's begin, and its end.
+
+    Raises:
+        NotFilmed: they are too many.
+    """
     steps = (end - begin) * settings.fps / settings.pace
+    if not steps <= _MOST_FRAMES:
+        faster = f"{(end - begin) * settings.fps / _MOST_FRAMES:.2g}"
+        raise NotFilmed(
+            f"{steps:.3g} frames are too many, at most {_MOST_FRAMES} are right: --pace {faster}, or faster"
+        )
     whole = int(steps * (1.0 + 1e-9))
     times: Floats = begin + np.arange(whole + 1, dtype=np.float64) * (settings.pace / settings.fps)
     return times if steps - whole < 1e-6 * max(steps, 1.0) else np.append(times, end)
@@ -51,7 +63,7 @@ def write_film(content: FilmContent, path: Path, settings: FilmSettings, report:
         report: is called with how many frames are done, and of how many.
 
     Raises:
-        NotFilmed: its plots do not fit, or its scene follows nothing.
+        NotFilmed: its plots do not fit, its frames are too many, or its scene follows nothing.
         NoBrowser, BrowserFailed: it cannot be drawn.
         RecordNotWritten: it cannot be written.
     """

@@ -32,7 +32,10 @@ def replaced(table: CampaignTable, column: str, values: list[Any]) -> CampaignTa
     index = table.table.column_names.index(column)
     whole: Any = table.table
     field = whole.schema.field(index)
-    return CampaignTable(whole.set_column(index, field, pa.array(values, field.type)))
+    made = pa.array(values)
+    fits = made.type == field.type or pa.types.is_null(made.type)
+    kept = field if fits and column != "seed" else pa.field(column, made.type, metadata=field.metadata)
+    return CampaignTable(whole.set_column(index, kept, made.cast(kept.type)))
 
 
 def test_a_campaign_that_is_not_complete_says_how_far_it_is(tmp_path: Path):
@@ -157,6 +160,29 @@ def test_of_a_damaged_folder_nothing_is_written(tmp_path: Path, file: str, conte
     with pytest.raises(InvalidRunFolder, match=fault):
         write_campaign_page(folder)
     assert not folder.report.exists()
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "fault"),
+    [
+        ("seed", ["x"] * 4, "'seed' does not hold whole numbers"),
+        ("seed", [None] * 4, "'seed' does not hold whole numbers"),
+        ("reason", [[1]] * 4, "'reason' does not hold texts"),
+        ("final_distance_thumb", ["x"] * 4, "'final_distance_thumb' does not hold numbers"),
+        ("run", ["y" * 10_000] * 4, "is no run's name"),
+    ],
+)
+def test_columns_of_other_types_are_refused(tmp_path: Path, column: str, values: list[Any], fault: str):
+    table = replaced(table_of(POINTS, final_distance_thumb=[0.04] * 4), column, values)
+    folder = folder_of(tmp_path, campaign_metadata("ir_grasp", POINTS), table)
+    with pytest.raises(InvalidRunFolder, match=fault):
+        write_campaign_page(folder)
+    assert not folder.report.exists()
+
+
+def test_a_value_that_is_no_number_is_shown_as_it_is(tmp_path: Path):
+    points = [{"forward": "<b>far</b>"}, {"forward": "0.03"}]
+    assert "&lt;b&gt;far" in page_of(tmp_path, campaign_metadata("ir_grasp", points), table_of(points))
 
 
 def test_numbers_of_a_column_have_one_precision(tmp_path: Path):

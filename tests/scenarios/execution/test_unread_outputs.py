@@ -39,6 +39,7 @@ def test_a_run_ends_with_a_line_and_goes_on_until_then(tmp_path: Path, fmi: int,
     finite = y[np.isfinite(y)]
     assert [metrics[name]["value"] for name in ("min_y", "max_y")] == [finite.min(), finite.max()]
     assert metrics["last_y"]["value"] == (float(y[-1]) if np.isfinite(y[-1]) else None)
+    assert ("not a number" in metrics["last_y"]["description"]) == np.isnan(y[-1])
 
 
 def test_page_and_result_have_the_line(tmp_path: Path):

@@ -23,7 +23,8 @@ from handover.scenarios.experiment.display_unit import column_text, digits_after
         (0.06389, "m/s", "0.06389 m/s"),
         (math.nan, "m", "–"),
         (math.radians(0.00001234), "rad", "1.234e-05°"),
-        (-1e-300, "m", "-1e-297 mm"),
+        (-1e-30, "m", "-1e-27 mm"),
+        (2.225e-308, "m", "0 mm"),
         (1e300, "m", "1e+300 m"),
     ],
 )
@@ -43,7 +44,7 @@ def test_a_value_is_reported_in_its_unit(value: float, unit: str, text: str):
         ([12.345, math.nan, 0.0], 2),
         ([1e-4, 2e-4], 7),
         ([5.5, 1e-9], 4),
-        ([1e-300], 7),
+        ([1e-30], 7),
         ([math.nan], 0),
         ([], 0),
     ],
@@ -56,7 +57,7 @@ def test_numbers_of_a_column_have_the_same_digits_after_the_point(values: list[f
     ("values", "texts"),
     [
         ([1e-4, 2e-4], ["0.0001000", "0.0002000"]),
-        ([1.5e-297, 0.0], ["1.500e-297", "0.0000000"]),
+        ([1.5e-37, 2e-300], ["1.500e-37", "0.0000000"]),
         ([1e300, 2.0], ["1.000e+300", "2"]),
         ([5.5, 1e-9], ["5.5000", "0.0000"]),
     ],

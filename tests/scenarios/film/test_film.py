@@ -1,5 +1,6 @@
 """`handover film`: its frames show the run at their times, as asked for; what cannot be filmed is refused."""
 
+import math
 import os
 import shutil
 import signal
@@ -21,7 +22,7 @@ from handover.fmus.build import cached
 from handover.scenarios.cli.command import main
 from handover.scenarios.film.browser import open_camera, window_of
 from handover.scenarios.film.film import FilmSettings, frame_times
-from handover.scenarios.film.film_page import film_content, film_html
+from handover.scenarios.film.film_page import NotFilmed, film_content, film_html
 from handover.scenarios.results.run_folder import RunFolder
 
 Pixels = NDArray[np.uint8]
@@ -130,6 +131,9 @@ def test_the_frames_times_are_even_and_end_with_the_run():
     np.testing.assert_allclose(frame_times(1.0, 2.0, settings), [1.0, 1.2, 1.4, 1.6, 1.8, 2.0])
     np.testing.assert_allclose(frame_times(1.0, 1.7, settings), [1.0, 1.2, 1.4, 1.6, 1.7])
     np.testing.assert_allclose(frame_times(0.0, 0.3, FilmSettings(pace=1.0, fps=10.0)), [0.0, 0.1, 0.2, 0.3])
+    for end, pace in ((1e300, 1.0), (1.0, 1e-300), (math.inf, 1.0)):
+        with pytest.raises(NotFilmed):
+            frame_times(0.0, end, FilmSettings(pace=pace))
 
 
 @pytest.mark.parametrize(
