@@ -1,6 +1,6 @@
 """What helps who leads a hand in a handover while it goes on: where the hand is to be, and what is to be done there."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -28,21 +28,22 @@ _NEEDED = (
 )
 
 
-def hand_hint(record: Record, receivers: Sequence[str]) -> HandHint | None:
+def hand_hint(record: Record, receivers: Sequence[str], thresholds: Mapping[str, float]) -> HandHint | None:
     """Return what helps in the last row of a record; None where it lacks outputs that this is made of.
 
     Args:
         record: of a handover.
         receivers: who is to have the object in turn, `HAND` or `GRIPPER`.
+        thresholds: speed of the gripper from which the robot feels a pull or a push, by receiver, m/s.
     """
     if not all(name in record for name in _NEEDED):
         return None
     holder = record.items("person.holder").get(int(record["person.holder"][-1]), "")
     p_WH, closed = record["person.p_WH"][-1], bool(record["person.closed_goal"][-1])
     if receivers[0] == "HAND" and holder in ("GRIPPER", "BOTH"):
-        return _taking(record, p_WH, holder, closed=closed)
+        return _taking(record, p_WH, holder, _felt(record, thresholds["HAND"]), closed=closed)
     if receivers[-1] == "GRIPPER" and holder in ("HAND", "BOTH"):
-        return _giving(record, p_WH, holder)
+        return _giving(record, p_WH, holder, _felt(record, thresholds["GRIPPER"]))
     if holder == "HAND":
         return HandHint(p_WH, None, holds=True, advice="You have it: draw your hand back.")
     if holder == "GRIPPER":
@@ -50,9 +51,16 @@ def hand_hint(record: Record, receivers: Sequence[str]) -> HandHint | None:
     return HandHint(p_WH, None, advice="The robot fetches the object." if receivers[0] == "HAND" else "")
 
 
-def _taking(record: Record, p_WH: Floats, holder: str, *, closed: bool) -> HandHint | None:
+def _felt(record: Record, threshold: float) -> str:
+    """Return how fast the robot sees its gripper move, of what it needs to feel a pull or a push."""
+    if "decision.speed_G" not in record:
+        return ""
+    return f": it moves at {float(record['decision.speed_G'][-1]):.3f} of {threshold:.3f} m/s"
+
+
+def _taking(record: Record, p_WH: Floats, holder: str, felt: str, *, closed: bool) -> HandHint | None:
     if holder == "BOTH":
-        return HandHint(p_WH, None, holds=True, advice="You hold it: pull until the gripper opens.")
+        return HandHint(p_WH, None, holds=True, advice=f"You hold it: pull until the gripper opens{felt}.")
     R_WO, p_WO = rotation_of(record["person.q_WO"][-1]), record["person.p_WO"][-1]
     goal = p_WO + R_WO @ _HOLD
     p_goal_H_O: Floats = (p_WH - goal) @ R_WO
@@ -65,7 +73,7 @@ def _taking(record: Record, p_WH: Floats, holder: str, *, closed: bool) -> HandH
     return HandHint(p_WH, goal, within_reach=within, advice=advice)
 
 
-def _giving(record: Record, p_WH: Floats, holder: str) -> HandHint:
+def _giving(record: Record, p_WH: Floats, holder: str, felt: str) -> HandHint:
     if holder == "BOTH":
         return HandHint(p_WH, None, holds=True, advice="The gripper has it, too: open your hand.")
     gripper, half = Params(), 0.5 * float(np.array(paper_values("free_flyer", "person")["object_size"])[1])
@@ -77,5 +85,8 @@ def _giving(record: Record, p_WH: Floats, holder: str) -> HandHint:
     within = bool(abs(to_gripper_G[0]) <= gripper.capture_axial and abs(to_gripper_G[2]) <= gripper.capture_lateral)
     if float(np.linalg.norm(to_gripper)) > _NEAR:
         return HandHint(p_WH, None, holds=True, advice="You hold the object: the robot comes to take it.")
-    here, there = "Between the fingers: press it against the gripper.", "After the yellow flash, lead it to the ring."
+    here, there = (
+        f"Between the fingers: press it against the gripper{felt}.",
+        "After the yellow flash, lead it to the ring.",
+    )
     return HandHint(p_WH, p_WH + to_gripper, within_reach=within, holds=True, advice=here if within else there)

@@ -157,9 +157,9 @@ class FlyerHandover(Experiment[HandoverEvaluator]):
         x, y, z = (float(n) for n in person["p_WH_0"])
         return LedHand("person", (x, y, z), float(person["arm_reach"]), self.asked)
 
-    def hand_hint(self, parameters: HandoverParameters, record: Record) -> HandHint | None:  # noqa: ARG002
+    def hand_hint(self, parameters: HandoverParameters, record: Record) -> HandHint | None:
         """Return where the hand is to be, and what is to be done there."""
-        return hand_hint(record, self.receivers)
+        return hand_hint(record, self.receivers, {name: parameters.threshold(name) for name in ("HAND", "GRIPPER")})
 
     def parameter_files(self, parameters: HandoverParameters) -> Mapping[str, Path]:
         """Return the track that leads the hand."""

@@ -109,6 +109,7 @@ class PersonsDeeds:
         by_track: whether it is a track.
         opened: since when it has been wanted open, s, and how far the object was from G then, m; None while closed.
         nearest: of such a hand to the object's end, or of the object in it to G, since the last signal, m.
+        tried: whether such a hand was closed since the last signal.
         beside: how far from G, across the fingers, the object was at the last push, m; None before.
         known: whether the outputs that it needs are there; None before the first instant.
         activity: what the person does.
@@ -128,6 +129,7 @@ class PersonsDeeds:
     by_track: bool = False
     opened: tuple[float, float] | None = None
     nearest: float = math.inf
+    tried: bool = False
     beside: float | None = None
     known: bool | None = None
     activity: str = ""
@@ -142,7 +144,7 @@ class PersonsDeeds:
 
     def signalled(self) -> None:
         """Begin to count what the person does anew."""
-        self.pulled, self.met, self.nearest = False, 0.0, math.inf
+        self.pulled, self.met, self.nearest, self.tried = False, 0.0, math.inf, False
 
     def follow(self, t: float, signals: Signals, holder: str, held_before: str) -> None:
         """Follow the person by the outputs of an instant; `held_before` is who held the object at the last one."""
@@ -165,7 +167,7 @@ class PersonsDeeds:
             self.beside = self._aside_of_fingers(signals)
         if self.led:
             if signals.plain("person.closed_goal"):
-                self.opened = None
+                self.opened, self.tried = None, True
             elif self.opened is None:
                 self.opened = (t, norm(_line_from_fingers(signals)))
             if holder in ("GRIPPER", "HAND"):
@@ -232,7 +234,10 @@ class PersonsDeeds:
             return Cause.NOT_TRIED, f"{hand} did not {touch}"
         what = hand if touch == "pull" else f"the object in {hand}"
         whom = "the object's end" if touch == "pull" else "the gripper"
-        return Cause.NOT_TRIED, f"{what} came no nearer than {1000.0 * self.nearest:.0f} mm to {whom}"
+        nearest = f"{1000.0 * self.nearest:.0f} mm"
+        if touch == "pull" and not self.tried:
+            return Cause.NOT_TRIED, f"{hand} was never closed; the nearest that it came to {whom} was {nearest}"
+        return Cause.NOT_TRIED, f"{what} came no nearer than {nearest} to {whom}"
 
     def from_fingers(self, signals: Signals) -> float | None:
         """Return how far the object's centre line is from G, m, where the outputs tell it."""

@@ -28,6 +28,7 @@ class Row:
             "person.closed_goal": closed,
             "robot.p_WG": u.p_WG,
             "robot.q_WG": u.q_WG,
+            "decision.speed_G": 0.045,
         }
 
     def __contains__(self, name: str) -> bool:
@@ -41,7 +42,7 @@ class Row:
 
 
 def hint_of(scene: Scene, receivers: tuple[str, ...], closed: bool = False) -> HandHint:
-    hint = hand_hint(cast(Record, Row(scene, closed)), receivers)
+    hint = hand_hint(cast(Record, Row(scene, closed)), receivers, {"HAND": 0.059, "GRIPPER": 0.021})
     assert hint is not None
     return hint
 
@@ -73,7 +74,9 @@ def test_a_hand_within_reach_gets_the_object_as_it_closes_and_one_that_is_not_mi
     assert hint.within_reach == within
     scene.go(0.8, closed_track=True, finger_track=np.array(CLOSED))
     assert (scene.y.holder == Holder.BOTH) == within
-    assert hint_of(scene, ("HAND",), closed=True).holds == within
+    hint = hint_of(scene, ("HAND",), closed=True)
+    assert hint.holds == within
+    assert ("0.045 of 0.059 m/s" in hint.advice) == within
 
 
 def test_the_object_in_a_hand_is_within_reach_between_the_fingers():

@@ -40,7 +40,7 @@ def test_the_five_inputs_of_a_hand_come_from_outside_and_nothing_else(scenario: 
 
 def test_a_hand_that_nothing_leads_rests_and_the_verdict_blames_no_simulated_person(tmp_path: Path):
     ended = run(RobotToHuman, tmp_path / "run", "hand=outside", "patience=20")
-    assert "the hand came no nearer than" in ended.outcome.reason
+    assert "the hand was never closed; the nearest that it came" in ended.outcome.reason
     assert metric(ended, "decided_by") == Cause.NOT_TRIED
     record = Record(tmp_path / "run" / "signals.parquet")
     assert (record["person.age"] > 0.2).all()

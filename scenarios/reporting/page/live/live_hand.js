@@ -9,7 +9,7 @@ const sidesOfHandover = scene => scene.points("gripper").length ? ["gripper", "r
 const createHandControl = (element, eye) => {
   const part = name => document.getElementById("hand-" + name);
   const HELP = {
-    pointer: "The hand is where the mouse is. The wheel moves it towards you and away; a click, or the space bar, closes and opens it. Q and E "
+    pointer: "The hand is where the mouse is. The wheel turned down brings it towards you, turned up takes it away; a click, or the space bar, closes and opens it. Q and E "
       + "roll it, W and S tilt its fingers down and up, A and D turn them left and right; arrows move it. A finger takes it along, two fingers change its depth. With Alt, you turn the view instead.",
     gamepad: "The left stick moves the hand, the triggers towards you and away, the right stick turns it, the first button closes and opens it.",
     tracker: `A tracker sends texts such as {"p_WH": [-0.4, 0.1, -0.05], "q_WH": [1, 0, 0, 0], "closed": false, "stamp": 12.5} to `
