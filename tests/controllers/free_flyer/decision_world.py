@@ -36,6 +36,7 @@ class World:
     y: Outputs | None = None
     t: float = 0.0
     ys: list[Outputs] = field(default_factory=list[Outputs])
+    us: list[Inputs] = field(default_factory=list[Inputs])
 
     def step(self) -> Outputs:
         self.before(self)
@@ -45,6 +46,7 @@ class World:
         angle = self.angle_closed if y and y.closure > 0.5 else OPEN
         noise = 0.001 * self.rng.standard_normal((2, 3)) if self.rng else np.zeros((2, 3))
         u = Inputs(p_WB_meas=self.p_WG - ARM + noise[0], v_WB_meas=self.v_WB + noise[1], gripper_angle=angle)
+        self.us.append(u)
         self.y = self.machine.step(self.t, T, u)
         self.t += T
         self.ys.append(self.y)
@@ -52,6 +54,12 @@ class World:
 
     def run(self, seconds: float) -> list[Outputs]:
         return [self.step() for _ in range(round(seconds / T))]
+
+    def until(self, phase: HandoverPhase) -> Outputs:
+        """Go on until the robot is in a phase."""
+        while (y := self.step()).phase is not phase:
+            assert self.t < 100.0
+        return y
 
     def phases(self) -> list[HandoverPhase]:
         found = [y.phase for y in self.ys]

@@ -8,6 +8,8 @@ import control as untyped_control
 import numpy as np
 import pytest
 from pushed_body import ARM, GOAL, MASS, Body, T, pushed
+from support.restored_states import assert_continues, assert_outputs_change_nothing
+from support.wording import Wording
 
 from handover.controllers.free_flyer.admittance_controller import AdmittanceController, Inputs, Params
 from handover.controllers.free_flyer.body import InvalidControllerParameters
@@ -31,9 +33,17 @@ def steady(axis: int, size: float, seconds: float) -> Floats:
     return d
 
 
-@pytest.mark.parametrize("behaviour", SPRING)
-@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
-@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize(
+    ("behaviour", "ratio", "axis"),
+    [
+        (Behaviour.RIGID, 0.5, 1),
+        (Behaviour.RIGID, 1.0, 0),
+        (Behaviour.RIGID, 2.0, 2),
+        (Behaviour.COMPLIANT, 0.5, 2),
+        (Behaviour.COMPLIANT, 1.0, 1),
+        (Behaviour.COMPLIANT, 2.0, 0),
+    ],
+)
 def test_a_step_of_force_moves_the_gripper_as_the_virtual_mass(behaviour: Behaviour, ratio: float, axis: int):
     """1 / (m_v s^2 + k_B s + k_D) along every axis, also where the lever would turn the body."""
     k, b = SPRING[behaviour]
@@ -90,8 +100,7 @@ def test_the_observer_alone_forgets_exponentially_and_takes_thrust_for_no_wrench
         memory, h = observer.following(memory, h, thrust), h + T * (thrust + wrench)
 
 
-@pytest.mark.parametrize("lag", [0.0, 0.02, 0.3])
-@pytest.mark.parametrize("delay", [0.0, 0.005, 0.016, 0.04])
+@pytest.mark.parametrize(("lag", "delay"), [(0.0, 0.04), (0.02, 0.0), (0.02, 0.005), (0.3, 0.016), (0.3, 0.04)])
 def test_the_model_of_the_propulsion_is_that_of_the_thrusters(lag: float, delay: float):
     model, rng = ThrustModel(lag, delay, T), np.random.default_rng(3)
     plant = thrusters.Thrusters(thrusters.Params(lag=lag, delay=delay, f_max=np.full(3, 9.0), tau_max=np.full(3, 9.0)))
@@ -138,30 +147,18 @@ def test_where_the_goal_changes_the_gripper_is_drawn_from_where_it_is():
 
 
 def test_a_restored_state_continues_bit_for_bit():
-    p = Params(delay=0.02)
-    controller, body, wrench = AdmittanceController(p), Body(), np.array([0.2, 0.1, -0.3])
-    for n in range(60):
-        y = controller.step(n * T, T, body.measured())
-        body.push(y.f_cmd, y.tau_cmd, wrench, np.zeros(3), T)
-    other = AdmittanceController(p)
-    other.set_state(controller.get_state())
-    for n in range(60, 90):
-        a, b = controller.step(n * T, T, body.measured()), other.step(n * T, T, body.measured())
-        for name, value in vars(a).items():
-            np.testing.assert_array_equal(value, getattr(b, name))
-        body.push(a.f_cmd, a.tau_cmd, wrench, np.zeros(3), T)
+    body, given = Body(), list[Inputs]()
+    controller = AdmittanceController(Params(delay=0.02))
+    for n in range(90):
+        given.append(body.measured())
+        y = controller.step(n * T, T, given[-1])
+        body.push(y.f_cmd, y.tau_cmd, np.array([0.2, 0.1, -0.3]), np.zeros(3), T)
+    assert_continues(lambda: AdmittanceController(Params(delay=0.02)), given.__getitem__, [1, 60], 30)
 
 
 def test_outputs_tell_the_step_and_change_nothing():
-    controller, u = AdmittanceController(PROMPT), Body(v=np.array([0.1, 0.0, 0.0])).measured()
-    y = controller.outputs(0.0, u)
-    np.testing.assert_array_equal(y.f_cmd, controller.step(0.0, T, u).f_cmd)
-
-
-def test_inner_gains_that_are_too_high_are_refused_with_a_remedy():
-    with pytest.raises(InvalidControllerParameters, match=r"the loop is unstable at 62\.5 Hz") as caught:
-        AdmittanceController(Params(k_x=900.0, k_v=200.0))
-    assert "times these gains" in str(caught.value)
+    u = Body(v=np.array([0.1, 0.0, 0.0])).measured()
+    assert_outputs_change_nothing(lambda: AdmittanceController(PROMPT), u, same=True)
 
 
 def test_a_delay_that_is_known_leaves_the_virtual_body_alone_until_the_inner_loop_cannot_bear_it():
@@ -169,23 +166,25 @@ def test_a_delay_that_is_known_leaves_the_virtual_body_alone_until_the_inner_loo
     prompt, late = (AdmittanceController(Params(delay=d)).outputs(0.0, Inputs()) for d in (0.0, 0.064))
     assert late.pole_radius == pytest.approx(prompt.pole_radius, abs=1e-9)
     assert late.damping_ratio == pytest.approx(prompt.damping_ratio, abs=1e-6)
-    with pytest.raises(InvalidControllerParameters, match=r"unstable.*a delay of at most about 0\.0"):
-        AdmittanceController(Params(delay=0.1, k_v=20.0, k_x=100.0))
 
 
 @pytest.mark.parametrize(
-    ("changes", "text"),
+    "changes",
     [
-        ({"k_v": 0.0}, "inner position gains: k_P = 9 and k_D = 0 must be positive"),
-        ({"k_R": 0.0}, "inner attitude gains: k_P = 0"),
-        ({"mass": np.inf}, "mass = inf kg must be positive and finite"),
-        ({"delay": -0.01}, r"delay = -0\.01 s must be finite and not negative"),
-        ({"behaviour": Behaviour.CUSTOM, "damping_rotation": np.zeros((3, 3))}, "damping_rotation = .* definite"),
+        {"k_x": 900.0, "k_v": 200.0},
+        {"delay": 0.1, "k_v": 20.0, "k_x": 100.0},
+        {"k_v": 0.0},
+        {"k_R": 0.0},
+        {"mass": np.inf},
+        {"delay": -0.01},
+        {"behaviour": Behaviour.CUSTOM, "damping_rotation": np.zeros((3, 3))},
     ],
+    ids=["gains too high", "delay too long", "k_v", "k_R", "mass", "delay", "damping"],
 )
-def test_what_cannot_work_is_refused(changes: dict[str, Any], text: str):
-    with pytest.raises(InvalidControllerParameters, match=text):
+def test_what_cannot_work_is_refused_with_a_remedy(changes: dict[str, Any], wording: Wording):
+    with pytest.raises(InvalidControllerParameters) as refused:
         AdmittanceController(replace(Params(), **changes))
+    wording.check(refused.value)
 
 
 def test_orientation_that_is_none_is_refused():

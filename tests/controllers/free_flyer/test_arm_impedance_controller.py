@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.wording import Wording
 
 from handover.controllers.free_flyer.arm_impedance import ArmAtRest
 from handover.controllers.free_flyer.arm_impedance_controller import (
@@ -83,7 +84,7 @@ def test_a_small_push_moves_the_robot_as_the_linear_loop_does(behaviour: Behavio
     controller, plant, goal = ArmImpedanceController(p), robot(p, p.q_J_goal, np.zeros(3)), np.zeros(3)
     q_WG = np.array(plant.motion().q_WG)
     rest = ArmAtRest(p.model(), p.posture)
-    steps, push = 400, np.array([0.02, -0.01, 0.03, 0.001, 0.002, -0.001])
+    steps, push = 250, np.array([0.02, -0.01, 0.03, 0.001, 0.002, -0.001])
     d = np.zeros((steps, 6))
     d[10:40] = push
     loop = SampledLoop(rest.linear_plant(0.0), rest.law(p.gains(), p.null()), PERIOD)
@@ -104,7 +105,7 @@ def test_the_joints_go_back_to_their_posture_while_the_gripper_stays():
     plant = robot(p, np.array([0.8, -0.6, 0.0]), np.zeros(3))
     controller, start = ArmImpedanceController(p), plant.motion()
     strayed = turned = 0.0
-    for k in range(750):
+    for k in range(500):
         y = controller.step(PERIOD * k, PERIOD, seen(plant, np.zeros(3), np.array(start.q_WG)))
         strayed, turned = max(strayed, y.error_p), max(turned, y.error_R)
         step(plant, y, np.zeros(3), np.zeros(3))
@@ -115,23 +116,24 @@ def test_the_joints_go_back_to_their_posture_while_the_gripper_stays():
     assert turned < 0.02
 
 
-def test_the_published_rigid_damping_is_refused_with_a_remedy_and_the_compliant_one_is_not():
-    with pytest.raises(InvalidControllerParameters, match=r"unstable at 62\.5 Hz.*times these gains") as caught:
+def test_the_published_rigid_damping_is_refused_with_a_remedy_and_the_compliant_one_is_not(wording: Wording):
+    with pytest.raises(InvalidControllerParameters) as caught:
         ArmImpedanceController(Params(rotational_damping=5.0))
     assert len(caught.value.faults) == 1
+    wording.check(caught.value)
     compliant = ArmImpedanceController(Params(behaviour=Behaviour.COMPLIANT, rotational_damping=1.0))
     assert compliant.outputs(0.0, Inputs()).pole_radius < 1.0
     heavy = Params(rotational_damping=5.0, rotor_J=np.full(3, 0.1))
     assert ArmImpedanceController(heavy).outputs(0.0, Inputs()).pole_radius < 1.0
 
 
-def test_all_faults_are_reported_together():
+def test_all_faults_are_reported_together(wording: Wording):
     with pytest.raises(InvalidControllerParameters) as caught:
         ArmImpedanceController(
             Params(mass=0.0, I_B=-np.eye(3), axis_J=np.diag([1.0, 0.0, 1.0]), mass_L=np.array([-1.0, 1.0, 1.0]))
         )
-    text = " ".join(caught.value.faults)
-    assert all(name in text for name in ("mass = 0 kg", "I_B", "axis_J[2]", "mass_L[1]"))
+    assert len(caught.value.faults) == 4
+    wording.check(caught.value)
 
 
 def test_a_quaternion_that_is_none_is_refused():

@@ -29,7 +29,7 @@ LINKS = np.array([[-0.1, 0.0, 0.02], [-0.05, 0.01, 0.0], [-0.05, 0.03, 0.02]])
 CENTRES, MASSES = np.array([0.5, 0.4, 0.6]), np.array([0.4, 0.3, 0.2])
 MOMENTS = np.array([[0.02, 0.025, 0.02], [0.013, 0.011, 0.006], [0.002, 0.002, 0.003]])
 ROTORS = np.array([0.01, 0.0, 0.003])
-SEEDS = range(5)
+SEEDS = range(2)
 
 
 def model(n: int) -> ArmModel:

@@ -1,10 +1,13 @@
 """Fingers that follow pull and push: when they open, close again, and release what they hold."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 from decision_world import ARM, EMPTY, HOLDING, OPEN, P, T, world
+from support.restored_states import assert_continues
+from support.wording import Wording
 
 from handover.controllers.free_flyer.handover_state_machine import (
     HandoverStateMachine,
@@ -36,9 +39,7 @@ class Fingers:
 def offered(speeds: Floats, **params: Any) -> tuple[list[Outputs], Fingers]:
     """What a robot does that gives, while its gripper's speed, from the check on, is this at each step."""
     w = world(HandoverTask.ROBOT_TO_HUMAN, gradual=True, filter_time=0.0, **params)
-    while w.y is None or w.y.phase is not P.CHECK_VELOCITY:
-        w.step()
-    fingers, ys, y = Fingers(), list[Outputs](), w.y
+    fingers, ys, y = Fingers(), list[Outputs](), w.until(P.CHECK_VELOCITY)
     for v in speeds:
         u = Inputs(p_WB_meas=w.p_WG - ARM, v_WB_meas=np.array([v, 0.0, 0.0]), gripper_angle=fingers.move(y.closure))
         y = w.machine.step(w.t, T, u)
@@ -74,8 +75,7 @@ def test_gradual_fingers_close_again_where_the_pull_ends_although_the_robot_coas
 
 def test_gradual_takes_an_empty_gripper_for_a_release():
     w = world(HandoverTask.ROBOT_TO_HUMAN, gradual=True)
-    while w.y is None or w.y.phase is not P.CHECK_VELOCITY:
-        w.step()
+    w.until(P.CHECK_VELOCITY)
     w.angle_closed = EMPTY
     w.run(2 * T)
     assert w.phases()[-1] is P.RELEASE_OBJECT
@@ -83,8 +83,7 @@ def test_gradual_takes_an_empty_gripper_for_a_release():
 
 def test_gradual_fingers_close_with_the_push_and_the_threshold_decides():
     w = world(HandoverTask.HUMAN_TO_ROBOT, gradual=True, filter_time=0.0)
-    while w.y is None or w.y.phase is not P.CHECK_VELOCITY:
-        w.step()
+    w.until(P.CHECK_VELOCITY)
     closures: list[float] = []
     for v in (0.0, 0.0126, 0.0168, 0.0147, 0.0):
         w.v_WB = np.array([v, 0.0, 0.0])
@@ -96,15 +95,14 @@ def test_gradual_fingers_close_with_the_push_and_the_threshold_decides():
 
 def test_gradual_restored_state_continues_as_it_was():
     w = world(HandoverTask.ROBOT_TO_HUMAN, gradual=True)
-    while w.y is None or w.y.phase is not P.CHECK_VELOCITY:
-        w.step()
-    other = HandoverStateMachine(Params(task=HandoverTask.ROBOT_TO_HUMAN, gradual=True))
-    for v in rising(0.3, 0.12, 1.0):
-        other.set_state(w.machine.get_state())
-        u = Inputs(p_WB_meas=w.p_WG - ARM, v_WB_meas=np.array([v, 0.0, 0.0]), gripper_angle=HOLDING)
-        a, b = w.machine.step(w.t, T, u), other.step(w.t, T, u)
-        for name, value in vars(a).items():
-            np.testing.assert_array_equal(value, getattr(b, name))
+    w.until(P.CHECK_VELOCITY)
+    begin = len(w.us)
+    w.us += [
+        Inputs(p_WB_meas=w.p_WG - ARM, v_WB_meas=np.array([v, 0.0, 0.0]), gripper_angle=HOLDING)
+        for v in rising(0.3, 0.12, 1.0)
+    ]
+    make = partial(HandoverStateMachine, Params(task=HandoverTask.ROBOT_TO_HUMAN, gradual=True))
+    assert_continues(make, w.us.__getitem__, range(begin, begin + 42, 6), 20)
 
 
 def test_a_pull_begins_with_more_than_thrust_gives_and_ends_with_the_braking():
@@ -121,11 +119,9 @@ def test_a_pull_begins_with_more_than_thrust_gives_and_ends_with_the_braking():
 def test_a_speed_from_before_the_lights_end_does_not_move_the_fingers():
     """Between the part of the threshold and the threshold, until the gripper has once been slower than that part."""
     w = world(HandoverTask.HUMAN_TO_ROBOT, gradual=True, filter_time=0.0)
-    while w.y is None or w.y.phase is not P.SIGNAL:
-        w.step()
+    w.until(P.SIGNAL)
     w.v_WB = np.array([0.0168, 0.0, 0.0])
-    while w.y.phase is P.SIGNAL:
-        w.step()
+    w.until(P.CHECK_VELOCITY)
     assert {w.step().closure for _ in range(3)} == {0.0}
     closures: list[float] = []
     for v in (0.0, 0.0168):
@@ -134,11 +130,10 @@ def test_a_speed_from_before_the_lights_end_does_not_move_the_fingers():
     np.testing.assert_allclose(closures, [0.0, 0.6], atol=1e-9)
 
 
-def test_a_share_that_rest_exceeds_is_refused_for_gradual_fingers_alone():
+def test_a_share_that_rest_exceeds_is_refused_for_gradual_fingers_alone(wording: Wording):
     Params(gradual_share=0.4).check()
-    with pytest.raises(InvalidHandoverParameters) as error:
-        Params(gradual=True, gradual_share=0.1).check()
-    for name in ("release_velocity = 0.059", "receive_velocity = 0.021"):
-        assert f"gradual_share = 0.1 of {name} m/s must exceed gate_speed = 0.01 m/s" in str(error.value)
-    with pytest.raises(InvalidHandoverParameters, match=r"gradual_share = 0\.4 of receive_velocity"):
-        Params(gradual=True, gradual_share=0.4).check()
+    for share, count in ((0.1, 2), (0.4, 1)):
+        with pytest.raises(InvalidHandoverParameters) as refused:
+            Params(gradual=True, gradual_share=share).check()
+        assert len(refused.value.faults) == count
+        wording.check(refused.value)

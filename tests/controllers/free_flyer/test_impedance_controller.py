@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from pushed_body import INERTIA, MASS, T, cross_matrix, pushed, rotation_vector
 from scipy.spatial.transform import Rotation
+from support.restored_states import assert_outputs_change_nothing
+from support.wording import Wording
 
 from handover.controllers.free_flyer.body import InvalidControllerParameters
-from handover.controllers.free_flyer.impedance_controller import ImpedanceController, Inputs, Outputs, Params
+from handover.controllers.free_flyer.impedance_controller import ImpedanceController, Inputs, Params
 from handover.controllers.free_flyer.ports import Behaviour
 from handover.controllers.free_flyer.rotations import InvalidOrientation
-from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.geometry import rotation_of
 from handover.cosim.blocks.ports import Floats
 
@@ -53,7 +54,7 @@ def anywhere(seed: int) -> Inputs:
 
 
 @pytest.mark.parametrize("behaviour", [Behaviour.RIGID, Behaviour.COMPLIANT])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_command_is_eq_3_25(behaviour: Behaviour, seed: int):
     p, u = Params(behaviour=behaviour, p_BG=np.array([-0.25, 0.06, -0.1])), anywhere(seed)
     f, tau = law(p, u)
@@ -155,11 +156,10 @@ def test_published_behaviours_have_their_damping():
     assert compliant.damping_ratio == pytest.approx(0.3, abs=0.05)
 
 
-def test_delay_that_destabilises_is_refused_with_valid_values():
-    with pytest.raises(InvalidControllerParameters, match=r"62\.5 Hz with a delay of 0\.032 s") as caught:
+def test_delay_that_destabilises_is_refused_with_valid_values(wording: Wording):
+    with pytest.raises(InvalidControllerParameters) as refused:
         ImpedanceController(replace(NO_LAG, delay=0.032))
-    assert "|z| = 1.0571" in str(caught.value)
-    assert "a delay of at most about 0.026 s" in str(caught.value)
+    wording.check(refused.value)
     ImpedanceController(replace(NO_LAG, delay=0.026))
     with pytest.raises(InvalidControllerParameters):
         ImpedanceController(replace(NO_LAG, delay=0.027))
@@ -191,33 +191,25 @@ def test_cure_named_for_the_gains_is_stable():
     )
 
 
-def test_matrices_that_are_not_positive_definite_are_refused_all_at_once():
-    skew = np.array([[20.0, 5.0, 0.0], [0.0, 20.0, 0.0], [0.0, 0.0, 20.0]])
-    with pytest.raises(InvalidControllerParameters) as caught:
-        ImpedanceController(
-            Params(
-                behaviour=Behaviour.CUSTOM,
-                stiffness_translation=skew,
-                damping_rotation=np.diag([1.0, 1.0, 0.0]),
-                I_B=np.diag([0.1, 0.1, 0.3]),
-            )
-        )
-    assert len(caught.value.faults) == 3
-    assert "none may exceed the others' sum" in str(caught.value)
-
-
 @pytest.mark.parametrize(
-    ("changes", "text"),
+    "changes",
     [
-        ({"delay": -0.01}, r"delay = -0\.01 s must be finite and not negative"),
-        ({"lag": np.nan}, "lag = nan s must be finite"),
-        ({"mass": np.inf}, "mass = inf kg must be positive and finite"),
-        ({"I_B": -np.eye(3)}, "I_B = .* must be symmetric and positive definite"),
+        {
+            "behaviour": Behaviour.CUSTOM,
+            "stiffness_translation": np.array([[20.0, 5.0, 0.0], [0.0, 20.0, 0.0], [0.0, 0.0, 20.0]]),
+            "damping_rotation": np.diag([1.0, 1.0, 0.0]),
+            "I_B": np.diag([0.1, 0.1, 0.3]),
+        },
+        {"mass": np.inf, "I_B": -np.eye(3)},
+        {"delay": -0.01, "lag": np.nan},
     ],
+    ids=["matrices", "body", "times"],
 )
-def test_a_body_or_a_time_that_cannot_be_is_refused(changes: dict[str, Any], text: str):
-    with pytest.raises(InvalidControllerParameters, match=text):
+def test_what_cannot_be_is_refused_all_at_once(changes: dict[str, Any], wording: Wording):
+    with pytest.raises(InvalidControllerParameters) as refused:
         ImpedanceController(replace(Params(), **changes))
+    assert len(refused.value.faults) == len({*changes} - {"behaviour"})
+    wording.check(refused.value)
 
 
 @pytest.mark.parametrize("q", [np.zeros(4), np.array([np.nan, 0.0, 0.0, 1.0])])
@@ -227,10 +219,4 @@ def test_orientation_that_is_none_is_refused(q: Floats):
 
 
 def test_outputs_at_the_start_are_those_of_the_step():
-    controller, u = ImpedanceController(Params()), anywhere(3)
-    flat = [
-        np.concatenate([np.ravel(getattr(y, v.name)) for v in describe(ImpedanceController).outputs])
-        for y in (controller.outputs(0.0, u), controller.step(0.0, T, u))
-    ]
-    np.testing.assert_array_equal(flat[0], flat[1])
-    assert isinstance(controller.outputs(0.0, u), Outputs)
+    assert_outputs_change_nothing(lambda: ImpedanceController(Params()), anywhere(3), same=True)

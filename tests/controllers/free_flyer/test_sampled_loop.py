@@ -103,6 +103,7 @@ def test_bisection_finds_the_limit():
     assert largest_stable(lambda _: 2.0, 1.0) == 0.0
 
 
+@pytest.mark.slow
 def test_closing_a_loop_wakes_no_thread_of_blas_and_leaves_their_number():
     """CPU time of other threads in the 0.3 s after a loop of 24 rows was sampled, in a process where BLAS has two."""
     code = """

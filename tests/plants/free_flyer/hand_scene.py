@@ -1,13 +1,14 @@
 """The hand, the object and a gripper that a test moves."""
 
 from dataclasses import replace
+from itertools import groupby
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand.hand_and_object import (
-    Activity,
     HandAndObject,
     Inputs,
     Motion,
@@ -31,30 +32,60 @@ def off(x: float, y: float = 0.0, z: float = 0.0) -> Floats:
     return PLACE + np.array([x, y, z])
 
 
-class Scene:
-    """A unit and its time; the gripper is where `move` says and closes on command."""
+class Steps:
+    """A unit, what it gets and gave, and its time."""
 
-    def __init__(self, params: Params, p_WG: Floats = PLACE) -> None:
-        self.unit, self.i = HandAndObject(params), 0
-        self.u = Inputs(p_WG=np.array(p_WG))
-        self.y = self.unit.outputs(0.0, self.u)
-        self.seen: list[Outputs] = []
+    def __init__(self, unit: Any, u: Any) -> None:
+        self.unit, self.u, self.i = unit, u, 0
+        self.y = unit.outputs(0.0, u)
+        self.seen: list[Any] = []
 
-    def go(self, seconds: float, dt: float = DT, **changes: Any) -> Outputs:
+    def go(self, seconds: float, dt: float = DT, **changes: Any) -> Any:
+        """Go on with changed inputs."""
         self.u = replace(self.u, **changes)
         for _ in range(round(seconds / dt)):
-            self.u.p_WG = self.u.p_WG + dt * self.u.v_WG
+            self.move(dt)
             self.y = self.unit.step(self.i * dt, dt, self.u)
             self.i += 1
             self.seen.append(self.y)
         return self.y
 
-    def until(self, activity: Activity, **changes: Any) -> Outputs:
+    def move(self, dt: float) -> None:
+        """Change inputs before a step."""
+
+    def until(self, activity: Any, **changes: Any) -> Any:
+        """Go on until the person does something."""
         for _ in range(2000):
             if self.go(DT, **changes).activity is activity:
                 return self.y
         raise AssertionError(f"{activity!r} did not come about")
 
-    def activities(self) -> list[Activity]:
-        all_of_them = [y.activity for y in self.seen]
-        return [a for a, b in zip(all_of_them, [None, *all_of_them], strict=False) if a is not b]
+    def activities(self) -> list[Any]:
+        """Return what the person did in turn."""
+        return [activity for activity, _ in groupby(y.activity for y in self.seen)]
+
+
+class Scene(Steps):
+    """Hand and object; the gripper is where `v_WG` moves it and closes on command."""
+
+    y: Outputs
+    u: Inputs
+    seen: list[Outputs]
+
+    def __init__(self, params: Params, p_WG: Floats = PLACE) -> None:
+        super().__init__(HandAndObject(params), Inputs(p_WG=np.array(p_WG)))
+
+    def move(self, dt: float) -> None:
+        """Move the gripper."""
+        self.u.p_WG = self.u.p_WG + dt * self.u.v_WG
+
+    def go(self, seconds: float, dt: float = DT, **changes: Any) -> Outputs:
+        """Go on with changed inputs."""
+        return super().go(seconds, dt, **changes)
+
+
+def body_sums(mass: float, inertia: Floats, p: Floats, q: Floats, v: Floats, w: Floats) -> Floats:
+    """Return a body's momentum, angular momentum about the world's origin, and kinetic energy."""
+    R = Rotation.from_quat(q, scalar_first=True)
+    L: Floats = R.apply(inertia @ R.apply(w, inverse=True))
+    return np.concatenate([mass * v, L + mass * np.cross(p, v), [0.5 * (mass * v @ v + w @ L)]])

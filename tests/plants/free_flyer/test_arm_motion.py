@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from arm_scene import MASS, Q_WB, SKEWED, limits, mujoco_model, skewed_arm, tumbling
 from scipy.spatial.transform import Rotation
+from support.restored_states import assert_continues
+from support.restored_states import flat as entries
 
 from handover.cosim.blocks.plain_rotation import ZERO, vector
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.rigid_body import RigidBody, Wrenches
-from handover.plants.free_flyer.robot.free_flyer import FreeFlyer, Inputs, InvalidFlyerParameters, Outputs, Params
+from handover.plants.free_flyer.robot.free_flyer import FreeFlyer, Inputs, InvalidFlyerParameters, Params
 from handover.plants.free_flyer.robot.stopping_joints import JointLimits, Motion, StoppingJoints
 
 NOTHING: Wrenches = (ZERO, ZERO, ZERO, ZERO)
@@ -35,9 +37,9 @@ def test_momenta_and_energy_stay_while_the_arm_whirls():
     walk(robot, 100, NOTHING, (0.04, -0.03, 0.02))
     before, energy, (_, _, v, L, _, pi) = robot.motion(), robot.energy, robot.state
     assert min(abs(rate) for rate in before.v_J) > 0.1
-    walk(robot, 2500, NOTHING, IDLE)
+    walk(robot, 1000, NOTHING, IDLE)
     after = robot.motion()
-    assert np.max(np.abs(np.subtract(after.q_J, before.q_J))) > 2.0
+    assert np.max(np.abs(np.subtract(after.q_J, before.q_J))) > 1.0
     assert robot.state[2] == v
     assert robot.state[3] == L
     assert robot.state[5] != pi
@@ -51,7 +53,7 @@ def test_torques_between_links_change_no_momentum():
     assert (robot.state[2], robot.state[3]) == (v, L)
 
 
-@pytest.mark.parametrize("n", [1, 2, 3])
+@pytest.mark.parametrize("n", [1, 3])
 def test_agrees_with_mujoco_on_the_same_wrenches_and_torques(n: int):
     mujoco = pytest.importorskip("mujoco")
     robot = tumbling(limits(n), q_J=(0.3, -0.4, 0.8)[:n])
@@ -181,27 +183,17 @@ ARMED = Params(joints=3, lower_J=np.full(3, -0.2), upper_J=np.full(3, 0.2), fric
 HELD = Inputs(**dict(zip(("f_B", "tau_B", "f_G", "tau_G", "tau_J"), map(np.array, (*PUSH, TORQUES)), strict=True)))
 
 
-def outputs(y: Outputs) -> Floats:
-    return np.concatenate([np.ravel(x) for x in vars(y).values()])
-
-
 def test_a_robot_with_an_arm_goes_on_bit_for_bit_after_a_state_is_restored():
-    a, b = FreeFlyer(ARMED), FreeFlyer(ARMED)
-    seen = [a.step(0.016 * i, 0.016, HELD).q_J for i in range(30)]
-    assert np.max(np.abs(seen)) == 0.2
-    state = a.get_state()
-    expected = [outputs(a.step(0.016 * i, 0.016, HELD)) for i in range(30, 60)]
-    for robot in (a, b):
-        robot.set_state(state)
-        again = [outputs(robot.step(0.016 * i, 0.016, HELD)) for i in range(30, 60)]
-        np.testing.assert_array_equal(again, expected)
+    robot = FreeFlyer(ARMED)
+    assert np.max(np.abs([robot.step(0.016 * i, 0.016, HELD).q_J for i in range(30)])) == 0.2
+    assert_continues(lambda: FreeFlyer(ARMED), lambda _: HELD, [30], 10)
 
 
 def test_with_no_tolerance_the_joints_are_fixed_and_with_some_they_go_no_farther():
     p = Params(joints=2, q_J_0=np.array([0.2, -0.3, 0.0]))
     for tolerance in (0.0, 0.05):
         robot = FreeFlyer(replace(p, tolerance_J=tolerance))
-        y = [robot.step(0.016 * i, 0.016, HELD) for i in range(60)]
+        y = [robot.step(0.016 * i, 0.016, HELD) for i in range(30)]
         strayed = np.max(np.abs([now.q_J[:2] - p.q_J_0[:2] for now in y]))
         assert strayed == pytest.approx(tolerance, abs=1e-12)
 
@@ -212,7 +204,7 @@ def test_torque_is_limited_and_joints_lock_when_they_are_to():
     a, b = FreeFlyer(p), FreeFlyer(p)
     for i in range(20):
         np.testing.assert_array_equal(
-            outputs(a.step(0.016 * i, 0.016, strong)), outputs(b.step(0.016 * i, 0.016, weak))
+            entries(a.step(0.016 * i, 0.016, strong)), entries(b.step(0.016 * i, 0.016, weak))
         )
     before = a.outputs(0.32, strong)
     assert np.min(np.abs(before.v_J[:2])) > 0.1
@@ -225,7 +217,7 @@ def test_without_joints_the_arm_counts_for_nothing():
     plain, other = FreeFlyer(Params()), FreeFlyer(Params(mass_L=np.full(3, 5.0), q_J_0=np.ones(3)))
     for i in range(20):
         a, b = (robot.step(0.016 * i, 0.016, HELD) for robot in (plain, other))
-        np.testing.assert_array_equal(outputs(a), outputs(b))
+        np.testing.assert_array_equal(entries(a), entries(b))
         np.testing.assert_array_equal(a.q_WG, a.q_WB)
         assert not np.any(a.q_J)
 

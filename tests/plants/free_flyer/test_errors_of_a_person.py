@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hand_scene import CALM, DT, GIVING, Scene
+from hand_scene import CALM, DT, GIVING, PLACE, Scene
+from support.restored_states import assert_continues
 
 from handover.cosim.blocks.plain_rotation import IDENTITY, ZERO
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand.attachment import Frame
-from handover.plants.free_flyer.hand.hand_and_object import Activity, HandAndObject, Holder, Motion, Params
+from handover.plants.free_flyer.hand.hand_and_object import Activity, HandAndObject, Holder, Inputs, Motion, Params
 from handover.plants.free_flyer.hand.sight import Perception, Sight
 
 END = np.array([0.0, 0.07, 0.0])
@@ -77,7 +78,7 @@ def test_the_object_is_seen_late_and_felt_at_once():
 
 def test_fingers_get_the_object_where_they_close_near_enough_and_nowhere_else():
     got: dict[bool, int] = {True: 0, False: 0}
-    for seed in range(16):
+    for seed in range(10):
         scene = reaching(depth_error=0.05, sight_error=0.01, seed=seed, attempts=1)
         closing = scene.until(Activity.PULL)
         x, _, z = closing.p_WH - closing.p_WO - END
@@ -89,7 +90,7 @@ def test_fingers_get_the_object_where_they_close_near_enough_and_nowhere_else():
 
 def test_a_hand_that_reaches_too_far_bumps_the_object_and_one_that_stops_short_does_not():
     bumps = 0
-    for seed in range(12):
+    for seed in range(8):
         scene = reaching(depth_error=0.03, seed=seed, attempts=1)
         begin = len(scene.seen)
         scene.until(Activity.PULL)
@@ -101,7 +102,7 @@ def test_a_hand_that_reaches_too_far_bumps_the_object_and_one_that_stops_short_d
             bumps += 1
         else:
             assert max(x) < 0.03
-    assert 2 <= bumps <= 10
+    assert 2 <= bumps <= 6
 
 
 def test_a_hand_that_got_nothing_is_felt_and_tries_again_with_other_errors():
@@ -131,7 +132,7 @@ def test_what_is_seen_is_as_old_as_the_interface_makes_it():
 
 def test_who_lets_go_before_the_fingers_have_closed_lets_the_object_float():
     early = late = 0
-    for seed in range(12):
+    for seed in range(8):
         scene = Scene(replace(GIVING, timing_error=0.5, reaction_time=0.1, seed=seed, **STRONG))
         scene.until(Activity.PUSH, light=True)
         scene.go(0.5)
@@ -183,19 +184,13 @@ def test_a_push_that_meets_nothing_is_tried_again_and_the_object_kept():
     assert {y.holder for y in scene.seen} == {Holder.HAND}
 
 
-@pytest.mark.parametrize("moment", [2.5, 3.6, 4.4, 5.2])
-def test_a_person_with_errors_continues_from_a_restored_state_bit_for_bit(moment: float):
+def test_a_person_with_errors_continues_from_a_restored_state_bit_for_bit():
     params = replace(
         CALM, depth_error=0.2, sight_error=0.02, interface_delay=0.1, timing_error=0.1, effort_spread=0.1, arm_reach=3.0
     )
-    scene = Scene(replace(params, seed=4, tremor_rms=0.001, drift_rms=0.002))
-    scene.go(2.0, closure=1.0)
-    scene.go(moment - 2.0, light=True)
-    other = HandAndObject(replace(params, seed=4, tremor_rms=0.001, drift_rms=0.002))
-    other.set_state(scene.unit.get_state())
-    assert other.get_state() == scene.unit.get_state()
-    for i in range(200):
-        a, b = (unit.step(i * DT, DT, scene.u) for unit in (scene.unit, other))
-        np.testing.assert_array_equal(np.concatenate([a.p_WH, a.p_WO, a.f_G]), np.concatenate([b.p_WH, b.p_WO, b.f_G]))
-        assert a.activity is b.activity
-    assert scene.unit.get_state() == other.get_state()
+    clumsy = replace(params, seed=4, tremor_rms=0.001, drift_rms=0.002)
+
+    def inputs(i: int) -> Inputs:
+        return Inputs(p_WG=PLACE, closure=1.0, light=i * DT > 2.0)
+
+    assert_continues(lambda: HandAndObject(clumsy), inputs, [round(t / DT) for t in (2.5, 3.6, 4.4, 5.2)], 100)

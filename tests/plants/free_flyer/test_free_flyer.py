@@ -4,8 +4,9 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.restored_states import assert_continues, assert_outputs_change_nothing, flat
+from support.wording import Wording
 
-from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.plain_rotation import quaternion, quaternion_multiply, row_major, vector
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.rigid_body import TurnsTooFast, momentum_rates
@@ -14,10 +15,6 @@ from handover.plants.free_flyer.robot.free_flyer import FreeFlyer, Inputs, Inval
 DEFAULT = Params()
 SKEWED = np.array([[0.1534, 0.01, -0.02], [0.01, 0.1427, 0.005], [-0.02, 0.005, 0.1623]])
 TUMBLING = replace(DEFAULT, I_B=SKEWED, v_WB_0=np.array([0.1, -0.2, 0.05]), w_WB_0=np.array([0.5, -0.3, 0.8]))
-
-
-def flat(y: Outputs) -> Floats:
-    return np.concatenate([np.ravel(getattr(y, v.name)) for v in describe(FreeFlyer).outputs])
 
 
 def from_quaternion(q: Floats) -> Rotation:
@@ -59,13 +56,13 @@ def test_starts_where_it_was_put():
     np.testing.assert_array_equal(y.q_WG, y.q_WB)
 
 
-def test_momenta_and_energy_stay_over_a_hundred_seconds_of_tumbling():
+def test_momenta_and_energy_stay_over_forty_seconds_of_tumbling():
     p = TUMBLING
     assert np.min(np.abs(np.linalg.eigvalsh(SKEWED) - 0.15)) > 1e-3  # no principal axis is the rotation's
     robot, w, v = FreeFlyer(p), p.w_WB_0, p.v_WB_0
     y = robot.outputs(0.0, Inputs())
     L, energy = SKEWED @ w, 0.5 * (p.mass * v @ v + w @ SKEWED @ w)
-    for i in range(6250):
+    for i in range(2500):
         y = robot.step(0.016 * i, 0.016, Inputs())
         if i % 250 == 249:
             L_now = spin(SKEWED, y.q_WB, y.w_WB)
@@ -74,7 +71,7 @@ def test_momenta_and_energy_stay_over_a_hundred_seconds_of_tumbling():
             np.testing.assert_allclose(p.mass * y.v_WB, p.mass * v, rtol=1e-12)
             assert energy_now == pytest.approx(energy, rel=1e-9)
             assert np.linalg.norm(y.q_WB) == pytest.approx(1.0, abs=1e-14)
-    np.testing.assert_allclose(y.p_WB, p.p_WB_0 + 100.0 * v, rtol=1e-9)
+    np.testing.assert_allclose(y.p_WB, p.p_WB_0 + 40.0 * v, rtol=1e-9)
 
 
 def test_a_force_at_the_gripper_gives_momentum_and_its_moment():
@@ -192,10 +189,10 @@ def mujoco_path(mujoco: Any, p: Params, u: Inputs, steps: int, per_step: int = 4
 def test_agrees_with_mujoco_on_the_same_wrench():
     mujoco = pytest.importorskip("mujoco")
     u, p = wrench(3), replace(TUMBLING, p_BG=np.array([-0.3, 0.02, 0.05]))
-    robot, path = FreeFlyer(p), mujoco_path(mujoco, p, u, 375)
-    ours = [robot.step(0.016 * i, 0.016, u).p_WG for i in range(375)]
+    robot, path = FreeFlyer(p), mujoco_path(mujoco, p, u, 250)
+    ours = [robot.step(0.016 * i, 0.016, u).p_WG for i in range(250)]
     worst = max(float(np.linalg.norm(a - b)) for a, b in zip(ours, path, strict=True))
-    print(f"\nlargest distance to MuJoCo {mujoco.__version__} in 6 s: {1e3 * worst:.2g} mm")
+    print(f"\nlargest distance to MuJoCo {mujoco.__version__} in 4 s: {1e3 * worst:.2g} mm")
     assert np.linalg.norm(path[-1] - p.p_WB_0) > 0.5
     assert worst < 5e-5
 
@@ -211,46 +208,33 @@ def test_sign_of_the_quaternion_never_jumps():
 
 
 def test_asking_for_outputs_changes_nothing():
-    a, b = FreeFlyer(Params()), FreeFlyer(Params())
-    np.testing.assert_array_equal(flat(a.outputs(0.0, Inputs())), flat(a.outputs(0.0, Inputs())))
-    np.testing.assert_array_equal(flat(walk(a, wrench(), 5)), flat(walk(b, wrench(), 5)))
+    assert_outputs_change_nothing(lambda: FreeFlyer(Params()), wrench())
 
 
 def test_goes_on_bit_for_bit_after_a_state_is_restored():
-    u, a, b = wrench(), FreeFlyer(TUMBLING), FreeFlyer(TUMBLING)
-    walk(a, u, 20)
-    state = a.get_state()
-    expected = flat(walk(a, u, 20))
-    for robot in (a, b):
-        robot.set_state(state)
-        np.testing.assert_array_equal(flat(walk(robot, u, 20)), expected)
+    assert_continues(lambda: FreeFlyer(TUMBLING), lambda _: wrench(), [0, 20], 20)
 
 
 @pytest.mark.parametrize(
-    ("changes", "text"),
+    "changes",
     [
-        ({"I_B": np.diag([0.1, 0.1, -0.1])}, "positive definite"),
-        ({"I_B": np.diag([0.1, 0.1, 0.3])}, "largest may not exceed"),
-        ({"I_B": np.array([[0.15, 0.01, 0.0], [0.0, 0.15, 0.0], [0.0, 0.0, 0.15]])}, "symmetric"),
-        ({"q_WB_0": np.array([1.0, 0.0, 0.2, 0.0])}, "norm is 1.0198"),
-        ({"q_WB_0": np.zeros(4)}, "norm is 0"),
-        ({"mass": -1.0}, "mass -1 kg must be positive"),
-        ({"mass": np.inf}, "mass inf kg must be positive and finite"),
-        ({"I_B": np.diag([np.inf, 1.0, 1.0])}, "must be finite"),
-        ({"I_B": np.full((3, 3), np.nan)}, "must be finite"),
+        {"I_B": np.diag([0.1, 0.1, -0.1])},
+        {"I_B": np.diag([0.1, 0.1, 0.3])},
+        {"I_B": np.array([[0.15, 0.01, 0.0], [0.0, 0.15, 0.0], [0.0, 0.0, 0.15]])},
+        {"q_WB_0": np.array([1.0, 0.0, 0.2, 0.0])},
+        {"mass": np.inf},
+        {"I_B": np.full((3, 3), np.nan)},
+        {"mass": -1.0, "I_B": np.diag([np.inf, 1.0, 1.0]), "q_WB_0": np.zeros(4)},
     ],
+    ids=["negative", "no body", "skew", "norm", "infinite", "nan", "all"],
 )
-def test_what_no_body_has_is_refused(changes: dict[str, Any], text: str):
-    with pytest.raises(InvalidFlyerParameters, match=text):
+def test_what_no_body_has_is_refused_all_at_once(changes: dict[str, Any], wording: Wording):
+    with pytest.raises(InvalidFlyerParameters) as refused:
         FreeFlyer(replace(Params(), **changes))
-
-
-def test_all_faults_are_reported_together():
-    with pytest.raises(InvalidFlyerParameters) as caught:
-        FreeFlyer(Params(mass=0.0, I_B=-np.eye(3), q_WB_0=np.zeros(4)))
-    assert len(caught.value.faults) == 3
+    assert len(refused.value.faults) == len(changes)
+    wording.check(refused.value)
 
 
 def test_a_turn_that_cannot_be_followed_is_an_error():
-    with pytest.raises(TurnsTooFast, match="rad/s"):
+    with pytest.raises(TurnsTooFast):
         moved(replace(DEFAULT, w_WB_0=np.array([0.0, 0.0, 400.0]), substep=0.016), Inputs(), 1.6)

@@ -5,14 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_scene import CALM, DT, IDLE, Scene, off
+from hand_scene import CALM, DT, IDLE, PLACE, Scene, off
 from scipy.spatial.transform import Rotation
+from support.restored_states import assert_continues
 
 from handover.cosim.blocks.plain_rotation import IDENTITY, ZERO, quaternion, vector
 from handover.plants.free_flyer.hand.attachment import Frame
 from handover.plants.free_flyer.hand.finger_contact import HandFingers
 from handover.plants.free_flyer.hand.gripper_contact import GripperSolids
-from handover.plants.free_flyer.hand.hand_and_object import Activity, Holder
+from handover.plants.free_flyer.hand.hand_and_object import Activity, HandAndObject, Holder, Inputs
 
 
 def test_gripper_follows_its_command_at_its_rate_and_distinguishes_empty_from_full():
@@ -176,18 +177,15 @@ def test_a_grip_that_fades_slides_at_less_the_farther_it_has_opened():
 
 
 def test_a_fading_grip_is_restored_with_what_it_holds():
-    scene = Scene(replace(IDLE, grip_fades=True))
-    scene.go(2.0, closure=1.0)
-    scene.go(0.16, closure=0.0)
-    other = Scene(replace(IDLE, grip_fades=True))
-    other.unit.set_state(scene.unit.get_state())
-    other.u, other.i = scene.u, scene.i
-    for s in (scene, other):
-        s.u.v_WG = np.array([0.0, 0.0, 0.5])
-    for _ in range(10):
-        a, b = scene.go(DT), other.go(DT)
-        np.testing.assert_array_equal(a.f_G, b.f_G)
-        np.testing.assert_array_equal(a.p_WO, b.p_WO)
+    def inputs(n: int) -> Inputs:
+        v = np.array([0.0, 0.0, 0.5 if n >= 135 else 0.0])
+        return Inputs(p_WG=PLACE + max(0, n - 135) * DT * v, v_WG=v, closure=float(n < 125))
+
+    fading = HandAndObject(replace(IDLE, grip_fades=True))
+    held = [fading.step(n * DT, DT, inputs(n)) for n in range(137)][-1]
+    assert held.holder is Holder.GRIPPER
+    assert np.linalg.norm(held.f_G) > 0.1
+    assert_continues(lambda: HandAndObject(replace(IDLE, grip_fades=True)), inputs, [125, 135], 12)
 
 
 def test_a_wide_palm_pushes_what_it_meets_far_from_its_middle():

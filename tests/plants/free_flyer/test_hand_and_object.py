@@ -5,22 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hand_scene import CALM, DT, GIVING, IDLE, Scene
+from support.restored_states import assert_continues, assert_outputs_change_nothing
 
-from handover.cosim.blocks.description import describe
-from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand.hand_and_object import (
     Activity,
     HandAndObject,
     Holder,
     Inputs,
     Motion,
-    Outputs,
     Params,
 )
-
-
-def flat(y: Outputs) -> Floats:
-    return np.concatenate([np.ravel(getattr(y, v.name)) for v in describe(HandAndObject).outputs])
 
 
 def test_a_time_that_whole_steps_fill_ends_at_the_same_step_whatever_their_last_digits():
@@ -54,29 +48,15 @@ def test_a_free_object_stays_where_it_is():
 
 @pytest.mark.parametrize("params", [replace(CALM, seed=3), replace(GIVING, seed=4, tremor_rms=0.001)])
 def test_goes_on_bit_for_bit_after_a_state_is_restored(params: Params):
-    def rest(unit: HandAndObject, begin: int) -> Floats:
-        return np.array([flat(unit.step(DT * i, DT, inputs(i))) for i in range(begin, 700)])
+    """From each state on for three times as long as it is until the next: activities begin and end in between."""
 
     def inputs(i: int) -> Inputs:
         taking = params.motion is Motion.TAKE
         closed = (100 < i < 400) if taking else i > 300
         return Inputs(closure=float(closed), light=130 < i < 160, v_WG=np.array([0.0, 0.0, 0.001]))
 
-    a = HandAndObject(params)
-    states: dict[int, bytes] = {0: a.get_state()}
-    path = list[Floats]()
-    for i in range(700):
-        if i % 70 == 35:
-            states[i] = a.get_state()
-        path.append(flat(a.step(DT * i, DT, inputs(i))))
-    b = HandAndObject(params)
-    for i, state in states.items():
-        for unit in (a, b):
-            unit.set_state(state)
-            np.testing.assert_array_equal(rest(unit, i), path[i:])
+    assert_continues(lambda: HandAndObject(params), inputs, [0, *range(35, 500, 70)], 210)
 
 
 def test_asking_for_outputs_changes_nothing():
-    a, b = HandAndObject(Params()), HandAndObject(Params())
-    np.testing.assert_array_equal(flat(a.outputs(0.0, Inputs())), flat(a.outputs(0.0, Inputs())))
-    np.testing.assert_array_equal(flat(a.step(0.0, DT, Inputs())), flat(b.step(0.0, DT, Inputs())))
+    assert_outputs_change_nothing(lambda: HandAndObject(Params()), Inputs())

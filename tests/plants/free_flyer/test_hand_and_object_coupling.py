@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hand_scene import EXACT
+from hand_scene import EXACT, body_sums
 from scipy.spatial.transform import Rotation
 
 from handover.cosim.blocks.ports import Floats
@@ -36,12 +36,6 @@ def matrix(q: Floats) -> Floats:
     return Rotation.from_quat(q, scalar_first=True).as_matrix()
 
 
-def body_sums(mass: float, inertia: Floats, p: Floats, R: Floats, v: Floats, w: Floats) -> Floats:
-    """Momentum, angular momentum about the world's origin, kinetic energy."""
-    L = turned(inertia, R, w)
-    return np.concatenate([mass * v, L + mass * np.cross(p, v), [0.5 * (mass * v @ v + w @ L)]])
-
-
 def turned(matrix_B: Floats, R: Floats, a: Floats) -> Floats:
     return np.asarray(R @ (matrix_B @ (np.transpose(R) @ a)), dtype=np.float64)
 
@@ -67,10 +61,9 @@ class Loop:
     def sums(self) -> Floats:
         """Momenta and kinetic energy of robot and object, the impulse that is on its way to the robot included."""
         y, h = self.y, self.h
-        robot = body_sums(FLYER.mass, self.inertia, y.p_WB, matrix(y.q_WB), y.v_WB, y.w_WB)
-        p, q, v, spin = h.p_WO, h.q_WO, h.v_WO, np.array(self.hand._object.body.spin)  # type: ignore
-        R = matrix(q)
-        held = body_sums(0.1, I_O, p, R, v, turned(np.diag(1.0 / np.diag(I_O)), R, spin))
+        robot = body_sums(FLYER.mass, self.inertia, y.p_WB, y.q_WB, y.v_WB, y.w_WB)
+        w_WO = turned(np.diag(1.0 / np.diag(I_O)), matrix(h.q_WO), np.array(self.hand._object.body.spin))  # type: ignore
+        held = body_sums(0.1, I_O, h.p_WO, h.q_WO, h.v_WO, w_WO)
         coming = self.dt * np.concatenate([h.f_G, h.tau_G + np.cross(y.p_WG, h.f_G), [0.0]])
         return robot + held + coming
 
@@ -133,8 +126,7 @@ def test_momentum_goes_from_robot_to_object_without_loss(dt: float):
     assert 0.1 * np.linalg.norm(loop.h.v_WO) > 0.01
 
 
-@pytest.mark.parametrize("dt", [0.016, 0.032])
-@pytest.mark.parametrize("kind", ["rigid", "compliant", ""])
+@pytest.mark.parametrize(("dt", "kind"), [(0.016, "rigid"), (0.032, "compliant"), (0.032, "")])
 def test_held_by_both_all_comes_to_rest(dt: float, kind: str):
     loop = gripped(
         dt,
@@ -157,11 +149,10 @@ def step_and_look(loop: Loop) -> float:
     return float(np.linalg.norm(loop.y.v_WG))
 
 
-@pytest.mark.parametrize("dt", [0.016, 0.032])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("dt", "kind"), [(0.032, "rigid"), (0.016, "compliant")])
 def test_robot_yields_to_a_pull_as_its_stiffness_says(dt: float, kind: str):
     loop = gripped(dt, kind=kind, motion=Motion.TAKE, pull_distance=0.03, patience=1e4)
-    loop_until_rest(loop, 16.0)
+    loop_until_rest(loop, 12.0)
     k = KINDS[kind][0]
     np.testing.assert_allclose(loop.y.p_WB - FLYER.p_WB_0, loop.h.f_G / k, atol=2e-4)
     np.testing.assert_allclose(loop.h.f_G, -loop.h.f_H, atol=2e-3)
@@ -196,7 +187,7 @@ def test_results_do_not_hang_on_the_step():
         loop_until_rest(loop, 3.2)
         return np.concatenate([loop.y.p_WG, loop.h.p_WO])
 
-    fine = path(0.002)
+    fine = path(0.004)
     assert np.linalg.norm(fine[:3] - [0.0, -0.07, 0.0]) > 0.01
     np.testing.assert_allclose(path(0.016), fine, atol=2e-3)
     np.testing.assert_allclose(path(0.032), fine, atol=4e-3)

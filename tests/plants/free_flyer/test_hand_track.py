@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hand_scene import DT, IDLE, Scene
+from support.wording import Wording
 
 from handover.cosim.blocks.plain_rotation import IDENTITY, from_rotation_vector
 from handover.plants.free_flyer.hand.hand_and_object import Driver, HandAndObject, InvalidHandParameters, Params
-from handover.plants.free_flyer.hand.hand_kinematics import JOINT_MAX, JOINTS
+from handover.plants.free_flyer.hand.hand_kinematics import JOINTS
 from handover.plants.free_flyer.hand.hand_track import COLUMNS, HandPose, InvalidTrack, read_track, write_track
 
 AWAY = np.array([1.0, 0.0, 0.0])
@@ -67,61 +68,63 @@ def test_columns_may_stand_in_any_order(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
+    "change",
     [
-        ({"p_y": (7, "nan")}, "every entry must be a finite number: line 7 (p_y)"),
-        ({"joint_3": (9, "x")}, "every entry must be a finite number: line 9 (joint_3)"),
-        ({"t": (5, 0.05)}, "time must increase: line 5 (0.05 s after 0.1 s)"),
-        ({"t": (61, 3.5)}, "rows must be 0.2 s apart at most: line 61 (0.6 s after the row before)"),
-        ({"t": (2, -0.1)}, "time must not be negative, a run begins at 0 s: line 2 (-0.1 s)"),
-        ({"joint_14": (4, 1.7)}, f"joints must be within 0 and {JOINT_MAX:.4f} rad: line 4 (joint_14 1.7)"),
-        ({"joint_1": (4, -0.1)}, f"joints must be within 0 and {JOINT_MAX:.4f} rad: line 4 (joint_1 -0.1)"),
-        ({"q_w": (3, 1.2)}, "a quaternion must have the norm 1: line 3 (norm 1.2"),
-        ({"closed": (8, 0.5)}, "closed must be 0 or 1: line 8 (0.5)"),
+        {"p_y": (7, "nan")},
+        {"joint_3": (9, "x")},
+        {"t": (5, 0.05)},
+        {"t": (61, 3.5)},
+        {"t": (2, -0.1)},
+        {"joint_14": (4, 1.7), "joint_1": (4, -0.1)},
+        {"q_w": (3, 1.2)},
+        {"closed": (8, 0.5)},
     ],
+    ids=lambda change: " ".join(change),
 )
 def test_what_cannot_be_followed_is_refused_with_file_line_and_reason(
-    tmp_path: Path, change: dict[str, tuple[int, object]], says: str
+    tmp_path: Path, change: dict[str, tuple[int, object]], wording: Wording
 ):
     path = spoiled(tmp_path / "t.csv", **change)
-    with pytest.raises(InvalidTrack) as e:
+    with pytest.raises(InvalidTrack) as refused:
         HandAndObject(replace(IDLE, driven_by=Driver.TRACK, track=str(path)))
-    assert any(f"track {path}: {says}" in fault for fault in e.value.faults), e.value.faults
+    wording.check(refused.value)
 
 
-def test_all_faults_are_told_at_once_and_the_first_lines_of_each(tmp_path: Path):
+def test_all_faults_are_told_at_once_and_the_first_lines_of_each(tmp_path: Path, wording: Wording):
     rows = [(t, pose._replace(angles=(2.0,) * JOINTS, q=(2.0, 0.0, 0.0, 0.0))) for t, pose in poses(10)]
     write_track(tmp_path / "t.csv", rows)
-    with pytest.raises(InvalidTrack) as e:
+    with pytest.raises(InvalidTrack) as refused:
         read_track(tmp_path / "t.csv", 0.01)
-    assert len(e.value.faults) == 3
-    assert all("and 7 more" in fault or "and 6 more" in fault for fault in e.value.faults)
-    assert "line 2 (norm 2), 3 (norm 2), 4 (norm 2) and 7 more" in str(e.value)
+    assert len(refused.value.faults) == 3
+    wording.check(refused.value)
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    "text",
     [
-        ("", "it is empty"),
-        ("t;p_x\n0;1\n", "all of t, p_x, .*, closed, separated by commas; it names none of them"),
-        (",".join((*COLUMNS, "t")) + "\n", "its first row names t more than once"),
-        ("t,p_x\n0,1\n", "lacking: p_y"),
-        (",".join(COLUMNS) + "\n", "no rows"),
-        (",".join(COLUMNS) + "\n0,1,2\n", "every entry must be a finite number: line 2"),
+        "",
+        "t;p_x\n0;1\n",
+        ",".join((*COLUMNS, "t")) + "\n",
+        "t,p_x\n0,1\n",
+        ",".join(COLUMNS) + "\n",
+        ",".join(COLUMNS) + "\n0,1,2\n",
+        None,
     ],
+    ids=["empty", "semicolons", "twice", "lacking", "no rows", "short row", "no file"],
 )
-def test_a_file_that_is_no_track_is_refused(tmp_path: Path, text: str, says: str):
-    (tmp_path / "t.csv").write_text(text)
-    with pytest.raises(InvalidTrack, match=says):
+def test_a_file_that_is_no_track_is_refused(tmp_path: Path, text: str | None, wording: Wording):
+    if text is not None:
+        (tmp_path / "t.csv").write_text(text)
+    with pytest.raises(InvalidTrack) as refused:
         read_track(tmp_path / "t.csv", 0.2)
+    wording.check(refused.value)
 
 
-def test_a_file_that_is_not_there_is_refused(tmp_path: Path):
-    with pytest.raises(InvalidTrack, match=r"there is no such file$"):
-        read_track(tmp_path / "none.csv", 0.2)
-    for params in (Params(driven_by=Driver.TRACK), Params(track="t.csv")):
-        with pytest.raises(InvalidHandParameters, match="track"):
-            HandAndObject(params)
+@pytest.mark.parametrize("params", [Params(driven_by=Driver.TRACK), Params(track="t.csv")], ids=["none", "not driven"])
+def test_a_driver_without_a_track_and_a_track_without_a_driver_are_refused(params: Params, wording: Wording):
+    with pytest.raises(InvalidHandParameters) as refused:
+        HandAndObject(params)
+    wording.check(refused.value)
 
 
 def test_hand_follows_a_track_without_delay_as_its_rows_are_known_beforehand(tmp_path: Path):

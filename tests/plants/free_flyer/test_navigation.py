@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.restored_states import assert_continues, flat
+from support.wording import Wording
 
-from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.robot.navigation import (
     Inputs,
@@ -38,10 +39,6 @@ def turned(q: Floats) -> Rotation:
 def truth(t: float) -> Inputs:
     """Return a robot that flies straight and turns evenly; its velocities grow with time, unlike a real one's."""
     return Inputs(p_WB=P_0 + t * V, q_WB=quaternion_of(Rotation.from_rotvec(t * W)), v_WB=V + t * W, w_WB=W + t * V)
-
-
-def flat(y: Outputs) -> Floats:
-    return np.concatenate([np.ravel(getattr(y, v.name)) for v in describe(Navigation).outputs])
 
 
 def courses(p: Params, steps: int, dt: float = DT) -> list[Outputs]:
@@ -139,8 +136,9 @@ def test_bias_and_drift_do_not_change_the_noise():
     assert np.std(together - noise) > 0.001
 
 
-@pytest.mark.parametrize("delay", [0.016, 0.048, 0.05, 0.1, 0.0037])
-@pytest.mark.parametrize("dt", [0.016, 0.002])
+@pytest.mark.parametrize(
+    ("delay", "dt"), [(0.016, 0.016), (0.05, 0.016), (0.0037, 0.016), (0.1, 0.016), (0.048, 0.002), (0.0037, 0.002)]
+)
 def test_a_delay_is_exact_on_a_ramp(delay: float, dt: float):
     for i, y in enumerate(courses(replace(EXACT, delay=delay), 150, dt)):
         np.testing.assert_allclose(off(y, truth(max(i * dt - delay, 0.0))), 0.0, atol=3e-8)
@@ -164,18 +162,6 @@ def test_a_held_estimate_has_one_noise():
     assert len(np.unique(ys, axis=0)) == 11  # one at the start, and ten in two seconds
 
 
-def test_asking_for_outputs_changes_nothing():
-    p = replace(DRIFTING, position_noise=0.001, delay=0.03, update_rate=20.0)
-    a, b = Navigation(p), Navigation(p)
-    for i in range(20):
-        u = truth(i * DT)
-        np.testing.assert_array_equal(flat(a.outputs(i * DT, u)), flat(a.outputs(i * DT, u)))
-        if i == 0:
-            b.outputs(0.0, u)
-        after = truth((i + 1) * DT)
-        np.testing.assert_array_equal(flat(a.step(i * DT, DT, after)), flat(b.step(i * DT, DT, after)))
-
-
 @pytest.mark.parametrize(
     "p",
     [
@@ -184,55 +170,46 @@ def test_asking_for_outputs_changes_nothing():
         replace(DRIFTING, seed=3, attitude_noise=0.002, update_rate=13.0, delay=0.1),
     ],
 )
-def test_goes_on_bit_for_bit_after_a_state_is_restored(p: Params):
-    def go(unit: Navigation) -> Floats:
-        return np.array([flat(unit.step(i * DT, DT, truth((i + 1) * DT))) for i in range(20, 60)])
-
-    a, b = Navigation(p), Navigation(p)
-    a.outputs(0.0, truth(0.0))
+def test_goes_on_bit_for_bit_after_a_state_is_restored_and_asking_for_outputs_changes_nothing(p: Params):
+    assert_continues(lambda: Navigation(p), lambda i: truth((i + 1) * DT), [5, 20], 40)
+    asked, other = Navigation(p), Navigation(p)
+    other.outputs(0.0, truth(0.0))
     for i in range(20):
-        a.step(i * DT, DT, truth((i + 1) * DT))
-    state = a.get_state()
-    expected = go(a)
-    for unit in (a, b):
-        unit.set_state(state)
-        np.testing.assert_array_equal(go(unit), expected)
+        now, after = truth(i * DT), truth((i + 1) * DT)
+        np.testing.assert_array_equal(flat(asked.outputs(i * DT, now)), flat(asked.outputs(i * DT, now)))
+        np.testing.assert_array_equal(flat(asked.step(i * DT, DT, after)), flat(other.step(i * DT, DT, after)))
 
 
 @pytest.mark.parametrize("name", ["noise", "bias", "drift"])
-@pytest.mark.parametrize("what", WHATS)
-def test_a_negative_deviation_is_refused(what: str, name: str):
-    changes: dict[str, Any] = {f"{what}_{name}": -0.001}
-    with pytest.raises(InvalidNavigationParameters, match=f"{what}_{name}: -0.001"):
-        Navigation(replace(EXACT, **changes))
+def test_negative_deviations_are_refused_all_at_once(name: str):
+    with pytest.raises(InvalidNavigationParameters) as refused:
+        Navigation(replace(EXACT, **{f"{what}_{name}": -0.001 for what in WHATS}))
+    assert [fault.partition(":")[0] for fault in refused.value.faults] == [f"{what}_{name}" for what in WHATS]
 
 
 @pytest.mark.parametrize(
-    ("changes", "text"),
+    "changes",
     [
-        ({"delay": -0.1}, "delay: -0.1"),
-        ({"delay": float("nan")}, "delay: nan is not finite"),
-        ({"update_rate": -1.0}, "update_rate: -1"),
-        ({"attitude_bias": 3.0}, "attitude_bias: 3"),
-        ({"position_drift": 0.01}, "position_drift 0.01 needs a correlation time: drift_time must be greater than 0 s"),
+        {"delay": -0.1, "update_rate": -1.0, "attitude_bias": 3.0},
+        {"delay": float("nan")},
+        {"position_drift": 0.01},
     ],
+    ids=["range", "nan", "drift"],
 )
-def test_what_no_navigation_has_is_refused(changes: dict[str, Any], text: str):
-    with pytest.raises(InvalidNavigationParameters, match=text):
+def test_what_no_navigation_has_is_refused(changes: dict[str, Any], wording: Wording):
+    with pytest.raises(InvalidNavigationParameters) as refused:
         Navigation(replace(Params(), **changes))
-
-
-def test_all_faults_are_reported_together():
-    with pytest.raises(InvalidNavigationParameters) as caught:
-        Navigation(Params(delay=-1.0, update_rate=-1.0, rate_noise=-1.0))
-    assert len(caught.value.faults) == 3
+    assert len(refused.value.faults) == len(changes)
+    wording.check(refused.value)
 
 
 @pytest.mark.parametrize("changes", [{}, {"delay": 0.1}, {"update_rate": 13.0}])
-def test_an_orientation_that_is_none_is_refused_by_name(changes: dict[str, Any]):
+def test_an_orientation_that_is_none_is_refused_by_name(changes: dict[str, Any], wording: Wording):
     unit, none = Navigation(replace(EXACT, **changes)), replace(truth(0.0), q_WB=np.zeros(4))
-    with pytest.raises(NoOrientation, match=r"q_WB is \[0, 0, 0, 0\] at 0 s.*unit quaternion"):
+    with pytest.raises(NoOrientation) as refused:
         unit.outputs(0.0, none)
+    wording.check(refused.value)
     unit.outputs(0.0, truth(0.0))
-    with pytest.raises(NoOrientation, match=r"at 0\.016 s"):
+    with pytest.raises(NoOrientation) as refused:
         unit.step(0.0, DT, none)
+    wording.check(refused.value)

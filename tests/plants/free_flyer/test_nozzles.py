@@ -1,10 +1,13 @@
 """Twelve nozzles: what they can give, that it comes out as commanded, and how flappers and impellers delay it."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import linprog
+from support.restored_states import assert_continues
+from support.wording import Wording
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.robot.nozzles import (
@@ -128,9 +131,9 @@ def test_the_mean_over_a_step_is_the_command_where_flappers_turn_at_once():
 
 def test_a_step_command_lags_by_about_the_flappers_lag():
     for axis in range(6):
-        for part in (0.01, 0.5, 0.75):
+        for part in (0.01, 0.75):
             wrench = part * LIMITS * np.eye(6)[axis]
-            lag = np.sum(1.0 - walk(thrusters(), wrench, 250, 0.002)[:, axis] / wrench[axis]) * 0.002
+            lag = np.sum(1.0 - walk(thrusters(), wrench, 100, 0.005)[:, axis] / wrench[axis]) * 0.005
             assert DEFAULT.flapper_lag * 0.8 < lag < DEFAULT.flapper_lag * 1.2
 
 
@@ -179,24 +182,19 @@ def test_a_stuck_nozzle_is_missing_and_the_others_of_its_plenum_blow_harder():
     assert -0.125 < walk(thrusters(flapper_range=share, **AT_ONCE), both, 1)[0][1] < -0.105
 
 
-def test_nozzles_whose_loss_takes_a_direction_away_are_refused_with_that_direction():
+def test_nozzles_whose_loss_takes_a_direction_away_are_refused_with_that_direction(wording: Wording):
     assert all(lost_directions([i]) == [] for i in range(12))
     share = np.ones(12)
     share[[0, 7]] = 0.0
-    with pytest.raises(InvalidThrusterParameters, match="nozzles 1, 8 stuck closed there is no force along -x"):
-        thrusters(flapper_range=share)
+    for closed in (share, np.zeros(12)):
+        with pytest.raises(InvalidThrusterParameters) as refused:
+            thrusters(flapper_range=closed)
+        wording.check(refused.value)
     assert Thrusters(Params(flapper_range=share))
-    with pytest.raises(InvalidThrusterParameters, match=r"12 stuck closed .* along \+x.* about -z"):
-        thrusters(flapper_range=np.zeros(12))
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.025])
 def test_goes_on_bit_for_bit_after_a_state_is_restored(delay: float):
-    a, b = (thrusters(delay=delay, impeller_speed_0=100.0) for _ in range(2))
-    there, back = np.array([0.3, 0, 0, 0.01, 0, 0.0]), np.array([-0.4, 0.1, 0, 0, 0.02, 0.0])
-    walk(a, there, 5)
-    state = a.get_state()
-    expected = walk(a, back, 8)
-    for unit in (a, b):
-        unit.set_state(state)
-        np.testing.assert_array_equal(walk(unit, back, 8), expected)
+    there, back = command(np.array([0.3, 0, 0, 0.01, 0, 0.0])), command(np.array([-0.4, 0.1, 0, 0, 0.02, 0.0]))
+    make = partial(thrusters, delay=delay, impeller_speed_0=100.0)
+    assert_continues(make, lambda n: there if n < 5 else back, [3, 5], 8)
