@@ -152,7 +152,7 @@ def step_and_look(loop: Loop) -> float:
 @pytest.mark.parametrize(("dt", "kind"), [(0.032, "rigid"), (0.016, "compliant")])
 def test_robot_yields_to_a_pull_as_its_stiffness_says(dt: float, kind: str):
     loop = gripped(dt, kind=kind, motion=Motion.TAKE, pull_distance=0.03, patience=1e4)
-    loop_until_rest(loop, 12.0)
+    loop_until_rest(loop, 16.0)
     k = KINDS[kind][0]
     np.testing.assert_allclose(loop.y.p_WB - FLYER.p_WB_0, loop.h.f_G / k, atol=2e-4)
     np.testing.assert_allclose(loop.h.f_G, -loop.h.f_H, atol=2e-3)

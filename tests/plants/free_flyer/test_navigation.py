@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,7 @@ def turned(q: Floats) -> Rotation:
     return Rotation.from_quat(q, scalar_first=True)
 
 
+@cache
 def truth(t: float) -> Inputs:
     """Return a robot that flies straight and turns evenly; its velocities grow with time, unlike a real one's."""
     return Inputs(p_WB=P_0 + t * V, q_WB=quaternion_of(Rotation.from_rotvec(t * W)), v_WB=V + t * W, w_WB=W + t * V)
@@ -50,12 +52,15 @@ def courses(p: Params, steps: int, dt: float = DT) -> list[Outputs]:
 def off(y: Outputs, u: Inputs) -> Floats:
     """Return by how much an estimate is off: position, rotation vector in the robot's frame, velocities."""
     turn: Floats = np.asarray((turned(u.q_WB).inv() * turned(y.q_WB_meas)).as_rotvec(), dtype=np.float64)
-    return np.concatenate([y.p_WB_meas - u.p_WB, turn, y.v_WB_meas - u.v_WB, y.w_WB_meas - u.w_WB])
+    return np.concatenate([y.p_WB_meas - u.p_WB, turn, y.v_WB_meas - u.v_WB, y.w_WB_meas - u.w_WB], axis=-1)
 
 
 def errors(p: Params, steps: int, dt: float = DT) -> Floats:
     """Return by how much the estimates are off, a row a communication point."""
-    return np.array([off(y, truth(i * dt)) for i, y in enumerate(courses(p, steps, dt))])
+    ys, us = courses(p, steps, dt), [truth(i * dt) for i in range(steps + 1)]
+    given = {name: np.array([getattr(y, name) for y in ys]) for name in vars(ys[0])}
+    true = {name: np.array([getattr(u, name) for u in us]) for name in vars(us[0])}
+    return off(Outputs(**given), Inputs(**true))
 
 
 def each_axis(what: dict[str, float]) -> Floats:
@@ -182,9 +187,10 @@ def test_goes_on_bit_for_bit_after_a_state_is_restored_and_asking_for_outputs_ch
 
 @pytest.mark.parametrize("name", ["noise", "bias", "drift"])
 def test_negative_deviations_are_refused_all_at_once(name: str):
+    negative: dict[str, Any] = {f"{what}_{name}": -0.001 for what in WHATS}
     with pytest.raises(InvalidNavigationParameters) as refused:
-        Navigation(replace(EXACT, **{f"{what}_{name}": -0.001 for what in WHATS}))
-    assert [fault.partition(":")[0] for fault in refused.value.faults] == [f"{what}_{name}" for what in WHATS]
+        Navigation(replace(EXACT, **negative))
+    assert [fault.partition(":")[0] for fault in refused.value.faults] == [*negative]
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flyer_runs import metric, run
+from flyer_runs import kept, metric, run
 
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.record.reader import Record
@@ -12,34 +12,36 @@ from handover.scenarios.free_flyer.push.arm_impedance import FlyerArmImpedance
 from handover.scenarios.free_flyer.push.arm_parameters import ArmPushParameters
 
 
-def test_a_pushed_robot_yields_with_its_arm_and_moves_as_the_impedance_model_says(tmp_path: Path):
-    ended = run(FlyerArmImpedance, tmp_path / "r", drawn=True)
-    assert ended.outcome.success, ended.outcome.reason
-    assert metric(ended, "disagreement_position") <= 0.007
-    assert metric(ended, "disagreement_orientation") <= 0.02
-    assert metric(ended, "joint_motion") > 0.2
-    record = Record(tmp_path / "r" / "signals.parquet")
-    away = np.linalg.norm(record["robot.p_WG"] - [0.0, -0.07, 0.0], axis=1)
-    assert metric(ended, "greatest_position_error") == pytest.approx(away.max())
-    moved = np.linalg.norm(record["robot.p_WB"] - record["robot.p_WB"][0], axis=1)
-    assert metric(ended, "base_displacement") == pytest.approx(moved.max())
+def test_a_pushed_robot_yields_with_its_arm_and_moves_as_the_impedance_model_says():
+    done = kept("flyer_arm_impedance")
+    assert done.success, done.reason
+    assert done.metric("disagreement_position") <= 0.007
+    assert done.metric("disagreement_orientation") <= 0.02
+    assert done.metric("joint_motion") > 0.2
+    away = np.linalg.norm(done.record["robot.p_WG"] - [0.0, -0.07, 0.0], axis=1)
+    assert done.metric("greatest_position_error") == pytest.approx(away.max())
+    moved = np.linalg.norm(done.record["robot.p_WB"] - done.record["robot.p_WB"][0], axis=1)
+    assert done.metric("base_displacement") == pytest.approx(moved.max())
 
 
+@pytest.mark.slow
 def test_with_fixed_joints_the_model_is_that_of_one_body_and_the_base_does_it_all(tmp_path: Path):
     ended = run(FlyerArmImpedance, tmp_path / "r", "tolerance=0")
     assert ended.outcome.success, ended.outcome.reason
     assert metric(ended, "joint_motion") == 0.0
 
 
+@pytest.mark.slow
 def test_joints_that_lock_unknown_to_the_controller_depart_from_the_model(tmp_path: Path):
     ended = run(FlyerArmImpedance, tmp_path / "r", "lock_time=1.25")
     assert not ended.outcome.success
     assert "departed from the impedance model" in ended.outcome.reason
     assert "joint 1 was held at" in ended.outcome.reason
-    q_J, t = Record(tmp_path / "r" / "signals.parquet")["robot.q_J"], Record(tmp_path / "r" / "signals.parquet").time
-    assert len(np.unique(q_J[t > 1.28], axis=0)) == 1
+    record = Record(tmp_path / "r" / "signals.parquet")
+    assert len(np.unique(record["robot.q_J"][record.time > 1.28], axis=0)) == 1
 
 
+@pytest.mark.slow
 def test_a_joint_at_its_end_stop_is_told(tmp_path: Path):
     ended = run(FlyerArmImpedance, tmp_path / "r", "posture=1.5,1.5,1.5", "joints=3")
     assert "joint 1 was held at 90°" in ended.outcome.reason
@@ -63,11 +65,10 @@ def test_factors_of_the_arm_scale_its_links():
 def test_the_age_of_the_estimate_reaches_navigation_and_controller(tmp_path: Path):
     with pytest.raises(InitializationError, match=r"with a delay of 0\.15 s"):
         run(FlyerArmImpedance, tmp_path / "r", "delay=0.05", "navigation_delay=0.1")
-    late = run(FlyerArmImpedance, tmp_path / "late", "navigation_delay=0.004")
-    prompt = run(FlyerArmImpedance, tmp_path / "prompt")
-    assert metric(late, "pole_margin_impedance") < metric(prompt, "pole_margin_impedance")
+    late = run(FlyerArmImpedance, tmp_path / "late", "navigation_delay=0.004", stop=0.5)
+    assert metric(late, "pole_margin_impedance") < kept("flyer_arm_impedance").metric("pole_margin_impedance")
 
 
 def test_a_nozzle_that_is_stuck_is_told(tmp_path: Path):
-    ended = run(FlyerArmImpedance, tmp_path / "r", "propulsion=nozzles", "stuck_nozzle=3", "force=0.2", "patience=10")
+    ended = run(FlyerArmImpedance, tmp_path / "r", "propulsion=nozzles", "stuck_nozzle=3", stop=0.1)
     assert ended.outcome.reason.endswith("; nozzle 3 was stuck closed")

@@ -1,39 +1,22 @@
 """What the free-flyer's scene shows, by its axes: a robot that drifts away, and what is in front of what."""
 
-from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
+from support.sketched_figures import Sketches
+from support.sketched_figures import sketches as sketches
 
 from handover.cosim.blocks.ports import Floats
-from handover.scenarios.experiment.plotting import figure
-from handover.scenarios.free_flyer import scene
 from handover.scenarios.free_flyer.scene import Solid, draw_near, draw_scene
 
 CUBE: Floats = np.array([[x, y, z] for x in (0.0, 0.3) for y in (0.0, 0.3) for z in (0.0, 0.3)])
 GREY, BLUE = "#c9d3df", "#2f6db5"
 NEAR = [Solid(CUBE, GREY)]
 BEFORE, BEHIND = Solid(CUBE - [0.0, 0.5, 0.0], BLUE), Solid(CUBE, GREY)
-
-
-@pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Axes]:
-    """The axes of what is drawn, row by row."""
-    kept: list[Axes] = []
-
-    @contextmanager
-    def keep(*args: Any, **kwargs: Any) -> Generator[list[Axes], None, None]:
-        with figure(*args, **kwargs) as axes:
-            yield axes
-            kept.extend(axes)
-
-    monkeypatch.setattr(scene, "figure", keep)
-    return kept
 
 
 def faces(axes: Axes) -> tuple[list[Floats], Floats]:
@@ -46,9 +29,9 @@ def span(limits: Sequence[float]) -> float:
     return limits[1] - limits[0]
 
 
-def test_a_robot_that_drifts_away_stays_large_in_the_scene(tmp_path: Path, drawn: list[Axes]):
+def test_a_robot_that_drifts_away_stays_large_in_the_scene(tmp_path: Path, sketches: Sketches):
     draw_scene({"start": NEAR, "end": [Solid(CUBE + 80.0, GREY)]}, "", tmp_path)
-    for axes, at in zip(drawn, (0.0, 80.0, 0.0, 80.0), strict=True):
+    for axes, at in zip(sketches["scene"].axes, (0.0, 80.0, 0.0, 80.0), strict=True):
         (face,), _ = faces(axes)
         assert face.min() == at
         assert axes.get_xlim()[0] < at < at + 0.3 < axes.get_xlim()[1]
@@ -56,19 +39,19 @@ def test_a_robot_that_drifts_away_stays_large_in_the_scene(tmp_path: Path, drawn
         assert 0.7 * span(axes.get_xlim()) < 0.3
 
 
-def test_the_scene_names_its_moments_views_and_axes(tmp_path: Path, drawn: list[Axes]):
+def test_the_scene_names_its_moments_views_and_axes(tmp_path: Path, sketches: Sketches):
     draw_scene({"0.0 s, start": NEAR, "9.0 s, end": NEAR}, "", tmp_path)
+    drawn = sketches["scene"].axes
     side = ["0.0 s, start\nfrom the side", "9.0 s, end\nfrom the side"]
     assert [axes.get_title() for axes in drawn] == [*side, "from above", "from above"]
     assert [(axes.get_xlabel(), axes.get_ylabel()) for axes in drawn] == [("x (m)", "z (m)")] * 2 + [
         ("x (m)", "y (m)")
     ] * 2
-    assert {path.name for path in tmp_path.iterdir()} == {"scene.png", "scene.svg"}
 
 
-def test_from_the_side_what_is_nearer_hides_what_is_behind_it(tmp_path: Path, drawn: list[Axes]):
+def test_from_the_side_what_is_nearer_hides_what_is_behind_it(tmp_path: Path, sketches: Sketches):
     draw_scene({"start": [BEFORE, BEHIND]}, "", tmp_path)
-    from_side, from_above = drawn
+    from_side, from_above = sketches["scene"].axes
     polygons, colours = faces(from_side)
     np.testing.assert_array_equal(polygons[0], polygons[1])
     assert colours[0][0] > colours[1][0]  # the blue one, of less red, is drawn over the grey one
@@ -76,9 +59,11 @@ def test_from_the_side_what_is_nearer_hides_what_is_behind_it(tmp_path: Path, dr
     assert abs(apart[0].mean(axis=0) - apart[1].mean(axis=0))[1] == pytest.approx(0.5)
 
 
-def test_a_transfer_is_shown_from_near_around_its_middle(tmp_path: Path, drawn: list[Axes]):
+def test_a_transfer_is_shown_from_near_around_its_middle(tmp_path: Path, sketches: Sketches):
     middle = np.array([0.1, -0.2, 0.3])
     draw_near({"5.0 s, transfer": NEAR}, {"5.0 s, transfer": middle}, tmp_path)
+    (figure,) = sketches.values()
+    drawn = figure.axes
     titles = [axes.get_title() for axes in drawn]
     assert titles == ["5.0 s, transfer, from the side", "5.0 s, transfer, from above"]
     for axes, up in zip(drawn, (middle[2], middle[1]), strict=True):

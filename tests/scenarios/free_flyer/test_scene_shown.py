@@ -4,25 +4,17 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-import pytest
-from flyer_runs import run
+from flyer_runs import kept, run
 
 from handover.cosim.record.reader import Record
 from handover.plants.free_flyer.hand.hand_kinematics import PALM_BONES, PALM_RADIUS
 from handover.scenarios.free_flyer.handover.hand_practice import HandPractice, PracticeParameters
-from handover.scenarios.free_flyer.handover.handovers import RobotToHuman
 from handover.scenarios.free_flyer.replay import replay_handover
 from handover.scenarios.free_flyer.scene import EDGE
 
 
-@pytest.fixture(scope="module")
-def record(tmp_path_factory: pytest.TempPathFactory) -> Record:
-    folder = tmp_path_factory.mktemp("runs") / "run"
-    run(RobotToHuman, folder, "hand=outside", "patience=2")
-    return Record(folder / "signals.parquet")
-
-
-def test_the_cube_is_in_view_wherever_it_flies(record: Record):
+def test_the_cube_is_in_view_wherever_it_flies():
+    record = kept("flyer_robot_to_human").record
     window = replay_handover(record).window
     assert window is not None
     for p_WB in record["robot.p_WB"]:
@@ -30,7 +22,8 @@ def test_the_cube_is_in_view_wherever_it_flies(record: Record):
         assert (window.max(axis=0) >= p_WB + EDGE / 2.0).all()
 
 
-def test_the_palm_is_drawn_where_it_touches(record: Record):
+def test_the_palm_is_drawn_where_it_touches():
+    record = kept("flyer_robot_to_human").record
     palm = next(body for body in replay_handover(record).bodies if body.label == "hand")
     bones = np.array(PALM_BONES).reshape(-1, 3)
     x, y, z = (palm.mesh.vertices - bones.mean(axis=0)).T

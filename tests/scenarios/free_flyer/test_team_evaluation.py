@@ -3,11 +3,9 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from staged_signals import staged
 
 from handover.controllers.free_flyer.handover_state_machine import HandoverPhase as Phase
-from handover.cosim.blocks.variable import Causality, Kind
-from handover.cosim.fmu.file.description import FmuPort
 from handover.cosim.system.signals import Signals
 from handover.scenarios.free_flyer.handover.person_evaluation import Cause
 from handover.scenarios.free_flyer.parameters import TeamParameters
@@ -20,38 +18,20 @@ UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
 def signals(phase: Phase, grippers: int, hands: int = 0, *, failed: int = 0, closed: bool = False) -> Signals:
     """Return what there is to see while both robots are in a phase, by bit masks of who holds the object."""
     values: dict[str, dict[str, Any]] = {
-        "decision": {"phase_1": [int(phase)], "phase_2": [int(phase)]},
-        "person": {"p_WO": np.zeros(3), "q_WO": UNTURNED, "grippers_holding": [grippers], "hands_holding": [hands]},
+        "decision": {"phase_1": phase, "phase_2": phase},
+        "person": {"p_WO": np.zeros(3), "q_WO": UNTURNED, "grippers_holding": grippers, "hands_holding": hands},
     }
     for i, side in ((1, 1.0), (2, -1.0)):
         values["decision"] |= {
-            f"closure_{i}": [float(closed)],
-            f"speed_{i}": [0.01],
-            f"failed_receptions_{i}": [0],
-            f"failed_deliveries_{i}": [failed],
+            f"closure_{i}": float(closed),
+            f"speed_{i}": 0.01,
+            f"failed_receptions_{i}": 0,
+            f"failed_deliveries_{i}": failed,
         }
         values["person"] |= {f"f_G_{i}": np.zeros(3), f"f_H_{i}": np.zeros(3)}
         values[f"robot_{i}"] = {"p_WG": np.array([0.28, 0.25 * side, 0.0])}
-        values[f"thrusters_{i}"] = {"saturated": [False]}
-    units: dict[str, dict[str, tuple[NDArray[Any], ...]]] = {
-        unit: {name: (np.array(value),) for name, value in ys.items()} for unit, ys in values.items()
-    }
-    ports = {
-        unit: {
-            name: FmuPort(
-                name=name,
-                kind=Kind.ENUMERATION if name.startswith("phase") else Kind.REAL,
-                causality=Causality.OUTPUT,
-                fmi_type="",
-                references=(),
-                shape=() if isinstance(value, list) else value.shape,
-                items=tuple((i.name, int(i)) for i in Phase) if name.startswith("phase") else (),
-            )
-            for name, value in ys.items()
-        }
-        for unit, ys in values.items()
-    }
-    return Signals(units, ports, None)
+        values[f"thrusters_{i}"] = {"saturated": False}
+    return staged(values)
 
 
 def released() -> TeamEvaluator:

@@ -140,6 +140,9 @@ def test_python_control_and_a_long_push_end_at_the_springs_stretch(behaviour: Be
 
 
 def test_without_records_there_are_no_curves(tmp_path: Path, sketches: Sketches, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(flyer_impedance_figures, "predicted_greatest", lambda _p, behaviour, _d: 1.0 + behaviour)
+    def predicted(_push: Push, behaviour: Behaviour, _duration: float) -> float:
+        return 1.0 + behaviour
+
+    monkeypatch.setattr(flyer_impedance_figures, "predicted_greatest", predicted)
     FlyerImpedanceTable().draw(table_of(), tmp_path, tmp_path)
     sketches.check("ratio")

@@ -43,6 +43,16 @@ def always(_given: Run, _k: int) -> bool:
     return True
 
 
+def each(_given: Run) -> bool:
+    """Return that every run fails."""
+    return True
+
+
+def none(_given: Run) -> bool:
+    """Return that no run fails."""
+    return False
+
+
 def by_position(given: Run) -> bool:
     """Return whether a run fails: where the object is fetched with a biased position, or a loop cannot bear a delay."""
     late = float(given.get("navigation.delay", 0.0))
@@ -99,13 +109,13 @@ def test_the_navigation_takes_every_level():
 
 def test_every_claim_is_judged_both_ways():
     good = verdicts(table_of())
-    bad = verdicts(table_of(fails=lambda _: True, signals=always, alone=True))
+    bad = verdicts(table_of(fails=each, signals=always, alone=True))
     judged = {text for text, claim in good.items() if claim.verdict is not Verdict.NOT_COMPARABLE}
     assert {good[text].verdict for text in judged} == {Verdict.REPRODUCED}
     changed = {text for text in judged if bad[text].verdict is Verdict.NOT_REPRODUCED}
     assert {text for text in judged - changed if "do not bear" not in text} == set()
-    none = verdicts(table_of(fails=lambda _: False))
-    assert {none[text].verdict for text in judged - changed} == {Verdict.NOT_REPRODUCED}
+    without = verdicts(table_of(fails=none))
+    assert {without[text].verdict for text in judged - changed} == {Verdict.NOT_REPRODUCED}
     assert all(claim.beyond for claim in good.values() if claim.verdict is not Verdict.NOT_COMPARABLE)
 
 
@@ -147,7 +157,7 @@ def test_a_robot_that_acted_alone_and_had_luck_is_no_success_and_no_figure():
 
 
 def test_a_transfer_before_a_failed_retreat_is_told_apart():
-    rows = table_of(fails=lambda _: True).rows
+    rows = table_of(fails=each).rows
     for row in rows:
         row |= {"handed_over": 1.0, "decided_by": int(Cause.NOT_RETREATED)}
     (shown,) = FlyerNavigation().tables(CampaignTable(pa.Table.from_pylist(rows)))

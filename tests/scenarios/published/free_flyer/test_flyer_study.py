@@ -37,6 +37,16 @@ def always(given: Mapping[str, str], k: int) -> bool:  # noqa: ARG001
     return True
 
 
+def one_in_twenty(_given: Mapping[str, str], k: int) -> bool:
+    """Return whether it is one of the repetitions, whatever the skill."""
+    return k == 7
+
+
+def never(_given: Mapping[str, str], _k: int) -> bool:
+    """Return that no trial fails."""
+    return False
+
+
 @cache
 def table_of(fails: Callable[[Mapping[str, str], int], bool] = by_skill, quick: bool = False) -> CampaignTable:
     """Return the plan's runs, of which some fail."""
@@ -88,7 +98,7 @@ def test_failures_that_grow_with_less_skill_are_noticed():
 
 
 def test_failures_that_do_not_are_noticed_too():
-    claims = verdicts(table_of(lambda _, k: k == 7))
+    claims = verdicts(table_of(one_in_twenty))
     grow = [c for name, c in claims.items() if name.startswith("Failures grow")]
     assert [c.verdict for c in grow] == [Verdict.NOT_REPRODUCED] * 3
     assert claims["The rigid robot succeeds more often (H2): collaborative"].verdict is Verdict.NOT_REPRODUCED
@@ -156,7 +166,7 @@ def test_one_participant_alone_does_not_show_that_the_rigid_robot_is_better():
 
 
 def test_trials_that_did_not_come_to_their_end_are_failures():
-    rows = table_of(lambda _given, _k: False).rows
+    rows = table_of(never).rows
     for row in rows[:20]:
         row |= {"status": "failed", "success": None, "decided_by": None}
     claims = verdicts(CampaignTable(pa.Table.from_pylist(rows)))
