@@ -5,6 +5,7 @@ For tests of exit status, signals and what is printed. What a command prints and
 """
 
 import atexit
+import contextlib
 import ctypes
 import multiprocessing
 import os
@@ -75,7 +76,9 @@ class Command:
         given = (call, place, environment, str(self.output_file), str(self.errors_file), privileged, begins, before)
         self._process = forking().Process(target=_main, args=given)
         self._process.start()
-        begun.recv()  # before that, signals are ignored
+        begins.close()
+        with contextlib.suppress(EOFError):  # where it ended at once; `wait` says how
+            begun.recv()  # before that, signals are ignored
 
     @property
     def pid(self) -> int:

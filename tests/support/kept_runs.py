@@ -43,6 +43,7 @@ def kept_run(*arguments: str) -> Path:
             folder.mkdir()
             done = Command(*arguments, "--out", wanted, cwd=folder).wait(_MOST)
             assert done.status in (0, 1), done.output + done.errors  # 1: the robot failed
+            assert arguments[0] != "run" or (wanted / "summary.json").is_file(), done.output + done.errors
             (folder / "whole").touch()
     return wanted
 
