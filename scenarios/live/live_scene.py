@@ -24,7 +24,6 @@ from handover.scenarios.reporting.replay_section import (
     scene_content,
     views_html,
 )
-from handover.scenarios.reporting.run_figures import figures_of_outputs
 from handover.scenarios.results.run_facts import elements_of
 from handover.scenarios.results.tolerated_faults import ToleratedFaults
 
@@ -219,6 +218,8 @@ class LiveScene:
         own = () if self._experiment is None else self._experiment.plots(self._parameters, self._history)
         if own:
             return own
+        from handover.scenarios.reporting.run_figures import figures_of_outputs  # matplotlib is slow to import
+
         units = dict.fromkeys(signal.rpartition(".")[0] for signal in self._history.signals)
         return [plot for figure in figures_of_outputs(units, self._history) for plot in figure.plots]
 
