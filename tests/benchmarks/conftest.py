@@ -40,4 +40,4 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 @pytest.fixture(scope="session")
 def wait_until() -> Callable[..., None]:
     """Waits for a page in a browser: `opened_page.wait_until`."""
-    return module("scenarios", "opened_page").wait_until
+    return module("support", "opened_page").wait_until

@@ -4,9 +4,9 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 from matplotlib.figure import Figure
-from opened_page import launched
 from playwright.sync_api import Browser
 from support.kept_runs import copied_run, kept_run
+from support.opened_page import launched
 
 
 @pytest.fixture(scope="module")

@@ -94,6 +94,11 @@ class Command:
         """Return its status, or None as long as it runs."""
         return self._process.exitcode
 
+    def join(self, seconds: float) -> int | None:
+        """Wait for its end, for at most some seconds; return its status, or None as long as it runs."""
+        self._process.join(seconds)
+        return self._process.exitcode
+
     def wait(self, seconds: float = 300.0) -> Ended:
         """Return how it ends; kill it and fail if that takes longer than some seconds."""
         self._process.join(seconds)

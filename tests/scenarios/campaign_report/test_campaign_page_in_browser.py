@@ -5,7 +5,8 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-from opened_page import opened, overflow, wait_until
+from support.opened_page import opened, overflow, wait_until
+from support.campaigns import campaign_metadata, carried_out, folder_of, table_of
 from playwright.sync_api import Browser
 from support.campaigns import campaign_metadata, carried_out, folder_of, table_of
 

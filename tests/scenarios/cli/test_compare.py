@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from opened_page import opened, overflow
+from support.opened_page import opened, overflow
 from playwright.sync_api import Browser
 from support.campaigns import campaign_metadata, carried_out, folder_of, table_of
 from support.wording import Wording

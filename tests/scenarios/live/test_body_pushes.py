@@ -1,16 +1,14 @@
 """Pushes of several pages: each ends with its page, or as that is silent."""
 
 import asyncio
-import json
 from collections.abc import Awaitable, Callable
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from handover.scenarios.free_flyer.robot_wiring import PUSHES, PUSHES_WITH_JOINTS
+from handover.scenarios.free_flyer.robot_wiring import PUSHES_WITH_JOINTS
 from handover.scenarios.live.body_pushes import BodyPushes
-from handover.scenarios.live.commands import InvalidCommand, Push, push_of
+from handover.scenarios.live.commands import Push
 
 NONE, POINT = (0.0, 0.0, 0.0), (0.1, 0.0, 0.0)
 ROBOT, GRIPPER = PUSHES_WITH_JOINTS
@@ -92,31 +90,3 @@ def test_a_push_is_held_once_more_where_the_server_was_busy(monkeypatch: pytest.
     played(act)
 
 
-def test_a_force_is_limited_by_its_body_and_a_point_by_its_distance():
-    def asked(force: float, point: float) -> dict[str, Any]:
-        return {"body": "gripper", "force": [force, 0, 0], "point": [point, 0, 0]}
-
-    strong = [replace(push, greatest=40.0) for push in PUSHES]
-    push = push_of(asked(30.0, 0.1), strong)
-    assert push is not None
-    assert push.force == (30.0, 0.0, 0.0)
-    for force, point, right in ((41.0, 0.1, "40 N at most"), (30.0, 6.0, "point, 5 m at most")):
-        with pytest.raises(InvalidCommand, match=right):
-            push_of(asked(force, point), strong)
-
-
-@pytest.mark.parametrize(
-    "value",
-    [
-        '{"body": "object", "point": [0, 0, 0], "force": [1, 0, 0]}',
-        '{"body": "robot", "point": [0, 0, 0], "force": [4, 4, 0]}',
-        '{"body": "robot", "point": [0, 0], "force": [1, 0, 0]}',
-        '{"body": "robot", "point": [0, 0, 1e300], "force": [1, 0, 0]}',
-        '"robot"',
-    ],
-)
-def test_a_push_that_cannot_be_is_refused(value: str):
-    with pytest.raises(InvalidCommand, match="push takes"):
-        push_of(json.loads(value), PUSHES)
-    with pytest.raises(InvalidCommand, match="nothing can be pushed"):
-        push_of(json.loads(value), ())

@@ -3,26 +3,23 @@
 import asyncio
 import contextlib
 import json
-import socket
 import urllib.request
-from collections.abc import Awaitable, Callable
+from http.client import HTTPConnection
 from pathlib import Path
-from typing import Any
 
 import pytest
 from starlette.websockets import WebSocket
-from websockets.asyncio.client import ClientConnection, connect
+from support.served_live_page import answer, opened, with_page
+from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from handover.plants.free_flyer.hand.hand_kinematics import STRAIGHT
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.live import live_page
-from handover.scenarios.live.commands import InvalidCommand, parse_command
 from handover.scenarios.live.connections import HEADERS, MessageRate, RefusalTimer
 from handover.scenarios.live.hand_messages import HandSample
 from handover.scenarios.live.hand_seat import HandSeat
 from handover.scenarios.live.live_page import LivePage
-from handover.scenarios.live.server import serve
 from handover.scenarios.live.shared_inputs import SharedInputs
 
 LED = LedHand("person", (-0.4, 0.1, -0.05), 0.9)
@@ -43,37 +40,26 @@ class PageWithHand(LivePage):
         await self.seat.connection(device)
 
 
-def with_page(folder: Path, act: Callable[[PageWithHand, str], Awaitable[None]]) -> None:
-    """Serve a page on a free port while something is done with it, by its `host:port`."""
-
-    async def work() -> None:
-        page = PageWithHand(folder)
-        with socket.create_server(("127.0.0.1", 0)) as listening:
-            host = f"127.0.0.1:{listening.getsockname()[1]}"
-
-            async def acting() -> None:
-                await act(page, host)
-
-            await serve(page, acting(), listening)
-
-    asyncio.run(work())
+def status(host: str, path: str, **headers: str) -> int:
+    """Return the status by which a server answers a path."""
+    with contextlib.closing(HTTPConnection(host, timeout=60.0)) as asking:
+        asking.request("GET", path, headers=headers)
+        return asking.getresponse().status
 
 
-def opened(host: str, path: str, **options: Any) -> connect:
-    return connect(f"ws://{host}/{path}", open_timeout=60.0, origin=f"http://{host}", **options)  # type: ignore
-
-
-async def answer(to: ClientConnection) -> dict[str, Any]:
-    return json.loads(await asyncio.wait_for(to.recv(), 30.0))
-
-
-def test_a_page_is_not_framed_not_kept_and_taken_for_html_alone(tmp_path: Path):
+def test_a_page_is_not_framed_not_kept_and_alone_and_for_this_computer(tmp_path: Path):
     async def act(_page: PageWithHand, host: str) -> None:
         got = await asyncio.to_thread(urllib.request.urlopen, f"http://{host}/")
         assert {name: got.headers[name] for name in HEADERS} == HEADERS
         assert HEADERS["X-Frame-Options"] == "DENY"
+        for path, headers, expected in (
+            ("/", {"Host": "elsewhere.example"}, 400),
+            ("/etc/passwd", {}, 404),
+            ("/report/../../etc/passwd", {}, 404),
+        ):
+            assert await asyncio.to_thread(status, host, path, **headers) == expected, path
 
-    with_page(tmp_path, act)
+    with_page(PageWithHand(tmp_path), act)
 
 
 def test_a_connection_of_another_sites_page_is_refused_and_a_tracker_without_a_site_is_not(tmp_path: Path):
@@ -85,8 +71,10 @@ def test_a_connection_of_another_sites_page_is_refused_and_a_tracker_without_a_s
             await connect(f"ws://{host}/run", open_timeout=60.0)
         async with connect(f"ws://{host}/hand", open_timeout=60.0) as tracker:
             assert "hand" in await answer(tracker)
+            async with connect(f"ws://{host}/hand", open_timeout=60.0) as second:
+                assert "another page or tracker" in (await answer(second))["refused"]
 
-    with_page(tmp_path, act)
+    with_page(PageWithHand(tmp_path), act)
 
 
 def test_a_binary_message_and_deep_json_are_refused_and_the_connection_goes_on(tmp_path: Path):
@@ -107,7 +95,7 @@ def test_a_binary_message_and_deep_json_are_refused_and_the_connection_goes_on(t
             while page.inputs.read() is None:
                 await asyncio.sleep(0.01)
 
-    with_page(tmp_path, act)
+    with_page(PageWithHand(tmp_path), act)
 
 
 def test_who_floods_is_disconnected_with_the_reason(tmp_path: Path):
@@ -122,7 +110,7 @@ def test_who_floods_is_disconnected_with_the_reason(tmp_path: Path):
                 assert "messages in a second" in str(flooding.close_reason)
         assert page.seat.report()["refused"]["more than 2000 messages in a second"] == 1
 
-    with_page(tmp_path, act)
+    with_page(PageWithHand(tmp_path), act)
 
 
 def test_a_message_beyond_all_bounds_ends_the_connection_with_the_reason(tmp_path: Path):
@@ -134,7 +122,7 @@ def test_a_message_beyond_all_bounds_ends_the_connection_with_the_reason(tmp_pat
                 assert sending.close_code == 1009
                 assert sending.close_reason == f"frame exceeds limit of {4 * page.longest} bytes"
 
-    with_page(tmp_path, act)
+    with_page(PageWithHand(tmp_path), act)
 
 
 def test_a_page_that_is_too_slow_is_closed_with_the_reason(tmp_path: Path):
@@ -151,7 +139,7 @@ def test_a_page_that_is_too_slow_is_closed_with_the_reason(tmp_path: Path):
             assert slow.close_code == 1013
             assert "more than 2 s to receive a message" in str(slow.close_reason)
 
-    with_page(tmp_path, act)
+    with_page(PageWithHand(tmp_path), act)
 
 
 def test_of_more_pages_than_a_run_is_shown_in_the_last_one_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -167,7 +155,7 @@ def test_of_more_pages_than_a_run_is_shown_in_the_last_one_is_refused(tmp_path: 
             await first.send("{")
             assert "refused" in await answer(first)
 
-    with_page(tmp_path, act)
+    with_page(PageWithHand(tmp_path), act)
 
 
 def test_messages_are_counted_over_a_second():
@@ -178,11 +166,6 @@ def test_messages_are_counted_over_a_second():
     assert rate.count() == 4
     now[0] = 1.0
     assert rate.count() == 2
-
-
-def test_deep_json_is_no_command():
-    with pytest.raises(InvalidCommand, match="not JSON"):
-        parse_command('{"command":' + "[" * 90_000, 100_000)
 
 
 def test_of_refusals_of_one_kind_two_a_second_are_told_and_those_of_another_besides():
@@ -207,4 +190,4 @@ def test_devices_of_ever_new_names_take_no_memory(tmp_path: Path):
                 await asyncio.sleep(0.01)
         assert len(page.seat.report()["samples"]) == 20
 
-    with_page(tmp_path, act)
+    with_page(PageWithHand(tmp_path), act)

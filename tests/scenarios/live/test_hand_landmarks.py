@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hand_points import landmarks_of_hand, turned
+from support.hand_points import landmarks_of_hand, turned
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page
 

@@ -4,11 +4,13 @@ import asyncio
 import contextlib
 import json
 import time
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
 from native_units import native_fmu
+from support.served_live_page import answer, opened, with_page
 
 from handover.cosim.master.live_control import LiveControl
 from handover.cosim.master.master import Master
@@ -45,6 +47,10 @@ class Told(LivePage):
     def __init__(self) -> None:
         super().__init__()
         self.told: list[object] = []
+        self.begins = asyncio.Event()
+
+    async def begun(self) -> None:
+        self.begins.set()
 
     async def tell(self, content: object) -> None:
         self.told.append(content)
@@ -59,9 +65,21 @@ def shown_run(folder: Path) -> ShownRun:
     return ShownRun(WatchedRun(folder / "run"), LiveControl.in_memory(1.0), folder, scene, seat=LedSeat(folder))
 
 
-async def cancelled(page: LivePage, shown: ShownRun) -> None:
+def test_a_run_whose_hand_nobody_leads_from_outside_has_no_seat_for_one(tmp_path: Path):
+    async def act(_page: LivePage, host: str) -> None:
+        async with opened(host, "hand") as device:
+            assert "hand=outside" in (await answer(device))["refused"]
+            await device.wait_closed()
+            assert device.close_code == 1008
+
+    page = LivePage()
+    page.shown = replace(shown_run(tmp_path), seat=None)
+    with_page(page, act)
+
+
+async def cancelled(page: Told, shown: ShownRun) -> None:
     showing = asyncio.create_task(page.show(shown))
-    await asyncio.sleep(0.1)
+    await page.begins.wait()
     showing.cancel()
     with contextlib.suppress(asyncio.CancelledError):
         await showing
@@ -70,7 +88,7 @@ async def cancelled(page: LivePage, shown: ShownRun) -> None:
 def test_the_report_is_written_where_showing_the_run_is_cancelled(tmp_path: Path):
     shown = shown_run(tmp_path)
     (tmp_path / "run").mkdir()
-    asyncio.run(cancelled(LivePage(), shown))
+    asyncio.run(cancelled(Told(), shown))
     assert json.loads((tmp_path / "run" / "inputs.json").read_text(encoding="utf-8"))["samples"] == {"test": 1}
 
 

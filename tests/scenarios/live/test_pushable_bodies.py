@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from flyer_runs import task_of
+from support.wording import Wording
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
@@ -40,9 +41,9 @@ def pushed_run(name: str, out: Path, forces: Mapping[str, Sequence[float] | Floa
 @pytest.mark.parametrize(
     ("name", "given", "unit"),
     [
-        ("flyer_two_robots", (), "robot_1"),
-        ("flyer_two_robots", (), "robot_2"),
-        ("flyer_arm_impedance", ("begin=30",), "robot"),
+        pytest.param("flyer_two_robots", (), "robot_1", marks=pytest.mark.slow),
+        pytest.param("flyer_two_robots", (), "robot_2", marks=pytest.mark.slow),
+        pytest.param("flyer_arm_impedance", ("begin=30",), "robot", marks=pytest.mark.slow),
         ("helix_reach", (), "arm"),
     ],
 )
@@ -62,11 +63,16 @@ def test_each_of_its_bodies_yields_to_a_push_and_the_scene_shows_it(
         way = record[f"{unit}.p_WG"][-1] - alone[f"{unit}.p_WG"][-1]
         assert way @ force > 0.0
         assert np.linalg.norm(way) > 1e-3
+        if push.force == "f_Q":  # the gripper of a robot with an arm, which leads its base
+            of_base = record[f"{unit}.p_WB"][-1] - alone[f"{unit}.p_WB"][-1]
+            assert np.linalg.norm(way) > 2.0 * np.linalg.norm(of_base)
+            assert np.abs(record[f"{unit}.q_J"][-1] - record[f"{unit}.q_J"][0]).max() > 0.01
         scene = experiment.replay(parameters, record)
         assert scene is not None
         assert set(push.labels) <= {body.label for body in scene.bodies}
         arrows = [line.points[-1] for line in scene.lines if line.label == "force of the push"]
         assert sum(bool(np.isfinite(points).all()) for points in arrows) == 1
+    assert (f"{unit}.f_Q" in {f"{unit}.{push.force}" for push in pushes}) == (name == "flyer_arm_impedance")
 
 
 def test_lines_and_points_of_a_pushed_helix_are_told_apart_by_their_colours(tmp_path: Path):
@@ -78,23 +84,17 @@ def test_lines_and_points_of_a_pushed_helix_are_told_apart_by_their_colours(tmp_
     assert len(set(colours.values())) == len(colours)
 
 
-def test_where_nothing_can_be_pushed_that_is_told_before_anything_runs(tmp_path: Path):
-    done = CliRunner().invoke(main, ["run", "ir_grasp", "--live", "--push", "--out", str(tmp_path / "run")])
+@pytest.mark.parametrize(
+    "given",
+    [
+        pytest.param(("ir_grasp", "--live"), id="nothing to push"),
+        pytest.param(("flyer_impedance",), id="without a page"),
+    ],
+)
+def test_pushes_that_cannot_be_are_refused_before_anything_runs(
+    given: Sequence[str], tmp_path: Path, wording: Wording
+):
+    done = CliRunner().invoke(main, ["run", *given, "--push", "--out", str(tmp_path / "run")])
     assert done.exit_code == 2
-    assert "--push: nothing can be pushed in ir_grasp" in done.output
-    assert not (tmp_path / "run").exists()
-
-
-def test_the_pushed_gripper_of_a_robot_with_an_arm_leads_its_base(tmp_path: Path):
-    force = {"robot.f_Q": [0.0, 3.0, 0.0], "robot.p_GQ": [0.0, 0.0, 0.0]}
-    record = pushed_run("flyer_arm_impedance", tmp_path / "gripper", force, "begin=30")
-    moved = {name: np.linalg.norm(np.ptp(record[f"robot.{name}"], axis=0)) for name in ("p_WG", "p_WB")}
-    assert moved["p_WG"] > 2.0 * moved["p_WB"]
-    assert np.abs(record["robot.q_J"][-1] - record["robot.q_J"][0]).max() > 0.01
-
-
-def test_a_run_without_a_page_does_not_take_pushes(tmp_path: Path):
-    done = CliRunner().invoke(main, ["run", "flyer_impedance", "--push", "--out", str(tmp_path / "run")])
-    assert done.exit_code == 2
-    assert "--push: it is the page of --live that pushes" in done.output
+    wording.check(done.output)
     assert not (tmp_path / "run").exists()

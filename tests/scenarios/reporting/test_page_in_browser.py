@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from opened_page import opened, overflow, wait_until
+from support.opened_page import opened, overflow, wait_until
 from playwright.sync_api import Browser, Page
 
 from handover.cosim.record.reader import Record

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from opened_page import opened, wait_until
+from support.opened_page import opened, wait_until
 from playwright.sync_api import Browser, Page
 
 from handover.cosim.record.reader import Record

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from opened_page import opened, wait_until
+from support.opened_page import opened, wait_until
 from PIL import Image
 from playwright.sync_api import Browser, Page
 from scipy.spatial.transform import Rotation

@@ -8,7 +8,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from opened_page import wait_until
+from support.opened_page import wait_until
 from playwright.sync_api import Page
 
 from handover.scenarios.study.plan.plan import default_plan

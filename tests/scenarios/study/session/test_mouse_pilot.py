@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 import pytest
 from mouse_hand import MouseHand
-from opened_page import wait_until
+from support.opened_page import wait_until
 from playwright.sync_api import Browser, Page
 from served_page import HANDOVER, at, pilot_plan, served, to_round
 

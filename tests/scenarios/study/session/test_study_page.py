@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from opened_page import overflow, wait_until
+from support.opened_page import overflow, wait_until
 from playwright.sync_api import Browser
 from served_page import HANDOVER, at, pilot_plan, served, to_round
 

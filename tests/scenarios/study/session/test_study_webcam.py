@@ -9,10 +9,10 @@ from urllib.request import urlopen
 
 import pytest
 from click.testing import CliRunner
-from opened_page import launched, wait_until
+from support.opened_page import launched, wait_until
 from playwright.sync_api import Page
 from served_page import at, pilot_plan, served, to_round
-from webcam_files import camera_of, write_files, write_video
+from support.webcam_files import camera_of, write_files, write_video
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.cli.command import main

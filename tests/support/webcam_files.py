@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
-from hand_points import landmarks_of_hand, turned
+from support.hand_points import landmarks_of_hand, turned
 
 from handover.plants.free_flyer.hand.hand_kinematics import CLOSED
 from handover.scenarios.live.webcam import BUNDLE, LOADER, MODEL, MODEL_PARTS, WASM
