@@ -71,18 +71,21 @@ def signed_rank_test(differences: Sequence[float]) -> SignedRankTest | None:
         n=len(d),
         zeros=int((d == 0.0).sum()),
         rank_sum=float(rankdata(np.abs(d))[d > 0.0].sum()),
-        p=signed_rank_p(d),
+        p=float(signed_rank_p(d)),
         estimate=float(np.median(pair_means(d))),
         low=low,
         high=high,
     )
 
 
-def signed_rank_p(d: Floats) -> float:
-    """Return the p-value of `signed_rank_test`, whatever the number of differences."""
-    doubled = np.rint(2.0 * rankdata(np.abs(d))).astype(np.int64)  # mean ranks are halves
-    weights = tuple(np.sort(doubled[d != 0.0]).tolist())
-    return _two_sided(_sum_of_chosen(weights), int(doubled[d > 0.0].sum()))
+def signed_rank_p(d: Floats) -> Floats:
+    """Return the p-values of `signed_rank_test` along the last axis, whatever the number of differences."""
+    doubled = np.rint(2.0 * rankdata(np.abs(d), axis=-1)).astype(np.int64)  # mean ranks are halves
+    weights = np.sort(np.where(d != 0.0, doubled, 0), axis=-1)
+    sums = np.where(d > 0.0, doubled, 0).sum(axis=-1)
+    rows = zip(weights.reshape(-1, d.shape[-1]).tolist(), sums.reshape(-1).tolist(), strict=True)
+    p = [_p_of_sum(tuple(w for w in row if w), found) for row, found in rows]
+    return np.array(p).reshape(sums.shape)
 
 
 def pair_means(d: Floats) -> Floats:
@@ -133,6 +136,12 @@ def within_condition_slopes(x: ArrayLike, y: Sequence[float], condition: Sequenc
     if np.linalg.matrix_rank(xs, tol=1e-6) < xs.shape[1]:
         return None
     return [float(slope) for slope in np.linalg.lstsq(xs, ys, rcond=None)[0]]
+
+
+@lru_cache(maxsize=65536)
+def _p_of_sum(weights: tuple[int, ...], found: int) -> float:
+    """Return how probable a sum as far from the mean is; those of differences without ties recur."""
+    return _two_sided(_sum_of_chosen(weights), found)
 
 
 @lru_cache(maxsize=4096)

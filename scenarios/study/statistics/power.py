@@ -123,7 +123,7 @@ def _rounded(standard: Floats, spread: float, repetitions: int) -> Floats:
 def _p_values(differences: Floats) -> Floats:
     if differences.shape[-1] < MIN_PARTICIPANTS:
         return np.ones(differences.shape[:-1])
-    return np.array([[signed_rank_p(d) for d in study] for study in differences])
+    return signed_rank_p(differences)
 
 
 def _t_test(differences: Floats) -> Floats:
