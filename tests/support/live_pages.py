@@ -36,9 +36,7 @@ def page_command(*arguments: object, cwd: Path | None = None) -> Generator[tuple
 
 
 @contextmanager
-def live_run(
-    out: Path, *more: object, scenario: object = "ir_grasp"
-) -> Generator[tuple[str, Command], None, None]:
+def live_run(out: Path, *more: object, scenario: object = "ir_grasp") -> Generator[tuple[str, Command], None, None]:
     """Begin a run that waits for its page; yield the page's address and the run."""
     with page_command("run", scenario, "--live", "--no-report", "--out", out, *more) as begun:
         yield begun

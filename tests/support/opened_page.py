@@ -18,7 +18,7 @@ _FLAGS = (
 _OF_DRIVERS = ("[.WebGL-", "Canvas2D: Multiple readback")
 """How messages begin that a browser which draws by software has for any page with pictures of space."""
 
-_PATIENCE = 120_000
+_PATIENCE = 300_000
 """ms; other tests may be using all of the machine."""
 
 

@@ -6,10 +6,10 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
-from support.hand_points import landmarks_of_hand, turned
 
 from handover.plants.free_flyer.hand.hand_kinematics import CLOSED
 from handover.scenarios.live.webcam import BUNDLE, LOADER, MODEL, MODEL_PARTS, WASM
+from support.hand_points import landmarks_of_hand, turned
 
 WIDTH, HEIGHT, RATE = 320, 240, 20
 FOCAL = 0.5 / math.tan(math.radians(30.0))

@@ -88,5 +88,3 @@ def test_a_push_is_held_once_more_where_the_server_was_busy(monkeypatch: pytest.
         assert bodies.forces == {ROBOT.labels: NONE}
 
     played(act)
-
-

@@ -72,7 +72,9 @@ def test_what_is_no_command_is_refused(text: str, wording: Wording):
         pytest.param(pushed, {"body": "robot", "point": [0, 0, 0], "force": [4, 4, 0]}, id="a push too strong"),
         pytest.param(pushed, {"body": "robot", "point": [0, 0], "force": [1, 0, 0]}, id="a push at no point"),
         pytest.param(pushed, {"body": "robot", "point": [0, 0, 6], "force": [1, 0, 0]}, id="a push far away"),
-        pytest.param(pushed, {"body": "robot", "point": [0, 0, 1e300], "force": [1, 0, 0]}, id="a push at a huge point"),
+        pytest.param(
+            pushed, {"body": "robot", "point": [0, 0, 1e300], "force": [1, 0, 0]}, id="a push at a huge point"
+        ),
         pytest.param(pushed, "robot", id="a push of a text"),
         pytest.param(lambda value: push_of(value, ()), None, id="a push where there is none"),
     ],

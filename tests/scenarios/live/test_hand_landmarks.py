@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.hand_points import landmarks_of_hand, turned
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page
+from support.hand_points import landmarks_of_hand, turned
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand.hand_kinematics import CLOSED, STRAIGHT

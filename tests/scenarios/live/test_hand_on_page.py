@@ -88,8 +88,9 @@ def test_the_space_bar_is_the_hands_wherever_the_focus_is(page: Page):
 
 def test_keys_move_and_turn_the_hand_as_they_lie_on_the_keyboard(page: Page):
     """Arrows move it to the right, up, and pages towards the eye; letters tilt, turn and roll it."""
-    pairs = ("ArrowRight", "ArrowLeft"), ("ArrowUp", "ArrowDown"), ("PageDown", "PageUp"), ("s", "w"), ("a", "d"), ("q", "e")
-    for k, pair in enumerate(pairs):
+    moves = ("ArrowRight", "ArrowLeft"), ("ArrowUp", "ArrowDown"), ("PageDown", "PageUp")
+    turns = ("s", "w"), ("a", "d"), ("q", "e")
+    for k, pair in enumerate((*moves, *turns)):
         for key, sign in zip(pair, (1.0, -1.0), strict=True):
             page.evaluate("hand.place({p_WH: [0, 0, 0], q_WH: [1, 0, 0, 0], closed: false})")
             page.keyboard.down(key)

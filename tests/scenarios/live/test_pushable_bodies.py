@@ -91,9 +91,7 @@ def test_lines_and_points_of_a_pushed_helix_are_told_apart_by_their_colours(tmp_
         pytest.param(("flyer_impedance",), id="without a page"),
     ],
 )
-def test_pushes_that_cannot_be_are_refused_before_anything_runs(
-    given: Sequence[str], tmp_path: Path, wording: Wording
-):
+def test_pushes_that_cannot_be_are_refused_before_anything_runs(given: Sequence[str], tmp_path: Path, wording: Wording):
     done = CliRunner().invoke(main, ["run", *given, "--push", "--out", str(tmp_path / "run")])
     assert done.exit_code == 2
     wording.check(done.output)

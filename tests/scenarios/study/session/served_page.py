@@ -2,27 +2,31 @@
 
 import re
 import signal
-import subprocess
-import sys
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from support.opened_page import wait_until
 from playwright.sync_api import Page
+from support.live_pages import page_command
+from support.opened_page import wait_until
 
 from handover.scenarios.study.plan.plan import default_plan
 from handover.scenarios.study.session.server import page_words
 
-HANDOVER = (sys.executable, "-c", "from handover.scenarios.cli.entry import main; main()")
+_ABOUT_TASKS = r'^\[tasks\.(?:{0})\]\nscenario = [^\n]*\n|^(?:{0}) = (?:""".*?"""|"[^"\n]*")\n'
 
 
-def pilot_plan(path: Path, *, devices: str, patience: float, practice: float, repetitions: int) -> Path:
-    """Write the plan of one scripted pilot: whatever leads the hand in tests is no person."""
+def pilot_plan(
+    path: Path, *, devices: str, patience: float, practice: float = 0, repetitions: int = 1, people: int = 1,
+    without: str = "",
+) -> Path:  # fmt: skip
+    """Write the plan of scripted pilots: whatever leads the hand in tests is no person. `without`: tasks, by `|`."""
     text = default_plan()
+    if without:
+        text = re.sub(_ABOUT_TASKS.format(without), "", text, flags=re.MULTILINE | re.DOTALL)
     for name, value in {
         "pilot": "true",
-        "participants": 1,
+        "participants": people,
         "repetitions": repetitions,
         "practice": practice,
         "devices": devices,
@@ -33,19 +37,13 @@ def pilot_plan(path: Path, *, devices: str, patience: float, practice: float, re
 
 
 @contextmanager
-def served(plan: Path, out: Path, *more: str) -> Generator[tuple[str, "subprocess.Popen[str]"], None, None]:
-    """Serve a study, and yield the address of its page and the process."""
-    command = [*HANDOVER, "study", "serve", str(plan), "--out", str(out), *more]
-    server = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    try:
-        assert server.stderr is not None
-        address = re.search(r"study: (http://\S+)", server.stderr.readline())
-        assert address
-        yield address[1], server
-    finally:
+def served(plan: Path, out: Path, *more: str) -> Generator[str, None, None]:
+    """Serve a study, and yield the address of its page."""
+    with page_command("study", "serve", plan, "--out", out, *more) as (address, server):
+        yield address
         server.send_signal(signal.SIGINT)
-        _, told = server.communicate(timeout=120)
-        assert "Traceback" not in told, told
+        done = server.wait()
+        assert "Traceback" not in done.errors, done.errors
 
 
 def at(page: Page, screen: str) -> None:

@@ -3,6 +3,7 @@
 import json
 import socket
 import threading
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Generator
@@ -10,14 +11,22 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pytest
 import uvicorn
 from websockets.sync.client import ClientConnection, connect
 
+from handover.scenarios.live.hand_messages import HandStream, hand_sample
+from handover.scenarios.live.webcam import WebcamFiles
 from handover.scenarios.study.folder.study_folder import StudyFolder
-from handover.scenarios.study.plan.plan import default_plan, parse_plan
+from handover.scenarios.study.plan.led_hands import led_hand_of
+from handover.scenarios.study.plan.plan import StudyPlan, default_plan, parse_plan
+from handover.scenarios.study.session import seat as seat_module
+from handover.scenarios.study.session.latency import LatencyLog
 from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.seat import StudySeat
 from handover.scenarios.study.session.server import StudyServer, uvicorn_config
+from handover.scenarios.study.session.trial import Frame, TrialRequest
 
 HOST = "127.0.0.1"
 SHORT = default_plan().replace("practice = 600 ", "practice = 0 ") + "\n[parameters]\npatience = 30\n"
@@ -25,8 +34,52 @@ PLAN = parse_plan(SHORT)
 HAND = {"p_WH": [-0.4, 0.1, -0.05], "q_WH": [1.0, 0.0, 0.0, 0.0], "closed": False}
 
 
-def server_of(path: Path, host: str = HOST) -> StudyServer:
-    return StudyServer(StudySeat(Protocol(StudyFolder.opened(path, PLAN), ["mouse", "tracker"])), host)
+def server_of(path: Path, host: str = HOST, plan: StudyPlan = PLAN, webcam: WebcamFiles | None = None) -> StudyServer:
+    devices = ["mouse", "tracker"] if webcam is None else ["webcam"]
+    return StudyServer(StudySeat(Protocol(StudyFolder.opened(path, plan), devices)), host, webcam)
+
+
+class EndlessTrial:
+    """A trial without a process, as its seat sees it: its states come as they are asked for, until it is closed."""
+
+    scene, newest, hand = "a scene", None, HAND
+    closing = 0.0
+    """How long it takes to end, s."""
+
+    def __init__(self, request: TrialRequest) -> None:
+        request.out.mkdir(parents=True)
+        self.latency, self.is_running, self._time = LatencyLog(), True, 0.0
+        self._stream = HandStream(led_hand_of(request.scenario, request.parameters))
+
+    @classmethod
+    async def open(cls, request: TrialRequest) -> "EndlessTrial":
+        return cls(request)
+
+    def begin(self) -> None:
+        pass
+
+    def scene_content(self) -> dict[str, Any]:
+        return {}
+
+    def go(self) -> None:
+        pass
+
+    def lead(self, content: Any, arrival: float) -> None:
+        self._stream.check(hand_sample(content), arrival)
+
+    def frame(self, *, always: bool = False) -> Frame:
+        self._time += 0.0 if always else 0.016
+        return Frame(self._time, 0.0, np.zeros(0))
+
+    def close(self) -> None:
+        time.sleep(self.closing)
+        self.is_running = False
+
+
+@pytest.fixture
+def without_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a seat's trials have no process of a run."""
+    monkeypatch.setattr(seat_module, "Trial", EndlessTrial)
 
 
 @contextmanager

@@ -1,16 +1,16 @@
 """A whole session by the mouse and keys of a browser: from the consent to the thanks, its report, export and replay."""
 
 import json
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
 from mouse_hand import MouseHand
-from support.opened_page import wait_until
 from playwright.sync_api import Browser, Page
-from served_page import HANDOVER, at, pilot_plan, served, to_round
+from served_page import at, pilot_plan, served, to_round
+from support.commands import run_command
+from support.opened_page import wait_until
 
 FIGURES = ["round", "success", "latency_median_ms", "latency_p95_ms", "missed_deadlines"]
 """Of the rounds: what is printed."""
@@ -44,7 +44,7 @@ def take_part(page: Page, hand: MouseHand) -> list[str]:
 def test_a_person_with_a_mouse_gets_through_the_study_by_what_the_page_shows(browser: Browser, tmp_path: Path):
     plan = pilot_plan(tmp_path / "plan.toml", devices='["mouse"]', patience=60, practice=60, repetitions=1)
     out = tmp_path / "study"
-    with served(plan, out) as (address, _), browser.new_page(viewport={"width": 1000, "height": 600}) as page:
+    with served(plan, out) as address, browser.new_page(viewport={"width": 1000, "height": 600}) as page:
         messages: list[str] = []
         page.on("pageerror", lambda error: messages.append(str(error)))
         hand = MouseHand(page)
@@ -67,7 +67,7 @@ def test_a_person_with_a_mouse_gets_through_the_study_by_what_the_page_shows(bro
     practice = json.loads((session / "practice.json").read_text(encoding="utf-8"))
     assert [r["name"] for r in practice["reached"]][:3] == ["+x", "-x", "+y"]
     for more in (["report", str(out)], ["export", str(out)], ["replay", str(out), "P01", "1", "--check"]):
-        subprocess.run([*HANDOVER, "study", *more], check=True, timeout=600)
+        assert run_command("study", *more).status == 0
     answers: Any = pd.read_parquet(out / "answers.parquet")
     assert set(zip(answers["statement"], answers["value"], strict=True)) == {("S1", 7), ("S2", 3), ("S3", 9)}
     assert pd.read_csv(out / "questionnaire.csv")["comments"].tolist() == ["it was a script"]

@@ -15,6 +15,7 @@ from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session.pilot import SeenScene
 
 
+@pytest.mark.slow
 def test_a_tracker_leads_the_hand_and_its_pictures_are_timed_by_the_pages_clock(tmp_path: Path):
     with served(server_of(tmp_path / "study")) as where, page_at(where) as page:
         assert told(page, "tracker") is False
@@ -30,14 +31,14 @@ def test_a_tracker_leads_the_hand_and_its_pictures_are_timed_by_the_pages_clock(
             ahead = 1000.0  # the page's clock goes before this computer's
             page.send(json.dumps({"clock": time.monotonic() + ahead}))
             page.send(json.dumps({"ready": True}))
-            end = time.monotonic() + 60.0
+            end = time.monotonic() + 300.0
             while not (np.linalg.norm(scene.place("hand") - there) < 0.02 and np.isfinite(scene.stamp)):
                 assert time.monotonic() < end
                 tracker.send(json.dumps({**HAND, "p_WH": there, "stamp": time.monotonic() - 500.0, "device": "leap"}))
                 message = page.recv(timeout=60)
                 if isinstance(message, bytes):
                     scene.take(message)
-            assert 0.0 <= time.monotonic() + ahead - scene.stamp < 30.0
+            assert 0.0 <= time.monotonic() + ahead - scene.stamp < 60.0
             page.send(json.dumps({"hand": {**HAND, "stamp": 1.0}}))
             assert "the tracker leads the hand" in told(page, "refused")
         assert told(page, "tracker") is False

@@ -4,29 +4,31 @@ import hashlib
 import json
 import re
 from pathlib import Path
-from urllib.error import HTTPError
 from urllib.request import urlopen
 
 import pytest
+import study_server
 from click.testing import CliRunner
-from support.opened_page import launched, wait_until
 from playwright.sync_api import Page
 from served_page import at, pilot_plan, served, to_round
+from study_server import server_of, status
+from support.opened_page import launched, wait_until
 from support.webcam_files import camera_of, write_files, write_video
+from support.wording import Wording
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.cli.command import main
 from handover.scenarios.live.webcam import FILES, MODEL, WebcamFiles
 from handover.scenarios.reporting.page import asset
 from handover.scenarios.study.folder.study_folder import StudyFolder
-from handover.scenarios.study.plan.plan import default_plan
+from handover.scenarios.study.plan.plan import default_plan, parse_plan
 from handover.scenarios.study.session.server import page_words
 
 TOLD = "document.getElementById('camera').textContent"
 
 
 def plan_of_webcam(path: Path, devices: str = '["webcam"]') -> Path:
-    return pilot_plan(path, devices=devices, patience=12, practice=0, repetitions=1)
+    return pilot_plan(path, devices=devices, patience=12)
 
 
 def begin(page: Page) -> None:
@@ -40,7 +42,7 @@ def test_a_hand_before_a_webcam_plays_a_round_whose_files_hashes_are_kept(tmp_pa
     plan = plan_of_webcam(tmp_path / "plan.toml", '["mouse", "webcam"]')
     with (
         launched(*camera_of(tmp_path / "camera.y4m")) as browser,
-        served(plan, tmp_path / "study", "--webcam", str(folder)) as (address, _),
+        served(plan, tmp_path / "study", "--webcam", str(folder), "--pace", "2") as address,
         browser.new_page() as page,
     ):
         messages: list[str] = []
@@ -70,45 +72,29 @@ def test_a_hand_before_a_webcam_plays_a_round_whose_files_hashes_are_kept(tmp_pa
     assert inputs["device"] == "webcam"
     assert inputs["webcam"]["sha256"] == {n: hashlib.sha256((folder / n).read_bytes()).hexdigest() for n in FILES}
     record = Record(run / "signals.parquet")
-    seen = record["person.age"] < 0.3
-    assert seen.sum() > 100
+    seen = record["person.age"] < 1.0
+    assert seen.sum() > 20
     p = record["person.p_WH_track"][seen]
     assert (p.max(axis=0) - p.min(axis=0)).max() > 0.1  # the hand in the video goes 0.12 m aside
     assert record["person.closed_track"][seen].any()
     assert not record["person.closed_track"][seen].all()
 
 
-@pytest.mark.slow
-def test_without_a_camera_no_round_begins_and_it_can_be_tried_again(tmp_path: Path):
+def test_a_webcams_files_are_served_below_the_page_and_nothing_else_of_their_folder(tmp_path: Path):
     folder = write_files(tmp_path / "vision")
-    plan = plan_of_webcam(tmp_path / "plan.toml")
-    with (
-        launched("--use-fake-ui-for-media-stream") as browser,
-        served(plan, tmp_path / "study", "--webcam", str(folder)) as (address, _),
-        browser.new_page() as page,
-    ):
-        page.goto(address)
-        to_round(page, device="Webcam")
-        wait_until(page, f"{TOLD} === 'The webcam cannot lead the hand: no camera is connected.'")
-        assert page.get_by_role("button", name="Begin").is_disabled()
-        page.evaluate(
-            "navigator.mediaDevices.getUserMedia = () => Promise.reject(new DOMException('', 'NotAllowedError')); 0"
-        )
-        page.get_by_role("button", name="Try again").click()
-        wait_until(page, f"{TOLD}.includes('the browser was not allowed to use the camera')")
+    plan = parse_plan(plan_of_webcam(tmp_path / "plan.toml").read_text(encoding="utf-8"))
+    offered = server_of(tmp_path / "study", "192.0.2.7", plan, WebcamFiles.read(folder))
+    with study_server.served(offered) as where:
         for path in ("webcam/package.json", "webcam/../package.json", "webcam/"):
-            with pytest.raises(HTTPError, match="404"):
-                urlopen(address + path)
-        with urlopen(f"{address}webcam/{MODEL}") as answer:
+            assert status(where, offered.path + path) == 404
+        with urlopen(f"http://{where}{offered.path}webcam/{MODEL}") as answer:
             assert answer.read() == (folder / MODEL).read_bytes()
-    plan = plan_of_webcam(plan, '["mouse", "webcam"]')
-    with served(plan, tmp_path / "mice") as (address, _):
-        with urlopen(address) as answer:
+    with study_server.served(server_of(tmp_path / "mice")) as where:
+        with urlopen(f"http://{where}/") as answer:
             text = answer.read().decode()
         for word in ("const handCamera", "worker-src", 'id="video"'):
             assert word not in text
-        with pytest.raises(HTTPError, match="404"):
-            urlopen(f"{address}webcam/worker.js")
+        assert status(where, "/webcam/worker.js") == 404
 
 
 @pytest.mark.slow
@@ -117,7 +103,7 @@ def test_why_a_camera_cannot_lead_is_told_in_the_language_of_the_participant(tmp
     begins, again = "Die Webcam kann die Hand nicht führen: ", page_words()["de"]["camera_again"]
     with (
         launched("--use-fake-ui-for-media-stream") as browser,
-        served(plan, tmp_path / "study", "--webcam", str(folder)) as (address, _),
+        served(plan, tmp_path / "study", "--webcam", str(folder)) as address,
         browser.new_page() as page,
     ):
         page.goto(address)
@@ -151,25 +137,16 @@ def test_every_fault_of_a_camera_has_a_text_in_english_and_in_every_other_langua
         assert {f"camera_{fault}" for fault in faults} <= language.keys()
 
 
-def test_a_webcam_without_files_or_plan_is_told_before_anything_starts(tmp_path: Path):
+def test_a_webcam_without_files_or_plan_is_refused_before_anything_starts(tmp_path: Path, wording: Wording):
     folder, out = write_files(tmp_path / "vision"), tmp_path / "study"
     plan = plan_of_webcam(tmp_path / "plan.toml")
     mice = tmp_path / "mice.toml"
     mice.write_text(default_plan(), encoding="utf-8")
     (tmp_path / "empty").mkdir()
-    for given, why in (
-        ((plan,), "the plan has no device but a webcam, which needs --webcam FOLDER"),
-        ((plan, "--webcam", tmp_path / "empty"), "--webcam: in "),
-        ((mice, "--webcam", folder), "has no device 'webcam'; it has mouse, gamepad, tracker"),
-    ):
+    for given in ((plan,), (plan, "--webcam", tmp_path / "empty"), (mice, "--webcam", folder)):
         done = CliRunner().invoke(main, ["study", "serve", *map(str, given), "--out", str(out)])
         assert done.exit_code == 2
-        assert why in done.output
+        wording.check(done.output)
     assert not out.exists()
     shown = CliRunner().invoke(main, ["study", "plan", str(plan)])
     assert "webcam, hand followed by a webcam (offered by `study serve --webcam FOLDER`)" in shown.output
-
-
-def test_files_are_served_below_the_page(tmp_path: Path):
-    files = WebcamFiles.read(write_files(tmp_path / "vision"))
-    assert {route.path for route in files.routes("/token/")} >= {f"/token/webcam/{MODEL}", "/token/webcam/worker.js"}

@@ -15,6 +15,7 @@ from sample_study import record
 from study_server import (
     HAND,
     PLAN,
+    EndlessTrial,
     act,
     page_at,
     page_of,
@@ -22,6 +23,7 @@ from study_server import (
     server_of,
     to_round,
     told,
+    without_runs,  # noqa: F401
 )
 from support.processes import with_argument
 from websockets.exceptions import ConnectionClosed
@@ -32,11 +34,13 @@ from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.session import page_messages
 from handover.scenarios.study.session import seat as seat_module
 from handover.scenarios.study.session.device_test import Reached
+from handover.scenarios.study.session.protocol import Protocol
 from handover.scenarios.study.session.screen_content import VoidCause
 from handover.scenarios.study.session.served_study import line_of_round
 from handover.scenarios.study.session.trial import Frame
 
 
+@pytest.mark.usefixtures("without_runs")
 def test_samples_that_cannot_be_used_are_refused_and_the_round_goes_on(tmp_path: Path):
     with page_of(server_of(tmp_path / "study")) as page:
         to_round(page)
@@ -65,8 +69,11 @@ def time_seen(page: ClientConnection) -> float:
     return float(np.frombuffer(message, dtype="<f8")[0])
 
 
-@pytest.mark.slow
-def test_a_page_that_is_closed_makes_its_round_void_and_it_is_played_again(tmp_path: Path):
+@pytest.mark.usefixtures("without_runs")
+def test_a_page_that_is_closed_makes_its_round_void_and_it_is_played_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(EndlessTrial, "closing", 0.5)
     server = server_of(tmp_path / "study")
     with served(server) as where:
         with page_at(where) as page:
@@ -80,11 +87,12 @@ def test_a_page_that_is_closed_makes_its_round_void_and_it_is_played_again(tmp_p
     assert server.seat.protocol.screen == "void"
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("without_runs")
 def test_who_withdraws_in_a_round_sees_nothing_but_that_and_no_attempt_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(seat_module, "SILENCE", 0.2)  # which passes while the run is ended
+    monkeypatch.setattr(seat_module, "SILENCE", 0.2)
+    monkeypatch.setattr(EndlessTrial, "closing", 0.5)  # the silence passes while the run is ended
     with page_of(server_of(tmp_path / "study")) as page:
         to_round(page)
         page.send(json.dumps({"hand": {**HAND, "stamp": 1.0}}))
@@ -92,14 +100,14 @@ def test_who_withdraws_in_a_round_sees_nothing_but_that_and_no_attempt_is_kept(
         assert told(page, "screen")["screen"] == "withdrawn"
         page.send('{"clock": 1.0}')  # nothing else is shown after it
         with contextlib.suppress(TimeoutError):
-            while message := page.recv(timeout=2):
+            while message := page.recv(timeout=0.5):
                 assert not isinstance(message, str) or "screen" not in json.loads(message), message
     session = StudyFolder.opened(tmp_path / "study", PLAN).session(1)
     assert session.notes.withdrawn is not None
     assert session.notes.void_attempts == []
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("without_runs")
 def test_a_device_that_falls_silent_makes_the_round_void(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(seat_module, "SILENCE", 0.5)
     with page_of(server_of(tmp_path / "study")) as page:
@@ -156,6 +164,7 @@ def test_silence_counts_while_the_run_goes_on_and_not_while_its_process_writes(
     assert (why is not None and VoidCause.NO_SAMPLE.value in why) == is_void, why
 
 
+@pytest.mark.slow
 def test_a_run_that_is_killed_makes_its_round_void(tmp_path: Path):
     server = server_of(tmp_path / "study")
     with served(server) as where, page_at(where) as page:
@@ -170,6 +179,7 @@ def test_a_run_that_is_killed_makes_its_round_void(tmp_path: Path):
     assert StudyFolder.opened(tmp_path / "study", PLAN).session(1).records == {}
 
 
+@pytest.mark.usefixtures("without_runs")
 def test_a_page_that_floods_in_a_round_makes_it_void(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(page_messages, "FLOOD", 200)
     server = server_of(tmp_path / "study")
@@ -187,11 +197,15 @@ def test_a_page_that_floods_in_a_round_makes_it_void(tmp_path: Path, monkeypatch
     assert "the page was closed" in session.notes.void_attempts[0].reason
 
 
+def choose_mouse(protocol: Protocol) -> None:
+    for action, value in (("language", "en"), ("consent", True), ("eligibility", [True] * 3), ("device", "mouse")):
+        protocol.act(action, value)
+
+
 def test_who_sits_down_after_a_withdrawal_has_practised_nothing(tmp_path: Path):
     seat = server_of(tmp_path / "study").seat
     for _ in range(2):
-        for action, value in (("language", "en"), ("consent", True), ("eligibility", [True] * 3), ("device", "mouse")):
-            seat.protocol.act(action, value)
+        choose_mouse(seat.protocol)
         assert seat.practice.done == 0.0
         assert seat.practice.test.reached == []
         seat.practice.done = 100.0
@@ -204,8 +218,7 @@ def test_who_sits_down_after_a_withdrawal_has_practised_nothing(tmp_path: Path):
 def test_a_round_that_cannot_be_kept_is_told_and_can_be_played_again(tmp_path: Path):
     seat = server_of(tmp_path / "study").seat
     protocol = seat.protocol
-    for action, value in (("language", "en"), ("consent", True), ("eligibility", [True] * 3), ("device", "mouse")):
-        protocol.act(action, value)
+    choose_mouse(protocol)
     protocol.act("begin")
     in_the_way = protocol.study.session(1).path / "rounds" / "01.json"
     in_the_way.mkdir()
@@ -235,8 +248,7 @@ def test_a_round_that_cannot_be_kept_is_told_and_can_be_played_again(tmp_path: P
 
 def test_a_round_that_the_servers_end_broke_off_is_an_attempt_in_the_tables(tmp_path: Path):
     protocol = server_of(tmp_path / "study").seat.protocol
-    for action, value in (("language", "en"), ("consent", True), ("eligibility", [True] * 3), ("device", "mouse")):
-        protocol.act(action, value)
+    choose_mouse(protocol)
     protocol.act("begin")
     session = protocol.study.session(1)
     session.run_folder(1).mkdir(parents=True)  # then the server was killed
@@ -261,8 +273,7 @@ def test_who_carries_the_study_out_is_told_what_became_of_each_round(tmp_path: P
     seat = server_of(tmp_path / "study").seat
     told_lines: list[str] = []
     seat.on_round_end = lambda planned, ended: told_lines.append(line_of_round(PLAN, 1, planned, ended))
-    for action, value in (("language", "en"), ("consent", True), ("eligibility", [True] * 3), ("device", "mouse")):
-        seat.protocol.act(action, value)
+    choose_mouse(seat.protocol)
     seat.protocol.act("begin")
     seat.keep("the page was closed", is_round=True)
     seat.protocol.act("next")
