@@ -28,6 +28,9 @@ def page_command(*arguments: object, cwd: Path | None = None) -> Generator[tuple
     command = Command(*arguments, cwd=cwd)
     try:
         yield _address(command), command
+    except BaseException:
+        print(f"its standard error: {command.errors_file.read_text('utf-8') if command.errors_file.exists() else ''}")
+        raise
     finally:
         if command.poll() is None:
             command.send_signal(signal.SIGTERM)

@@ -48,8 +48,8 @@ def write_video(path: Path) -> None:
     focal = FOCAL * WIDTH
     size = round(focal * SIDE / 0.6)
     places = [
-        *[(0.0, 235)] * 30,
-        *[(-0.12 * k / 20, 235) for k in range(20)],
+        *[(0.0, 235)] * 40,
+        *[(-0.12 * k / 10, 235) for k in range(10)],
         *[(-0.12, 235)] * 20,
         *[(-0.12, 150)] * 30,
     ]

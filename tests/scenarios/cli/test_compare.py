@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from support.opened_page import opened, overflow
 from playwright.sync_api import Browser
 from support.campaigns import campaign_metadata, carried_out, folder_of, table_of
+from support.opened_page import opened, overflow
 from support.wording import Wording
 
 from handover.scenarios.campaign.plan import CampaignPlan

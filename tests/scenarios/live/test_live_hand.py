@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Locator, Page
-from support.live_pages import LIVE, TOLD, connected, frame, frames_come, live_run, send, shown, told
+from support.live_pages import LIVE, connected, frame, frames_come, live_run, send, shown, told
 from support.opened_page import wait_until
 from support.wording import Wording
 
@@ -45,6 +45,10 @@ def edges(part: Locator) -> tuple[float, float]:
     box = part.bounding_box()
     assert box is not None
     return box["y"], box["y"] + box["height"]
+
+
+def wanted(page: Page) -> list[float]:
+    return page.evaluate("live.hand.pose().p_WH")
 
 
 @pytest.mark.slow
@@ -113,62 +117,6 @@ def test_the_page_shows_the_hand_that_a_mouse_or_gamepad_leads_and_its_record_is
     handover.run(SCENARIO, hand="outside", inputs_from=out, stop=stop, out=tmp_path / "again", progress=False)
     again = Record(tmp_path / "again" / "signals.parquet")
     assert all(np.array_equal(again[name][: len(led.time)], led[name]) for name in led.signals)
-
-
-def move_hand(page: Page, to: list[float], steps: int = 1) -> None:
-    """Move the mouse to where a point of the plane z = constant is seen, in steps of 30 ms."""
-    page.mouse.move(*page.evaluate(PIXEL, to), steps=steps)
-    page.wait_for_timeout(30)
-
-
-def wanted(page: Page) -> list[float]:
-    return page.evaluate("live.hand.pose().p_WH")
-
-
-def phase(page: Page) -> str:
-    return page.evaluate(TOLD).partition(", ")[2]
-
-
-def take_object(page: Page) -> None:
-    """Lead the hand to the object's end as the robot signals, close it, and pull until the robot opens its gripper."""
-    wait_until(page, "live.hand")
-    page.locator("[data-view=top]").click()
-    page.wait_for_timeout(300)
-    move_hand(page, [-0.15, 0.07, wanted(page)[2]])
-    page.mouse.wheel(0, -wanted(page)[2] / 0.00015)
-    page.wait_for_timeout(300)
-    move_hand(page, [-0.15, 0.07, 0.0])
-    assert wanted(page) == pytest.approx([-0.15, 0.07, 0.0], abs=0.002)
-    wait_until(page, f"/signal|velocity/.test({TOLD})")
-    for k in range(1, 11):
-        move_hand(page, [-0.15 + 0.015 * k, 0.07, 0.0])
-    page.wait_for_timeout(300)
-    page.mouse.down()
-    page.mouse.up()
-    page.wait_for_timeout(300)
-    for _ in range(10):
-        for k in range(20):
-            move_hand(page, [-0.015 * k, 0.07, 0.0])
-        page.wait_for_timeout(1000)
-        if "velocity" not in phase(page):
-            return
-        move_hand(page, [0.0, 0.07, 0.0], steps=10)
-
-
-@pytest.mark.real_time
-def test_the_pages_hand_takes_the_object(browser: Browser, tmp_path: Path):
-    given = ("-p", "hand=outside", "--pace", "4")
-    with (
-        live_run(tmp_path / "led", *given, scenario=SCENARIO) as (address, run),
-        shown(browser, address, 1000, 900) as page,
-    ):
-        take_object(page)
-        wait_until(page, f"{LIVE}.dataset.ended")
-        assert page.locator(".verdict").inner_text().startswith("Succeeded: ")
-        assert run.wait().status == 0
-    report = json.loads((tmp_path / "led" / "inputs.json").read_text(encoding="utf-8"))
-    assert report["samples"]["mouse"] > 100
-    assert report["age_at_use"]["median"] < 0.2
 
 
 @pytest.mark.slow

@@ -95,7 +95,7 @@ BEYOND = """[...document.querySelectorAll("body *")]
 def test_a_slider_begins_a_run_anew_and_a_run_is_that_of_its_command_is_shown_again_and_gets_a_report(
     browser: Browser, tmp_path: Path
 ):
-    with played("flyer_impedance", tmp_path / "runs", "--pace", "0.5") as (address, session):
+    with played("flyer_impedance", tmp_path / "runs", "--pace", "0.05") as (address, session):
         with shown(browser, address) as page:
             begun(page, 1)
             frames_come(page)
@@ -207,9 +207,9 @@ def test_an_ssp_and_an_own_scenario_are_played_with(tmp_path: Path):
             assert field in fields
             told(page, "ended")
             send(page, "set", {"parameters": {field: value}})
-            rows = told(page, "runs")
+            rows = told(page, "runs")["rows"]
             while [row["state"] for row in rows].count("succeeded") < 2:
-                rows = told(page, "runs")
+                rows = told(page, "runs")["rows"]
             assert sorted((row["number"], row["parameters"]) for row in rows) == [(1, {}), (2, {field: value})]
         assert json.loads((out / "002" / "summary.json").read_text(encoding="utf-8"))["success"]
 
@@ -264,7 +264,7 @@ def test_a_push_moves_the_robot_and_is_played_back_and_what_is_killed_is_told_as
     out = tmp_path / "runs"
     with (
         played("flyer_impedance", out, "-p", "begin=30") as (address, session),
-        shown(browser, address) as page,
+        shown(browser, address, 1000, 800) as page,
     ):
         begun(page, 1)
         assert page.locator("#field-begin").input_value() == "30"
@@ -306,6 +306,7 @@ def test_a_push_moves_the_robot_and_is_played_back_and_what_is_killed_is_told_as
 
 def dragged(page: Page) -> float:
     """Press on the robot and drag; return how far it has moved until it is released, m."""
+    page.locator(".replay-scene").scroll_into_view_if_needed()
     x, y = page.evaluate(
         """(() => {
             const {left, top} = document.querySelector(".replay-scene").getBoundingClientRect();

@@ -75,6 +75,7 @@ def test_each_of_its_bodies_yields_to_a_push_and_the_scene_shows_it(
     assert (f"{unit}.f_Q" in {f"{unit}.{push.force}" for push in pushes}) == (name == "flyer_arm_impedance")
 
 
+@pytest.mark.slow
 def test_lines_and_points_of_a_pushed_helix_are_told_apart_by_their_colours(tmp_path: Path):
     record = pushed_run("helix_handover", tmp_path / "run", {"arm.f_P": [0.0, 0.5, 0.0]})
     scene = SCENARIOS["helix_handover"]().replay(parse_parameters(SCENARIOS["helix_handover"], ()), record)

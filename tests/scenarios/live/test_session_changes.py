@@ -1,13 +1,18 @@
 """What a session shows changes one after the other, by however many pages it is asked at once."""
 
 import asyncio
+import shutil
 import subprocess
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+from typing import cast
 
 import pytest
 
 from handover.cosim.python_process import code_command
 from handover.scenarios.execution.request import RunRequest
+from handover.scenarios.live import play_page
 from handover.scenarios.live.play_page import PlayPage, Session
 from handover.scenarios.live.played_run import Choice, PlayedRun
 from handover.scenarios.live.waiting_command import WaitingCommand
@@ -48,6 +53,31 @@ class Counted(PlayPage):
         await asyncio.sleep(0.05)
 
 
+class IdleCommand:
+    """A command that waits for ever, without a process."""
+
+    has_exited, last_error = True, ""
+
+    def __init__(self, _scenario: str = "") -> None:
+        self.folder, self.process = Path(tempfile.mkdtemp()), self
+
+    def call(self, arguments: Sequence[str]) -> None:
+        pass
+
+    def kill(self) -> None:
+        pass
+
+    def close(self) -> None:
+        shutil.rmtree(self.folder)
+
+
+@pytest.fixture(autouse=True)
+def idle(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Let no process wait for a session's next run."""
+    monkeypatch.setattr(play_page, "WaitingCommand", IdleCommand)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+
+
 def test_a_command_waits_where_pandas_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "pandas.py").write_text("raise ModuleNotFoundError('not installed', name='pandas')\n")
     monkeypatch.syspath_prepend(tmp_path)
@@ -56,6 +86,7 @@ def test_a_command_waits_where_pandas_is_not_installed(tmp_path: Path, monkeypat
     waiting.call(["list", "--help"])
     assert waiting.process.wait(60.0) == 0, waiting.last_error
     waiting.close()
+    assert not waiting.folder.exists()
 
 
 def test_of_several_runs_that_are_shown_again_at_once_the_last_one_is_shown_alone(tmp_path: Path):
@@ -63,8 +94,7 @@ def test_of_several_runs_that_are_shown_again_at_once_the_last_one_is_shown_alon
 
     async def work() -> None:
         page = Counted(session)
-        run = PlayedRun(1, Choice(), SCENARIO, [], tmp_path / "001", 1.0, WaitingCommand(SCENARIO))
-        run.kill()
+        run = PlayedRun(1, Choice(), SCENARIO, [], tmp_path / "001", 1.0, cast(WaitingCommand, IdleCommand()))
         await page.ask_at_once(run)
         page.end()
         await page.work()
@@ -76,6 +106,7 @@ def test_of_several_runs_that_are_shown_again_at_once_the_last_one_is_shown_alon
     asyncio.run(work())
 
 
+@pytest.mark.slow
 def test_what_a_run_was_refused_for_is_told_beside_what_is_wrong_with_a_later_choice(tmp_path: Path):
     session = Session("", RunRequest(subject=SCENARIO), [], ["noise", "shift"], False, False, [], tmp_path, 2.0)
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from native_units import native_fmu
+from support.wording import Wording
 
 from handover.cosim.fmu.file.archive import FmuArchive, write_archive
 from handover.cosim.system.system import System
@@ -46,7 +47,7 @@ def test_a_loop_lies_clockwise_in_the_order_of_its_signals():
     assert sorted(angles, key=lambda name: angles[name]) == ["arm", "hand", "camera", "vision", "servo"]
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 8, 9, 40])
+@pytest.mark.parametrize("n", [1, 2, 8, 9])
 def test_places_are_the_same_each_time_apart_and_within_the_square(n: int):
     names = [f"u{i}" for i in range(n)]
     pairs = list(itertools.pairwise(names))
@@ -150,16 +151,19 @@ def test_of_an_icon_that_is_too_large_the_png_is_kept(svg: int, png: int, kept: 
 
 
 @pytest.mark.parametrize(
-    ("icon", "fault"),
+    "described",
     [
-        ({"type": "text/html", "base64": ""}, "an icon of type 'text/html'"),
-        ({"type": "image/png", "base64": "https://a.b"}, "Only base64 data is allowed"),
-        ({"type": "image/png", "base64": "abc"}, "Incorrect padding"),
+        pytest.param({"name": "a", "icon": {"type": "text/html", "base64": ""}}, id="an icon of HTML"),
+        pytest.param({"name": "a", "icon": {"type": "image/png", "base64": "https://a.b"}}, id="an icon elsewhere"),
+        pytest.param({"name": "a", "icon": {"type": "image/png", "base64": "abc"}}, id="half an icon"),
+        pytest.param(1, id="a number for a unit"),
     ],
 )
-def test_what_a_run_says_to_be_an_icon_is_a_picture(icon: dict[str, str], fault: str, tmp_path: Path):
-    with pytest.raises(InvalidRunFolder, match=f"its description of the units is damaged: .*{fault}"):
-        write_run_page(run_of(tmp_path, [unit("a", icon=icon)]))
+def test_a_damaged_system_is_reported_as_the_runs_fault(described: Any, tmp_path: Path, wording: Wording):
+    run = run_of(tmp_path, [{**unit("a"), **described} if isinstance(described, dict) else described])
+    with pytest.raises(InvalidRunFolder) as refused:
+        write_run_page(run)
+    wording.check(refused.value)
     assert not (tmp_path / "report.html").exists()
 
 
@@ -208,9 +212,3 @@ def run_of(folder: Path, units: Sequence[object]) -> RunFolder:
     (folder / "run.json").write_text(json.dumps(run))
     (folder / "summary.json").write_text(json.dumps({"success": True, "reason": "", "metrics": {}}))
     return RunFolder.of_run(folder)
-
-
-def test_a_damaged_system_is_reported_as_the_runs_fault(tmp_path: Path):
-    with pytest.raises(InvalidRunFolder, match=r"its run\.json is damaged: Expected `object`"):
-        write_run_page(run_of(tmp_path, [1]))
-    assert not (tmp_path / "report.html").exists()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import patch
 
 from handover.scenarios.study.folder.session_folder import RoundRecord, Session, SessionFolder
 from handover.scenarios.study.folder.study_folder import StudyFolder
@@ -57,12 +58,25 @@ def same(_number: int, _planned: Round, _statement: str) -> int:
     return 5
 
 
+def rigid_is_better(number: int, planned: Round, statement: str) -> int:
+    """Rate rigid rounds two points higher, in S1 only; some people rate higher than others."""
+    above = 2 if planned.condition.behaviour == "rigid" and statement == "S1" else 0
+    return 3 + number % 4 + above
+
+
+def compliant_fails(number: int, planned: Round) -> bool:
+    """Fail both compliant rounds of the second task, if the number is even."""
+    return number % 2 == 0 and (planned.condition.task, planned.condition.behaviour) == ("human_to_robot", "compliant")
+
+
 def play(folder: SessionFolder, rate: Rate, fails: Fails = never) -> None:
     """Play a session to its end: `rate` gives a participant's rating of a round's statement, `fails` who failed."""
     number = folder.session.number
-    for planned in folder.rounds:
-        folder.record_round(planned.number, record(success=not fails(number, planned)))
-        folder.record_answers(planned.number, {name: rate(number, planned, name) for name in folder.plan.statements})
+    with patch.object(SessionFolder, "write_tables"):  # which the questionnaire's answers write, too
+        for planned in folder.rounds:
+            folder.record_round(planned.number, record(success=not fails(number, planned)))
+            ratings = {name: rate(number, planned, name) for name in folder.plan.statements}
+            folder.record_answers(planned.number, ratings)
     folder.record_questionnaire({"age_group": "21-30", "background": "engineering", "comments": 'a "quoted", text\n2'})
 
 

@@ -45,7 +45,7 @@ def test_a_textbooks_example():
 
 
 @given(HALVES)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_ties_and_zeros_are_exact_by_all_signs(d: list[float]):
     found = signed_rank_test(d)
     assert found is not None
@@ -53,7 +53,7 @@ def test_ties_and_zeros_are_exact_by_all_signs(d: list[float]):
     assert found.p == pytest.approx(by_all_signs(d))
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_scipy_agrees_with_ties_and_without(seed: int):
     rng = np.random.default_rng(seed)
     tied = rng.choice([-2.0, -1.5, -1.0, -0.5, 0.5, 1.0, 1.5, 2.0], size=11)
@@ -89,7 +89,7 @@ def test_no_difference_at_all_is_no_evidence():
 
 
 @given(st.lists(st.integers(-99, 99).map(float), min_size=6, max_size=16, unique_by=abs).filter(lambda d: 0.0 not in d))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_the_interval_has_the_shifts_that_the_test_does_not_reject(d: list[float]):
     low, high = shift_interval(np.array(d))
     means = np.unique(pair_means(np.array(d)))
@@ -122,7 +122,7 @@ def by_all_flips(pairs: Sequence[tuple[int, int]]) -> float:
     return float(np.mean(np.abs(ways) >= abs(sum(a - b for a, b in pairs))))
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_flips_within_matched_pairs_agree_with_all_flips_and_with_mcnemars_test(seed: int):
     pairs = [(int(a), int(b)) for a, b in np.random.default_rng(seed).binomial(1, (0.2, 0.7), size=(11, 2))]
     discordant = [a - b for a, b in pairs if a != b]

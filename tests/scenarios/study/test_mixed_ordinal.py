@@ -65,6 +65,7 @@ def drawn(
     return y, x
 
 
+@pytest.mark.slow
 def test_known_parameters_are_found_and_intervals_cover_them():
     rng = np.random.default_rng(11)
     found: list[MixedModel] = []
@@ -105,6 +106,7 @@ def test_the_likelihood_with_slopes_is_that_of_integration_in_two_dimensions():
     assert model.log_likelihood == pytest.approx(total, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_slopes_of_people_are_found_and_widen_the_interval():
     studies = [drawn(np.random.default_rng(seed), 60, 1.0, 1.5, 2.0) for seed in range(4)]
     found = [with_slopes(y, x).slope_deviation for y, x in studies]
@@ -119,7 +121,7 @@ def test_slopes_of_people_are_found_and_widen_the_interval():
 @pytest.mark.slow
 def test_the_test_of_behaviour_keeps_its_size_where_people_differ_in_it():
     """Without an effect, with slopes of 2 log-odds; intercepts alone take ratings of one for independent evidence."""
-    rng, studies = np.random.default_rng(21), 300
+    rng, studies = np.random.default_rng(21), 150
     rejected = by_intercepts = 0
     for _ in range(studies):
         y, x = drawn(rng, 18, 0.0, 1.5, 2.0)

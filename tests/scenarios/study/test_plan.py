@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from support.wording import Wording
 
 from handover.scenarios.catalog import SCENARIOS
 from handover.scenarios.experiment.paper import paper_values
@@ -60,13 +61,8 @@ def test_parameters_of_all_of_a_task_and_of_a_condition_add_up_and_the_narrower_
         plan.condition("human_to_robot", "soft")
 
 
-def test_an_unknown_task_is_told_with_the_nearest():
-    [fault] = faults_of(('"flyer_collaborative"', '"flyer_colaborative"'))
-    assert fault.startswith("tasks.collaborative.scenario: no scenario 'flyer_colaborative'; did you mean flyer_coll")
-
-
-def test_all_faults_are_told_at_once():
-    faults = faults_of(
+def test_all_faults_are_told_at_once(wording: Wording):
+    of_types = faults_of(
         ("seed = 2020", "sed = 2020"),
         ("practice = 600", 'practice = "long"'),
         ('kind = "text"', 'kind = "txt"'),
@@ -78,55 +74,34 @@ def test_all_faults_are_told_at_once():
         ('S2 = "I was', 'S22 = "I was'),
         ('"mouse", ', '"mose", '),
     )
-    assert (len(faults), len(together)) == (5, 7)
-    shown = "\n".join(faults + together)
-    for part in (
-        "sed: no such key; did you mean seed",
-        "seed: it is missing; expected a whole number from 0",
-        "practice: it is 'long'; expected a number from 0 to 7200",
-        "scale: its highest, 1, is not above its lowest, 1",
-        "tasks.robot_to_human, rigid: behaviour: 'rigd' is none of rigid, compliant",
-        "text.en.statements.S2: it is missing",
-        "text.en.statements.S22: no such key; did you mean S2",
-        "devices: no device 'mose'; did you mean mouse?",
-        "text.en.language: it is datetime.date(1979, 5, 27); expected a non-empty string",
-        "questions[3].kind: it is 'txt'; expected 'choice' or 'text'",
-    ):
-        assert part in shown
+    assert (len(of_types), len(together)) == (5, 7)
+    wording.check("\n".join(of_types))
+    wording.check("\n".join(together))
 
 
 @pytest.mark.parametrize(
-    ("change", "fault"),
+    ("old", "new"),
     [
-        (("title = ", "title = 3 #"), "title: it is 3; expected a non-empty string"),
-        (("pilot = false", "pilot = 0"), "pilot: it is 0; expected true or false"),
-        (('["S1", "S2", "S3"]', "[]"), "statements: it is []; expected a list of non-empty strings"),
-        (('["S1", "S2", "S3"]', '["S1", "S1"]'), "statements: a name is given twice"),
-        (('"gamepad", ', '"script", '), "devices: 'script' is no person's; pilot = true is of scripted pilots"),
-        (("[behaviours.compliant]", "[behaviours.rigid.compliant]"), "behaviours.rigid.compliant: it is {"),
-        (
-            ("[behaviours.compliant]", "[behaviours.soft]\nskill = 1\n[behaviours.compliant]"),
-            "behaviours: two are compared",
-        ),
-        (
-            ("[behaviours.compliant]", "[behaviours.scenario]"),
-            "behaviours.scenario: that is what a task's own",
-        ),
-        (("[tasks.human_to_robot]", '[tasks."a b"]'), "tasks.a b: it is 'a b'; expected a name of letters, digits"),
-        (('"not_said"]\n\n[[', '"not_said", "mars"]\n\n[['), "text.en.choices.age_group: 7 texts for 8 choices"),
-        (("participants = 18", "participants = nan"), "participants: it is nan; expected a whole number from 1 to 999"),
-        (("practice = 600", "practice = nan"), "practice: it is nan; expected a number from 0 to 7200"),
-        (
-            ("[tasks.human_to_robot]", "[tasks.human_to_robot]\nrigd = {}"),
-            "tasks.human_to_robot.rigd: no such key; did",
-        ),
-        (("practice = 600", "practice = inf"), "practice: it is inf; expected a number from 0 to 7200"),
-        (('behaviour = "compliant"', 'bahaviour = "compliant"'), "has no parameter 'bahaviour'; did you mean behav"),
-        (('S3"]', 'S3"'), "it is not TOML"),
+        ("title = ", "title = 3 #"),
+        ("pilot = false", "pilot = 0"),
+        ('["S1", "S2", "S3"]', "[]"),
+        ('["S1", "S2", "S3"]', '["S1", "S1"]'),
+        ('"gamepad", ', '"script", '),
+        ('"flyer_collaborative"', '"flyer_colaborative"'),
+        ("[behaviours.compliant]", "[behaviours.rigid.compliant]"),
+        ("[behaviours.compliant]", "[behaviours.soft]\nskill = 1\n[behaviours.compliant]"),
+        ("[behaviours.compliant]", "[behaviours.scenario]"),
+        ("[tasks.human_to_robot]", '[tasks."a b"]'),
+        ("[tasks.human_to_robot]", "[tasks.human_to_robot]\nrigd = {}"),
+        ('"not_said"]\n\n[[', '"not_said", "mars"]\n\n[['),
+        ("participants = 18", "participants = nan"),
+        ("practice = 600", "practice = inf"),
+        ('behaviour = "compliant"', 'bahaviour = "compliant"'),
+        ('S3"]', 'S3"'),
     ],
 )
-def test_a_bad_plan_is_refused_with_the_reason(change: tuple[str, str], fault: str):
-    assert any(fault in told for told in faults_of(change))
+def test_a_bad_plan_is_refused_with_the_reason(old: str, new: str, wording: Wording):
+    wording.check("\n".join(faults_of((old, new))))
 
 
 def test_a_pilot_study_may_be_driven_by_scripts():
@@ -135,16 +110,15 @@ def test_a_pilot_study_may_be_driven_by_scripts():
     assert "script" in plan.devices
 
 
-def test_a_file_that_is_no_plan_is_told(tmp_path: Path):
-    with pytest.raises(InvalidPlan, match="there is no such file"):
-        read_plan(tmp_path / "plan.toml")
-    (tmp_path / "plan.toml").write_bytes(b"\xff\xfe")
-    with pytest.raises(InvalidPlan, match="it is not text in UTF-8"):
-        read_plan(tmp_path / "plan.toml")
+def test_a_file_that_is_no_plan_is_refused(tmp_path: Path, wording: Wording):
+    (tmp_path / "no_text.toml").write_bytes(b"\xff\xfe")
+    for name in ("none.toml", "no_text.toml"):
+        with pytest.raises(InvalidPlan) as refused:
+            read_plan(tmp_path / name)
+        wording.check(refused.value)
 
 
-def test_a_plan_in_whose_rounds_nobody_can_lead_a_hand_is_told():
-    plan = parse_plan(default_plan().replace('"flyer_robot_to_human"', '"flyer_two_robots"'))
-    (rigid, compliant) = hand_faults(plan)
-    assert rigid.startswith("tasks.robot_to_human, rigid: in flyer_two_robots nobody outside can lead a hand")
-    assert compliant.startswith("tasks.robot_to_human, compliant: ")
+def test_a_plan_in_whose_rounds_nobody_can_lead_a_hand_is_told(wording: Wording):
+    faults = hand_faults(parse_plan(default_plan().replace('"flyer_robot_to_human"', '"flyer_two_robots"')))
+    assert len(faults) == 2
+    wording.check("\n".join(faults))

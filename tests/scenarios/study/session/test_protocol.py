@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from sample_study import PLAN, play, record, same, session
+from support.wording import Wording
 
 from handover.scenarios.experiment.live_inputs import LedHand
 from handover.scenarios.reporting.page import asset
@@ -198,22 +199,25 @@ def test_who_withdraws_is_not_asked_again_and_is_in_no_result(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("action", "value", "why"),
+    ("action", "value"),
     [
-        ("rate", {"S1": 7, "S2": 8}, "S3 is not rated"),
-        ("rate", {"S1": 7, "S2": 8, "S3": 10}, "a whole number from 1 to 9"),
-        ("rate", {"S1": 7, "S2": 8, "S3": "9"}, "a whole number from 1 to 9"),
-        ("rate", [7, 8, 9], "a number for each statement"),
-        ("begin", None, "'rating'"),
-        ("fly", None, "rate is"),
+        pytest.param("rate", {"S1": 7, "S2": 8}, id="two of three ratings"),
+        pytest.param("rate", {"S1": 7, "S2": 8, "S3": 10}, id="a rating too high"),
+        pytest.param("rate", {"S1": 7, "S2": 8, "S3": "9"}, id="a text for a rating"),
+        pytest.param("rate", [7, 8, 9], id="a list of ratings"),
+        pytest.param("begin", None, id="an action of another screen"),
+        pytest.param("fly", None, id="no action"),
     ],
 )
-def test_what_is_not_to_be_done_is_refused_and_changes_nothing(action: str, value: object, why: str, tmp_path: Path):
+def test_what_is_not_to_be_done_is_refused_and_changes_nothing(
+    action: str, value: object, tmp_path: Path, wording: Wording
+):
     protocol = practised(tmp_path / "study")
     protocol.act("begin")
     protocol.end_round(record())
-    with pytest.raises(InvalidAction, match=why):
+    with pytest.raises(InvalidAction) as refused:
         protocol.act(action, value)
+    wording.check(refused.value)
     assert protocol.screen == "rating"
     assert protocol.study.session(1).answers == {}
 

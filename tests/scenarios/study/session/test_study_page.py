@@ -243,6 +243,7 @@ def test_a_scripted_pilot_plays_rounds_that_survive_a_kill_and_are_played_back(
     assert pq.read_table(tmp_path / "again" / "signals.parquet").equals(pq.read_table(played / "signals.parquet"))
 
 
+@pytest.mark.slow
 def test_a_scripted_pilot_that_is_refused_ends_the_command_with_the_reason(tmp_path: Path):
     plan = pilot_plan(tmp_path / "plan.toml", devices='["script"]', patience=15)
     study = StudyFolder.opened(tmp_path / "study", parse_plan(plan.read_text(encoding="utf-8")))

@@ -1,15 +1,17 @@
-"""The replay of a run in a browser: the slider moves what was recorded, play goes on, the legend hides."""
+"""The replay of a run's page in a browser: the slider moves what was recorded, play goes on, a video is saved."""
 
 from collections.abc import Generator
 from io import BytesIO
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
-from support.opened_page import opened, wait_until
+from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Browser, Page
 from scipy.spatial.transform import Rotation
+from support.opened_page import opened, overflow, wait_until
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.record.reader import Record
@@ -36,6 +38,63 @@ def page(browser: Browser, grasp: Path) -> Generator[Page, None, None]:
 @pytest.fixture(scope="module")
 def record(grasp: Path) -> Record:
     return Record(grasp / "signals.parquet")
+
+
+TEXT_COLOURS = "[...document.querySelectorAll('.plot .xtitle')].map(t => getComputedStyle(t).fill)"
+
+
+def drawn(page: Page) -> list[str]:
+    """Return the names of the curves in the explorer's plot."""
+    return page.evaluate("document.querySelector('.explorer .plot').data.map(trace => trace.name)")
+
+
+LOOKS = """(() => {
+    const style = getComputedStyle(document.documentElement), names = [0, 1, 2, 3].map(k => `--c${k}`);
+    const named = new Map(names.map(name => [style.getPropertyValue(name).trim(), `var(${name})`]));
+    return document.querySelector('.explorer .plot').data.map(t => [named.get(t.line.color), t.line.dash]);
+})()"""
+
+
+def looks(page: Page) -> list[list[str]]:
+    """Return colour and stroke of the curves in the explorer's plot."""
+    return page.evaluate(LOOKS)
+
+
+def test_the_page_is_drawn_follows_its_reader_and_asks_for_nothing(page: Page):
+    assert page.inner_text("h1") == "ir_grasp: succeeded"
+    assert page.locator(".plot").count() == page.locator(".plot:has(.main-svg)").count() > 0
+    assert page.locator(".modebar-btn").count() > 0
+    assert page.locator(".modebar-btn[data-title*=hare], .modebar-btn[data-title*=loud]").count() == 0
+    page.fill(".explorer input", "range")
+    page.select_option(".explorer select", ["scene.range"])
+    wait_until(page, "document.querySelector('.explorer .plot').data[0].name === 'scene.range[1]'")
+    assert drawn(page) == [f"scene.range[{i}]" for i in (1, 2, 3)]
+    assert page.inner_text(".explorer .about").startswith("scene.range ")
+    assert looks(page) == [["var(--c0)", "solid"], ["var(--c1)", "dash"], ["var(--c2)", "dot"]]
+    page.fill(".explorer input", "scene.q")
+    page.select_option(".explorer select", ["scene.q"])
+    wait_until(page, "document.querySelector('.explorer .plot').data[0].name === 'scene.q[1]'")
+    strokes, colours = ["solid", "dash", "dot"], [f"var(--c{k})" for k in range(3)]
+    assert looks(page)[:9] == [[colours[k // 3], strokes[k % 3]] for k in range(len(looks(page)))][:9]
+    light = page.evaluate(TEXT_COLOURS)
+    page.emulate_media(color_scheme="dark")
+    wait_until(page, f"({TEXT_COLOURS}).every((c, k) => c !== {light}[k])")
+    assert overflow(page) <= 0
+    page.set_viewport_size({"width": 400, "height": 800})
+    wait_until(page, "[...document.querySelectorAll('.plot svg.main-svg')].every(s => s.clientWidth < 400)")
+    assert overflow(page) <= 0
+    page.emulate_media(color_scheme="light")
+    page.set_viewport_size({"width": 1400, "height": 900})
+
+
+def test_each_phase_is_named_on_the_page_as_in_the_figure(page: Page, record: Record):
+    phases = phases_of_grasp(record)
+    names = page.evaluate("document.querySelector('#time .plot').layout.annotations.map(a => [a.text, a.textangle])")
+    level, upright = ([name for name, angle in names if bool(angle) is turned] for turned in (False, True))
+    assert {p.name for p in phases} == {*level, *upright}
+    assert len(set(upright)) == len(upright)
+    assert not set(upright) & set(level)
+    assert len(names) < len(phases)
 
 
 def move(page: Page, frame: int) -> None:
@@ -119,7 +178,7 @@ def test_a_view_just_holds_what_is_drawn_at_any_time(page: Page, record: Record,
     labels = {drawn.label for drawn in (*shown.bodies, *shown.lines)}
     page.get_by_role("button", name=name).click()
     seen: list[list[float]] = []
-    for frame in range(0, len(frame_rows(record.time)), 20):
+    for frame in range(0, len(frame_rows(record.time)), 60):
         move(page, frame)
         for label in labels:
             script = "name => replays[0].scene.points(name).map(p => replays[0].scene.toPixels(p))"
@@ -296,6 +355,48 @@ def test_a_body_turns_as_its_quaternion_says_and_vanishes_without_a_place(page: 
     assert np.ptp(seen(2), axis=0) == pytest.approx(0.0, abs=1e-12)
 
 
+def frames(file: Path) -> list[NDArray[np.uint8]]:
+    video = cv2.VideoCapture(str(file))
+    found: list[NDArray[np.uint8]] = []
+    while True:
+        there, frame = video.read()
+        if not there:
+            return found
+        found.append(np.asarray(frame, np.uint8))
+
+
+@pytest.mark.slow
+def test_the_button_saves_the_replay_from_its_beginning_to_its_end(page: Page, record: Record, tmp_path: Path):
+    last = float(record.time[-1])
+    page.locator(".replay-time").fill("100")
+    page.locator(".replay-speed").select_option("5")
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="record a video").click()
+        assert page.get_by_role("button", name="stop and save").is_visible()
+    assert page.locator(".replay-told").inner_text().startswith(f"{last:.1f} s")
+    assert saved.value.suggested_filename.split(".") in (["ir_grasp", "mp4"], ["ir_grasp", "webm"])
+    file = tmp_path / saved.value.suggested_filename
+    saved.value.save_as(file)
+    shown = frames(file)
+    wide, high = page.evaluate("[replays[0].scene.canvas.width & ~1, replays[0].scene.canvas.height & ~1]")
+    assert {p.shape for p in shown} == {(high, wide, 3)}
+    assert np.abs(shown[-1].astype(float) - shown[0]).max() > 100.0
+    assert shown[0].mean() > 180.0  # it has the page's background
+
+
+def test_a_video_that_is_ended_early_is_saved_and_another_can_begin(page: Page, tmp_path: Path):
+    page.locator(".replay-speed").select_option("1")
+    for _ in range(2):
+        with page.expect_download() as saved:
+            page.get_by_role("button", name="record a video").click()
+            wait_until(page, "replays[0].element.dataset.frame > 10")
+            page.get_by_role("button", name="stop and save").click()
+        saved.value.save_as(tmp_path / "video")
+        assert frames(tmp_path / "video")
+        assert float(page.evaluate("replays[0].element.dataset.frame")) < 200
+        page.get_by_role("button", name="record a video").wait_for()
+
+
 @pytest.mark.slow
 def test_without_webgl_a_sentence_says_so(browser: Browser, grasp: Path):
     page = browser.new_page()
@@ -315,11 +416,17 @@ def test_without_webgl_a_sentence_says_so(browser: Browser, grasp: Path):
 
 
 @pytest.mark.slow
-def test_a_finger_scrolls_the_page_until_it_wakes_the_scene(browser: Browser, grasp: Path):
-    context = browser.new_context(viewport={"width": 400, "height": 800}, has_touch=True, is_mobile=True)
+def test_on_a_phone_in_the_dark_a_finger_scrolls_the_page_until_it_wakes_the_scene(browser: Browser, grasp: Path):
+    context = browser.new_context(
+        viewport={"width": 400, "height": 800}, has_touch=True, is_mobile=True, color_scheme="dark"
+    )
     page = context.new_page()
+    page.add_init_script("delete window.MediaRecorder")
     page.goto((grasp / "report.html").as_uri())
     wait_until(page, f"{SCENE}.dataset.frame === '0'")
+    assert overflow(page) <= 0
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(18, 23, 30)"
+    assert not page.locator(".replay-film").is_visible(), "there is no recorder"
     wake = page.get_by_role("button", name="Tap to turn")
     assert wake.evaluate("button => getComputedStyle(button).touchAction") == "pan-y"
     wake.tap()
