@@ -26,6 +26,7 @@ from support.live_pages import (
     told,
 )
 from support.opened_page import wait_until
+from support.processes import until
 from support.wording import Wording
 
 from handover.cosim.record.reader import Record
@@ -210,10 +211,15 @@ def test_the_page_of_a_run_that_is_ended_from_outside_says_what_is_left_of_it(
         frame(page)
         while told(page, "time") < 0.3:
             pass
+        server = process_with(run, SERVER)
+        scratch = Path(server.cmdline()[server.cmdline().index(SERVER) + 2])
+        assert scratch.is_dir()
         run.send_signal(how)
         ended = told(page, "ended")
     assert ended["judged"] is (how is signal.SIGINT)
     wording.check(re.sub(r"\d+\.\d+ s", "T s", ended["reason"]))
+    until(lambda: not server.is_running(), 300.0)
+    assert not scratch.exists()
 
 
 @pytest.mark.slow

@@ -14,11 +14,11 @@ import pytest
 from click.testing import CliRunner
 from native_units import native_fmu
 from playwright.sync_api import Browser, Page
-from processes import until
 from support.commands import Command, run_command
 from support.kept_runs import kept_run
 from support.live_pages import LIVE, connected, frame, frames_come, page_command, send, shown, time_passes, told
 from support.opened_page import wait_until
+from support.processes import until
 from support.wording import Wording
 
 from handover.cosim.fmu.file.archive import FmuArchive, write_archive

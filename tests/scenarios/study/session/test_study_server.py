@@ -9,7 +9,6 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from processes import until
 from study_server import (
     HOST,
     PLAN,
@@ -21,6 +20,7 @@ from study_server import (
     status,
     told,
 )
+from support.processes import until
 from support.wording import Wording
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect

@@ -42,7 +42,7 @@ def test_a_hand_before_a_webcam_plays_a_round_whose_files_hashes_are_kept(tmp_pa
     plan = plan_of_webcam(tmp_path / "plan.toml", '["mouse", "webcam"]')
     with (
         launched(*camera_of(tmp_path / "camera.y4m")) as browser,
-        served(plan, tmp_path / "study", "--webcam", str(folder), "--pace", "2") as address,
+        served(plan, tmp_path / "study", "--webcam", str(folder)) as address,
         browser.new_page() as page,
     ):
         messages: list[str] = []
