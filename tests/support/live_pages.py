@@ -69,7 +69,8 @@ def connected(address: str, path: str = "run", **options: Any) -> Generator[Clie
     """Connect to what a page connects to, as the page or, without an origin, as a device does."""
     host = address.removeprefix("http://").rstrip("/")
     own = {"origin": f"http://{host}"} if path == "run" else {}
-    with connect(f"ws://{host}/{path}", open_timeout=_PATIENCE, max_size=None, **{**own, **options}) as made:
+    given: dict[str, Any] = {"open_timeout": _PATIENCE, "max_size": None, **own, **options}
+    with connect(f"ws://{host}/{path}", **given) as made:
         yield made
 
 

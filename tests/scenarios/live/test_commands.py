@@ -33,6 +33,18 @@ def pushed(value: Any) -> object:
     return push_of(value, PUSHES)
 
 
+def choosing(value: Any) -> object:
+    return signal_names(value, ["a.y"])
+
+
+def of_first_run(value: Any) -> object:
+    return run_number(value, [1])
+
+
+def pushing_nothing(value: Any) -> object:
+    return push_of(value, ())
+
+
 def controlled(name: str) -> Callable[[Any], object]:
     return lambda value: control_run(LiveControl.in_memory(1.0), Command(name, value))
 
@@ -59,15 +71,15 @@ def test_what_is_no_command_is_refused(text: str, wording: Wording):
     [
         pytest.param(controlled("pace"), -1, id="a pace backwards"),
         pytest.param(controlled("pace"), 1001.0, id="a pace beyond all"),
-        pytest.param(lambda value: signal_names(value, ["a.y"]), ["secret"], id="an unknown signal"),
-        pytest.param(lambda value: signal_names(value, ["a.y"]), ["a.y"] * 7, id="seven signals"),
+        pytest.param(choosing, ["secret"], id="an unknown signal"),
+        pytest.param(choosing, ["a.y"] * 7, id="seven signals"),
         pytest.param(plot_numbers, "all", id="no numbers of plots"),
         pytest.param(chosen, "all", id="no parameters"),
         pytest.param(chosen, {"parameters": {"secret": "1"}}, id="an unknown parameter"),
         pytest.param(chosen, {"parameters": {"force": 3}}, id="a parameter that is no text"),
         pytest.param(chosen, {"parameters": {}, "seed": -1}, id="a negative seed"),
         pytest.param(chosen, {"parameters": {}, "out": "/tmp"}, id="another option"),
-        pytest.param(lambda value: run_number(value, [1]), 7, id="a run that is not over"),
+        pytest.param(of_first_run, 7, id="a run that is not over"),
         pytest.param(pushed, {"body": "object", "point": [0, 0, 0], "force": [1, 0, 0]}, id="a push of another body"),
         pytest.param(pushed, {"body": "robot", "point": [0, 0, 0], "force": [4, 4, 0]}, id="a push too strong"),
         pytest.param(pushed, {"body": "robot", "point": [0, 0], "force": [1, 0, 0]}, id="a push at no point"),
@@ -76,7 +88,7 @@ def test_what_is_no_command_is_refused(text: str, wording: Wording):
             pushed, {"body": "robot", "point": [0, 0, 1e300], "force": [1, 0, 0]}, id="a push at a huge point"
         ),
         pytest.param(pushed, "robot", id="a push of a text"),
-        pytest.param(lambda value: push_of(value, ()), None, id="a push where there is none"),
+        pytest.param(pushing_nothing, None, id="a push where there is none"),
     ],
 )
 def test_a_value_that_is_not_right_is_refused(taken_by: Callable[[Any], object], value: Any, wording: Wording):

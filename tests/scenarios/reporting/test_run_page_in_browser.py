@@ -60,33 +60,6 @@ def looks(page: Page) -> list[list[str]]:
     return page.evaluate(LOOKS)
 
 
-def test_the_page_is_drawn_follows_its_reader_and_asks_for_nothing(page: Page):
-    assert page.inner_text("h1") == "ir_grasp: succeeded"
-    assert page.locator(".plot").count() == page.locator(".plot:has(.main-svg)").count() > 0
-    assert page.locator(".modebar-btn").count() > 0
-    assert page.locator(".modebar-btn[data-title*=hare], .modebar-btn[data-title*=loud]").count() == 0
-    page.fill(".explorer input", "range")
-    page.select_option(".explorer select", ["scene.range"])
-    wait_until(page, "document.querySelector('.explorer .plot').data[0].name === 'scene.range[1]'")
-    assert drawn(page) == [f"scene.range[{i}]" for i in (1, 2, 3)]
-    assert page.inner_text(".explorer .about").startswith("scene.range ")
-    assert looks(page) == [["var(--c0)", "solid"], ["var(--c1)", "dash"], ["var(--c2)", "dot"]]
-    page.fill(".explorer input", "scene.q")
-    page.select_option(".explorer select", ["scene.q"])
-    wait_until(page, "document.querySelector('.explorer .plot').data[0].name === 'scene.q[1]'")
-    strokes, colours = ["solid", "dash", "dot"], [f"var(--c{k})" for k in range(3)]
-    assert looks(page)[:9] == [[colours[k // 3], strokes[k % 3]] for k in range(len(looks(page)))][:9]
-    light = page.evaluate(TEXT_COLOURS)
-    page.emulate_media(color_scheme="dark")
-    wait_until(page, f"({TEXT_COLOURS}).every((c, k) => c !== {light}[k])")
-    assert overflow(page) <= 0
-    page.set_viewport_size({"width": 400, "height": 800})
-    wait_until(page, "[...document.querySelectorAll('.plot svg.main-svg')].every(s => s.clientWidth < 400)")
-    assert overflow(page) <= 0
-    page.emulate_media(color_scheme="light")
-    page.set_viewport_size({"width": 1400, "height": 900})
-
-
 def test_each_phase_is_named_on_the_page_as_in_the_figure(page: Page, record: Record):
     phases = phases_of_grasp(record)
     names = page.evaluate("document.querySelector('#time .plot').layout.annotations.map(a => [a.text, a.textangle])")
@@ -384,6 +357,7 @@ def test_the_button_saves_the_replay_from_its_beginning_to_its_end(page: Page, r
     assert shown[0].mean() > 180.0  # it has the page's background
 
 
+@pytest.mark.slow
 def test_a_video_that_is_ended_early_is_saved_and_another_can_begin(page: Page, tmp_path: Path):
     page.locator(".replay-speed").select_option("1")
     for _ in range(2):
@@ -395,6 +369,31 @@ def test_a_video_that_is_ended_early_is_saved_and_another_can_begin(page: Page, 
         assert frames(tmp_path / "video")
         assert float(page.evaluate("replays[0].element.dataset.frame")) < 200
         page.get_by_role("button", name="record a video").wait_for()
+
+
+def test_the_page_is_drawn_follows_its_reader_and_asks_for_nothing(page: Page):
+    assert page.inner_text("h1") == "ir_grasp: succeeded"
+    assert page.locator(".plot").count() == page.locator(".plot:has(.main-svg)").count() > 0
+    assert page.locator(".modebar-btn").count() > 0
+    assert page.locator(".modebar-btn[data-title*=hare], .modebar-btn[data-title*=loud]").count() == 0
+    page.fill(".explorer input", "range")
+    page.select_option(".explorer select", ["scene.range"])
+    wait_until(page, "document.querySelector('.explorer .plot').data[0].name === 'scene.range[1]'")
+    assert drawn(page) == [f"scene.range[{i}]" for i in (1, 2, 3)]
+    assert page.inner_text(".explorer .about").startswith("scene.range ")
+    assert looks(page) == [["var(--c0)", "solid"], ["var(--c1)", "dash"], ["var(--c2)", "dot"]]
+    page.fill(".explorer input", "scene.q")
+    page.select_option(".explorer select", ["scene.q"])
+    wait_until(page, "document.querySelector('.explorer .plot').data[0].name === 'scene.q[1]'")
+    strokes, colours = ["solid", "dash", "dot"], [f"var(--c{k})" for k in range(3)]
+    assert looks(page)[:9] == [[colours[k // 3], strokes[k % 3]] for k in range(len(looks(page)))][:9]
+    light = page.evaluate(TEXT_COLOURS)
+    page.emulate_media(color_scheme="dark")
+    wait_until(page, f"({TEXT_COLOURS}).every((c, k) => c !== {light}[k])")
+    assert overflow(page) <= 0
+    page.set_viewport_size({"width": 400, "height": 800})
+    wait_until(page, "[...document.querySelectorAll('.plot svg.main-svg')].every(s => s.clientWidth < 400)")
+    assert overflow(page) <= 0
 
 
 @pytest.mark.slow
