@@ -147,7 +147,7 @@ def test_a_phone_shows_both_views_and_tells_how_far_the_hand_is_from_the_ball(br
     phone = {"viewport": {"width": 390, "height": 844}, "has_touch": True}
     with served(plan, tmp_path / "out") as address, opened(browser, address, **phone) as page:
         to_round(page, "practice", "Touch screen")
-        assert "The practice lasts 300 s." in page.locator("main").inner_text()
+        assert "The practice lasts 5 min." in page.locator("main").inner_text()
         assert page.locator("#photodiode").count() == 0
         page.get_by_role("button", name="Begin").click()
         wait_until(page, UNDER_WAY)
