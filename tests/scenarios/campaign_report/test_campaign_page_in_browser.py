@@ -5,9 +5,9 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-from support.opened_page import opened, overflow, wait_until
-from support.campaigns import campaign_metadata, carried_out, folder_of, table_of
 from playwright.sync_api import Browser
+from support.campaigns import campaign_metadata, carried_out, folder_of, table_of
+from support.opened_page import opened, overflow, wait_until
 
 from handover.scenarios.campaign.folder import CampaignFolder
 from handover.scenarios.campaign.plan import CampaignPlan
