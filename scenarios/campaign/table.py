@@ -93,14 +93,16 @@ class CampaignTable:
 
     def holds(self, name: str, kind: str) -> bool:
         """Return whether a column holds `texts`, `numbers`, `whole numbers`, all of them given, or `true and false`."""
-        is_whole = pa.types.is_integer(self._kind(name))
+        is_whole = pa.types.is_integer(self._kind(name)) and self.table.column(name).null_count == 0
         fits = {
             "texts": pa.types.is_string(self._kind(name)),
             "numbers": is_whole or pa.types.is_floating(self._kind(name)),
-            "whole numbers": is_whole and self.table.column(name).null_count == 0,
+            "whole numbers": is_whole,
             "true and false": pa.types.is_boolean(self._kind(name)),
         }
-        return fits[kind] or (pa.types.is_null(self._kind(name)) and kind != "whole numbers") or not len(self)
+        return (
+            fits[kind] or (pa.types.is_null(self._kind(name)) and kind in ("texts", "true and false")) or not len(self)
+        )
 
     def unit(self, name: str) -> str:
         """Return the unit of a column, "1" where it has none.
@@ -126,7 +128,7 @@ class CampaignTable:
 
     def _metadata(self, name: str, key: str) -> str:
         metadata: Mapping[bytes, bytes] = self.table.schema.field(self._checked(name)).metadata or {}
-        return metadata.get(key.encode(), b"").decode()
+        return metadata.get(key.encode(), b"").decode(errors="replace")
 
     def _checked(self, name: str) -> str:
         if name not in self.table.column_names:

@@ -35,7 +35,7 @@ def replaced(table: CampaignTable, column: str, values: list[Any]) -> CampaignTa
     field = whole.schema.field(index)
     made = pa.array(values)
     fits = made.type == field.type or pa.types.is_null(made.type)
-    kept = field if fits and column != "seed" else pa.field(column, made.type, metadata=field.metadata)
+    kept = field if fits and column == "success" else pa.field(column, made.type, metadata=field.metadata)
     return CampaignTable(whole.set_column(index, kept, made.cast(kept.type)))
 
 
@@ -170,6 +170,7 @@ def test_of_a_damaged_folder_nothing_is_written(tmp_path: Path, file: str, conte
         ("seed", ["x"] * 4, "'seed' does not hold whole numbers"),
         ("seed", [None] * 4, "'seed' does not hold whole numbers"),
         ("reason", [[1]] * 4, "'reason' does not hold texts"),
+        ("final_distance_thumb", [1, None, 2, 3], "'final_distance_thumb' does not hold numbers"),
         ("final_distance_thumb", ["x"] * 4, "'final_distance_thumb' does not hold numbers"),
         ("run", ["y" * 10_000] * 4, "is no run's name"),
     ],
