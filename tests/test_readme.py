@@ -313,7 +313,7 @@ def test_a_run_is_reported_again_and_filmed(tmp_path: Path):
 @pytest.mark.slow
 def test_a_model_is_trained_run_and_adapted(tmp_path: Path):
     train, adapt = (c for c in COMMANDS if " vsl-train " in c)
-    succeeded(train, tmp_path, "--points", "200")
+    succeeded(train, tmp_path)
     succeeded(command_with(" run vsl_hybrid -p model="), tmp_path, "--no-report")
     succeeded(adapt, tmp_path)
     assert (tmp_path / "stiffer_arm.json").is_file()
