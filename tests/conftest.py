@@ -36,6 +36,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as of a shell's job in 
 _CPU = "CPU seconds"
 _BEGAN = pytest.StashKey[float]()
 _COSTLIEST = 10
+_deselected: set[str] = set()
 
 
 def _cpu() -> float:
@@ -56,8 +57,12 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     return report
 
 
+def pytest_deselected(items: list[pytest.Item]) -> None:
+    _deselected.update(item.nodeid for item in items)
+
+
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    write_golden({item.nodeid.partition("::")[0] for item in session.items})
+    write_golden({item.nodeid for item in session.items}, _deselected)
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:

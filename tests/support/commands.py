@@ -149,7 +149,7 @@ def _main(
 ) -> None:
     """Become the command, as its entry point starts it."""
     if not privileged:
-        _drop_privilege_of_limits()
+        drop_privilege_of_limits()
     os.environ.clear()
     os.environ.update(environment)
     tempfile.tempdir = None  # this process's environment says which it is
@@ -178,7 +178,7 @@ def _main(
         sys.stdout.flush()
 
 
-def _drop_privilege_of_limits() -> None:
+def drop_privilege_of_limits() -> None:
     """Take CAP_SYS_RESOURCE from this process (Linux)."""
     libc, header, sets = ctypes.CDLL(None), (ctypes.c_uint32 * 2)(0x20080522, 0), (ctypes.c_uint32 * 6)()
     assert libc.capget(header, sets) == 0

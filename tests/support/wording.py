@@ -37,11 +37,12 @@ class Wording:
         assert text == wanted, "the message is not the golden file's; if it is better, run `make wording`"
 
 
-def write_golden(collected: "set[str]") -> None:
-    """Write what was noted in place of what the file has of the same tests' files; other files' tests stay."""
+def write_golden(collected: "set[str]", deselected: "set[str]") -> None:
+    """Write what was noted in place of what the file has of the same files' tests, if these were not deselected."""
     if not os.environ.get(_REWRITES):
         return
-    kept = {test: said for test, said in _golden().items() if test.partition("::")[0] not in collected}
+    files = {test.partition("::")[0] for test in collected}
+    kept = {t: said for t, said in _golden().items() if t in deselected or t.partition("::")[0] not in files}
     blocks = [
         f"== {test}\n" + "\n--\n".join(indent(message, "  ") for message in messages)
         for test, messages in sorted({**kept, **_noted}.items())
