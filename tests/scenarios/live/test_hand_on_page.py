@@ -171,3 +171,30 @@ def test_words_say_how_far_and_in_which_direction_of_the_view_the_hand_is_off(pa
     )
     page.wait_for_function("document.querySelector('.hand-words').textContent")
     assert page.locator(".hand-words").inner_text() == "Go. 54 mm too far left, 20 mm too low"
+
+
+def test_the_view_from_the_side_grows_to_hold_a_hand_that_leaves_it(page: Page):
+    page.add_script_tag(content=asset("scene/side_view.js"))
+    held = page.evaluate(
+        """() => {
+            const where = {hand: [[0, 0, 0]], object: [[0.5, 0.1, 0.1]]}, held = [];
+            const first = {points: label => where[label], spherical: () => ({azimuth: 0}), onBeforeRender() {}};
+            window.createScene = (_, content) => (held.push(content.held), {
+                hold(corners) { held.push(corners); }, lookFrom() {}, show() {}, dispose() {},
+            });
+            const content = {traces: [{label: "hand"}, {label: "object"}]};
+            const side = createSideView(document.getElementById("e"), first, content, ["hand", "object"]);
+            for (const x of [0.1, -2]) {
+                where.hand = [[x, 0, 0]];
+                window.now += 200;
+                side.show();
+            }
+            return held;
+        }"""
+    )
+    assert len(held) == 2, "it stays as it is while all is in it"
+    before, after = (np.array(corners) for corners in held)
+    assert before.min(axis=0)[0] < 0.0
+    assert before.max(axis=0)[0] > 0.5
+    assert after.min(axis=0)[0] < -2.0
+    assert np.all(after.max(axis=0) >= before.max(axis=0))

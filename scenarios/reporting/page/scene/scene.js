@@ -12,6 +12,7 @@
 //   scene.setView(name)           looks from one of scene.views: "start", "front", "side", "top";
 //                                 side is from that end of x which the eye is nearer to at the start
 //   scene.lookFrom([x, y, z])     looks from that side, along a vector of W that points to the eye
+//   scene.hold(corners)           what a view just shows from now on, as `held`
 //   scene.follows = true          the view moves with the body of that label from now on
 //   scene.setVisible(label, yes), scene.visible(label)
 //   scene.updateColours()         takes the page's colours anew
@@ -117,7 +118,8 @@ const createScene = (() => {
   }
 
   return (element, content) => {
-    const {traces, low, high, held, eye, weightless = false, floor = low[2], follow = ""} = content;
+    const {traces, low, high, eye, weightless = false, floor = low[2], follow = ""} = content;
+    let held = content.held;
     const {played = false, live = false, ghost = ""} = content;
     if (!hasWebGl()) return null;
     const sides = high.map((x, i) => x - low[i]), centre = high.map((x, i) => (x + low[i]) / 2);
@@ -251,6 +253,7 @@ const createScene = (() => {
         requestRender();
       },
       lookFrom,
+      hold(corners) { held = corners; },
       setView: name => lookFrom(VIEWS[name]?.(eye) ?? eye),
       get follows() { return follows; },
       set follows(yes) { follows = Boolean(yes && follow); },

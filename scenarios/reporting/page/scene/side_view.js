@@ -16,15 +16,19 @@ const createSideView = (element, first, content, [front, back]) => {
   name.textContent = "from the side";
   inset.append(name);
   const PERIOD = 100;  // ms between two frames at least: the first view's, and a camera's, come before
-  let scene = null, azimuth = NaN, shownAt = 0;
+  let scene = null, azimuth = NaN, shownAt = 0, ends = [];
 
-  // Corners of a box around all that is drawn now, with some room: things move.
-  function around() {
+  // Whether anything that is drawn now has left what the view holds, which then grows to hold it, with some room.
+  function grow() {
     const points = content.traces.flatMap(trace => first.points(trace.label)).filter(p => p.every(Number.isFinite));
-    const ends = [0, 1, 2].map(i => points.reduce(([low, high], p) => [Math.min(low, p[i]), Math.max(high, p[i])], [Infinity, -Infinity]));
-    const room = ROOM * Math.max(...ends.map(([low, high]) => high - low));
-    return [0, 1, 2, 3, 4, 5, 6, 7].map(n => ends.map(([low, high], i) => n >> i & 1 ? high + room : low - room));
+    if (points.every(p => ends.length && p.every((x, i) => ends[i][0] <= x && x <= ends[i][1]))) return false;
+    const all = points.concat(ends.length ? [0, 1].map(k => ends.map(end => end[k])) : []);
+    const tight = [0, 1, 2].map(i => [Math.min(...all.map(p => p[i])), Math.max(...all.map(p => p[i]))]);
+    const room = ROOM * Math.max(...tight.map(([low, high]) => high - low));
+    ends = tight.map(([low, high]) => [low - room, high + room]);
+    return true;
   }
+  const corners = () => [0, 1, 2, 3, 4, 5, 6, 7].map(n => ends.map(([low, high], i) => n >> i & 1 ? high : low));
 
   // Looks from the first view's right or left, whose azimuth is a quarter turn from its eye's.
   function follow() {
@@ -40,6 +44,11 @@ const createSideView = (element, first, content, [front, back]) => {
     show() {
       if (performance.now() - shownAt < PERIOD) return;
       shownAt = performance.now();
+      if (scene && grow()) {
+        scene.hold(corners());
+        azimuth = NaN;
+        follow();
+      }
       scene?.show(Infinity);
     },
     get shown() { return scene !== null; },
@@ -47,7 +56,9 @@ const createSideView = (element, first, content, [front, back]) => {
       if (yes === api.shown) return;
       if (yes) {
         element.append(inset);
-        scene = createScene(inset, {...content, held: around()});
+        ends = [];
+        grow();
+        scene = createScene(inset, {...content, held: corners()});
         azimuth = NaN;
         follow();
         api.show();
