@@ -4,6 +4,7 @@ import colorsys
 import importlib.util
 import re
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import cv2
 import numpy as np
@@ -49,7 +50,7 @@ def test_the_fingers_in_the_picture_are_as_in_the_figure_of_today(grasp: Path, f
 
 def test_every_shape_of_a_mark_is_drawn():
     axes = Canvas().subplots()
-    shapes = re.findall(r'"([a-z ]+)"', (Mark.__doc__ or "").partition("shape: ")[2].partition("\n")[0])
+    shapes = get_args(get_type_hints(Mark)["shape"])
     marks = [Mark(label="ball", shape=shape, u=20.0, v=20.0) for shape in shapes]
     pixels = np.zeros((40, 40, 3), np.uint8)
     plots._show(axes, CameraPicture.take(t=0.0, camera="left", role="", pixels=pixels, marks=marks), (40, 0))  # type: ignore

@@ -149,7 +149,7 @@ def test_wrong_values_of_an_ssp_are_refused(tmp_path: Path):
 def test_what_cannot_be_run_is_refused(tmp_path: Path):
     with pytest.raises(InvalidFmu):
         prepared(plan_of(tmp_path / "absent.fmu", "a=1,2"))
-    with pytest.raises(UsageError, match=r"absent\.csv: no such file"):
+    with pytest.raises(UsageError, match=r"absent\.csv: there is no such file"):
         plan_of(native_fmu("mass", 2), "m=1,2", inputs=tmp_path / "absent.csv")
 
 
