@@ -12,6 +12,8 @@ from handover.scenarios.experiment.returned_types import COLOUR, Checked
 QUALITY = 88
 """Quality of the JPEG that is kept, of 100."""
 
+MarkShape = Literal["circle", "dashed circle", "cross", "plus"]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Mark(Checked):
@@ -25,7 +27,7 @@ class Mark(Checked):
     """
 
     label: str
-    shape: Literal["circle", "dashed circle", "cross", "plus"]
+    shape: MarkShape
     u: float
     v: float
     radius: float = 8.0

@@ -12,7 +12,7 @@ from handover.controllers.helix.vision.vision_parameters import Params as Vision
 from handover.cosim.blocks.geometry import Pinhole
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.system.signals import Signals
-from handover.scenarios.experiment.pictures import CameraPicture, Mark
+from handover.scenarios.experiment.pictures import CameraPicture, Mark, MarkShape
 from handover.scenarios.helix.cameras import pinholes
 from handover.scenarios.helix.disturbances import Cover
 from handover.scenarios.helix.parameters import Parameters
@@ -25,7 +25,7 @@ _POINTS = {
 }
 """What each point is, its colour, and that in words; how it is known is seen by the mark's shape."""
 MEASURED, ESTIMATED = "as measured", "as the controller has it"
-_SHAPES = {MEASURED: ("circle", "cross"), ESTIMATED: ("dashed circle", "plus")}
+_SHAPES: dict[str, tuple[MarkShape, MarkShape]] = {MEASURED: ("circle", "cross"), ESTIMATED: ("dashed circle", "plus")}
 """Shapes of the mark of the ball, which has its size in the picture, and of the other points."""
 LEGEND = (
     f"{', '.join(f'{what} {colour}' for what, _, colour in _POINTS.values())}; "
