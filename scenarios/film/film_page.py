@@ -1,6 +1,6 @@
 """The page that a film is made of: a run's scene beside plots over time, at the time that `film.js` is called with."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,7 +49,8 @@ class FilmContent:
     Attributes:
         title: of the run, in a line.
         record: of the run.
-        replay: its scene; None where it has none.
+        replay: its scene; None where it has none, or none that can be drawn.
+        scene: that as `scene.js` takes it.
         plots: over the record's time.
         notes: what could not be shown, a line each.
     """
@@ -57,6 +58,7 @@ class FilmContent:
     title: str
     record: Record
     replay: Replay | None
+    scene: Mapping[str, Any] | None
     plots: Sequence[TimePlot]
     notes: Sequence[str]
 
@@ -94,12 +96,17 @@ def film_content(folder: RunFolder, names: Sequence[str] | None, height: int) ->
         faults.lines += facts.not_drawn
         own = [p for f in figures_of_outputs(facts.run.get("units", {}), record) for p in f.plots]
     plots = [] if names is None else _chosen(own, record, names) if names else own[: 2 if height >= _TWO_PLOTS else 1]
-    if replay is None and not plots:
+    scene = None
+    if replay is not None:
+        with faults.tolerated("the scene could not be drawn"):
+            scene = scene_content(replay, record, frames=MAX_FRAMES)
+    if scene is None and not plots:
         raise NotFilmed(_nothing(facts, faults))
     return FilmContent(
         title=f"{facts.scenario}: {facts.title}" if facts.title else facts.scenario,
         record=record,
-        replay=replay,
+        replay=replay if scene else None,
+        scene=scene,
         plots=plots,
         notes=faults.lines if replay or faults.lines else [f"{facts.scenario} has no scene: the film has plots only"],
     )
@@ -184,9 +191,8 @@ def film_html(content: FilmContent, size: tuple[int, int], view: str) -> str:
         raise NotFilmed(f"--view follow: this scene has nothing to follow; {', '.join(VIEWS[:-1])} are right")
     data: dict[str, Any] = {"scene": None, "view": view, "phases": []}
     legend = Markup()
-    if replay is not None:
-        scene = scene_content(replay, record, frames=MAX_FRAMES)
-        data |= {"scene": scene, "phases": scene["phases"]}
+    if replay is not None and content.scene is not None:
+        data |= {"scene": content.scene, "phases": content.scene["phases"]}
         legend = legend_html([d for group in drawn_groups(replay, record) for d in group])
     wide = _is_wide(size)
     shape = "scene-only" if not content.plots else "plots-only" if replay is None else "beside" if wide else "below"

@@ -86,7 +86,7 @@ def scene_content(replay: Replay, record: Record, frames: int = MAX_FRAMES, *, r
         room: how much the views show around what is there, as a share of its longest side.
 
     Raises:
-        ValueError: a line or a body has neither one row nor as many as the record.
+        ValueError: a line or a body has neither one row nor as many as the record, or nothing has a place.
     """
     rows = frame_rows(record.time, frames)
     drawn = _drawn(replay, record, rows)
@@ -196,7 +196,10 @@ def _packed(values: NDArray[Any], dtype: str = "f4") -> dict[str, Any]:
 
 def _extent(drawn: Sequence[Drawn]) -> tuple[Floats, Floats, Floats]:
     """Return minimum and maximum corner of all that is drawn at any time, with a margin, and its outermost points."""
-    seen = _outermost(np.vstack([_outermost(points) for points in map(_points, drawn) if len(points)]))
+    outermost = [_outermost(points) for points in map(_points, drawn) if len(points)]
+    if not outermost:
+        raise ValueError("nothing in it has a place at any time")
+    seen = _outermost(np.vstack(outermost))
     low, high = seen.min(axis=0), seen.max(axis=0)
     margin = max(_MARGIN * float(np.max(high - low)), 1e-3)
     return low - margin, high + margin, seen
@@ -221,10 +224,18 @@ def _points(drawn: Drawn) -> Floats:
         radii = np.zeros(1) if drawn.radii is None else drawn.radii
         points = np.concatenate([drawn.points + r * radii[:, None] for r in np.vstack([np.eye(3), -np.eye(3)])])
     else:
-        R_WB = np.eye(3)[None] if drawn.q_WB is None else Rotation.from_quat(drawn.q_WB, scalar_first=True).as_matrix()
+        R_WB = np.eye(3)[None] if drawn.q_WB is None else _rotations(drawn.q_WB)
         points = drawn.p_WB[:, None] + np.einsum("rij,nj->rni", R_WB, drawn.mesh.vertices)
     points = points.reshape(-1, 3)
     return points[np.isfinite(points).all(axis=1)]
+
+
+def _rotations(q_WB: Floats) -> Floats:
+    """Return rotation matrices, shape (n, 3, 3), of quaternions, shape (n, 4); NaN where one has no direction."""
+    has_direction = np.linalg.norm(q_WB, axis=1) > 0.0
+    R_WB = np.full((len(q_WB), 3, 3), np.nan)
+    R_WB[has_direction] = Rotation.from_quat(q_WB[has_direction], scalar_first=True).as_matrix()
+    return R_WB
 
 
 def _seen_colour(drawn: Drawn) -> str:

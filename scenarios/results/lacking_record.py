@@ -112,4 +112,5 @@ class LackingRecord(Record):
 
 
 def _has_place(body: Body) -> bool:
-    return bool(np.isfinite(body.p_WB).all(axis=1).any())
+    known = np.isfinite(body.p_WB).all(axis=1)
+    return bool((known if body.q_WB is None else known & np.isfinite(body.q_WB).all(axis=1)).any())

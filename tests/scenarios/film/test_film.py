@@ -12,6 +12,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 from numpy.typing import NDArray
@@ -190,6 +191,18 @@ def test_what_cannot_be_filmed_so_is_refused(
     assert status == 2
     wording.check(output)
     assert {p.name for p in tmp_path.iterdir()} == {"folder.mp4", "there.mp4"}
+
+
+def test_a_scene_of_which_nothing_has_a_place_is_left_out(tmp_path: Path):
+    folder = copied_run(tmp_path / "r", "run", "ir_grasp", "--no-report", "--stop", "0.5")
+    table = pq.read_table(folder / "signals.parquet")
+    pq.write_table(
+        table.select([c for c in table.column_names if not c.startswith("scene.")]), folder / "signals.parquet"
+    )
+    content = film_content(RunFolder.of_run(folder), (), 720)
+    assert content.scene is None
+    assert content.plots
+    assert any("scene" in line for line in content.notes)
 
 
 def test_what_is_no_run_is_refused(tmp_path: Path, wording: Wording):
