@@ -306,7 +306,7 @@ def test_a_run_is_reported_again_and_filmed(tmp_path: Path):
     succeeded(command_with(" report "), tmp_path)
     assert (tmp_path / "r" / "report.html").is_file()
     if shutil.which("chromium"):
-        succeeded(command_with(" film "), tmp_path, "--size", "320x180", "--pace", "40")
+        succeeded(command_with(" film "), tmp_path, "--size", "320x240", "--pace", "40")
         assert (tmp_path / "grasp.gif").is_file()
 
 

@@ -12,7 +12,7 @@ import handover.fmus.compile
 from handover.fmus.binaries import binaries
 from handover.fmus.compile import RUNTIME, TARGETS, compile_runtime, host_platform, library
 
-ANOTHER = "x86_64-windows"
+ANOTHER = "aarch64-linux"
 """That of the other platforms which is compiled for in the slow tier."""
 OTHERS = [target for target in TARGETS if target not in (host_platform(), ANOTHER)]
 EVERY = [
