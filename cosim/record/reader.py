@@ -100,8 +100,7 @@ class Record:
     """The signals of a run. `time` is in seconds, shape (rows,).
 
     Args:
-        path: a Parquet file with the column `time`, finite numbers that never fall, and others; all are numbers or
-            booleans.
+        path: a Parquet file with the column `time`, finite numbers, and others; all are numbers or booleans.
 
     Raises:
         OSError: it cannot be read. InvalidRecord: it is damaged or no record.
@@ -118,8 +117,6 @@ class Record:
         self.time = self._values("time")
         if self.time.dtype != np.float64 or not np.isfinite(self.time).all():
             raise InvalidRecord(path, "its column 'time' has other values than finite numbers")
-        if np.any(self.time[1:] < self.time[:-1]):
-            raise InvalidRecord(path, "its column 'time' goes back")
         for signal in self.signals:
             self._check_metadata(path, signal)
 

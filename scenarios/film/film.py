@@ -40,8 +40,10 @@ def frame_times(begin: float, end: float, settings: FilmSettings) -> Floats:
     """Return the simulated times of a film's frames, s: evenly spaced from the record's begin, and its end.
 
     Raises:
-        NotFilmed: they are too many.
+        NotFilmed: they are too many, or the record's time goes back.
     """
+    if end < begin:
+        raise NotFilmed(f"the record's time goes back, from {begin:g} to {end:g} s")
     steps = (end - begin) * settings.fps / settings.pace
     if not steps <= _MOST_FRAMES:
         faster = f"{(end - begin) * settings.fps / _MOST_FRAMES:.2g}"

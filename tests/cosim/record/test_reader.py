@@ -77,7 +77,6 @@ def test_what_takes_as_much_memory_as_its_file_is_large_is_read(tmp_path: Path):
         {"time": pa.nulls(2, pa.float64())},
         {"time": [0.0, math.inf]},
         {"time": [0.0, math.nan]},
-        {"time": [0.0, 0.2, 0.1]},
         {"time": [[0.0], [1.0]]},
         {"time": [0, 1]},
         {"a.y": [0.0, 1.0]},

@@ -129,6 +129,11 @@ def test_a_frame_looks_the_same_whatever_was_shown_before(grasp: Path):
     assert picture.mean() < 80.0  # it is dark
 
 
+def test_a_time_that_goes_back_has_no_frames():
+    with pytest.raises(NotFilmed):
+        frame_times(0.2, 0.1, FilmSettings())
+
+
 def test_the_frames_times_are_even_and_end_with_the_run():
     settings = FilmSettings(pace=2.0, fps=10.0)
     np.testing.assert_allclose(frame_times(1.0, 2.0, settings), [1.0, 1.2, 1.4, 1.6, 1.8, 2.0])
