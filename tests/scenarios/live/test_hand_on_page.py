@@ -186,7 +186,7 @@ def test_the_view_from_the_side_grows_to_hold_a_hand_that_leaves_it(page: Page):
             const side = createSideView(document.getElementById("e"), first, content, ["hand", "object"]);
             for (const x of [0.1, -2]) {
                 where.hand = [[x, 0, 0]];
-                window.now += 200;
+                window.now += 1200;
                 side.show();
             }
             return held;

@@ -16,7 +16,8 @@ const createSideView = (element, first, content, [front, back]) => {
   name.textContent = "from the side";
   inset.append(name);
   const PERIOD = 100;  // ms between two frames at least: the first view's, and a camera's, come before
-  let scene = null, azimuth = NaN, shownAt = 0, ends = [];
+  const LOOK = 1000;  // ms after which it is looked at once more whether all is seen: that goes through all points
+  let scene = null, azimuth = NaN, shownAt = 0, lookedAt = 0, ends = [];
 
   // Whether anything that is drawn now has left what the view holds, which then grows to hold it, with some room.
   function grow() {
@@ -44,10 +45,13 @@ const createSideView = (element, first, content, [front, back]) => {
     show() {
       if (performance.now() - shownAt < PERIOD) return;
       shownAt = performance.now();
-      if (scene && grow()) {
-        scene.hold(corners());
-        azimuth = NaN;
-        follow();
+      if (scene && shownAt - lookedAt > LOOK) {
+        lookedAt = shownAt;
+        if (grow()) {
+          scene.hold(corners());
+          azimuth = NaN;
+          follow();
+        }
       }
       scene?.show(Infinity);
     },
