@@ -102,6 +102,7 @@ def frames_come(page: Page, more: int = 3) -> None:
 
 def time_passes(page: Page, seconds: float) -> None:
     """Wait until so much simulated time has passed, s."""
+    wait_until(page, f"parseFloat({TOLD}) >= 0")
     since = float(page.evaluate(f"parseFloat({TOLD})"))
     wait_until(page, f"parseFloat({TOLD}) > {since + seconds}")
 
