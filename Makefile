@@ -74,7 +74,7 @@ notebook: $(VENV)/.installed-test
 
 # The units' icons as PNG, of their drawings in fmus/icons/.
 icons: $(VENV)/.installed-test
-	$(BIN)/python tests/fmus/rendered_icons.py
+	$(BIN)/python tests/support/fmus/rendered_icons.py
 
 wheels: $(VENV)/bin/python
 	for platform in $(WHEELS); do \

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from disturbed_grasp import DISTURBED, OFF
 from pytest_benchmark.fixture import BenchmarkFixture
+from support.exchange.disturbed_grasp import DISTURBED, OFF
 
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import MasterOptions

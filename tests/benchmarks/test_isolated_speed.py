@@ -14,6 +14,7 @@ from statistics import median
 
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
+from support.processes import program
 
 pytestmark = [
     pytest.mark.skipif(sys.platform == "win32", reason="units are isolated on Linux and macOS"),
@@ -28,8 +29,8 @@ PAIRS = 5
 
 def microseconds(fmu: Path, isolated: str, *arguments: int) -> float:
     """Return what a step of a ring takes."""
-    command = [sys.executable, str(Path(__file__).with_name("isolated_units.py")), str(fmu), isolated]
-    done = subprocess.run([*command, *map(str, arguments)], capture_output=True, text=True, timeout=170, check=False)
+    command = program("benchmarks/isolated_units.py", fmu, isolated, *arguments)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=170, check=False)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
+from support.processes import program
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="Ecos and libcosim are there for Linux alone"),
@@ -40,8 +41,8 @@ WIRING = 2.0
 
 
 def script(name: str, environment: dict[str, str], *arguments: object) -> Any:
-    """Return what a script of this folder prints last."""
-    command = [sys.executable, str(Path(__file__).with_name(name)), *map(str, arguments)]
+    """Return what a script prints last."""
+    command = program(f"benchmarks/{name}", *arguments)
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=170, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return json.loads(done.stdout.splitlines()[-1])

@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from large_systems import write_large_fmu, write_large_ssp
 from pytest_benchmark.fixture import BenchmarkFixture
+from support.benchmarks.large_systems import write_large_fmu, write_large_ssp
 
 pytest.importorskip("resource", reason="memory is told on Linux and macOS only")
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bare_folder import BareFolder, can_be_entered
 from pytest_benchmark.fixture import BenchmarkFixture
+from support.fmus.bare_folder import BareFolder, can_be_entered
 
 from handover.fmus.build import build, cached
 from handover.fmus.catalog import UNITS

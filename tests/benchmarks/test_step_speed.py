@@ -15,16 +15,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ctypes_host import OK
 from pytest_benchmark.fixture import BenchmarkFixture
-from step_speed import INPUTS, OUTPUTS, Measured, assignments, medians
-from workshop import Workshop
+from support.benchmarks.step_speed import INPUTS, OUTPUTS, Measured, assignments, medians
+from support.fmus.ctypes_host import OK
+from support.fmus.workshop import Workshop
+from support.processes import program, with_path
 
 from handover.fmus.compile import RUNTIME, zig_cc
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="step_loop.c measures with clock_gettime")
 
-SPEED = Path(__file__).with_name("step_speed.py")
 ROUNDS = 9
 TARGET = 3.0
 """Most microseconds of CPU that a step should cost over the plain object."""
@@ -88,8 +88,8 @@ def measured_apart(loops: Path, rounds: int, fmus: Mapping[str, Path]) -> dict[s
     """Return microseconds of CPU and of wall time a step, measured by step_speed.py."""
     units = [f"{name}={fmu}" for name, fmu in fmus.items()]
     done = subprocess.run(
-        [sys.executable, str(SPEED), str(loops), str(rounds), *units],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        program("benchmarks/step_speed.py", loops, rounds, *units),
+        env=with_path(),
         capture_output=True,
         text=True,
         check=False,

@@ -1,10 +1,10 @@
 from fractions import Fraction
 from pathlib import Path
 
-import decay
 import pytest
-from fmu_of import FmuOf
-from native_units import Edited, native_fmu
+from support.cosim import decay
+from support.cosim.fmu_of import FmuOf
+from support.cosim.native_units import Edited, native_fmu
 from support.rewritten_archive import rewritten
 
 from handover.fmus.build import build_block
@@ -18,7 +18,7 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> FmuOf:
 
     def build(block: str, fmi: int = 3) -> Path:
         if (block, fmi) not in made:
-            made[block, fmi] = build_block(f"master_blocks:{block}", fmi, folder, step=Fraction(1, 10))
+            made[block, fmi] = build_block(f"support.cosim.master_blocks:{block}", fmi, folder, step=Fraction(1, 10))
         return made[block, fmi]
 
     return build

@@ -1,5 +1,5 @@
 import pytest
-from reference import References
+from support.exchange.reference import References
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
-from disturbed_grasp import DISTURBED, OFF
+from support.exchange.disturbed_grasp import DISTURBED, OFF
 
 from handover.cosim.blocks.variable import Kind
 from handover.cosim.fmu.file.description import FmuPort, indices_of

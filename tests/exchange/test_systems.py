@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-import systems
 from click.testing import CliRunner
-from container import outputs_of, put_into_container
-from ecos_command import Ecos
-from fmpy_rows import record_in_fmpy
-from libcosim_job import Job, known, needs_libcosim, without_enumerations
-from own_master import Placed, run_in_our_own
-from reference import expect_same
+from support.exchange import systems
+from support.exchange.container import outputs_of, put_into_container
+from support.exchange.ecos_command import Ecos
+from support.exchange.fmpy_rows import record_in_fmpy
+from support.exchange.libcosim_job import Job, known, needs_libcosim, without_enumerations
+from support.exchange.own_master import Placed, run_in_our_own
+from support.exchange.reference import expect_same
 
 from handover.cosim.master.master import Master
 from handover.cosim.ssp.ssp_file import SspFile

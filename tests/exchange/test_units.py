@@ -11,9 +11,9 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
-from drive import STEPS, inputs, parameters, scalars
-from host_runs import Case, Form, fmu_of, in_c_program, in_fmpy
-from reference import FMI2_UNITS, References, description, expect_same, variables
+from support.exchange.drive import STEPS, inputs, parameters, scalars
+from support.exchange.host_runs import Case, Form, fmu_of, in_c_program, in_fmpy
+from support.exchange.reference import FMI2_UNITS, References, description, expect_same, variables
 
 from handover.cosim.blocks.variable import element_names
 from handover.fmus import interpreter

@@ -13,10 +13,10 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-import driver
 import pytest
-from call_ring import count_of, lines_of
 from support.commands import forking
+from support.faults import driver
+from support.faults.call_ring import count_of, lines_of
 
 from handover.fmus.build import build_block, cached
 from handover.fmus.catalog import UNITS
@@ -130,7 +130,7 @@ def pool(tmp_path: Path) -> Iterator[WorkerPool]:
 
 
 def sample_fmus(folder: Path) -> list[tuple[Path, int]]:
-    return [(build_block(f"sample_units.{block}", fmi, folder), fmi) for block in SAMPLES for fmi in (2, 3)]
+    return [(build_block(f"support.sample_units.{block}", fmi, folder), fmi) for block in SAMPLES for fmi in (2, 3)]
 
 
 def catalog_fmus(names: "tuple[str, ...]") -> list[tuple[Path, int]]:
@@ -138,7 +138,9 @@ def catalog_fmus(names: "tuple[str, ...]") -> list[tuple[Path, int]]:
 
 
 def test_a_few_sequences_on_light_units(pool: WorkerPool, tmp_path: Path):
-    samples = [(build_block(f"sample_units.{b}", 2 + k % 2, tmp_path), 2 + k % 2) for k, b in enumerate(SAMPLES)]
+    samples = [
+        (build_block(f"support.sample_units.{b}", 2 + k % 2, tmp_path), 2 + k % 2) for k, b in enumerate(SAMPLES)
+    ]
     pool.add([*samples, (cached(LIGHT[0], 2), 2), (cached(LIGHT[1], 3), 3)], FEW)  # each in one of the standards
     pool.add(catalog_fmus(LIGHT[:1])[1:], FEW_APART, kinds=KINDS[1:], apart=True)
     pool.run()
@@ -153,7 +155,7 @@ def test_a_few_with_python_apart(pool: WorkerPool):
 @pytest.mark.slow
 def test_a_unit_that_crashes_or_hangs_is_reported_with_its_last_calls(pool: WorkerPool, tmp_path: Path):
     for name in ("Crashing", "Hanging"):
-        fmu = build_block(f"sample_units.fatal:{name}", 3, tmp_path)
+        fmu = build_block(f"support.sample_units.fatal:{name}", 3, tmp_path)
         pool.jobs.append(Job(fmu, 3, "legal", MANY, tmp_path / f"{name}.ring", hung=SOON))
     with pytest.raises(AssertionError) as caught:
         pool.run()

@@ -4,8 +4,8 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from call_log import CallLog
-from native_units import native_fmu
+from support.cosim.call_log import CallLog
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.fmu.failures import UnitTerminated
 from handover.cosim.master.master import Master

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fault_rows import FAULTS, WAYS, Fault
-from fault_table import faults_of, run_fault
+from support.faults.fault_rows import FAULTS, WAYS, Fault
+from support.faults.fault_table import faults_of, run_fault
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="what a crash does depends on the system")
 

@@ -5,7 +5,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.fmu.failures import StartValuesLost

@@ -6,7 +6,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.fmu.failures import InvalidReturn
 from handover.cosim.master.master import Master

@@ -2,7 +2,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from workshop import Workshop
+from support.fmus.workshop import Workshop
 
 
 @pytest.fixture(scope="session")

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
-from workshop import Workshop
-from written_blocks import write_block
+from support.fmus.workshop import Workshop
+from support.fmus.written_blocks import write_block
 
 from handover.cosim.experiments import manifest as manifest_format
 from handover.fmus.binaries import universal
@@ -30,7 +30,9 @@ def test_an_unknown_unit_is_answered_with_the_nearest():
         find_unit("TendonArn")
 
 
-@pytest.mark.parametrize("path", ["nowhere.at_all:Block", "sample_units.every_kind", "sample_units.every_kind:Nothing"])
+@pytest.mark.parametrize(
+    "path", ["nowhere.at_all:Block", "support.sample_units.every_kind", "support.sample_units.every_kind:Nothing"]
+)
 def test_an_unknown_block_is_refused(path: str, tmp_path: Path):
     with pytest.raises(UnknownBlock, match=path):
         build_block(path, 3, tmp_path)
@@ -48,23 +50,23 @@ def test_a_module_that_ends_its_process_as_it_is_loaded_is_refused(tmp_path: Pat
 
 def test_a_name_that_is_no_identifier_and_an_unknown_version_are_refused(tmp_path: Path):
     with pytest.raises(InvalidName, match="two words"):
-        build_block("sample_units.every_kind:EveryKind", 3, tmp_path, name="two words")
+        build_block("support.sample_units.every_kind:EveryKind", 3, tmp_path, name="two words")
     with pytest.raises(UnknownVersion, match="there are 2"):
-        build_block("sample_units.every_kind:EveryKind", 1, tmp_path)
+        build_block("support.sample_units.every_kind:EveryKind", 1, tmp_path)
 
 
 @pytest.mark.parametrize("step", [Fraction(0), Fraction(-1), 0, 0.1, "soon", Fraction("1e400"), Fraction("1e-400")])
 def test_a_step_that_is_none_is_refused_before_anything_is_written(tmp_path: Path, step: Any):
     with pytest.raises(InvalidStep, match=r"above 0, such as Fraction\(1, 100\)$") as caught:
-        build_block("sample_units.every_kind:EveryKind", 3, tmp_path / "out", step=step)
+        build_block("support.sample_units.every_kind:EveryKind", 3, tmp_path / "out", step=step)
     assert f"step of {step!r} s" in str(caught.value)
     assert not (tmp_path / "out").exists()
 
 
 def test_a_block_is_built_for_the_platforms_that_are_named(tmp_path: Path):
     with pytest.raises(UnknownPlatform, match="no platform 'amiga'"):
-        build_block("sample_units.every_kind:EveryKind", 3, tmp_path, platforms=["amiga"])
-    made = build_block("sample_units.every_kind:EveryKind", 3, tmp_path, platforms=["host"])
+        build_block("support.sample_units.every_kind:EveryKind", 3, tmp_path, platforms=["amiga"])
+    made = build_block("support.sample_units.every_kind:EveryKind", 3, tmp_path, platforms=["host"])
     with zipfile.ZipFile(made) as archive:
         folders = {n.split("/")[1] for n in archive.namelist() if n.startswith("binaries/")}
     assert folders == {host_platform()}
@@ -72,7 +74,7 @@ def test_a_block_is_built_for_the_platforms_that_are_named(tmp_path: Path):
 
 def test_the_same_sources_give_the_same_bytes(workshop: Workshop, tmp_path: Path):
     first = workshop.fmu("every_kind:EveryKind", 3)
-    again = build_block("sample_units.every_kind:EveryKind", 3, tmp_path)
+    again = build_block("support.sample_units.every_kind:EveryKind", 3, tmp_path)
     assert again.read_bytes() == first.read_bytes()
 
 
@@ -98,7 +100,7 @@ def test_an_fmu_carries_its_sources_and_lists_its_packages(workshop: Workshop):
         unit = json.loads(archive.read("resources/unit.json"))
         page = archive.read("documentation/index.html").decode()
     assert {
-        "resources/sources/sample_units/every_kind.py",
+        "resources/sources/support/sample_units/every_kind.py",
         "resources/sources/handover/cosim/blocks/description.py",
     } <= names
     assert not any("build" in name or "catalog" in name for name in names)

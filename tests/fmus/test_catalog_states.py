@@ -5,9 +5,9 @@ from multiprocessing.pool import Pool
 from pathlib import Path
 
 import pytest
-from fmpy_host import FmpyHost
-from state_runs import STEPS, inputs_at, other_parameters, run, run_on
 from support.commands import forking
+from support.fmus.fmpy_host import FmpyHost
+from support.fmus.state_runs import STEPS, inputs_at, other_parameters, run, run_on
 
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS

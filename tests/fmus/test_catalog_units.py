@@ -7,7 +7,7 @@ import zipfile
 import fmpy
 import numpy as np
 import pytest
-from validity import problems_of
+from support.fmus.validity import problems_of
 
 from handover.cosim.fmu.file.archive import TERMINALS
 from handover.cosim.fmu.file.description import describe_fmu

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sample_units import every_kind, eye
+from support.sample_units import every_kind, eye
 
 from handover.cosim.blocks.description import describe
 from handover.fmus.buffers import Buffers

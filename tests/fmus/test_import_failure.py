@@ -6,8 +6,8 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
-from ctypes_host import CtypesHost
-from workshop import Workshop
+from support.fmus.ctypes_host import CtypesHost
+from support.fmus.workshop import Workshop
 
 from handover.fmus.catalog import PackageFailure, UnknownBlock, import_class
 from handover.fmus.import_failure import debian_package, explain_import
@@ -73,7 +73,7 @@ def test_an_fmu_tells_it(host: CtypesHost, package: "tuple[str, str]"):
     name, told = package
     unit = host.folder / "resources" / "unit.json"
     unit.write_text(unit.read_text().replace("_fmu_", f"_fmu_{name}_"))
-    (host.folder / "resources" / "sources" / "sample_units" / "scalars.py").write_text(f"import {name}\n")
+    (host.folder / "resources" / "sources" / "support" / "sample_units" / "scalars.py").write_text(f"import {name}\n")
     assert not host.instantiate()
     assert "unit Scalars cannot be loaded: " in host.log[-1]
     assert name in host.log[-1]

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 from fmpy.fmi1 import FMICallException
-from fmpy_host import FmpyHost
-from planted import planted_pickle
-from saved_states import digest
+from support.cosim.planted import planted_pickle
+from support.fmus.fmpy_host import FmpyHost
+from support.fmus.saved_states import digest
 
 from handover.fmus.buffers import join, split
 from handover.fmus.build import cached

@@ -10,8 +10,8 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from ctypes_host import ERROR, OK, SIZE, CtypesHost
-from validity import problems_of
+from support.fmus.ctypes_host import ERROR, OK, SIZE, CtypesHost
+from support.fmus.validity import problems_of
 
 from handover.cosim.blocks.variable import indices_of
 from handover.cosim.fmu.file.description import describe_fmu
@@ -21,7 +21,7 @@ from handover.fmus.build import build_block, cached
 from handover.scenarios.free_flyer.parameters import ImpedanceParameters
 from handover.scenarios.free_flyer.push.impedance import FlyerImpedance
 
-BLOCK = "sample_units.every_kind:EveryKind"
+BLOCK = "support.sample_units.every_kind:EveryKind"
 
 
 def root_of(fmu: Path) -> ET.Element:
@@ -69,7 +69,7 @@ def test_integers_have_32_bits_if_their_declaration_allows_it(every_kind: Path, 
         v.attrib["name"]: v.tag for v in root_of(every_kind).iter() if {"name", "valueReference"} <= v.attrib.keys()
     }
     assert [types[name] for name in ("n", "seed", "k", "total")] == ["Int32"] * 4
-    wide = root_of(build_block("sample_units.every_width:EveryWidth", 3, fmu_folder, scalar=True))
+    wide = root_of(build_block("support.sample_units.every_width:EveryWidth", 3, fmu_folder, scalar=True))
     assert {"Int8", "UInt16", "UInt64"} <= {v.tag for v in wide.iter()}
 
 

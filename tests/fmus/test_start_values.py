@@ -8,16 +8,16 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
-from fmpy_host import Digests, FmpyHost
+from support.fmus.fmpy_host import Digests, FmpyHost
+from support.fmus.workshop import Workshop
 from support.wording import Wording
-from workshop import Workshop
 
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus.build import build_block, cached
 
 HOST: Any = fmpy
-BLOCK = "sample_units.every_kind:EveryKind"
+BLOCK = "support.sample_units.every_kind:EveryKind"
 START: dict[str, Any] = {
     "gain": 3.5,
     "p0": [4.0, 5.0, 1 / 3],

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from flyer_runs import run
 from support.constant_records import constant_record
+from support.scenarios.flyer_runs import run
 
 from handover.cosim.record.reader import RecordedSignals
 from handover.fmus.build import cached

@@ -7,7 +7,6 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from native_units import native_fmu
 
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
@@ -15,6 +14,7 @@ from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.campaign.table import CampaignTable
+from support.cosim.native_units import native_fmu
 from support.in_process_pool import InProcessPool
 
 

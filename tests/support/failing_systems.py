@@ -4,11 +4,10 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
 
-from native_units import native_fmu
-
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System
 from support.commands import Command
+from support.cosim.native_units import native_fmu
 from support.processes import until
 
 

@@ -1,9 +1,23 @@
-"""Processes that are alive, by /proc, how far a run has come, and waiting for a condition."""
+"""Processes that are alive, by /proc, how far a run has come, waiting for a condition, and programs among the tests."""
 
 import contextlib
+import os
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+
+SUPPORT = Path(__file__).parent
+
+
+def program(name: str, *arguments: object) -> list[str]:
+    """Return the command of a program in this folder, which may need `with_path`."""
+    return [sys.executable, str(SUPPORT / name), *map(str, arguments)]
+
+
+def with_path() -> dict[str, str]:
+    """Return an environment in which Python imports what it does here."""
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
 
 
 def lives(process: int) -> bool:

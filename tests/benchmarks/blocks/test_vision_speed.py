@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
-from vision_scenes import anywhere, rising
+from support.controllers.vision_scenes import anywhere, rising
 
 from handover.controllers.helix.vision.handover_vision import Detector, HandoverVision, Outputs, Params
 from handover.controllers.helix.vision.handover_vision import Inputs as Pictures

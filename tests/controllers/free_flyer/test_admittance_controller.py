@@ -7,7 +7,7 @@ from typing import Any
 import control as untyped_control
 import numpy as np
 import pytest
-from pushed_body import ARM, GOAL, MASS, Body, T, pushed
+from support.controllers.pushed_body import ARM, GOAL, MASS, Body, T, pushed
 from support.restored_states import assert_continues, assert_outputs_change_nothing
 from support.wording import Wording
 

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from decision_world import EMPTY, END, HOLDING, TO_HUMAN, P, T, World, tug, world
+from support.controllers.decision_world import EMPTY, END, HOLDING, TO_HUMAN, P, T, World, tug, world
 from support.restored_states import assert_continues
 from support.wording import Wording
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from decision_world import ARM, EMPTY, HOLDING, OPEN, P, T, world
+from support.controllers.decision_world import ARM, EMPTY, HOLDING, OPEN, P, T, world
 from support.restored_states import assert_continues
 from support.wording import Wording
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from decision_world import EMPTY, END, HOLDING, RECEIVE, TO_HUMAN, P, T, World, first, tug, world
 from scipy.spatial.transform import Rotation
+from support.controllers.decision_world import EMPTY, END, HOLDING, RECEIVE, TO_HUMAN, P, T, World, first, tug, world
 from support.restored_states import assert_continues, assert_outputs_change_nothing
 from support.wording import Wording
 

@@ -7,8 +7,8 @@ from typing import Any
 import control as untyped_control
 import numpy as np
 import pytest
-from pushed_body import INERTIA, MASS, T, cross_matrix, pushed, rotation_vector
 from scipy.spatial.transform import Rotation
+from support.controllers.pushed_body import INERTIA, MASS, T, cross_matrix, pushed, rotation_vector
 from support.restored_states import assert_outputs_change_nothing
 from support.wording import Wording
 

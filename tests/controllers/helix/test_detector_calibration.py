@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from vision_scenes import anywhere
+from support.controllers.vision_scenes import anywhere
 
 from handover.controllers.helix.vision.ball_edges import edges, outline_of
 from handover.controllers.helix.vision.detector_calibration import Shift, TooFewPictures, calibrate_detector

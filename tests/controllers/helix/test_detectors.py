@@ -4,7 +4,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from vision_scenes import AWAY, anywhere, distances, hanging, look, rising, scene
+from support.controllers.vision_scenes import AWAY, anywhere, distances, hanging, look, rising, scene
 
 from handover.controllers.helix.vision.handover_vision import Detector, HandoverVision, Inputs, Outputs, Params
 from handover.controllers.helix.vision.published_detector import green_middle

@@ -2,7 +2,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from vision_scenes import AWAY, PLACES, anywhere, distances, hanging, look, over_ball, reaching
+from support.controllers.vision_scenes import AWAY, PLACES, anywhere, distances, hanging, look, over_ball, reaching
 
 from handover.controllers.helix.vision.handover_vision import Detector, HandoverVision, Inputs, Outputs, Params
 from handover.controllers.helix.vision.vision_parameters import InvalidVisionParameters

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sagging_arm import W_FROM_B, SaggingArm, ball_at
+from support.controllers.sagging_arm import W_FROM_B, SaggingArm, ball_at
 
 from handover.controllers.helix.servo import estimation
 from handover.controllers.helix.servo.constant_curvature import forward_kinematics

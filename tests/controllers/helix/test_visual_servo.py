@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sagging_arm import Q_CALIB, W_FROM_B, SaggingArm, ball_at
+from support.controllers.sagging_arm import Q_CALIB, W_FROM_B, SaggingArm, ball_at
 
 from handover.controllers.helix.servo.constant_curvature import forward_kinematics, tendon_lengths
 from handover.controllers.helix.servo.visual_servo import Inputs, Outputs, Params, Phase, VisualServo

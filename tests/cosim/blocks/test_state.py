@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis.extra import numpy as arrays
-from planted import CodeThatRuns, planted_pickle
+from support.cosim.planted import CodeThatRuns, planted_pickle
 
 from handover.cosim.blocks.block import InvalidState
 from handover.cosim.blocks.start_values import fault_of, numbers_of, range_of

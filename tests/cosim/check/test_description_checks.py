@@ -4,11 +4,11 @@ import re
 import zipfile
 from pathlib import Path
 
-import decay
 import pytest
-from fmu_of import FmuOf
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.cosim import decay
+from support.cosim.fmu_of import FmuOf
 from support.rewritten_archive import DESCRIPTION, rewritten
 from support.wording import Wording
 

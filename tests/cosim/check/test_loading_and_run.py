@@ -4,9 +4,9 @@ import os
 import subprocess
 from pathlib import Path
 
-import decay
 import fmpy
 import pytest
+from support.cosim import decay
 from support.forked_probes import ForkedProbes
 
 from handover.cosim.check.check_fmu import check_fmu

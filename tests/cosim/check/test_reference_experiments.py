@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from experiment_files import INPUTS, RESULT, SETUP, STIMULUS, manifest, outputs, packed
+from support.cosim.experiment_files import INPUTS, RESULT, SETUP, STIMULUS, manifest, outputs, packed
 from support.wording import Wording
 
 from handover.cosim.check.check_fmu import check_fmu

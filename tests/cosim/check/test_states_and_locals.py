@@ -5,8 +5,8 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from fmu_of import FmuOf
-from native_units import Edited, native_fmu
+from support.cosim.fmu_of import FmuOf
+from support.cosim.native_units import Edited, native_fmu
 from support.rewritten_archive import described_otherwise
 
 from handover.cosim.check.check_fmu import check_fmu

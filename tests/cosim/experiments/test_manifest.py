@@ -4,7 +4,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from experiment_files import INPUTS, SETUP, STIMULUS, manifest, packed
+from support.cosim.experiment_files import INPUTS, SETUP, STIMULUS, manifest, packed
 
 from handover.cosim.experiments.experiment_run import communication_points
 from handover.cosim.experiments.manifest import FOLDER, MANIFEST, related_files

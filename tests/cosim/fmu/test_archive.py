@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.file.archive import FmuArchive, archive_faults, write_archive

@@ -3,9 +3,9 @@
 from fractions import Fraction
 from pathlib import Path
 
-import decay
 import pytest
-from native_units import Edited, native_fmu
+from support.cosim import decay
+from support.cosim.native_units import Edited, native_fmu
 
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.fmu.file.description import FmuDescription, describe_fmu

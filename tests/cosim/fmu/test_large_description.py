@@ -3,7 +3,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.exceptions import InvalidFmu
 from handover.cosim.fmu.file import large_description

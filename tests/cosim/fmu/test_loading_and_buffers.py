@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-from native_units import native_fmu
 from numpy.typing import NDArray
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.fmu.buffers import joined
 from handover.cosim.fmu.file.description import FmuDescription, describe_fmu

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from terminal_units import described_unit, terminal_xml
+from support.cosim.terminal_units import described_unit, terminal_xml
 
 from handover.cosim.blocks.terminals import MatchingRule
 from handover.cosim.check.check_fmu import check_fmu

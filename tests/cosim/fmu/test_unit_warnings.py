@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from faulty_units import faulty_fmu
+from support.faults.faulty_units import faulty_fmu
 
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.unit_warnings import WarningData

@@ -6,9 +6,9 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
-import decay
 import pytest
-from native_units import Edited, native_fmu
+from support.cosim import decay
+from support.cosim.native_units import Edited, native_fmu
 
 from handover.cosim.check.check_fmu import check_fmu
 from handover.cosim.exceptions import InvalidFmu

@@ -9,9 +9,9 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from both_paths import PLAIN
-from fmu_of import FmuOf
-from native_units import native_fmu
+from support.cosim.both_paths import PLAIN
+from support.cosim.fmu_of import FmuOf
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.exceptions import InvalidFmu, UnitFailure
 from handover.cosim.fmu.failures import UnitError

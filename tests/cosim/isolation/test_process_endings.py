@@ -10,9 +10,9 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from call_log import CallLog, fed_by
-from faulty_units import faulty_fmu
-from native_units import native_fmu
+from support.cosim.call_log import CallLog, fed_by
+from support.cosim.native_units import native_fmu
+from support.faults.faulty_units import faulty_fmu
 
 from handover.cosim.exceptions import InitializationError, UnitFailure
 from handover.cosim.fmu.failures import UnitCrashed, UnitFatal, UnitHung
@@ -144,7 +144,7 @@ import time
 from fractions import Fraction
 from pathlib import Path
 sys.path.insert(0, {tests!r})
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions
 from handover.cosim.system.system import System
@@ -159,7 +159,7 @@ with Master(s, MasterOptions(isolated=("all",))) as master:
 
 
 def test_no_process_is_left_when_the_master_is_killed():
-    tests = str(Path(__file__).parents[1])
+    tests = str(Path(__file__).parents[2])
     with subprocess.Popen([sys.executable, "-c", _RUN.format(tests=tests)], stdout=subprocess.PIPE) as run:
         assert run.stdout is not None
         hosts = [int(pid) for pid in run.stdout.readline().split()]

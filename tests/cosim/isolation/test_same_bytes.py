@@ -5,14 +5,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import checkpointed_runs
-import decay
 import numpy as np
 import pytest
-from both_paths import Build, everything
-from event_systems import bouncing, counting
-from fmu_of import FmuOf
-from native_units import native_fmu
+from support.cosim import checkpointed_runs, decay
+from support.cosim.both_paths import Build, everything
+from support.cosim.event_systems import bouncing, counting
+from support.cosim.fmu_of import FmuOf
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.master.checkpoint import take_checkpoint

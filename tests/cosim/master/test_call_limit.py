@@ -6,9 +6,9 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from call_log import CallLog, fed_by
-from endless_blocks import GO_ON
-from native_units import native_fmu
+from support.cosim.call_log import CallLog, fed_by
+from support.cosim.endless_blocks import GO_ON
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.fmu.failures import UnitHung
 from handover.cosim.master.master import Master
@@ -40,7 +40,7 @@ def endless(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
 
 
 def block(name: str, folder: Path) -> Path:
-    return build_block(f"endless_blocks:{name}", 3, folder, step=Fraction(1, 10))
+    return build_block(f"support.cosim.endless_blocks:{name}", 3, folder, step=Fraction(1, 10))
 
 
 @pytest.mark.parametrize("compiled", [False, True], ids=["general", "compiled"])

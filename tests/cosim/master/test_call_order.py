@@ -5,8 +5,8 @@ from fractions import Fraction
 from itertools import pairwise
 
 import pytest
-from call_log import CallLog
-from checkpointed_runs import oscillator
+from support.cosim.call_log import CallLog
+from support.cosim.checkpointed_runs import oscillator
 
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions

@@ -3,7 +3,6 @@ import json
 import os
 import struct
 import subprocess
-import sys
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,15 +10,16 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import checkpointed_runs
 import numpy as np
 import pytest
-from checkpointed_runs import checkpoint_of, record_of, resume, run
-from event_systems import BOUNCING, COUNTING, bouncing, counting
-from fmu_of import FmuOf
 from hypothesis import given
 from hypothesis import strategies as st
-from native_units import native_fmu
+from support.cosim import checkpointed_runs
+from support.cosim.checkpointed_runs import checkpoint_of, record_of, resume, run
+from support.cosim.event_systems import BOUNCING, COUNTING, bouncing, counting
+from support.cosim.fmu_of import FmuOf
+from support.cosim.native_units import native_fmu
+from support.processes import program, with_path
 
 from handover.cosim.exceptions import CosimError
 from handover.cosim.master.checkpoint import (
@@ -45,8 +45,10 @@ def test_a_run_that_was_killed_goes_on_to_the_same_bytes(tmp_path: Path):
     whole.mkdir()
     killed.mkdir()
     run(whole)
-    command = [sys.executable, checkpointed_runs.__file__ or "", str(killed)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+    command = program("cosim/checkpointed_runs.py", killed)
+    with subprocess.Popen(
+        command, env=with_path(), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "passed\n"
         process.kill()

@@ -7,7 +7,7 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
-from observed_rows import observed_rows
+from support.cosim.observed_rows import observed_rows
 from support.rewritten_archive import described_otherwise, rewritten
 
 from handover.cosim.exceptions import InitializationError, InvalidFmu, InvalidOptions, UnitFailure, WiringError

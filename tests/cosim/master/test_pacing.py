@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.exceptions import InvalidOptions
 from handover.cosim.master.live_control import ControlledPacer, LiveControl

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from native_units import Edited, native_fmu
+from support.cosim.native_units import Edited, native_fmu
 
 from handover.cosim.exceptions import InvalidOptions, UnitFailure, WiringError
 from handover.cosim.master.master import Master

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from call_log import CallLog, fed_by
-from native_units import native_fmu
+from support.cosim.call_log import CallLog, fed_by
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.exceptions import InitializationError, UnitFailure
 from handover.cosim.fmu.failures import (

@@ -2,7 +2,7 @@
 
 import pytest
 from fmpy.validation import validate_fmu
-from native_units import declarations, native_fmu
+from support.cosim.native_units import declarations, native_fmu
 
 HARM_HERE = ("_in_load", "_in_unload", "_in_instantiate", "_in_free")
 """Ends of the names of units that would harm this process, as the validation loads and instantiates them."""

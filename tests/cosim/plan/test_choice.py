@@ -7,7 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.master.master import Master
 from handover.cosim.native_libraries import TARGETS, CompilationError, NativeLibraries, host_platform, zig_cc

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from both_paths import PLAIN, expect_alike, recorded
-from fmu_of import FmuOf
-from native_units import native_fmu
+from support.cosim.both_paths import PLAIN, expect_alike, recorded
+from support.cosim.fmu_of import FmuOf
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.exceptions import RecordNotWritten, UnitFailure
 from handover.cosim.fmu.failures import NotFinite, UnitDiscarded, UnitError, UnitFatal

@@ -4,9 +4,9 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from both_paths import PLAIN, expect_alike
-from fmu_of import FmuOf
-from native_units import native_fmu
+from support.cosim.both_paths import PLAIN, expect_alike
+from support.cosim.fmu_of import FmuOf
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.fmu.buffers import SignalBuffer
 from handover.cosim.master.master import Master

@@ -12,7 +12,7 @@ import scipy.io
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from signals_of import signals_of
+from support.cosim.signals_of import signals_of
 
 from handover.cosim.blocks.units import Unit
 from handover.cosim.blocks.variable import Kind

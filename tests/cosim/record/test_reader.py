@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from signals_of import signals_of
+from support.cosim.signals_of import signals_of
 
 from handover.cosim.record import reader
 from handover.cosim.record.columns import column_values

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from numpy.typing import NDArray
-from signals_of import signals_of
+from support.cosim.signals_of import signals_of
 
 from handover.cosim.exceptions import RecordNotWritten
 from handover.cosim.files import FileLocked
@@ -210,7 +210,7 @@ from pathlib import Path
 import numpy as np
 from handover.cosim.record.recorder import Recorder
 from handover.scenarios.results.system_facts import peak_memory
-from signals_of import signals_of
+from support.cosim.signals_of import signals_of
 
 def record(name, rows):
     x = np.zeros(100)
@@ -230,7 +230,7 @@ print(record("short.parquet", 40_000), record("long.parquet", 100_000))
 def test_a_record_of_ten_million_values_takes_no_more_memory_than_one_of_four(tmp_path: Path):
     pytest.importorskip("resource")
     done = subprocess.run(
-        [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(Path(__file__).parents[1])!r})\n{PROGRAM}"],
+        [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(Path(__file__).parents[2])!r})\n{PROGRAM}"],
         cwd=tmp_path,
         check=True,
         capture_output=True,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from ssp_of import component, described, pack_ssp, system
+from support.cosim.ssp_of import component, described, pack_ssp, system
 
 from handover.cosim.exceptions import InvalidFmu, InvalidSsp, named_by_archive
 from handover.cosim.ssp.ssp_file import SspFile

@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from pathlib import Path
 
-import decay
 import pytest
-from native_units import native_fmu
-from ssp_of import MM, component, connection, connectors, described, pack_ssp, system
+from support.cosim import decay
+from support.cosim.native_units import native_fmu
+from support.cosim.ssp_of import MM, component, connection, connectors, described, pack_ssp, system
 from support.wording import Wording
 
 from handover.cosim.exceptions import InvalidSsp

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmu_of import FmuOf
-from native_units import native_fmu
 from numpy.typing import NDArray
-from ssp_schemas import expect_valid
+from support.cosim.fmu_of import FmuOf
+from support.cosim.native_units import native_fmu
+from support.cosim.ssp_schemas import expect_valid
 
 from handover.cosim.fmu.file.archive import FmuArchive
 from handover.cosim.fmu.file.icon import Icon, read_icon

@@ -6,10 +6,10 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import decay
 import numpy as np
 import pytest
-from ssp_of import (
+from support.cosim import decay
+from support.cosim.ssp_of import (
     MM,
     MORE_PARAMETERS,
     NAMESPACES,
@@ -342,7 +342,7 @@ STEP = Fraction(1, 10)
 
 def test_entries_that_are_swapped_arrive_swapped(tmp_path: Path):
     fmus = {
-        f"resources/{name}.fmu": build_block(f"master_blocks:{name}", 3, tmp_path, step=STEP, scalar=True)
+        f"resources/{name}.fmu": build_block(f"support.cosim.master_blocks:{name}", 3, tmp_path, step=STEP, scalar=True)
         for name in ("Counter", "Echo")
     }
     gives, takes = ({f"pair[{k}]": kind for k in (1, 2)} for kind in ("output", "input"))

@@ -7,11 +7,11 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
-import decay
 import numpy as np
 import pytest
-from fmu_of import FmuOf
-from ssp_schemas import expect_valid
+from support.cosim import decay
+from support.cosim.fmu_of import FmuOf
+from support.cosim.ssp_schemas import expect_valid
 
 from handover.cosim.exceptions import NotExportable, WiringError
 from handover.cosim.master.master import Master
@@ -153,7 +153,7 @@ def test_transformations_and_conversions_are_written_out(tmp_path: Path):
 
 def test_what_cannot_be_exported_is_reported_and_nothing_is_written(fmu: FmuOf, tmp_path: Path):
     s = System()
-    scalar = build_block("master_blocks:Echo", 3, tmp_path, step=STEP, scalar=True)
+    scalar = build_block("support.cosim.master_blocks:Echo", 3, tmp_path, step=STEP, scalar=True)
     one, many = s.add("one", fmu("Counter")), s.add("many", scalar)
     s.connect(one.y.pair, many.u.pair)
     with pytest.raises(NotExportable, match=r"one.pair is one array variable and each entry of many.pair one"):

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from native_units import native_fmu
-from oscillator import PLAIN, STATES, STIFF
+from support.cosim.native_units import native_fmu
+from support.cosim.oscillator import PLAIN, STATES, STIFF
 
 from handover.cosim.exceptions import InvalidOptions, ScheduleError
 from handover.cosim.master.checkpoint import read_checkpoint, take_checkpoint, write_checkpoint

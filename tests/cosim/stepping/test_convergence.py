@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oscillator import PLAIN, STATES, Floats, equal_masses
+from support.cosim.oscillator import PLAIN, STATES, Floats, equal_masses
 
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, Extrapolation, MasterOptions

@@ -3,8 +3,8 @@
 from fractions import Fraction
 
 import pytest
-from native_units import native_fmu
-from observed_rows import grid, observed_rows
+from support.cosim.native_units import native_fmu
+from support.cosim.observed_rows import grid, observed_rows
 
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.failures import StepDiscarded

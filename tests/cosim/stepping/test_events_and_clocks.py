@@ -5,8 +5,8 @@ import math
 from fractions import Fraction
 
 import pytest
-from native_units import native_fmu
-from observed_rows import grid, observed_rows
+from support.cosim.native_units import native_fmu
+from support.cosim.observed_rows import grid, observed_rows
 
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.fmu.failures import UnsettledEvents

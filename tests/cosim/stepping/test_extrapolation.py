@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from native_units import native_fmu
-from observed_rows import observed_rows
-from oscillator import PLAIN, STATES
+from support.cosim.native_units import native_fmu
+from support.cosim.observed_rows import observed_rows
+from support.cosim.oscillator import PLAIN, STATES
 
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.extrapolation import SampleHistory

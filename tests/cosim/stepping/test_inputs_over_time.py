@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from native_units import native_fmu
-from ssp_schemas import expect_valid
+from support.cosim.native_units import native_fmu
+from support.cosim.ssp_schemas import expect_valid
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import NotExportable, WiringError

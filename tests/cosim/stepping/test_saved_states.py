@@ -6,8 +6,8 @@ from fractions import Fraction
 from typing import cast
 
 import pytest
-from call_log import CallLog
-from native_units import native_fmu
+from support.cosim.call_log import CallLog
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.exceptions import UnitFailure
 from handover.cosim.fmu.instance import Instance

@@ -5,8 +5,8 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from native_units import native_fmu
-from observed_rows import observed_rows
+from support.cosim.native_units import native_fmu
+from support.cosim.observed_rows import observed_rows
 
 from handover.cosim.master.checkpoint import take_checkpoint
 from handover.cosim.master.master import Master

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from native_units import Edited, native_fmu
 from numpy.typing import NDArray
-from signals_of import port_of
+from support.cosim.native_units import Edited, native_fmu
+from support.cosim.signals_of import port_of
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.fmu.event_instance import EventInstance

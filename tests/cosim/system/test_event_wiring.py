@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from native_units import Edited, native_fmu
+from support.cosim.native_units import Edited, native_fmu
 
 from handover.cosim.exceptions import InvalidFmu, NotExportable, ScheduleError, WiringError
 from handover.cosim.fmu.file.description import describe_fmu

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from terminal_units import described_unit
+from support.cosim.terminal_units import described_unit
 
 from handover.cosim.blocks.units import BaseExponents, Unit
 from handover.cosim.exceptions import WiringError

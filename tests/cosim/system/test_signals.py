@@ -5,8 +5,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from fmu_of import FmuOf
-from native_units import native_fmu
+from support.cosim.fmu_of import FmuOf
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.blocks.variable import Causality, Kind
 from handover.cosim.fmu.file.description import FmuPort

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from native_units import Edited, native_fmu
+from support.cosim.native_units import Edited, native_fmu
 
 from handover.cosim.blocks.start_values import numbers_of
 from handover.cosim.blocks.units import UNKNOWN, BaseExponents, Unit

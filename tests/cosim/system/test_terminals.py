@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from terminal_units import described_unit, terminal_xml
+from support.cosim.terminal_units import described_unit, terminal_xml
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.system.conversion import LinearTransformation

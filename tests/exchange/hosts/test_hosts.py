@@ -5,18 +5,18 @@ import json
 import os
 import re
 import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
-from cells import Cell, difference
-from host_runs import HOSTS, Form
-from libcosim_job import needs_libcosim
-from page import PAGE, Cells, Notes, is_sound, page, written
-from reference import Record
+from support.exchange.cells import Cell, difference
+from support.exchange.host_runs import HOSTS, Form
+from support.exchange.libcosim_job import needs_libcosim
+from support.exchange.page import PAGE, Cells, Notes, is_sound, page, written
+from support.exchange.reference import Record
+from support.processes import SUPPORT, program, with_path
 
 from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS
@@ -133,8 +133,8 @@ def _cells(folder: Path, unit: str, form: Form) -> dict[str, Cell]:
     done = _sound(file, unit, form)
     while len(done) < len(HOSTS):
         file.write_text(json.dumps({host: vars(cell) for host, cell in done.items()}))
-        environment = {**os.environ, "PYTHONPATH": str(HERE.parent), "OPENBLAS_NUM_THREADS": "1"}
-        command = [sys.executable, str(HERE / "cells.py"), unit, form.value, str(file)]
+        environment = with_path() | {"OPENBLAS_NUM_THREADS": "1"}
+        command = program("exchange/cells.py", unit, form.value, file)
         ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=LIMIT)
         found = json.loads(file.read_text())
         running = found.pop("running", "")
@@ -161,7 +161,7 @@ def _short(cell: Cell) -> str:
 def _sources() -> str:
     """Return a hash of the drivers: what another version of them found is not gone on with."""
     digest = hashlib.sha256()
-    for file in sorted(HERE.parent.rglob("*.[pc]*")):
-        if file.suffix in (".py", ".c") and not file.name.startswith(("test_", "page")):
+    for file in sorted((SUPPORT / "exchange").iterdir()):
+        if file.suffix in (".py", ".c") and file.name != "page.py":
             digest.update(file.read_bytes())
     return digest.hexdigest()[:16]

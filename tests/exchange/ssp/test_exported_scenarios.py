@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ecos_command import Ecos
-from libcosim_job import Job, known, needs_libcosim
-from own_master import Placed
+from support.exchange.ecos_command import Ecos
+from support.exchange.libcosim_job import Job, known, needs_libcosim
+from support.exchange.own_master import Placed
 
 from handover.cosim.master.master import Master
 from handover.cosim.ssp.ssp_file import SspFile

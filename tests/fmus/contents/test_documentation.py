@@ -14,7 +14,7 @@ HOUSE = Path(__file__).parents[3]
 
 
 def page_of(block: str, folder: Path, fmi: int, *, scalar: bool = False) -> str:
-    with zipfile.ZipFile(build_block(f"sample_units.{block}", fmi, folder, scalar=scalar)) as archive:
+    with zipfile.ZipFile(build_block(f"support.sample_units.{block}", fmi, folder, scalar=scalar)) as archive:
         return archive.read("documentation/index.html").decode()
 
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import fmpy
 import pytest
-from rendered_icons import ICONS, difference, drawings, pixels, rendered
+from support.fmus.rendered_icons import ICONS, difference, drawings, pixels, rendered
+from support.fmus.written_blocks import write_block
 from support.wording import Wording
-from written_blocks import write_block
 
 from handover.cosim.fmu.file.archive import TERMINALS
 from handover.fmus.build import build_block, cached

@@ -12,8 +12,8 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
-from sample_units import declarations
-from workshop import Workshop
+from support.fmus.workshop import Workshop
+from support.sample_units import declarations
 
 from handover.cosim.blocks.description import Description, describe
 from handover.cosim.blocks.ports import parameter

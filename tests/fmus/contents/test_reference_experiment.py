@@ -29,7 +29,7 @@ from handover.fmus.contents.related_files import CannotRecordExperiment
 
 STEP = Fraction(1, 10)
 CHAOTIC, CHAOTIC_SINGLE, RANDOM, EVERY_KIND = (
-    Entry(block.rpartition(":")[2], f"sample_units.{block}", STEP, "a sample")
+    Entry(block.rpartition(":")[2], f"support.sample_units.{block}", STEP, "a sample")
     for block in ("chaotic:Chaotic", "chaotic:ChaoticSingle", "chaotic:Random", "every_kind:EveryKind")
 )
 

@@ -35,7 +35,7 @@ FORMS = [(2, False), (3, False), (3, True)]
 
 
 def unit(block: str, step: Fraction = Fraction(1, 10)) -> Entry:
-    return Entry(block.rpartition(":")[2], f"sample_units.{block}", step, "a sample")
+    return Entry(block.rpartition(":")[2], f"support.sample_units.{block}", step, "a sample")
 
 
 EVERY_KIND, SAMPLED = unit("every_kind:EveryKind"), unit("sampled:Sampled", Fraction(1, 30))
@@ -81,7 +81,7 @@ def test_an_experiment_is_stored_with_its_result(tmp_path: Path):
     listed, findings = related_files(FmuArchive(fmu))
     assert findings == []
     assert [f.role for f in listed] == ["model", "document", "document", "parameter", "experiment", "result"]
-    assert listed[0].path == "resources/sources/sample_units/every_kind.py"
+    assert listed[0].path == "resources/sources/support/sample_units/every_kind.py"
     stimulus, result = (rows_of(files[f"{FOLDER}/smoke-test/{name}.csv"]) for name in ("stimulus", "result"))
     assert {"a", "v[3]", "M[2,1]", "k", "on", "mood_in", "word"} <= set(stimulus[0])
     assert (stimulus[0]["mood_in"], stimulus[0]["on"], stimulus[0]["word"]) == ("CALM", "true", "hello")

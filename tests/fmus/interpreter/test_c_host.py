@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from ctypes_host import CtypesHost
 from support.c_programs import compiled
-from workshop import Workshop
+from support.fmus.ctypes_host import CtypesHost
+from support.fmus.workshop import Workshop
 
 from handover.fmus import interpreter
 from handover.fmus.compile import RUNTIME
@@ -111,7 +111,7 @@ def test_a_python_without_shared_library_runs_in_a_process_of_its_own_with_a_war
 @pytest.mark.parametrize("place", EITHER_PLACE)
 def test_a_folder_and_a_module_in_any_script_serve_in_any_locale(unpacked: CtypesHost, tmp_path: Path, place: str):
     resources = shutil.copytree(unpacked.folder / "resources", tmp_path / "größe 100% #a" / "resources")
-    with (resources / "sources" / "sample_units" / "every_kind.py").open("a", encoding="utf-8") as file:
+    with (resources / "sources" / "support" / "sample_units" / "every_kind.py").open("a", encoding="utf-8") as file:
         file.write("\nω = 3\n\nclass Ünit:\n    größe = ω\n")
     bare = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "FMU_PYTHON_PROCESS": place}
     expect_values(run_in("host.c", unpacked, resources, bare))

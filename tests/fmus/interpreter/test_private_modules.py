@@ -10,9 +10,9 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
-from ctypes_host import OK, CtypesHost
-from workshop import Workshop
-from written_blocks import write_block
+from support.fmus.ctypes_host import OK, CtypesHost
+from support.fmus.workshop import Workshop
+from support.fmus.written_blocks import write_block
 
 from handover.fmus import loader
 from handover.fmus.build import build_block
@@ -124,7 +124,7 @@ def test_a_unit_whose_import_fails_is_a_logged_error(workshop: Workshop):
     host = workshop.own("scalars:Scalars", 3)
     unit = host.folder / "resources" / "unit.json"
     unit.write_text(unit.read_text().replace("_fmu_", "_fmu_broken_"))
-    (host.folder / "resources" / "sources" / "sample_units" / "scalars.py").write_text(
+    (host.folder / "resources" / "sources" / "support" / "sample_units" / "scalars.py").write_text(
         "import handover.cosim.nothing\n"
     )
     assert not host.instantiate()
@@ -140,7 +140,7 @@ def test_the_prefix_of_a_units_modules_is_reported_nowhere(workshop: Workshop):
     assert host.initialise() == OK
     host.set("a", [666.0])
     assert host.step(0.0, 1 / 64) != OK
-    assert "\nsample_units.every_kind.Misfortune: the number of the beast" in host.log[-1]
+    assert "\nsupport.sample_units.every_kind.Misfortune: the number of the beast" in host.log[-1]
     assert "_fmu_" not in host.log[-1]
 
 

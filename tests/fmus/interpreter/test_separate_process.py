@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from binary_values import SIZE_OF_PICTURE, put, take
-from ctypes_host import DOUBLE, ERROR, OK, SIZE, CtypesHost
-from sample_units.trouble import Deed
-from saved_states import called, deserialise, save, serialised
-from workshop import Workshop
+from support.fmus.binary_values import SIZE_OF_PICTURE, put, take
+from support.fmus.ctypes_host import DOUBLE, ERROR, OK, SIZE, CtypesHost
+from support.fmus.saved_states import called, deserialise, save, serialised
+from support.fmus.workshop import Workshop
+from support.sample_units.trouble import Deed
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="looks after processes as POSIX has them")
 
@@ -270,7 +270,7 @@ HOST = """
 import os, signal, sys
 sys.path[:0] = {path!r}
 from pathlib import Path
-from ctypes_host import CtypesHost
+from support.fmus.ctypes_host import CtypesHost
 from test_separate_process import Deed, asked_for
 host = CtypesHost(Path({fmu!r}), 3)
 assert host.instantiate() and host.initialise() == 0 and host.step(0.0, 1 / 64) == 0
@@ -285,7 +285,8 @@ signal.pause()
 
 @pytest.mark.parametrize("hangs", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_the_process_ends_with_the_host(workshop: Workshop, hangs: bool):
-    script = HOST.format(path=sys.path, fmu=str(workshop.fmu(TROUBLE, 3)), hangs=hangs)
+    path = [str(Path(__file__).parent), *sys.path]
+    script = HOST.format(path=path, fmu=str(workshop.fmu(TROUBLE, 3)), hangs=hangs)
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as host:
         assert host.stdout
         assert host.stdout.readline() == "ready\n"

@@ -5,8 +5,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from foreign import functions
-from libraries import Facts, facts, is_signed, slices
+from support.fmus.foreign import functions
+from support.fmus.libraries import Facts, facts, is_signed, slices
 
 import handover.fmus.compile
 from handover.fmus.binaries import binaries

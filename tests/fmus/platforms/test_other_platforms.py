@@ -8,11 +8,11 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from foreign import compile_program, compiled_host, expect_clear_answers, unpack
+from support.fmus.foreign import compile_program, compiled_host, expect_clear_answers, unpack
 
 from handover.fmus.catalog import Entry
 
-ENTRY = Entry("Scalars", "sample_units.scalars:Scalars", Fraction(1, 100), "for a test")
+ENTRY = Entry("Scalars", "support.sample_units.scalars:Scalars", Fraction(1, 100), "for a test")
 QEMU = shutil.which("qemu-aarch64")
 AARCH64_LIBRARIES = Path("/usr/aarch64-linux-gnu")
 

@@ -7,8 +7,8 @@ from email.message import Message
 from pathlib import Path
 
 import pytest
-from libraries import facts
-from wheels import ROOT, build_wheel, copy_sources
+from support.fmus.libraries import facts
+from support.fmus.wheels import ROOT, build_wheel, copy_sources
 
 from handover.cosim.native_libraries import TARGETS
 

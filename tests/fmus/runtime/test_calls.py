@@ -5,9 +5,9 @@ import math
 from collections.abc import Callable
 
 import pytest
-from ctypes_host import DISCARD, DOUBLE, ERROR, OK, SIZE, CtypesHost
+from support.fmus.ctypes_host import DISCARD, DOUBLE, ERROR, OK, SIZE, CtypesHost
+from support.fmus.workshop import Workshop
 from support.wording import Wording
-from workshop import Workshop
 
 BLOCK = "every_kind:EveryKind"
 

@@ -5,15 +5,16 @@ import dataclasses
 import xml.etree.ElementTree as ET
 from fractions import Fraction
 
-import drive
 import fmpy
 import numpy as np
 import pytest
-from ctypes_host import BOOL, DOUBLE, ERROR, OK, SIZE, CtypesHost
-from saved_states import deserialise, save, serialised
+from support.exchange import drive
+from support.fmus.ctypes_host import BOOL, DOUBLE, ERROR, OK, SIZE, CtypesHost
+from support.fmus.saved_states import deserialise, save, serialised
+from support.fmus.unit_calls import SAMPLED, P, tick
+from support.fmus.validity import problems_of
+from support.fmus.workshop import Workshop
 from support.wording import Wording
-from validity import problems_of
-from workshop import Workshop
 
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.variable import Kind
@@ -21,21 +22,12 @@ from handover.fmus.build import cached
 from handover.fmus.catalog import UNITS, import_class
 from handover.fmus.layout import DuplicateName, Layout
 
-SAMPLED = "sampled:Sampled"
-P = 1 / 30
-
 
 def started(workshop: Workshop, block: str = SAMPLED, *, early_return: bool = False) -> CtypesHost:
     """Return a host in the event mode that follows initialisation."""
     host = workshop.host(block, 3, event_mode=True, early_return=early_return)
     assert host.initialise() == OK
     return host
-
-
-def tick(host: CtypesHost) -> None:
-    assert host.set_clock() == OK, host.log[-1]
-    assert host.update() == OK, host.log[-1]
-    assert host.call("EnterStepMode") == OK
 
 
 def clock(host: CtypesHost) -> "ctypes.Array[ctypes.c_uint32]":
@@ -329,7 +321,7 @@ def test_a_failure_in_a_tick_is_a_failure_of_the_instance(workshop: Workshop, wo
 
 
 def test_no_port_of_a_sampled_block_has_the_clocks_name():
-    d = describe(import_class("sample_units.sampled:Sampled"))
+    d = describe(import_class("support.sample_units.sampled:Sampled"))
     inputs = (dataclasses.replace(d.inputs[0], name="sample_clock"),)
     with pytest.raises(DuplicateName, match="more than one variable is named sample_clock"):
         Layout(dataclasses.replace(d, inputs=inputs))

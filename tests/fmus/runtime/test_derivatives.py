@@ -1,41 +1,18 @@
 """Partial derivatives of a unit that has them, against differences of its outputs through the same interface."""
 
-import ctypes
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from ctypes_host import DOUBLE, ERROR, OK, SIZE, CtypesHost
 from numpy.typing import NDArray
+from support.fmus.ctypes_host import DOUBLE, ERROR, OK, SIZE, CtypesHost
+from support.fmus.unit_calls import INPUTS, OUTPUTS, TANGENT, derivative, references
+from support.fmus.workshop import Workshop
 from support.wording import Wording
-from workshop import Workshop
 
-TANGENT = "tangent:Tangent"
-INPUTS, OUTPUTS = {"a": 1, "r": 3, "s": 3}, {"y": 1, "p": 3}
 EPSILON = 1e-6
 
 both = pytest.mark.parametrize("fmi", [2, 3])
-
-
-def references(host: CtypesHost, sizes: dict[str, int]) -> "ctypes.Array[ctypes.c_uint32]":
-    found = [host.references[n] + i for n, size in sizes.items() for i in range(size if host.fmi == 2 else 1)]
-    return (ctypes.c_uint32 * len(found))(*found)
-
-
-def derivative(
-    host: CtypesHost,
-    seed: Sequence[float],
-    function: str = "GetDirectionalDerivative",
-    knowns: dict[str, int] = INPUTS,
-    unknowns: dict[str, int] = OUTPUTS,
-) -> tuple[int, list[float]]:
-    k, u = references(host, knowns), references(host, unknowns)
-    result = (DOUBLE * sum((knowns if "Adjoint" in function else unknowns).values()))()
-    values = (DOUBLE * len(seed))(*seed)
-    sizes = (SIZE(len(seed)), SIZE(len(result)))
-    vectors = (values, result) if host.fmi == 2 else (values, sizes[0], result, sizes[1])
-    return host.call(function, u, SIZE(len(u)), k, SIZE(len(k)), *vectors), list(result)
 
 
 def outputs(host: CtypesHost) -> NDArray[np.float64]:

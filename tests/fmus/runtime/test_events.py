@@ -1,28 +1,26 @@
 """A unit with events of its own, in hosts with and without event mode and early return."""
 
 import math
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 import fmpy
 import numpy as np
 import pytest
-from ctypes_host import ERROR, OK, CtypesHost
-from sample_units.bouncing_ball import BouncingBall, Inputs, Outputs, Params
-from sample_units.scalars import Scalars
-from saved_states import deserialise, save, serialised
+from support.fmus.ctypes_host import ERROR, OK
+from support.fmus.saved_states import deserialise, save, serialised
+from support.fmus.unit_calls import BALL, DT, drive, handle
+from support.fmus.validity import problems_of
+from support.fmus.workshop import Workshop
+from support.sample_units.bouncing_ball import BouncingBall, Inputs, Outputs, Params
+from support.sample_units.scalars import Scalars
 from support.wording import Wording
-from validity import problems_of
-from workshop import Workshop
 
 from handover.cosim.blocks.block import InvalidAdvance, TooManyEvents, step_through_events
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.description import describe
 
-BALL = "bouncing_ball:BouncingBall"
 G, E, HEIGHT, RELEASE = 9.81, 0.7, 1.0, 0.25
-DT = 0.02
 IMPACTS = math.ceil(math.log(0.05 / math.sqrt(2 * G * HEIGHT), E))
 """Of the last one, the rebound is slower than 0.05 m/s and the ball stays."""
 
@@ -34,43 +32,6 @@ def impact_times(n: int) -> list[float]:
     for k in range(1, n):
         times.append(times[-1] + 2 * E**k * fall)
     return times
-
-
-@dataclass
-class Seen:
-    """States at a host's regular points, and the times of events."""
-
-    states: list[list[float]]
-    events: list[float]
-
-
-def drive(host: CtypesHost, steps: int) -> Seen:
-    """Do what a host with event mode does: steps up to regular points, known events and early returns."""
-    seen = Seen([], [])
-    assert host.initialise() == OK
-    following = handle(host)
-    t, k = 0.0, 0
-    for _ in range(2 * steps):
-        if k == steps:
-            return seen
-        regular = (k + 1) * DT
-        to = regular if following is None or following >= regular else following
-        assert host.step(t, to - t) == OK, host.log[-1]
-        t = host.last_time if host.early else to
-        if host.event_needed or t == following:
-            seen.events.append(t)
-            assert host.call("EnterEventMode") == OK
-            following = handle(host)
-        if t == regular:
-            seen.states.append(host.get("h") + host.get("v"))
-            k += 1
-    raise AssertionError(f"at t = {t} s there is no progress any more")
-
-
-def handle(host: CtypesHost) -> float | None:
-    assert host.update() == OK, host.log[-1]
-    assert host.call("EnterStepMode") == OK
-    return host.next_event
 
 
 def without_events(workshop: Workshop, steps: int) -> list[list[float]]:

@@ -4,7 +4,7 @@ import math
 from fractions import Fraction
 
 import pytest
-from workshop import Workshop
+from support.fmus.workshop import Workshop
 
 from handover.cosim.master.master import Master
 from handover.cosim.stepping.options import Algorithm, MasterOptions

@@ -4,9 +4,9 @@ import ctypes
 import json
 
 import pytest
-from ctypes_host import ERROR, OK, SIZE, CtypesHost
-from sample_units.trouble import Deed
-from workshop import Workshop
+from support.fmus.ctypes_host import ERROR, OK, SIZE, CtypesHost
+from support.fmus.workshop import Workshop
+from support.sample_units.trouble import Deed
 
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.master.master import Master

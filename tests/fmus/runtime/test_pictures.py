@@ -1,10 +1,10 @@
 import ctypes
 
 import numpy as np
-from binary_values import SIZE_OF_PICTURE, put, take
-from ctypes_host import ERROR, OK
+from support.fmus.binary_values import SIZE_OF_PICTURE, put, take
+from support.fmus.ctypes_host import ERROR, OK
+from support.fmus.workshop import Workshop
 from support.wording import Wording
-from workshop import Workshop
 
 
 def test_a_picture_goes_in_and_out_and_is_read_where_it_lies(workshop: Workshop):

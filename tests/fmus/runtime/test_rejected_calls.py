@@ -3,10 +3,10 @@
 import ctypes
 
 import pytest
-from ctypes_host import BOOL, ERROR, OK, SIZE, CtypesHost
-from saved_states import save, serialised
+from support.fmus.ctypes_host import BOOL, ERROR, OK, SIZE, CtypesHost
+from support.fmus.saved_states import save, serialised
+from support.fmus.workshop import Workshop
 from support.wording import Wording
-from workshop import Workshop
 
 DT = 1 / 64
 

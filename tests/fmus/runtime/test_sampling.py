@@ -5,10 +5,10 @@ import math
 from fractions import Fraction
 
 import pytest
-from ctypes_host import ERROR, OK, CtypesHost
-from saved_states import deserialise, save, serialised
+from support.fmus.ctypes_host import ERROR, OK, CtypesHost
+from support.fmus.saved_states import deserialise, save, serialised
+from support.fmus.workshop import Workshop
 from support.wording import Wording
-from workshop import Workshop
 
 SAMPLED = "sampled:Sampled"
 P = 1 / 30

@@ -5,14 +5,24 @@ import os
 from collections.abc import Callable
 
 import pytest
-from ctypes_host import DOUBLE, OK, SIZE, CtypesHost
-from saved_states import deserialise, save, serialised
-from test_clock import SAMPLED, P, tick
-from test_derivatives import TANGENT, derivative
-from test_events import BALL, drive
-from test_widths import BLOCK as EVERY_WIDTH
-from test_widths import C_TYPES, extremes, get, port_of, transfer
-from workshop import Workshop
+from support.fmus.ctypes_host import DOUBLE, OK, SIZE, CtypesHost
+from support.fmus.saved_states import deserialise, save, serialised
+from support.fmus.unit_calls import (
+    BALL,
+    C_TYPES,
+    EVERY_WIDTH,
+    SAMPLED,
+    TANGENT,
+    P,
+    derivative,
+    drive,
+    extremes,
+    get,
+    port_of,
+    tick,
+    transfer,
+)
+from support.fmus.workshop import Workshop
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="sets the environment with setenv alone")
 

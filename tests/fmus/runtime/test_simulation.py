@@ -7,9 +7,9 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
-from sample_units.every_kind import EveryKind, Inputs, Mood, Outputs, Params
-from validity import problems_of
-from workshop import Workshop
+from support.fmus.validity import problems_of
+from support.fmus.workshop import Workshop
+from support.sample_units.every_kind import EveryKind, Inputs, Mood, Outputs, Params
 
 from handover.fmus.contents.fmi2_description import NoFmi2Form
 

@@ -2,10 +2,10 @@ import ctypes
 import struct
 
 import pytest
-from ctypes_host import ERROR, OK, CtypesHost
-from saved_states import called, deserialise, digest, save, serialised
+from support.fmus.ctypes_host import ERROR, OK, CtypesHost
+from support.fmus.saved_states import called, deserialise, digest, save, serialised
+from support.fmus.workshop import Workshop
 from support.wording import Wording
-from workshop import Workshop
 
 DT = 1 / 64
 

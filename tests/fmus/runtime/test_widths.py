@@ -6,42 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ctypes_host import ERROR, OK, SIZE, CtypesHost
+from support.fmus.ctypes_host import ERROR, OK, SIZE, CtypesHost
+from support.fmus.unit_calls import C_TYPES, EVERY_WIDTH, extremes, get, port_of, transfer
+from support.fmus.workshop import Workshop
 from support.wording import Wording
-from workshop import Workshop
 
 from handover.fmus.contents.fmi2_description import NoFmi2Form
-
-BLOCK = "every_width:EveryWidth"
-
-C_TYPES: dict[str, Any] = {
-    f"{sign}Int{bits}": getattr(ctypes, f"c_{sign.lower()}int{bits}") for bits in (8, 16, 32, 64) for sign in ("", "U")
-}
-
-
-def port_of(width: str) -> str:
-    return width.lower().replace("uint", "u").replace("int", "i")
-
-
-def transfer(host: CtypesHost, verb: str, width: str, name: str, values: Any) -> int:
-    reference = ctypes.byref(ctypes.c_uint32(host.references[name]))
-    return host.call(f"{verb}{width}", reference, SIZE(1), values, SIZE(len(values)))
-
-
-def get(host: CtypesHost, width: str, name: str) -> int:
-    values = (C_TYPES[width] * 1)()
-    assert transfer(host, "Get", width, name, values) == OK, host.log[-1]
-    return values[0]
-
-
-def extremes(width: str) -> tuple[int, int]:
-    limits = np.iinfo(width.lower())
-    return int(limits.min), int(limits.max)
 
 
 @pytest.mark.parametrize("width", C_TYPES)
 def test_an_integer_of_every_width_passes_with_its_extremes(workshop: Workshop, width: str):
-    host = workshop.host(BLOCK, 3)
+    host = workshop.host(EVERY_WIDTH, 3)
     assert host.initialise() == OK
     for k, value in enumerate(extremes(width)):
         assert transfer(host, "Set", width, port_of(width), (C_TYPES[width] * 1)(value)) == OK
@@ -50,7 +25,7 @@ def test_an_integer_of_every_width_passes_with_its_extremes(workshop: Workshop, 
 
 
 def test_a_single_is_widened_on_its_way_in_and_rounded_on_its_way_out(workshop: Workshop):
-    host = workshop.host(BLOCK, 3)
+    host = workshop.host(EVERY_WIDTH, 3)
     stretch, x = np.float32(0.7), np.float32(0.3)
     assert transfer(host, "Set", "Float32", "stretch", (ctypes.c_float * 1)(stretch)) == OK
     assert transfer(host, "Set", "Float32", "x", (ctypes.c_float * 1)(x)) == OK
@@ -74,7 +49,7 @@ def set_real(host: CtypesHost, name: str, *values: float) -> int:
 def test_a_step_whose_output_no_single_holds_is_an_error(
     workshop: Workshop, fmi: int, name: str, values: tuple[float, ...], wording: Wording
 ):
-    host = workshop.host(BLOCK, fmi)
+    host = workshop.host(EVERY_WIDTH, fmi)
     assert set_real(host, "stretch", 5e37) == OK
     assert host.initialise() == OK
     assert host.step(0.0, 0.5) == OK
@@ -92,7 +67,7 @@ def test_a_step_whose_output_no_single_holds_is_an_error(
 def test_a_call_of_another_type_is_reported_the_variables_own(
     workshop: Workshop, width: str, name: str, wording: Wording
 ):
-    host = workshop.host(BLOCK, 3)
+    host = workshop.host(EVERY_WIDTH, 3)
     host.initialise()
     for verb in ("Get", "Set"):
         assert transfer(host, verb, width, name, (ctypes.c_double * 1)()) == ERROR
@@ -101,7 +76,7 @@ def test_a_call_of_another_type_is_reported_the_variables_own(
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_an_output_outside_its_width_is_an_error_that_says_the_range(workshop: Workshop, fmi: int, wording: Wording):
-    host = workshop.host(BLOCK, fmi)
+    host = workshop.host(EVERY_WIDTH, fmi)
     width = "Integer" if fmi == 2 else "Int16"
     shift = (ctypes.c_int * 1)(-1) if fmi == 2 else (ctypes.c_int16 * 1)(-1)
     assert set_integer(host, width, "shift", shift) == OK
@@ -125,7 +100,7 @@ def set_integer(host: CtypesHost, function: str, name: str, values: Any) -> int:
     ("name", "value"), [("i8", 128), ("u8", -1), ("i16", -40000), ("u16", 65536), ("u32", -1), ("u64", -1)]
 )
 def test_fmi_2_refuses_what_is_outside_an_inputs_width(workshop: Workshop, name: str, value: int, wording: Wording):
-    host = workshop.host(BLOCK, 2)
+    host = workshop.host(EVERY_WIDTH, 2)
     assert host.initialise() == OK
     before = get_integer(host, name)
     assert set_integer(host, "Integer", name, (ctypes.c_int * 1)(value)) == ERROR
@@ -134,7 +109,7 @@ def test_fmi_2_refuses_what_is_outside_an_inputs_width(workshop: Workshop, name:
 
 
 def test_fmi_2_takes_every_integer_that_fits_and_reals_with_all_their_digits(workshop: Workshop):
-    host = workshop.host(BLOCK, 2)
+    host = workshop.host(EVERY_WIDTH, 2)
     assert host.set("x", [0.3]) == OK
     assert host.set("v", [0.1, 0.2, math.pi]) == OK
     values = {"i8": -128, "u8": 255, "i16": 2**15 - 1, "u16": 2**16 - 1, "i32": -(2**31), "u32": 2**31 - 1, "u64": 5}

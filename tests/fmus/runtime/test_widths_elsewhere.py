@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from fmpy.validation import validate_fmu
-from workshop import Workshop
+from support.fmus.workshop import Workshop
 
 from handover.cosim.exceptions import InitializationError, WiringError
 from handover.cosim.master.master import Master

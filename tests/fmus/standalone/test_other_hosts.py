@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from bare_folder import BareFolder, can_be_entered
-from ecos_command import Ecos
-from libcosim_job import needs_libcosim
 from support.c_programs import compiled
+from support.exchange.ecos_command import Ecos
+from support.exchange.libcosim_job import needs_libcosim
+from support.fmus.bare_folder import BareFolder, can_be_entered
 
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus import interpreter

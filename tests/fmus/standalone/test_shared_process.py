@@ -10,8 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from ctypes_host import ERROR, OK, SIZE, CtypesHost
-from sample_units.trouble import Deed
+from support.fmus.ctypes_host import ERROR, OK, SIZE, CtypesHost
+from support.processes import program, with_path
+from support.sample_units.trouble import Deed
 
 from handover.fmus.build import build, build_block
 from handover.fmus.catalog import own_unit
@@ -39,7 +40,9 @@ VARIABLES = (
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build(own_unit("sample_units.trouble:Trouble", None), 3, tmp_path_factory.mktemp("unit"), standalone=True)
+    return build(
+        own_unit("support.sample_units.trouble:Trouble", None), 3, tmp_path_factory.mktemp("unit"), standalone=True
+    )
 
 
 @pytest.fixture
@@ -154,9 +157,9 @@ def test_another_unit_at_the_same_place_does_not_meet_the_process_of_the_one_bef
 
 @pytest.mark.parametrize("standalone", [True, False])
 def test_it_ends_with_a_host_of_which_a_fork_lives_on(fmu: Path, tmp_path: Path, standalone: bool):
-    unit = fmu if standalone else build_block("sample_units.trouble:Trouble", 3, tmp_path)
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "FMU_PYTHON_PROCESS": "1"}
-    command = [sys.executable, str(Path(__file__).with_name("forking_host.py")), str(unit)]
+    unit = fmu if standalone else build_block("support.sample_units.trouble:Trouble", 3, tmp_path)
+    environment = with_path() | {"FMU_PYTHON_PROCESS": "1"}
+    command = program("fmus/forking_host.py", unit)
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as host:
         assert host.stdout
         fork = int(host.stdout.readline())

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from ctypes_host import CtypesHost
 from support.c_programs import compiled
+from support.fmus.ctypes_host import CtypesHost
 
 from handover.fmus.build import build_block
 from handover.fmus.compile import RUNTIME, host_platform
@@ -38,7 +38,7 @@ while not os.path.exists(sys.argv[0] + "may_end"):
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build_block("sample_units.trouble:Trouble", 3, tmp_path_factory.mktemp("unit"))
+    return build_block("support.sample_units.trouble:Trouble", 3, tmp_path_factory.mktemp("unit"))
 
 
 @pytest.fixture

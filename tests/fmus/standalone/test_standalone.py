@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from bare_folder import BareFolder, can_be_entered
+from support.fmus.bare_folder import BareFolder, can_be_entered
 
 from handover.cosim.fmu.file.description import describe_fmu
 from handover.fmus.build import build, cached

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from arm_scene import MASS, Q_WB, SKEWED, limits, mujoco_model, skewed_arm, tumbling
 from scipy.spatial.transform import Rotation
+from support.plants.arm_scene import MASS, Q_WB, SKEWED, limits, mujoco_model, skewed_arm, tumbling
 from support.restored_states import assert_continues
 from support.restored_states import flat as entries
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_scene import CALM, DT, Scene
+from support.plants.hand_scene import CALM, DT, Scene
 
 from handover.plants.free_flyer.hand.effort import Effort, force_at_rest
 from handover.plants.free_flyer.hand.hand_and_object import Activity, Params

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hand_scene import CALM, DT, GIVING, PLACE, Scene
+from support.plants.hand_scene import CALM, DT, GIVING, PLACE, Scene
 from support.restored_states import assert_continues
 
 from handover.cosim.blocks.plain_rotation import IDENTITY, ZERO

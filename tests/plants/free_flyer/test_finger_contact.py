@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_scene import CALM, DT, Scene
+from support.plants.hand_scene import CALM, DT, Scene
 
 from handover.cosim.blocks.plain_rotation import IDENTITY, Vector, from_rotation_vector, vector
 from handover.cosim.blocks.ports import Floats

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from hand_scene import CALM, DT, Scene
 from scipy.spatial.transform import Rotation
+from support.plants.hand_scene import CALM, DT, Scene
 
 from handover.cosim.blocks.plain_rotation import IDENTITY, ZERO
 from handover.cosim.blocks.ports import Floats

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_scene import CALM, DT, IDLE, PLACE, Scene, off
 from scipy.spatial.transform import Rotation
+from support.plants.hand_scene import CALM, DT, IDLE, PLACE, Scene, off
 from support.restored_states import assert_continues
 
 from handover.cosim.blocks.plain_rotation import IDENTITY, ZERO, quaternion, vector

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_scene import CALM, DT, GIVING, IDLE, Scene
+from support.plants.hand_scene import CALM, DT, GIVING, IDLE, Scene
 from support.restored_states import assert_continues, assert_outputs_change_nothing
 
 from handover.plants.free_flyer.hand.hand_and_object import (

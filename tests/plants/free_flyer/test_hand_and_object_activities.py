@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hand_scene import CALM, DT, GIVING, IDLE, PLACE, Scene
 from scipy.spatial.transform import Rotation
+from support.plants.hand_scene import CALM, DT, GIVING, IDLE, PLACE, Scene
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand.hand_and_object import Activity, Holder, Motion, Params

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hand_scene import EXACT, body_sums
 from scipy.spatial.transform import Rotation
+from support.plants.hand_scene import EXACT, body_sums
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.free_flyer.hand.floating_object import FloatingObject

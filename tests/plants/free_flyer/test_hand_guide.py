@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hand_scene import DT, IDLE, PLACE, Scene
 from scipy.spatial.transform import Rotation
+from support.plants.hand_scene import DT, IDLE, PLACE, Scene
 from support.restored_states import assert_continues
 
 from handover.cosim.blocks.plain_rotation import angle_between, quaternion

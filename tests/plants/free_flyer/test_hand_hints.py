@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from hand_scene import IDLE, Scene
+from support.plants.hand_scene import IDLE, Scene
 
 from handover.cosim.record.reader import Record
 from handover.plants.free_flyer.hand.hand_and_object import Driver, Holder, StartHolder

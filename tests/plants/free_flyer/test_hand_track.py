@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hand_scene import DT, IDLE, Scene
+from support.plants.hand_scene import DT, IDLE, Scene
 from support.wording import Wording
 
 from handover.cosim.blocks.plain_rotation import IDENTITY, from_rotation_vector

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hand_scene import DT, EXACT, Steps, body_sums
+from support.plants.hand_scene import DT, EXACT, Steps, body_sums
 from support.wording import Wording
 
 from handover.cosim.blocks.plain_rotation import (

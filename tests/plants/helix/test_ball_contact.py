@@ -1,16 +1,15 @@
 """The ball's contacts, against the laws of mechanics in cases that can be solved by hand."""
 
 import math
-import os
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from partner_runs import DOWN, P_WO, STILL, beside, lift, take, taken
+from support.plants.partner_runs import DOWN, P_WO, STILL, beside, lift, take, taken
+from support.processes import with_path
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.gripper_fingers import finger_joints
@@ -163,12 +162,11 @@ def test_fingers_are_where_they_are_painted_and_mirror_nothing():
 @pytest.mark.parametrize("compiled", [True, False])
 def test_plain_python_gives_the_same_grasp(*, compiled: bool):
     script = (
-        "from partner_runs import *\n"
+        "from support.plants.partner_runs import *\n"
         "y = take(HandoverPartner(STILL), beside(0.004, 0.0, 0.0))[-1]\n"
         "print(*y.p_WO, *y.f_G)\n"
     )
-    path = os.pathsep.join([str(Path(__file__).parents[3]), str(Path(__file__).parent)])
-    env = os.environ | {"PYTHONPATH": path, "HANDOVER_COMPILE": "1" if compiled else "0"}
+    env = with_path() | {"HANDOVER_COMPILE": "1" if compiled else "0"}
     done = subprocess.run([sys.executable, "-c", script], env=env, capture_output=True, text=True, check=True)
     y = take(HandoverPartner(STILL), beside(0.004, 0.0, 0.0))[-1]
     np.testing.assert_allclose([float(x) for x in done.stdout.split()], [*y.p_WO, *y.f_G], atol=1e-6)

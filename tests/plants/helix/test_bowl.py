@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from partner_runs import take
+from support.plants.partner_runs import take
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.cameras.stereo_camera import Inputs as Seen

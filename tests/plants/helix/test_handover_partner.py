@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from partner_runs import AWAY, P_WO, STILL, beside, flat, inputs, take, taken, walk
+from support.plants.partner_runs import AWAY, P_WO, STILL, beside, flat, inputs, take, taken, walk
 
 from handover.cosim.blocks.ports import Floats
 from handover.plants.helix.arm.tendon_arm_fast import TendonArmFast

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from beams import ONE_LINK, tip
+from support.plants.beams import ONE_LINK, tip
 
 L, EI, GA, MASS = 0.225, 0.55, 60.0, 0.14
 EXTENSIBLE = 1e5

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from beams import ONE_LINK, tip
+from support.plants.beams import ONE_LINK, tip
 
 from handover.plants.vsl.arm import Inputs, Outputs, VslArm
 from handover.plants.vsl.parameters import InvalidVslArmParameters, Link, Motion, Params

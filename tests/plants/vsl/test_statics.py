@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from beams import ONE_LINK, STIFF, rest, tip
+from support.plants.beams import ONE_LINK, STIFF, rest, tip
 
 from handover.plants.vsl.chain import Pose, VslChain
 from handover.plants.vsl.parameters import Link, Params

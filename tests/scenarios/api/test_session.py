@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 from support.kept_runs import kept_run
 
 import handover

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from native_units import native_fmu
 from support.campaigns import campaign_metadata, folder_of, table_of
+from support.cosim.native_units import native_fmu
 from support.in_process_pool import InProcessPool
 from support.wording import Wording
 

@@ -7,11 +7,11 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import decay
 import numpy as np
 import pytest
-from native_units import native_fmu
 from support.campaigns import carried_out
+from support.cosim import decay
+from support.cosim.native_units import native_fmu
 from support.in_process_pool import InProcessPool
 from support.wording import Wording
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from ssp_of import component, connection, connectors, described, pack_ssp, system
+from support.cosim.ssp_of import component, connection, connectors, described, pack_ssp, system
 from support.wording import Wording
 
 from handover.fmus.build import cached

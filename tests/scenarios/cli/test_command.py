@@ -112,11 +112,11 @@ def test_ctrl_c_while_the_command_loads_aborts_it(tmp_path: Path):
         ("build", "TendonArms"),
         ("build", "spring"),
         ("build", "nowhere:Spring"),
-        ("build", "failing_arm:Nothing"),
-        ("build", "failing_arm:RunTime", "--step", "soon"),
-        ("build", "failing_arm:RunTime", "--step", "1e400"),
-        ("build", "failing_arm:RunTime", "--step", "1e-400"),
-        ("build", "failing_arm:Inputs"),
+        ("build", "support.scenarios.failing_arm:Nothing"),
+        ("build", "support.scenarios.failing_arm:RunTime", "--step", "soon"),
+        ("build", "support.scenarios.failing_arm:RunTime", "--step", "1e400"),
+        ("build", "support.scenarios.failing_arm:RunTime", "--step", "1e-400"),
+        ("build", "support.scenarios.failing_arm:Inputs"),
         ("build", "Push", "--step", "0.1"),
         ("build", "StereoCamera", "--fmi", "2"),
         ("build", "Push", "--stimulus", "given.csv"),
@@ -250,7 +250,7 @@ def test_build_scalar_writes_fmi_3_without_arrays(tmp_path: Path):
 
 @pytest.mark.slow
 def test_a_unit_that_fails_ends_the_run_with_status_3_and_keeps_the_record(tmp_path: Path):
-    failing = build_block("failing_arm:FailingArm", 3, tmp_path, step=Fraction(1, 50))
+    failing = build_block("support.scenarios.failing_arm:FailingArm", 3, tmp_path, step=Fraction(1, 50))
     out = tmp_path / "out"
     result = call("run", "helix_handover", "--unit", f"arm={failing}", "--no-report", "--out", out)
     assert result.exit_code == 3, result.output

@@ -8,7 +8,7 @@ from typing import Any
 import click
 import pytest
 from click.testing import CliRunner, Result
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 from support.wording import Wording
 
 from handover.cosim.ssp.writing import write_ssp

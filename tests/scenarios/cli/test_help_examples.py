@@ -16,11 +16,11 @@ from typing import Any, NoReturn
 import click
 import pytest
 from click.testing import CliRunner, Result
-from native_units import native_fmu
-from sample_study import same, write_study
 from support.campaigns import campaign_metadata, folder_of, table_of
+from support.cosim.native_units import native_fmu
 from support.kept_runs import copied_run
 from support.killed_run import killed_run
+from support.scenarios.sample_study import same, write_study
 
 from handover.fmus.build import cached
 from handover.scenarios.cli.command import DeferredCommand, main

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from native_units import native_fmu
-from oscillator import equal_masses
+from support.cosim.native_units import native_fmu
+from support.cosim.oscillator import equal_masses
 
 from handover.cosim.ssp.writing import write_ssp
 from handover.cosim.system.system import System

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from oscillator import PLAIN, STATES
+from support.cosim.oscillator import PLAIN, STATES
 from support.wording import Wording
 
 from handover.cosim.record.reader import Record

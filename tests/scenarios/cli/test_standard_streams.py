@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from faulty_units import faulty_fmu
 from support.commands import Ended, run_command
+from support.faults.faulty_units import faulty_fmu
 
 PROGRAM = """
 import sys

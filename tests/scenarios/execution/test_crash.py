@@ -6,7 +6,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 from support.failing_systems import failing_ssp, start
 
 from handover.cosim.record.reader import Record
@@ -74,7 +74,7 @@ def test_a_crash_as_units_are_made_is_named_and_leaves_nothing(tmp_path: Path):
 @pytest.mark.slow
 def test_a_unit_that_holds_the_whole_process_is_reported_by_the_parent(tmp_path: Path):
     s = System()
-    s.add("bad", build_block("endless_blocks:HoldsTheInterpreter", 3, tmp_path, step=Fraction(1, 10)))
+    s.add("bad", build_block("support.cosim.endless_blocks:HoldsTheInterpreter", 3, tmp_path, step=Fraction(1, 10)))
     ssp = write_ssp(s, tmp_path / "held.ssp", "held", Fraction(1))
     status, _, errors = start(tmp_path, ssp, "--out", "r", "--call-limit", "1", "--no-report").wait()
     assert (status, errors) == (3, "bad: fmi3DoStep at t = 0.3 s did not return within 1 s\n")

@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import decay
 import fmpy
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from native_units import native_fmu
-from ssp_of import component, described, pack_ssp, system
 from support.commands import run_command
+from support.cosim import decay
+from support.cosim.native_units import native_fmu
+from support.cosim.ssp_of import component, described, pack_ssp, system
 from support.wording import Wording
 
 import handover

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 from support.wording import Wording
 
 from handover.cosim.blocks.ports import Width

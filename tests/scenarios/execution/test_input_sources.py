@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from flyer_runs import task_of
-from native_units import native_fmu
 from numpy.typing import NDArray
+from support.cosim.native_units import native_fmu
 from support.kept_runs import kept_run
+from support.scenarios.flyer_runs import task_of
 
 import handover
 from handover.cosim.record.reader import Record

@@ -100,7 +100,7 @@ def test_ctrl_c_while_units_are_built_leaves_nothing(tmp_path: Path):
     "block", ["HangsInPython", "HangsInNativeCode"][: 2 if sys.platform.startswith("linux") else 1]
 )
 def test_a_second_ctrl_c_ends_a_run_whose_unit_hangs(block: str, tmp_path: Path):
-    unit = build_block(f"hanging_blocks:{block}", 3, tmp_path, step=Fraction(1, 10))
+    unit = build_block(f"support.scenarios.hanging_blocks:{block}", 3, tmp_path, step=Fraction(1, 10))
     hangs = tmp_path / "hangs"
     going = Command("run", unit, "--stop", "1", "--out", tmp_path / "r", env={"HANGING_BLOCK_TELLS": str(hangs)})
     wait_until(hangs.exists, going)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 
 from handover.scenarios.cli.command import main
 

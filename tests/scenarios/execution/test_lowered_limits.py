@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from native_units import native_fmu
 from support.commands import Ended, drop_privilege_of_limits
+from support.cosim.native_units import native_fmu
 from support.failing_systems import start
 
 from handover.cosim.record.reader import Record

@@ -14,8 +14,8 @@ from typing import Any, cast
 
 import pytest
 from click.testing import CliRunner, Result
-from planted import planted_pickle
 from support.commands import Command
+from support.cosim.planted import planted_pickle
 from support.kept_runs import kept_run
 from support.killed_run import killed_run
 from support.processes import until

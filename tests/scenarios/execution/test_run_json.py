@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 from click.testing import CliRunner
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 from support.failing_systems import failing_ssp
 from support.kept_runs import kept_run
 

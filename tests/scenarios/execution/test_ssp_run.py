@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 from support.failing_systems import failing_ssp
 from support.wording import Wording
 
@@ -31,7 +31,7 @@ def run(file: Path, *arguments: str | Path) -> Result:
 @pytest.fixture(scope="module")
 def spring(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("spring")
-    return build_block("tearing_spring:TearingSpring", 2, folder, step=Fraction(1, 10))
+    return build_block("support.scenarios.tearing_spring:TearingSpring", 2, folder, step=Fraction(1, 10))
 
 
 def packed(spring: Path, folder: Path, stop: Fraction | None = None, **start: Any) -> Path:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from flyer_runs import task_of
 from support.kept_runs import kept_run
+from support.scenarios.flyer_runs import task_of
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.typed_data import decoded

@@ -8,8 +8,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
-from native_units import native_fmu
-from ssp_of import component, described, pack_ssp, system
+from support.cosim.native_units import native_fmu
+from support.cosim.ssp_of import component, described, pack_ssp, system
 
 import handover
 from handover.cosim.record.reader import Record

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flyer_runs import kept, metric, run
+from support.scenarios.flyer_runs import kept, metric, run
 
 from handover.cosim.exceptions import InitializationError
 from handover.cosim.record.reader import Record

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from flyer_runs import metric, run
+from support.scenarios.flyer_runs import metric, run
 
 from handover.scenarios.free_flyer.handover.handovers import (
     Collaborative,

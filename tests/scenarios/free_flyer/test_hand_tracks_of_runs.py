@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from flyer_runs import fmu, kept, metric, run
+from support.scenarios.flyer_runs import fmu, kept, metric, run
 from support.wording import Wording
 
 from handover.cosim.record.reader import Record

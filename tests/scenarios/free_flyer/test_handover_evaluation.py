@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from staged_signals import staged
+from support.scenarios.staged_signals import staged
 from support.wording import Wording
 
 from handover.controllers.free_flyer.handover_state_machine import HandoverPhase as Phase

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flyer_runs import Kept, fmu, kept, metric, run
+from support.scenarios.flyer_runs import Kept, fmu, kept, metric, run
 from support.wording import Wording
 
 from handover.cosim.record.reader import Record

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from flyer_runs import fmu, metric, run
+from support.scenarios.flyer_runs import fmu, metric, run
 from support.wording import Wording
 
 from handover.cosim.record.reader import Record

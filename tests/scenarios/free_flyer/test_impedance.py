@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flyer_runs import fmu, kept, metric, run
+from support.scenarios.flyer_runs import fmu, kept, metric, run
 from support.wording import Wording
 
 from handover.cosim.exceptions import InitializationError

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flyer_offer import Offer, offer
-from flyer_runs import metric, run
+from support.scenarios.flyer_offer import Offer, offer
+from support.scenarios.flyer_runs import metric, run
 
 from handover.controllers.free_flyer.handover_state_machine import HandoverPhase
 from handover.controllers.free_flyer.impedance_controller import Behaviour

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli
-from parameter_origins import assert_every_default_has_its_origin
+from support.scenarios.parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.free_flyer
 from handover.controllers.free_flyer.arm_impedance_controller import Params as ArmControllerParams

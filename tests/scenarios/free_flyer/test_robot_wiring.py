@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from flyer_runs import run
-from staged_signals import staged
+from support.scenarios.flyer_runs import run
+from support.scenarios.staged_signals import staged
 from support.wording import Wording
 
 from handover.cosim.exceptions import InitializationError

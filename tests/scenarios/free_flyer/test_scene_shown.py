@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from flyer_runs import kept, run
+from support.scenarios.flyer_runs import kept, run
 
 from handover.cosim.record.reader import Record
 from handover.plants.free_flyer.hand.hand_kinematics import PALM_BONES, PALM_RADIUS

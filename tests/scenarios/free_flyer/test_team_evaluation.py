@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from staged_signals import staged
+from support.scenarios.staged_signals import staged
 
 from handover.controllers.free_flyer.handover_state_machine import HandoverPhase as Phase
 from handover.cosim.system.signals import Signals

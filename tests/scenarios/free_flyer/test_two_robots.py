@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flyer_runs import fmu, kept, metric, run
+from support.scenarios.flyer_runs import fmu, kept, metric, run
 from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 from support.wording import Wording

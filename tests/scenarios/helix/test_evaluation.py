@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helix_signals import P_WG, P_WR, PICTURE, port, views_and_ports
+from support.scenarios.helix_signals import P_WG, P_WR, PICTURE, port, views_and_ports
 
 from handover.controllers.helix.servo.visual_servo import Phase, Verdict
 from handover.cosim.blocks.variable import Kind

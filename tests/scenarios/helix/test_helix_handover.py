@@ -8,8 +8,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from support.commands import run_command
+from support.cosim.terminal_units import described_unit, terminal_xml
 from support.kept_runs import kept_run
-from terminal_units import described_unit, terminal_xml
 
 from handover.cosim.exceptions import WiringError
 from handover.cosim.record.reader import Record

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli
-from parameter_origins import assert_every_default_has_its_origin
+from support.scenarios.parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.helix
 from handover.controllers.helix.reflex.grasp_reflex import Params as ReflexParams

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flyer_runs import metric, run
-from helix_signals import PICTURE, port, views_and_ports
+from support.scenarios.flyer_runs import metric, run
+from support.scenarios.helix_signals import PICTURE, port, views_and_ports
 
 from handover.controllers.helix.servo.visual_servo import Phase
 from handover.cosim.blocks.variable import Kind

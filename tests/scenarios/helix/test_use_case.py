@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli
-from helix_signals import PICTURE, port, views_and_ports
-from parameter_origins import assert_every_default_has_its_origin
 from support.kept_runs import kept_run
+from support.scenarios.helix_signals import PICTURE, port, views_and_ports
+from support.scenarios.parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.helix
 from handover.controllers.helix.servo.visual_servo import Phase, Verdict

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flyer_runs import metric, run
+from support.scenarios.flyer_runs import metric, run
 
 from handover.controllers.ir_grasp.ir_reflex import Phase
 from handover.cosim.blocks.ports import Floats

@@ -3,7 +3,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from made_signals import made_signals
+from support.scenarios.made_signals import made_signals
 
 from handover.controllers.ir_grasp.ir_reflex import Phase, Stop
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams

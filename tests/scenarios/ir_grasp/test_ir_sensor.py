@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flyer_runs import metric, run
+from support.scenarios.flyer_runs import metric, run
 
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams
 from handover.cosim.record.reader import Record

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli
-from parameter_origins import assert_every_default_has_its_origin
+from support.scenarios.parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.ir_grasp
 from handover.controllers.ir_grasp.parameters import Params as ReflexParams

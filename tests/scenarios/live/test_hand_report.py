@@ -9,7 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 from support.served_live_page import answer, opened, with_page
 
 from handover.cosim.master.live_control import LiveControl

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.blocks.variable import Causality, Declared, Kind
 from handover.scenarios.cli.command import main

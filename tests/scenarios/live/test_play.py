@@ -12,9 +12,9 @@ import numpy as np
 import psutil
 import pytest
 from click.testing import CliRunner
-from native_units import native_fmu
 from playwright.sync_api import Browser, Page
 from support.commands import Command, run_command
+from support.cosim.native_units import native_fmu
 from support.kept_runs import kept_run
 from support.live_pages import LIVE, connected, frame, frames_come, page_command, send, shown, time_passes, told
 from support.opened_page import wait_until

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from flyer_runs import task_of
+from support.scenarios.flyer_runs import task_of
 from support.wording import Wording
 
 from handover.cosim.blocks.ports import Floats

@@ -1,7 +1,7 @@
 from pathlib import Path
 
 import pytest
-from tutorial import write_files
+from support.scenarios.tutorial import write_files
 
 
 @pytest.fixture

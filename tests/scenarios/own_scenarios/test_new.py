@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from tutorial import succeeded
+from support.scenarios.tutorial import succeeded
 
 from handover.scenarios.cli.command import main
 

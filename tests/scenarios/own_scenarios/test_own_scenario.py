@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from support.commands import Command
 from support.processes import until
-from tutorial import QUIET, SCENE, TUTORIAL, call, ran, signals, succeeded, write_files
+from support.scenarios.tutorial import QUIET, SCENE, TUTORIAL, call, ran, signals, succeeded, write_files
 
 from handover.cosim.record.reader import Record
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from own_controllers import PROPORTIONAL, write_controller, write_placed
-from tutorial import call, ran, succeeded
+from support.scenarios.own_controllers import PROPORTIONAL, write_controller, write_placed
+from support.scenarios.tutorial import call, ran, succeeded
 
 from handover.cosim.record.reader import Record
 

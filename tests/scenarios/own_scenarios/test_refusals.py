@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from own_controllers import write_placed
+from support.scenarios.own_controllers import write_placed
+from support.scenarios.tutorial import SCENE, refused, write_files
 from support.wording import Wording
-from tutorial import SCENE, refused, write_files
 
 from handover.scenarios.cli.command import main
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tutorial import QUIET, SCENE, call, ran, refused, signals, succeeded
+from support.scenarios.tutorial import QUIET, SCENE, call, ran, refused, signals, succeeded
 
 from handover.cosim.record.reader import Record
 from handover.scenarios.campaign.table import CampaignTable

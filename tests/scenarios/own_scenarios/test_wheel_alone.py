@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.fmus.wheels import ROOT, build_wheel, copy_sources
 from support.installed import distributions, link_distributions
-from tutorial import SCENE, write_files
-from wheels import ROOT, build_wheel, copy_sources
+from support.scenarios.tutorial import SCENE, write_files
 
 from handover.cosim.native_libraries import host_platform
 from handover.cosim.record.reader import Record

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 from support.wording import Wording
 
 from handover.cosim.fmu.file.archive import FmuArchive, write_archive

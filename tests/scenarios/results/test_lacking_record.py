@@ -8,8 +8,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from flyer_runs import run
 from support.kept_runs import copied_run, kept_run
+from support.scenarios.flyer_runs import run
 
 from handover.cosim.record.reader import Record
 from handover.cosim.system.signals import Signals

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from faulty_units import faulty_fmu
 from support.failing_systems import failing_ssp, native_fmu
+from support.faults.faulty_units import faulty_fmu
 
 import handover
 from handover.cosim.ssp.writing import write_ssp

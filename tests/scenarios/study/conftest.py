@@ -1,5 +1,5 @@
 import pytest
-from sample_study import compliant_fails, rigid_is_better, write_study
+from support.scenarios.sample_study import compliant_fails, rigid_is_better, write_study
 
 from handover.scenarios.study.folder.study_folder import StudyFolder
 

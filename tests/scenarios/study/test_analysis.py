@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from sample_study import PLAN, compliant_fails, play, record, rigid_is_better, session, write_study
+from support.scenarios.sample_study import PLAN, compliant_fails, play, record, rigid_is_better, session, write_study
 
 from handover.scenarios.study.folder.study_folder import StudyFolder
 from handover.scenarios.study.plan.order import Round, rounds_of

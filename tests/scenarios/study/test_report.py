@@ -10,10 +10,19 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
-from sample_study import PILOT_PLAN, PLAN, compliant_fails, never, record, rigid_is_better, session, write_study
 from support.kept_runs import copied_run
+from support.scenarios.sample_study import (
+    PILOT_PLAN,
+    PLAN,
+    compliant_fails,
+    never,
+    read_by_codebook,
+    record,
+    rigid_is_better,
+    session,
+    write_study,
+)
 from support.wording import Wording
-from test_session_folder import read_by_codebook
 
 from handover.scenarios.cli.command import main
 from handover.scenarios.study.folder.codebook import PILOT

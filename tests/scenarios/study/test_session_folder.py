@@ -1,7 +1,6 @@
 """What a session keeps: tables that pandas reads by the codebook, rounds that outlive a kill, and refusals."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -12,8 +11,9 @@ from typing import Any
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from sample_study import PILOT_PLAN, PLAN, play, record, same, session, write_study
 from support.kept_runs import kept_run
+from support.processes import with_path
+from support.scenarios.sample_study import PILOT_PLAN, PLAN, play, read_by_codebook, record, same, session, write_study
 
 from handover.scenarios.results.run_folder import InvalidRunFolder, RunFolder
 from handover.scenarios.study.folder.codebook import PILOT, questionnaire_columns, write_csv
@@ -23,23 +23,8 @@ from handover.scenarios.study.plan.order import rounds_of
 from handover.scenarios.study.plan.plan import default_plan, parse_plan
 from handover.scenarios.study.session.trial import failed_by_rule
 
-_TYPES = {"text": "string", "whole number": "Int64", "number": "Float64", "true or false": "boolean"}
-
-
 csv_of: Any = pd.read_csv  # type: ignore
 """Returns frames, whose types are open."""
-
-
-def read_by_codebook(study: Path, table: str, file: Path) -> Any:
-    """Read a table as somebody does who knows the codebook alone."""
-    codebook = csv_of(study / "codebook.csv", keep_default_na=False)
-    columns = codebook[codebook["table"] == table]
-    types = {name: _TYPES[kind] for name, kind in zip(columns["column"], columns["type"], strict=True)}
-    found = csv_of(file, dtype=types)
-    assert list(found.columns) == list(columns["column"])
-    filled = columns[columns["may_be_empty"] == "no"]["column"]
-    assert not found[filled].isna().any(axis=None)
-    return found
 
 
 def test_pandas_reads_every_table_by_the_codebook(tmp_path: Path):
@@ -127,7 +112,7 @@ def test_rounds_come_in_turn_and_want_ratings_unless_void(tmp_path: Path):
 _PLAYS = """
 import sys
 from pathlib import Path
-from sample_study import PLAN, record, session
+from support.scenarios.sample_study import PLAN, record, session
 from handover.scenarios.study.folder.study_folder import StudyFolder
 folder = StudyFolder.opened(Path(sys.argv[1]), PLAN).begin(session(1))
 for planned in folder.rounds:
@@ -138,10 +123,8 @@ for planned in folder.rounds:
 
 
 def test_a_kill_in_the_middle_keeps_the_rounds_before_and_the_study_goes_on(tmp_path: Path):
-    here = str(Path(__file__).parent)
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([here, os.environ.get("PYTHONPATH", "")])}
     command = [sys.executable, "-c", _PLAYS, str(tmp_path / "out")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=with_path()) as process:
         assert process.stdout is not None
         told = 0
         while told < 4:

@@ -1,5 +1,5 @@
 import pytest
-from vsl_training_points import Trained, call
+from support.scenarios.vsl_training_points import Trained, call
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flyer_runs import metric, run
+from support.scenarios.flyer_runs import metric, run
 
 from handover.cosim.record.reader import Record
 from handover.plants.vsl.parameters import Link

@@ -3,8 +3,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_signals import made_signals
 from numpy.typing import NDArray
+from support.scenarios.made_signals import made_signals
 
 from handover.cosim.system.signals import Signals
 from handover.cosim.system.system import System

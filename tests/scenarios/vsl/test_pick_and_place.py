@@ -10,9 +10,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 import tomli
-from flyer_runs import metric, run
-from parameter_origins import assert_every_default_has_its_origin
 from support.kept_runs import kept_run
+from support.scenarios.flyer_runs import metric, run
+from support.scenarios.parameter_origins import assert_every_default_has_its_origin
 
 import handover.scenarios.vsl
 from handover.controllers.vsl.pick_and_place import Params, TaskPhase

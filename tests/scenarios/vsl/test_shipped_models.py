@@ -4,7 +4,7 @@ import types
 
 import numpy as np
 import pytest
-from vsl_training_points import ARM, shipped
+from support.scenarios.vsl_training_points import ARM, shipped
 
 from handover.controllers.vsl import default_friction_model, default_model, default_physics_model, default_small_model
 from handover.controllers.vsl.model_text import parse_model

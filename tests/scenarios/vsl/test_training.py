@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from vsl_training_points import ARM, TRAINING, call, made_up, nobody, points
+from support.scenarios.vsl_training_points import ARM, TRAINING, call, made_up, nobody, points
 
 from handover.controllers.vsl.hybrid_kinematics import HybridKinematics, Inputs, Params
 from handover.controllers.vsl.learned_model import ForwardInput, Learned

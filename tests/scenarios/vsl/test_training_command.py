@@ -15,8 +15,8 @@ from typing import Any, TextIO
 
 import numpy as np
 import pytest
+from support.scenarios.vsl_training_points import TRAINING, Trained, call, key_of_made_up, made_up, nobody, shipped
 from support.wording import Wording
-from vsl_training_points import TRAINING, Trained, call, key_of_made_up, made_up, nobody, shipped
 
 from handover.controllers.vsl.default_model import DEFAULT_MODEL
 from handover.controllers.vsl.hybrid_kinematics import HybridKinematics, InvalidModel, Params
@@ -192,7 +192,7 @@ def test_usage_errors_take_a_line(
 
 
 def test_an_arm_that_fails_leaves_no_file(tmp_path: Path):
-    fmu = build_block("vsl_training_arms:BreakingArm", 3, tmp_path, step=Fraction(1, 50))
+    fmu = build_block("support.scenarios.vsl_training_arms:BreakingArm", 3, tmp_path, step=Fraction(1, 50))
     result = call("--plant", fmu, "--out", tmp_path / "m.json")
     assert result.exit_code == 3
     assert "the arm broke" in result.output
@@ -204,7 +204,7 @@ def test_an_arm_that_teaches_nothing_is_refused(
     arm: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wording: Wording
 ):
     monkeypatch.setattr(vsl_train_command, "MIN_POINTS", 20)
-    fmu = build_block(f"vsl_training_arms:{arm}", 3, tmp_path, step=Fraction(1, 50))
+    fmu = build_block(f"support.scenarios.vsl_training_arms:{arm}", 3, tmp_path, step=Fraction(1, 50))
     result = call("--points", "20", "--plant", fmu, "--out", tmp_path / "m.json")
     assert result.exit_code == 2
     wording.check(result.output)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from support.scenarios.vsl_training_points import ARM, Trained, call, key_of_made_up, made_up, nobody
 from support.wording import Wording
-from vsl_training_points import ARM, Trained, call, key_of_made_up, made_up, nobody
 
 from handover.fmus.build import cached
 from handover.scenarios.cli.robots import vsl_train as vsl_train_command

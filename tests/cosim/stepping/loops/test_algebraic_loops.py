@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 
 from handover.cosim.blocks.ports import Floats
 from handover.cosim.exceptions import InitializationError, ScheduleError

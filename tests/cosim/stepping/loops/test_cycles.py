@@ -5,8 +5,8 @@ from collections import Counter
 from fractions import Fraction
 
 import pytest
-from native_units import native_fmu
-from oscillator import equal_masses
+from support.cosim.native_units import native_fmu
+from support.cosim.oscillator import equal_masses
 
 from handover.cosim.exceptions import ScheduleError
 from handover.cosim.fmu.instance import Instance

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from native_units import native_fmu
+from support.cosim.native_units import native_fmu
 from support.rewritten_archive import described_otherwise
 
 from handover.cosim.exceptions import ScheduleError

@@ -9,9 +9,9 @@ from collections.abc import Generator
 from pathlib import Path
 
 import pytest
-from sample_jobs import bad_job, job
 from support.clusters import scheduler, worker
-from support.processes import lives, parent, servers, until
+from support.processes import lives, parent, program, servers, until
+from support.scenarios.sample_jobs import bad_job, job
 
 from handover.scenarios.campaign.local_cluster import connect_cluster
 from handover.scenarios.campaign.scheduler import scheduler_address
@@ -61,8 +61,7 @@ def test_a_command_that_is_killed_leaves_no_run_on_the_cluster(address: str, nan
     runs = tmp_path / "runs"
     jobs = [bad_job(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(3)]
     (tmp_path / "jobs").write_bytes(pickle.dumps(jobs))
-    program = [sys.executable, str(Path(__file__).with_name("pool_program.py")), str(tmp_path / "jobs"), address]
-    with subprocess.Popen(program) as command:
+    with subprocess.Popen(program("scenarios/pool_program.py", tmp_path / "jobs", address)) as command:
         try:
             until(lambda: len(list(runs.glob(".*/signals.tail"))) == 2)
             below = servers(nanny)

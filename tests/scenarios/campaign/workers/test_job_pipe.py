@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from planted import planted_pickle
-from sample_jobs import job
+from support.cosim.planted import planted_pickle
+from support.scenarios.sample_jobs import job
 
 from handover.cosim.blocks.block import InvalidState
 from handover.cosim.stepping.options import AdaptiveStep, Algorithm, Extrapolation, MasterOptions

@@ -4,9 +4,9 @@ import signal
 from pathlib import Path
 
 import pytest
-from native_units import native_fmu
 from support.campaigns import carried_out, short_plan
 from support.clusters import scheduler, worker
+from support.cosim.native_units import native_fmu
 from support.sweep_process import ended, runs_in, sweeping, wait_for, without_times, workers_of
 
 from handover.scenarios.campaign.folder import CampaignFolder

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import psutil
 import pytest
-from sample_jobs import bad_job, job
-from support.processes import family, lives, parent, servers, until
+from support.processes import family, lives, parent, program, servers, until
+from support.scenarios.sample_jobs import bad_job, job
 
 from handover.scenarios.campaign.local_cluster import local_cluster
 from handover.scenarios.campaign.worker_pool import JobResult, RunJob, WorkerPool, cores
@@ -102,7 +102,7 @@ def test_a_command_that_is_ended_leaves_no_process_and_says_nothing(
 ):
     hanging = [bad_job(runs, "Hangs", tmp_path, f"hangs_{i}") for i in range(4)]
     (tmp_path / "jobs").write_bytes(pickle.dumps(hanging))
-    command = [sys.executable, str(Path(__file__).with_name("pool_program.py")), str(tmp_path / "jobs")]
+    command = program("scenarios/pool_program.py", tmp_path / "jobs")
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as process:
         try:
             until(lambda: going(runs))

@@ -15,10 +15,10 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
-from native_units import native_fmu
-from sample_jobs import bad_job, job
+from support.cosim.native_units import native_fmu
 from support.processes import children, lives, until
 from support.rewritten_archive import DESCRIPTION, rewritten
+from support.scenarios.sample_jobs import bad_job, job
 
 from handover.cosim.python_process import code_command
 from handover.cosim.record.reader import Record

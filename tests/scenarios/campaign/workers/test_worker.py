@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from distributed import Client
-from sample_jobs import job
+from support.scenarios.sample_jobs import job
 
 from handover.scenarios.campaign import worker
 from handover.scenarios.campaign.run_job import run_job

@@ -7,7 +7,7 @@ from typing import Any
 
 import pyarrow as pa
 import pytest
-from flyer_runs import metric, task_of
+from support.scenarios.flyer_runs import metric, task_of
 from support.sketched_figures import Sketches
 from support.sketched_figures import sketches as sketches
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pyarrow as pa
 import pytest
-from helix_1_rows import spread, table_of
+from support.scenarios.helix_1_rows import spread, table_of
 
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.helix.helix_1 import Helix1

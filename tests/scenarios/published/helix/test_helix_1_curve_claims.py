@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from chosen_curves import curves_as
-from helix_1_rows import table_of
+from support.scenarios.chosen_curves import curves_as
+from support.scenarios.helix_1_rows import table_of
 
 from handover.cosim.blocks.ports import Floats
 from handover.scenarios.helix.parameters import Tuning

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from chosen_curves import PERIOD
+from support.scenarios.chosen_curves import PERIOD
 
 from handover.controllers.helix.servo.constant_curvature import forward_kinematics
 from handover.controllers.helix.servo.visual_servo import Phase

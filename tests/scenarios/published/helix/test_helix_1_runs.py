@@ -7,9 +7,9 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
-from helix_1_rows import table_of
 from support.in_process_pool import InProcessPool
 from support.kept_runs import kept_run
+from support.scenarios.helix_1_rows import table_of
 
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder

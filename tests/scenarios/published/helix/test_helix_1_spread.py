@@ -6,7 +6,7 @@ from typing import Any
 
 import pyarrow as pa
 import pytest
-from helix_1_rows import spread, table_of
+from support.scenarios.helix_1_rows import spread, table_of
 
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.helix.helix_1 import Helix1

@@ -4,7 +4,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from helix_1_rows import spread, table_of
+from support.scenarios.helix_1_rows import spread, table_of
 
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.helix.helix_1 import Helix1

@@ -3,7 +3,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pytest
-from handover_columns import columns
+from support.scenarios.handover_columns import columns
 
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.published.helix.helix_improvements import CHANGES, HelixImprovements

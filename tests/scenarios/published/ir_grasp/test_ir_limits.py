@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from limits_table import limits_table
+from support.scenarios.limits_table import limits_table
 
 from handover.controllers.ir_grasp.ir_reflex import IrReflex
 from handover.cosim.blocks.description import describe

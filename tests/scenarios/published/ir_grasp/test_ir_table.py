@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 import tomli
-from grasp_table import grasp_table
+from support.scenarios.grasp_table import grasp_table
 
 from handover.plants.ir_grasp.objects import Thing
 from handover.scenarios.campaign.plan import PlannedRun

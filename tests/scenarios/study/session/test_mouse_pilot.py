@@ -6,11 +6,11 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from mouse_hand import MouseHand
 from playwright.sync_api import Browser, Page
-from served_page import at, pilot_plan, served, to_round
 from support.commands import run_command
 from support.opened_page import wait_until
+from support.scenarios.mouse_hand import MouseHand
+from support.scenarios.served_page import at, pilot_plan, served, to_round
 
 FIGURES = ["round", "success", "latency_median_ms", "latency_p95_ms", "missed_deadlines"]
 """Of the rounds: what is printed."""

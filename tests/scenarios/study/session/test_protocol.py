@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from sample_study import PLAN, play, record, same, session
+from support.scenarios.sample_study import PLAN, play, record, same, session
 from support.wording import Wording
 
 from handover.scenarios.experiment.live_inputs import LedHand

@@ -11,7 +11,7 @@ import pyarrow
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
-from sample_study import record, same, session, write_study
+from support.scenarios.sample_study import record, same, session, write_study
 
 from handover.cosim.record.reader import Record
 from handover.cosim.system.time_series import TimeSeries

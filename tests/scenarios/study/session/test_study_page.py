@@ -11,10 +11,10 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 from playwright.sync_api import Browser, Page
-from served_page import at, pilot_plan, served, to_round
 from support.commands import Command, run_command
 from support.opened_page import overflow, wait_until
 from support.processes import until
+from support.scenarios.served_page import at, pilot_plan, served, to_round
 from support.wording import Wording
 
 from handover.scenarios.cli.command import main

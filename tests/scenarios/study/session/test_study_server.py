@@ -9,7 +9,8 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from study_server import (
+from support.processes import until
+from support.scenarios.study_server import (
     HOST,
     PLAN,
     act,
@@ -20,7 +21,6 @@ from study_server import (
     status,
     told,
 )
-from support.processes import until
 from support.wording import Wording
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect

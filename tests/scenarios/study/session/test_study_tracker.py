@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_server import HAND, act, page_at, served, server_of, to_instruction, told
+from support.scenarios.study_server import HAND, act, page_at, served, server_of, to_instruction, told
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 

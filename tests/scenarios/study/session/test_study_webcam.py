@@ -7,12 +7,12 @@ from pathlib import Path
 from urllib.request import urlopen
 
 import pytest
-import study_server
 from click.testing import CliRunner
 from playwright.sync_api import Page
-from served_page import at, pilot_plan, served, to_round
-from study_server import server_of, status
 from support.opened_page import launched, wait_until
+from support.scenarios import study_server
+from support.scenarios.served_page import at, pilot_plan, served, to_round
+from support.scenarios.study_server import server_of, status
 from support.webcam_files import camera_of, write_files, write_video
 from support.wording import Wording
 

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from sample_study import record
-from study_server import (
+from support.processes import with_argument
+from support.scenarios.sample_study import record
+from support.scenarios.study_server import (
     HAND,
     PLAN,
     EndlessTrial,
@@ -25,7 +26,6 @@ from study_server import (
     told,
     without_runs,  # noqa: F401
 )
-from support.processes import with_argument
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
