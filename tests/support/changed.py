@@ -5,7 +5,7 @@ that import it, by themselves or through a helper module; where there are none, 
 so on. A test that has changed is run itself; of another file, such as C or TOML, the tests of its folder are run.
 """
 
-import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping
@@ -14,6 +14,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("controllers", "cosim", "fmus", "plants", "scenarios")
+
+_IMPORT = re.compile(r"^\s*(?:from ([\w.]+) import (\([^)]*\)|.*)|import ([\w.]+))", re.MULTILINE)
+_NAME = re.compile(r"\w+")
 
 
 def changed_files(commit: str) -> list[Path]:
@@ -81,8 +84,7 @@ def _importers() -> dict[Path, set[Path]]:
     for room, paths in files.items():
         for path in (p.relative_to(ROOT) for p in paths):
             words = path.with_suffix("").parts
-            named[path.stem if room == "tests" else ".".join(("handover", *words))] = path
-            named[".".join(words[1:] if room == "tests" else words)] = path
+            named[".".join(words[1:] if room == "tests" else ("handover", *words))] = path
     found: dict[Path, set[Path]] = {}
     for path in (p for paths in files.values() for p in paths):
         for name in _imported(path):
@@ -92,13 +94,10 @@ def _importers() -> dict[Path, set[Path]]:
 
 
 def _imported(path: Path) -> set[str]:
-    """Return the names of modules that a file imports, also within functions."""
+    """Return the names of modules that a file imports, also within functions and in programs that it writes."""
     names: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_bytes())):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    for module, imported, module_alone in _IMPORT.findall(path.read_text(encoding="utf-8")):
+        names |= {module or module_alone, *(f"{module}.{name}" for name in _NAME.findall(imported))}
     return names
 
 
