@@ -10,18 +10,17 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from support.wording import Wording
 
 from handover.controllers.vsl import default_friction_model, default_model, default_physics_model, default_small_model
 from handover.controllers.vsl.default_model import DEFAULT_MODEL
-from handover.controllers.vsl.fit import fit_adapted, fit_cubic, fit_friction, rounded
+from handover.controllers.vsl.fit import fit_adapted, fit_cubic, fit_friction
 from handover.controllers.vsl.kinematics import Elbow, VslKinematics
 from handover.controllers.vsl.learned_model import (
-    Adapted,
     Cubic,
     ForwardInput,
     Learned,
     VslModel,
-    all_powers,
     hull_directions,
     inputs_of,
     rotate_about_z,
@@ -52,6 +51,7 @@ def model() -> VslModel:
 
 
 SHIPPED = [m.DEFAULT_MODEL for m in (default_model, default_small_model, default_physics_model, default_friction_model)]
+KINDS = ["cubic", "small", "physics", "friction"]
 
 
 def slopes(f: Callable[[Floats], Floats], at: Floats, step: float) -> Floats:
@@ -66,10 +66,6 @@ def adapted() -> VslModel:
     return VslModel(inverse, forward, m.kinematics, {"seed": 2})
 
 
-def content() -> dict[str, Any]:
-    return json.loads(model_text(model()))
-
-
 def test_ridge_recovers_a_cubic():
     inside = X[:150].min(0) + 0.02 * np.ptp(X[:150], axis=0), X[:150].max(0) - 0.02 * np.ptp(X[:150], axis=0)
     fresh = RNG.uniform(*inside, (50, 3))
@@ -77,34 +73,20 @@ def test_ridge_recovers_a_cubic():
     np.testing.assert_allclose(fitted().predict(fresh[0]), cubic_values(fresh[:1])[0], atol=1e-7)
 
 
-def test_the_penalty_is_chosen_on_the_validation_points():
-    noisy = cubic_values(X[:60]) + RNG.normal(0.0, 0.3, (60, 3))
-    fit = fit_cubic(X[:60], noisy, X[60:], cubic_values(X[60:]))
-    assert fit.penalty > 1e-10
-    assert fit.validation_rms < 0.5
-
-
-def test_the_penalty_is_per_point():
+def test_the_penalty_is_per_point_and_chosen_on_the_validation_points():
     x, y = X[:40], cubic_values(X[:40]) + np.random.default_rng(0).normal(0.0, 0.3, (40, 3))
     once, twice = (fit_cubic(np.tile(x, (n, 1)), np.tile(y, (n, 1)), X[40:], cubic_values(X[40:])) for n in (1, 2))
     assert once.penalty == twice.penalty > 1e-10
+    assert once.validation_rms < 0.5
     np.testing.assert_allclose(twice.cubic.predict(X), once.cubic.predict(X), atol=1e-6)
-
-
-def test_there_are_120_monomials_of_seven_inputs():
-    powers = all_powers(7)
-    assert powers.shape == (120, 7)
-    assert len(np.unique(powers, axis=0)) == 120
-    assert powers.sum(axis=1).max() == 3
-    np.testing.assert_array_equal(powers[0], np.zeros(7))
 
 
 def test_hull_holds_its_points_and_touches_them():
     z = (X[:150] - fitted().mean) / fitted().scale
-    directions, hull = hull_directions(3), fitted().hull
+    directions = hull_directions(3)
     assert directions.shape == (18, 3)
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0)
-    np.testing.assert_allclose(np.max(z @ np.transpose(directions), axis=0), hull, atol=1e-8)
+    np.testing.assert_allclose(np.max(z @ np.transpose(directions), axis=0), fitted().hull, atol=1e-8)
     assert not any(fitted().outside(x) for x in X[:150])
 
 
@@ -126,12 +108,8 @@ def test_beyond_the_sides_the_polynomial_stays_what_it_is_there():
     edge = cubic.mean + cubic.scale * cubic.hull[0:6:2]
     np.testing.assert_array_equal(cubic.predict(edge + 10.0 * cubic.scale), cubic.predict(edge + cubic.scale))
     np.testing.assert_allclose(cubic.predict(edge + cubic.scale), cubic.predict(edge), atol=1e-6)
-
-
-def test_numbers_are_written_with_twelve_digits():
-    np.testing.assert_array_equal(
-        rounded(np.array([[1.0 / 3.0, -2e-20 / 3.0]])), [[0.333333333333, -6.66666666667e-21]]
-    )
+    assert np.all(cubic.jacobian(edge + 10.0 * cubic.scale) == 0.0)
+    np.testing.assert_allclose(cubic.jacobian(X[:5])[3], cubic.jacobian(X[3]), rtol=1e-9)
 
 
 def test_the_forward_residual_turns_with_joint_1():
@@ -142,18 +120,11 @@ def test_the_forward_residual_turns_with_joint_1():
     np.testing.assert_allclose(rotate_about_z(np.array([1.0, 0.0, 2.0]), np.pi / 2), [0.0, 1.0, 2.0], atol=1e-15)
 
 
-def test_the_current_of_joint_1_is_left_out():
-    q, p = np.array([0.6, 0.5, -1.0]), np.array([0.1, 0.2])
-    np.testing.assert_array_equal(inputs_of(q, p, np.array([9.0, 0.3, 0.4])), [0.6, 0.5, -1.0, 0.1, 0.2, 0.3, 0.4])
-
-
-@pytest.mark.parametrize("text", SHIPPED)
-@pytest.mark.parametrize("theta_1", [0.0, 0.4])
-def test_the_corrected_jacobian_is_the_derivative_of_the_tip(text: str, theta_1: float):
+@pytest.mark.parametrize("text", SHIPPED, ids=KINDS)
+def test_the_corrected_jacobian_is_the_derivative_of_the_tip(text: str):
     m = parse_model(text, "that ships")
-    q, p, i = np.array([theta_1, 0.6, -1.2]), np.array([0.9e5, 1.2e5]), np.array([0.0, 0.7, 0.15])
-    expected = slopes(lambda q: m.tip(q, p, i), q, 1e-4)
-    np.testing.assert_allclose(m.tip_jacobian(q, p, i), expected, atol=2e-6)
+    q, p, i = np.array([0.4, 0.6, -1.2]), np.array([0.9e5, 1.2e5]), np.array([0.0, 0.7, 0.15])
+    np.testing.assert_allclose(m.tip_jacobian(q, p, i), slopes(lambda q: m.tip(q, p, i), q, 1e-4), atol=2e-6)
     assert np.max(np.abs(m.tip_jacobian(q, p, i) - m.kinematics.jacobian(q))) > 0.005
 
 
@@ -176,24 +147,12 @@ def test_a_published_model_gives_angles_and_position_themselves():
     np.testing.assert_array_equal(published.tip(q, p, i), m.forward.predict(inputs_of(X, p, i)))
 
 
-def test_a_cubics_jacobian_is_its_derivative_and_0_where_inputs_are_held():
-    cubic, x = fitted(), X[:150].mean(axis=0)
-    step = 1e-5 * cubic.scale
-    J = np.transpose([(cubic.predict(x + h) - cubic.predict(x - h)) / (2.0 * h.sum()) for h in np.diag(step)])
-    np.testing.assert_allclose(cubic.jacobian(x) * cubic.scale, J * cubic.scale, atol=1e-7)
-    np.testing.assert_allclose(cubic.jacobian(X[:5])[3], cubic.jacobian(X[3]), rtol=1e-9)
-    assert np.all(cubic.jacobian(x + 10.0 * cubic.scale) == 0.0)
-
-
 def test_few_points_are_enough_to_adapt():
     m, fresh = adapted(), np.random.default_rng(9).normal(size=(100, 7))
     for now, was in ((m.inverse, model().inverse), (m.forward, model().forward)):
-        assert isinstance(now, Adapted)
         expected = 0.9 * was.predict(fresh) + 0.01
         error = np.sqrt(np.mean((now.predict(fresh) - expected) ** 2))
         assert error < 0.05 * np.sqrt(np.mean((was.predict(fresh) - expected) ** 2))
-        x = np.full(7, 0.1)
-        np.testing.assert_allclose(now.jacobian(x), slopes(now.predict, x, 1e-5), atol=1e-6)
 
 
 def test_friction_in_the_currents_is_found():
@@ -210,25 +169,24 @@ def test_friction_in_the_currents_is_found():
     assert fit_friction(inputs_at, directions, y) == pytest.approx((0.3, 0.2), rel=0.02)
 
 
-@pytest.mark.parametrize("text", SHIPPED)
+@pytest.mark.parametrize("text", SHIPPED, ids=KINDS)
 def test_what_ships_is_what_would_be_written(text: str):
-    shipped = parse_model(text, "that ships")
-    assert model_text(shipped) == text
-    assert max(len(line) for line in text.splitlines()) < 120
-    assert len(shipped.provenance["data"]) == 64
+    assert model_text(parse_model(text, "that ships")) == text
 
 
-def test_an_adapted_model_is_written_and_read():
-    text = model_text(adapted())
-    back = parse_model(text, "x.json")
-    assert model_text(back) == text
+def test_text_and_model_are_the_same(tmp_path: Path):
     x = np.linspace(-1.0, 1.0, 7)
-    np.testing.assert_array_equal(back.forward.predict(x), adapted().forward.predict(x))
+    for made in (model(), adapted()):
+        (tmp_path / "m.json").write_text(model_text(made))
+        back = read_model(tmp_path / "m.json")
+        assert model_text(back) == model_text(made)
+        assert back.kinematics == made.kinematics
+        for which in ("inverse", "forward"):
+            np.testing.assert_array_equal(getattr(back, which).predict(x), getattr(made, which).predict(x))
 
 
-@pytest.mark.parametrize("text", SHIPPED, ids=["cubic", "small", "physics", "friction"])
-@settings(max_examples=60, deadline=None)
-@given(data=st.data())
+@settings(max_examples=60)
+@given(text=st.sampled_from(SHIPPED), data=st.data())
 def test_a_damaged_model_is_refused(text: str, data: st.DataObject):
     """Whatever a letter or digit of it becomes, and wherever the file is cut."""
     if data.draw(st.booleans()):
@@ -249,138 +207,76 @@ def _same_numbers(damaged: str, text: str) -> bool:
     return False
 
 
-def test_text_and_model_are_the_same(tmp_path: Path):
-    text = model_text(model())
-    file = tmp_path / "m.json"
-    file.write_text(text)
-    back = read_model(file)
-    assert model_text(back) == text
-    assert max(len(line) for line in text.splitlines()) < 120
-    x = np.linspace(-1.0, 1.0, 7)
-    np.testing.assert_array_equal(back.inverse.predict(x), model().inverse.predict(x))
-    assert back.kinematics == model().kinematics
+def weights_of(numbers: int) -> list[str]:
+    return [base64.b64encode(np.full(numbers, np.nan, "<f4").tobytes()).decode()]
 
 
-def test_the_model_that_ships_is_one():
-    shipped = parse_model(DEFAULT_MODEL, "that ships")
-    assert shipped.kinematics == VslKinematics(0.15, 0.225, 0.225, Elbow.UP)
-    assert "\n" + model_text(shipped) == "\n" + DEFAULT_MODEL
-    sentence = shipped.provenance["mean_test_errors_m"]
-    assert sentence["forward_hybrid"] < sentence["forward_model_based"] / 5.0
-    assert sentence["inverse_hybrid"] < sentence["inverse_model_based"] / 5.0
+CUT: Any = object()
+WITHOUT = {
+    "own": ("inverse", "forward hull", "links L_2", "provenance", "kind", "friction", "sha256"),
+    "physics": ("inverse beam",),
+    "friction": ("nominal",),
+}
+FAULTS: list[tuple[str, str, Any]] = [
+    ("own", "version", 1),
+    ("own", "links L_2", 0.2251),
+    ("own", "format", "other"),
+    ("own", "links", None),
+    ("own", "links elbow", "LEFT"),
+    ("own", "links L_3", -1.0),
+    ("own", "inverse mean", [1.0] * 6),
+    ("own", "inverse coefficients", [1.0] * 7),
+    ("own", "inverse coefficients", [[1.0], [1.0, 2.0]]),
+    ("own", "forward scale", [0.0] * 7),
+    ("own", "forward mean", [float("nan")] * 7),
+    ("own", "forward scale", [float("inf")] * 7),
+    ("own", "forward mean", [10**400] * 7),
+    ("own", "forward mean", [True] * 7),
+    ("own", "forward mean", "0"),
+    ("own", "forward mean", json.loads("[" * 500 + "1.0" + "]" * 500)),
+    ("own", "inverse powers", [[4] + [0] * 119] * 7),
+    ("own", "inverse powers", [[0.5] * 120] * 7),
+    ("own", "inverse powers", []),
+    ("own", "inverse hull", [-1.0] * 98),
+    ("own", "inverse inputs", ["q"]),
+    ("cubic", "kind", "other"),
+    ("cubic", "kind", "small"),
+    ("small", "inverse neurons", [32, 33]),
+    ("small", "kind", "published"),
+    ("small", "inverse activation", "relu"),
+    ("small", "forward precision", "float16"),
+    ("small", "forward weights", "abc"),
+    ("small", "forward weights", ["ab!d"]),
+    ("small", "forward weights", ["abcd"]),
+    ("small", "forward weights", weights_of(1411)),
+    ("small", "forward weights", weights_of(1410)),
+    ("physics", "forward beam EI_0", -1.0),
+    ("physics", "forward beam cap", 0.2),
+    ("friction", "friction", [0.1]),
+]
 
 
-def cut(*path: str) -> Callable[[dict[str, Any]], None]:
-    def change(d: dict[str, Any]) -> None:
-        for key in path[:-1]:
-            d = d[key]
-        del d[path[-1]]
-
-    return change
-
-
-def put(value: Any, *path: str) -> Callable[[dict[str, Any]], None]:
-    def change(d: dict[str, Any]) -> None:
-        for key in path[:-1]:
-            d = d[key]
-        d[path[-1]] = value
-
-    return change
+def test_what_is_no_model_is_refused(wording: Wording):
+    texts = {"own": model_text(model()), **dict(zip(KINDS, SHIPPED, strict=True))}
+    without = [(kind, place, CUT) for kind, places in WITHOUT.items() for place in places]
+    for kind, place, value in without + FAULTS:
+        changed = json.loads(texts[kind])
+        *way, last = place.split()
+        at = functools.reduce(dict[str, Any].__getitem__, way, changed)
+        if value is CUT:
+            del at[last]
+        else:
+            at[last] = value
+        with pytest.raises(InvalidModel) as caught:
+            parse_model(json.dumps(changed), "x.json")
+        wording.check(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("change", "sentence"),
-    [
-        (cut("inverse"), "the file has no 'inverse'"),
-        (cut("forward", "hull"), "forward has no 'hull'"),
-        (cut("links", "L_2"), "links has no 'L_2'"),
-        (cut("provenance"), "no 'provenance'"),
-        (put(1, "version"), "its version is 1; this program reads version 2"),
-        (cut("kind"), "the file has no 'kind'"),
-        (cut("friction"), "the file has no 'friction'"),
-        (cut("sha256"), "the file has no 'sha256'"),
-        (put(0.2251, "links", "L_2"), "it is damaged, or was changed by hand"),
-        (put("other", "format"), "its format is 'other'"),
-        (put(None, "links"), "links must be an object, not NoneType"),
-        (put("LEFT", "links", "elbow"), "links.elbow is 'LEFT'"),
-        (put(-1.0, "links", "L_3"), "must be above 0"),
-        (put([1.0] * 6, "inverse", "mean"), r"inverse.mean has the shape \[6\], not \[7\]"),
-        (put([1.0] * 7, "inverse", "coefficients"), r"shape \[7\], not \[3, 120\]"),
-        (put([[1.0], [1.0, 2.0]], "inverse", "coefficients"), "its rows differ in length"),
-        (put([0.0] * 7, "forward", "scale"), "forward.scale must be above 0"),
-        (put([float("nan")] * 7, "forward", "mean"), "forward.mean must be made of finite numbers"),
-        (put([float("inf")] * 7, "forward", "scale"), "forward.scale must be made of finite numbers"),
-        (put([10**400] * 7, "forward", "mean"), "forward.mean must be made of finite numbers"),
-        (put([True] * 7, "forward", "mean"), "forward.mean must be made of finite numbers"),
-        (put("0", "forward", "mean"), "forward.mean must be made of finite numbers"),
-        (put([[4] + [0] * 119] * 7, "inverse", "powers"), "powers must be whole numbers"),
-        (put([[0.5] * 120] * 7, "inverse", "powers"), "powers must be whole numbers"),
-        (put([], "inverse", "powers"), r"inverse.powers has the shape \[0\], not \[7, any\]"),
-        (put([-1.0] * 98, "inverse", "hull"), "inverse.hull is empty"),
-        (put(["q"], "inverse", "inputs"), "inverse.inputs are"),
-    ],
-)
-def test_what_is_no_model_is_refused(change: Callable[[dict[str, Any]], None], sentence: str):
-    changed = content()
-    change(changed)
-    with pytest.raises(InvalidModel, match=sentence) as caught:
-        parse_model(json.dumps(changed), "x.json")
-    assert "model x.json" in str(caught.value)
-
-
-def test_numbers_within_many_lists_are_refused():
-    deep = json.loads("[" * 500 + "1.0" + "]" * 500)
-    changed = content()
-    put(deep, "forward", "mean")(changed)
-    with pytest.raises(InvalidModel, match=r"forward\.mean must be made of finite numbers"):
-        parse_model(json.dumps(changed), "x.json")
-
-
-@pytest.mark.parametrize(
-    ("text", "change", "sentence"),
-    [
-        (SHIPPED[0], put("other", "kind"), "its kind is 'other', not one of cubic, small, published, physics"),
-        (SHIPPED[0], put("small", "kind"), "inverse has no 'neurons'"),
-        (SHIPPED[1], put([32, 33], "inverse", "neurons"), r"neurons are \[32, 33\]; a small network has \[32, 32\]"),
-        (SHIPPED[1], put("published", "kind"), "a published network has"),
-        (SHIPPED[1], put("relu", "inverse", "activation"), "activation is 'relu', not 'tanh'"),
-        (SHIPPED[1], put("float16", "forward", "precision"), "precision is 'float16'"),
-        (SHIPPED[1], put("abc", "forward", "weights"), "weights must be a list of texts"),
-        (SHIPPED[1], put(["ab!d"], "forward", "weights"), "weights is not base64"),
-        (SHIPPED[1], put(["abcd"], "forward", "weights"), "weights is no whole number of 4 bytes"),
-        (SHIPPED[2], cut("inverse", "beam"), "inverse has no 'beam'"),
-        (SHIPPED[2], put(-1.0, "forward", "beam", "EI_0"), "forward.beam.EI_0 must be above 0"),
-        (SHIPPED[2], put(0.2, "forward", "beam", "cap"), "two caps leave nothing"),
-        (SHIPPED[3], cut("nominal"), "the file has no 'nominal'"),
-        (SHIPPED[3], put([0.1], "friction"), r"friction has the shape \[1\], not \[2\]"),
-    ],
-)
-def test_what_is_no_model_of_its_kind_is_refused(text: str, change: Callable[[dict[str, Any]], None], sentence: str):
-    changed = json.loads(text)
-    change(changed)
-    with pytest.raises(InvalidModel, match=sentence):
-        parse_model(json.dumps(changed), "x.json")
-
-
-def test_weights_that_are_not_finite_are_refused():
-    changed = json.loads(SHIPPED[1])
-    data = np.full(1411, np.nan, "<f4").tobytes()
-    changed["forward"]["weights"] = [base64.b64encode(data).decode()]
-    with pytest.raises(InvalidModel, match="must be made of finite numbers"):
-        parse_model(json.dumps(changed), "x.json")
-    changed["forward"]["weights"] = [base64.b64encode(data[:-4]).decode()]
-    with pytest.raises(InvalidModel, match=r"weights must be made|has 1410 numbers, not 1411"):
-        parse_model(json.dumps(changed), "x.json")
-
-
-@pytest.mark.parametrize("text", ["", "{", "[]", "null", "[" * 100000, '{"format": 1}'])
-def test_other_text_is_refused(text: str):
-    with pytest.raises(InvalidModel):
-        parse_model(text, "x.json")
-
-
-def test_files_that_cannot_be_read_are_refused(tmp_path: Path):
+def test_other_texts_and_files_are_refused(tmp_path: Path):
+    for text in ("", "{", "[]", "null", "[" * 100000, '{"format": 1}'):
+        with pytest.raises(InvalidModel):
+            parse_model(text, "x.json")
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
     for name in ("none.json", "binary", "."):
-        with pytest.raises(InvalidModel, match=r"cannot be read|there is no such file"):
+        with pytest.raises(InvalidModel):
             read_model(tmp_path / name)

@@ -6,9 +6,9 @@ import itertools
 import numpy as np
 import pytest
 
-from handover.controllers.vsl.fit_network import Points, fit_published, fit_small, published_module, torch_or_refusal
+from handover.controllers.vsl.fit_network import Points, fit_published, fit_small, torch_or_refusal
 from handover.controllers.vsl.learned_model import Learned
-from handover.controllers.vsl.network import ACTIVATIONS, LAYERS, Activation, Network, Weights
+from handover.controllers.vsl.network import ACTIVATIONS, LAYERS, Network, Weights
 from handover.cosim.blocks.ports import Floats
 
 RNG = np.random.default_rng(2)
@@ -20,28 +20,12 @@ def values(x: Floats) -> Floats:
     return np.column_stack([np.sin(z[:, 1]) + z[:, 3] * z[:, 5], z[:, 2] ** 2, 0.1 * z[:, 6]]) * 0.01
 
 
-def parts(kind: Learned, dtype: str) -> list[Weights]:
-    sizes = (7, *LAYERS[kind], 3)
-    rng = np.random.default_rng(4)
-    made: list[Weights] = []
-    for n, m in itertools.pairwise(sizes):
-        made += [(rng.normal(size=(n, m)) / np.sqrt(n)).astype(dtype), rng.normal(size=m).astype(dtype) * 0.1]
-    return made
-
-
 def network(kind: Learned, dtype: str = "float64") -> Network:
-    made = parts(kind, dtype)
-    hull = np.full(98, 9.0)
-    return Network(
-        X.mean(axis=0),
-        X.std(axis=0),
-        hull,
-        tuple(made[0::2]),
-        tuple(made[1::2]),
-        ACTIVATIONS[kind],
-        np.array([0.3, 0.0, 0.2]),
-        np.full(3, 0.1),
-    )
+    rng, made = np.random.default_rng(4), list[Weights]()
+    for n, m in itertools.pairwise((7, *LAYERS[kind], 3)):
+        made += [(rng.normal(size=(n, m)) / np.sqrt(n)).astype(dtype), rng.normal(size=m).astype(dtype) * 0.1]
+    domain, values = (X.mean(axis=0), X.std(axis=0), np.full(98, 9.0)), (np.array([0.3, 0.0, 0.2]), np.full(3, 0.1))
+    return Network(*domain, tuple(made[0::2]), tuple(made[1::2]), ACTIVATIONS[kind], *values)
 
 
 PYTORCH = {
@@ -59,42 +43,15 @@ PYTORCH = {
 """What PyTorch 2.13 gives for the first three inputs, in double precision."""
 
 
-def test_the_published_network_has_the_published_layers():
-    weights = network(Learned.PUBLISHED).weights
-    assert [W.shape for W in weights] == [
-        (7, 64),
-        (64, 256),
-        (256, 1024),
-        (1024, 1024),
-        (1024, 256),
-        (256, 64),
-        (64, 3),
-    ]
-    assert network(Learned.PUBLISHED).activation is Activation.RELU
-    assert network(Learned.PUBLISHED).neurons == LAYERS[Learned.PUBLISHED]
-
-
 @pytest.mark.parametrize("kind", list(PYTORCH))
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_numpy_gives_what_pytorch_gave(kind: Learned, dtype: str):
     np.testing.assert_allclose(network(kind, dtype).predict(X[:3]), PYTORCH[kind], atol=1e-6, rtol=0.0)
 
 
-@pytest.mark.parametrize("dtype", ["float32", "float64"])
-def test_numpy_gives_what_pytorch_gives(dtype: str):
-    torch = pytest.importorskip("torch")
-    published = network(Learned.PUBLISHED, dtype)
-    module = published_module(torch, parts(Learned.PUBLISHED, dtype))
-    with torch.no_grad():
-        z = torch.tensor(published.standardised(X), dtype=torch.float32)
-        theirs = published.mean_y + published.scale_y * module(z).numpy()
-    np.testing.assert_allclose(published.predict(X), theirs, atol=1e-6, rtol=0.0)
-    np.testing.assert_allclose(published.predict(X[0]), theirs[0], atol=1e-6, rtol=0.0)
-
-
-@pytest.mark.parametrize("kind", [Learned.SMALL, Learned.PUBLISHED])
-def test_the_jacobian_is_the_derivative(kind: Learned):
-    made, x = network(kind), X[7]
+def test_the_published_networks_jacobian_is_the_derivative():
+    """The small one's is among the models' of `test_feedback`."""
+    made, x = network(Learned.PUBLISHED), X[7]
     step = 1e-6 * X.std(axis=0)
     J = [(made.predict(x + h) - made.predict(x - h)) / (2.0 * h.sum()) for h in np.diag(step)]
     np.testing.assert_allclose(made.jacobian(x) * X.std(axis=0), np.transpose(J) * X.std(axis=0), atol=1e-7)
