@@ -39,6 +39,17 @@ def assert_continues(
         np.testing.assert_array_equal(rest, path[begin : begin + steps])
 
 
+def assert_passed_on(make: Callable[[], Any], inputs: Sequence[Any], every: int, dt: float) -> None:
+    """Assert that a unit which hands its state to a new one after every so many steps is the same as one that stays."""
+    stays, passed_on = make(), make()
+    for n, u in enumerate(inputs):
+        if n % every == 0:
+            state, passed_on = passed_on.get_state(), make()
+            passed_on.set_state(state)
+        assert np.array_equal(flat(passed_on.step(n * dt, dt, u)), flat(stays.step(n * dt, dt, u)), equal_nan=True)
+        assert passed_on.get_state() == stays.get_state()
+
+
 def assert_outputs_change_nothing(make: Callable[[], Any], u: Any, dt: float = 0.016, *, same: bool = False) -> None:
     """Assert that outputs may be asked for at the start; with `same` they are those of the first step."""
     asked, other = make(), make()

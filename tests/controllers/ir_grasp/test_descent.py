@@ -31,39 +31,26 @@ def test_a_linear_scene_is_solved_in_few_steps():
 def test_a_step_that_raises_the_cost_leads_back_and_halves_alpha():
     d = descent(max_step=np.ones(4))
     first = np.array(d.next_command(X)) - X
-    worse = np.array([0.021, 0.02])
-    assert d.judge(X, worse, (0.0,) * 4) is Verdict.BACK
+    assert d.judge(X, np.array([0.021, 0.02]), (0.0,) * 4) is Verdict.BACK
     assert d.best == X
     d.measure(X, np.array([0.02, 0.02]), X)
     d.probed(J)
     assert np.allclose(np.array(d.next_command(X)) - X, 0.5 * first)
 
 
-def test_steps_without_progress_end_the_descent():
-    d, r = descent(stalled_steps=3), np.array([0.02, 0.02])
-    verdicts = [d.judge(X, r * (1.0 - 0.001 * k), X) for k in (1, 2, 3)]
-    assert verdicts[:2] == [Verdict.STEP] * 2
-    assert verdicts[2] is Verdict.STALLED
-
-
-def test_steps_are_limited():
-    d = descent(max_steps=2)
-    assert d.judge(X, np.array([0.018, 0.018]), X) is Verdict.STEP
-    assert d.judge(X, np.array([0.015, 0.015]), X) is Verdict.USED_UP
-
-
-def test_the_jacobian_is_probed_anew_after_some_steps():
-    d = descent(probe_every=2)
-    assert d.judge(X, np.array([0.018, 0.018]), X) is Verdict.STEP
-    assert d.judge(X, np.array([0.015, 0.015]), X) is Verdict.PROBE
-
-
-def test_as_printed_every_step_is_probed():
-    d = Descent(Params(literal=True))
-    d.measure(X, np.array([0.04, 0.04]), X)
-    d.probed(J)
-    assert d.judge(X, np.array([0.035, 0.035]), X) is Verdict.PROBE
-    assert d.judge(X, np.array([0.012, 0.012]), X) is Verdict.REACHED
+@pytest.mark.parametrize(
+    ("params", "distances", "verdicts"),
+    [
+        ({"stalled_steps": 3}, (0.01998, 0.01996, 0.01994), (Verdict.STEP, Verdict.STEP, Verdict.STALLED)),
+        ({"max_steps": 2}, (0.018, 0.015), (Verdict.STEP, Verdict.USED_UP)),
+        ({"probe_every": 2}, (0.018, 0.015), (Verdict.STEP, Verdict.PROBE)),
+        ({"literal": True}, (0.018, 0.012), (Verdict.PROBE, Verdict.REACHED)),
+    ],
+)
+def test_verdicts_on_steps(params: dict[str, Any], distances: tuple[float, ...], verdicts: tuple[Verdict, ...]):
+    """What ends a descent, and when its Jacobian is probed anew: as printed, at every step."""
+    d = descent(**params)
+    assert tuple(d.judge(X, np.full(2, r), X) for r in distances) == verdicts
 
 
 def test_commands_stay_within_reach():

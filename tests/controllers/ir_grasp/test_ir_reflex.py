@@ -2,11 +2,12 @@
 
 import dataclasses
 import math
-import pickle
 from typing import Any
 
 import numpy as np
 import pytest
+from support.restored_states import assert_outputs_change_nothing, assert_passed_on
+from support.wording import Wording
 
 from handover.controllers.ir_grasp.ir_reflex import (
     Inputs,
@@ -20,7 +21,7 @@ from handover.controllers.ir_grasp.ir_reflex import (
     Strategy,
     Visibility,
 )
-from handover.controllers.ir_grasp.visibility import RECOVERY, Action
+from handover.controllers.ir_grasp.visibility import RECOVERY, Recovery, displaced
 
 DT = 0.015
 CURVE = Params().calibration
@@ -64,14 +65,15 @@ def inputs(x: tuple[float, ...], distances: Any) -> Inputs:
     return Inputs(ticks=ticks, p_WH=np.array(x[:2]), yaw=x[2], sigma=x[3])
 
 
-def run(scene: Scene, reflex: IrReflex, seconds: float = 60.0) -> list[Outputs]:
+def run(scene: Scene, reflex: IrReflex, given: list[Inputs] | None = None) -> list[Outputs]:
     seen: list[Outputs] = []
-    for k in range(round(seconds / DT)):
-        y = reflex.step(k * DT, DT, scene.inputs())
-        seen.append(y)
-        scene.follow(y)
-        if y.phase is Phase.DONE:
-            break
+    while not (seen and seen[-1].phase is Phase.DONE):
+        assert len(seen) * DT < 60.0
+        u = scene.inputs()
+        seen.append(reflex.step(len(seen) * DT, DT, u))
+        scene.follow(seen[-1])
+        if given is not None:
+            given.append(u)
     return seen
 
 
@@ -118,20 +120,8 @@ def test_blind_closes_at_the_pre_grasp_pose_and_forward_35_mm_ahead():
         seen = run(Scene(p_WO=(0.0, 0.02)), IrReflex(pregrasp(-0.17, 0.01, yaw_pregrasp=0.3, strategy=strategy)))
         closing = next(y for y in seen if y.phase is Phase.CLOSE)
         assert closing.p_WH_cmd == pytest.approx([-0.17 + ahead * math.cos(0.3), 0.01 + ahead * math.sin(0.3)])
-        assert closing.stop is stop
-        assert seen[-1].steps == 0
+        assert (closing.stop, seen[-1].steps) == (stop, 0)
         assert not {Phase.CHECK, Phase.PROBE, Phase.STEP} & set(phases(seen))
-
-
-def test_between_two_probings_the_jacobian_is_updated_but_as_printed_every_step_is_probed():
-    def probings_and_steps(literal: bool) -> tuple[int, int]:
-        seen = run(Scene(p_WO=(0.01, 0.015)), IrReflex(pregrasp(-0.15, 0.0, literal=literal)))
-        return phases(seen).count(Phase.PROBE), seen[-1].steps
-
-    probings, steps = probings_and_steps(literal=False)
-    assert steps > probings
-    probings, steps = probings_and_steps(literal=True)
-    assert steps <= probings
 
 
 def test_as_printed_the_cost_is_of_the_distances_themselves():
@@ -142,35 +132,23 @@ def test_as_printed_the_cost_is_of_the_distances_themselves():
     assert own.cost == pytest.approx(0.5 * ((d[0] - 0.01) ** 2 + (d[2] - 0.01) ** 2))
     index_too = IrReflex(Params(weight=np.ones(3), literal=True)).outputs(0.0, u)
     assert index_too.cost == pytest.approx(0.5 * float(d @ d))
-
-
-def test_distances_are_those_of_equation_11_cut_at_the_sensors_range():
-    u = Inputs(ticks=np.array([0.0, 300.0, 4095.0]))
-    y = IrReflex(Params()).outputs(0.0, u)
-    assert y.distance.tolist() == [0.065, CURVE.distance(300.0), CURVE.distance(4095.0)]
-    assert y.case is Visibility.INDEX_RING
+    cut = IrReflex(Params()).outputs(0.0, Inputs(ticks=np.array([0.0, 300.0, 4095.0])))
+    assert cut.distance.tolist() == [0.065, CURVE.distance(300.0), CURVE.distance(4095.0)]
+    assert cut.case is Visibility.INDEX_RING
 
 
 @pytest.mark.parametrize("case", RECOVERY)
 def test_each_case_makes_the_hand_move_as_its_action_says(case: Visibility):
-    reflex, x = IrReflex(pregrasp(-0.15, 0.02, sigma_pregrasp=0.1)), (-0.15, 0.02, 0.0, 0.1)
-    near = [0.03 if case & (1 << i) else 0.065 for i in range(3)]
-    y = reflex.outputs(0.0, inputs(x, near))
+    reflex, x, p = IrReflex(pregrasp(-0.15, 0.02, sigma_pregrasp=0.1)), (-0.15, 0.02, 0.0, 0.1), Params()
+    u = inputs(x, [0.03 if case & (1 << i) else 0.065 for i in range(3)])
+    y = reflex.outputs(0.0, u)
     assert y.case is case
     for k in range(40):
-        y = reflex.step(k * DT, DT, inputs(x, near))
+        y = reflex.step(k * DT, DT, u)
         if y.phase not in (Phase.REACH, Phase.CHECK):
             break
-    moved = np.array([*y.p_WH_cmd, y.yaw_cmd, y.sigma_cmd]) - x
-    step, closing = Params().recovery_step, Params().recovery_closing
-    expected = {
-        Action.FORWARD: (step, 0.0, 0.0, 0.0),
-        Action.BACK: (-step, 0.0, 0.0, 0.0),
-        Action.TO_THUMB: (0.0, -step, 0.0, 0.0),
-        Action.TO_FINGERS: (0.0, step, 0.0, 0.0),
-        Action.CLOSE: (0.0, 0.0, 0.0, closing),
-    }[RECOVERY[case]]
-    assert moved == pytest.approx(expected)
+    motion = Recovery(p.recovery_step, p.recovery_closing, p.recovery_least).motion(case, may_close=True)
+    assert (*y.p_WH_cmd, y.yaw_cmd, y.sigma_cmd) == pytest.approx(displaced(x, motion))
     assert y.phase is (Phase.APPROACH if case is Visibility.NONE else Phase.RECOVER)
 
 
@@ -181,55 +159,23 @@ def test_a_hand_that_sees_nothing_goes_forward_to_its_reach_and_closes():
     assert closing.p_WH_cmd == pytest.approx([-0.15 + Params().reach[0], 0.0])
 
 
-def test_readings_that_alternate_between_the_sides_end_and_lead_forward():
-    reflex, scene, across = IrReflex(pregrasp(-0.15, 0.0)), Scene(x=(-0.15, 0.0, 0.0, 0.0)), 0.0
-    y = reflex.outputs(0.0, scene.inputs())
-    for k in range(4000):
-        near = (0.065, 0.03, 0.03) if scene.x[1] < 0.0005 else (0.03, 0.065, 0.065)
-        y = reflex.step(k * DT, DT, inputs(scene.x, near))
-        scene.follow(y)
-        across = max(across, abs(scene.x[1]))
-        if y.phase is Phase.CLOSE:
-            break
-    assert y.stop is Stop.REACH
-    assert y.p_WH_cmd[0] > -0.15 + 3 * Params().recovery_step
-    assert across <= 0.021
-
-
 def test_a_finger_outside_the_cost_is_not_waited_for():
-    reflex, x = IrReflex(pregrasp(-0.15, 0.0)), (-0.15, 0.0, 0.0, 0.0)
-    order: list[Phase] = []
-    for k in range(200):
-        y = reflex.step(k * DT, DT, inputs(x, (0.03, 0.065, 0.03)))
-        x = (*y.p_WH_cmd.tolist(), y.yaw_cmd, y.sigma_cmd)
-        order += [y.phase] if not order or order[-1] is not y.phase else []
-        if y.phase is Phase.PROBE:
-            break
-    assert order.count(Phase.RECOVER) == Params().waited_closings
-    assert x[3] == pytest.approx(Params().waited_closings * Params().recovery_closing)
+    reflex, x, p, seen = IrReflex(pregrasp(-0.15, 0.0)), (-0.15, 0.0, 0.0, 0.0), Params(), list[Outputs]()
+    while not (seen and seen[-1].phase is Phase.PROBE):
+        seen.append(reflex.step(len(seen) * DT, DT, inputs(x, (0.03, 0.065, 0.03))))
+        x = (*seen[-1].p_WH_cmd.tolist(), seen[-1].yaw_cmd, seen[-1].sigma_cmd)
+        assert len(seen) < 200
+    assert phases(seen).count(Phase.RECOVER) == p.waited_closings
+    assert seen[-2].sigma_cmd == pytest.approx(p.waited_closings * p.recovery_closing)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("literal", "p_x"),
-    [(False, -0.16), (False, -0.11), (True, -0.11)],  # far off, and so near that the index sees past the object
-)
-def test_it_goes_on_from_any_state_bit_for_bit(literal: bool, p_x: float):
-    params = pregrasp(p_x, 0.0, literal=literal)
-    one, passed_on, scene, met = IrReflex(params), IrReflex(params), Scene(p_WO=(0.01, 0.015)), set[Phase]()
-    for k in range(3000):
-        if k % 3 == 0:
-            state, passed_on = passed_on.get_state(), IrReflex(params)
-            passed_on.set_state(state)
-        u = scene.inputs()
-        y, again = one.step(k * DT, DT, u), passed_on.step(k * DT, DT, u)
-        assert pickle.dumps(y) == pickle.dumps(again)
-        met.add(y.phase)
-        scene.follow(y)
-        if y.phase is Phase.DONE:
-            break
-    assert set(Phase) - {Phase.APPROACH, Phase.RECOVER, Phase.SEARCH, Phase.TRACK} <= met
-    assert (Phase.RECOVER in met) or p_x < -0.15
+def test_it_goes_on_from_any_state_bit_for_bit():
+    """From a pre-grasp pose so near that the index sees past the object."""
+    params, given = pregrasp(-0.11, 0.0), list[Inputs]()
+    met = set(phases(run(Scene(p_WO=(0.01, 0.015)), IrReflex(params), given)))
+    assert met == set(Phase) - {Phase.APPROACH, Phase.SEARCH, Phase.TRACK}
+    assert_passed_on(lambda: IrReflex(params), given, 3, DT)
+    assert_outputs_change_nothing(lambda: IrReflex(params), Scene().inputs(), DT, same=True)
 
 
 def test_a_reading_that_is_no_number_is_refused_and_leaves_no_trace():
@@ -240,42 +186,13 @@ def test_a_reading_that_is_no_number_is_refused_and_leaves_no_trace():
     assert reflex.get_state() == other.get_state()
 
 
-def test_outputs_at_the_start_are_those_of_the_first_step_while_nothing_is_decided():
-    reflex, scene = IrReflex(Params()), Scene()
-    before = reflex.outputs(0.0, scene.inputs())
-    assert pickle.dumps(before) == pickle.dumps(reflex.step(0.0, DT, scene.inputs()))
-
-
-def test_all_faults_of_the_parameters_are_reported_together():
-    bad = Params(
-        probe=np.array([0.004, 0.004, 0.04, 0.0]),
-        weight=np.zeros(3),
-        damping=0.0,
-        alpha=0.0,
-        epsilon=0.07,
-        b=0.0,
-        sigma_pregrasp=0.9,
-        recovery_least=0.02,
-    )
-    with pytest.raises(InvalidReflexParameters) as refused:
-        IrReflex(bad)
-    text = "; ".join(refused.value.faults)
-    for name in (
-        "probe of sigma",
-        "weight",
-        "damping",
-        "alpha",
-        "epsilon",
-        "b = 0",
-        "sigma_pregrasp",
-        "recovery_least",
+def test_all_faults_of_the_parameters_are_reported_together(wording: Wording):
+    no_probe, coarse = np.array([0.004, 0.004, 0.04, 0.0]), np.full(4, 0.01)
+    for bad in (
+        {"probe": no_probe, "weight": np.zeros(3), "damping": 0.0, "alpha": 0.0, "epsilon": 0.07, "b": 0.0},
+        {"sigma_pregrasp": 0.9, "recovery_least": 0.02, "target": 0.003, "distance_max": 0.09, "tolerance": coarse},
+        {"scans": 0},
     ):
-        assert name in text
-
-
-@pytest.mark.parametrize(
-    ("name", "value"), [("target", 0.003), ("distance_max", 0.09), ("tolerance", np.full(4, 0.01)), ("scans", 0)]
-)
-def test_a_value_with_which_it_cannot_work_is_refused(name: str, value: Any):
-    with pytest.raises(InvalidReflexParameters, match=name):
-        IrReflex(Params(**{name: value}))
+        with pytest.raises(InvalidReflexParameters) as refused:
+            IrReflex(Params(**bad))
+        wording.check("\n".join(refused.value.faults))
