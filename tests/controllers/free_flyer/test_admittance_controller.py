@@ -15,7 +15,6 @@ from handover.controllers.free_flyer.admittance_controller import AdmittanceCont
 from handover.controllers.free_flyer.body import InvalidControllerParameters
 from handover.controllers.free_flyer.ports import Behaviour
 from handover.controllers.free_flyer.published_rate import PUBLISHED_PERIOD, AdmittanceController67
-from handover.controllers.free_flyer.rotations import InvalidOrientation
 from handover.controllers.free_flyer.wrench_observer import ThrustModel, WrenchObserver
 from handover.cosim.blocks.description import describe
 from handover.cosim.blocks.ports import Floats
@@ -35,14 +34,7 @@ def steady(axis: int, size: float, seconds: float) -> Floats:
 
 @pytest.mark.parametrize(
     ("behaviour", "ratio", "axis"),
-    [
-        (Behaviour.RIGID, 0.5, 1),
-        (Behaviour.RIGID, 1.0, 0),
-        (Behaviour.RIGID, 2.0, 2),
-        (Behaviour.COMPLIANT, 0.5, 2),
-        (Behaviour.COMPLIANT, 1.0, 1),
-        (Behaviour.COMPLIANT, 2.0, 0),
-    ],
+    [(Behaviour.RIGID, 0.5, 1), (Behaviour.RIGID, 1.0, 2), (Behaviour.COMPLIANT, 2.0, 0)],
 )
 def test_a_step_of_force_moves_the_gripper_as_the_virtual_mass(behaviour: Behaviour, ratio: float, axis: int):
     """1 / (m_v s^2 + k_B s + k_D) along every axis, also where the lever would turn the body."""
@@ -55,40 +47,14 @@ def test_a_step_of_force_moves_the_gripper_as_the_virtual_mass(behaviour: Behavi
     assert np.max(np.abs(real[:, 3:])) < 0.02
 
 
-def test_the_slower_the_observer_the_farther_the_gripper_is_from_the_virtual_body():
-    k, b = SPRING[Behaviour.RIGID]
-    t = T * np.arange(round(4.0 / T))
-    wanted = 0.05 * control.step_response(control.tf([1.0], [MASS, b, k]), t).outputs
-    controllers = [AdmittanceController(replace(PROMPT, observer_rate=rate)) for rate in (3.0, 10.0, 30.0)]
-    errors = [np.max(np.abs(pushed(c, steady(0, 0.05, 4.0))[:, 0] - wanted)) for c in controllers]
-    assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2]
-
-
-@pytest.mark.parametrize("axis", range(6))
-def test_small_pushes_move_the_gripper_as_linear_theory_says(axis: int):
-    controller = AdmittanceController(PROMPT)
+@pytest.mark.parametrize(("axis", "delay"), [*((axis, 0) for axis in range(6)), (2, 2)])
+def test_small_pushes_move_the_gripper_as_linear_theory_says(axis: int, delay: int):
+    controller = AdmittanceController(replace(PROMPT, delay=delay * T))
     wrench = steady(axis, 0.05 if axis < 3 else 0.01, 3.0)
     wrench[round(0.5 / T) :] = 0.0
     predicted = controller.loop.response(wrench)[:, :6]
-    real = pushed(controller, wrench)
+    real = pushed(controller, wrench, delay)
     assert np.max(np.abs(real - predicted)) < 0.01 * np.max(np.abs(predicted[:, axis]))
-
-
-def test_prediction_holds_with_a_delay_that_is_known():
-    controller = AdmittanceController(replace(PROMPT, delay=2 * T))
-    wrench = steady(2, 0.05, 3.0)
-    predicted = controller.loop.response(wrench)[:, :6]
-    assert np.max(np.abs(pushed(controller, wrench, delay=2) - predicted)) < 0.01 * np.max(np.abs(predicted[:, 2]))
-
-
-def test_the_estimate_converges_to_a_constant_wrench_at_its_rate():
-    rate, wrench = 10.0, np.array([0.3, -0.2, 0.1, 0.01, 0.02, -0.01])
-    controller, body = AdmittanceController(replace(PROMPT, observer_rate=rate)), Body()
-    for n in range(round(1.0 / T)):
-        y = controller.step(n * T, T, body.measured())
-        felt = np.concatenate([y.f_G_est, y.tau_G_est])
-        np.testing.assert_allclose(felt, (1.0 - math.exp(-rate * n * T)) * wrench, atol=0.01 * np.max(wrench))
-        body.push(y.f_cmd, y.tau_cmd, wrench[:3], wrench[3:], T)
 
 
 def test_the_observer_alone_forgets_exponentially_and_takes_thrust_for_no_wrench():
@@ -100,7 +66,7 @@ def test_the_observer_alone_forgets_exponentially_and_takes_thrust_for_no_wrench
         memory, h = observer.following(memory, h, thrust), h + T * (thrust + wrench)
 
 
-@pytest.mark.parametrize(("lag", "delay"), [(0.0, 0.04), (0.02, 0.0), (0.02, 0.005), (0.3, 0.016), (0.3, 0.04)])
+@pytest.mark.parametrize(("lag", "delay"), [(0.0, 0.04), (0.02, 0.005), (0.3, 0.016)])
 def test_the_model_of_the_propulsion_is_that_of_the_thrusters(lag: float, delay: float):
     model, rng = ThrustModel(lag, delay, T), np.random.default_rng(3)
     plant = thrusters.Thrusters(thrusters.Params(lag=lag, delay=delay, f_max=np.full(3, 9.0), tau_max=np.full(3, 9.0)))
@@ -147,18 +113,13 @@ def test_where_the_goal_changes_the_gripper_is_drawn_from_where_it_is():
 
 
 def test_a_restored_state_continues_bit_for_bit():
-    body, given = Body(), list[Inputs]()
-    controller = AdmittanceController(Params(delay=0.02))
+    controller, body, given = AdmittanceController(Params(delay=0.02)), Body(), list[Inputs]()
     for n in range(90):
         given.append(body.measured())
         y = controller.step(n * T, T, given[-1])
         body.push(y.f_cmd, y.tau_cmd, np.array([0.2, 0.1, -0.3]), np.zeros(3), T)
     assert_continues(lambda: AdmittanceController(Params(delay=0.02)), given.__getitem__, [1, 60], 30)
-
-
-def test_outputs_tell_the_step_and_change_nothing():
-    u = Body(v=np.array([0.1, 0.0, 0.0])).measured()
-    assert_outputs_change_nothing(lambda: AdmittanceController(PROMPT), u, same=True)
+    assert_outputs_change_nothing(lambda: AdmittanceController(PROMPT), given[60], same=True)
 
 
 def test_a_delay_that_is_known_leaves_the_virtual_body_alone_until_the_inner_loop_cannot_bear_it():
@@ -168,28 +129,18 @@ def test_a_delay_that_is_known_leaves_the_virtual_body_alone_until_the_inner_loo
     assert late.damping_ratio == pytest.approx(prompt.damping_ratio, abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
+def test_what_cannot_work_is_refused_with_a_remedy(wording: Wording):
+    unusable: tuple[dict[str, Any], ...] = (
         {"k_x": 900.0, "k_v": 200.0},
         {"delay": 0.1, "k_v": 20.0, "k_x": 100.0},
-        {"k_v": 0.0},
-        {"k_R": 0.0},
-        {"mass": np.inf},
-        {"delay": -0.01},
+        {"k_v": 0.0, "k_R": 0.0},
+        {"mass": np.inf, "delay": -0.01},
         {"behaviour": Behaviour.CUSTOM, "damping_rotation": np.zeros((3, 3))},
-    ],
-    ids=["gains too high", "delay too long", "k_v", "k_R", "mass", "delay", "damping"],
-)
-def test_what_cannot_work_is_refused_with_a_remedy(changes: dict[str, Any], wording: Wording):
-    with pytest.raises(InvalidControllerParameters) as refused:
-        AdmittanceController(replace(Params(), **changes))
-    wording.check(refused.value)
-
-
-def test_orientation_that_is_none_is_refused():
-    with pytest.raises(InvalidOrientation, match="q_WB_meas"):
-        AdmittanceController(Params()).step(0.0, T, Inputs(q_WB_meas=np.zeros(4)))
+    )
+    for changes in unusable:
+        with pytest.raises(InvalidControllerParameters) as refused:
+            AdmittanceController(replace(Params(), **changes))
+        wording.check(refused.value)
 
 
 def test_turning_the_goal_turns_the_command():
@@ -205,27 +156,23 @@ def test_an_output_depends_directly_on_the_inputs_that_are_declared_and_on_no_ot
     controller, rng = AdmittanceController(Params(delay=T)), np.random.default_rng(5)
 
     def drawn(active: bool = True) -> Inputs:
-        q = np.array([1.0, *0.1 * rng.standard_normal(3)])
-        p, v, w = 0.02 * rng.standard_normal((3, 3))
-        goal = {"p_WG_goal": 0.02 * rng.standard_normal(3), "q_WG_goal": np.array([1.0, 0.1, 0.0, 0.0])}
-        return Inputs(p_WB_meas=p, q_WB_meas=q, v_WB_meas=v, w_WB_meas=w, active=active, **goal)
+        q, goal = (np.array([1.0, *0.1 * rng.standard_normal(3)]) for _ in range(2))
+        p, v, w, g = 0.02 * rng.standard_normal((4, 3))
+        places = {"p_WB_meas": p, "q_WB_meas": q, "p_WG_goal": g, "q_WG_goal": goal}
+        return Inputs(**places, v_WB_meas=v, w_WB_meas=w, active=active)
 
-    names = [v.name for v in describe(AdmittanceController).inputs]
     changed: dict[str, set[str]] = {v.name: set() for v in describe(AdmittanceController).outputs}
     for n in range(12):
         u = drawn()
         for _ in range(5):
             controller.step(0.0, T, u)
         for given in (u, drawn(active=n % 3 > 0)):
-            before = vars(controller.outputs(0.0, given))
-            for name in names:
-                other: Any = not given.active if name == "active" else getattr(drawn(), name)
-                if name == "q_WG_goal":
-                    other = np.array([1.0, 0.0, 0.2, 0.0])
-                after = vars(controller.outputs(0.0, replace(given, **{name: other})))
-                for output, seen in changed.items():
+            before, other = vars(controller.outputs(0.0, given)), vars(drawn(active=not given.active))
+            for name, value in other.items():
+                after = vars(controller.outputs(0.0, replace(given, **{name: value})))
+                for output in changed:
                     if not np.array_equal(before[output], after[output]):
-                        seen.add(name)
+                        changed[output].add(name)
     declared = AdmittanceController.feedthrough
     assert changed == {output: set(declared.get(output, ())) for output in changed}
 
@@ -239,5 +186,3 @@ def test_at_another_rate_loop_observer_and_virtual_body_have_that_rate():
     wrenches = [np.tile([0.05, 0.0, 0.0, 0.0, 0.0, 0.0], (round(2.0 / dt), 1)) for dt in (T, period)]
     ends = [c.loop.response(d)[-1, 0] for c, d in zip((slow, fast), wrenches, strict=True)]
     assert ends[0] == pytest.approx(ends[1], rel=0.01)
-    states = [c.step(0.0, 1.0, Inputs(active=True)).slowest_decay for c in (slow, fast)]
-    assert states == [slow.loop.slowest_decay, fast.loop.slowest_decay]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from support.controllers.decision_world import EMPTY, END, HOLDING, RECEIVE, TO_HUMAN, P, T, World, first, tug, world
-from support.restored_states import assert_continues, assert_outputs_change_nothing
+from support.restored_states import assert_outputs_change_nothing, assert_passed_on
 from support.wording import Wording
 
 from handover.controllers.free_flyer.handover_state_machine import (
@@ -27,6 +27,8 @@ from handover.controllers.free_flyer.published_rate import (
 )
 from handover.controllers.free_flyer.velocity_monitor import VelocityMonitor
 from handover.cosim.blocks.description import describe
+
+VELOCITIES = {"release_velocity": 0.1, "receive_velocity": 0.06}
 
 
 def test_robot_to_human_goes_through_figure_3_2():
@@ -110,28 +112,22 @@ def test_hold_yields_at_the_handover_pose_from_the_start_for_good():
 
 
 @pytest.mark.parametrize(
-    ("task", "behaviour", "threshold"),
+    ("task", "given", "threshold"),
     [
-        (HandoverTask.ROBOT_TO_HUMAN, Behaviour.RIGID, 0.059),
-        (HandoverTask.ROBOT_TO_HUMAN, Behaviour.COMPLIANT, 0.08),
-        (HandoverTask.HUMAN_TO_ROBOT, Behaviour.RIGID, 0.021),
-        (HandoverTask.HUMAN_TO_ROBOT, Behaviour.COMPLIANT, 0.037),
+        (HandoverTask.ROBOT_TO_HUMAN, {"behaviour": Behaviour.RIGID}, 0.059),
+        (HandoverTask.ROBOT_TO_HUMAN, {"behaviour": Behaviour.COMPLIANT}, 0.08),
+        (HandoverTask.HUMAN_TO_ROBOT, {"behaviour": Behaviour.RIGID}, 0.021),
+        (HandoverTask.HUMAN_TO_ROBOT, {"behaviour": Behaviour.COMPLIANT}, 0.037),
+        (HandoverTask.HUMAN_TO_ROBOT, {"behaviour": Behaviour.CUSTOM, **VELOCITIES}, 0.06),
+        (HandoverTask.ROBOT_TO_HUMAN, {"behaviour": Behaviour.CUSTOM, **VELOCITIES}, 0.1),
     ],
 )
-def test_published_velocities_decide(task: HandoverTask, behaviour: Behaviour, threshold: float):
+def test_published_velocities_decide_or_those_given(task: HandoverTask, given: dict[str, Any], threshold: float):
     """Just below the threshold nothing happens, just above it does."""
     for factor, moves in ((0.99, False), (1.01, True)):
-        w = world(task, tug(factor * threshold), behaviour=behaviour)
+        w = world(task, tug(factor * threshold), **given)
         w.run(12.0)
         assert (w.phases()[-1] is not P.CHECK_VELOCITY) is moves
-
-
-def test_given_velocities_replace_the_published_ones():
-    w = world(
-        HandoverTask.HUMAN_TO_ROBOT, tug(0.05), behaviour=Behaviour.CUSTOM, release_velocity=0.1, receive_velocity=0.06
-    )
-    w.run(10.0)
-    assert w.phases()[-1] is P.CHECK_VELOCITY
 
 
 def test_gripper_velocity_has_the_share_of_the_turning():
@@ -185,16 +181,10 @@ def test_without_the_gate_a_moving_robot_yields_signals_and_takes_its_own_motion
     assert P.CLOSE_GRIPPER in w.phases()
 
 
-@pytest.mark.parametrize(
-    "block", [HandoverStateMachine67, ImpedanceController67, AdmittanceController67, PoseController67]
-)
-def test_the_published_rate_is_67_5_hz(block: type[Any]):
-    assert describe(block).period == 1 / Fraction("67.5")
-
-
 def test_times_are_kept_at_the_published_rate():
-    machine = HandoverStateMachine67(Params(task=HandoverTask.HUMAN_TO_ROBOT, gripper_time=2.0))
-    steps = 0
+    for block in (HandoverStateMachine67, ImpedanceController67, AdmittanceController67, PoseController67):
+        assert describe(block).period == 1 / Fraction("67.5")
+    machine, steps = HandoverStateMachine67(Params(task=HandoverTask.HUMAN_TO_ROBOT, gripper_time=2.0)), 0
     while machine.step(steps * 2 / 135, 2 / 135, Inputs()).phase is P.OPEN_GRIPPER:
         steps += 1
     assert steps * 2 / 135 == pytest.approx(2.0, abs=0.02)
@@ -236,7 +226,7 @@ def test_low_pass_has_its_time_constant():
 def test_noise_of_the_estimate_trips_nothing():
     w = world(HandoverTask.HUMAN_TO_ROBOT, patience=1e4)
     w.rng = np.random.default_rng(3)
-    w.run(120.0)
+    w.run(60.0)
     assert w.phases()[-1] is P.CHECK_VELOCITY
 
 
@@ -246,8 +236,7 @@ def test_patience_ends_and_the_robot_holds_what_it_has():
     assert w.phases() == [*TO_HUMAN[:-1], P.GIVEN_UP]
     assert (y.impedance, y.pose, y.light, y.closure) == (False, True, False, 1.0)
     np.testing.assert_array_equal(y.p_WG_goal, w.p_WG)
-    checked = sum(x.phase is P.CHECK_VELOCITY for x in w.ys) * T
-    assert checked == pytest.approx(5.0, abs=0.05)
+    assert sum(x.phase is P.CHECK_VELOCITY for x in w.ys) * T == pytest.approx(5.0, abs=0.05)
 
 
 def test_object_that_is_not_there_is_noticed():
@@ -256,16 +245,6 @@ def test_object_that_is_not_there_is_noticed():
     y = w.run(10.0)[-1]
     assert w.phases() == [P.OPEN_GRIPPER, P.MOVE_TO_OBJECT, P.GRASP_OBJECT, P.GIVEN_UP]
     assert y.failed_receptions == 0
-
-
-def test_object_lost_on_the_way_is_noticed():
-    def lose(w: World) -> None:
-        if w.y and w.y.phase is P.MOVE_TO_HANDOVER:
-            w.angle_closed, w.follows = EMPTY, False
-
-    w = world(HandoverTask.ROBOT_TO_HUMAN, lose)
-    w.run(10.0)
-    assert w.phases()[-2:] == [P.MOVE_TO_HANDOVER, P.GIVEN_UP]
 
 
 def test_too_many_failures_end_it():
@@ -287,33 +266,20 @@ def test_object_is_approached_straight_ahead():
     np.testing.assert_allclose(goals[-1], [-0.1, -0.64, 0.0])
 
 
-def test_places_out_of_the_workspace_are_refused_all_at_once(wording: Wording):
-    with pytest.raises(InvalidHandoverParameters) as caught:
-        HandoverStateMachine(
-            Params(
-                task=HandoverTask.HUMAN_TO_ROBOT,
-                p_WG_handover=np.array([-0.5, 0.0, 0.0]),
-                p_WG_retreat=np.array([1.9, 0.0, 0.0]),
-                behaviour=Behaviour.CUSTOM,
-                receive_velocity=0.005,
-            )
-        )
-    assert len(caught.value.faults) == 4
-    wording.check(caught.value)
-
-
-def test_waits_that_outlast_the_patience_are_refused_unless_it_only_holds(wording: Wording):
+def test_what_cannot_work_is_refused_all_at_once(wording: Wording):
     impatient: dict[str, Any] = {"patience": 2.0, "signal_time": 3.0, "pause": 4.0}
-    with pytest.raises(InvalidHandoverParameters) as caught:
-        HandoverStateMachine(Params(task=HandoverTask.COLLABORATIVE, **impatient))
-    assert len(caught.value.faults) == 2
-    wording.check(caught.value)
+    away = {"p_WG_handover": np.array([-0.5, 0.0, 0.0]), "p_WG_retreat": np.array([1.9, 0.0, 0.0])}
+    unusable: tuple[tuple[dict[str, Any], int], ...] = (
+        ({"task": HandoverTask.HUMAN_TO_ROBOT, **away, "behaviour": Behaviour.CUSTOM, "receive_velocity": 0.005}, 4),
+        ({"task": HandoverTask.COLLABORATIVE, **impatient}, 2),
+        ({"q_WG_handover": np.zeros(4)}, 1),
+    )
+    for given, faults in unusable:
+        with pytest.raises(InvalidHandoverParameters) as caught:
+            HandoverStateMachine(Params(**given))
+        assert len(caught.value.faults) == faults
+        wording.check(caught.value)
     HandoverStateMachine(Params(task=HandoverTask.HOLD, **impatient))
-
-
-def test_orientation_that_is_none_is_refused():
-    with pytest.raises(InvalidHandoverParameters, match="q_WG_handover"):
-        HandoverStateMachine(Params(q_WG_handover=np.zeros(4)))
 
 
 def test_restored_state_continues_bit_for_bit():
@@ -322,17 +288,10 @@ def test_restored_state_continues_bit_for_bit():
     w.run(20.0)
     assert P.CLOSE_GRIPPER in w.phases()
     make = partial(HandoverStateMachine, Params(task=HandoverTask.COLLABORATIVE))
-    assert_continues(make, w.us.__getitem__, [round(t / T) for t in (0.0, 1.5, 4.0, 6.7, 8.5)], 700)
-
-
-def test_outputs_at_the_start_are_those_of_the_step_and_decide_nothing():
+    assert_passed_on(make, w.us, 6, T)
     u = Inputs(p_WB_meas=np.array([0.2, 0.1, 0.0]))
-    make = partial(HandoverStateMachine, Params(task=HandoverTask.ROBOT_TO_HUMAN))
     assert_outputs_change_nothing(make, u, same=True)
-    machine = make()
-    before = machine.get_state()
-    np.testing.assert_allclose(machine.outputs(0.0, u).p_WG_goal, [-0.1, 0.1, 0.0])
-    assert machine.get_state() == before
+    np.testing.assert_allclose(make().outputs(0.0, u).p_WG_goal, [-0.1, 0.1, 0.0])
 
 
 def test_inputs_are_not_kept():
