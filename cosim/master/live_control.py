@@ -123,8 +123,13 @@ class ControlledPacer(Pacer):
     Deadlines count from the last change of pace, and from the end of the last pause; so does the report.
     """
 
-    def __init__(self, control: LiveControl) -> None:
-        super().__init__(_finite(control.pace))
+    def __init__(
+        self,
+        control: LiveControl,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        super().__init__(_finite(control.pace), clock, sleep)
         self._control = control
         self._first: float = control.pace
         self._current: float = control.pace
@@ -149,7 +154,7 @@ class ControlledPacer(Pacer):
                 waited = True
                 if control.take_step():
                     break
-                time.sleep(_SLICE)
+                self._sleep(_SLICE)
                 continue
             control.forget_steps()
             if waited:

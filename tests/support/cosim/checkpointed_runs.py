@@ -1,21 +1,16 @@
-"""Runs of native units that are killed and resumed from a checkpoint."""
+"""Runs of native units that are resumed from a checkpoint."""
 
-import sys
 from fractions import Fraction
 from pathlib import Path
 
 from handover.cosim.master.checkpoint import Checkpointer, read_checkpoint
 from handover.cosim.master.master import Master
 from handover.cosim.record.recorder import Recorder
-from handover.cosim.system.signals import ObserveAfter, Observer, Signals
+from handover.cosim.system.signals import ObserveAfter, Observer
 from handover.cosim.system.system import System
 from support.cosim.native_units import native_fmu
 
 STOP, EVERY = Fraction(20), Fraction(7, 2)
-PASSED = 10.0
-"""Time at which a run prints that it may be killed, s."""
-WAITS = 10.4
-"""Time at which it waits to be killed, before its next checkpoint, s."""
 
 
 def record_of(folder: Path) -> Path:
@@ -59,16 +54,3 @@ def resume(folder: Path) -> float:
             write = Checkpointer(checkpoint_of(folder), EVERY, master, recorder)
             master.run(STOP, [ObserveAfter(c.time, observe) for observe in (recorder, write)])
     return c.time
-
-
-def stop_to_be_killed(t: float, signals: Signals) -> None:  # noqa: ARG001
-    """Print when PASSED is reached, go on, and wait at WAITS, before the next checkpoint is written."""
-    if t >= PASSED:
-        sys.stdout.write("passed\n")
-        sys.stdout.flush()
-    if t >= WAITS:
-        sys.stdin.read()
-
-
-if __name__ == "__main__":
-    run(Path(sys.argv[1]), stop_to_be_killed)

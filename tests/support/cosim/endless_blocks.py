@@ -1,18 +1,13 @@
-"""Blocks that do not return: in a step, or as they are made, until a file appears whose path is a parameter."""
+"""Blocks that do not return in a step, one of them until somebody opens a named pipe and closes it."""
 
 import os
 import re
 from pathlib import Path
 
-from support.cosim.master_blocks import Counter, CounterInputs, CounterOutputs, CounterParams
+from support.cosim.master_blocks import Counter, CounterInputs, CounterOutputs
 
 GO_ON = "ENDLESS_BLOCKS_GO_ON"
-"""Environment variable: the file whose appearance lets them go on."""
-
-
-def _wait() -> None:
-    while not Path(os.environ[GO_ON]).exists():
-        pass
+"""Environment variable: the pipe."""
 
 
 class HangsInStep(Counter):
@@ -20,16 +15,8 @@ class HangsInStep(Counter):
 
     def step(self, t: float, dt: float, u: CounterInputs) -> CounterOutputs:
         if t > 0.29:
-            _wait()
+            Path(os.environ[GO_ON]).read_bytes()
         return super().step(t, dt, u)
-
-
-class HangsAtOnce(Counter):
-    """Never starts."""
-
-    def __init__(self, params: CounterParams) -> None:
-        _wait()
-        super().__init__(params)
 
 
 class HoldsTheInterpreter(Counter):
