@@ -144,6 +144,9 @@ MANY = 100
             id="not passed by a pause",
         ),
         pytest.param(
+            0.1, {0.25: "pause", 0.5: "go"}, {0.0: 2, 0.25: 0, 0.5: 1, 0.59: 4}, id="and from the end of a pause"
+        ),
+        pytest.param(
             math.inf, {0.2: "slow", 0.75: "fast"}, {0.0: MANY, 0.21: 5, 0.76: MANY}, id="a pace counts from its setting"
         ),
     ],

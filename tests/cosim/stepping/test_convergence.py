@@ -34,9 +34,9 @@ def test_units_that_have_either_states_or_feedthrough(
 @pytest.mark.parametrize(
     ("extrapolation", "fmi", "expected", "algorithm"),
     [
-        *((HOLD, 2, 1, algorithm) for algorithm in Algorithm),
+        *((HOLD, 2, 1, algorithm) for algorithm in (Algorithm.GAUSS_SEIDEL, Algorithm.FIXED_POINT)),
         *((LINEAR, 2, 2, algorithm) for algorithm in (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL, Algorithm.NEWTON)),
-        *((LINEAR, 3, 1, algorithm) for algorithm in (Algorithm.JACOBI, Algorithm.GAUSS_SEIDEL)),  # one held value
+        (LINEAR, 3, 1, Algorithm.GAUSS_SEIDEL),  # one held value
     ],
 )
 def test_a_unit_with_both_state_and_feedthrough(
@@ -47,45 +47,30 @@ def test_a_unit_with_both_state_and_feedthrough(
 
 
 STRONGLY = equal_masses(k_c=4000.0, d_c=8.0)
-PERIOD = Fraction(1, 10)
-both = pytest.mark.parametrize("algorithm", [Algorithm.FIXED_POINT, Algorithm.NEWTON])
 
 
-def end(system: System, stop: Fraction, algorithm: Algorithm, **options: Any) -> tuple[Floats, Master]:
-    with Master(system, MasterOptions(algorithm=algorithm, **options)) as master:
-        master.run(stop)
+def end(algorithm: Algorithm, fmi: int = 3, **options: Any) -> tuple[Floats, Master]:
+    with Master(STRONGLY.two_units(Fraction(1, 10), fmi), MasterOptions(algorithm=algorithm, **options)) as master:
+        master.run(Fraction(2))
         return np.array([float(master.signals[name]) for name in STATES]), master
 
 
-@both
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_the_iterated_coupling_reaches_the_monolithic_solution_where_others_diverge(algorithm: Algorithm, fmi: int):
-    state, _ = end(STRONGLY.two_units(PERIOD, fmi), Fraction(2), algorithm)
-    assert state == pytest.approx(STRONGLY.implicit(0.1, 20), abs=1e-6)
-    assert np.max(np.abs(state)) < 1.5
-
-
-def test_jacobi_diverges_there():
-    assert np.max(np.abs(end(STRONGLY.two_units(PERIOD), Fraction(2), Algorithm.JACOBI)[0])) > 1e6
-
-
-def test_plain_fixed_point_iteration_would_diverge_there():
-    assert STRONGLY.gain(0.1) < -2.0
-
-
-def test_newton_needs_fewer_iterations():
-    _, slow = end(STRONGLY.two_units(PERIOD), Fraction(2), Algorithm.FIXED_POINT)
-    _, fast = end(STRONGLY.two_units(PERIOD), Fraction(2), Algorithm.NEWTON)
-    assert slow.iterations.steps == fast.iterations.steps == 20
-    assert fast.iterations.iterations < slow.iterations.iterations
-    assert fast.iterations.rollbacks < slow.iterations.rollbacks
+def test_the_iterated_coupling_reaches_the_monolithic_solution_where_others_diverge(fmi: int):
+    (slow, one), (fast, other) = end(Algorithm.FIXED_POINT, fmi), end(Algorithm.NEWTON, fmi)
+    for state in (slow, fast):
+        assert state == pytest.approx(STRONGLY.implicit(0.1, 20), abs=1e-6)
+    assert np.max(np.abs(slow)) < 1.5
+    assert one.iterations.steps == other.iterations.steps == 20
+    assert other.iterations.iterations < one.iterations.iterations
+    assert other.iterations.rollbacks < one.iterations.rollbacks
+    assert np.max(np.abs(end(Algorithm.JACOBI, fmi)[0])) > 1e6
+    assert STRONGLY.gain(0.1) < -2.0  # plain fixed-point iteration would diverge, too
 
 
 def test_both_solvers_come_to_the_same_the_closer_the_tighter_the_tolerance():
     def apart(tolerance: float) -> float:
-        one, _ = end(STRONGLY.two_units(PERIOD), Fraction(2), Algorithm.FIXED_POINT, tolerance=tolerance)
-        other, _ = end(STRONGLY.two_units(PERIOD), Fraction(2), Algorithm.NEWTON, tolerance=tolerance)
-        return float(np.linalg.norm(one - other))
+        ends = (end(a, tolerance=tolerance)[0] for a in (Algorithm.FIXED_POINT, Algorithm.NEWTON))
+        return float(np.linalg.norm(next(ends) - next(ends)))
 
-    assert apart(1e-12) < 1e-10
-    assert apart(1e-12) < apart(1e-3)
+    assert apart(1e-12) < min(1e-10, apart(1e-3))

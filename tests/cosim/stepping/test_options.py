@@ -2,12 +2,16 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
+from support.cosim.native_units import native_fmu
 from support.wording import Wording
 
-from handover.cosim.exceptions import InvalidOptions
-from handover.cosim.stepping.options import AdaptiveStep, MasterOptions
+from handover.cosim.exceptions import InvalidOptions, ScheduleError
+from handover.cosim.master.master import Master
+from handover.cosim.stepping.options import AdaptiveStep, Extrapolation, MasterOptions
+from handover.cosim.system.system import System
 
 NAN = float("nan")
+LINEAR, ADAPTIVE = {"extrapolation": Extrapolation.LINEAR}, {"adaptive": AdaptiveStep()}
 
 
 @pytest.mark.parametrize(
@@ -29,4 +33,24 @@ def test_all_that_is_none_is_refused_at_once_with_what_is_valid(
     with pytest.raises(InvalidOptions) as refused:
         options(**given)
     assert len(refused.value.faults) == (1 if given.get("relative") == 0.0 else len(given) - ("largest" in given))
+    wording.check(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("units", "options"),
+    [
+        pytest.param({"forgetful": "mass", "rigid": "fixed_step", "ball": "ball"}, ADAPTIVE, id="fixed"),
+        pytest.param({"clock": "ramp"}, ADAPTIVE, id="sampled"),
+        pytest.param({"mass": "mass"}, {"adaptive": AdaptiveStep(uncontrolled=("mass.w",))}, id="uncontrolled"),
+        pytest.param({"ball": "ball"}, LINEAR, id="line to events"),
+        pytest.param({"short": "discards"}, {**LINEAR, "repeat_discarded": True}, id="line to a discarded step"),
+    ],
+)
+def test_what_does_not_go_with_a_system_is_refused(units: dict[str, str], options: dict[str, Any], wording: Wording):
+    s = System()
+    for name, unit in units.items():
+        fmu = native_fmu(unit, canGetAndSetFMUState=False) if name == "forgetful" else native_fmu(unit)
+        s.add(name, fmu, sampled=name == "clock")
+    with pytest.raises(ScheduleError) as refused:
+        Master(s, MasterOptions(**options))
     wording.check(refused.value)
