@@ -1,4 +1,4 @@
-"""What watching a run costs it, and how often scenes are drawn: runs with a page and without, in a real browser.
+"""What watching a run costs it: runs with a page and without, in a real browser.
 
 Run with `pytest tests/benchmarks/test_live_speed.py --benchmark-enable -s`. The browser draws by software, on the cores
 of the run. CPU time is that of the run's own process: its page's server and the browser have theirs. A process takes
@@ -31,18 +31,6 @@ HANDOVER = (sys.executable, "-c", "from handover.scenarios.cli.entry import main
 FLAGS = ("--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 PACES = {"flyer_robot_to_human": "4", "helix_handover": "1"}
 """Of runs without cameras' pictures and with."""
-SCENES = ("flyer_robot_to_human", "helix_handover", "ir_grasp", "vsl_model_based")
-"""A scenario of each of the four systems."""
-DRAW = """async seconds => {
-  const counted = document.querySelector(".scene") ?? document.querySelector("[data-pictures]");
-  const before = Number(counted.dataset.pictures), end = performance.now() + 1000 * seconds;
-  while (performance.now() < end) {
-    live.scene.show(Infinity);
-    await new Promise(requestAnimationFrame);
-  }
-  return (Number(counted.dataset.pictures) - before) / seconds;
-}"""
-"""Draws the scene as often as the browser can; gives pictures a second."""
 DRAW_AS_A_RUN_DOES = "() => { setInterval(() => live.scene.show(Infinity), 1000 / 30); }"
 
 
@@ -116,20 +104,3 @@ def test_what_a_page_costs_its_run(
     told = ", ".join(f"{share:.1f} % {name}" for name, share in late.items())
     print(f"{scenario}: deadlines missed at pace {PACES[scenario]}: {told}")
     benchmark.extra_info.update(late)
-
-
-@pytest.mark.parametrize("scenario", SCENES)
-def test_how_often_a_scene_is_drawn(
-    benchmark: BenchmarkFixture, tmp_path: Path, wait_until: Waiter, scenario: str
-) -> None:
-    """Pictures a second that the browser draws by software, while the run is paused."""
-    rates: list[float] = []
-    with watched(wait_until, scenario, tmp_path / "run") as page:
-        page.get_by_label("pause").click()
-        page.get_by_label("go on").wait_for()
-        benchmark.pedantic(lambda: rates.append(page.evaluate(DRAW, 3.0)), rounds=3 if benchmark.enabled else 1)
-        page.locator("#stop").click()
-    rate = float(np.median(rates))
-    print(f"\n{scenario}: {rate:.0f} pictures a second")
-    benchmark.extra_info.update(rate=rate)
-    assert rate > 0.0

@@ -19,7 +19,7 @@ from handover.cosim.blocks.ports import Floats
 _BLUR = 1.4  # px; "the image is blurred", assumed
 
 BALL_DEVIATION = 0.0042
-"""Standard deviation of the ball along an axis, in m: 7.3 mm RMS, by tests/benchmarks/blocks/test_vision_speed.py."""
+"""Standard deviation of the ball along an axis, in m: 7.3 mm RMS, by tests/benchmarks/test_vision_speed.py."""
 WRIST_DEVIATION = 0.028
 """Of the wrist, likewise: 48 mm RMS, most of it the same away from the cameras; 52 mm by one camera."""
 GRIPPER_DEVIATION = 0.031

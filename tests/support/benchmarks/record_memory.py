@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 from handover.scenarios.results.system_facts import peak_memory
-from support.benchmarks.ring_hosts import recorded
+from support.benchmarks.ring_hosts import HOSTS
 
 UNITS, WARM = 50, 500_000
 
@@ -16,7 +16,7 @@ UNITS, WARM = 50, 500_000
 def main(fmu: Path, values: int) -> None:
     """Measure."""
     with tempfile.TemporaryDirectory() as folder:
-        with recorded(UNITS, fmu, Path(folder)) as ring:
+        with HOSTS["recorded"](UNITS, fmu, Path(folder)) as ring:
             ring.advance(WARM // UNITS)
             before = peak_memory() or 0.0
             ring.advance((values - WARM) // UNITS)

@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Generator
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -66,20 +67,6 @@ def handover(
 
 
 @contextlib.contextmanager
-def recorded(n: int, fmu: Path, folder: Path) -> Generator[Ring, None, None]:
-    """Give a ring in our master, all outputs recorded."""
-    with handover(n, fmu, folder, recorded=True) as ring:
-        yield ring
-
-
-@contextlib.contextmanager
-def general(n: int, fmu: Path, folder: Path) -> Generator[Ring, None, None]:
-    """Give a ring in our master, on its general path."""
-    with handover(n, fmu, folder, compiled=False) as ring:
-        yield ring
-
-
-@contextlib.contextmanager
 def ecos(n: int, fmu: Path, folder: Path, recorded: bool = False) -> Generator[Ring, None, None]:
     """Give a ring in Ecos, or, recorded, with its CSV writer."""
     from ecospy import EcosSimulation, EcosSimulationStructure
@@ -100,13 +87,6 @@ def ecos(n: int, fmu: Path, folder: Path, recorded: bool = False) -> Generator[R
     yield Ring(advance, lambda: simulation.get_real("u0::y"))
     simulation.terminate()
     simulation.free()
-
-
-@contextlib.contextmanager
-def ecos_csv(n: int, fmu: Path, folder: Path) -> Generator[Ring, None, None]:
-    """Give a ring in Ecos that writes CSV."""
-    with ecos(n, fmu, folder, recorded=True) as ring:
-        yield ring
 
 
 @contextlib.contextmanager
@@ -136,13 +116,6 @@ def libcosim(n: int, fmu: Path, folder: Path, recorded: bool = False) -> Generat
         return observer.last_real_values(0, [REFERENCE_Y])[0]
 
     yield Ring(advance, read)
-
-
-@contextlib.contextmanager
-def libcosim_csv(n: int, fmu: Path, folder: Path) -> Generator[Ring, None, None]:
-    """Give a ring in libcosim that writes CSV."""
-    with libcosim(n, fmu, folder, recorded=True) as ring:
-        yield ring
 
 
 @contextlib.contextmanager
@@ -213,8 +186,15 @@ def prebuilt_calls(n: int, fmu: Path, folder: Path) -> Generator[Ring, None, Non
 
 
 HOSTS: dict[str, Host] = {
-    f.__name__: f
-    for f in (handover, recorded, general, ecos, ecos_csv, libcosim, libcosim_csv, fmpy_loop, prebuilt_calls)
+    "handover": handover,
+    "recorded": partial(handover, recorded=True),
+    "general": partial(handover, compiled=False),
+    "ecos": ecos,
+    "ecos_csv": partial(ecos, recorded=True),
+    "libcosim": libcosim,
+    "libcosim_csv": partial(libcosim, recorded=True),
+    "fmpy_loop": fmpy_loop,
+    "prebuilt_calls": prebuilt_calls,
 }
 
 
@@ -229,7 +209,7 @@ def measured(host: Host, n: int, fmu: Path) -> dict[str, float]:
                 ring.advance(STEPS)
                 spent.append(time.process_time() - began)
             steps = WARMING + len(spent) * STEPS
-            assert steps <= ring.read() <= steps + 1, f"{host.__name__}: {ring.read()} after {steps} steps"
+            assert steps <= ring.read() <= steps + 1, f"{host}: {ring.read()} after {steps} steps"
             began = time.process_time()
         ended = time.process_time() - began
     return {"step": 1e6 * min(spent) / (n * STEPS), "end": 1e6 * ended / (n * steps)}

@@ -1,6 +1,6 @@
 """CPU time of a picture pair, of finding ball and wrist in it, and the errors made.
 
-Run with `pytest tests/benchmarks/blocks/test_vision_speed.py --benchmark-enable -s -m "slow or not slow"`.
+Run with `pytest tests/benchmarks/test_vision_speed.py --benchmark-enable -s -m "slow or not slow"`.
 """
 
 import time
@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
-from support.controllers.vision_scenes import anywhere, rising
+from support.controllers.vision_scenes import anywhere
 
 from handover.controllers.helix.vision.handover_vision import Detector, HandoverVision, Outputs, Params
 from handover.controllers.helix.vision.handover_vision import Inputs as Pictures
@@ -98,28 +98,6 @@ def test_detection(benchmark: BenchmarkFixture, detector: Detector, eyes: str):
     benchmark.extra_info.update(found.told())
     assert len(found.errors["wrist"]) > 80
     assert len(found.errors["ball"]) > 80 or (detector, eyes) == (Detector.PUBLISHED, "left")
-
-
-@pytest.mark.parametrize("rings", [1, 2])
-@pytest.mark.parametrize("detector", Detector, ids=lambda d: d.name.lower())
-def test_high_up(benchmark: BenchmarkFixture, detector: Detector, rings: int):
-    """The arm's end rises to above -0.42 m and tilts, at ten pictures a second."""
-    camera, rng = StereoCamera(CameraParams(rings=rings)), np.random.default_rng(6)
-    found = Found()
-
-    def rises() -> None:
-        for _ in range(12):
-            vision = HandoverVision(Params(detector=detector, rings=rings))
-            for i, u in enumerate(rising(rng, 25)):
-                y = camera.step(0.1 * i, 0.1, u)
-                x = vision.step(0.1 * i, 0.1, Pictures(left=y.left, right=y.right))
-                if u.p_WR[2] > -0.5:
-                    found.add(x, u)
-
-    benchmark.pedantic(rises, rounds=1)
-    print(f"\nhigh up, {detector.name.lower()}, rings: {rings}")
-    benchmark.extra_info.update(found.told())
-    assert len(found.errors["wrist"]) > 80
 
 
 class Found:
