@@ -2,8 +2,6 @@
 
 import importlib
 import json
-import math
-import os
 import sys
 from collections.abc import Iterator
 from importlib import metadata
@@ -51,26 +49,6 @@ def test_units_with_modules_of_the_same_name_run_their_own_code(tmp_path: Path, 
     assert all(name.startswith("_fmu_") for name in set(sys.modules) - modules_before)
 
 
-def test_a_step_that_imports_does_not_ask_the_disk_again(
-    tmp_path: Path, hosts: list[CtypesHost], monkeypatch: pytest.MonkeyPatch
-):
-    host = CtypesHost(build_in(tmp_path / "imports_in_steps", "__import__('math').pi"), 3)
-    hosts.append(host)
-    assert host.instantiate()
-    assert host.initialise() == OK
-    assert host.step(0.0, 0.5) == OK
-    asked: list[str] = []
-    exists = os.path.exists
-
-    def counted(path: str) -> bool:
-        asked.append(path)
-        return exists(path)
-
-    monkeypatch.setattr(os.path, "exists", counted)
-    assert [host.step(0.5, 0.5), host.get("y")] == [OK, [math.pi]]
-    assert asked == []
-
-
 def test_a_second_instance_finds_its_modules_though_the_first_ones_folder_is_gone(
     tmp_path: Path, hosts: list[CtypesHost]
 ):
@@ -84,73 +62,44 @@ def test_a_second_instance_finds_its_modules_though_the_first_ones_folder_is_gon
     assert "return [][0]" in hosts[0].log[-1]
 
 
+def edited(host: CtypesHost, **changed: object) -> None:
+    """Change what stands in an unpacked unit's facts."""
+    file = host.folder / "resources" / "unit.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), **changed}))
+
+
 @pytest.mark.machine
 def test_missing_packages_are_named_with_version_interpreter_and_cure(workshop: Workshop):
     host = workshop.own("scalars:Scalars", 3)
-    file = host.folder / "resources" / "unit.json"
-    unit = json.loads(file.read_text())
-    unit["packages"].append({"module": "no_such_module", "distribution": "no-such-package", "version": "4.5.6"})
-    file.write_text(json.dumps(unit))
+    edited(host, packages=[{"module": "no_such_module", "distribution": "no-such-package", "version": "4.5.6"}])
     assert not host.instantiate()
     for part in ("no-such-package (built with version 4.5.6)", sys.executable, "pip install no-such-package==4.5.6"):
         assert part in host.log[-1]
 
 
-@pytest.mark.parametrize(("change", "warned"), [(1, True), (0, False), (-1, False)])
-def test_a_package_older_than_that_of_the_build_is_a_warning(workshop: Workshop, change: int, warned: bool):
-    host = workshop.own("scalars:Scalars", 3)
-    host.log.clear()
-    here = metadata.version("numpy")
+def test_a_package_older_than_that_of_the_build_is_a_warning(workshop: Workshop):
+    host, here = workshop.own("scalars:Scalars", 3), metadata.version("numpy")
     major, minor = (int(n) for n in here.split(".")[:2])
-    built = f"{major}.{minor + change}.99"
-    file = host.folder / "resources" / "unit.json"
-    unit = json.loads(file.read_text())
-    unit["packages"] = [{"module": "numpy", "distribution": "numpy", "version": built}]
-    file.write_text(json.dumps(unit))
     host.logging = True
-    assert host.instantiate()
-    expected = [f"x: fmi3InstantiateCoSimulation: numpy: built with {built}, found {here}"]
-    assert host.log == (expected if warned else [])
-
-
-def test_a_missing_source_is_a_logged_error(workshop: Workshop):
-    host = workshop.own("scalars:Scalars", 3)
-    (host.folder / "resources" / "sources" / "handover" / "fmus" / "loader.py").unlink()
-    assert not host.instantiate()
-    assert "loader.py cannot be read" in host.log[-1]
+    for change in (-1, 0, 1):
+        built = f"{major}.{minor + change}.99"
+        edited(host, packages=[{"module": "numpy", "distribution": "numpy", "version": built}])
+        assert host.instantiate()
+        host.free()
+    assert host.log == [f"x: fmi3InstantiateCoSimulation: numpy: built with {built}, found {here}"]
 
 
 def test_a_unit_whose_import_fails_is_a_logged_error(workshop: Workshop):
     host = workshop.own("scalars:Scalars", 3)
     unit = host.folder / "resources" / "unit.json"
     unit.write_text(unit.read_text().replace("_fmu_", "_fmu_broken_"))
-    (host.folder / "resources" / "sources" / "support" / "sample_units" / "scalars.py").write_text(
-        "import handover.cosim.nothing\n"
-    )
+    source = host.folder / "resources" / "sources" / "support" / "sample_units" / "scalars.py"
+    source.write_text("import handover.cosim.nothing\n")
     assert not host.instantiate()
     assert "the FMU has no module 'handover.cosim.nothing'" in host.log[-1]
 
 
-def test_an_explanation_of_a_refusal_has_no_traceback():
+def test_a_refusal_is_explained_without_traceback_and_a_path_keeps_all_its_parts():
     assert loader.explain(loader.HostError("why")) == "why"
-
-
-def test_the_prefix_of_a_units_modules_is_reported_nowhere(workshop: Workshop):
-    host = workshop.host("every_kind:EveryKind", 3)
-    assert host.initialise() == OK
-    host.set("a", [666.0])
-    assert host.step(0.0, 1 / 64) != OK
-    assert "\nsupport.sample_units.every_kind.Misfortune: the number of the beast" in host.log[-1]
-    assert "_fmu_" not in host.log[-1]
-
-
-def test_a_path_keeps_all_its_parts():
     error = ValueError("in /tmp/_fmu_12.d/a.py: <_fmu_12ab.plants.arm.Arm object>, _fmu_12ab.größe.Ünit")
     assert loader.explain(error) == "ValueError: in /tmp/_fmu_12.d/a.py: <plants.arm.Arm object>, größe.Ünit"
-
-
-def test_two_builds_in_one_folder_are_reported_with_a_cure(workshop: Workshop):
-    host = workshop.own("scalars:Scalars", 3)
-    assert not host.instantiate(token="{0}")
-    for part in ("token {0} is not that of the resources", "of two different builds. Cure: unpack the FMU again"):
-        assert part in host.log[-1]

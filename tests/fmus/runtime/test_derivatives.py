@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from support.fmus.ctypes_host import DOUBLE, ERROR, OK, SIZE, CtypesHost
 from support.fmus.unit_calls import INPUTS, OUTPUTS, TANGENT, derivative, references
-from support.fmus.workshop import Workshop
+from support.fmus.workshop import Workshop, expect_error
 from support.wording import Wording
 
 EPSILON = 1e-6
@@ -35,7 +35,7 @@ def jacobian_by_differences(host: CtypesHost) -> NDArray[np.float64]:
 
 
 @both
-def test_directional_derivatives_are_the_differences_of_the_outputs(workshop: Workshop, fmi: int):
+def test_derivatives_are_the_differences_of_the_outputs(workshop: Workshop, fmi: int):
     host = workshop.host(TANGENT, fmi)
     host.enter()
     J = jacobian_by_differences(host)
@@ -44,34 +44,21 @@ def test_directional_derivatives_are_the_differences_of_the_outputs(workshop: Wo
         status, dy = derivative(host, seed.tolist())
         assert status == OK, host.log[-1]
         assert dy == pytest.approx(J @ seed, abs=1e-7)
-
-
-def test_adjoint_derivatives_are_the_transpose(workshop: Workshop):
-    host = workshop.host(TANGENT, 3)
-    host.enter()
-    J = jacobian_by_differences(host)
-    weights = np.array([0.5, -1.0, 2.0, 3.0])
-    status, result = derivative(host, weights.tolist(), "GetAdjointDerivative")
+    some = [1.0, 2.0, 3.0, 4.0]
+    status, dy = derivative(host, some, knowns={"s": 3, "a": 1}, unknowns={"p": 3})
     assert status == OK
-    assert result == pytest.approx(weights @ J, abs=1e-7)
-
-
-@both
-def test_some_variables_in_any_order_give_their_part(workshop: Workshop, fmi: int):
-    host = workshop.host(TANGENT, fmi)
-    host.enter()
-    J = jacobian_by_differences(host)
-    seed = [1.0, 2.0, 3.0, 4.0]
-    status, dy = derivative(host, seed, knowns={"s": 3, "a": 1}, unknowns={"p": 3})
-    assert status == OK
-    assert dy == pytest.approx(J[1:, 4:7] @ seed[:3] + J[1:, 0] * 4.0, abs=1e-7)
+    assert dy == pytest.approx(J[1:, 4:7] @ some[:3] + J[1:, 0] * 4.0, abs=1e-7)
+    if fmi == 3:
+        weights = np.array([0.5, -1.0, 2.0, 3.0])
+        status, result = derivative(host, weights.tolist(), "GetAdjointDerivative")
+        assert status == OK
+        assert result == pytest.approx(weights @ J, abs=1e-7)
 
 
 @both
 def test_derivatives_are_there_in_step_mode_and_after_and_not_before(workshop: Workshop, fmi: int, wording: Wording):
     host = workshop.host(TANGENT, fmi)
-    assert derivative(host, [1.0] * 7)[0] == ERROR
-    wording.check(host.log[-1])
+    expect_error(wording, host, derivative(host, [1.0] * 7)[0])
     host.initialise()
     first = derivative(host, [1.0] * 7)
     host.set("a", [1.0])
@@ -84,7 +71,7 @@ def test_derivatives_are_there_in_step_mode_and_after_and_not_before(workshop: W
 
 
 @both
-def test_what_is_no_real_input_or_output_is_refused(workshop: Workshop, fmi: int, wording: Wording):
+def test_what_is_no_real_input_or_output_or_of_another_size_is_refused(workshop: Workshop, fmi: int, wording: Wording):
     host = workshop.host(TANGENT, fmi)
     host.initialise()
     for knowns, unknowns, seed in [
@@ -94,28 +81,15 @@ def test_what_is_no_real_input_or_output_is_refused(workshop: Workshop, fmi: int
         ({"gain": 1}, OUTPUTS, [1.0]),
         (INPUTS, OUTPUTS, [float("nan")] * 7),
     ]:
-        assert derivative(host, seed, knowns=knowns, unknowns=unknowns)[0] == ERROR
-        wording.check(host.log[-1])
-    assert derivative(host, [1.0] * 7)[0] == OK
-
-
-def test_sizes_and_null_are_refused(workshop: Workshop, wording: Wording):
-    host = workshop.host(TANGENT, 3)
-    host.initialise()
-    assert derivative(host, [1.0] * 6)[0] == ERROR
-    wording.check(host.log[-1])
-    k, u = references(host, INPUTS), references(host, OUTPUTS)
-    result = (DOUBLE * 4)()
-    arguments = (u, SIZE(2), k, SIZE(3), None, SIZE(7), result, SIZE(4))
-    assert host.call("GetDirectionalDerivative", *arguments) == ERROR
-    wording.check(host.log[-1])
-
-
-def test_a_derivative_of_what_is_no_output_is_an_error_and_the_instance_lives(workshop: Workshop, wording: Wording):
-    host = workshop.host(TANGENT, 3)
-    host.initialise()
+        expect_error(wording, host, derivative(host, seed, knowns=knowns, unknowns=unknowns)[0])
     assert derivative(host, [666.0] + [0.0] * 6)[0] == ERROR
-    wording.check(host.log[-1].splitlines()[-1])
+    wording.check(host.log[-1].splitlines()[-1])  # of what is no output
+    if fmi == 3:
+        expect_error(wording, host, derivative(host, [1.0] * 6)[0])
+        k, u = references(host, INPUTS), references(host, OUTPUTS)
+        arguments = (u, SIZE(2), k, SIZE(3), None, SIZE(7), (DOUBLE * 4)(), SIZE(4))
+        expect_error(wording, host, host.call("GetDirectionalDerivative", *arguments))
+    assert derivative(host, [1.0] * 7)[0] == OK
     assert host.step(0.0, 0.1) == OK
 
 
@@ -128,5 +102,4 @@ def test_only_a_unit_that_has_derivatives_says_so(workshop: Workshop, fmi: int, 
         assert interface is not None
         assert [interface.get(n) for n in names[fmi]] == [expected] * len(names[fmi])
     host.initialise()
-    assert derivative(host, [1.0], knowns={"u1": 1}, unknowns={"y1": 1})[0] == ERROR
-    wording.check(host.log[-1])
+    expect_error(wording, host, derivative(host, [1.0], knowns={"u1": 1}, unknowns={"y1": 1})[0])

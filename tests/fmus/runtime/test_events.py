@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from support.fmus.ctypes_host import ERROR, OK
 from support.fmus.saved_states import deserialise, save, serialised
-from support.fmus.unit_calls import BALL, DT, drive, handle
+from support.fmus.unit_calls import BALL, DT, drive, handle, with_events
 from support.fmus.validity import problems_of
-from support.fmus.workshop import Workshop
+from support.fmus.workshop import Workshop, expect_error
 from support.sample_units.bouncing_ball import BouncingBall, Inputs, Outputs, Params
 from support.sample_units.scalars import Scalars
 from support.wording import Wording
@@ -19,6 +19,8 @@ from support.wording import Wording
 from handover.cosim.blocks.block import InvalidAdvance, TooManyEvents, step_through_events
 from handover.cosim.blocks.declarations import DeclarationError
 from handover.cosim.blocks.description import describe
+from handover.cosim.master.master import Master
+from handover.cosim.system.system import System
 
 G, E, HEIGHT, RELEASE = 9.81, 0.7, 1.0, 0.25
 IMPACTS = math.ceil(math.log(0.05 / math.sqrt(2 * G * HEIGHT), E))
@@ -34,57 +36,35 @@ def impact_times(n: int) -> list[float]:
     return times
 
 
-def without_events(workshop: Workshop, steps: int) -> list[list[float]]:
-    host = workshop.host(BALL, 3)
-    assert host.initialise() == OK
-    states: list[list[float]] = []
-    for k in range(steps):
-        assert host.step(k * DT, DT) == OK
-        assert (host.early, host.event_needed) == (False, False)
-        states.append(host.get("h") + host.get("v"))
-    return states
-
-
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_the_unit_is_valid(workshop: Workshop, fmi: int):
-    assert problems_of(workshop.fmu(BALL, fmi)) == []
-
-
-def test_impacts_are_where_the_closed_form_has_them(workshop: Workshop):
-    seen = drive(workshop.host(BALL, 3, event_mode=True, early_return=True), 200)
+def test_impacts_are_where_the_closed_form_has_them_and_the_course_is_that_without_event_mode(workshop: Workshop):
+    seen, quiet = (drive(with_events(workshop, BALL, early_return=early), 250) for early in (True, False))
     assert seen.events == pytest.approx([RELEASE, *impact_times(IMPACTS)], abs=1e-12)
-
-
-def test_the_course_is_the_same_with_event_mode_and_without(workshop: Workshop):
-    plain = without_events(workshop, 200)
-    seen = drive(workshop.host(BALL, 3, event_mode=True, early_return=True), 200)
-    assert np.abs(np.subtract(seen.states, plain)).max() < 1e-12
-    quiet = drive(workshop.host(BALL, 3, event_mode=True, early_return=False), 200)
-    assert np.abs(np.subtract(quiet.states, plain)).max() < 1e-12
     assert quiet.events == [RELEASE]
-
-
-def test_the_ball_comes_to_rest_and_its_events_end(workshop: Workshop):
-    host = workshop.host(BALL, 3, event_mode=True, early_return=True)
-    seen = drive(host, 250)
     assert seen.states[-1] == [0.0, 0.0]
-    assert seen.events[-1] < 3.5
-    assert len(seen.events) == 1 + IMPACTS
-    assert not host.event_needed
+    plain = workshop.host(BALL, 3)
+    assert plain.initialise() == OK
+    for k, states in enumerate(zip(seen.states, quiet.states, strict=True)):
+        assert plain.step(k * DT, DT) == OK
+        assert (plain.early, plain.event_needed) == (False, False)
+        assert np.abs(np.subtract(states, plain.get("h") + plain.get("v"))).max() < 1e-12
 
 
 def test_an_early_return_says_where_the_step_ended_and_that_an_event_waits(workshop: Workshop, wording: Wording):
-    host = workshop.host(BALL, 3, event_mode=True, early_return=True)
-    host.initialise()
+    host = with_events(workshop, BALL, early_return=True)
+    for _ in range(3):  # without an event, nothing changes
+        assert host.update() == OK
+        assert host.next_event == RELEASE
+    assert host.call("EnterStepMode") == OK
+    assert host.step(0.0, 0.1) == OK
+    assert (host.early, host.event_needed) == (False, False)
+    assert host.call("EnterEventMode") == OK
     assert handle(host) == RELEASE
-    assert host.step(0.0, 5.0) == OK
+    assert host.step(0.1, 5.0) == OK
     assert (host.early, host.event_needed, host.last_time, host.terminate) == (True, True, RELEASE, False)
     assert host.get("time") == [RELEASE]
-    assert host.step(RELEASE, 0.1) == ERROR
-    wording.check(host.log[-1])
+    expect_error(wording, host, host.step(RELEASE, 0.1))
     assert host.call("EnterEventMode") == OK
-    assert host.call("EnterStepMode") == ERROR
-    wording.check(host.log[-1])
+    expect_error(wording, host, host.call("EnterStepMode"))
     assert handle(host) is None
     assert host.step(RELEASE, 5.0) == OK
     assert host.last_time == pytest.approx(impact_times(1)[0], abs=1e-12)
@@ -96,39 +76,24 @@ def test_an_early_return_says_where_the_step_ended_and_that_an_event_waits(works
 
 
 def test_a_known_event_at_a_steps_end_is_reported_without_early_return(workshop: Workshop):
-    host = workshop.host(BALL, 3, event_mode=True)
-    host.initialise()
+    host = with_events(workshop, BALL)
     handle(host)
     assert host.step(0.0, RELEASE) == OK
     assert (host.early, host.event_needed) == (False, True)
     assert host.get("h") == [HEIGHT]
 
 
-def test_event_mode_without_an_event_changes_nothing(workshop: Workshop):
-    host = workshop.host(BALL, 3, event_mode=True, early_return=True)
-    host.initialise()
-    for _ in range(3):
-        assert host.update() == OK
-        assert host.next_event == RELEASE
-    assert host.call("EnterStepMode") == OK
-    assert host.step(0.0, 0.1) == OK
-    assert (host.early, host.event_needed) == (False, False)
-    assert host.call("EnterEventMode") == OK
-    assert handle(host) == RELEASE
-
-
 def test_a_state_with_a_waiting_event_continues_in_another_instance(workshop: Workshop):
-    host, other = (workshop.host(BALL, 3, event_mode=True, early_return=True) for _ in range(2))
-    host.initialise()
+    host, other = (
+        with_events(workshop, BALL, early_return=True),
+        workshop.host(BALL, 3, event_mode=True, early_return=True),
+    )
     handle(host)
-    for t in (0.0, RELEASE):
-        assert host.step(t, 5.0) == OK
-        if t == 0.0:
-            host.call("EnterEventMode")
-            handle(host)
-    status, state = deserialise(other, serialised(host, save(host)))
-    assert status == OK
-    assert other.call("SetFMUState", state) == OK
+    assert host.step(0.0, 5.0) == OK
+    host.call("EnterEventMode")
+    handle(host)
+    assert host.step(RELEASE, 5.0) == OK
+    assert other.call("SetFMUState", deserialise(other, serialised(host, save(host)))[1]) == OK
     t = host.last_time
     assert other.step(t, 1.0) == ERROR
     assert "is not handled yet" in other.log[-1]
@@ -143,42 +108,33 @@ def test_a_state_with_a_waiting_event_continues_in_another_instance(workshop: Wo
     assert host.last_time == pytest.approx(impact_times(2)[1], abs=1e-12)
 
 
-def test_fmpys_own_simulation_follows_the_events(workshop: Workshop):
-    runs: list[Any] = [
-        fmpy.simulate_fmu(
-            str(workshop.fmu(BALL, 3)),
-            stop_time=2.0,
-            output_interval=DT,
-            output=["h", "v"],
-            use_event_mode=mode,
-            early_return_allowed=mode,
-        )
-        for mode in (False, True)
-    ]
-    plain, seen = runs
-    impacts = [t for t in impact_times(20) if t < 2.0]
-    assert len(seen) == len(plain) + 2 * (1 + len(impacts))
-    for t, h in zip(plain["time"], plain["h"], strict=True):
-        at = np.flatnonzero(np.isclose(seen["time"], t, rtol=0, atol=1e-12))
-        assert np.abs(seen["h"][at[-1]] - h) < 1e-12
-
-
-def test_a_block_has_all_of_the_event_methods_or_none():
-    assert describe(BouncingBall).has_events
-
-    with pytest.raises(DeclarationError, match=r"Half.handle_event: a block with advance needs this method too"):
-        describe(Half)
-
-    class Sampled(BouncingBall):
-        period = Fraction(1, 10)
-
-    with pytest.raises(DeclarationError, match=r"a block with events is not sampled"):
-        describe(Sampled)
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_other_masters_follow_the_events(workshop: Workshop, fmi: int):
+    """FMPy without event mode (FMI 2) or with it, and our own."""
+    fmu, impacts = workshop.fmu(BALL, fmi), [t for t in impact_times(20) if t < 2.0]
+    assert problems_of(fmu) == []
+    seen: Any = fmpy.simulate_fmu(
+        str(fmu), stop_time=2.0, output_interval=DT, use_event_mode=fmi == 3, early_return_allowed=fmi == 3
+    )
+    assert len(seen) == 101 + (2 * (1 + len(impacts)) if fmi == 3 else 0)
+    s, rows = System(), dict[float, float]()
+    s.add("ball", fmu, period=Fraction(1, 10))
+    with Master(s) as master:
+        master.run(Fraction(2), [lambda t, y: rows.__setitem__(t, float(y["ball.h"]))])
+    off_grid = [t for t in rows if t not in {k / 10 for k in range(21)}]
+    assert off_grid == (pytest.approx([RELEASE, *impacts], abs=1e-9) if fmi == 3 else [])
+    for t, h in rows.items():
+        at = np.flatnonzero(np.isclose(seen["time"], t, rtol=0, atol=1e-9))
+        assert not len(at) or seen["h"][at[-1]] == pytest.approx(h, abs=1e-9)
 
 
 class Half(Scalars):
     def advance(self, t: float, dt: float, u: Any) -> tuple[float, Any]:
         return dt, self.step(t, dt, u)
+
+
+class Sampled(BouncingBall):
+    period = Fraction(1, 10)
 
 
 class Stuck(BouncingBall):
@@ -191,8 +147,13 @@ class Hasty(BouncingBall):
         return 2.0 * dt, self.outputs(t, u)
 
 
-def test_events_without_end_and_impossible_progress_are_errors():
-    with pytest.raises(TooManyEvents, match=r"Stuck has had 1000 events at t = 1\.0 s"):
-        step_through_events(Stuck(Params()), 1.0, 0.1, Inputs())
-    with pytest.raises(InvalidAdvance, match=r"Hasty.advance came 0\.2 s far; it was to advance by at most 0\.1 s"):
-        step_through_events(Hasty(Params()), 1.0, 0.1, Inputs())
+def test_what_a_block_with_events_must_not_declare_or_do_is_refused(wording: Wording):
+    assert describe(BouncingBall).has_events
+    for declared in (Half, Sampled):
+        with pytest.raises(DeclarationError) as refused:
+            describe(declared)
+        wording.check(refused.value)
+    for block, kind in ((Stuck, TooManyEvents), (Hasty, InvalidAdvance)):
+        with pytest.raises(kind) as failed:
+            step_through_events(block(Params()), 1.0, 0.1, Inputs())
+        wording.check(failed.value)

@@ -17,6 +17,18 @@ from handover.fmus.compile import host_platform, library
 OK, DISCARD, ERROR = 0, 2, 3
 
 DOUBLE, SIZE, BOOL = ctypes.c_double, ctypes.c_size_t, ctypes.c_bool
+INTEGERS: dict[str, Any] = {
+    f"{sign}Int{bits}": getattr(ctypes, f"c_{sign.lower()}int{bits}") for bits in (8, 16, 32, 64) for sign in ("", "U")
+}
+"""C's types of integers by FMI 3's names."""
+C_TYPES: dict[str, Any] = {
+    **INTEGERS,
+    "Real": DOUBLE,
+    "Float64": DOUBLE,
+    "Float32": ctypes.c_float,
+    "Integer": ctypes.c_int,
+    "String": ctypes.c_char_p,
+}
 Log2 = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
 Log3 = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
 
@@ -146,20 +158,36 @@ class CtypesHost:
 
     def set(self, name: str, values: Sequence[float]) -> int:
         """Set a real variable, by the name of its first entry in FMI 2."""
-        return self._transfer("Set", name, (DOUBLE * len(values))(*values))
+        return self.put("Real" if self.fmi == 2 else "Float64", name, *values)
 
     def get(self, name: str, n: int = 1) -> list[float]:
         """Get a real variable; it must succeed."""
-        values = (DOUBLE * n)()
-        assert self._transfer("Get", name, values) == OK, self.log[-1]
+        return self.take("Real" if self.fmi == 2 else "Float64", name, n)
+
+    def put(self, kind: str, name: str, *values: Any) -> int:
+        """Set a variable of any kind but binary, such as `Int8` or `String`; `Integer` is `Int64` in FMI 3."""
+        kind, c_type = self._kind(kind)
+        return self.transfer(f"Set{kind}", name, (c_type * len(values))(*values))
+
+    def take(self, kind: str, name: str, n: int = 1) -> list[Any]:
+        """Get a variable of any kind but binary; it must succeed."""
+        kind, c_type = self._kind(kind)
+        values = (c_type * n)()
+        assert self.transfer(f"Get{kind}", name, values) == OK, self.log[-1]
         return list(values)
 
-    def _transfer(self, verb: str, name: str, values: "ctypes.Array[ctypes.c_double]") -> int:
+    def _kind(self, kind: str) -> tuple[str, Any]:
+        if kind == "Boolean":
+            return kind, BOOL if self.fmi == 3 else ctypes.c_int
+        kind = "Int64" if kind == "Integer" and self.fmi == 3 else kind
+        return kind, C_TYPES[kind]
+
+    def transfer(self, function: str, name: str, values: "ctypes.Array[Any]") -> int:
+        """Call a function that sets or gets a variable's values."""
         n, first = len(values), self.references[name]
         if self.fmi == 3:
-            return self.call(f"{verb}Float64", ctypes.byref(ctypes.c_uint32(first)), SIZE(1), values, SIZE(n))
-        references = (ctypes.c_uint32 * n)(*range(first, first + n))
-        return self.call(f"{verb}Real", references, SIZE(n), values)
+            return self.call(function, ctypes.byref(ctypes.c_uint32(first)), SIZE(1), values, SIZE(n))
+        return self.call(function, (ctypes.c_uint32 * n)(*range(first, first + n)), SIZE(n), values)
 
     def beside(self) -> "CtypesHost":
         """Return a host without an instance in the same folder, which stays when it is closed."""

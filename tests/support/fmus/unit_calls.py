@@ -3,11 +3,11 @@
 import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from support.fmus.ctypes_host import DOUBLE, OK, SIZE, CtypesHost
+from support.fmus.workshop import Workshop
 
 P = 1 / 30
 """Period of `SAMPLED`, s."""
@@ -17,15 +17,25 @@ EVERY_WIDTH = "every_width:EveryWidth"
 SAMPLED = "sampled:Sampled"
 TANGENT = "tangent:Tangent"
 BALL = "bouncing_ball:BouncingBall"
-C_TYPES: dict[str, Any] = {
-    f"{sign}Int{bits}": getattr(ctypes, f"c_{sign.lower()}int{bits}") for bits in (8, 16, 32, 64) for sign in ("", "U")
-}
+
+
+def with_events(workshop: Workshop, block: str, *, early_return: bool = False) -> CtypesHost:
+    """Return a host in the event mode that follows initialisation."""
+    host = workshop.host(block, 3, event_mode=True, early_return=early_return)
+    assert host.initialise() == OK
+    return host
 
 
 def tick(host: CtypesHost) -> None:
     assert host.set_clock() == OK, host.log[-1]
+    handle(host)
+
+
+def handle(host: CtypesHost) -> float | None:
+    """Update discrete states and leave event mode; return the time of the next event."""
     assert host.update() == OK, host.log[-1]
     assert host.call("EnterStepMode") == OK
+    return host.next_event
 
 
 def references(host: CtypesHost, sizes: dict[str, int]) -> "ctypes.Array[ctypes.c_uint32]":
@@ -59,7 +69,6 @@ class Seen:
 def drive(host: CtypesHost, steps: int) -> Seen:
     """Do what a host with event mode does: steps up to regular points, known events and early returns."""
     seen = Seen([], [])
-    assert host.initialise() == OK
     following = handle(host)
     t, k = 0.0, 0
     for _ in range(2 * steps):
@@ -79,25 +88,8 @@ def drive(host: CtypesHost, steps: int) -> Seen:
     raise AssertionError(f"at t = {t} s there is no progress any more")
 
 
-def handle(host: CtypesHost) -> float | None:
-    assert host.update() == OK, host.log[-1]
-    assert host.call("EnterStepMode") == OK
-    return host.next_event
-
-
 def port_of(width: str) -> str:
     return width.lower().replace("uint", "u").replace("int", "i")
-
-
-def transfer(host: CtypesHost, verb: str, width: str, name: str, values: Any) -> int:
-    reference = ctypes.byref(ctypes.c_uint32(host.references[name]))
-    return host.call(f"{verb}{width}", reference, SIZE(1), values, SIZE(len(values)))
-
-
-def get(host: CtypesHost, width: str, name: str) -> int:
-    values = (C_TYPES[width] * 1)()
-    assert transfer(host, "Get", width, name, values) == OK, host.log[-1]
-    return values[0]
 
 
 def extremes(width: str) -> tuple[int, int]:

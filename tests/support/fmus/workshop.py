@@ -4,7 +4,8 @@ import functools
 from pathlib import Path
 
 from handover.fmus.build import build_block
-from support.fmus.ctypes_host import CtypesHost
+from support.fmus.ctypes_host import ERROR, CtypesHost
+from support.wording import Wording
 
 
 class Workshop:
@@ -38,3 +39,9 @@ class Workshop:
 @functools.cache
 def _unpacked(fmu: Path, fmi: int) -> CtypesHost:
     return CtypesHost(fmu, fmi)
+
+
+def expect_error(wording: Wording, host: CtypesHost, status: int) -> None:
+    """Fail unless a call was an error, and its message is the golden file's."""
+    assert status == ERROR
+    wording.check(host.log[-1])
