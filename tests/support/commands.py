@@ -1,12 +1,13 @@
 """The command `handover` in processes that start in hundredths of a second, as they are forked from one that is warm.
 
 For tests of exit status, signals and what is printed. What a command prints and returns is the same in this process by
-`click.testing.CliRunner`, which is cheaper still; what depends on how Python starts needs a real start.
+`call`, which is cheaper still; what depends on how Python starts needs a real start.
 """
 
 import atexit
 import contextlib
 import ctypes
+import json
 import multiprocessing
 import os
 import signal
@@ -18,9 +19,12 @@ from multiprocessing import forkserver
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import psutil
+from click.testing import CliRunner, Result
+
+from handover.scenarios.cli.command import main
 
 _LOADED = (
     "handover.cosim.check.load_probe",
@@ -121,6 +125,23 @@ def run_command(
 ) -> Ended:
     """Run `handover ARGUMENTS` to its end in a process of its own."""
     return Command(*arguments, cwd=cwd, env=env, before=before).wait()
+
+
+def call(*arguments: object) -> Result:
+    """Run `handover ARGUMENTS` in this process."""
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def refusal(*arguments: object) -> str:
+    """Return what `handover ARGUMENTS` says, in this process, of a usage error."""
+    done = call(*arguments)
+    assert (done.exit_code, done.exception.__class__) == (2, SystemExit), (arguments, done.output, done.exception)
+    return done.output
+
+
+def data_in(folder: Path, name: str = "summary") -> Any:
+    """Return the content of a JSON file of a run's or campaign's folder."""
+    return json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
 
 
 def cpu_of_commands() -> float:

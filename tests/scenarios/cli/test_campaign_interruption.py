@@ -8,19 +8,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.campaigns import short_plan
 from support.in_process_pool import InProcessPool
 
 from handover.scenarios.campaign.campaign import run_campaign
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.plan import CampaignPlan
 from handover.scenarios.campaign.plan_check import prepared
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.campaign.worker_pool import JobResult, RunCounts, RunJob
 from handover.scenarios.cli.campaign import CampaignInterruption, run_campaign_command
 
-PLAN = CampaignPlan(
-    scenario="ir_grasp", points=[{"forward": "0.03"}, {"forward": "0.1"}], fixed={"strategy": "forward", "run_up": "0"}
-)
+PLAN = short_plan()
 NAMES = [run.name for run in PLAN.runs()]
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows has no SIGINT for one process")
@@ -34,9 +32,7 @@ class SilentPool(InProcessPool):
     """Carries runs out and answers for none, as one that was lost just then."""
 
     def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
-        for _ in super().run_jobs(jobs):
-            pass
-        yield from ()
+        yield from list(super().run_jobs(jobs))[:0]
 
 
 class InterruptedEnd:
@@ -58,29 +54,24 @@ class InterruptedEnd:
         self.ended = True
 
 
-class InterruptedFinalizer(InProcessPool):
-    """Is interrupted amid a finalizer, as Dask's futures have some: Python drops the exception."""
-
-    def run_jobs(self, jobs: Sequence[RunJob]) -> Generator[JobResult, None, None]:
-        for i, result in enumerate(super().run_jobs(jobs)):
-            if i == 0:
-                finalized = InterruptedFinalized()
-                del finalized
-            yield result
-
-
 class InterruptedFinalized:
     def __del__(self) -> None:
         interrupt()
 
 
+def finalize(job: RunJob) -> str:
+    """Interrupt the first run amid a finalizer, as Dask's futures have some: Python drops the exception."""
+    if job.name == NAMES[0]:
+        InterruptedFinalized()
+    return ""
+
+
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_in_a_finalizer(tmp_path: Path):
     folder = CampaignFolder(tmp_path / "c")
+    pool = InProcessPool(finalize)
     with CampaignInterruption() as interruption, pytest.raises(KeyboardInterrupt):
-        run_campaign(
-            prepared(PLAN), folder, InterruptedFinalizer(), lambda _counts: None, interruption.deferred_signals
-        )
+        run_campaign(prepared(PLAN), folder, pool, lambda _counts: None, interruption.deferred_signals)
     assert CampaignTable.read(folder.table).column("run").tolist() == NAMES[:1]
 
 
@@ -101,8 +92,6 @@ def test_as_the_workers_are_ended(tmp_path: Path, capsys: pytest.CaptureFixture[
         run_campaign_command(PLAN, tmp_path / "c", workers, lambda _outcome: None)
     assert caught.value.code == 1
     assert workers.ended
-    assert (
-        capsys.readouterr().err.splitlines()[-1]
-        == f"2 of 2 runs done in {tmp_path / 'c'}; run the same command again to resume"
-    )
+    told = f"2 of 2 runs done in {tmp_path / 'c'}; run the same command again to resume"
+    assert capsys.readouterr().err.splitlines()[-1] == told
     assert CampaignTable.read(tmp_path / "c").column("run").tolist() == NAMES

@@ -5,14 +5,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from playwright.sync_api import Browser
 from support.campaigns import campaign_metadata, carried_out, folder_of, table_of
+from support.commands import call
 from support.opened_page import opened, overflow
-from support.wording import Wording
 
 from handover.scenarios.campaign.plan import CampaignPlan
-from handover.scenarios.cli.command import main
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +26,7 @@ def grasps(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def compare(*arguments: object) -> Result:
-    return CliRunner().invoke(main, ["compare", *map(str, arguments)])
+    return call("compare", *arguments)
 
 
 @pytest.mark.slow
@@ -78,6 +77,10 @@ def test_runs_are_compared_by_their_curves(grasps: Path, tmp_path: Path, browser
     assert {p.name for p in (out / "figures").iterdir()} == {"curves.png", "curves.svg"}
     assert json.loads((out / "comparison.json").read_bytes())["curves"] == ["scene.p_WH[1]", "scene.p_WH[2]"]
     assert (out / "comparison.csv").read_text().startswith("metric,unit,far,near\n")
+    done = compare(*folders, "--out", tmp_path / "plots", "--json")  # the scenario's own, as no signal is named
+    curves = json.loads(done.stdout)["curves"]
+    assert curves[0] == "Distances of the fingers from the object: thumb, as seen"
+    assert (len(curves), "Cost of thumb and ring, [Luberto] eq. (4)" in curves) == (6, True)
     with opened(browser, out / "report.html") as page:
         first = "document.querySelector('#time .plot')"
         assert page.evaluate(f"{first}.data.map(t => t.name)") == ["far", "near"]
@@ -87,18 +90,6 @@ def test_runs_are_compared_by_their_curves(grasps: Path, tmp_path: Path, browser
         assert far - near == pytest.approx(100, abs=2)  # mm, which it goes forward before it closes
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("empty_figures")
-def test_the_scenarios_own_plots_are_compared_where_no_signal_is_named(grasps: Path, tmp_path: Path):
-    folders = [grasps / name / "runs" / "000_thing=cylinder_r0000" for name in ("far", "near")]
-    done = compare(*folders, "--out", tmp_path / "out", "--json")
-    assert done.exit_code == 0, done.output
-    curves = json.loads(done.stdout)["curves"]
-    assert curves[0] == "Distances of the fingers from the object: thumb, as seen"
-    assert "Cost of thumb and ring, [Luberto] eq. (4)" in curves
-    assert len(curves) == 6
-
-
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
@@ -106,11 +97,13 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.usefixtures("empty_figures")
-def test_without_a_folder_it_is_one_of_its_own(here: Path):
+def test_without_a_folder_it_is_one_of_its_own_and_long_tables_are_cut(here: Path):
+    points = [{"forward": f"0.{n}"} for n in range(10, 23)]
     for name in ("a", "b"):
-        folder_of(here / name, campaign_metadata("ir_grasp", [{}]), table_of([{}]))
+        folder_of(here / name, campaign_metadata("ir_grasp", points), table_of(points))
     done = compare("a", "b"), compare("a", "b")
     assert [d.exit_code for d in done] == [0, 0]
+    assert "and 2 more rows, in the report" in done[0].stdout
     made = sorted((here / "comparisons").iterdir())
     assert len(made) == 2
     assert all((folder / "report.html").is_file() and "_ir_grasp" in folder.name for folder in made)
@@ -127,29 +120,3 @@ def test_where_all_runs_succeed_the_tests_of_metrics_are_printed(here: Path):
     assert ["all", "runs", "moved", "b", "–", "a", "+30", "mm", "Wilcoxon", "0.0625"] in lines
     assert "McNemar" not in done.stdout  # whose p is 1
     assert "With 5 pairs p cannot fall below 0.0625" in done.stdout
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("a",),
-        ("a", "absent", "--name", "x"),
-        ("a", "b", "--signal", "scene.yaw"),
-        ("a", "b", "--metric", "mowed"),
-        ("a", "r"),
-        ("a", "b", "--out", "a"),
-    ],
-    ids=" ".join,
-)
-def test_usage_errors_are_told_in_a_line_each_and_leave_nothing(
-    here: Path, arguments: tuple[str, ...], wording: Wording
-):
-    for name in ("a", "b"):
-        folder_of(here / name, campaign_metadata("ir_grasp", [{}]), table_of([{}], moved=[0.1, 0.2]))
-    (here / "r").mkdir()
-    (here / "r" / "run.json").write_text('{"scenario": "ir_grasp", "parameters": {}}')
-    before = {*here.rglob("*")}
-    done = compare(*arguments)
-    assert done.exit_code == 2, done.output
-    wording.check(done.output)
-    assert {*here.rglob("*")} == before

@@ -1,7 +1,7 @@
-"""Every example in a `--help` runs, or is checked as far as it can be without what it would start.
+"""Every example in a `--help` runs, or is called with all of the command's checks up to what takes long.
 
-`EXAMPLES` says which is which: what takes minutes, a browser or a cluster is called as it stands, with all of the
-command's checks, up to the function that would start it.
+`EXAMPLES` says which is which: the function before which an example is ended, as it would start runs, a browser or a
+cluster, or write a page.
 """
 
 import re
@@ -9,65 +9,32 @@ import shlex
 import shutil
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
-from enum import Enum, auto
 from pathlib import Path
 from typing import Any, NoReturn
 
 import click
 import pytest
-from click.testing import CliRunner, Result
 from support.campaigns import campaign_metadata, folder_of, table_of
+from support.commands import call
 from support.cosim.native_units import native_fmu
 from support.kept_runs import copied_run
-from support.killed_run import killed_run
 from support.scenarios.sample_study import same, write_study
 
+from handover.cosim.ssp.writing import write_ssp
+from handover.cosim.system.system import System
 from handover.fmus.build import cached
 from handover.scenarios.cli.command import DeferredCommand, main
 
 
-class How(Enum):
-    RUN = auto()
-    """As it stands, in process."""
-    CHECKED = auto()
-    """As it stands, up to what it would start: the function in `STARTS`."""
-    SLOW = auto()
-    """As it stands, in the slow tier."""
+class Started(BaseException):
+    """A command would start what takes long."""
 
 
-class Started(Exception):
-    """A command would start something, by the function that is named."""
-
-
-STARTS: Mapping[str, str] = {
-    "run": "handover.scenarios.cli.run.run_task",
-    "sweep": "handover.scenarios.cli.campaign._run",
-    "paper": "handover.scenarios.cli.campaign._run",
-    "play": "handover.scenarios.cli.play._serve",
-    "film": "handover.scenarios.cli.film._film",
-    "vsl-train": "handover.scenarios.cli.robots.vsl_train._train",
-    "serve": "handover.scenarios.study.session.served_study.serve_study",
-}
-CLUSTER = "handover.scenarios.campaign.pool_config.PoolConfig.check"
+CLI, CAMPAIGNS, STUDY = "handover.scenarios.cli.", "handover.scenarios.campaign.", "handover.scenarios.study."
+RUN, SWEEP, PLAY, FILM = CLI + "run.run_task", CLI + "campaign._run", CLI + "play._serve", CLI + "film._film"
+COMPARE = "handover.scenarios.comparison.page.write_comparison"
+CLUSTER = CAMPAIGNS + "pool_config.PoolConfig.check"
 """Looks for a scheduler at an address that is nobody's here; the plan has been checked then."""
-
-
-def call(*arguments: str) -> Result:
-    return CliRunner().invoke(main, arguments)
-
-
-def succeeded(*arguments: str) -> None:
-    done = call(*arguments)
-    assert done.exit_code == 0, (arguments, done.output, done.exception)
-
-
-def run_of(scenario: str, *given: str) -> Callable[[Path], None]:
-    """Return what makes a short run, whose task need not succeed."""
-
-    def make(path: Path) -> None:
-        copied_run(path, "run", scenario, "--stop", "0.1", "--no-report", *given)
-
-    return make
 
 
 def campaign(path: Path) -> None:
@@ -87,69 +54,69 @@ def table(path: Path) -> None:
 
 
 def system(path: Path) -> None:
-    succeeded("export", "flyer_impedance", "--ssp", f"{path}.ssp")
-    Path(f"{path}.ssp").rename(path)
+    masses = System()
+    masses.add("mass", native_fmu("mass"))
+    write_ssp(masses, path, "masses")
 
 
 def study(path: Path) -> None:
-    HANDOVER(write_study(path, 2, same).session(1).run_folder(3))
+    ran(write_study(path, 2, same).session(1).run_folder(3))
 
 
-def interrupted(path: Path) -> None:
-    killed_run(path, 1.0, "run", "flyer_impedance", "--checkpoint", "0.5")
+def described(path: Path) -> None:
+    path.mkdir(parents=True)
+    (path / "run.json").write_text('{"scenario": "flyer_robot_to_human", "parameters": {}}')
+    (path / "signals.parquet").touch()
 
 
-HANDOVER, RIGID, COMPLIANT = (
-    run_of("flyer_robot_to_human"),
-    run_of("flyer_impedance", "-p", "behaviour=rigid"),
-    run_of("flyer_impedance", "-p", "behaviour=compliant"),
-)
+def ran(path: Path) -> None:
+    copied_run(path, "run", "flyer_impedance", "--stop", "0.1", "--no-report")
+
+
 Needs = Mapping[str, Callable[[Path], None]]
-RUN, CHECKED, SLOW = How.RUN, How.CHECKED, How.SLOW
-
-EXAMPLES: Mapping[str, tuple[How, Needs]] = {
-    "handover list": (RUN, {}),
-    "handover list helix_handover": (RUN, {}),
-    "handover list VslArm": (RUN, {}),
-    "handover run helix_handover": (CHECKED, {}),
-    "handover run x.ssp --stop 5": (CHECKED, {"x.ssp": system}),
-    "handover run x.fmu --input u.csv --stop 5": (CHECKED, {"x.fmu": fmu, "u.csv": table}),
-    "handover play flyer_impedance": (CHECKED, {}),
-    "handover resume runs/long": (SLOW, {"runs/long": interrupted}),
-    "handover sweep ir_grasp strategy=reflex,blind --repeat 20": (CHECKED, {}),
-    "handover compare ours theirs": (RUN, {"ours": campaign, "theirs": campaign}),
-    "handover paper ir-table": (CHECKED, {}),
-    "handover report runs/long": (RUN, {"runs/long": HANDOVER}),
-    "handover film runs/long --out x.mp4": (CHECKED, {"runs/long": HANDOVER}),
-    "handover vsl-train --out model.json": (CHECKED, {}),
-    "handover flyer-track runs/x": (RUN, {"runs/x": HANDOVER}),
-    "handover study new plan.toml": (RUN, {}),
-    "handover new scenario Reach": (RUN, {}),
-    "handover run reach:Reach": (CHECKED, {}),
-    "handover build TendonArm --fmi both": (RUN, {}),
-    "handover export ir_grasp --ssp grasp.ssp": (RUN, {}),
-    "handover info Their.fmu": (RUN, {"Their.fmu": fmu}),
-    "handover check Their.fmu": (RUN, {"Their.fmu": fmu}),
-    "handover sweep ir_grasp thing=cylinder,baby_cup_a -p strategy=reflex --repeat 6 --out ours": (CHECKED, {}),
-    "handover sweep ir_grasp thing=cylinder,baby_cup_a -p strategy=blind --repeat 6 --out theirs": (CHECKED, {}),
-    "handover run flyer_impedance -p behaviour=rigid --out a": (CHECKED, {}),
-    "handover run flyer_impedance -p behaviour=compliant --out b": (CHECKED, {}),
-    "handover compare a b --name rigid --name compliant --signal robot.p_WB": (RUN, {"a": RIGID, "b": COMPLIANT}),
-    "handover new controller Gentle": (RUN, {}),
-    "handover run reach:Reach --unit controller=gentle:Gentle": (CHECKED, {}),
-    "handover new controller Mine --for helix_handover:servo": (RUN, {}),
-    "handover sweep ir_grasp strategy=reflex,blind,forward --repeat 20 --paired": (CHECKED, {}),
-    "handover sweep helix_handover alpha=0.1:0.4:4 -p patience=30 --out alphas": (CHECKED, {}),
-    "handover sweep flyer_impedance force=1:20:10 --scheduler tcp://10.0.0.5:8786": (CHECKED, {}),
-    "handover sweep x.fmu m=1,2,4 k=0:20:5 -p f=1 --stop 10": (CHECKED, {"x.fmu": mass}),
-    "handover study plan plan.toml": (RUN, {}),
-    "handover study serve plan.toml --out DIR": (CHECKED, {}),
-    "handover study power plan.toml": (SLOW, {}),
-    "handover study report DIR": (RUN, {"DIR": study}),
-    "handover study replay DIR P01 3": (RUN, {"DIR": study}),
-    "handover study export DIR": (RUN, {"DIR": study}),
-    "handover study withdraw DIR P01": (RUN, {"DIR": study}),
-}
+EXAMPLES: Mapping[str, tuple[str, Needs]] = {
+    "handover list": ("", {}),
+    "handover list helix_handover": ("", {}),
+    "handover list VslArm": ("", {}),
+    "handover run helix_handover": (RUN, {}),
+    "handover run x.ssp --stop 5": (RUN, {"x.ssp": system}),
+    "handover run x.fmu --input u.csv --stop 5": (RUN, {"x.fmu": fmu, "u.csv": table}),
+    "handover play flyer_impedance": (PLAY, {}),
+    "handover resume runs/long": (CLI + "resume.InterruptedRun", {"runs/long": described}),
+    "handover sweep ir_grasp strategy=reflex,blind --repeat 20": (SWEEP, {}),
+    "handover compare ours theirs": (COMPARE, {"ours": campaign, "theirs": campaign}),
+    "handover paper ir-table": (SWEEP, {}),
+    "handover report runs/long": (CLI + "report._write_of_run", {"runs/long": described}),
+    "handover film runs/long --out x.mp4": (FILM, {"runs/long": described}),
+    "handover vsl-train --out model.json": (CLI + "robots.vsl_train._train", {}),
+    "handover flyer-track runs/x": (CLI + "robots.flyer_track._write", {"runs/x": described}),
+    "handover study new plan.toml": ("", {}),
+    "handover new scenario Reach": ("", {}),
+    "handover run reach:Reach": (RUN, {}),
+    "handover build TendonArm --fmi both": ("", {}),
+    "handover export ir_grasp --ssp grasp.ssp": ("", {}),
+    "handover info Their.fmu": ("", {"Their.fmu": fmu}),
+    "handover check Their.fmu": ("", {"Their.fmu": mass}),
+    "handover sweep ir_grasp thing=cylinder,baby_cup_a -p strategy=reflex --repeat 6 --out ours": (SWEEP, {}),
+    "handover sweep ir_grasp thing=cylinder,baby_cup_a -p strategy=blind --repeat 6 --out theirs": (SWEEP, {}),
+    "handover run flyer_impedance -p behaviour=rigid --out a": (RUN, {}),
+    "handover run flyer_impedance -p behaviour=compliant --out b": (RUN, {}),
+    "handover compare a b --name rigid --name compliant --signal robot.p_WB": (COMPARE, {"a": ran, "b": ran}),
+    "handover new controller Gentle": ("", {}),
+    "handover run reach:Reach --unit controller=gentle:Gentle": (RUN, {}),
+    "handover new controller Mine --for helix_handover:servo": ("", {}),
+    "handover sweep ir_grasp strategy=reflex,blind,forward --repeat 20 --paired": (SWEEP, {}),
+    "handover sweep helix_handover alpha=0.1:0.4:4 -p patience=30 --out alphas": (SWEEP, {}),
+    "handover sweep flyer_impedance force=1:20:10 --scheduler tcp://10.0.0.5:8786": (CLUSTER, {}),
+    "handover sweep x.fmu m=1,2,4 k=0:20:5 -p f=1 --stop 10": (SWEEP, {"x.fmu": mass}),
+    "handover study plan plan.toml": ("", {}),
+    "handover study serve plan.toml --out DIR": (STUDY + "session.served_study.serve_study", {}),
+    "handover study power plan.toml": (STUDY + "statistics.power.simulated_power", {}),
+    "handover study report DIR": (STUDY + "report.report_page.write_study_report", {"DIR": study}),
+    "handover study replay DIR P01 3": ("handover.scenarios.reporting.run_page.write_run_page", {"DIR": study}),
+    "handover study export DIR": ("", {"DIR": study}),
+    "handover study withdraw DIR P01": ("", {"DIR": study}),
+}  # fmt: skip
 
 
 def all_commands() -> Generator[tuple[str, click.Command], None, None]:
@@ -178,21 +145,6 @@ def test_every_example_of_a_help_is_in_the_table():
     assert {*OWNERS} == {*EXAMPLES}
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Callable[[Path], None]], Path]:
-    """Return what gives the file or folder that a function makes, which is made once."""
-    folder = tmp_path_factory.mktemp("made")
-    known: dict[Callable[[Path], None], Path] = {}
-
-    def get(make: Callable[[Path], None]) -> Path:
-        if make not in known:
-            known[make] = folder / str(len(known))
-            make(known[make])
-        return known[make]
-
-    return get
-
-
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Generator[Path, None, None]:
     """Give the working directory; modules in it are forgotten afterwards."""
@@ -204,67 +156,38 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Generator[Path, Non
             del sys.modules[name]
 
 
-def put(here: Path, needs: Needs, made: Callable[[Callable[[Path], None]], Path]) -> None:
-    for name, make in needs.items():
-        (here / name).parent.mkdir(exist_ok=True)
-        if not (here / name).exists():
-            source = made(make)
-            (shutil.copytree if source.is_dir() else shutil.copyfile)(source, here / name)
+def start(*_given: Any, **_more: Any) -> NoReturn:
+    raise Started
 
 
 @pytest.mark.usefixtures("empty_figures")
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=() if n else pytest.mark.slow) for n in dict.fromkeys(OWNERS.values())]
-)
-def test_the_examples_of_a_help_run(
-    name: str, here: Path, made: Callable[[Callable[[Path], None]], Path], monkeypatch: pytest.MonkeyPatch
-):
+@pytest.mark.parametrize("name", dict.fromkeys(OWNERS.values()))
+def test_the_examples_of_a_help_run(name: str, here: Path, monkeypatch: pytest.MonkeyPatch):
     for example in (e for e in HELPS[name] if OWNERS[e] == name):
-        how, needs = EXAMPLES[example]
-        arguments = shlex.split(example)[1:]
-        if how is How.SLOW:
-            continue
-        put(here, needs, made)
-        if how is How.RUN:
-            succeeded(*arguments)
-            continue
-        command = next(word for word in arguments if word in STARTS)
-        function = CLUSTER if "--scheduler" in arguments else STARTS[command]
+        starts, needs = EXAMPLES[example]
+        for need, make in needs.items():
+            if not (here / need).exists():
+                make(here / need)
+        before = files_in(here)
         with monkeypatch.context() as patched:
-            patched.setattr(function, starter_of(function))
-            before = files_in(here)
-            done = call(*arguments)
-        assert isinstance(done.exception, Started), (example, done.output, done.exception)
-        assert files_in(here) == before
+            if starts:
+                patched.setattr(starts, start)
+            try:
+                done = call(*shlex.split(example)[1:])
+            except Started:
+                assert files_in(here) == before
+            else:
+                assert (done.exit_code, starts) == (0, ""), (example, done.output, done.exception)
 
 
 def files_in(folder: Path) -> set[Path]:
     return {path for path in folder.rglob("*") if "__pycache__" not in path.parts}
 
 
-def starter_of(function: str) -> Callable[..., NoReturn]:
-    def start(*_given: Any, **_more: Any) -> NoReturn:
-        raise Started(function)
-
-    return start
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("example", [e for e, (how, _) in EXAMPLES.items() if how is How.SLOW])
-def test_examples_that_take_long_run(example: str, here: Path, made: Callable[[Callable[[Path], None]], Path]):
-    succeeded("study", "new", "plan.toml")
-    put(here, EXAMPLES[example][1], made)
-    succeeded(*shlex.split(example)[1:])
-
-
-def texts_of(command: click.Command) -> Sequence[str]:
-    """Return what a command's help says, that of its options included."""
-    return [command.help or "", *(p.help or "" for p in command.params if isinstance(p, click.Option))]
-
-
 @pytest.mark.parametrize("name", COMMANDS)
 def test_commands_that_a_help_names_have_the_options_that_it_gives_them(name: str):
-    for text in texts_of(COMMANDS[name]):
+    command = COMMANDS[name]
+    for text in [command.help or "", *(p.help or "" for p in command.params if isinstance(p, click.Option))]:
         for quoted in re.findall(r"`handover ([^`]*)`", " ".join(text.split())):
             words = quoted.split()
             known = [n for n in COMMANDS if n and words[: len(n.split())] == n.split()]

@@ -21,9 +21,7 @@ CALLS = (
     (["list", "ir_grasp"], HEAVY | OTHER_ROBOTS),
     (["list"], HEAVY),
     (["list", "helix_handover"], HEAVY),
-    (["list", "flyer_impedance"], HEAVY),
     (["list", "TendonArm"], HEAVY),
-    (["list", "PoseController"], HEAVY),
     (["list", "StereoCamera"], HEAVY - {"cv2"}),  # which draws its pictures by it
 )
 """Calls, one after another in a process, and what is not loaded then."""
@@ -58,30 +56,20 @@ def test_help_and_lists_load_no_physics_plots_or_records():
 @pytest.mark.parametrize("name", [c.name for c in COMMANDS])
 def test_a_command_is_in_the_help_as_it_says_itself(name: str):
     context = click.Context(main)
-    deferred = main.get_command(context, name)
-    loaded = main.resolve_command(context, [name])[1]
-    assert deferred is not None
-    assert loaded is not None
-    assert loaded is not deferred
+    deferred, loaded = main.get_command(context, name), main.resolve_command(context, [name])[1]
+    assert deferred is not loaded is not None is not deferred
     assert loaded.name == name
-    for width in range(20, 120):
+    for width in (20, 50, 120):
         assert deferred.get_short_help_str(width) == loaded.get_short_help_str(width)
 
 
-def test_scenarios_have_the_names_and_titles_by_which_they_are_listed():
+def test_scenarios_and_units_have_the_names_and_titles_by_which_they_are_listed():
     listed = {name: entry.title for system in SYSTEMS for name, entry in system.scenarios.items()}
     assert listed == {experiment.name: experiment.title for experiment in SCENARIOS.values()}
     assert [*SCENARIOS] == [*listed]
-    assert "nothing" not in SCENARIOS
-
-
-ALTERNATIVES = {"AdmittanceController", "TendonArmFast"}  # for --unit
-
-
-def test_the_units_of_a_robot_are_those_of_its_scenarios():
     for system in SYSTEMS:
         used = {unit for name in system.scenarios for unit in SCENARIOS[name].units.values()}
-        assert set(system.units) - ALTERNATIVES == used
+        assert set(system.units) - {"AdmittanceController", "TendonArmFast"} == used  # which are for --unit
 
 
 def test_ctrl_c_while_a_command_loads_aborts_it(

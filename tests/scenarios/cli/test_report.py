@@ -7,13 +7,13 @@ import re
 import shutil
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import pytest
-from click.testing import CliRunner
+from support.campaigns import campaign_metadata, carried_out, folder_of, short_plan, table_of
+from support.commands import call
 from support.kept_runs import copied_run, kept_run
 from support.wording import Wording
-
-from handover.scenarios.cli.command import main
 
 FILES = {"figures", "report.html", "run.json", "signals.parquet", "summary.json"}
 
@@ -26,11 +26,14 @@ def copy(tmp_path: Path) -> Path:
 
 def report(*arguments: object) -> tuple[int, str]:
     """Return status and output, without what the command says it is doing."""
-    done = CliRunner().invoke(main, ["report", *map(str, arguments)])
+    done = call("report", *arguments)
     assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
-    return done.exit_code, "".join(
-        t for t in done.output.splitlines(keepends=True) if not t.startswith(("drawing ", "writing "))
-    )
+    return done.exit_code, re.sub("^(drawing|writing) .*\n", "", done.output, flags=re.MULTILINE)
+
+
+def page_of(folder: Path) -> str:
+    assert report(folder) == (0, f"report: {folder / 'report.html'}\n")
+    return (folder / "report.html").read_text(encoding="utf-8")
 
 
 def change(file: Path, **changes: Any) -> None:
@@ -59,34 +62,22 @@ def test_the_page_goes_where_it_is_asked_for(copy: Path, tmp_path: Path):
     assert all((tmp_path / link).exists() for link in linked), linked
     assert "<code>handover run --config run.json</code>" in page
     assert not (copy / "report.html").exists()
-    assert report(copy, "--out", tmp_path) == (2, f"Error: {tmp_path} is a folder; name a file for the page\n")
 
 
-def test_a_run_of_which_an_older_version_said_less_has_a_page(copy: Path):
+def test_a_run_of_another_version_has_a_page_and_says_what_is_left_out(copy: Path):
     unknown = dict.fromkeys(("title", "headline", "told_parameters", "system", "versions", "units"), ...)
-    change(copy / "run.json", **unknown)
+    change(copy / "run.json", **unknown, parameters={"colour": "red"})
     change(copy / "summary.json", units=..., wall_seconds=...)
-    assert report(copy)[0] == 0
-    page = (copy / "report.html").read_text()
-    assert 'id="signals"' in page
-    assert 'id="parameters"' in page
-
-
-def test_a_run_of_another_version_of_its_scenario_says_what_is_left_out(copy: Path):
-    change(copy / "run.json", parameters={"colour": "red"})
-    assert report(copy)[0] == 0
-    page = (copy / "report.html").read_text()
+    page = page_of(copy)
     assert "ir_grasp has no parameter &#39;colour&#39;" in page
-    assert 'id="replay"' not in page
+    assert [f'id="{part}"' in page for part in ("signals", "parameters", "replay")] == [True, True, False]
     status, value = report(copy, "--figures")
-    assert status == 2
-    assert "another version of ir_grasp" in value
+    assert (status, "another version of ir_grasp" in value) == (2, True)
 
 
 def test_a_run_that_was_killed_with_all_that_watched_it_has_a_page(copy: Path):
     (copy / "summary.json").unlink()
-    assert report(copy)[0] == 0
-    lead = (copy / "report.html").read_text().partition("<main>")[0]
+    lead = page_of(copy).partition("<main>")[0]
     assert "<b>Not ended</b>: it has no summary" in lead
     assert "ir_grasp: not ended</h1>" in lead
     assert not (copy / "summary.json").exists()
@@ -95,57 +86,61 @@ def test_a_run_that_was_killed_with_all_that_watched_it_has_a_page(copy: Path):
 @pytest.mark.parametrize(
     ("file", "content"),
     [
-        ("run.json", None),
         ("run.json", "{"),
         ("run.json", '{"scenario": 3}'),
         ("summary.json", '{"metrics": 3}'),
         ("signals.parquet", "PAR1"),
     ],
-    ids=["missing", "syntax", "type", "summary", "signals"],
+    ids=["syntax", "type", "summary", "signals"],
 )
-def test_what_is_damaged_is_reported_in_a_line(copy: Path, file: str, content: str | None, wording: Wording):
-    if content is None:
-        (copy / file).unlink()
-    else:
-        (copy / file).write_text(content)
+def test_what_is_damaged_is_reported_in_a_line(copy: Path, file: str, content: str, wording: Wording):
+    (copy / file).write_text(content)
     status, printed = report(copy)
     assert (status, printed.count("\n")) == (2, 1)
     wording.check(printed)
     assert not (copy / "report.html").exists()
 
 
-def test_no_folder_and_a_full_disk(copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    status, value = report(tmp_path / "nothing")
-    assert (status, value) == (2, f"Error: {tmp_path / 'nothing'} is no folder; name that of a run or of a campaign\n")
+def test_what_cannot_be_written_is_reported(copy: Path, monkeypatch: pytest.MonkeyPatch):
+    def refusing(number: int) -> Any:
+        def refuse(*given: Any, **_options: Any) -> None:
+            raise OSError(number, os.strerror(number), str(given[0]))
 
-    def refuse(source: Any, target: Any) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(source), str(target))
+        return refuse
 
-    monkeypatch.setattr(os, "replace", refuse)
-    assert report(copy) == (3, f"Error: {copy / 'report.html'} cannot be written: No space left on device\n")
+    text = f"Error: {copy / 'report.html'} cannot be written: "
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "replace", refusing(errno.ENOSPC))
+        assert report(copy) == (3, f"{text}No space left on device\n")
     assert {p.name for p in copy.iterdir()} == FILES - {"report.html", "figures"}
-
-
-def test_a_folder_that_may_not_be_written_to(copy: Path, monkeypatch: pytest.MonkeyPatch):
-    def refuse(file: Path, *_arguments: Any, **_options: Any) -> None:
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(file))
-
-    monkeypatch.setattr(Path, "write_text", refuse)
-    monkeypatch.setattr(Path, "mkdir", refuse)
-    assert report(copy) == (3, f"Error: {copy / 'report.html'} cannot be written: Permission denied\n")
+    monkeypatch.setattr(Path, "write_text", refusing(errno.EACCES))
+    monkeypatch.setattr(Path, "mkdir", refusing(errno.EACCES))
+    assert report(copy) == (3, f"{text}Permission denied\n")
     status, value = report(copy, "--figures")
     assert (status, value.count("\n")) == (3, 1)
     assert "cannot be written: Permission denied" in value
 
 
-@pytest.mark.slow
-def test_a_run_of_an_ssp_has_a_page_and_figures(tmp_path: Path):
-    for call in (
-        ["export", "ir_grasp", "--ssp", str(tmp_path / "x.ssp")],
-        ["run", str(tmp_path / "x.ssp"), "--stop", "0.3", "--no-report", "--out", str(tmp_path / "run")],
-    ):
-        done = CliRunner().invoke(main, call)
-        assert done.exit_code == 0, done.output
-    assert {p.name for p in (tmp_path / "run").iterdir()} == FILES - {"report.html", "figures"}
-    assert report(tmp_path / "run", "--figures") == (0, f"report: {tmp_path / 'run' / 'report.html'}\n")
-    assert {p.suffix for p in (tmp_path / "run" / "figures").iterdir()} == {".png", ".svg"}
+@pytest.mark.usefixtures("empty_figures")
+def test_of_a_campaign_page_and_figures_are_written_where_they_are_asked_for(tmp_path: Path):
+    points = [{"strategy": "reflex"}, {"strategy": "blind"}]
+    campaign = folder_of(tmp_path / "c", campaign_metadata("ir_grasp", points), table_of(points))
+    before, page = sorted(os.listdir(campaign.path)), tmp_path / "page.html"
+    assert report(campaign.path, "--out", page) == (0, f"report: {page}\n")
+    assert sorted(os.listdir(campaign.path)) == before
+    assert report(campaign.path, "--figures")[0] == 0
+    assert {p.name for p in campaign.figures.iterdir()} == {"success_by_point.png", "success_by_point.svg"}
+
+
+def test_pages_of_a_campaigns_runs_are_written_and_linked_if_they_are_asked_for(tmp_path: Path):
+    done, lost = (run.name for run in short_plan().runs())
+    campaign = carried_out(short_plan(), tmp_path / "c", lost=[lost])
+    assert "handover report c --runs" in page_of(campaign.path)
+    assert report(campaign.path, "--runs") == (0, f"report: {campaign.report}\n")
+    run = campaign.runs / done
+    assert "mass" in (run / "report.html").read_text(encoding="utf-8")
+    page = campaign.report.read_text(encoding="utf-8")
+    assert f"<a href='runs/{quote(run.name)}/report.html'>" in page
+    assert quote(lost) not in page
+    status, told = report(run, "--runs")
+    assert (status, "--runs is for that of a campaign" in told) == (2, True)

@@ -7,33 +7,25 @@ from pathlib import Path
 
 import psutil
 import pytest
-from support.sweep_process import SweepProcess, ended, runs_in, sweeping, wait_for
+from support.cosim.native_units import native_fmu
+from support.sweep_process import ended, runs_in, sweeping, wait_for
 
 from handover.scenarios.campaign.table import CampaignTable
 from handover.scenarios.cli.campaign import CampaignInterruption
 
 pytestmark = pytest.mark.slow
 
-CALL = ["ir_grasp", "--repeat", "200", "-p", "strategy=forward", "--workers", "2", "--no-report"]
-
-
-def family_of(going: SweepProcess) -> list[psutil.Process]:
-    return psutil.Process(going.pid).children(recursive=True)
-
-
-def wait_for_end_of(processes: list[psutil.Process]) -> None:
-    _, alive = psutil.wait_procs(processes, timeout=60)
-    assert alive == []
+CALL = [str(native_fmu("mass")), "--repeat", "200", "--pace", "5", "--workers", "1", "--no-report"]
 
 
 def test_a_sigterm_ends_it_in_order(tmp_path: Path):
     out = tmp_path / "c"
     with sweeping(*CALL, "--out", out) as going:
         wait_for(lambda: len(runs_in(out)) >= 3, going)
-        family = family_of(going)
+        family = psutil.Process(going.pid).children(recursive=True)
         going.send_signal(signal.SIGTERM)
         status, value, errors = ended(going)
-        wait_for_end_of(family)
+        assert psutil.wait_procs(family, timeout=60)[1] == []
     done = len(runs_in(out))
     assert (status, value) == (1, "")
     assert errors.splitlines()[-1] == f"{done} of 200 runs done in {out}; run the same command again to resume"
@@ -46,7 +38,7 @@ def test_ctrl_c_before_the_first_run_leaves_nothing(tmp_path: Path, monkeypatch:
     """As units are built, which takes long enough to be met."""
     cache, out = tmp_path / "cache", tmp_path / "c"
     monkeypatch.setenv("HANDOVER_CACHE", str(cache))
-    with sweeping(*CALL, "--out", out) as going:
+    with sweeping("ir_grasp", *CALL[1:], "--out", out) as going:
         wait_for(cache.exists, going)
         going.send_signal(signal.SIGINT)
         status, value, errors = ended(going)
@@ -61,7 +53,7 @@ def test_ctrl_c_as_workers_start_leaves_nothing_of_a_campaign_that_begins(tmp_pa
         going.send_signal(signal.SIGINT)
         status, value, errors = ended(going)
     assert (status, value) == (130, "")
-    assert errors == f"200 runs of ir_grasp on 2 workers into {out}\nAborted!\n"
+    assert errors == f"200 runs of {CALL[0]} on 1 worker into {out}\nAborted!\n"
     assert not out.exists()
 
 

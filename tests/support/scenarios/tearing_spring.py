@@ -1,12 +1,10 @@
 """A spring that can tear, to test how a run ends when a unit fails."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
-from typing import ClassVar
 
 from handover.cosim.blocks.ports import output, parameter
 from handover.cosim.blocks.units import Metre, Second
+from support.cosim.master_blocks import Stateless
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,11 +22,8 @@ class Outputs:
     x: Metre = output("stretch")
 
 
-class TearingSpring:
+class TearingSpring(Stateless):
     """Stretches by x = t^2 until it tears."""
-
-    feedthrough: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-    period: ClassVar[Fraction | None] = None
 
     def __init__(self, params: Params) -> None:
         self.tears = params.tears
@@ -40,8 +35,3 @@ class TearingSpring:
         if t > self.tears:
             raise RuntimeError("the spring tore")
         return self.outputs(t + dt, u)
-
-    def get_state(self) -> bytes:
-        return b""
-
-    def set_state(self, state: bytes) -> None: ...

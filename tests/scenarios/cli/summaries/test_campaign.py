@@ -1,13 +1,14 @@
 """The summary that is printed at the end of a campaign: at most a screen."""
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 
 from handover.scenarios.campaign.folder import CampaignFolder
-from handover.scenarios.campaign.plan import CampaignPlan
+from handover.scenarios.campaign.plan import CampaignPlan, PlannedRun
 from handover.scenarios.campaign.results import CampaignResults
 from handover.scenarios.campaign.table import CampaignTable, RunRow
 from handover.scenarios.campaign.table_writer import table_of
@@ -23,18 +24,14 @@ def printed(plan: CampaignPlan, rows: list[RunRow], capsys: pytest.CaptureFixtur
     return capsys.readouterr().out
 
 
+def done(run: PlannedRun, *, success: bool = True, metrics: Mapping[str, Metric] = {}) -> RunRow:
+    return RunRow(run=run, status="done", success=success, reason="closed", metrics=metrics)
+
+
 def test_each_point_has_its_rate_with_an_interval_and_its_medians(capsys: pytest.CaptureFixture[str]):
     plan = CampaignPlan(scenario="ir_grasp", points=[{"forward": "0.03"}], repetitions=10)
-    rows = [
-        RunRow(
-            run=run,
-            status="done",
-            success=run.repetition < 9,
-            reason="closed",
-            metrics={"final_distance_thumb": Metric(0.001 * run.repetition, "m")},
-        )
-        for run in plan.runs()
-    ]
+    metrics = [{"final_distance_thumb": Metric(0.001 * k, "m")} for k in range(10)]
+    rows = [done(run, success=run.repetition < 9, metrics=metrics[run.repetition]) for run in plan.runs()]
     output = printed(plan, rows, capsys)
     (row,) = [line.split() for line in output.splitlines() if " of 10 " in line and "runs" not in line]
     # Clopper and Pearson of 9 of 10, as in tables: 0.555 to 0.997
@@ -45,17 +42,15 @@ def test_long_names_are_broken_between_their_words(capsys: pytest.CaptureFixture
     monkeypatch.setattr("handover.scenarios.cli.summaries.campaign.open_console", lambda: Console(width=80))
     plan = CampaignPlan(scenario="ir_grasp", points=[{"approach_disturbance_scale": "0.03"}])
     metrics = {"final_distance_thumb": Metric(0.001, "m"), "true_distance_thumb": Metric(0.002, "m")}
-    rows = [RunRow(run=run, status="done", success=True, reason="closed", metrics=metrics) for run in plan.runs()]
+    rows = [done(run, metrics=metrics) for run in plan.runs()]
     words = printed(plan, rows, capsys).split()
     assert {"approach_", "disturbance_", "scale", "final_distance_", "thumb"} <= {*words}
 
 
 def test_of_many_points_and_reasons_the_first_are_reported(capsys: pytest.CaptureFixture[str]):
     plan = CampaignPlan(scenario="ir_grasp", points=[{"forward": f"0.{n}"} for n in range(100, 200)])
-    rows = [
-        RunRow(run=run, status="failed", success=None, reason=f"the hand broke {run.point % 10} times")
-        for run in plan.runs()
-    ]
+    broke = "the hand broke {} times"
+    rows = [RunRow(run=run, status="failed", success=None, reason=broke.format(run.point % 10)) for run in plan.runs()]
     output = printed(plan, rows, capsys)
     assert "and 88 points more" in output
     assert "10 failed: the hand broke 3 times" in output
@@ -75,5 +70,4 @@ def test_a_page_that_is_older_than_the_table_is_not_reported(tmp_path: Path, cap
 
 def test_a_campaign_that_varies_nothing_has_one_row(capsys: pytest.CaptureFixture[str]):
     plan = CampaignPlan(scenario="ir_grasp", points=[{}])
-    rows = [RunRow(run=run, status="done", success=True, reason="closed") for run in plan.runs()]
-    assert "1 of 1" in printed(plan, rows, capsys)
+    assert "1 of 1" in printed(plan, [done(run) for run in plan.runs()], capsys)
